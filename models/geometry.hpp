@@ -1,0 +1,32 @@
+// Vectors and frames that all folders share.
+//
+//   W  world: z up, fixed to the floor             ┌─ S sensor  (measures between flange and handle)
+//   B  base of the arm                       T tool ┤
+//   T  tool: the point of the handle that     ╲    │
+//      is held and rendered                     ╲ ╱
+//   S  force sensor                        B ── arm
+//                                          │
+//                                     W ───┘
+//
+// A vector's suffix names the frame that it is expressed in (force_S); X_WT is the pose of T in W, and poses read left
+// to right: X_WT = X_WB · X_BT.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace proxarm::models {
+
+template <int N>
+using Vec = Eigen::Matrix<double, N, 1>;
+using Vec3 = Vec<3>;
+using Mat3 = Eigen::Matrix3d;
+using Pose = Eigen::Isometry3d;
+
+// Force and torque about the origin of the frame they are expressed in; N and Nm.
+struct Wrench {
+  Vec3 force = Vec3::Zero();
+  Vec3 torque = Vec3::Zero();
+};
+
+}  // namespace proxarm::models
