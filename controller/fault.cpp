@@ -1,0 +1,88 @@
+#include "controller/fault.hpp"
+
+#include <array>
+#include <cstdio>
+
+namespace proxarm::controller {
+namespace {
+
+// One row per fault: what was seen (with one %s for where, %.4g value, %.4g limit used as the row says), what to do.
+struct FaultText {
+  Fault fault;
+  const char* name;
+  const char* cause;
+  const char* unit;  // of value and limit; nullptr: no figures
+  const char* advice;
+};
+
+constexpr const char* stopped = "the arm made a controlled stop and the drives were switched off";
+
+constexpr std::array texts{
+    FaultText{Fault::none, "none", "no fault", nullptr, ""},
+    FaultText{Fault::sensor_lost, "sensor_lost", "no complete sample of the force sensor in time", "cycles",
+              "check the sensor's cable, power and base_id; `proxarm plan` tells whether its bus can carry it"},
+    FaultText{Fault::sensor_status, "sensor_status", "the force sensor's status word reports an error", nullptr,
+              "power-cycle the sensor; look up the status bits in its manual"},
+    FaultText{Fault::sensor_saturated, "sensor_saturated", "a gauge of the force sensor is at its rail", nullptr,
+              "push less, or use a sensor with a larger range"},
+    FaultText{Fault::force_not_finite, "force_not_finite", "the decoded force isn't a finite number", nullptr,
+              "check the sensor's calibration matrix"},
+    FaultText{Fault::force_excessive, "force_excessive", "force beyond limits.max_force_N", "N",
+              "push less, or raise the limit in the cell file"},
+    FaultText{Fault::force_at_start, "force_at_start", "the handle was touched while the sensor was tared", "N",
+              "take the hand off the handle until rendering starts"},
+    FaultText{Fault::drive_silent, "drive_silent", "no feedback from a drive", "cycles",
+              "check the drive's power, cable and node number"},
+    FaultText{Fault::drive_fault, "drive_fault", "a drive reports a fault", nullptr,
+              "read the drive's error code in the record, mend its cause, start again"},
+    FaultText{Fault::drive_disabled, "drive_disabled", "a drive left operation enabled by itself", nullptr,
+              "check the drive's enable input, its supply and STO"},
+    FaultText{Fault::drive_not_enabled, "drive_not_enabled", "a drive didn't reach operation enabled", "s",
+              "check the drive's power stage, STO and enable input"},
+    FaultText{Fault::target_out_of_range, "target_out_of_range", "the motion would leave a joint's range", "rad",
+              "keep away from that end of the range, or move the scene"},
+    FaultText{Fault::target_too_fast, "target_too_fast", "the motion would exceed a joint's speed", "rad/s",
+              "move slower, raise mass or damping, or move the scene away from the singularity"},
+    FaultText{Fault::singular, "singular", "the arm is too close to a singularity to follow", nullptr,
+              "move the scene or the start pose"},
+    FaultText{Fault::leash_exceeded, "leash_exceeded", "the tool doesn't follow the proxy", "m",
+              "look for an obstacle or a jammed joint; limits.leash_m holds the limit"},
+    FaultText{Fault::proxy_not_finite, "proxy_not_finite", "the proxy's step isn't finite", nullptr,
+              "check the scene with `proxarm check`"},
+    FaultText{Fault::bus_off, "bus_off", "the CAN controller went off the bus", nullptr,
+              "check termination, bitrate and cable"},
+    FaultText{Fault::send_failed, "send_failed", "a frame couldn't be sent", nullptr,
+              "check the interface; a queue that stays full means that nobody acknowledges"},
+    FaultText{Fault::receive_overflow, "receive_overflow", "received frames were dropped by the kernel", "frames",
+              "another program floods the bus, or the machine is too slow"},
+    FaultText{Fault::overrun, "overrun", "cycles in a row ended too late", "cycles",
+              "use a longer --timestep, or a faster or less loaded machine"},
+};
+
+const FaultText& text_of(Fault fault) noexcept {
+  for (const FaultText& text : texts) {
+    if (text.fault == fault) return text;
+  }
+  return texts.front();
+}
+
+}  // namespace
+
+const char* fault_name(Fault fault) noexcept { return text_of(fault).name; }
+
+std::string describe(const FaultReport& report, const std::string& where) {
+  const FaultText& text = text_of(report.fault);
+  std::string line = text.name;
+  if (!where.empty()) line += " (" + where + ")";
+  line += ": ";
+  line += text.cause;
+  if (text.unit != nullptr) {
+    std::array<char, 96> figures{};
+    std::snprintf(figures.data(), figures.size(), " (%.4g %s, limit %.4g)", report.value, text.unit, report.limit);
+    line += figures.data();
+  }
+  line += " at cycle " + std::to_string(report.cycle) + "; " + stopped + "; " + text.advice;
+  return line;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,76 @@
+#include "controller/supervisor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+namespace {
+
+using proxarm::controller::Event;
+using proxarm::controller::Fault;
+using proxarm::controller::Phase;
+using proxarm::controller::Supervisor;
+
+constexpr std::array all_events{Event::begin,   Event::enabled,  Event::tared, Event::stop,
+                                Event::at_rest, Event::disabled, Event::fault};
+
+Supervisor in_rendering() {
+  Supervisor supervisor;
+  for (const Event event : {Event::begin, Event::enabled, Event::tared}) supervisor.handle(event);
+  return supervisor;
+}
+
+TEST(Supervisor, WalksTheWholeSession) {
+  Supervisor supervisor = in_rendering();
+  EXPECT_EQ(supervisor.phase(), Phase::rendering);
+  for (const Event event : {Event::stop, Event::at_rest, Event::disabled}) supervisor.handle(event);
+  EXPECT_EQ(supervisor.phase(), Phase::done);
+  EXPECT_FALSE(supervisor.faulted());
+}
+
+// Whatever follows a stop or a fault, rendering is never entered again.
+TEST(Supervisor, NeverRendersAgainOnceItHasStopped) {
+  for (const Event first : {Event::stop, Event::fault}) {
+    for (const Event second : all_events) {
+      for (const Event third : all_events) {
+        for (const Event fourth : all_events) {
+          Supervisor supervisor = in_rendering();
+          for (const Event event : {first, second, third, fourth}) {
+            supervisor.handle(event);
+            EXPECT_NE(supervisor.phase(), Phase::rendering);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Supervisor, NeverRendersWithoutEnablingAndTaring) {
+  Supervisor supervisor;
+  for (const Event event : {Event::tared, Event::enabled, Event::at_rest, Event::disabled}) supervisor.handle(event);
+  EXPECT_EQ(supervisor.phase(), Phase::idle);
+}
+
+TEST(Supervisor, KeepsTheFirstFault) {
+  Supervisor supervisor = in_rendering();
+  supervisor.raise({Fault::sensor_lost, -1, 17, 4.0, 3.0});
+  supervisor.raise({Fault::drive_fault, 2, 18});
+  EXPECT_EQ(supervisor.phase(), Phase::stopping);
+  EXPECT_EQ(supervisor.report().fault, Fault::sensor_lost);
+  EXPECT_EQ(supervisor.report().cycle, 17U);
+}
+
+TEST(Supervisor, AFaultBeforeAnythingMovesDisablesAtOnce) {
+  Supervisor supervisor;
+  supervisor.handle(Event::begin);
+  supervisor.raise({Fault::drive_not_enabled, 3, 100});
+  EXPECT_EQ(supervisor.phase(), Phase::disabling);
+}
+
+TEST(FaultText, EveryFaultHasANameOfItsOwn) {
+  for (int i = 1; i <= static_cast<int>(Fault::overrun); ++i) {
+    EXPECT_STRNE(proxarm::controller::fault_name(static_cast<Fault>(i)), "none") << i;
+  }
+}
+
+}  // namespace
