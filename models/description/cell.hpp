@@ -1,7 +1,7 @@
 // A cell as its file states it: the arm, its tool, the buses, a drive per joint, the sensor, the limits.
 //
-// Plain numbers and strings, in SI units unless the name says otherwise; no behaviour. Loaded by load_cell(), used by the
-// controller, by the field bus and, for the far end of the wire, by the simulated arm.
+// Plain numbers and strings, in SI units unless the name says otherwise; no behaviour. Loaded by load_cell(), used by
+// the controller, by the field bus and, for the far end of the wire, by the simulated arm.
 #pragma once
 
 #include <array>
@@ -13,7 +13,8 @@
 
 namespace proxarm::description {
 
-// A pose as files give it: metres, and roll, pitch, yaw in radians (fixed axes x, y, z: R = Rz(y) Ry(p) Rx(r), as URDF).
+// A pose as files give it: metres, and roll, pitch, yaw in radians (fixed axes x, y, z: R = Rz(y) Ry(p) Rx(r), as
+// URDF).
 struct PoseDescription {
   std::array<double, 3> position_m{};
   std::array<double, 3> rpy_rad{};
@@ -21,13 +22,13 @@ struct PoseDescription {
 
 struct BusDescription {
   std::string name;
-  std::int64_t bitrate = 1'000'000;       // bit/s, arbitration phase
-  std::int64_t data_bitrate = 0;          // bit/s, CAN FD data phase; 0 for a classic bus
+  std::int64_t bitrate = 1'000'000;  // bit/s, arbitration phase
+  std::int64_t data_bitrate = 0;     // bit/s, CAN FD data phase; 0 for a classic bus
 };
 
 // How the drive of a joint behaves that only a simulation must know.
 struct SimulatedDrive {
-  double coulomb_friction_Nm = 0.0;       // at the joint, motor side of the gear
+  double coulomb_friction_Nm = 0.0;  // at the joint, motor side of the gear
   double viscous_friction_Nms_per_rad = 0.0;
   double gear_damping_Nms_per_rad = 0.0;  // of the gear's elasticity
   double backlash_rad = 0.0;              // total play at the joint
@@ -40,60 +41,60 @@ struct SimulatedDrive {
 };
 
 struct DriveDescription {
-  std::string joint;                      // name in the URDF
+  std::string joint;  // name in the URDF
   std::string bus;
-  std::uint8_t node = 0;                  // 1..127
+  std::uint8_t node = 0;  // 1..127
   std::string profile = "cia402";
   std::string mode = "csp";
-  std::uint32_t device_type = 0x00020192; // expected in 1000h: CiA 402 servo drive
+  std::uint32_t device_type = 0x00020192;  // expected in 1000h: CiA 402 servo drive
   double counts_per_motor_revolution = 1048576.0;
-  double gear_ratio = 100.0;              // motor revolutions per joint revolution
-  int direction = 1;                      // +1 or −1: sign of counts against the URDF's joint
-  std::int32_t offset_counts = 0;         // counts at joint angle zero
+  double gear_ratio = 100.0;       // motor revolutions per joint revolution
+  int direction = 1;               // +1 or −1: sign of counts against the URDF's joint
+  std::int32_t offset_counts = 0;  // counts at joint angle zero
   std::array<double, 2> range_rad{};
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
-  double rotor_inertia_kg_m2 = 0.0;       // reflected to the joint
-  double gear_stiffness_Nm_per_rad = 0.0; // 0: taken as rigid; used to compensate gravity's deflection
+  double rotor_inertia_kg_m2 = 0.0;        // reflected to the joint
+  double gear_stiffness_Nm_per_rad = 0.0;  // 0: taken as rigid; used to compensate gravity's deflection
   SimulatedDrive simulation;
 
   [[nodiscard]] double counts_per_rad() const noexcept;  // signed by `direction`
 };
 
 struct ToolDescription {
-  double mass_kg = 0.0;                   // all that hangs after the sensor: handle and what is fixed to it
+  double mass_kg = 0.0;  // all that hangs after the sensor: handle and what is fixed to it
   std::array<double, 3> centre_of_mass_S_m{};
   std::array<double, 6> inertia_kg_m2{};  // ixx iyy izz ixy ixz iyz about the centre of mass, axes of S
   PoseDescription handle_S;               // X_ST: the rendered point and its axes
 };
 
 struct SensorPlacement {
-  std::string description;                // path of the sensor's file, as written; resolved against the cell's folder
+  std::string description;  // path of the sensor's file, as written; resolved against the cell's folder
   std::string bus;
-  std::uint32_t base_id = 0;              // meaning is the sensor's own
-  std::string link;                       // link of the URDF that carries it (the flange)
-  PoseDescription pose_link;              // X_LS
+  std::uint32_t base_id = 0;  // meaning is the sensor's own
+  std::string link;           // link of the URDF that carries it (the flange)
+  PoseDescription pose_link;  // X_LS
   // Simulated sensor only:
-  double noise_N = 0.0;                   // standard deviation per axis
+  double noise_N = 0.0;  // standard deviation per axis
   double noise_Nm = 0.0;
-  double sample_rate_Hz = 0.0;            // of its converter, not synchronised with anything
-  double bandwidth_Hz = 0.0;              // its own low-pass; 0: none
+  double sample_rate_Hz = 0.0;  // of its converter, not synchronised with anything
+  double bandwidth_Hz = 0.0;    // its own low-pass; 0: none
 };
 
 struct CellLimits {
   double max_tool_speed_m_per_s = 0.5;
   double max_tool_acceleration_m_per_s2 = 20.0;
-  double max_force_N = 200.0;             // above it the sensor's reading is taken as a fault
+  double max_force_N = 200.0;  // above it the sensor's reading is taken as a fault
   double leash_m = 0.02;
 };
 
 struct Cell {
-  std::filesystem::path file;             // as given, made absolute
+  std::filesystem::path file;  // as given, made absolute
   std::string name;
-  std::filesystem::path urdf;             // resolved
-  PoseDescription base_W;                 // X_WB
+  std::filesystem::path urdf;  // resolved
+  PoseDescription base_W;      // X_WB
   std::array<double, 3> gravity_W_m_per_s2{0.0, 0.0, -9.80665};
-  std::vector<double> start_rad;          // joint angles at the start, in the order of `drives`
+  std::vector<double> start_rad;  // joint angles at the start, in the order of `drives`
   ToolDescription tool;
   std::vector<BusDescription> buses;
   std::vector<DriveDescription> drives;
@@ -101,8 +102,8 @@ struct Cell {
   CellLimits limits;
   double default_period_s = 1e-3;
   double default_mass_kg = 4.0;
-  std::string default_scene;              // path, resolved against the cell's folder
-  std::string default_hand;               // path, resolved against the cell's folder
+  std::string default_scene;  // path, resolved against the cell's folder
+  std::string default_hand;   // path, resolved against the cell's folder
 };
 
 }  // namespace proxarm::description
