@@ -25,16 +25,16 @@ namespace proxarm::models {
 // One thing that pressed on the proxy in the last step.
 template <int N>
 struct Contact {
-  std::int32_t object = 0;   // index in the scene; 0 for a 𝒢 that is a single object
-  std::int32_t feature = 0;  // face, edge or region within the object
-  bool slips = false;        // false: sticks (or is frictionless and at rest makes no difference)
+  std::int32_t object = 0;         // index in the scene; 0 for a 𝒢 that is a single object
+  std::int32_t feature = 0;        // face, edge or region within the object
+  bool slips = false;              // false: sticks (or is frictionless and at rest makes no difference)
   Vec<N> normal = Vec<N>::Zero();  // unit, out of the object
 };
 
 // What a step may know besides K, p and q: only laws that hold a time, and things that move, look at it.
 struct StepTime {
-  double time_s = 0.0;    // time label of the q to come
-  double period_s = 1e-3; // T; at order 2 the effective one, 2T/3
+  double time_s = 0.0;     // time label of the q to come
+  double period_s = 1e-3;  // T; at order 2 the effective one, 2T/3
 };
 
 // A geometric algorithm in n dimensions. Calls neither allocate, lock nor throw. A call may remember where it was

@@ -1,0 +1,69 @@
+// A flat wall with Coulomb friction, equation (4).
+//
+//   𝒢(K, p, q) = p                                                   if nᵀp > 0
+//                q_sf                                                if nᵀp ≤ 0 ∧ ‖p_sf − q_sf‖ ≤ −μ nᵀp
+//                p_sf + μ nᵀp (p_sf − q_sf)/‖p_sf − q_sf‖            if nᵀp ≤ 0 ∧ ‖p_sf − q_sf‖ > −μ nᵀp      (4)
+//
+//   p_sf = p − n nᵀp,   q_sf = q − n nᵀq
+//
+// with p and q taken relative to a point of the surface. ℳ is (17). K does not appear: penetration and friction's reach
+// are both forces over K. A proxy that is on the surface (within rounding) and sticks is returned bit for bit, so that
+// it doesn't creep however long it is held.
+#pragma once
+
+#include <cmath>
+#include <stdexcept>
+
+#include "models/flat_surface.hpp"
+#include "models/geometric_algorithm.hpp"
+
+namespace proxarm::models {
+
+template <int N>
+class FrictionPlane final : public GeometricAlgorithm<N> {
+ public:
+  // Throws std::invalid_argument for a normal without a direction or a friction coefficient that isn't finite and ≥ 0.
+  // μ = 0 gives (2), at the price of (4): Plane is cheaper.
+  FrictionPlane(const Vec<N>& point_m, const Vec<N>& normal, double friction)
+      : surface_(point_m, normal), mu_(friction) {
+    if (!std::isfinite(friction) || !(friction >= 0.0)) {
+      throw std::invalid_argument("a friction coefficient must be finite and not negative");
+    }
+    contact_.normal = surface_.normal();
+  }
+
+  Vec<N> operator()(double /*K*/, const Vec<N>& p, const Vec<N>& q) noexcept override {
+    const double n_p = surface_.height(p);  // nᵀp
+    touches_ = !(n_p > 0.0);
+    contact_.slips = false;
+    if (!touches_) return p;                        // (4), first case
+    if constexpr (N == 1) return surface_.point();  // no tangent to slip along: the surface is a point
+
+    const Vec<N> p_sf = p - surface_.normal() * n_p;
+    const double n_q = surface_.height(q);
+    const bool on_surface = std::abs(n_q) <= surface_.rounding(q);
+    const Vec<N> q_sf = on_surface ? q : Vec<N>(q - surface_.normal() * n_q);
+    const Vec<N> d = p_sf - q_sf;
+    const double distance = d.norm();
+    // "Not greater", so that a distance too small for its square sticks and nothing is divided by zero below.
+    if (!(distance > -mu_ * n_p)) return on_surface ? q : surface_.projection(q_sf);  // (4), second case
+
+    contact_.slips = mu_ > 0.0;
+    return surface_.projection(p_sf + (mu_ * n_p / distance) * d);  // (4), third case; projected against rounding
+  }
+
+  [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override {
+    return {&contact_, touches_ ? std::size_t{1} : std::size_t{0}};
+  }
+
+  [[nodiscard]] const FlatSurface<N>& surface() const noexcept { return surface_; }
+  [[nodiscard]] double friction() const noexcept { return mu_; }
+
+ private:
+  FlatSurface<N> surface_;
+  double mu_;
+  Contact<N> contact_;
+  bool touches_ = false;
+};
+
+}  // namespace proxarm::models

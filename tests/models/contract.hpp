@@ -1,0 +1,119 @@
+// The contract that every 𝒢 and every composition keeps; adding one is one line:
+//
+//   TEST(Contract, FrictionPlane3) { expect_contract<3>(FrictionPlane<3>(point, normal, 0.3), {.friction = {0.3}}); }
+//
+// At random states (K, p, q), with q reached by the 𝒢 itself:
+//   finite        the result has no NaN and no infinity
+//   repeatable    the same arguments give the same result, bit for bit, whatever was asked before
+//   κ-independent Assumption 1, over twelve decades of κ
+//   never inside  the result is where the world lets a proxy rest: 𝒢(K, r, r) = r
+//   never pulls   f lies in the sum of the friction cones of the contacts that are reported
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <functional>
+#include <sstream>
+#include <vector>
+
+#include "models/cone_sum.hpp"
+#include "models/mechanistic_map.hpp"
+#include "tests/models/random_states.hpp"
+
+namespace proxarm::tests {
+
+template <int N>
+struct ContractOptions {
+  std::uint64_t seed = 20070322;
+  double states = 20'000;                          // at scale 1
+  models::Vec<N> centre = models::Vec<N>::Zero();  // states are drawn around here
+  double size_m = 1.0;                             // within this half-width
+  double smallest_depth_m = 1e-9;                  // ‖p − q‖ is drawn log-uniformly between this and size_m
+  double kappa_decades = 6.0;                      // on either side of K
+  double condition = 1.0;                          // multiplies the allowance for rounding
+  double inside_tolerance_m = 1e-12;               // relative to a 1 m scene
+  // μ of each contact by object index; a single entry stands for all. Empty: reported contacts aren't checked.
+  std::vector<double> friction{};
+  bool forces_without_contact = false;  // a field or a layer acts on a proxy that touches nothing
+  // States to leave out, such as those where Coulomb's law has several solutions; they are counted and printed.
+  std::function<bool(double K, const models::Vec<N>& p, const models::Vec<N>& q, const models::Vec<N>& r)> leave_out{};
+};
+
+template <int N>
+std::string state_text(double K, const models::Vec<N>& p, const models::Vec<N>& q, const models::Vec<N>& r) {
+  std::ostringstream text;
+  text.precision(17);
+  text << "K = " << K << ", p = [" << p.transpose() << "], q = [" << q.transpose() << "], r = [" << r.transpose()
+       << "]";
+  return text.str();
+}
+
+template <int N>
+void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>& options = {}) {
+  using models::Vec;
+  Random random(options.seed);
+  std::int64_t left_out = 0, pressed = 0, slipped = 0;
+  const std::int64_t states = scaled(options.states);
+  for (std::int64_t i = 0; i < states; ++i) {
+    const double K = random.log_uniform(1.0, 1e7);
+    const Vec<N> start = options.centre + random.in_box<N>(options.size_m);
+    // A proxy is where the world let it go: half of them have slid there, half were resting where they are.
+    Vec<N> q = g(K, start, options.centre + random.in_box<N>(options.size_m));
+    if (random.chance(0.5)) q = g(K, start, start);
+    const Vec<N> p = q + random.log_uniform(options.smallest_depth_m, options.size_m) * random.direction<N>();
+
+    const Vec<N> r = g(K, p, q);
+    const auto state = [&] { return state_text<N>(K, p, q, r) + ", seed " + std::to_string(options.seed); };
+    ASSERT_TRUE(r.allFinite()) << state();
+    const std::vector<models::Contact<N>> contacts(g.contacts().begin(), g.contacts().end());
+    if (options.leave_out && options.leave_out(K, p, q, r)) {
+      ++left_out;
+      continue;
+    }
+    const Vec<N> f = K * (r - p);  // (1b)
+    pressed += contacts.empty() ? 0 : 1;
+    for (const auto& contact : contacts) slipped += contact.slips ? 1 : 0;
+
+    // The force's own rounding: K times that of r and p.
+    const double force_rounding = 64.0 * std::numeric_limits<double>::epsilon() * options.condition *
+                                  (K * (r.norm() + p.norm() + q.norm()) + f.norm());
+    if (contacts.empty()) {
+      if (!options.forces_without_contact) {
+        ASSERT_LE(f.norm(), force_rounding) << "force without contact; " << state();
+      }
+    } else if (!options.friction.empty()) {
+      std::vector<models::ForceCone> cones;
+      for (const auto& contact : contacts) {
+        ASSERT_NEAR(contact.normal.norm(), 1.0, 1e-14) << state();
+        const auto object = static_cast<std::size_t>(contact.object);
+        const double mu = options.friction.size() == 1 ? options.friction[0] : options.friction.at(object);
+        models::Vec3 axis = models::Vec3::Zero();
+        axis.template head<N>() = contact.normal;
+        cones.push_back({axis, N == 1 ? 0.0 : mu});
+      }
+      models::Vec3 f3 = models::Vec3::Zero();
+      f3.template head<N>() = f;
+      ASSERT_TRUE(models::in_sum_of_cones(f3, cones, force_rounding)) << "force outside the cone; " << state();
+    }
+
+    // Assumption 1.
+    for (int k = 0; k < 4; ++k) {
+      const double kappa = K * std::pow(10.0, random.uniform(-options.kappa_decades, options.kappa_decades));
+      const Vec<N> r_kappa = g(kappa, r - f / kappa, q);
+      ASSERT_LE((r_kappa - r).norm(), options.condition * models::map_9_rounding<N>(r, q, f, K, kappa))
+          << "depends on K: κ = " << kappa << " gives [" << r_kappa.transpose() << "]; " << state();
+    }
+
+    if (!options.forces_without_contact) {
+      const Vec<N> rest = g(K, r, r);
+      ASSERT_LE((rest - r).norm(), options.inside_tolerance_m) << "inside; " << state();
+    }
+    const Vec<N> again = g(K, p, q);
+    ASSERT_TRUE((again.array() == r.array()).all()) << "depends on what was asked before; " << state();
+  }
+  std::cout << "  " << states << " states, seed " << options.seed << ": " << pressed << " in contact, " << slipped
+            << " slipping contacts, " << left_out << " left out\n";
+}
+
+}  // namespace proxarm::tests
