@@ -17,6 +17,7 @@ enum class SendResult : std::uint8_t {
   queue_full,  // ENOBUFS: nothing was queued
   bus_off,     // the controller is off the bus; its queue was purged
   down,        // interface down or removed
+  refused,     // the bus can't carry this frame (CAN FD on a classic bus, a length that isn't one)
 };
 
 enum class BusState : std::uint8_t { error_active, error_warning, error_passive, bus_off, down };

@@ -1,0 +1,144 @@
+// Discrete events at absolute times: what drives the simulated far end of the wire.
+//
+// The same queue serves virtual time (SimulatedCanNetwork runs events until the controller's deadline) and real time (a
+// loop that sleeps until next_time() and then calls run_until() with the clock's reading). Times are int64 nanoseconds
+// of whatever clock the owner uses.
+//
+// Order: by time, and in the order of scheduling among equal times, so a run is a function of its input alone.
+// An event scheduled for the past runs at once, at now_ns(): time never steps back.
+//
+// A callback is any movable callable of at most `callback_bytes` bytes, called as f() or f(time_ns), time_ns being the
+// event's own time. It may schedule and cancel events. It lives in a reused slot: once the number of events pending at
+// the same time has reached its peak (or reserve() named it), nothing allocates. For one thread.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <new>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace proxarm::fieldbus {
+
+class EventQueue {
+ public:
+  static constexpr std::size_t callback_bytes = 48;
+  static constexpr std::int64_t never = std::numeric_limits<std::int64_t>::max();
+
+  // Names a scheduled event; a default one names none. Stays safe to cancel() after its event has run.
+  struct EventId {
+    std::uint32_t slot = 0;
+    std::uint32_t generation = 0;
+  };
+
+  EventQueue() = default;
+  explicit EventQueue(std::int64_t start_ns) : now_ns_(start_ns) {}
+  EventQueue(const EventQueue&) = delete;
+  EventQueue& operator=(const EventQueue&) = delete;
+  ~EventQueue();
+
+  void reserve(std::size_t events);
+
+  template <class F>
+  EventId schedule(std::int64_t time_ns, F&& callback) {
+    using Callable = std::decay_t<F>;
+    static_assert(sizeof(Callable) <= callback_bytes, "capture less: a pointer to the state, not the state");
+    static_assert(alignof(Callable) <= alignof(std::max_align_t));
+    static_assert(std::is_nothrow_move_constructible_v<Callable>);
+    const std::uint32_t slot = take_slot();
+    ::new (static_cast<void*>(slots_[slot].storage)) Callable(std::forward<F>(callback));
+    slots_[slot].operations = &operations_of<Callable>;
+    return push(time_ns, slot);
+  }
+  template <class F>
+  EventId schedule_after(std::int64_t delay_ns, F&& callback) {
+    return schedule(now_ns_ + delay_ns, std::forward<F>(callback));
+  }
+  // True if the event was still pending. Its callback is destroyed at once and never runs.
+  bool cancel(EventId id) noexcept;
+
+  // Runs all events up to and including time_ns in order, those scheduled meanwhile too; leaves now_ns() at time_ns.
+  void run_until(std::int64_t time_ns);
+  // Runs the one next event if its time is at most limit_ns; leaves now_ns() at its time. False if there is none.
+  bool run_next(std::int64_t limit_ns = never);
+  // Lets time pass without running anything: for a real-time loop before it handles input that came at time_ns, with
+  // next_time() > time_ns. Never steps back.
+  void advance_to(std::int64_t time_ns) noexcept { now_ns_ = time_ns > now_ns_ ? time_ns : now_ns_; }
+
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }
+  [[nodiscard]] std::int64_t next_time() const noexcept { return heap_.empty() ? never : heap_.front().time_ns; }
+  [[nodiscard]] std::size_t pending() const noexcept { return heap_.size(); }
+
+ private:
+  struct Operations {
+    void (*run)(void* callable, std::int64_t time_ns);
+    void (*move_to)(void* from, void* to) noexcept;  // destroys `from`
+    void (*destroy)(void* callable) noexcept;
+  };
+  struct Slot {
+    alignas(std::max_align_t) std::byte storage[callback_bytes];
+    const Operations* operations = nullptr;
+    std::uint32_t generation = 1;
+    std::uint32_t heap_index = 0;
+
+    Slot() = default;
+    Slot(Slot&& other) noexcept;
+    Slot& operator=(Slot&&) = delete;
+    ~Slot();
+  };
+  struct Entry {
+    std::int64_t time_ns;
+    std::uint64_t sequence;
+    std::uint32_t slot;
+  };
+
+  template <class Callable>
+  static void run_callable(void* callable, std::int64_t time_ns) {
+    auto& f = *static_cast<Callable*>(callable);
+    if constexpr (std::is_invocable_v<Callable&, std::int64_t>) {
+      f(time_ns);
+    } else {
+      f();
+    }
+  }
+  template <class Callable>
+  static void move_callable(void* from, void* to) noexcept {
+    if constexpr (std::is_trivially_copyable_v<Callable>) {
+      std::memcpy(to, from, sizeof(Callable));
+    } else {
+      auto* source = static_cast<Callable*>(from);
+      ::new (to) Callable(std::move(*source));
+      source->~Callable();
+    }
+  }
+  template <class Callable>
+  static void destroy_callable(void* callable) noexcept {
+    std::destroy_at(static_cast<Callable*>(callable));
+  }
+  template <class Callable>
+  static constexpr Operations operations_of{&run_callable<Callable>, &move_callable<Callable>,
+                                            &destroy_callable<Callable>};
+
+  static bool before(const Entry& a, const Entry& b) noexcept {
+    return a.time_ns != b.time_ns ? a.time_ns < b.time_ns : a.sequence < b.sequence;
+  }
+  std::uint32_t take_slot();
+  EventId push(std::int64_t time_ns, std::uint32_t slot);
+  void release_slot(std::uint32_t slot) noexcept;
+  void place(std::size_t index, const Entry& entry) noexcept;
+  void sift_up(std::size_t index, const Entry& entry) noexcept;
+  void sift_down(std::size_t index, const Entry& entry) noexcept;
+  void remove_at(std::size_t index) noexcept;
+
+  std::int64_t now_ns_ = 0;
+  std::uint64_t next_sequence_ = 0;
+  std::vector<Entry> heap_;
+  std::vector<Slot> slots_;
+  std::vector<std::uint32_t> free_slots_;
+};
+
+}  // namespace proxarm::fieldbus
