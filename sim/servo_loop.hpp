@@ -1,0 +1,84 @@
+// The control loop inside a simulated servo drive: encoder in, motor torque out, setpoints interpolated between SYNCs.
+//
+// Cascade, once per servo period h; e = r − θ, with r the interpolated setpoint and θ the encoder's angle:
+//   v* = K_p e + f_v ṙ
+//   τ  = clamp( K_v (v* − θ̇) + K_i ∫(v* − θ̇) dt + f_a J_r r̈,  ± τ_max ),   K_v = J_r ω_v,  K_i = K_v ω_v/10
+// θ̇ is the difference of encoder counts over one servo period. All at the joint (gear ratio taken off), except counts.
+//
+// Setpoints: a target given at SYNC is reached one interpolation period later, along a straight line from where the
+// setpoint is; for the feed-forward ṙ ramps from the last segment's speed to this one's, so that a change of speed is
+// one period of constant torque rather than a kick. When no target comes, the last speed is kept for a quarter of a
+// period (SYNC may be held back by a frame), then the setpoint decelerates at the drive's limit to rest and stays.
+#pragma once
+
+#include <cstdint>
+
+#include "models/description/cell.hpp"
+
+namespace proxarm::sim {
+
+// One drive's loop. Times are those of the network's clock, in nanoseconds; nothing here allocates or throws.
+class ServoLoop {
+ public:
+  ServoLoop(const description::DriveDescription& drive, std::int64_t servo_period_ns) noexcept;
+
+  // Power and brake. enable() holds the present position, with the torque that the drive held when it was last enabled
+  // (at first: holding_torque_Nm, what gravity needs) so that a load doesn't drop when the brake opens.
+  void reset(double motor_angle_rad, double holding_torque_Nm) noexcept;  // not powered
+  void enable(std::int64_t time_ns) noexcept;
+  void disable() noexcept;
+  [[nodiscard]] bool powered() const noexcept { return powered_; }
+
+  // 60C2h. Takes effect with the next target.
+  void set_interpolation_period_ns(std::int64_t period_ns) noexcept { period_ns_ = period_ns; }
+
+  // At SYNC, with the latched 607Ah. Ignored when not powered. A setpoint faster than the drive's top speed lags behind
+  // its target (limited() says so).
+  void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept;
+  // From now on: to rest with this deceleration (rad/s²), then hold; until the next set_target(). For a SYNC without a
+  // new target, quick stop and halt.
+  void stop(double deceleration_rad_per_s2, std::int64_t time_ns) noexcept;
+  // Cyclic synchronous torque: 6071h as torque at the joint, without position control, until set_target() or stop().
+  void set_torque_Nm(double torque_Nm) noexcept;
+
+  // One servo period: samples the encoder and returns the motor's torque at the joint, Nm, until the next call. Zero
+  // when not powered. Call at time_ns = k · servo period.
+  double update(double motor_angle_rad, std::int64_t time_ns) noexcept;
+
+  // 6064h, 6062h, 60F4h, and more, as of the last update().
+  [[nodiscard]] std::int32_t position_counts() const noexcept { return counts_; }
+  [[nodiscard]] std::int32_t demand_counts() const noexcept { return to_counts(setpoint_rad_); }
+  [[nodiscard]] double following_error_rad() const noexcept { return setpoint_rad_ - angle_rad_; }
+  [[nodiscard]] double speed_rad_per_s() const noexcept { return speed_; }
+  [[nodiscard]] double torque_Nm() const noexcept { return torque_Nm_; }
+  [[nodiscard]] bool limited() const noexcept { return limited_; }               // torque or speed at its limit
+  [[nodiscard]] bool at_rest() const noexcept { return phase_ == Phase::hold; }  // the setpoint
+
+ private:
+  enum class Phase : std::uint8_t { hold, segment, stopping, torque };
+
+  [[nodiscard]] std::int32_t to_counts(double joint_rad) const noexcept;
+  void interpolate(std::int64_t time_ns) noexcept;  // sets setpoint, its speed and acceleration
+
+  // Fixed
+  double counts_per_rad_, offset_counts_, max_torque_Nm_, max_speed_, max_deceleration_;
+  double rotor_inertia_, position_gain_, velocity_gain_, integral_gain_, velocity_feedforward_,
+      acceleration_feedforward_;
+  double servo_period_s_;
+  std::int64_t servo_period_ns_;
+  std::int64_t period_ns_ = 1'000'000;
+
+  // Setpoint
+  Phase phase_ = Phase::hold;
+  std::int64_t segment_start_ns_ = 0, segment_end_ns_ = 0, interpolated_ns_ = 0;
+  double segment_from_rad_ = 0.0, segment_speed_ = 0.0, previous_speed_ = 0.0;
+  double setpoint_rad_ = 0.0, setpoint_speed_ = 0.0, feedforward_speed_ = 0.0, setpoint_acceleration_ = 0.0;
+  double stop_deceleration_ = 0.0, torque_target_Nm_ = 0.0;
+
+  // Loop
+  bool powered_ = false, limited_ = false;
+  std::int32_t counts_ = 0;
+  double angle_rad_ = 0.0, speed_ = 0.0, integral_Nm_ = 0.0, torque_Nm_ = 0.0;
+};
+
+}  // namespace proxarm::sim
