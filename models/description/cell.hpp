@@ -69,7 +69,7 @@ struct ToolDescription {
 };
 
 struct SensorPlacement {
-  std::string description;  // path of the sensor's file, as written; resolved against the cell's folder
+  std::string description;  // path of the sensor's file, absolute (in the cell's file: relative to its folder)
   std::string bus;
   std::uint32_t base_id = 0;  // meaning is the sensor's own
   std::string link;           // link of the URDF that carries it (the flange)
@@ -102,8 +102,12 @@ struct Cell {
   CellLimits limits;
   double default_period_s = 1e-3;
   double default_mass_kg = 4.0;
-  std::string default_scene;  // path, resolved against the cell's folder
-  std::string default_hand;   // path, resolved against the cell's folder
+  std::string default_scene;  // path, absolute (in the cell's file: relative to its folder); may be empty
+  std::string default_hand;   // likewise
 };
+
+// Reads and checks a cell: all that can be checked without its URDF. The file's keys are the names of the fields above,
+// nested as the structs are; fields with a default may be left out. Throws SetupError, with file, line and key.
+Cell load_cell(const std::filesystem::path& file);
 
 }  // namespace proxarm::description

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "models/description/text.hpp"
@@ -61,7 +62,10 @@ std::string in_quotes(std::string_view text, std::size_t max_bytes) {
 
 std::string number_text(double value) {
   std::array<char, 32> buffer;
-  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value);
+  const double size = std::abs(value);
+  const bool fixed = value == 0.0 || (size >= 1e-5 && size < 1e9);  // at most 6 + 17 digits
+  const auto format = fixed ? std::chars_format::fixed : std::chars_format::scientific;
+  const auto result = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, format);
   return {buffer.data(), result.ptr};
 }
 

@@ -1,0 +1,252 @@
+#include "models/description/cell.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <set>
+
+#include "models/description/text.hpp"
+#include "models/description/yaml_file.hpp"
+
+namespace proxarm::description {
+namespace {
+
+constexpr double turn = 2.0 * std::numbers::pi;
+
+PoseDescription read_pose(const YamlNode& node) {
+  return {.position_m = node.vec3_or("position_m", {}, between(-1000.0, 1000.0)),
+          .rpy_rad = node.vec3_or("rpy_rad", {}, between(-turn, turn))};
+}
+
+PoseDescription pose_or_identity(const YamlNode& node, std::string_view key) {
+  const auto pose = node.find_map(key);
+  return pose ? read_pose(*pose) : PoseDescription{};
+}
+
+// Not looked at here: a run may name another scene or hand.
+std::string absolute_path_or_empty(const YamlNode& node, std::string_view key) {
+  return node.has(key) ? node.path_of(key).string() : std::string();
+}
+
+// A name for the command line (--bus NAME=IFACE,…), for files and for messages.
+std::string read_name(const YamlNode& node, std::string_view key) {
+  const std::string name = node.string(key);
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+           c == '.';
+  };
+  if (name.size() > 64 || !std::all_of(name.begin(), name.end(), plain)) {
+    throw node.error_at(key, "a name of letters, digits, _, - and . (at most 64)");
+  }
+  return name;
+}
+
+// A physical inertia: positive semidefinite, and principal moments that satisfy the triangle inequality. Both together
+// say that the pseudo-inertia tr(I)/2·E − I is positive semidefinite, since tr(I)/2 − λ_i = (λ_j + λ_k − λ_i)/2 ≥ 0,
+// and λ_j + λ_k ≥ λ_i for all three makes each λ ≥ 0.
+bool is_physical(const std::array<double, 6>& inertia) {
+  const auto [xx, yy, zz, xy, xz, yz] = inertia;
+  const double half = 0.5 * (xx + yy + zz);
+  const double a = half - xx, b = half - yy, c = half - zz, d = -xy, e = -xz, f = -yz;
+  // Slack for a figure rounded to four digits on the boundary, as the inertia of a flat plate is.
+  const double slack = 1e-4 * half;
+  const double A = a + slack, B = b + slack, C = c + slack;
+  return half >= 0.0 && A >= 0.0 && B >= 0.0 && C >= 0.0 && A * B - d * d >= 0.0 && A * C - e * e >= 0.0 &&
+         B * C - f * f >= 0.0 && A * (B * C - f * f) - d * (d * C - f * e) + e * (d * f - B * e) >= 0.0;
+}
+
+ToolDescription read_tool(const YamlNode& node) {
+  ToolDescription tool;
+  tool.mass_kg = node.number("mass_kg", 0.0, 1000.0);
+  tool.centre_of_mass_S_m = node.vec3("centre_of_mass_S_m", between(-10.0, 10.0));
+  if (node.has("inertia_kg_m2")) {
+    const auto inertia = node.numbers("inertia_kg_m2", 6, 6, between(-1e3, 1e3));
+    std::copy(inertia.begin(), inertia.end(), tool.inertia_kg_m2.begin());
+    if (!is_physical(tool.inertia_kg_m2)) {
+      throw node.error_at("inertia_kg_m2",
+                          "a physical inertia (ixx iyy izz ixy ixz iyz): no principal moment above the sum "
+                          "of the other two");
+    }
+  }
+  tool.handle_S = read_pose(node.map("handle_S"));
+  return tool;
+}
+
+BusDescription read_bus(const YamlNode& node) {
+  constexpr std::int64_t rates[] = {10'000, 20'000, 50'000, 100'000, 125'000, 250'000, 500'000, 800'000, 1'000'000};
+  BusDescription bus;
+  bus.name = read_name(node, "name");
+  bus.bitrate = node.integer_or("bitrate", bus.bitrate, rates[0], 1'000'000);
+  if (std::find(std::begin(rates), std::end(rates), bus.bitrate) == std::end(rates)) {
+    throw node.error_at("bitrate", "10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 or 1000000 bit/s");
+  }
+  bus.data_bitrate = node.integer_or("data_bitrate", 0, 0, 8'000'000);
+  if (bus.data_bitrate != 0 && bus.data_bitrate < bus.bitrate) {
+    throw node.error_at("data_bitrate", "0 (a classic bus), or at least the bitrate, " + std::to_string(bus.bitrate));
+  }
+  return bus;
+}
+
+SimulatedDrive read_simulation(const YamlNode& node) {
+  SimulatedDrive s;
+  s.coulomb_friction_Nm = node.number_or("coulomb_friction_Nm", s.coulomb_friction_Nm, 0.0, 1e5);
+  s.viscous_friction_Nms_per_rad =
+      node.number_or("viscous_friction_Nms_per_rad", s.viscous_friction_Nms_per_rad, 0.0, 1e6);
+  s.gear_damping_Nms_per_rad = node.number_or("gear_damping_Nms_per_rad", s.gear_damping_Nms_per_rad, 0.0, 1e6);
+  s.backlash_rad = node.number_or("backlash_rad", s.backlash_rad, 0.0, 0.1);
+  s.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
+  s.position_gain_per_s = node.number("position_gain_per_s", above(0.0, 1e4));
+  s.velocity_bandwidth_Hz = node.number("velocity_bandwidth_Hz", above(0.0, 5e3));
+  s.velocity_feedforward = node.number_or("velocity_feedforward", s.velocity_feedforward, 0.0, 1.0);
+  s.acceleration_feedforward = node.number_or("acceleration_feedforward", s.acceleration_feedforward, 0.0, 1.0);
+  s.servo_rate_Hz = node.number_or("servo_rate_Hz", s.servo_rate_Hz, 1000.0, 1e5);
+  return s;
+}
+
+// 607A and 6064 are 32-bit: the whole range must fit them.
+void check_counts(const YamlNode& node, const DriveDescription& drive) {
+  for (const double angle : drive.range_rad) {
+    const double counts = drive.offset_counts + drive.counts_per_rad() * angle;
+    if (counts < std::numeric_limits<std::int32_t>::min() || counts > std::numeric_limits<std::int32_t>::max()) {
+      throw node.error_at("range_rad",
+                          "angles whose counts fit 32 bits (offset_counts + angle · gear_ratio · " +
+                              number_text(drive.counts_per_motor_revolution) + " / 2π)",
+                          number_text(angle) + " rad = " + number_text(std::round(counts)) + " counts");
+    }
+  }
+}
+
+DriveDescription read_drive(const YamlNode& node) {
+  DriveDescription d;
+  d.joint = node.string("joint");
+  d.bus = node.string("bus");
+  d.node = static_cast<std::uint8_t>(node.integer("node", 1, 127));
+  d.profile = node.choice_or("profile", d.profile, {"cia402"});
+  d.mode = node.choice_or("mode", d.mode, {"csp"});
+  d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
+  d.counts_per_motor_revolution =
+      node.number_or("counts_per_motor_revolution", d.counts_per_motor_revolution, 1.0, 4294967296.0);
+  d.gear_ratio = node.number_or("gear_ratio", d.gear_ratio, above(0.0, 1e5));
+  d.direction = static_cast<int>(node.integer_or("direction", d.direction, -1, 1));
+  if (d.direction == 0) throw node.error_at("direction", "1 or -1");
+  d.offset_counts = static_cast<std::int32_t>(node.integer_or(
+      "offset_counts", 0, std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()));
+  const auto range = node.numbers("range_rad", 2, 2, between(-1000.0, 1000.0));
+  if (!(range[0] < range[1])) {
+    throw node.error_at("range_rad", "[lowest, highest] angle, in this order",
+                        "[" + number_text(range[0]) + ", " + number_text(range[1]) + "]");
+  }
+  d.range_rad = {range[0], range[1]};
+  check_counts(node, d);
+  d.max_speed_rad_per_s = node.number("max_speed_rad_per_s", above(0.0, 100.0));
+  d.max_acceleration_rad_per_s2 = node.number("max_acceleration_rad_per_s2", above(0.0, 1e4));
+  d.rotor_inertia_kg_m2 = node.number("rotor_inertia_kg_m2", 0.0, 1e5);
+  d.gear_stiffness_Nm_per_rad = node.number_or("gear_stiffness_Nm_per_rad", 0.0, 0.0, 1e9);
+  d.simulation = read_simulation(node.map("simulation"));
+  return d;
+}
+
+SensorPlacement read_sensor(const YamlNode& node) {
+  SensorPlacement s;
+  s.description = node.existing_file("description").string();
+  s.bus = node.string("bus");
+  s.base_id = static_cast<std::uint32_t>(node.integer("base_id", 0, 0x1fffffff));
+  s.link = node.string("link");
+  s.pose_link = pose_or_identity(node, "pose_link");
+  s.noise_N = node.number_or("noise_N", 0.0, 0.0, 1e3);
+  s.noise_Nm = node.number_or("noise_Nm", 0.0, 0.0, 1e3);
+  s.sample_rate_Hz = node.number("sample_rate_Hz", above(0.0, 1e6));
+  s.bandwidth_Hz = node.number_or("bandwidth_Hz", 0.0, 0.0, 1e6);
+  return s;
+}
+
+CellLimits read_limits(const YamlNode& node) {
+  CellLimits limits;
+  limits.max_tool_speed_m_per_s =
+      node.number_or("max_tool_speed_m_per_s", limits.max_tool_speed_m_per_s, above(0.0, 10.0));
+  limits.max_tool_acceleration_m_per_s2 =
+      node.number_or("max_tool_acceleration_m_per_s2", limits.max_tool_acceleration_m_per_s2, above(0.0, 1000.0));
+  limits.max_force_N = node.number_or("max_force_N", limits.max_force_N, above(0.0, 1e5));
+  limits.leash_m = node.number_or("leash_m", limits.leash_m, above(0.0, 1.0));
+  return limits;
+}
+
+void check_bus(const YamlNode& node, const std::string& bus, const std::vector<BusDescription>& buses) {
+  std::vector<std::string> names;
+  for (const BusDescription& b : buses) names.push_back(b.name);
+  if (std::find(names.begin(), names.end(), bus) != names.end()) return;
+  const std::string meant = nearest(bus, names);
+  throw node.error_at("bus", "a bus of this cell: " + one_of(names), {},
+                      meant.empty() ? "" : "did you mean " + in_quotes(meant) + "?");
+}
+
+void read_buses(const YamlNode& root, Cell& cell) {
+  for (const YamlNode& node : root.list("buses", 1, 16)) {
+    const BusDescription bus = read_bus(node);
+    for (const BusDescription& other : cell.buses) {
+      if (other.name == bus.name) throw node.error_at("name", "a name that no other bus of this cell has");
+    }
+    cell.buses.push_back(bus);
+  }
+}
+
+void read_drives(const YamlNode& root, Cell& cell) {
+  for (const YamlNode& node : root.list("drives", 1, 32)) {
+    const DriveDescription drive = read_drive(node);
+    check_bus(node, drive.bus, cell.buses);
+    for (const DriveDescription& other : cell.drives) {
+      if (other.joint == drive.joint) throw node.error_at("joint", "a joint that no other drive of this cell moves");
+      if (other.bus == drive.bus && other.node == drive.node) {
+        throw node.error_at("node", "a node that is free on bus " + drive.bus, {},
+                            "joint " + in_quotes(other.joint) + " has it already");
+      }
+    }
+    cell.drives.push_back(drive);
+  }
+}
+
+void read_start(const YamlNode& root, Cell& cell) {
+  const YamlNode node = root.at("start_rad");
+  const std::size_t n = cell.drives.size();
+  cell.start_rad = node.as_numbers(n, n, between(-1000.0, 1000.0));
+  const auto elements = node.as_list();
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto [low, high] = cell.drives[i].range_rad;
+    if (cell.start_rad[i] < low || cell.start_rad[i] > high) {
+      throw elements[i].error("an angle in the range of joint " + in_quotes(cell.drives[i].joint) + ", " +
+                              number_text(low) + " to " + number_text(high) + " rad");
+    }
+  }
+}
+
+}  // namespace
+
+double DriveDescription::counts_per_rad() const noexcept {
+  return direction * counts_per_motor_revolution * gear_ratio / turn;
+}
+
+Cell load_cell(const std::filesystem::path& file) {
+  const YamlNode root = YamlNode::load(file);
+  Cell cell;
+  cell.file = std::filesystem::absolute(file).lexically_normal();
+  cell.name = root.string_or("name", file.stem().string());
+  cell.urdf = root.existing_file("urdf");
+  cell.base_W = pose_or_identity(root, "base_W");
+  cell.gravity_W_m_per_s2 = root.vec3_or("gravity_W_m_per_s2", cell.gravity_W_m_per_s2, between(-30.0, 30.0));
+  cell.tool = read_tool(root.map("tool"));
+  read_buses(root, cell);
+  read_drives(root, cell);
+  read_start(root, cell);
+  cell.sensor = read_sensor(root.map("sensor"));
+  check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
+  if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
+  cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
+  cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
+  cell.default_scene = absolute_path_or_empty(root, "default_scene");
+  cell.default_hand = absolute_path_or_empty(root, "default_hand");
+  root.finish();
+  return cell;
+}
+
+}  // namespace proxarm::description

@@ -1,0 +1,54 @@
+#include "models/description/hand.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "models/description/yaml_file.hpp"
+
+namespace proxarm::description {
+namespace {
+
+Waypoint read_waypoint(const YamlNode& node) {
+  return {.time_s = node.number("time_s", 0.0, 1e6), .offset_m = node.vec3("offset_m", between(-10.0, 10.0))};
+}
+
+Sine read_sine(const YamlNode& node) {
+  Sine sine;
+  sine.frequency_Hz = node.number("frequency_Hz", above(0.0, 1000.0));
+  sine.amplitude_m = node.number("amplitude_m", 0.0, 1.0);
+  sine.phase_rad = node.number_or("phase_rad", 0.0, -2.0 * std::numbers::pi, 2.0 * std::numbers::pi);
+  sine.direction = node.vec3("direction", between(-1e3, 1e3));
+  const double length = std::hypot(sine.direction[0], sine.direction[1], sine.direction[2]);
+  if (length < 1e-3) throw node.error_at("direction", "a direction of length 0.001 or more", number_text(length));
+  for (double& x : sine.direction) x /= length;
+  return sine;
+}
+
+}  // namespace
+
+HandDescription load_hand(const std::filesystem::path& file) {
+  const YamlNode root = YamlNode::load(file);
+  HandDescription hand;
+  hand.file = std::filesystem::absolute(file).lexically_normal();
+  hand.name = root.string_or("name", file.stem().string());
+  hand.mass_kg = root.number_or("mass_kg", hand.mass_kg, 0.0, 100.0);
+  hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, 0.0, 1e5);
+  hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, 0.0, 1e4);
+  if (root.has("waypoints")) {
+    for (const YamlNode& node : root.list("waypoints", 1, 100'000)) {
+      const Waypoint waypoint = read_waypoint(node);
+      if (!hand.waypoints.empty() && waypoint.time_s <= hand.waypoints.back().time_s) {
+        throw node.error_at("time_s",
+                            "a time after the one before, " + number_text(hand.waypoints.back().time_s) + " s");
+      }
+      hand.waypoints.push_back(waypoint);
+    }
+  }
+  if (root.has("multisine")) {
+    for (const YamlNode& node : root.list("multisine", 1, 1000)) hand.multisine.push_back(read_sine(node));
+  }
+  root.finish();
+  return hand;
+}
+
+}  // namespace proxarm::description

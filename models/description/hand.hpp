@@ -1,0 +1,41 @@
+// A hand for simulation, as its file states it: what it is made of and the motion that it intends.
+//
+// The hand holds the tool's point T through stiffness and damping and follows its intention: waypoints, joined by
+// minimum-jerk motions, plus a sum of sines. With s = (t − t_i)/(t_{i+1} − t_i) in [0, 1]:
+//   x(t) = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵) + Σ_j a_j d_j sin(2π f_j t + φ_j)
+// It rests at the first waypoint before its time and at the last one after it. No waypoint: it holds the start.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace proxarm::description {
+
+struct Waypoint {
+  double time_s = 0.0;               // strictly rising along the list
+  std::array<double, 3> offset_m{};  // in W, from where the tool is at the start
+};
+
+struct Sine {
+  double frequency_Hz = 1.0;
+  double amplitude_m = 0.0;
+  double phase_rad = 0.0;
+  std::array<double, 3> direction{1.0, 0.0, 0.0};  // in W; scaled to length 1 by load_hand
+};
+
+struct HandDescription {
+  std::filesystem::path file;
+  std::string name;
+  double mass_kg = 1.0;  // of the hand, beyond the handle; felt by the force sensor
+  double stiffness_N_per_m = 500.0;
+  double damping_Ns_per_m = 20.0;
+  std::vector<Waypoint> waypoints;
+  std::vector<Sine> multisine;
+};
+
+// Throws SetupError, with file, line and key.
+HandDescription load_hand(const std::filesystem::path& file);
+
+}  // namespace proxarm::description

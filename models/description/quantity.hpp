@@ -1,0 +1,23 @@
+// Numbers with units, as they stand on the command line: 1ms, 0.5 ms, 3kg, 20Ns/m.
+//
+// Where a number alone would be ambiguous (a duration: seconds? milliseconds?) the unit is required. All throw
+// SetupError naming `option`, which is what the user typed, such as "--timestep".
+#pragma once
+
+#include <string_view>
+
+namespace proxarm::description {
+
+// "1ms", "0.5ms", "500us", "500µs", "2s", "1min", "24h", "250000ns" → seconds, above zero. The unit is required.
+double parse_duration(std::string_view text, std::string_view option = "duration");
+
+// "3", "3kg", "250g" → kg, above zero.
+double parse_mass(std::string_view text, std::string_view option = "mass");
+
+// "20", "20Ns/m" → Ns/m, zero or more.
+double parse_damping(std::string_view text, std::string_view option = "damping");
+
+// "500", "500N/m" → N/m, zero or more.
+double parse_stiffness(std::string_view text, std::string_view option = "stiffness");
+
+}  // namespace proxarm::description

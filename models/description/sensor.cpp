@@ -1,0 +1,86 @@
+#include "models/description/sensor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/description/yaml_file.hpp"
+
+namespace proxarm::description {
+namespace {
+
+using Matrix = std::array<std::array<double, 6>, 6>;
+
+// Whether a 6×6 matrix can be inverted with something left of single precision: Gauss-Jordan inversion with partial
+// pivoting, then the condition number in the ∞-norm of the row-scaled matrix (rows differ by their units alone).
+double condition(Matrix a) {
+  Matrix inverse{};
+  double norm = 0.0, inverse_norm = 0.0;
+  for (std::size_t i = 0; i < 6; ++i) {
+    double largest = 0.0, sum = 0.0;
+    for (const double x : a[i]) largest = std::max(largest, std::abs(x));
+    if (largest == 0.0) return std::numeric_limits<double>::infinity();
+    for (double& x : a[i]) sum += std::abs(x /= largest);
+    norm = std::max(norm, sum);
+    inverse[i][i] = 1.0;
+  }
+  for (std::size_t k = 0; k < 6; ++k) {
+    std::size_t pivot = k;
+    for (std::size_t i = k + 1; i < 6; ++i) pivot = std::abs(a[i][k]) > std::abs(a[pivot][k]) ? i : pivot;
+    if (a[pivot][k] == 0.0) return std::numeric_limits<double>::infinity();
+    std::swap(a[k], a[pivot]);
+    std::swap(inverse[k], inverse[pivot]);
+    const double p = a[k][k];
+    for (std::size_t j = 0; j < 6; ++j) a[k][j] /= p, inverse[k][j] /= p;
+    for (std::size_t i = 0; i < 6; ++i) {
+      if (i == k) continue;
+      const double factor = a[i][k];
+      for (std::size_t j = 0; j < 6; ++j) a[i][j] -= factor * a[k][j], inverse[i][j] -= factor * inverse[k][j];
+    }
+  }
+  for (const auto& row : inverse) {
+    double sum = 0.0;
+    for (const double x : row) sum += std::abs(x);
+    inverse_norm = std::max(inverse_norm, sum);
+  }
+  const double result = norm * inverse_norm;
+  return std::isfinite(result) ? result : std::numeric_limits<double>::infinity();
+}
+
+SensorSimulation read_simulation(const YamlNode& node) {
+  SensorSimulation s;
+  const auto rows = node.list("matrix", 6, 6);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto row = rows[i].as_numbers(6, 6, between(-1e9, 1e9));
+    for (std::size_t j = 0; j < 6; ++j) s.matrix[i][j] = static_cast<double>(static_cast<float>(row[j]));
+  }
+  // Above 1e4, single-precision coefficients (6e-8) leave less than three digits of the smallest component.
+  if (const double c = condition(s.matrix); !(c < 1e4)) {
+    throw node.error_at("matrix", "an invertible matrix of condition below 10000",
+                        "one of condition " + number_text(c));
+  }
+  s.counts_per_N = static_cast<std::uint32_t>(node.integer_or("counts_per_N", s.counts_per_N, 1, 0xffffffff));
+  s.counts_per_Nm = static_cast<std::uint32_t>(node.integer_or("counts_per_Nm", s.counts_per_Nm, 1, 0xffffffff));
+  if (node.has("bias_counts")) {
+    const auto bias = node.numbers("bias_counts", 6, 6, between(-32768.0, 32767.0));
+    std::copy(bias.begin(), bias.end(), s.bias_counts.begin());
+  }
+  return s;
+}
+
+}  // namespace
+
+SensorDescription load_sensor(const std::filesystem::path& file) {
+  const YamlNode root = YamlNode::load(file);
+  SensorDescription sensor;
+  sensor.file = std::filesystem::absolute(file).lexically_normal();
+  sensor.name = root.string("name");
+  sensor.protocol = root.choice("protocol", {"ati_net_can_oem"});
+  sensor.force_range_N = root.vec3("force_range_N", above(0.0, 1e6));
+  sensor.torque_range_Nm = root.vec3("torque_range_Nm", above(0.0, 1e6));
+  sensor.simulation = read_simulation(root.map("simulation"));
+  root.finish();
+  return sensor;
+}
+
+}  // namespace proxarm::description

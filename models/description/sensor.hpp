@@ -1,0 +1,36 @@
+// A force sensor's description: which protocol it speaks, its range, and what only a simulated one must know.
+//
+// A file under models/sensors. What a real ATI Net CAN OEM needs beyond that (matrix, counts) is read over CAN at
+// start; the simulation's values stand in the file, so that the simulated sensor can answer those requests.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace proxarm::description {
+
+// The sensor as the far end of the wire. With gauges g (counts) and wrench w = (Fx, Fy, Fz in N, Tx, Ty, Tz in Nm):
+//   w = matrix · (g − bias) / (counts_per_N, …, counts_per_Nm, …)
+struct SensorSimulation {
+  std::array<std::array<double, 6>, 6> matrix{};  // rows Fx Fy Fz Tx Ty Tz, columns gauges 0..5; single precision
+                                                  // values, since that is what goes over the wire
+  std::uint32_t counts_per_N = 1'000'000;
+  std::uint32_t counts_per_Nm = 1'000'000;
+  std::array<double, 6> bias_counts{};  // gauges without any load
+};
+
+struct SensorDescription {
+  std::filesystem::path file;
+  std::string name;
+  std::string protocol;                   // "ati_net_can_oem"
+  std::array<double, 3> force_range_N{};  // ± per axis of S; beyond it a reading isn't to be trusted
+  std::array<double, 3> torque_range_Nm{};
+  SensorSimulation simulation;
+};
+
+// Throws SetupError, with file, line and key.
+SensorDescription load_sensor(const std::filesystem::path& file);
+
+}  // namespace proxarm::description
