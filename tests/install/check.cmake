@@ -1,0 +1,18 @@
+set(folder ${build}/tests/install)
+file(REMOVE_RECURSE ${folder}/prefix ${folder}/own_world)
+
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT status EQUAL 0)
+    list(JOIN ARGV " " command)
+    message(FATAL_ERROR "${command}\nexited with ${status}:\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+run(${CMAKE_COMMAND} --install ${build} --prefix ${folder}/prefix)
+run(${CMAKE_COMMAND} -G Ninja -S ${CMAKE_CURRENT_LIST_DIR}/own_world -B ${folder}/own_world
+    -D CMAKE_PREFIX_PATH=${folder}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_BUILD_TYPE=Debug)
+run(${CMAKE_COMMAND} --build ${folder}/own_world)
+run(${folder}/own_world/own_world)
+message(STATUS "${output}")
