@@ -1,0 +1,62 @@
+// Makes the smallest 𝒢 that renders a scene: no friction code without friction, a single wall is just (2) or (4), an
+// empty scene is 𝒢(K, p, q) = p.
+//
+//   CompiledScene world = compile(load_scene("scenes/wall.yaml"));
+//   GeometricAlgorithm<3>& g = world.algorithm<3>();
+//   const Vec3 q = g(M / (T * T), p_hat, q_k1);                    // (26b)
+#pragma once
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "models/geometric_algorithm.hpp"
+#include "scenes/scene.hpp"
+
+namespace proxarm::scenes {
+
+// One line of what was compiled in or left out, for `proxarm explain`.
+struct Stage {
+  std::string what;
+  std::string why;
+};
+
+struct CompiledScene {
+  template <int N>
+  using Algorithm = std::unique_ptr<models::GeometricAlgorithm<N>>;
+
+  std::string name;
+  Space space;
+  std::vector<Stage> stages;   // in the order in which a step goes through them
+  std::vector<Stage> skipped;  // what this scene doesn't need
+  std::variant<Algorithm<1>, Algorithm<2>, Algorithm<3>> any_algorithm;
+
+  [[nodiscard]] int dimensions() const noexcept { return space.dimensions; }
+
+  // The scene's 𝒢; N must be its dimensions (std::bad_variant_access otherwise). One per proxy: it remembers contacts.
+  template <int N>
+  [[nodiscard]] models::GeometricAlgorithm<N>& algorithm() const {
+    return *std::get<Algorithm<N>>(any_algorithm);
+  }
+
+  // Coordinates of the space ↔ points of W.
+  template <int N>
+  [[nodiscard]] models::Vec3 to_W(const models::Vec<N>& x) const noexcept {
+    return space.origin_m + space.axes.leftCols<N>() * x;
+  }
+  template <int N>
+  [[nodiscard]] models::Vec<N> from_W(const models::Vec3& x_W) const noexcept {
+    return space.axes.leftCols<N>().transpose() * (x_W - space.origin_m);
+  }
+};
+
+// Throws description::SetupError for a scene that can't be: a space of fewer dimensions that lies inside an object,
+// say.
+CompiledScene compile(const Scene& scene);
+
+// How far x_W is from the nearest object, in metres; negative inside one. Infinite in an empty scene. For summaries and
+// tests, not for the cycle.
+double clearance_m(const Scene& scene, const models::Vec3& x_W);
+
+}  // namespace proxarm::scenes

@@ -1,0 +1,120 @@
+// From a scene's file to the smallest 𝒢 that renders it.
+#include "scenes/compile.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "models/coulomb_field.hpp"
+#include "models/description/setup_error.hpp"
+#include "models/free_space.hpp"
+#include "models/friction_plane.hpp"
+#include "models/plane.hpp"
+#include "scenes/scene_file.hpp"
+
+namespace proxarm::tests {
+namespace {
+
+using models::Vec3;
+using scenes::compile;
+using scenes::CompiledScene;
+using scenes::load_scene;
+using scenes::parse_scene;
+
+const std::filesystem::path kScenes = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
+
+template <typename Algorithm, int N>
+bool is(const CompiledScene& scene) {
+  return dynamic_cast<Algorithm*>(&scene.algorithm<N>()) != nullptr;
+}
+
+TEST(Compile, MakesTheSmallestAlgorithm) {
+  EXPECT_TRUE((is<models::FreeSpace<3>, 3>(compile(load_scene(kScenes / "free.yaml")))));
+  EXPECT_TRUE((is<models::Plane<3>, 3>(compile(load_scene(kScenes / "frictionless_wall.yaml")))));
+  EXPECT_TRUE((is<models::FrictionPlane<3>, 3>(compile(load_scene(kScenes / "wall.yaml")))));
+  EXPECT_TRUE((is<models::CoulombField<3>, 3>(compile(load_scene(kScenes / "coulomb.yaml")))));
+}
+
+TEST(Compile, EveryShippedSceneLoads) {
+  for (const auto& entry : std::filesystem::directory_iterator(kScenes)) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_NO_THROW(compile(load_scene(entry.path()))) << entry.path();
+  }
+}
+
+TEST(Compile, SaysWhatIsSkippedAndWhy) {
+  const CompiledScene scene = compile(load_scene(kScenes / "frictionless_wall.yaml"));
+  ASSERT_EQ(scene.stages.size(), 1u);
+  EXPECT_EQ(scene.stages[0].what, "wall, equation (2)");
+  bool friction = false;
+  for (const auto& stage : scene.skipped) friction = friction || (stage.what == "friction" && stage.why == "μ = 0");
+  EXPECT_TRUE(friction);
+}
+
+TEST(Compile, CutsAPlaneWithTheSpaceOfTheProxy) {
+  // A wall at x = 0.9 that leans by 45°, met on a plane and on a line.
+  const auto text = [](int n, const char* axes) {
+    return "dimensions: " + std::to_string(n) + "\nspace: {origin_m: [0.7, 0, 0.6], axes: [" + axes +
+           "]}\nobjects:\n  - plane: {point_m: [0.9, 0, 0.6], normal: [-1, 0, -1], friction: 0.3}\n";
+  };
+  const CompiledScene plane = compile(parse_scene(text(2, "[2, 0, 0], [0, 1, 0]"), "plane.yaml"));
+  ASSERT_EQ(plane.dimensions(), 2);
+  auto& g2 = plane.algorithm<2>();
+  EXPECT_TRUE(g2(1.0, {0.19, 5.0}, {0.0, 0.0}).isApprox(models::Vec<2>(0.19, 5.0)));
+  EXPECT_NEAR(g2(1.0, {0.3, 0.0}, {0.0, 0.0}).x(), 0.2, 1e-15);
+  EXPECT_TRUE(plane.to_W<2>({0.2, 1.0}).isApprox(Vec3(0.9, 1.0, 0.6)));
+  EXPECT_TRUE(plane.from_W<2>({0.9, 1.0, 7.0}).isApprox(models::Vec<2>(0.2, 1.0)));
+
+  const CompiledScene line = compile(parse_scene(text(1, "[0, 0, 1]"), "line.yaml"));
+  auto& g1 = line.algorithm<1>();
+  EXPECT_NEAR(g1(1.0, models::Vec<1>(0.5), models::Vec<1>(0.0))[0], 0.2, 1e-15);
+
+  // Parallel to the space: out of reach, or all around.
+  const std::string parallel = "dimensions: 1\nspace: {origin_m: [0, 0, 0], axes: [[0, 1, 0]]}\nobjects:\n  - plane: ";
+  EXPECT_TRUE((is<models::FreeSpace<1>, 1>(
+      compile(parse_scene(parallel + "{point_m: [1, 0, 0], normal: [-1, 0, 0]}\n", "a.yaml")))));
+  EXPECT_THROW(compile(parse_scene(parallel + "{point_m: [1, 0, 0], normal: [1, 0, 0]}\n", "a.yaml")),
+               description::SetupError);
+}
+
+TEST(SceneFile, NamesEveryMistakeWithItsPlace) {
+  const auto problem = [](const std::string& text) {
+    try {
+      parse_scene(text, "scene.yaml");
+    } catch (const description::SetupError& error) {
+      EXPECT_EQ(error.file(), "scene.yaml") << error.what();
+      EXPECT_GT(error.line(), 0) << error.what();
+      return std::string(error.what());
+    }
+    ADD_FAILURE() << "accepted: " << text;
+    return std::string();
+  };
+  const auto has = [](const std::string& text, const char* part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text << "\n  lacks: " << part;
+  };
+  has(problem("objects:\n  - plane: {point_m: [0, 0, 0], normal: [0, 0, 0]}\n"), "normal");
+  has(problem("objects:\n  - plane: {point_m: [0, 0], normal: [0, 0, 1]}\n"), "point_m");
+  has(problem("objects:\n  - plane: {point_m: [0, 0, 0], normal: [0, 0, 1], friction: -0.1}\n"), "friction");
+  has(problem("objects:\n  - plane: {point_m: [0, 0, 0], normal: [0, 0, 1], frictoin: 0.1}\n"), "friction");
+  has(problem("objects:\n  - plan: {point_m: [0, 0, 0], normal: [0, 0, 1]}\n"), "plane");
+  has(problem("objects:\n  - {}\n"), "plane");
+  has(problem("objects:\n  - 3\n"), "plane");
+  has(problem("coulomb_field: {force_N: 0}\n"), "force_N");
+  has(problem("dimensions: 4\n"), "dimensions");
+  has(problem("dimensions: 2\n"), "space");
+  has(problem("dimensions: 2\nspace: {axes: [[1, 0, 0]]}\n"), "axes");
+  has(problem("dimensions: 2\nspace: {axes: [[1, 0, 0], [1, 1, 0]]}\n"), "right angles");
+  has(problem("objects:\n  - plane: {name: a, point_m: [0, 0, 0], normal: [0, 0, 1]}\n"
+              "  - plane: {name: a, point_m: [0, 0, 0], normal: [0, 0, 1]}\n"),
+      "name");
+}
+
+TEST(Clearance, IsTheDistanceToTheNearestSurface) {
+  const scenes::Scene scene = load_scene(kScenes / "wall.yaml");
+  EXPECT_NEAR(clearance_m(scene, {0.7, 3.0, -2.0}), 0.2, 1e-15);
+  EXPECT_NEAR(clearance_m(scene, {1.0, 3.0, -2.0}), -0.1, 1e-15);
+  EXPECT_EQ(clearance_m(load_scene(kScenes / "free.yaml"), Vec3::Zero()), std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+}  // namespace proxarm::tests
