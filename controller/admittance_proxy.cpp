@@ -78,6 +78,7 @@ ProxyFault AdmittanceProxy<N>::solve(Trial& out, const V& q_previous, double law
   if (!out.p_hat.allFinite() || !q_previous.allFinite()) return ProxyFault::result_not_finite;
   g_->set_time({epoch_s_ + static_cast<double>(steps_ + 1) * config_.period_s, law_period_s});
   out.q = (*g_)(out.kappa, out.p_hat, q_previous);
+  out.held = out.q == q_previous && out.p_hat != q_previous;
   // f = κ(q − p̂) may overflow although both are finite.
   return (out.kappa * (out.q - out.p_hat)).allFinite() ? ProxyFault::none : ProxyFault::result_not_finite;
 }
@@ -131,7 +132,7 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, bool& contacts_chang
   for (const bool from_q_tilde : {false, true}) {
     const ProxyFault fault = from_q_tilde ? solve(out, q_tilde, 2.0 * T / 3.0) : solve(out, q_k1_, T);
     if (fault != ProxyFault::none) return fault;
-    if (contacts_.known && !same(contacts_, contact_set(g_->contacts()))) {
+    if (contacts_.known && !same(contacts_, contact_set(g_->contacts(), out.held))) {
       contacts_changed = true;
       return ProxyFault::none;
     }
@@ -158,7 +159,7 @@ ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
     const ProxyFault fault = euler(h, out);
     if (fault != ProxyFault::none) return fault;
   }
-  const ContactSet now = contact_set(g_->contacts());
+  const ContactSet now = contact_set(g_->contacts(), out.held);
   if (again) {
     const bool event = changed || (contacts_.known && !same(contacts_, now));
     const int after_event = contacts_.known && gained(contacts_, now) ? 2 : 1;
@@ -171,9 +172,10 @@ ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
 }
 
 template <int N>
-typename AdmittanceProxy<N>::ContactSet AdmittanceProxy<N>::contact_set(
-    std::span<const models::Contact<N>> contacts) noexcept {
+typename AdmittanceProxy<N>::ContactSet AdmittanceProxy<N>::contact_set(std::span<const models::Contact<N>> contacts,
+                                                                        bool held) noexcept {
   ContactSet set;
+  set.held = held;
   set.overflow = contacts.size() > max_contacts;
   for (const auto& contact : contacts) {
     if (set.count == max_contacts) break;
@@ -182,7 +184,7 @@ typename AdmittanceProxy<N>::ContactSet AdmittanceProxy<N>::contact_set(
   return set;
 }
 
-// Is every contact of `now` one of `before`? With `stick_and_slip`, also in the same state.
+// Does `now` hold a contact that `before` doesn't?
 template <int N>
 bool AdmittanceProxy<N>::gained(const ContactSet& before, const ContactSet& now) noexcept {
   for (std::size_t i = 0; i < now.count; ++i) {
@@ -197,7 +199,7 @@ bool AdmittanceProxy<N>::gained(const ContactSet& before, const ContactSet& now)
 
 template <int N>
 bool AdmittanceProxy<N>::same(const ContactSet& a, const ContactSet& b) noexcept {
-  if (a.overflow || b.overflow || a.count != b.count) return false;
+  if (a.overflow || b.overflow || a.count != b.count || a.held != b.held) return false;
   for (std::size_t i = 0; i < a.count; ++i) {
     bool found = false;
     for (std::size_t j = 0; j < b.count; ++j) {

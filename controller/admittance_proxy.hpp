@@ -117,14 +117,16 @@ class AdmittanceProxy {
     std::size_t count = 0;
     bool overflow = false;  // more than fit: never equal to anything
     bool known = true;
+    bool held = false;  // q = q(k−1) bit for bit although p̂ isn't: a 𝒢 that reports no contacts may stick all the same
   };
 
   struct Trial {
     double kappa = 0.0;
     V p_hat = V::Zero(), q = V::Zero(), v = V::Zero();
+    bool held = false;
   };
 
-  static ContactSet contact_set(std::span<const models::Contact<N>> contacts) noexcept;
+  static ContactSet contact_set(std::span<const models::Contact<N>> contacts, bool held) noexcept;
   static bool same(const ContactSet& a, const ContactSet& b) noexcept;
   static bool gained(const ContactSet& before, const ContactSet& now) noexcept;
 

@@ -70,17 +70,15 @@ class Wall : public OneContact<N> {
   double mu_, offset_;
 };
 
-// (3)
+// (3), which reports no contacts.
 template <int N>
-class DryFriction : public OneContact<N> {
+class DryFriction : public GeometricAlgorithm<N> {
  public:
   explicit DryFriction(double F) : F_(F) {}
 
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
     const Vec<N> d = p - q;
-    const bool slips = d.norm() > F_ / K;
-    this->touch(Vec<N>::Unit(0), slips);
-    return slips ? Vec<N>(p - F_ / K * d / d.norm()) : q;
+    return d.norm() > F_ / K ? Vec<N>(p - F_ / K * d / d.norm()) : q;
   }
 
  private:
