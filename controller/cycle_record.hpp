@@ -1,0 +1,77 @@
+// What one cycle leaves behind: plain data of fixed size, pushed into a ring by the cycle, read by the summary, the
+// files and the plot outside of it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "controller/supervisor.hpp"
+#include "models/geometry.hpp"
+
+namespace proxarm::controller {
+
+enum class ContactPhase : std::uint8_t { free, stick, slip };
+
+const char* contact_phase_name(ContactPhase phase) noexcept;
+
+// What was out of the ordinary in a cycle; an active limit is no fault.
+enum class RecordFlag : std::uint32_t {
+  sample_held = 1u << 0,       // no new sensor sample: the last force was used again
+  feedback_missing = 1u << 1,  // some drive's TPDO didn't come: its last position was used
+  limit_speed = 1u << 2,
+  limit_acceleration = 1u << 3,
+  limit_workspace = 1u << 4,
+  limit_joint = 1u << 5,
+  limit_leash = 1u << 6,
+  limit_orientation = 1u << 7,
+  contact_multivalued = 1u << 8,  // the contact problem had more than one solution
+  truth = 1u << 9,                // the fields of the simulation's truth are filled in
+  overrun = 1u << 10,             // the cycle was late; wall-clock, so it goes to timing.json and not to signals.csv
+};
+
+// Three numbers that stay trivially copyable (Eigen's types aren't).
+using Triple = std::array<double, 3>;
+
+inline Triple triple(const models::Vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
+inline models::Vec3 vec3(const Triple& v) noexcept { return {v[0], v[1], v[2]}; }
+
+inline constexpr std::size_t max_axes = 8;
+
+struct CycleRecord {
+  std::uint64_t cycle = 0;   // k
+  std::int64_t time_ns = 0;  // t_k, as scheduled, from the first cycle of the session
+  Phase phase = Phase::idle;
+  ContactPhase contact = ContactPhase::free;
+  std::uint8_t axes = 0;
+  std::uint32_t flags = 0;  // RecordFlag
+
+  Triple force_S_N{}, torque_S_Nm{};  // the sensor's wrench, as decoded
+  Triple force_W_N{}, torque_W_Nm{};  // bias and tool weight taken off, turned to W, about the rendered point: h(k)
+  Triple p_hat_W_m{};                 // (26a)
+  Triple proxy_W_m{};                 // q(k)
+  Triple contact_force_W_N{};         // f(k), (25a): on the proxy
+  Triple normal_W{};                  // of the first contact; zero when free
+  Triple tool_W_m{};                  // the rendered point by the encoders, at t_k
+  double proxy_clearance_m = 0.0;     // signed distance of the proxy to the nearest surface; below 0: inside
+  double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders
+  std::array<std::int32_t, max_axes> target_counts{};  // 607A, sent in this cycle
+  std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
+
+  // The simulation's truth at t_k (flag `truth`).
+  Triple true_tool_W_m{};
+  Triple hand_force_W_N{};  // of the hand on the tool
+
+  std::int64_t compute_ns = 0;  // wall-clock of the cycle, waiting apart; goes to timing.json alone
+
+  [[nodiscard]] bool has(RecordFlag flag) const noexcept { return (flags & static_cast<std::uint32_t>(flag)) != 0; }
+  void set(RecordFlag flag, bool on = true) noexcept {
+    const auto bit = static_cast<std::uint32_t>(flag);
+    flags = on ? flags | bit : flags & ~bit;
+  }
+};
+
+static_assert(std::is_trivially_copyable_v<CycleRecord>);
+
+}  // namespace proxarm::controller
