@@ -1,0 +1,50 @@
+// The power state machine of a CiA 402 drive as a table: states, commands and the standard's transition numbers.
+//
+//   statusword, state = word & mask              controlword, bits 7 3 2 1 0
+//   not ready to switch on   004F  0000          shutdown            0 x 1 1 0
+//   switch on disabled       004F  0040          switch on           0 0 1 1 1   (= disable operation)
+//   ready to switch on       006F  0021          enable operation    0 1 1 1 1
+//   switched on              006F  0023          disable voltage     0 x x 0 x
+//   operation enabled        006F  0027          quick stop          0 x 0 1 x
+//   quick stop active        006F  0007          fault reset         rising edge of bit 7
+//   fault reaction active    004F  000F
+//   fault                    004F  0008
+#pragma once
+
+#include <cstdint>
+
+namespace proxarm::sim {
+
+enum class DriveState : std::uint8_t {
+  not_ready_to_switch_on,
+  switch_on_disabled,
+  ready_to_switch_on,
+  switched_on,
+  operation_enabled,
+  quick_stop_active,
+  fault_reaction_active,
+  fault,
+};
+
+enum class DriveCommand : std::uint8_t {
+  none,
+  shutdown,
+  switch_on,
+  enable_operation,
+  disable_voltage,
+  quick_stop,
+  fault_reset,
+};
+
+struct DriveTransition {
+  int number = 0;  // of CiA 402; 0: the command means nothing in this state
+  DriveState to = DriveState::not_ready_to_switch_on;
+};
+
+[[nodiscard]] DriveCommand decode_controlword(std::uint16_t word, std::uint16_t word_before) noexcept;
+// Transitions by command: 2 to 12, 15 and 16. The others (0, 1, 13, 14, and 12 after a quick stop) happen by themselves.
+[[nodiscard]] DriveTransition transition_for(DriveState from, DriveCommand command) noexcept;
+// Bits 0..3, 5 and 6 of the statusword.
+[[nodiscard]] std::uint16_t statusword_bits(DriveState state) noexcept;
+
+}  // namespace proxarm::sim

@@ -1,0 +1,129 @@
+// The object dictionary of a simulated CANopen device (CiA 301, 7.4): entries by index and subindex, each with its type,
+// who may access it, whether it may be mapped into a PDO, the value it starts with, and what happens when it is written.
+//
+// Values are kept as they go over the wire: little-endian bytes.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace proxarm::sim {
+
+// SDO abort codes, numbers and wording of CiA 301, table 22.
+enum class SdoAbort : std::uint32_t {
+  none = 0,                                        // not an abort: the access succeeded
+  toggle_bit_not_alternated = 0x05030000,
+  protocol_timed_out = 0x05040000,
+  command_specifier_not_valid = 0x05040001,
+  invalid_block_size = 0x05040002,
+  invalid_sequence_number = 0x05040003,
+  crc_error = 0x05040004,
+  out_of_memory = 0x05040005,
+  unsupported_access = 0x06010000,
+  read_of_write_only = 0x06010001,
+  write_of_read_only = 0x06010002,
+  object_does_not_exist = 0x06020000,
+  object_cannot_be_mapped = 0x06040041,
+  pdo_length_exceeded = 0x06040042,
+  parameter_incompatibility = 0x06040043,
+  hardware_error = 0x06060000,
+  length_does_not_match = 0x06070010,
+  length_too_high = 0x06070012,
+  length_too_low = 0x06070013,
+  subindex_does_not_exist = 0x06090011,
+  invalid_value = 0x06090030,
+  value_too_high = 0x06090031,
+  value_too_low = 0x06090032,
+  general_error = 0x08000000,
+  cannot_transfer = 0x08000020,
+  not_because_of_local_control = 0x08000021,
+  not_in_present_device_state = 0x08000022,
+};
+
+enum class Access : std::uint8_t {
+  read_only,
+  write_only,
+  read_write,
+  constant,  // read-only, and never changed by the device either
+};
+
+// Data types with their CiA 301 numbers.
+enum class DataType : std::uint16_t {
+  boolean = 0x0001,
+  integer8 = 0x0002,
+  integer16 = 0x0003,
+  integer32 = 0x0004,
+  unsigned8 = 0x0005,
+  unsigned16 = 0x0006,
+  unsigned32 = 0x0007,
+  visible_string = 0x0009,
+  octet_string = 0x000A,
+  domain = 0x000F,
+  integer64 = 0x0015,
+  unsigned64 = 0x001B,
+};
+
+// Bytes of a type of fixed length; 0 for strings and domains.
+[[nodiscard]] std::size_t size_of(DataType type) noexcept;
+
+struct ObjectEntry {
+  std::uint16_t index = 0;
+  std::uint8_t subindex = 0;
+  DataType type = DataType::unsigned32;
+  Access access = Access::read_write;
+  bool pdo_mappable = false;
+  std::vector<std::uint8_t> value;          // present value; of fixed length unless a string or domain
+  std::vector<std::uint8_t> default_value;  // after a reset
+  std::size_t max_length = 0;               // strings and domains: longest value accepted
+  std::optional<std::int64_t> minimum, maximum;
+  // Asked before a write over SDO or PDO is taken over, with the new value (0 for strings and domains); what it returns
+  // other than `none` refuses the write.
+  std::function<SdoAbort(std::int64_t)> before_write;
+  // Called after a write was taken over.
+  std::function<void()> after_write;
+
+  // The value as a number, sign-extended where the type is signed. 0 for strings and domains. Never throws.
+  [[nodiscard]] std::int64_t number() const noexcept;
+  // Sets the value as the device itself does: no access check, no hooks, truncated to the type's length.
+  void set(std::int64_t number) noexcept;
+};
+
+class ObjectDictionary {
+ public:
+  // Adds a number; the entry stays where it is for the dictionary's life.
+  ObjectEntry& add(std::uint16_t index, std::uint8_t subindex, DataType type, Access access, std::int64_t value,
+                   bool pdo_mappable = false);
+  ObjectEntry& add_text(std::uint16_t index, std::uint8_t subindex, std::string_view text);
+  ObjectEntry& add_domain(std::uint16_t index, std::uint8_t subindex, Access access, std::size_t max_length);
+
+  [[nodiscard]] ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) noexcept;
+  [[nodiscard]] const ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) const noexcept;
+  // An entry that is known to be there.
+  [[nodiscard]] ObjectEntry& at(std::uint16_t index, std::uint8_t subindex = 0);
+  [[nodiscard]] std::int64_t number(std::uint16_t index, std::uint8_t subindex = 0) const noexcept;  // 0 if not there
+
+  // Access from the network. `read` gives the entry, `write` takes the bytes over when everything about them is right.
+  [[nodiscard]] SdoAbort read(std::uint16_t index, std::uint8_t subindex, const ObjectEntry*& entry) const noexcept;
+  [[nodiscard]] SdoAbort write(std::uint16_t index, std::uint8_t subindex, std::span<const std::uint8_t> bytes);
+  // The checks of `write` that need no value, for the start of a long transfer. `length` 0: not known yet.
+  [[nodiscard]] SdoAbort can_write(std::uint16_t index, std::uint8_t subindex, std::size_t length) const noexcept;
+  // Takes over bytes of the entry's own length that came in a PDO; false when the value was refused.
+  static bool write_mapped(ObjectEntry& entry, std::span<const std::uint8_t> bytes);
+
+  // Back to the default values in indices first..last, hooks not called.
+  void restore_defaults(std::uint16_t first, std::uint16_t last) noexcept;
+
+ private:
+  [[nodiscard]] SdoAbort find_for_access(std::uint16_t index, std::uint8_t subindex,
+                                         const ObjectEntry*& entry) const noexcept;
+  static SdoAbort take_over(ObjectEntry& entry, std::span<const std::uint8_t> bytes);
+
+  std::map<std::uint32_t, ObjectEntry> entries_;  // by index << 8 | subindex
+};
+
+}  // namespace proxarm::sim
