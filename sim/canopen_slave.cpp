@@ -179,8 +179,8 @@ void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns
   if (state_ == NmtState::operational) transmit_on_sync(time_ns);
 }
 
-// A PDO that comes after the synchronous window (1007h) has closed is left out. One that is too short is refused; of one
-// that is too long, the first bytes count.
+// A PDO that comes after the synchronous window (1007h) has closed is left out. One that is too short is refused; of
+// one that is too long, the first bytes count.
 void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   if (frame.length < receive.pdo.length()) {
     return raise_error(emcy::pdo_too_short, error_register::communication, time_ns);

@@ -29,6 +29,7 @@ enum class NmtState : std::uint8_t { initialising = 0x00, stopped = 0x04, operat
 // EMCY error codes used here (CiA 301, table 26; CiA 402-2 for the drive's own).
 namespace emcy {
 constexpr std::uint16_t no_error = 0x0000;
+constexpr std::uint16_t communication = 0x8100;
 constexpr std::uint16_t heartbeat_lost = 0x8130;
 constexpr std::uint16_t pdo_too_short = 0x8210;
 constexpr std::uint16_t pdo_too_long = 0x8220;
@@ -106,7 +107,7 @@ class CanopenSlave final : public BusDevice {
     SlavePdo pdo;
     std::array<std::uint8_t, 8> data{};  // waiting for SYNC
     bool waiting = false;
-    std::int64_t last_ns = kNever;       // supervised by the event timer once the first one has come
+    std::int64_t last_ns = kNever;  // supervised by the event timer once the first one has come
     bool overdue = false;
   };
   struct Transmit {

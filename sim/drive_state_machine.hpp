@@ -42,7 +42,8 @@ struct DriveTransition {
 };
 
 [[nodiscard]] DriveCommand decode_controlword(std::uint16_t word, std::uint16_t word_before) noexcept;
-// Transitions by command: 2 to 12, 15 and 16. The others (0, 1, 13, 14, and 12 after a quick stop) happen by themselves.
+// Transitions by command: 2 to 12, 15 and 16. The others (0, 1, 13, 14, and 12 after a quick stop) happen by
+// themselves.
 [[nodiscard]] DriveTransition transition_for(DriveState from, DriveCommand command) noexcept;
 // Bits 0..3, 5 and 6 of the statusword.
 [[nodiscard]] std::uint16_t statusword_bits(DriveState state) noexcept;

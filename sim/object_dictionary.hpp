@@ -1,5 +1,6 @@
-// The object dictionary of a simulated CANopen device (CiA 301, 7.4): entries by index and subindex, each with its type,
-// who may access it, whether it may be mapped into a PDO, the value it starts with, and what happens when it is written.
+// The object dictionary of a simulated CANopen device (CiA 301, 7.4): entries by index and subindex, each with its
+// type, who may access it, whether it may be mapped into a PDO, the value it starts with, and what happens when it is
+// written.
 //
 // Values are kept as they go over the wire: little-endian bytes.
 #pragma once
@@ -16,7 +17,7 @@ namespace proxarm::sim {
 
 // SDO abort codes, numbers and wording of CiA 301, table 22.
 enum class SdoAbort : std::uint32_t {
-  none = 0,                                        // not an abort: the access succeeded
+  none = 0,  // not an abort: the access succeeded
   toggle_bit_not_alternated = 0x05030000,
   protocol_timed_out = 0x05040000,
   command_specifier_not_valid = 0x05040001,

@@ -34,11 +34,11 @@ class SdoServer {
     idle,
     segmented_download,
     segmented_upload,
-    block_download,         // receiving segments
-    block_download_end,     // all segments in, waiting for the end request with the CRC
-    block_upload_start,     // answered the initiate request, waiting for the start
-    block_upload,           // a sub-block is out, waiting for its acknowledgement
-    block_upload_end,       // end request is out, waiting for its confirmation
+    block_download,      // receiving segments
+    block_download_end,  // all segments in, waiting for the end request with the CRC
+    block_upload_start,  // answered the initiate request, waiting for the start
+    block_upload,        // a sub-block is out, waiting for its acknowledgement
+    block_upload_end,    // end request is out, waiting for its confirmation
   };
 
   void on_abort() noexcept { phase_ = Phase::idle; }
@@ -66,12 +66,12 @@ class SdoServer {
   Phase phase_ = Phase::idle;
   std::uint16_t index_ = 0;
   std::uint8_t subindex_ = 0;
-  std::vector<std::uint8_t> data_;   // collected so far, or to be sent
-  std::size_t expected_ = 0;         // bytes that the client announced; 0: it didn't
-  std::size_t sent_ = 0;             // bytes of data_ confirmed to have been sent
+  std::vector<std::uint8_t> data_;  // collected so far, or to be sent
+  std::size_t expected_ = 0;        // bytes that the client announced; 0: it didn't
+  std::size_t sent_ = 0;            // bytes of data_ confirmed to have been sent
   std::uint8_t toggle_ = 0;
-  std::uint8_t block_size_ = 0;      // segments per sub-block
-  std::uint8_t sequence_ = 0;        // of the last segment received in order, or of the last one sent
+  std::uint8_t block_size_ = 0;  // segments per sub-block
+  std::uint8_t sequence_ = 0;    // of the last segment received in order, or of the last one sent
   bool with_crc_ = false;
 };
 

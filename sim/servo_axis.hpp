@@ -5,15 +5,8 @@
 
 namespace proxarm::sim {
 
-// Where the servo loop is to go, in encoder counts. Unwrapped: goes on past what 32 bits hold.
-struct ServoDemand {
-  double position_counts = 0.0;
-  double velocity_counts_per_s = 0.0;
-  double acceleration_counts_per_s2 = 0.0;
-};
-
-// A servo loop with its motor, encoder and brake. The drive hands over a demand at every tick; between ticks the physics
-// moves on.
+// A servo loop with its motor, encoder, brake and the interpolation of targets, in encoder counts. Readings are those
+// of the latest step of the physics.
 class ServoAxis {
  public:
   ServoAxis() = default;
@@ -21,18 +14,22 @@ class ServoAxis {
   ServoAxis& operator=(const ServoAxis&) = delete;
   virtual ~ServoAxis() = default;
 
-  // Power stage on: the loop follows the demand. Off: no torque. Switching on starts the loop without a step in torque
-  // other than what the demand asks for.
-  virtual void set_power(bool on) noexcept = 0;
-  // The holding brake at the motor; acts at once.
-  virtual void set_brake(bool engaged) noexcept = 0;
-  virtual void set_demand(const ServoDemand& demand) noexcept = 0;
+  // Power on: holds the present position, and the brake opens. Off: the brake closes, no torque.
+  virtual void enable(std::int64_t time_ns) noexcept = 0;
+  virtual void disable() noexcept = 0;
+  // From a target to where it is reached; with effect from the next target on. More than 0.
+  virtual void set_interpolation_period_ns(std::int64_t period_ns) noexcept = 0;
+  // Go to it, to be there one interpolation period later. Only while enabled.
+  virtual void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept = 0;
+  // Slow down to rest and hold, until the next target.
+  virtual void stop(double deceleration_counts_per_s2, std::int64_t time_ns) noexcept = 0;
 
-  // Encoder reading at the latest tick, unwrapped counts.
-  [[nodiscard]] virtual std::int64_t actual_counts() const noexcept = 0;
-  [[nodiscard]] virtual double actual_velocity_counts_per_s() const noexcept = 0;
-  // Torque over the largest that the drive can give, −1..1; at ±1 the current limit is active.
-  [[nodiscard]] virtual double torque_ratio() const noexcept = 0;
+  [[nodiscard]] virtual std::int32_t position_counts() const noexcept = 0;
+  [[nodiscard]] virtual std::int32_t demand_counts() const noexcept = 0;
+  [[nodiscard]] virtual double speed_counts_per_s() const noexcept = 0;
+  [[nodiscard]] virtual double torque_ratio() const noexcept = 0;  // of the largest torque, −1..1
+  [[nodiscard]] virtual bool limited() const noexcept = 0;         // torque or speed is at its limit
+  [[nodiscard]] virtual bool at_rest() const noexcept = 0;         // the demand
 };
 
 }  // namespace proxarm::sim

@@ -26,8 +26,8 @@ SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number
   const auto reconfigure = [this] { configure(); };
   dictionary.add(parameters_, 0, DataType::unsigned8, Access::constant, 5);
 
-  ObjectEntry& identifier = dictionary.add(parameters_, 1, DataType::unsigned32, Access::read_write,
-                                           valid ? id : id | kNotValid);
+  ObjectEntry& identifier =
+      dictionary.add(parameters_, 1, DataType::unsigned32, Access::read_write, valid ? id : id | kNotValid);
   identifier.before_write = [this](std::int64_t value) { return check_identifier(value); };
   identifier.after_write = reconfigure;
 
@@ -42,8 +42,9 @@ SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number
   count.before_write = [this](std::int64_t value) { return check_count(value); };
   count.after_write = reconfigure;
   for (std::uint8_t i = 1; i <= 8; ++i) {
-    dictionary.add(mapping_, i, DataType::unsigned32, Access::read_write, 0).before_write =
-        [this](std::int64_t value) { return check_object(value); };
+    dictionary.add(mapping_, i, DataType::unsigned32, Access::read_write, 0).before_write = [this](std::int64_t value) {
+      return check_object(value);
+    };
   }
 }
 

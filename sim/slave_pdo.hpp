@@ -2,8 +2,8 @@
 //
 //   receive PDO n:  parameters 1400h + n − 1, mapping 1600h + n − 1, identifier 200h, 300h, 400h, 500h + node
 //   transmit PDO n: parameters 1800h + n − 1, mapping 1A00h + n − 1, identifier 180h, 280h, 380h, 480h + node
-//   parameters: 1 identifier (bit 31: PDO not valid), 2 transmission type, 3 inhibit time in 100 µs, 5 event timer in ms
-//   mapping:    0 number of objects, then index << 16 | subindex << 8 | bits each; bytes follow in that order
+//   parameters: 1 identifier (bit 31: PDO not valid), 2 transmission type, 3 inhibit time in 100 µs, 5 event timer in
+//   ms mapping:    0 number of objects, then index << 16 | subindex << 8 | bits each; bytes follow in that order
 #pragma once
 
 #include <array>
