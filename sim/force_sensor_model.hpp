@@ -41,12 +41,15 @@ class ForceSensorModel {
     std::int64_t start_ns = 0;
     Vec6 start = Vec6::Zero(), input = Vec6::Zero();
   };
+  [[nodiscard]] double decay(std::int64_t elapsed_ns) const noexcept;
   [[nodiscard]] Vec6 filtered(const Piece& piece, std::int64_t time_ns) const noexcept;
 
   Eigen::Matrix<double, 6, 6> gauges_per_unit_;  // matrix⁻¹ · counts per unit
   Vec6 bias_counts_, noise_deviation_;
   double rate_Hz_, time_constant_s_;
   std::uint64_t seed_;
+  std::int64_t step_ns_ = 0;  // steps are equal: the decay over one is kept
+  double step_decay_ = 1.0;
   Piece before_, now_;
 };
 

@@ -18,24 +18,27 @@
 
 namespace proxarm::sim {
 
+// The step of the mechanics is the shortest servo period of the cell (servo_rate_Hz), 0.25 ms by default.
 struct PlantConfig {
-  std::int64_t step_ns = 250'000;  // of the mechanics; servo periods are whole multiples of it
+  std::int64_t finer = 1;  // steps of the mechanics in the shortest servo period; more is slower and more accurate
   std::uint64_t noise_seed = 1;
 };
 
 class Plant {
  public:
   // At rest in the cell's start pose, brakes closed, drives off, at start_ns of the network's clock.
-  // Throws description::SetupError (see ArmDynamics, ForceSensorModel; servo rate that isn't 1/(n · step_ns)).
+  // Throws description::SetupError (see ArmDynamics, ForceSensorModel; servo rates whose periods aren't whole
+  // nanoseconds, or no multiples of the shortest).
   Plant(const description::Cell& cell, const description::SensorDescription& sensor,
         const description::HandDescription& hand, std::int64_t start_ns = 0, const PlantConfig& config = {});
 
-  // Runs all steps up to this time (the state then is that of the last step's end, at most step_ns before). Never goes
-  // back. noexcept, no allocation.
+  // Runs all steps up to this time (the state then is that of the last step's end, less than step_ns() before). Never
+  // goes back. noexcept, no allocation.
   void advance_to(std::int64_t time_ns) noexcept;
   [[nodiscard]] std::int64_t time_ns() const noexcept { return time_ns_; }  // of the state
 
   [[nodiscard]] std::size_t axis_count() const noexcept { return servos_.size(); }
+  [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
   // A brake opens when its servo is enabled and closes when it is disabled.
   [[nodiscard]] ServoLoop& servo(std::size_t axis) noexcept { return servos_[axis]; }
   [[nodiscard]] const ServoLoop& servo(std::size_t axis) const noexcept { return servos_[axis]; }
@@ -55,15 +58,15 @@ class Plant {
 
  private:
   void step() noexcept;
-  void apply() noexcept;
 
+  std::int64_t step_ns_;
   ArmDynamics arm_;
   Hand hand_;
   ForceSensorModel force_sensor_;
   std::vector<ServoLoop> servos_;
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<double> torque_Nm_;
-  std::int64_t start_ns_, time_ns_, step_ns_;
+  std::int64_t start_ns_, time_ns_;
   std::int64_t hand_start_ns_ = 0;
   bool hand_started_ = false;
 };

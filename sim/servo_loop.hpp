@@ -47,8 +47,8 @@ class ServoLoop {
 
   // 6064h, 6062h, 60F4h, and more, as of the last update().
   [[nodiscard]] std::int32_t position_counts() const noexcept { return counts_; }
-  [[nodiscard]] std::int32_t demand_counts() const noexcept { return to_counts(setpoint_rad_); }
-  [[nodiscard]] double following_error_rad() const noexcept { return setpoint_rad_ - angle_rad_; }
+  [[nodiscard]] std::int32_t demand_counts() const noexcept { return to_counts(setpoint_.position_rad); }
+  [[nodiscard]] double following_error_rad() const noexcept { return setpoint_.position_rad - angle_rad_; }
   [[nodiscard]] double speed_rad_per_s() const noexcept { return speed_; }
   [[nodiscard]] double torque_Nm() const noexcept { return torque_Nm_; }
   [[nodiscard]] bool limited() const noexcept { return limited_; }               // torque or speed at its limit
@@ -56,27 +56,33 @@ class ServoLoop {
 
  private:
   enum class Phase : std::uint8_t { hold, segment, stopping, torque };
+  struct Setpoint {
+    double position_rad = 0.0, speed = 0.0, feedforward_speed = 0.0, acceleration = 0.0;
+  };
 
   [[nodiscard]] std::int32_t to_counts(double joint_rad) const noexcept;
-  void interpolate(std::int64_t time_ns) noexcept;  // sets setpoint, its speed and acceleration
+  [[nodiscard]] double to_angle(std::int32_t counts) const noexcept;
+  [[nodiscard]] Setpoint on_segment(std::int64_t time_ns) const noexcept;
+  [[nodiscard]] Setpoint on_stop(std::int64_t time_ns) const noexcept;
+  void hold_here() noexcept;
+  void interpolate(std::int64_t time_ns) noexcept;
+  void begin_stop(double deceleration, std::int64_t time_ns) noexcept;
 
   // Fixed
   double counts_per_rad_, offset_counts_, max_torque_Nm_, max_speed_, max_deceleration_;
-  double rotor_inertia_, position_gain_, velocity_gain_, integral_gain_, velocity_feedforward_,
-      acceleration_feedforward_;
-  double servo_period_s_;
-  std::int64_t servo_period_ns_;
+  double rotor_inertia_, position_gain_, velocity_gain_, integral_gain_;
+  double velocity_feedforward_, acceleration_feedforward_, servo_period_s_;
   std::int64_t period_ns_ = 1'000'000;
 
-  // Setpoint
+  // Setpoint; segment_* also describe a stop: from where, with which speed, since when
   Phase phase_ = Phase::hold;
-  std::int64_t segment_start_ns_ = 0, segment_end_ns_ = 0, interpolated_ns_ = 0;
+  std::int64_t segment_start_ns_ = 0, segment_end_ns_ = 0;
   double segment_from_rad_ = 0.0, segment_speed_ = 0.0, previous_speed_ = 0.0;
-  double setpoint_rad_ = 0.0, setpoint_speed_ = 0.0, feedforward_speed_ = 0.0, setpoint_acceleration_ = 0.0;
   double stop_deceleration_ = 0.0, torque_target_Nm_ = 0.0;
+  Setpoint setpoint_;
 
   // Loop
-  bool powered_ = false, limited_ = false;
+  bool powered_ = false, limited_ = false, speed_limited_ = false;
   std::int32_t counts_ = 0;
   double angle_rad_ = 0.0, speed_ = 0.0, integral_Nm_ = 0.0, torque_Nm_ = 0.0;
 };

@@ -1,0 +1,23 @@
+// From a cell's URDF to MuJoCo's model of the links: the loader behind ArmDynamics.
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+
+#include "models/description/cell.hpp"
+
+namespace proxarm::sim {
+
+struct MujocoDelete {
+  void operator()(mjModel* model) const noexcept { mj_deleteModel(model); }
+  void operator()(mjData* data) const noexcept { mj_deleteData(data); }
+};
+using ModelPointer = std::unique_ptr<mjModel, MujocoDelete>;
+using DataPointer = std::unique_ptr<mjData, MujocoDelete>;
+
+// The links of the URDF, with the handle and the hand's point mass fixed to the sensor's link, in the base's frame
+// (gravity turned into it). Shapes are left out: nothing collides here. Throws description::SetupError.
+ModelPointer load_links(const description::Cell& cell, double hand_mass_kg);
+
+}  // namespace proxarm::sim
