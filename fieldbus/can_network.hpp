@@ -47,7 +47,8 @@ class CanBus {
   [[nodiscard]] virtual const std::string& name() const noexcept = 0;  // of the interface: "vcan0", or the cell's name
 };
 
-// The buses of a cell and their clock, in nanoseconds; its zero means nothing (CLOCK_MONOTONIC, or start of simulation).
+// The buses of a cell and their clock, in nanoseconds; its zero means nothing (CLOCK_MONOTONIC, or start of
+// simulation).
 class CanNetwork {
  public:
   CanNetwork() = default;
