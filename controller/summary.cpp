@@ -1,0 +1,240 @@
+#include "controller/summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+#include "controller/apparent_mass.hpp"
+#include "controller/setpoint_hash.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+
+constexpr double shortest_slide_s = 0.1;
+
+// Durations up to 1 ms in bins of 10 ns, so that a median over hours needs no more memory than one over seconds.
+class Durations {
+ public:
+  void add(std::int64_t ns) {
+    const std::int64_t bin = std::clamp<std::int64_t>(ns / 10, 0, static_cast<std::int64_t>(bins_.size()) - 1);
+    ++bins_[static_cast<std::size_t>(bin)];
+    ++count_;
+    max_ns_ = std::max(max_ns_, ns);
+  }
+
+  // The duration that a fraction of all don't exceed, in µs; past the last bin the longest.
+  [[nodiscard]] double quantile_us(double fraction) const {
+    if (count_ == 0) return 0.0;
+    const auto rank = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
+    std::uint64_t seen = 0;
+    for (std::size_t i = 0; i + 1 < bins_.size(); ++i) {
+      seen += bins_[i];
+      if (seen >= rank) return std::min(0.01 * static_cast<double>(i) + 0.005, max_us());
+    }
+    return max_us();
+  }
+  [[nodiscard]] double max_us() const { return 1e-3 * static_cast<double>(max_ns_); }
+
+ private:
+  std::vector<std::uint32_t> bins_ = std::vector<std::uint32_t>(100'000);
+  std::uint64_t count_ = 0;
+  std::int64_t max_ns_ = 0;
+};
+
+// Root mean square and maximum of a stream.
+struct Spread {
+  double sum_of_squares = 0.0, max = 0.0;
+  std::uint64_t count = 0;
+
+  void add(double value) {
+    sum_of_squares += value * value;
+    max = std::max(max, std::abs(value));
+    ++count;
+  }
+  [[nodiscard]] std::optional<double> rms() const {
+    if (count == 0) return std::nullopt;
+    return std::sqrt(sum_of_squares / static_cast<double>(count));
+  }
+  [[nodiscard]] std::optional<double> largest() const { return count == 0 ? std::nullopt : std::optional(max); }
+};
+
+struct Slide {
+  double tangential = 0.0, limit = 0.0, length_s = 0.0;
+};
+
+constexpr std::uint32_t limit_flags =
+    static_cast<std::uint32_t>(RecordFlag::limit_speed) | static_cast<std::uint32_t>(RecordFlag::limit_acceleration) |
+    static_cast<std::uint32_t>(RecordFlag::limit_workspace) | static_cast<std::uint32_t>(RecordFlag::limit_joint) |
+    static_cast<std::uint32_t>(RecordFlag::limit_leash) | static_cast<std::uint32_t>(RecordFlag::limit_orientation);
+
+}  // namespace
+
+struct SummaryBuilder::State {
+  explicit State(const SummaryConfig& c) : config(c), apparent(c.period_s) {}
+
+  void count(const CycleRecord& record);
+  void track(const CycleRecord& record);
+  void penetrate(const CycleRecord& record);
+  void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
+  void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
+  void end_slide();
+
+  SummaryConfig config;
+  Summary summary;
+  SetpointHash hash;
+  Durations durations;
+  Spread tracking, contact_force;
+  ApparentMass apparent;
+  Slide current_slide;
+  std::optional<double> worst_slide;
+  double contact_s = 0.0;          // how long the contact has lasted
+  std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
+};
+
+SummaryBuilder::SummaryBuilder(const SummaryConfig& config) : state_(std::make_unique<State>(config)) {}
+SummaryBuilder::~SummaryBuilder() = default;
+SummaryBuilder::SummaryBuilder(SummaryBuilder&&) noexcept = default;
+SummaryBuilder& SummaryBuilder::operator=(SummaryBuilder&&) noexcept = default;
+
+void SummaryBuilder::add(const CycleRecord& record) {
+  State& s = *state_;
+  s.count(record);
+  const bool follows = !s.recent.empty() && s.recent.back().cycle + 1 == record.cycle;
+  if (record.phase != Phase::rendering || !follows) {
+    s.recent.clear();
+    s.apparent.end_segment();
+    s.end_slide();
+    s.contact_s = 0.0;
+  }
+  if (record.phase != Phase::rendering) return;
+  s.summary.rendered_time_s += s.config.period_s;
+  s.recent.push_back(record);
+  s.penetrate(record);
+  s.track(record);
+  const std::size_t n = s.recent.size();
+  if (n >= 3) s.middle(s.recent[n - 3], s.recent[n - 2], s.recent[n - 1]);
+  const auto kept = static_cast<std::size_t>(std::max(s.config.setpoint_delay_cycles, 2)) + 1;
+  if (n > kept) s.recent.pop_front();
+}
+
+// What is counted in every phase.
+void SummaryBuilder::State::count(const CycleRecord& record) {
+  ++summary.cycles;
+  summary.simulated_time_s = static_cast<double>(summary.cycles) * config.period_s;
+  hash.add({record.target_counts.data(), std::min<std::size_t>(record.axes, max_axes)});
+  durations.add(record.compute_ns);
+  if (record.has(RecordFlag::overrun)) ++summary.overruns;
+  if (record.phase != Phase::rendering) return;
+  if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
+  if ((record.flags & limit_flags) != 0) ++summary.limited_cycles;
+  if (record.has(RecordFlag::truth)) summary.from_truth = true;
+}
+
+void SummaryBuilder::State::penetrate(const CycleRecord& record) {
+  if (record.contact == ContactPhase::free) {
+    contact_s = 0.0;
+  } else {
+    if (contact_s == 0.0) ++summary.contacts;
+    contact_s += config.period_s;
+    summary.contact_time_s += config.period_s;
+    if (record.contact == ContactPhase::slip) summary.sliding_time_s += config.period_s;
+    summary.pulling_force_max_N =
+        std::max(summary.pulling_force_max_N, -vec3(record.normal_W).dot(vec3(record.contact_force_W_N)));
+  }
+  summary.penetration_max_m = std::max(summary.penetration_max_m, -record.proxy_clearance_m);
+  const double depth = -record.tool_clearance_m;
+  summary.tool_penetration_max_m = std::max(summary.tool_penetration_max_m, depth);
+  if (contact_s > 0.0 && contact_s <= config.touch_s) {
+    summary.tool_penetration_touch_max_m = std::max(summary.tool_penetration_touch_max_m, depth);
+  } else if (record.contact == ContactPhase::slip) {
+    summary.tool_penetration_sliding_max_m = std::max(summary.tool_penetration_sliding_max_m, depth);
+  }
+}
+
+void SummaryBuilder::State::track(const CycleRecord& record) {
+  const auto delay = static_cast<std::size_t>(std::max(config.setpoint_delay_cycles, 0));
+  if (recent.size() <= delay) return;
+  const CycleRecord& due = recent[recent.size() - 1 - delay];
+  const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+  tracking.add((vec3(tool) - vec3(due.proxy_W_m)).norm());
+}
+
+// What needs derivatives: of the record before last, from its neighbours.
+void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after) {
+  const double T = config.period_s, m = config.handle_mass_kg, M = config.felt_mass_kg, B = config.damping_Ns_per_m;
+  const bool truth = before.has(RecordFlag::truth) && now.has(RecordFlag::truth) && after.has(RecordFlag::truth);
+  const auto tool = [truth](const CycleRecord& r) { return vec3(truth ? r.true_tool_W_m : r.tool_W_m); };
+  const Vec3 x = tool(now), v = (tool(after) - tool(before)) / (2.0 * T);
+  const Vec3 a = (tool(after) - 2.0 * x + tool(before)) / (T * T);
+  const Vec3 hand = truth ? vec3(now.hand_force_W_N) : Vec3(vec3(now.force_W_N) + m * a);
+
+  if (now.contact == ContactPhase::free) {
+    apparent.add(hand, x);
+    end_slide();
+    return;
+  }
+  apparent.end_segment();
+  // `contact_s` is that of `after`: one period more than that of `now`, unless the contact ends there.
+  const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
+  if (!established) {
+    end_slide();
+    return;
+  }
+  // (24): M_p ∇²q(k)/T² + B ∇q(k)/T = h(k) + f(k), with the differences that end at q(k).
+  const std::size_t i = recent.size() - 2;
+  const Vec3 q = vec3(now.proxy_W_m), q1 = vec3(before.proxy_W_m);
+  const Vec3 q2 = i >= 2 ? vec3(recent[i - 2].proxy_W_m) : q1;
+  const Vec3 n = vec3(now.normal_W);
+  if (i >= 2) {
+    const Vec3 a_q = (q - 2.0 * q1 + q2) / (T * T), v_q = (q - q1) / T;
+    const double push = -n.dot(hand - m * a - (M - m) * a_q - B * v_q);
+    contact_force.add(n.dot(vec3(now.contact_force_W_N)) - push);
+  }
+  slide(before, now, hand - M * a - B * v);
+}
+
+void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance) {
+  if (now.contact != ContactPhase::slip || !(now.friction > 0.0)) {
+    end_slide();
+    return;
+  }
+  const Vec3 n = vec3(now.normal_W);
+  const Vec3 step = vec3(now.proxy_W_m) - vec3(before.proxy_W_m);
+  const Vec3 along = step - n.dot(step) * n;
+  if (!(along.norm() > 0.0)) return;
+  current_slide.tangential += resistance.dot(along.normalized());
+  current_slide.limit += -now.friction * n.dot(resistance);
+  current_slide.length_s += config.period_s;
+}
+
+void SummaryBuilder::State::end_slide() {
+  if (current_slide.length_s >= shortest_slide_s && current_slide.limit > 0.0) {
+    const double error = current_slide.tangential / current_slide.limit - 1.0;
+    if (!worst_slide || std::abs(error) > std::abs(*worst_slide)) worst_slide = error;
+  }
+  current_slide = {};
+}
+
+Summary SummaryBuilder::finish() {
+  State& s = *state_;
+  s.apparent.end_segment();
+  s.end_slide();
+  Summary summary = s.summary;
+  summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
+  summary.tracking_rms_m = s.tracking.rms();
+  summary.tracking_max_m = s.tracking.largest();
+  if (const auto apparent = s.apparent.estimate()) {
+    summary.apparent_mass_kg = apparent->mass_kg;
+    summary.apparent_damping_Ns_per_m = apparent->damping_Ns_per_m;
+  }
+  summary.contact_force_error_N = s.contact_force.rms();
+  summary.contact_force_error_max_N = s.contact_force.largest();
+  summary.friction_ratio_error = s.worst_slide;
+  summary.setpoint_sha256 = s.hash.hex();
+  summary.felt_mass_kg = s.config.felt_mass_kg;
+  return summary;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,115 @@
+// The figures of a session: what was rendered, how well, and how fast it was computed.
+//
+// SummaryBuilder sees every cycle's record once, in order, and keeps little of it; finish() gives the figures. Not for
+// the cycle. Unless it says otherwise, a figure is over cycles of Phase::rendering. Where nothing happened that a
+// figure could be taken from, it is absent (null in JSON).
+//
+// "Hand's force" F_h and "tool" x are the simulation's truth where the records hold it; else F_h is the measured force,
+// compensated, plus the handle's inertia (which the sensor doesn't see: it sits before the handle), and x comes from
+// the encoders. `source` says which. a, v: central differences of x. n: contact normal of the record; f: (25a).
+//
+//   penetration_max_m       max(0, −signed distance of the proxy)
+//   tool_penetration_max_m  the same of the tool; …_touch_… within the first touch_s of a contact, …_sliding_… after
+//   that
+//                           while the proxy slips
+//   tracking_rms_m, _max_m  ‖x(t_k) − q(k − delay)‖, delay = 2 cycles: a target sent in cycle k is latched at SYNC k+1
+//   and,
+//                           interpolated, reached at k+2
+//   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, apparent_damping_Ns_per_m its Im
+//   (apparent_mass.hpp) contact_force_error_N   root mean square, over cycles of established contact, of n·f − push,
+//   where
+//                           push = −n·(F_h − m a − M_p a_q − B v_q): m the handle's mass, M_p the proxy's, a_q and v_q
+//                           the proxy's own (zero along n on a flat wall). "Established": touch_s after the contact
+//                           began, so impact steps are apart
+//   friction_ratio_error    t·R / (−μ n·R) − 1 with R = F_h − M a − B v, M = m + M_p what the hand feels, t the
+//   direction of
+//                           the slide: summed over a slide (established contact, slipping, at least 0.1 s), the slide
+//                           with the largest error
+//   pulling_force_max_N     max(0, −n·f) over all cycles in contact
+//   setpoint_sha256         all target counts of all cycles (setpoint_hash.hpp), whatever the phase
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/cycle_record.hpp"
+#include "controller/fault.hpp"
+
+namespace proxarm::controller {
+
+struct SummaryConfig {
+  double period_s = 1e-3;
+  double felt_mass_kg = 4.0;      // M: proxy and handle
+  double handle_mass_kg = 0.0;    // m: what moves after the sensor
+  double damping_Ns_per_m = 0.0;  // B
+  int setpoint_delay_cycles = 2;
+  double touch_s = 0.1;  // how long a contact counts as a touch
+};
+
+struct FaultSummary {
+  Fault fault = Fault::none;
+  std::uint64_t cycle = 0;
+  std::string text;  // describe()
+};
+
+struct ComputeTime {
+  double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns, below 1 ms
+};
+
+struct Summary {
+  double simulated_time_s = 0.0;  // all cycles, whatever the phase
+  double rendered_time_s = 0.0;
+  double wall_time_s = 0.0;  // set by the caller
+  std::uint64_t cycles = 0;
+  std::uint64_t overruns = 0;              // all phases
+  ComputeTime compute_us;                  // all phases
+  std::map<std::string, double> bus_load;  // set by the caller
+  double penetration_max_m = 0.0;
+  double tool_penetration_max_m = 0.0;
+  double tool_penetration_touch_max_m = 0.0;
+  double tool_penetration_sliding_max_m = 0.0;
+  std::optional<double> tracking_rms_m, tracking_max_m;
+  std::optional<double> apparent_mass_kg, apparent_damping_Ns_per_m;
+  std::optional<double> contact_force_error_N, contact_force_error_max_N;
+  std::optional<double> friction_ratio_error;
+  double pulling_force_max_N = 0.0;
+  double contact_time_s = 0.0, sliding_time_s = 0.0;
+  std::uint64_t contacts = 0;        // how often the proxy came to touch
+  std::uint64_t limited_cycles = 0;  // some limit was active
+  std::uint64_t held_samples = 0;    // cycles without a new sample of the sensor
+  std::vector<FaultSummary> faults;  // set by the caller
+  bool from_truth = false;
+  std::string setpoint_sha256;
+  double felt_mass_kg = 0.0;  // as configured, for comparison
+};
+
+class SummaryBuilder {
+ public:
+  explicit SummaryBuilder(const SummaryConfig& config);
+  ~SummaryBuilder();
+  SummaryBuilder(SummaryBuilder&&) noexcept;
+  SummaryBuilder& operator=(SummaryBuilder&&) noexcept;
+
+  void add(const CycleRecord& record);
+  // Of all that was added. More may be added afterwards, but segments and slides are cut here.
+  [[nodiscard]] Summary finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// One JSON object on one line: everything, for `--json`.
+std::string summary_json(const Summary& summary);
+// For files: all that is the same in two runs with the same input, and the wall-clock figures, each on lines of their
+// own.
+std::string repeatable_json(const Summary& summary);
+std::string timing_json(const Summary& summary);
+// For people: a table of some twenty lines.
+std::string summary_text(const Summary& summary);
+
+}  // namespace proxarm::controller

@@ -1,0 +1,144 @@
+// The summary for programs and for people.
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "controller/summary.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json faults(const Summary& summary) {
+  Json list = Json::array();
+  for (const FaultSummary& fault : summary.faults) {
+    list.push_back({{"fault", fault_name(fault.fault)}, {"cycle", fault.cycle}, {"text", fault.text}});
+  }
+  return list;
+}
+
+void add_timing(Json& json, const Summary& s) {
+  json["wall_time_s"] = s.wall_time_s;
+  json["overruns"] = s.overruns;
+  json["compute_us"] = {{"median", s.compute_us.median}, {"p99", s.compute_us.p99}, {"max", s.compute_us.max}};
+}
+
+void add_repeatable(Json& json, const Summary& s) {
+  json["bus_load"] = Json::object();
+  for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
+  json["penetration_max_m"] = s.penetration_max_m;
+  json["tool_penetration_max_m"] = s.tool_penetration_max_m;
+  json["tool_penetration_touch_max_m"] = s.tool_penetration_touch_max_m;
+  json["tool_penetration_sliding_max_m"] = s.tool_penetration_sliding_max_m;
+  json["tracking_rms_m"] = optional_number(s.tracking_rms_m);
+  json["tracking_max_m"] = optional_number(s.tracking_max_m);
+  json["felt_mass_kg"] = s.felt_mass_kg;
+  json["apparent_mass_kg"] = optional_number(s.apparent_mass_kg);
+  json["apparent_damping_Ns_per_m"] = optional_number(s.apparent_damping_Ns_per_m);
+  json["contact_force_error_N"] = optional_number(s.contact_force_error_N);
+  json["contact_force_error_max_N"] = optional_number(s.contact_force_error_max_N);
+  json["friction_ratio_error"] = optional_number(s.friction_ratio_error);
+  json["pulling_force_max_N"] = s.pulling_force_max_N;
+  json["rendered_time_s"] = s.rendered_time_s;
+  json["contact_time_s"] = s.contact_time_s;
+  json["sliding_time_s"] = s.sliding_time_s;
+  json["contacts"] = s.contacts;
+  json["limited_cycles"] = s.limited_cycles;
+  json["held_samples"] = s.held_samples;
+  json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
+  json["faults"] = faults(s);
+  json["setpoint_sha256"] = s.setpoint_sha256;
+}
+
+std::string format(const char* pattern, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+// A length with the unit that makes it readable: "12.3 µm", "0.45 mm", "0 m".
+std::string length(const std::optional<double>& metres) {
+  if (!metres) return "none";
+  const double size = std::abs(*metres);
+  if (size == 0.0) return "0";
+  if (size < 1e-9) return format("%.2g m", *metres);
+  if (size < 1e-6) return format("%.3g nm", *metres * 1e9);
+  if (size < 1e-3) return format("%.3g µm", *metres * 1e6);
+  if (size < 1.0) return format("%.3g mm", *metres * 1e3);
+  return format("%.3f m", *metres);
+}
+
+std::string number(const std::optional<double>& value, const char* pattern) {
+  return value ? format(pattern, *value) : "none";
+}
+
+}  // namespace
+
+std::string summary_json(const Summary& s) {
+  Json json;
+  json["simulated_time_s"] = s.simulated_time_s;
+  json["cycles"] = s.cycles;
+  add_timing(json, s);
+  add_repeatable(json, s);
+  return json.dump() + "\n";
+}
+
+std::string repeatable_json(const Summary& s) {
+  Json json;
+  json["simulated_time_s"] = s.simulated_time_s;
+  json["cycles"] = s.cycles;
+  add_repeatable(json, s);
+  return json.dump(2) + "\n";
+}
+
+std::string timing_json(const Summary& s) {
+  Json json;
+  add_timing(json, s);
+  return json.dump(2) + "\n";
+}
+
+std::string summary_text(const Summary& s) {
+  std::string text;
+  const auto line = [&text](const char* name, const std::string& value) {
+    text += "  ";
+    text += name;
+    text.append(name[0] == '\0' ? 0 : 1, ':');
+    const std::size_t width = std::char_traits<char>::length(name) + 1;
+    text.append(width < 26 ? 26 - width : 1, ' ');
+    text += value + "\n";
+  };
+  line("time", format("%.3f s in ", s.simulated_time_s) + std::to_string(s.cycles) + " cycles, " +
+                   format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s", s.wall_time_s));
+  line("compute per cycle", format("median %.1f, ", s.compute_us.median) + format("p99 %.1f, ", s.compute_us.p99) +
+                                format("max %.1f µs; overruns ", s.compute_us.max) + std::to_string(s.overruns));
+  std::string loads;
+  for (const auto& [bus, load] : s.bus_load)
+    loads += (loads.empty() ? "" : ", ") + bus + format(" %.1f %%", 100 * load);
+  if (!loads.empty()) line("bus load", loads);
+  line("felt mass",
+       number(s.apparent_mass_kg, "%.3f kg") + format(", wanted %.3f kg", s.felt_mass_kg) +
+           (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : ""));
+  line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m));
+  line("contact", std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
+                      format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s));
+  line("penetration, proxy", length(s.penetration_max_m));
+  line("penetration, tool", length(s.tool_penetration_max_m) + "; at the touch " +
+                                length(s.tool_penetration_touch_max_m) + ", sliding " +
+                                length(s.tool_penetration_sliding_max_m));
+  line("contact force error",
+       "rms " + number(s.contact_force_error_N, "%.3f N") + ", max " + number(s.contact_force_error_max_N, "%.3f N"));
+  line("friction ratio error", s.friction_ratio_error ? format("%+.2f %%", 100 * *s.friction_ratio_error) : "none");
+  line("pulling force", format("%.3g N", s.pulling_force_max_N));
+  if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
+  if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
+  line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
+  line("setpoints (SHA-256)", s.setpoint_sha256);
+  if (s.faults.empty()) line("faults", "none");
+  for (const FaultSummary& fault : s.faults) line("FAULT", fault.text);
+  return text;
+}
+
+}  // namespace proxarm::controller
