@@ -1,0 +1,18 @@
+// The address of one entry of a CANopen object dictionary, and how messages to the user write it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace proxarm::fieldbus {
+
+struct ObjectAddress {
+  std::uint16_t index = 0;
+  std::uint8_t sub = 0;
+  friend bool operator==(const ObjectAddress&, const ObjectAddress&) = default;
+};
+
+[[nodiscard]] std::string to_string(ObjectAddress object);            // "60C2h:01"
+[[nodiscard]] std::string hex_text(std::uint64_t value, int digits);  // "0x00020192"
+
+}  // namespace proxarm::fieldbus

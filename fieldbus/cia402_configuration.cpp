@@ -1,0 +1,213 @@
+// What a CiA 402 drive is told before the cycle, and what is said of it in words.
+#include <cstdio>
+
+#include "fieldbus/canopen_pdo.hpp"
+#include "fieldbus/canopen_sync.hpp"
+#include "fieldbus/cia402_drive.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+using description::number_text;
+using description::SetupError;
+
+constexpr std::uint8_t csp = 8;
+constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
+
+constexpr const char* period_advice =
+    "take a period of one to three digits of microseconds or milliseconds, such as 0.5ms, 1ms, 2ms, 4ms";
+
+const DriveSettings& checked(const DriveSettings& settings) {
+  settings.validate();
+  return settings;
+}
+
+std::string period_text(std::int64_t period_ns) { return number_text(static_cast<double>(period_ns) * 1e-6) + " ms"; }
+
+[[noreturn]] void refuse(const description::DriveDescription& drive, const std::string& key, std::string found,
+                         std::string expected) {
+  throw SetupError({.bus = drive.bus,
+                    .node = drive.node,
+                    .key = "drive of " + drive.joint + ": " + key,
+                    .found = std::move(found),
+                    .expected = std::move(expected)});
+}
+
+std::uint16_t rpdo_timeout_ms(const DriveSettings& settings) noexcept {
+  const std::int64_t timeout_ns = settings.period_ns * settings.rpdo_timeout_periods;
+  return static_cast<std::uint16_t>((timeout_ns + 999'999) / 1'000'000);
+}
+
+std::uint32_t as_u8(std::int8_t value) noexcept { return static_cast<std::uint8_t>(value); }
+
+void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
+  steps.insert(steps.end(), more.begin(), more.end());
+}
+
+void append_identity(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
+  // The first step is also the one that finds out whether the node is there at all.
+  steps.push_back(
+      sdo_expect({0x1000, 0}, 4, drive.device_type, "device type",
+                 "is another device set to this node, or is device_type in the cell's file not this drive's?"));
+  steps.push_back(sdo_read({0x1018, 1}, 4, "vendor-ID"));
+  steps.push_back(optional(sdo_read({0x1018, 2}, 4, "product code")));
+  steps.push_back(optional(sdo_read({0x1018, 3}, 4, "revision number")));
+  steps.push_back(optional(sdo_read({0x1018, 4}, 4, "serial number")));
+  constexpr std::uint32_t csp_supported = 1U << (csp - 1);
+  steps.push_back(sdo_expect({0x6502, 0}, 4, csp_supported, "supported drive modes",
+                             "the drive can't do cyclic synchronous position (mode 8)", csp_supported));
+}
+
+// Quiet first: nothing but what the cycle needs may be on the bus.
+void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, std::uint16_t timeout_ms) {
+  for (std::uint8_t number = 2; number <= 4; ++number) {
+    steps.push_back(disable_pdo_step(PdoDirection::receive, number, node));
+    steps.push_back(disable_pdo_step(PdoDirection::transmit, number, node));
+  }
+  append(steps, pdo_steps({.direction = PdoDirection::receive,
+                           .number = 1,
+                           .id = pdo_id(PdoDirection::receive, 1, node),
+                           .transmission_type = every_sync,
+                           .event_timer_ms = timeout_ms,
+                           .mapping = {{{0x6040, 0}, 16}, {{0x607A, 0}, 32}}}));
+  append(steps, pdo_steps({.direction = PdoDirection::transmit,
+                           .number = 1,
+                           .id = pdo_id(PdoDirection::transmit, 1, node),
+                           .transmission_type = every_sync,
+                           .event_timer_ms = 0,
+                           .mapping = {{{0x6041, 0}, 16}, {{0x6064, 0}, 32}}}));
+}
+
+// What the drive does when we are gone or when it is told to stop. 1016h and 6007h are a must, since they are what
+// stops the arm when the controller dies; the others have defaults in the standard that stop it too.
+void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings) {
+  const std::uint32_t consumer =
+      static_cast<std::uint32_t>(settings.master_node) << 16 | settings.master_heartbeat_timeout_ms;
+  steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
+  steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
+  steps.push_back(optional(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
+  steps.push_back(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"));
+  steps.push_back(optional(sdo_write({0x605A, 0}, 2, 2, "quick stop option code (quick-stop ramp, then disabled)")));
+  steps.push_back(optional(sdo_write({0x605B, 0}, 2, 1, "shutdown option code (slow down, then disable)")));
+  steps.push_back(optional(sdo_write({0x605C, 0}, 2, 1, "disable operation option code (slow down, then disable)")));
+  steps.push_back(optional(sdo_write({0x605D, 0}, 2, 1, "halt option code (slow down on ramp)")));
+  steps.push_back(optional(sdo_write({0x605E, 0}, 2, 2, "fault reaction option code (quick-stop ramp)")));
+}
+
+}  // namespace
+
+void DriveSettings::validate() const {
+  const auto refuse_setting = [](const char* key, std::string found, std::string expected, std::string advice = "") {
+    throw SetupError(
+        {.key = key, .found = std::move(found), .expected = std::move(expected), .advice = std::move(advice)});
+  };
+  if (!interpolation_period(period_ns) || !sync_period_us(period_ns)) {
+    refuse_setting(
+        "timestep", period_text(period_ns),
+        "a period that the drives can hold exactly: 1..255 times a power of ten of seconds (60C2h) and whole "
+        "microseconds (1006h)",
+        period_advice);
+  }
+  if (master_node < 1 || master_node > 127) refuse_setting("master_node", std::to_string(master_node), "1 to 127");
+  if (master_heartbeat_ms < 1 || master_heartbeat_timeout_ms <= master_heartbeat_ms) {
+    refuse_setting("master_heartbeat_timeout_ms", std::to_string(master_heartbeat_timeout_ms),
+                   "more than the heartbeat's own " + std::to_string(master_heartbeat_ms) + " ms");
+  }
+  if (drive_heartbeat_ms < 1 || drive_heartbeat_timeout_ms <= drive_heartbeat_ms) {
+    refuse_setting("drive_heartbeat_timeout_ms", std::to_string(drive_heartbeat_timeout_ms),
+                   "more than the heartbeat's own " + std::to_string(drive_heartbeat_ms) + " ms");
+  }
+  if (rpdo_timeout_periods < 2 || period_ns * rpdo_timeout_periods > 65'535'000'000) {
+    refuse_setting("rpdo_timeout_periods", std::to_string(rpdo_timeout_periods),
+                   "2 or more, and at most 65.535 s in all");
+  }
+  if (!(following_error_window_rad > 0.0)) {
+    refuse_setting("following_error_window_rad", number_text(following_error_window_rad), "more than 0 rad");
+  }
+}
+
+ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings)
+    : description_(drive),
+      settings_(checked(settings)),
+      scale_(drive),
+      heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
+  if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
+  if (drive.node == settings.master_node) {
+    refuse(drive, "node", std::to_string(drive.node), "a number other than the controller's own");
+  }
+  if (drive.profile != "cia402") refuse(drive, "profile", description::in_quotes(drive.profile), "cia402");
+  if (drive.mode != "csp") refuse(drive, "mode", description::in_quotes(drive.mode), "csp");
+  if (!scale_.size_counts(settings.following_error_window_rad)) {
+    refuse(drive, "following_error_window_rad", number_text(settings.following_error_window_rad),
+           "a window whose counts fit 32 bits");
+  }
+}
+
+std::vector<SdoStep> ServoDrive::configuration_steps() const {
+  const auto period = *interpolation_period(settings_.period_ns);
+  std::vector<SdoStep> steps;
+  append_identity(steps, description_);
+  append_pdos(steps, node(), rpdo_timeout_ms(settings_));
+  steps.push_back(sdo_write({0x60C2, 1}, 1, period.units, "interpolation time period value"));
+  steps.push_back(sdo_write({0x60C2, 2}, 1, as_u8(period.exponent), "interpolation time index"));
+  steps.push_back(
+      optional(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
+  append_reactions(steps, settings_);
+  // Ramps of the stops above, in counts/s² (the profile's default unit).
+  if (const auto ramp = scale_.size_counts(description_.max_acceleration_rad_per_s2); ramp && *ramp > 0) {
+    steps.push_back(optional(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
+    steps.push_back(optional(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
+  }
+  steps.push_back(
+      sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"));
+  steps.push_back(optional(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
+  steps.push_back(sdo_write({0x6060, 0}, 1, csp, "modes of operation"));
+  SdoStep display = sdo_expect({0x6061, 0}, 1, csp, "modes of operation display",
+                               "the drive took mode 8 (cyclic synchronous position) but didn't change to it");
+  display.patience_ns = mode_patience_ns;
+  steps.push_back(display);
+  return steps;
+}
+
+std::string ServoDrive::describe() const {
+  std::string text = "drive of " + description_.joint + " (bus " + description_.bus + ", node " +
+                     std::to_string(description_.node) + "): ";
+  if (!heard_) {
+    text += "no TPDO yet";
+  } else {
+    text += std::string(to_string(state_)) + " (statusword " + hex_text(statusword_, 4) + ")";
+  }
+  if (following_error()) text += ", following error";
+  if (internal_limit()) text += ", internal limit active";
+  if (fault_ != DriveFault::none) text += std::string("; ") + to_string(fault_);
+  if (emergencies_ > 0) text += "; last " + fieldbus::describe(emergency_);
+  return text;
+}
+
+const char* to_string(DriveFault fault) noexcept {
+  switch (fault) {
+    case DriveFault::none:
+      return "no fault";
+    case DriveFault::state_fault:
+      return "the drive reports a fault";
+    case DriveFault::left_operation:
+      return "the drive left operation enabled by itself";
+    case DriveFault::emergency:
+      return "the drive sent an emergency message";
+    case DriveFault::heartbeat_lost:
+      return "the drive's heartbeat is lost";
+    case DriveFault::restarted:
+      return "the drive was restarted and has lost its configuration";
+    case DriveFault::not_operational:
+      return "the drive was taken out of operational by another NMT command or by its own error behaviour";
+    case DriveFault::pdo_short:
+      return "the drive sent a TPDO shorter than its mapping";
+    case DriveFault::not_remote:
+      return "the drive is under local control";
+    case DriveFault::target_out_of_range:
+      return "a target did not fit the drive's 32-bit counts";
+  }
+  return "unknown fault";
+}
+
+}  // namespace proxarm::fieldbus

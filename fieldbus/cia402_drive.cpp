@@ -1,0 +1,126 @@
+#include "fieldbus/cia402_drive.hpp"
+
+#include "fieldbus/byte_order.hpp"
+#include "fieldbus/canopen_pdo.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+constexpr std::uint8_t pdo_bytes = 6;   // 16 bits of word, 32 bits of position
+constexpr int syncs_before_enable = 3;  // that must have latched target = actual before 0F
+
+}  // namespace
+
+std::array<std::uint32_t, 4> ServoDrive::wanted_ids() const noexcept {
+  return {pdo_id(PdoDirection::transmit, 1, node()), emcy_id(node()), SdoClient::answer_id(node()),
+          heartbeat_id(node())};
+}
+
+void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
+  cycling_ = true;
+  heartbeat_.restart(now_ns);
+  boot_ups_at_start_ = heartbeat_.boot_ups();
+  cycles_without_tpdo_ = 0;
+}
+
+void ServoDrive::raise(DriveFault fault, std::int64_t time_ns) noexcept {
+  if (fault_ != DriveFault::none) return;
+  fault_ = fault;
+  fault_time_ns_ = time_ns;
+}
+
+void ServoDrive::on_sync(std::int64_t now_ns) noexcept {
+  // The drive latches the RPDO sent before this SYNC.
+  if (held_pending_) ++held_;
+  held_pending_ = false;
+  if (!fresh_ && cycles_without_tpdo_ < UINT32_MAX) ++cycles_without_tpdo_;
+  fresh_ = false;
+  if (cycling_ && heartbeat_.lost(now_ns)) raise(DriveFault::heartbeat_lost, now_ns);
+}
+
+bool ServoDrive::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept {
+  if (frame.extended || frame.remote || frame.error) return false;
+  if (frame.id == pdo_id(PdoDirection::transmit, 1, node())) return decode_tpdo(frame, time_ns);
+  if (Emergency emergency; decode_emcy(frame, time_ns, node(), emergency)) {
+    if (emergency.code == 0) return true;  // an error is over; the latest one stays readable
+    emergency_ = emergency;
+    ++emergencies_;
+    if (cycling_ && goal_ == DriveGoal::operation_enabled && !old_fault_) raise(DriveFault::emergency, time_ns);
+    return true;
+  }
+  if (heartbeat_.on_frame(frame, time_ns)) {
+    if (!cycling_) return true;
+    if (heartbeat_.boot_ups() != boot_ups_at_start_) {
+      raise(DriveFault::restarted, time_ns);
+    } else if (heartbeat_.state() != NmtState::operational) {
+      raise(DriveFault::not_operational, time_ns);
+    }
+    return true;
+  }
+  return false;
+}
+
+bool ServoDrive::decode_tpdo(const CanFrame& frame, std::int64_t time_ns) noexcept {
+  if (frame.length < pdo_bytes) {
+    raise(DriveFault::pdo_short, time_ns);
+    return true;
+  }
+  if (fresh_) ++repeated_tpdos_;
+  statusword_ = read_u16_le(&frame.data[0]);
+  actual_counts_ = read_i32_le(&frame.data[2]);
+  tpdo_time_ns_ = time_ns;
+  cycles_without_tpdo_ = 0;
+  fresh_ = heard_ = true;
+
+  const bool was_enabled = state_ == DriveState::operation_enabled;
+  state_ = decode_state(statusword_);
+  const bool enabled = state_ == DriveState::operation_enabled;
+  if (state_ != DriveState::switched_on) held_ = 0;
+  // Once it follows, it is commanded until it leaves operation enabled: bit 12 may drop at a limit.
+  following_ = enabled && (following_ || follows_command());
+  if (goal_ == DriveGoal::operation_enabled) judge_state(was_enabled, time_ns);
+  return true;
+}
+
+void ServoDrive::judge_state(bool was_enabled, std::int64_t time_ns) noexcept {
+  const bool enabled = state_ == DriveState::operation_enabled;
+  const bool faulty = state_ == DriveState::fault || state_ == DriveState::fault_reaction_active;
+  if (!faulty) old_fault_ = false;
+  if (faulty && !old_fault_) {
+    raise(DriveFault::state_fault, time_ns);
+  } else if (was_enabled && !enabled) {
+    raise(DriveFault::left_operation, time_ns);
+  } else if (enabled && (statusword_ & statusword::remote) == 0) {
+    raise(DriveFault::not_remote, time_ns);
+  }
+}
+
+bool ServoDrive::set_target_rad(double angle_rad) noexcept {
+  if (!following_) return false;
+  const auto counts = scale_.counts(angle_rad);
+  if (!counts) {
+    raise(DriveFault::target_out_of_range, tpdo_time_ns_);
+    return false;
+  }
+  target_counts_ = *counts;
+  return true;
+}
+
+bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
+  if (!heard_) return false;
+  if (!following_) target_counts_ = actual_counts_;
+  const bool reset_first = goal_ == DriveGoal::operation_enabled && old_fault_ && state_ == DriveState::fault;
+  ControlStep step = next_controlword(state_, reset_first ? DriveGoal::fault_reset : goal_, controlword_);
+  if (step.transition == 4 && held_ < syncs_before_enable) step = {controlword::switch_on, -1};
+  controlword_ = step.controlword;
+  held_pending_ = state_ == DriveState::switched_on;
+
+  frame = CanFrame{};
+  frame.id = pdo_id(PdoDirection::receive, 1, node());
+  frame.length = pdo_bytes;
+  write_u16_le(&frame.data[0], controlword_);
+  write_u32_le(&frame.data[2], static_cast<std::uint32_t>(target_counts_));
+  return true;
+}
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,150 @@
+// One CiA 402 servo drive in cyclic synchronous position mode (CSP, mode 8), as the master's cycle sees it.
+//
+// Wire, every SYNC (identifiers of the predefined connection set, numbers little-endian):
+//   TPDO1 180 + node, 6 bytes: statusword 6041h (u16), position actual value 6064h (i32)
+//   RPDO1 200 + node, 6 bytes: controlword 6040h (u16), target position 607Ah (i32)
+// plus EMCY 080 + node and heartbeat 700 + node, as they come.
+//
+// A cycle: on_sync(); on_frame() for what comes in; set_target_rad() where following(); encode_rpdo(), send. All of
+// that is noexcept and allocates nothing. The target follows the actual position until the drive itself says that it
+// follows (operation enabled and statusword bit 12: the brake is open), and at least three SYNCs have latched such a
+// target before 0F (enable operation) is sent: otherwise the axis would jump.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fieldbus/can_frame.hpp"
+#include "fieldbus/canopen_emcy.hpp"
+#include "fieldbus/canopen_heartbeat.hpp"
+#include "fieldbus/canopen_sequence.hpp"
+#include "fieldbus/cia402_state.hpp"
+#include "fieldbus/cia402_units.hpp"
+#include "models/description/cell.hpp"
+
+namespace proxarm::fieldbus {
+
+// What all drives of a session share. Times that go on the wire as milliseconds have that unit.
+struct DriveSettings {
+  std::int64_t period_ns = 1'000'000;              // of SYNC; must fit 60C2h and 1006h exactly
+  std::uint8_t master_node = 127;                  // whose heartbeat the drives consume
+  std::uint16_t master_heartbeat_ms = 20;          // how often the cycle sends it
+  std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01: without it the drives stop by themselves
+  std::uint16_t drive_heartbeat_ms = 50;           // 1017h
+  std::uint16_t drive_heartbeat_timeout_ms = 150;  // of the master for the drives
+  std::uint16_t rpdo_timeout_periods = 5;          // 1400h:05, rounded up to whole milliseconds
+  double following_error_window_rad = 0.05;        // 6065h, at the joint
+  std::uint16_t following_error_time_ms = 10;      // 6066h
+  SdoSequenceConfig sdo{};
+  std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
+
+  void validate() const;  // throws SetupError
+};
+
+enum class DriveFault : std::uint8_t {
+  none,
+  state_fault,          // statusword says fault or fault reaction active, while operation was wanted
+  left_operation,       // the drive left operation enabled by itself (quick stop, disabled, ...)
+  emergency,            // an EMCY with a code other than 0
+  heartbeat_lost,       // no heartbeat for drive_heartbeat_timeout_ms
+  restarted,            // boot-up message: the drive was reset, and has lost its configuration
+  not_operational,      // someone else's NMT command took it out of operational
+  pdo_short,            // a TPDO shorter than its mapping
+  not_remote,           // statusword bit 9 is 0 in operation: the drive is under local control
+  target_out_of_range,  // a target that isn't finite or doesn't fit 32 bits; the one before is kept
+};
+
+class ServoDrive {
+ public:
+  // Throws SetupError where the description or the settings can't be what a drive is given.
+  ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings);
+
+  // ---- set-up ----
+  [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
+  // What the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
+  [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
+  [[nodiscard]] std::uint8_t node() const noexcept { return description_.node; }
+  [[nodiscard]] const description::DriveDescription& description() const noexcept { return description_; }
+  [[nodiscard]] const DriveSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] const CountScale& scale() const noexcept { return scale_; }
+  // Watching for faults of the wire starts here, once the drive is in operational.
+  void start_cycle(std::int64_t now_ns) noexcept;
+
+  // ---- cycle ----
+  // A fault that the drive is found in when operation is first wanted (its last controller died, say) is reset on the
+  // way; any later one is raised as a fault, and only fault_reset leaves it.
+  void request(DriveGoal goal) noexcept { goal_ = goal; }
+  // A SYNC is going out: what was received before it is no longer fresh. Also notices a lost heartbeat.
+  void on_sync(std::int64_t now_ns) noexcept;
+  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept;  // true when it was this drive's
+  // Takes a new target; false where none is taken: not following() yet, or fault target_out_of_range.
+  bool set_target_rad(double angle_rad) noexcept;
+  // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
+  bool encode_rpdo(CanFrame& frame) noexcept;
+
+  // ---- what is known of the drive ----
+  [[nodiscard]] bool fresh() const noexcept { return fresh_; }  // a TPDO came since the last SYNC
+  [[nodiscard]] bool heard() const noexcept { return heard_; }  // a TPDO came ever
+  [[nodiscard]] std::int64_t tpdo_time_ns() const noexcept { return tpdo_time_ns_; }
+  [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept { return cycles_without_tpdo_; }
+  [[nodiscard]] DriveState state() const noexcept { return state_; }
+  [[nodiscard]] DriveGoal goal() const noexcept { return goal_; }
+  [[nodiscard]] bool following() const noexcept { return following_; }  // takes targets
+  [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
+  [[nodiscard]] std::uint16_t last_controlword() const noexcept { return controlword_; }
+  [[nodiscard]] std::int32_t actual_counts() const noexcept { return actual_counts_; }
+  [[nodiscard]] double actual_rad() const noexcept { return scale_.angle_rad(actual_counts_); }
+  [[nodiscard]] std::int32_t target_counts() const noexcept { return target_counts_; }
+  [[nodiscard]] double target_rad() const noexcept { return scale_.angle_rad(target_counts_); }
+  [[nodiscard]] bool follows_command() const noexcept { return (statusword_ & statusword::follows_command) != 0; }
+  [[nodiscard]] bool following_error() const noexcept { return (statusword_ & statusword::following_error) != 0; }
+  [[nodiscard]] bool internal_limit() const noexcept { return (statusword_ & statusword::internal_limit_active) != 0; }
+  [[nodiscard]] bool warning() const noexcept { return (statusword_ & statusword::warning) != 0; }
+  [[nodiscard]] NmtState nmt_state() const noexcept { return heartbeat_.state(); }
+
+  [[nodiscard]] DriveFault fault() const noexcept { return fault_; }  // the first one, kept until clear_fault()
+  [[nodiscard]] std::int64_t fault_time_ns() const noexcept { return fault_time_ns_; }
+  void clear_fault() noexcept { fault_ = DriveFault::none; }
+  [[nodiscard]] const Emergency& latest_emergency() const noexcept { return emergency_; }
+  [[nodiscard]] std::uint64_t emergencies() const noexcept { return emergencies_; }
+  [[nodiscard]] std::uint64_t repeated_tpdos() const noexcept { return repeated_tpdos_; }
+  // State, fault and latest EMCY in words; not for the cycle.
+  [[nodiscard]] std::string describe() const;
+
+ private:
+  bool decode_tpdo(const CanFrame& frame, std::int64_t time_ns) noexcept;
+  void judge_state(bool was_enabled, std::int64_t time_ns) noexcept;
+  void raise(DriveFault fault, std::int64_t time_ns) noexcept;
+
+  description::DriveDescription description_;
+  DriveSettings settings_;
+  CountScale scale_;
+  HeartbeatConsumer heartbeat_;
+  DriveGoal goal_ = DriveGoal::none;
+  DriveState state_ = DriveState::unknown;
+  DriveFault fault_ = DriveFault::none;
+  std::uint16_t statusword_ = 0;
+  std::uint16_t controlword_ = 0;
+  std::int32_t actual_counts_ = 0;
+  std::int32_t target_counts_ = 0;
+  std::int64_t tpdo_time_ns_ = 0;
+  std::int64_t fault_time_ns_ = 0;
+  std::uint64_t boot_ups_at_start_ = 0;
+  std::uint32_t cycles_without_tpdo_ = 0;
+  int held_ = 0;  // SYNCs that latched a target equal to the actual position, in the state switched on
+  bool held_pending_ = false;
+  bool cycling_ = false;
+  bool old_fault_ = true;  // no state other than fault has been seen since operation was first wanted
+  bool fresh_ = false;
+  bool heard_ = false;
+  bool following_ = false;
+  Emergency emergency_{};
+  std::uint64_t emergencies_ = 0;
+  std::uint64_t repeated_tpdos_ = 0;
+};
+
+[[nodiscard]] const char* to_string(DriveFault fault) noexcept;
+
+}  // namespace proxarm::fieldbus

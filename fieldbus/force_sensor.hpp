@@ -1,0 +1,69 @@
+// A six-axis force/torque sensor on a CAN bus, whatever its make, as the master's cycle sees it.
+//
+//   sensor.start(network, bus);                   // identity, calibration; throws SetupError
+//   sensor.tare(network, bus, 200, period_ns);    // or begin_tare() and let the cycle collect
+//   each cycle:  if (sensor.poll(now, frame)) bus.send(frame);  ...  sensor.on_frame(frame, time);
+//                if (sensor.fresh()) use sensor.latest().wrench_S;
+//
+// Force is what acts on the sensor's tool side, in newtons and newton metres, in the sensor's own frame S and about its
+// own origin. What hangs there (tool weight) is the caller's to take off.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fieldbus/can_frame.hpp"
+#include "fieldbus/can_network.hpp"
+#include "fieldbus/frame_pump.hpp"
+
+namespace proxarm::fieldbus {
+
+using Wrench = std::array<double, 6>;  // fx fy fz (N), tx ty tz (Nm)
+
+struct ForceSample {
+  Wrench wrench_S{};
+  std::int64_t time_ns = 0;   // when its last frame was on the wire
+  std::uint32_t status = 0;   // the maker's status word; 0: no error
+  bool saturated = false;     // some channel is at its rail, so the wrench is not to be believed
+  std::uint64_t number = 0;   // counts the samples, from 1
+  std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
+};
+
+class ForceSensor {
+ public:
+  ForceSensor() = default;
+  ForceSensor(const ForceSensor&) = delete;
+  ForceSensor& operator=(const ForceSensor&) = delete;
+  virtual ~ForceSensor() = default;
+
+  // ---- before the cycle ----
+  [[nodiscard]] virtual std::vector<std::uint32_t> wanted_ids() const = 0;  // for the kernel's filters
+  // Reads and checks what the sensor says of itself, and starts it; throws SetupError. Frames of others go to `other`.
+  virtual void start(CanNetwork& network, std::size_t bus, const FrameHandler& other = {}) = 0;
+  // What was learned at start: make, serial number, calibration; one line for the log.
+  [[nodiscard]] virtual std::string identity() const = 0;
+
+  // ---- cycle: noexcept, no allocation ----
+  // The frame that asks for the next sample; false where the sensor streams by itself. What was received before no
+  // longer counts as fresh, and halves of older samples are dropped.
+  virtual bool poll(std::int64_t now_ns, CanFrame& frame) noexcept = 0;
+  virtual bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;  // true when it was the sensor's
+  [[nodiscard]] virtual bool fresh() const noexcept = 0;  // a whole sample came since the last poll
+  [[nodiscard]] virtual const ForceSample& latest() const noexcept = 0;
+  // Averages the raw readings of the coming samples; when `samples` are in, the sensor reads `known_wrench_S` there.
+  virtual void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept = 0;
+  [[nodiscard]] virtual bool taring() const noexcept = 0;
+
+  // ---- in words, not for the cycle ----
+  [[nodiscard]] virtual std::string describe_status(std::uint32_t status) const = 0;
+
+  // Polls until the tare is done, one sample per period, before the cycle runs; throws SetupError when the sensor
+  // falls silent, or reports an error or saturation.
+  void tare(CanNetwork& network, std::size_t bus, std::size_t samples, std::int64_t period_ns,
+            const Wrench& known_wrench_S = {}, const FrameHandler& other = {});
+};
+
+}  // namespace proxarm::fieldbus
