@@ -26,7 +26,8 @@ using Wrench = std::array<double, 6>;  // fx fy fz (N), tx ty tz (Nm)
 struct ForceSample {
   Wrench wrench_S{};
   std::int64_t time_ns = 0;   // when its last frame was on the wire
-  std::uint32_t status = 0;   // the maker's status word; 0: no error
+  std::uint32_t status = 0;   // the maker's status word, see describe_status()
+  bool healthy = false;       // the status reports no error
   bool saturated = false;     // some channel is at its rail, so the wrench is not to be believed
   std::uint64_t number = 0;   // counts the samples, from 1
   std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
