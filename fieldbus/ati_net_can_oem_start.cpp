@@ -151,8 +151,8 @@ std::vector<CanFrame> AtiNetCanOem::ask(CanNetwork& network, std::size_t bus, co
     const std::int64_t sent_ns = network.now_ns();
     const std::int64_t deadline_ns = sent_ns + settings_.answer_timeout_ns;
     const SendResult result = network.bus(bus).send(request);
-    if (result == SendResult::bus_off || result == SendResult::down) {
-      trouble = result == SendResult::down ? "an interface that is down" : "bus-off";
+    if (result != SendResult::sent && result != SendResult::queue_full) {
+      trouble = result == SendResult::bus_off ? "bus-off" : "an interface that is down or refuses the frame";
       break;
     }
     const FrameHandler handler = [&](std::size_t from, const TimedFrame& received) {

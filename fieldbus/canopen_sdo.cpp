@@ -84,6 +84,7 @@ void SdoClient::send(const CanFrame& frame) {
       return;
     case SendResult::bus_off:
     case SendResult::down:
+    case SendResult::refused:
       finish(SdoOutcome::not_sent);
       return;
   }

@@ -35,6 +35,7 @@ void send_nmt(CanNetwork& network, Slots drives, NmtCommand command, const char*
     if (result == SendResult::sent) continue;
     const char* found = result == SendResult::queue_full ? "a full queue"
                         : result == SendResult::bus_off  ? "bus-off"
+                        : result == SendResult::refused  ? "a frame that the interface can't carry"
                                                          : "an interface that is down";
     throw SetupError({.bus = slot.drive->description().bus,
                       .node = slot.drive->node(),
