@@ -101,8 +101,8 @@ TEST_F(SimulatedCellTest, StandsAtTheStartPose) {
   pass(50 * kMs);
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const auto& drive = cell.drives[axis];
-    const double rad =
-        (far_end->drive(axis).canopen().dictionary().number(0x6064) - drive.offset_counts) / drive.counts_per_rad();
+    const auto counts = static_cast<double>(far_end->drive(axis).canopen().dictionary().number(0x6064));
+    const double rad = (counts - drive.offset_counts) / drive.counts_per_rad();
     // Gravity's torque is at most 1500 Nm over the softest gear of 16,000 Nm/rad, far less in fact.
     EXPECT_NEAR(rad, cell.start_rad[axis], 0.01) << axis;
   }
