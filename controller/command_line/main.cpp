@@ -30,28 +30,26 @@ CLI::callback_t quantity(Parse parse, Store store) {
 }
 
 void add_session_options(CLI::App& app, RunOptions& options) {
-  using description::parse_duration;
-  using description::parse_quantity;
   app.add_option("cell", options.cell, "cell file (default: the six-axis arm of the 150 kg class)");
   app.add_option("--scene", options.scene, "scene file (default: the cell's)");
   app.add_option("--hand", options.hand, "the simulated hand's file (default: the cell's)");
-  app.add_option("--mass", quantity([](const std::string& w) { return parse_quantity("--mass", w, "kg"); },
+  app.add_option("--mass", quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
                                     [&](double value) { options.mass_kg = value; }),
                  "mass that the hand feels, in kg, handle included")
       ->type_name("KG");
-  app.add_option("--damping", quantity([](const std::string& w) { return parse_quantity("--damping", w, "Ns/m"); },
+  app.add_option("--damping", quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
                                        [&](double value) { options.settings.damping_Ns_per_m = value; }),
                  "damping against the world, in Ns/m (default 0)")
       ->type_name("NS/M");
-  app.add_option("--spring", quantity([](const std::string& w) { return parse_quantity("--spring", w, "N/m"); },
+  app.add_option("--spring", quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
                                       [&](double value) { options.settings.spring_N_per_m = value; }),
                  "spring to the start position, in N/m (default 0)")
       ->type_name("N/M");
-  app.add_option("--timestep", quantity([](const std::string& w) { return parse_duration("--timestep", w); },
+  app.add_option("--timestep", quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
                                         [&](double value) { options.period_s = value; }),
                  "timestep T with its unit: 1ms, 500us (default: the cell's)")
       ->type_name("TIME");
-  app.add_option("--duration", quantity([](const std::string& w) { return parse_duration("--duration", w); },
+  app.add_option("--duration", quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
                                         [&](double value) { options.duration_s = value; }),
                  "how long to render, with its unit (default 10s)")
       ->type_name("TIME");
