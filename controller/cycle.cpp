@@ -27,14 +27,14 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       limits_(limits),
       period_ns_(std::llround(settings.period_s * 1e9)),
       receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
-      link_rad_(parts_.arm.start_rad()),
-      target_rad_(parts_.arm.start_rad()),
-      target_k1_rad_(parts_.arm.start_rad()),
-      target_rad_per_s_(JointVector::Zero(parts_.arm.axes())),
-      run_out_rad_per_s_(JointVector::Zero(parts_.arm.axes())),
-      measured_link_rad_(parts_.arm.start_rad()),
+      link_rad_(parts_.arm->start_rad()),
+      target_rad_(parts_.arm->start_rad()),
+      target_k1_rad_(parts_.arm->start_rad()),
+      target_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
+      run_out_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
+      measured_link_rad_(parts_.arm->start_rad()),
       records_(record_capacity) {
-  for (DriveOnBus& axis : parts_.drives) axis.drive.request(fieldbus::DriveGoal::none);
+  solution_.q = link_rad_;
 }
 
 void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
@@ -91,12 +91,12 @@ bool Cycle::everything_received() const noexcept {
 
 // Where the arm is by its encoders, and what the hand does by the sensor.
 void Cycle::measure() noexcept {
-  JointVector motor_rad(parts_.arm.axes());
+  JointVector motor_rad(parts_.arm->axes());
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) motor_rad[i] = parts_.drives[i].drive.actual_rad();
   // Gravity twists the gears; the twist of the last cycle is right to within a cycle's change of it.
-  measured_link_rad_ = motor_rad - (parts_.arm.motor_from_link(measured_link_rad_) - measured_link_rad_);
-  tool_W_ = parts_.arm.tool_pose(measured_link_rad_).translation();
-  R_WS_ = parts_.arm.sensor_pose(measured_link_rad_).linear();
+  measured_link_rad_ = motor_rad - (parts_.arm->motor_from_link(measured_link_rad_) - measured_link_rad_);
+  tool_W_ = parts_.arm->tool_pose(measured_link_rad_).translation();
+  R_WS_ = parts_.arm->sensor_pose(measured_link_rad_).linear();
 
   sample_is_new_ = parts_.sensor->fresh();
   if (sample_is_new_) {
@@ -245,8 +245,8 @@ void Cycle::tare(std::int64_t t_k_ns) noexcept {
 
 // The proxy starts at rest where the targets stand, so the first setpoint equals the last one.
 void Cycle::start_rendering() noexcept {
-  link_rad_ = parts_.arm.link_from_motor(target_rad_);
-  const models::Pose X_WT = parts_.arm.tool_pose(link_rad_);
+  link_rad_ = parts_.arm->link_from_motor(target_rad_);
+  const models::Pose X_WT = parts_.arm->tool_pose(link_rad_);
   proxy_W_ = X_WT.translation();
   parts_.world->start(proxy_W_);
   parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
@@ -263,21 +263,19 @@ void Cycle::render() noexcept {
   record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
   record_.set(RecordFlag::limit_orientation,
               parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
-  follow_proxy(step);
+  follow_proxy();
   ++rendered_cycles_;
 }
 
 // Joint targets for the proxy's pose. A step that the joints can't take isn't sent: the last target stands, and the
 // stop that follows runs out from there.
-void Cycle::follow_proxy(const WorldStep& step) noexcept {
+void Cycle::follow_proxy() noexcept {
   models::Pose X_WT = models::Pose::Identity();
-  X_WT.translation() = step.q_W;
+  X_WT.translation() = proxy_W_;
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
-  JointVector link_rad = link_rad_;
-  if (parts_.inverse.solve(X_WT, link_rad).status != models::InverseStatus::converged) {
-    return raise(Fault::singular, -1);
-  }
-  const JointVector motor_rad = parts_.arm.motor_from_link(link_rad);
+  parts_.inverse.solve(link_rad_, X_WT, solution_);
+  if (solution_.status != models::InverseKinematicsResult::Status::converged) return raise(Fault::singular, -1);
+  const JointVector motor_rad = parts_.arm->motor_from_link(solution_.q);
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const description::DriveDescription& drive = parts_.drives[i].drive.description();
     const auto where = static_cast<std::int32_t>(i);
@@ -290,7 +288,7 @@ void Cycle::follow_proxy(const WorldStep& step) noexcept {
       return raise(Fault::target_too_fast, where, speed, drive.max_speed_rad_per_s);
     }
   }
-  link_rad_ = link_rad;
+  link_rad_ = solution_.q;
   target_rad_ = motor_rad;
 }
 

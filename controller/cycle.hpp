@@ -54,7 +54,8 @@ struct CycleParts {
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
   std::size_t sensor_bus;
-  models::Arm arm;
+  std::unique_ptr<models::Arm> arm;  // in one place for good: the inverse kinematics refers to it
+  models::InverseKinematics inverse;
   std::unique_ptr<RenderedWorld> world;
   OrientationProxy orientation;
   WrenchCompensation compensation;
@@ -98,7 +99,7 @@ class Cycle {
   void tare(std::int64_t t_k_ns) noexcept;
   void start_rendering() noexcept;
   void render() noexcept;
-  void follow_proxy(const WorldStep& step) noexcept;
+  void follow_proxy() noexcept;
   void run_out() noexcept;
   void send_targets() noexcept;
   void send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept;
@@ -134,6 +135,7 @@ class Cycle {
   JointVector target_rad_per_s_;   // of the last cycle: what a stop runs out
   JointVector run_out_rad_per_s_;
   JointVector measured_link_rad_;
+  models::InverseKinematicsResult solution_;
   double run_out_scale_ = 1.0;
   double run_out_per_cycle_ = 1.0;
 
