@@ -44,7 +44,7 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
     settings.base_id = cell.sensor.base_id;
     return std::make_unique<fieldbus::AtiNetCanOem>(settings);
   }
-  throw SetupError({.file = sensor.file.string(), .key = "protocol", .found = description::quoted(sensor.protocol),
+  throw SetupError({.file = sensor.file.string(), .key = "protocol", .found = sensor.protocol,
                     .expected = "ati_net_can_oem"});
 }
 
