@@ -29,9 +29,9 @@ std::vector<DriveBus> drive_buses(const std::vector<DriveOnBus>& drives) {
   for (const DriveOnBus& axis : drives) {
     const bool known = std::any_of(buses.begin(), buses.end(), [&](const DriveBus& b) { return b.bus == axis.bus; });
     if (known) continue;
-    buses.push_back({axis.bus, fieldbus::SyncProducer(),
-                     fieldbus::HeartbeatProducer(defaults.master_node,
-                                                 std::int64_t{defaults.master_heartbeat_ms} * 1'000'000)});
+    buses.push_back(
+        {axis.bus, fieldbus::SyncProducer(),
+         fieldbus::HeartbeatProducer(defaults.master_node, std::int64_t{defaults.master_heartbeat_ms} * 1'000'000)});
   }
   return buses;
 }
@@ -44,8 +44,8 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
     settings.base_id = cell.sensor.base_id;
     return std::make_unique<fieldbus::AtiNetCanOem>(settings);
   }
-  throw SetupError({.file = sensor.file.string(), .key = "protocol", .found = sensor.protocol,
-                    .expected = "ati_net_can_oem"});
+  throw SetupError(
+      {.file = sensor.file.string(), .key = "protocol", .found = sensor.protocol, .expected = "ati_net_can_oem"});
 }
 
 // One joint per cycle may turn as far as its speed allows.
@@ -60,7 +60,8 @@ models::InverseKinematicsConfig inverse_config(const description::Cell& cell, do
 // The tool behind the sensor is felt by itself; (26) gets what is left of the wanted mass.
 double proxy_mass(const description::Cell& cell, const SessionSettings& settings) {
   if (settings.mass_kg > cell.tool.mass_kg) return settings.mass_kg - cell.tool.mass_kg;
-  throw SetupError({.key = "--mass", .found = description::number_text(settings.mass_kg) + " kg",
+  throw SetupError({.key = "--mass",
+                    .found = description::number_text(settings.mass_kg) + " kg",
                     .expected = "more than " + description::number_text(cell.tool.mass_kg) +
                                 " kg: the tool behind the sensor alone has that, and is felt in full",
                     .advice = "ask for more mass, or use a lighter tool"});

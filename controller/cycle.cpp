@@ -146,10 +146,17 @@ void Cycle::judge_drives() noexcept {
       raise(Fault::drive_silent, where, drive.cycles_without_tpdo(), settings_.max_missed_feedback);
     }
     switch (drive.fault()) {
-      case fieldbus::DriveFault::none: break;
-      case fieldbus::DriveFault::left_operation: raise(Fault::drive_disabled, where); break;
-      case fieldbus::DriveFault::target_out_of_range: raise(Fault::target_out_of_range, where); break;
-      default: raise(Fault::drive_fault, where); break;
+      case fieldbus::DriveFault::none:
+        break;
+      case fieldbus::DriveFault::left_operation:
+        raise(Fault::drive_disabled, where);
+        break;
+      case fieldbus::DriveFault::target_out_of_range:
+        raise(Fault::target_out_of_range, where);
+        break;
+      default:
+        raise(Fault::drive_fault, where);
+        break;
     }
   }
 }
@@ -202,19 +209,30 @@ void Cycle::choose_targets(std::int64_t t_k_ns) noexcept {
 
 void Cycle::act(std::int64_t t_k_ns) noexcept {
   switch (supervisor_.phase()) {
-    case Phase::enabling: await_enabled(t_k_ns); break;
-    case Phase::taring: tare(t_k_ns); break;
-    case Phase::rendering: render(); break;
-    case Phase::stopping: run_out(); break;
-    case Phase::disabling: await_disabled(t_k_ns); break;
+    case Phase::enabling:
+      await_enabled(t_k_ns);
+      break;
+    case Phase::taring:
+      tare(t_k_ns);
+      break;
+    case Phase::rendering:
+      render();
+      break;
+    case Phase::stopping:
+      run_out();
+      break;
+    case Phase::disabling:
+      await_disabled(t_k_ns);
+      break;
     case Phase::idle:
-    case Phase::done: break;
+    case Phase::done:
+      break;
   }
 }
 
 void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
-  const auto not_following =
-      std::find_if(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& a) { return !a.drive.following(); });
+  const auto not_following = std::find_if(parts_.drives.begin(), parts_.drives.end(),
+                                          [](const DriveOnBus& a) { return !a.drive.following(); });
   if (not_following == parts_.drives.end()) {
     supervisor_.handle(Event::enabled);
   } else if (static_cast<double>(t_k_ns - phase_since_ns_) * seconds_per_ns > settings_.enable_timeout_s) {
@@ -261,8 +279,7 @@ void Cycle::render() noexcept {
   record_.contact_force_W_N = triple(step.f_W);
   record_.normal_W = triple(step.normal_W);
   record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
-  record_.set(RecordFlag::limit_orientation,
-              parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
+  record_.set(RecordFlag::limit_orientation, parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy();
   ++rendered_cycles_;
 }

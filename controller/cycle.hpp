@@ -132,7 +132,7 @@ class Cycle {
   JointVector link_rad_;    // angles of the links at the target: what inverse kinematics starts from
   JointVector target_rad_;  // motor side, what the drives are sent
   JointVector target_k1_rad_;
-  JointVector target_rad_per_s_;   // of the last cycle: what a stop runs out
+  JointVector target_rad_per_s_;  // of the last cycle: what a stop runs out
   JointVector run_out_rad_per_s_;
   JointVector measured_link_rad_;
   models::InverseKinematicsResult solution_;

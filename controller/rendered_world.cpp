@@ -71,9 +71,12 @@ std::unique_ptr<RenderedWorld> make_rendered_world(scenes::CompiledScene& scene,
   config.period_s = settings.period_s;
   config.order = settings.order;
   switch (scene.dimensions()) {
-    case 1: return std::make_unique<WorldOfDimension<1>>(scene, config);
-    case 2: return std::make_unique<WorldOfDimension<2>>(scene, config);
-    default: return std::make_unique<WorldOfDimension<3>>(scene, config);
+    case 1:
+      return std::make_unique<WorldOfDimension<1>>(scene, config);
+    case 2:
+      return std::make_unique<WorldOfDimension<2>>(scene, config);
+    default:
+      return std::make_unique<WorldOfDimension<3>>(scene, config);
   }
 }
 

@@ -41,7 +41,8 @@ class RenderedWorld {
   virtual WorldStep step(const models::Vec3& h_W) noexcept = 0;
 };
 
-// `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the result.
+// `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the
+// result.
 std::unique_ptr<RenderedWorld> make_rendered_world(scenes::CompiledScene& scene, const SessionSettings& settings,
                                                    double proxy_mass_kg);
 

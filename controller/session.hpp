@@ -1,7 +1,7 @@
 // The loop around the cycle: wakes at t_k, runs it, looks after lateness, ends after the stop.
 //
-// On time: t_k = t_0 + k T. A cycle that ends after the next t_k has begun is an overrun; the periods that it missed are
-// skipped, never caught up in a burst, and the drives see a longer step instead.
+// On time: t_k = t_0 + k T. A cycle that ends after the next t_k has begun is an overrun; the periods that it missed
+// are skipped, never caught up in a burst, and the drives see a longer step instead.
 #pragma once
 
 #include <cstdint>

@@ -33,28 +33,34 @@ void add_session_options(CLI::App& app, RunOptions& options) {
   app.add_option("cell", options.cell, "cell file (default: the six-axis arm of the 150 kg class)");
   app.add_option("--scene", options.scene, "scene file (default: the cell's)");
   app.add_option("--hand", options.hand, "the simulated hand's file (default: the cell's)");
-  app.add_option("--mass", quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
-                                    [&](double value) { options.mass_kg = value; }),
+  app.add_option("--mass",
+                 quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
+                          [&](double value) { options.mass_kg = value; }),
                  "mass that the hand feels, in kg, handle included")
       ->type_name("KG");
-  app.add_option("--damping", quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
-                                       [&](double value) { options.settings.damping_Ns_per_m = value; }),
+  app.add_option("--damping",
+                 quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
+                          [&](double value) { options.settings.damping_Ns_per_m = value; }),
                  "damping against the world, in Ns/m (default 0)")
       ->type_name("NS/M");
-  app.add_option("--spring", quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
-                                      [&](double value) { options.settings.spring_N_per_m = value; }),
+  app.add_option("--spring",
+                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
+                          [&](double value) { options.settings.spring_N_per_m = value; }),
                  "spring to the start position, in N/m (default 0)")
       ->type_name("N/M");
-  app.add_option("--timestep", quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
-                                        [&](double value) { options.period_s = value; }),
+  app.add_option("--timestep",
+                 quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
+                          [&](double value) { options.period_s = value; }),
                  "timestep T with its unit: 1ms, 500us (default: the cell's)")
       ->type_name("TIME");
-  app.add_option("--duration", quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
-                                        [&](double value) { options.duration_s = value; }),
+  app.add_option("--duration",
+                 quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
+                          [&](double value) { options.duration_s = value; }),
                  "how long to render, with its unit (default 10s)")
       ->type_name("TIME");
-  app.add_option("--bus", quantity([](const std::string& w) { return BusMapping::parse(w); },
-                                   [&](BusMapping value) { options.bus = std::move(value); }),
+  app.add_option("--bus",
+                 quantity([](const std::string& w) { return BusMapping::parse(w); },
+                          [&](BusMapping value) { options.bus = std::move(value); }),
                  "sim (default), one interface for all buses, or NAME=INTERFACE,…")
       ->type_name("BUS");
 }
@@ -74,7 +80,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
   app.add_flag("!--no-plot", options.plot, "draw no plot");
   app.add_flag("--json", options.json, "print the summary as one JSON object");
-  app.add_flag("--force-unstable", options.force_unstable, "simulation only: run with a mass that is predicted unstable");
+  app.add_flag("--force-unstable", options.force_unstable,
+               "simulation only: run with a mass that is predicted unstable");
 }
 
 int run(int argc, char** argv) {

@@ -50,8 +50,8 @@ void introduce(const PreparedSession& session, const controller::CycleParts& par
   std::printf("%s, scene %s: %.4g kg felt, T = %.4g ms, loop delay %.3g ms\n", session.cell.name.c_str(),
               session.scene.name.c_str(), session.settings.mass_kg, 1e3 * session.settings.period_s,
               1e3 * total_delay_s(session));
-  std::printf("the arm itself, without control: %.0f to %.0f kg at the tip, first mode %.1f Hz\n", tip.min_kg, tip.max_kg,
-              parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad()));
+  std::printf("the arm itself, without control: %.0f to %.0f kg at the tip, first mode %.1f Hz\n", tip.min_kg,
+              tip.max_kg, parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad()));
 }
 
 std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
@@ -84,14 +84,12 @@ class SimulatedRun {
         output_(session, options, true) {}
 
   int run() {
-    controller::CycleParts parts =
-        controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_,
-                                one_to_one(session_.cell.buses.size()));
+    controller::CycleParts parts = controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings,
+                                                           network_, one_to_one(session_.cell.buses.size()));
     introduce(session_, parts, options_);
     if (!options_.record_dir.empty()) {
-      network_.set_observer([this](const fieldbus::WireFrame& wire) {
-        output_.add_frame(wire.bus_name, wire.frame, wire.end_ns);
-      });
+      network_.set_observer(
+          [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
     }
     far_end_.attach_to(network_);
     far_end_.power_on();
@@ -105,9 +103,9 @@ class SimulatedRun {
     Cycle cycle(std::move(parts), session_.settings, session_.cell.limits, record_capacity);
     SignalWatch signals([&](int) { cycle.request_stop(); });
     const SteadyClock::time_point begun = SteadyClock::now();
-    const controller::SessionTally tally = controller::run_session(
-        cycle, network_, session_.settings.period_s, session_.duration_s,
-        {[this](std::int64_t) { truth_ = far_end_.truth(); }, [&] { drain(cycle.records()); }});
+    const controller::SessionTally tally =
+        controller::run_session(cycle, network_, session_.settings.period_s, session_.duration_s,
+                                {[this](std::int64_t) { truth_ = far_end_.truth(); }, [&] { drain(cycle.records()); }});
     const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
 
     Summary summary = output_.summary();

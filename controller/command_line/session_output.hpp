@@ -15,7 +15,8 @@ namespace proxarm::command_line {
 
 class SessionOutput {
  public:
-  // Makes the record's folder where one is wanted; throws SetupError. `with_truth`: records carry the simulation's truth.
+  // Makes the record's folder where one is wanted; throws SetupError. `with_truth`: records carry the simulation's
+  // truth.
   SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
 
   // Adds the distances to the scene, which the cycle has no need of, and passes the record on.
