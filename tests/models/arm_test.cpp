@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tinyxml2.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <kdl/chain.hpp>
@@ -361,8 +362,7 @@ Cell with_urdf(const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   text.replace(at, from.size(), to);
-  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-  cell.urdf = std::filesystem::path(testing::TempDir()) / (std::string("proxarm_") + test->name() + ".urdf");
+  cell.urdf = std::filesystem::path(testing::TempDir()) / ("proxarm_" + std::to_string(getpid()) + ".urdf");
   std::ofstream(cell.urdf) << text;
   return cell;
 }
@@ -441,7 +441,7 @@ TEST(ArmMistakes, FilesThatAreNoUrdfAreRefused) {
 TEST(ArmMistakes, TruncatedUrdfsNeverCrash) {
   Cell cell = default_cell();
   const std::string text = read(cell.urdf);
-  cell.urdf = std::filesystem::path(testing::TempDir()) / "proxarm_truncated.urdf";
+  cell.urdf = std::filesystem::path(testing::TempDir()) / ("proxarm_truncated_" + std::to_string(getpid()) + ".urdf");
   Random random(108);
   for (auto n = tests::scaled(100); n > 0; --n) {
     std::string part = text;
