@@ -34,7 +34,7 @@ struct PdoConfiguration {
   std::uint32_t id = 0;     // 11-bit identifier
   std::uint8_t transmission_type = every_sync;
   std::uint16_t event_timer_ms = 0;  // 0: left alone
-  std::vector<MappedObject> mapping;
+  std::vector<MappedObject> mapping{};
 };
 
 // Identifier of the predefined connection set; `number` 1..4, `node` 1..127.

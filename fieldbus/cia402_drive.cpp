@@ -21,6 +21,7 @@ void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
   heartbeat_.restart(now_ns);
   boot_ups_at_start_ = heartbeat_.boot_ups();
   cycles_without_tpdo_ = 0;
+  fresh_ = true;  // nothing was due before the first SYNC
 }
 
 void ServoDrive::raise(DriveFault fault, std::int64_t time_ns) noexcept {

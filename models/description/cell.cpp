@@ -142,6 +142,7 @@ DriveDescription read_drive(const YamlNode& node) {
   d.max_speed_rad_per_s = node.number("max_speed_rad_per_s", above(0.0, 100.0));
   d.max_acceleration_rad_per_s2 = node.number("max_acceleration_rad_per_s2", above(0.0, 1e4));
   d.rotor_inertia_kg_m2 = node.number("rotor_inertia_kg_m2", 0.0, 1e5);
+  d.position_bandwidth_Hz = node.number_or("position_bandwidth_Hz", 100.0, 1.0, 10000.0);
   d.gear_stiffness_Nm_per_rad = node.number_or("gear_stiffness_Nm_per_rad", 0.0, 0.0, 1e9);
   d.simulation = read_simulation(node.map("simulation"));
   return d;

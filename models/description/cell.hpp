@@ -55,6 +55,8 @@ struct DriveDescription {
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
   double rotor_inertia_kg_m2 = 0.0;        // reflected to the joint
+  double position_bandwidth_Hz = 100.0;    // of the drive's position loop, as its maker or a test states it: the lag
+                                           // that the stability check counts on
   double gear_stiffness_Nm_per_rad = 0.0;  // 0: taken as rigid; used to compensate gravity's deflection
   SimulatedDrive simulation;
 

@@ -1,0 +1,138 @@
+#include "controller/bring_up.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fieldbus/ati_net_can_oem.hpp"
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using description::SetupError;
+
+std::size_t index_of(const description::Cell& cell, const std::string& bus) {
+  const auto found = std::find_if(cell.buses.begin(), cell.buses.end(),
+                                  [&](const description::BusDescription& b) { return b.name == bus; });
+  return static_cast<std::size_t>(found - cell.buses.begin());
+}
+
+fieldbus::DriveSettings drive_settings(const SessionSettings& settings) {
+  fieldbus::DriveSettings drive;
+  drive.period_ns = std::llround(settings.period_s * 1e9);
+  return drive;
+}
+
+std::vector<DriveBus> drive_buses(const std::vector<DriveOnBus>& drives) {
+  const fieldbus::DriveSettings defaults;
+  std::vector<DriveBus> buses;
+  for (const DriveOnBus& axis : drives) {
+    const bool known = std::any_of(buses.begin(), buses.end(), [&](const DriveBus& b) { return b.bus == axis.bus; });
+    if (known) continue;
+    buses.push_back(
+        {axis.bus, fieldbus::SyncProducer(),
+         fieldbus::HeartbeatProducer(defaults.master_node, std::int64_t{defaults.master_heartbeat_ms} * 1'000'000)});
+  }
+  return buses;
+}
+
+std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
+                                                   const description::SensorDescription& sensor) {
+  if (sensor.protocol == "ati_net_can_oem") {
+    fieldbus::AtiNetCanOemSettings settings;
+    settings.bus_name = cell.sensor.bus;
+    settings.base_id = cell.sensor.base_id;
+    return std::make_unique<fieldbus::AtiNetCanOem>(settings);
+  }
+  throw SetupError(
+      {.file = sensor.file.string(), .key = "protocol", .found = sensor.protocol, .expected = "ati_net_can_oem"});
+}
+
+// One joint per cycle may turn as far as its speed allows.
+models::InverseKinematicsConfig inverse_config(const description::Cell& cell, double period_s) {
+  models::InverseKinematicsConfig config;
+  for (std::size_t i = 0; i < cell.drives.size() && i < config.max_step_rad.size(); ++i) {
+    config.max_step_rad[i] = cell.drives[i].max_speed_rad_per_s * period_s;
+  }
+  return config;
+}
+
+// The tool behind the sensor is felt by itself; (26) gets what is left of the wanted mass.
+double proxy_mass(const description::Cell& cell, const SessionSettings& settings) {
+  if (settings.mass_kg > cell.tool.mass_kg) return settings.mass_kg - cell.tool.mass_kg;
+  throw SetupError({.key = "--mass",
+                    .found = description::number_text(settings.mass_kg) + " kg",
+                    .expected = "more than " + description::number_text(cell.tool.mass_kg) +
+                                " kg: the tool behind the sensor alone has that, and is felt in full",
+                    .advice = "ask for more mass, or use a lighter tool"});
+}
+
+OrientationConfig orientation_config(const SessionSettings& settings) {
+  OrientationConfig config;
+  config.free = settings.orientation == OrientationMode::free;
+  config.inertia_kg_m2 = settings.rotational_inertia_kg_m2;
+  config.damping_Nms_per_rad = settings.rotational_damping_Nms_per_rad;
+  config.period_s = settings.period_s;
+  return config;
+}
+
+std::vector<fieldbus::DriveSlot> slots(CycleParts& parts) {
+  std::vector<fieldbus::DriveSlot> slots;
+  for (DriveOnBus& axis : parts.drives) slots.push_back({&axis.drive, axis.bus});
+  return slots;
+}
+
+}  // namespace
+
+CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
+                       scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
+                       const BusIndices& bus_indices) {
+  std::vector<DriveOnBus> drives;
+  for (const description::DriveDescription& drive : cell.drives) {
+    drives.push_back({fieldbus::ServoDrive(drive, drive_settings(settings)), bus_indices[index_of(cell, drive.bus)]});
+  }
+  auto arm = std::make_unique<models::Arm>(cell);
+  models::InverseKinematics inverse(*arm, inverse_config(cell, settings.period_s));
+  std::vector<DriveBus> buses = drive_buses(drives);
+  return CycleParts{network,
+                    std::move(drives),
+                    std::move(buses),
+                    make_sensor(cell, sensor),
+                    bus_indices[index_of(cell, cell.sensor.bus)],
+                    std::move(arm),
+                    std::move(inverse),
+                    make_rendered_world(scene, settings, proxy_mass(cell, settings)),
+                    OrientationProxy(orientation_config(settings)),
+                    WrenchCompensation(cell)};
+}
+
+std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) {
+  std::vector<std::uint32_t> ids;
+  for (const DriveOnBus& axis : parts.drives) {
+    if (axis.bus != bus) continue;
+    for (const std::uint32_t id : axis.drive.wanted_ids()) ids.push_back(id);
+  }
+  if (bus == parts.sensor_bus) {
+    for (const std::uint32_t id : parts.sensor->wanted_ids()) ids.push_back(id);
+  }
+  return ids;
+}
+
+Identities bring_up(CycleParts& parts) {
+  Identities lines;
+  parts.sensor->start(parts.network, parts.sensor_bus);
+  lines.push_back("sensor: " + parts.sensor->identity());
+  const std::vector<fieldbus::DriveSlot> drives = slots(parts);
+  const std::vector<fieldbus::DriveIdentity> identities = fieldbus::bring_up_drives(parts.network, drives);
+  for (std::size_t i = 0; i < identities.size(); ++i) {
+    lines.push_back("drive of " + parts.drives[i].drive.description().joint + ": " + describe(identities[i]));
+  }
+  return lines;
+}
+
+void shut_down(CycleParts& parts) noexcept {
+  const std::vector<fieldbus::DriveSlot> drives = slots(parts);
+  fieldbus::shut_down_drives(parts.network, drives);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,37 @@
+// From files to a cycle that can start: every part built, every device found, configured and read back.
+//
+// Nothing moves here. Throws SetupError that names file and key, or bus, node and object; then nothing was enabled.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "controller/cycle.hpp"
+#include "fieldbus/cia402_bring_up.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/sensor.hpp"
+#include "scenes/compile.hpp"
+
+namespace proxarm::controller {
+
+// Where each bus of the cell is in the network; two buses on one interface have one index.
+using BusIndices = std::vector<std::size_t>;
+
+// `scene` must outlive the parts.
+CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
+                       scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
+                       const BusIndices& bus_indices);
+
+// Identifiers that a bus of the network must let through, for the kernel's filters.
+std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus);
+
+// What the devices said of themselves, a line each.
+using Identities = std::vector<std::string>;
+
+// NMT, SDO configuration written and read back, sensor calibration read; drives end in NMT operational, not enabled.
+Identities bring_up(CycleParts& parts);
+// After the last cycle: drives back to NMT pre-operational. Never fails.
+void shut_down(CycleParts& parts) noexcept;
+
+}  // namespace proxarm::controller

@@ -1,0 +1,136 @@
+// proxarm's command line: the one place that knows the controller, the field bus and the simulated arm.
+//
+// Exit status: 0 fine, 1 a fault ended the run, 2 set-up mistake.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <iostream>
+
+#include "controller/command_line/commands.hpp"
+#include "models/description/quantity.hpp"
+#include "models/description/setup_error.hpp"
+
+namespace {
+
+using namespace proxarm;
+using command_line::BusMapping;
+using command_line::Pace;
+using command_line::RunOptions;
+
+constexpr int set_up_mistake = 2;
+
+// A number with its unit, checked while the command line is parsed, so that CLI11 names the option in its message.
+template <typename Parse, typename Store>
+CLI::callback_t quantity(Parse parse, Store store) {
+  return [parse, store](const CLI::results_t& words) {
+    store(parse(words.back()));
+    return true;
+  };
+}
+
+void add_session_options(CLI::App& app, RunOptions& options) {
+  app.add_option("cell", options.cell, "cell file (default: the six-axis arm of the 150 kg class)");
+  app.add_option("--scene", options.scene, "scene file (default: the cell's)");
+  app.add_option("--hand", options.hand, "the simulated hand's file (default: the cell's)");
+  app.add_option("--mass",
+                 quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
+                          [&](double value) { options.mass_kg = value; }),
+                 "mass that the hand feels, in kg, handle included")
+      ->type_name("KG");
+  app.add_option("--damping",
+                 quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
+                          [&](double value) { options.settings.damping_Ns_per_m = value; }),
+                 "damping against the world, in Ns/m (default 0)")
+      ->type_name("NS/M");
+  app.add_option("--spring",
+                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
+                          [&](double value) { options.settings.spring_N_per_m = value; }),
+                 "spring to the start position, in N/m (default 0)")
+      ->type_name("N/M");
+  app.add_option("--timestep",
+                 quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
+                          [&](double value) { options.period_s = value; }),
+                 "timestep T with its unit: 1ms, 500us (default: the cell's)")
+      ->type_name("TIME");
+  app.add_option("--duration",
+                 quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
+                          [&](double value) { options.duration_s = value; }),
+                 "how long to render, with its unit (default 10s)")
+      ->type_name("TIME");
+  app.add_option("--bus",
+                 quantity([](const std::string& w) { return BusMapping::parse(w); },
+                          [&](BusMapping value) { options.bus = std::move(value); }),
+                 "sim (default), one interface for all buses, or NAME=INTERFACE,…")
+      ->type_name("BUS");
+}
+
+void add_run_options(CLI::App& app, RunOptions& options) {
+  add_session_options(app, options);
+  const std::map<std::string, Pace> paces{{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}};
+  app.add_option("--pace", options.pace, "virtual (default in-process) or realtime")
+      ->transform(CLI::CheckedTransformer(paces).description("virtual|realtime"));
+  app.add_option("--order", options.settings.order, "1: eq. (26) (default); 2: its second-order sibling")
+      ->check(CLI::IsMember({1, 2}));
+  const std::map<std::string, controller::OrientationMode> modes{{"held", controller::OrientationMode::held},
+                                                                 {"free", controller::OrientationMode::free}};
+  app.add_option("--orientation", options.settings.orientation, "held (default) or free")
+      ->transform(CLI::CheckedTransformer(modes).description("held|free"));
+  app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
+  app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
+  app.add_flag("!--no-plot", options.plot, "draw no plot");
+  app.add_flag("--json", options.json, "print the summary as one JSON object");
+  app.add_flag("--force-unstable", options.force_unstable,
+               "simulation only: run with a mass that is predicted unstable");
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"Hold an industrial robot arm and feel a virtual world through it."};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", std::string("proxarm ") + PROXARM_VERSION);
+  app.set_help_all_flag("--help-all", "help of all commands");
+
+  std::function<int()> command;
+  RunOptions run_options, sim_options, plan_options;
+  command_line::FileOptions check_options, explain_options;
+
+  CLI::App* run_app = app.add_subcommand("run", "render a scene on a simulated or real arm");
+  add_run_options(*run_app, run_options);
+  run_app->callback([&] { command = [&] { return command_line::run_command(run_options); }; });
+
+  CLI::App* sim_app = app.add_subcommand("sim", "the simulated arm as a process of its own on CAN interfaces");
+  add_session_options(*sim_app, sim_options);
+  sim_app->callback([&] { command = [&] { return command_line::sim_command(sim_options); }; });
+
+  CLI::App* plan_app = app.add_subcommand("plan", "bus budget of a cell; status 1 if it can't be carried");
+  add_session_options(*plan_app, plan_options);
+  plan_app->callback([&] { command = [&] { return command_line::plan_command(plan_options); }; });
+
+  CLI::App* check_app = app.add_subcommand("check", "validate cell, scene, hand and sensor files");
+  check_app->add_option("files", check_options.files, "files to check")->required();
+  check_app->callback([&] { command = [&] { return command_line::check_command(check_options); }; });
+
+  CLI::App* explain_app = app.add_subcommand("explain", "what a scene compiles to, what is skipped and why");
+  explain_app->add_option("scene", explain_options.files, "scene file")->required();
+  explain_app->callback([&] { command = [&] { return command_line::explain_command(explain_options); }; });
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error, std::cout, std::cerr) == 0 ? 0 : set_up_mistake;
+  }
+  return command();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const description::SetupError& error) {
+    std::fprintf(stderr, "proxarm: %s\n", error.what());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "proxarm: %s\n", error.what());
+  }
+  return set_up_mistake;
+}

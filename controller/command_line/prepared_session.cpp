@@ -1,0 +1,85 @@
+#include "controller/command_line/prepared_session.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+#include "controller/command_line/data_files.hpp"
+#include "models/description/setup_error.hpp"
+#include "scenes/scene_file.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using std::numbers::pi;
+
+constexpr const char* default_cell = "models/cells/default.yaml";
+
+fs::path beside(const fs::path& file, const std::string& relative) {
+  return (file.parent_path() / relative).lexically_normal();
+}
+
+fs::path chosen(const fs::path& given, const description::Cell& cell, const std::string& cells_own) {
+  return given.empty() ? beside(cell.file, cells_own) : user_file(given);
+}
+
+// Mean age of a sample: its converter holds it for half a period, its filter delays by its time constant.
+double sensor_delay_s(const description::SensorPlacement& sensor) {
+  double delay_s = 0.0;
+  if (sensor.sample_rate_Hz > 0.0) delay_s += 0.5 / sensor.sample_rate_Hz;
+  if (sensor.bandwidth_Hz > 0.0) delay_s += 1.0 / (2.0 * pi * sensor.bandwidth_Hz);
+  return delay_s;
+}
+
+// The slowest drive sets the pace.
+double drive_time_constant_s(const description::Cell& cell) {
+  double slowest_s = 0.0;
+  for (const description::DriveDescription& drive : cell.drives) {
+    slowest_s = std::max(slowest_s, 1.0 / (2.0 * pi * drive.position_bandwidth_Hz));
+  }
+  return slowest_s;
+}
+
+}  // namespace
+
+PreparedSession prepare(const RunOptions& options) {
+  PreparedSession session;
+  const fs::path cell_file = options.cell.empty() ? shipped_file(default_cell) : user_file(options.cell);
+  session.cell = description::load_cell(cell_file);
+  session.sensor = description::load_sensor(beside(session.cell.file, session.cell.sensor.description));
+  session.hand = description::load_hand(chosen(options.hand, session.cell, session.cell.default_hand));
+  session.scene = scenes::load_scene(chosen(options.scene, session.cell, session.cell.default_scene));
+  session.settings = options.settings;
+  session.settings.period_s = options.period_s.value_or(session.cell.default_period_s);
+  session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
+  session.duration_s = options.duration_s;
+
+  // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
+  session.loop.period_s = session.settings.period_s;
+  session.loop.delay_s = session.settings.period_s + sensor_delay_s(session.cell.sensor);
+  session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
+  session.loop.handle_mass_kg = session.cell.tool.mass_kg;
+  session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
+  session.loop.spring_N_per_m = session.settings.spring_N_per_m;
+  session.loop.order = session.settings.order;
+  return session;
+}
+
+void require_stable(const PreparedSession& session, const RunOptions& options) {
+  controller::HandModel hand;
+  hand.stiffness_N_per_m = session.hand.stiffness_N_per_m;
+  hand.damping_Ns_per_m = session.hand.damping_Ns_per_m;
+  hand.mass_kg = session.hand.mass_kg;
+  if (options.force_unstable && !options.bus.simulated()) {
+    throw description::SetupError({.key = "--force-unstable",
+                                   .found = "a bus that isn't simulated",
+                                   .expected = "--bus sim: an unstable mass is for simulation only"});
+  }
+  controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+}
+
+double total_delay_s(const PreparedSession& session) {
+  return session.loop.period_s + session.loop.delay_s + session.loop.drive_time_constant_s;
+}
+
+}  // namespace proxarm::command_line

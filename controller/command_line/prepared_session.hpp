@@ -1,0 +1,35 @@
+// What `run`, `sim` and `plan` know before they open a bus: all files loaded and checked, all defaults filled in.
+#pragma once
+
+#include <string>
+
+#include "controller/command_line/run_options.hpp"
+#include "controller/stability.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "scenes/scene.hpp"
+
+namespace proxarm::command_line {
+
+struct PreparedSession {
+  description::Cell cell;
+  description::SensorDescription sensor;
+  description::HandDescription hand;
+  scenes::Scene scene;
+  controller::SessionSettings settings;
+  double duration_s = 10.0;
+  controller::LoopModel loop;  // how the controller expects the closed loop to behave
+};
+
+// Throws SetupError. Opens no bus and starts nothing.
+PreparedSession prepare(const RunOptions& options);
+
+// The mass and timestep, judged: throws SetupError where the handle alone is heavier, or where the loop with the hand
+// would be unstable (unless forced, which only a simulation may be).
+void require_stable(const PreparedSession& session, const RunOptions& options);
+
+// Total delay from a force on the handle to the arm being where the proxy went, in seconds.
+double total_delay_s(const PreparedSession& session);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,369 @@
+#include "controller/cycle.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+
+using models::JointVector;
+using models::Vec3;
+
+namespace {
+
+constexpr double seconds_per_ns = 1e-9;
+
+// Of the period; what is left must carry the targets and be computed in (see bus_plan.hpp).
+constexpr double receive_window = 0.45;
+
+// How long the drives may take to switch off before the run ends without them.
+constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
+
+}  // namespace
+
+Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
+             std::size_t record_capacity)
+    : parts_(std::move(parts)),
+      settings_(settings),
+      limits_(limits),
+      period_ns_(std::llround(settings.period_s * 1e9)),
+      receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
+      link_rad_(parts_.arm->start_rad()),
+      target_rad_(parts_.arm->start_rad()),
+      target_k1_rad_(parts_.arm->start_rad()),
+      target_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
+      run_out_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
+      measured_link_rad_(parts_.arm->start_rad()),
+      records_(record_capacity) {
+  solution_.q = link_rad_;
+}
+
+void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
+  begin_cycle(t_k_ns);
+  receive_until(t_k_ns + receive_window_ns_);
+  const SteadyTime begun = std::chrono::steady_clock::now();
+  measure();
+  judge(t_k_ns);
+  choose_targets(t_k_ns);
+  send_targets();
+  compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
+  write_record(t_k_ns);
+  ++cycle_;
+}
+
+void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
+  const SteadyTime begun = std::chrono::steady_clock::now();
+  if (cycle_ == 0) {
+    first_cycle_ns_ = t_k_ns;
+    supervisor_.handle(Event::begin);
+  }
+  record_ = {};
+  sample_is_new_ = false;
+  fieldbus::CanFrame frame;
+  for (DriveBus& bus : parts_.drive_buses) {
+    send(bus.bus, bus.sync.next(), -1);
+    if (bus.heartbeat.due(t_k_ns, cycle_, frame)) send(bus.bus, frame, -1);
+  }
+  for (DriveOnBus& axis : parts_.drives) axis.drive.on_sync(t_k_ns);
+  if (parts_.sensor->poll(t_k_ns, frame)) send(parts_.sensor_bus, frame, -1);
+  compute_ns_ = std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
+}
+
+void Cycle::receive_until(std::int64_t deadline_ns) noexcept {
+  fieldbus::TimedFrame received;
+  do {
+    const SteadyTime begun = std::chrono::steady_clock::now();
+    for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
+      while (parts_.network.bus(bus).receive(received)) {
+        if (bus == parts_.sensor_bus && parts_.sensor->on_frame(received.frame, received.time_ns)) continue;
+        for (DriveOnBus& axis : parts_.drives) {
+          if (axis.bus == bus && axis.drive.on_frame(received.frame, received.time_ns)) break;
+        }
+      }
+    }
+    compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
+  } while (!everything_received() && parts_.network.wait_for_frame(deadline_ns));
+}
+
+bool Cycle::everything_received() const noexcept {
+  return parts_.sensor->fresh() &&
+         std::all_of(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& a) { return a.drive.fresh(); });
+}
+
+// Where the arm is by its encoders, and what the hand does by the sensor.
+void Cycle::measure() noexcept {
+  JointVector motor_rad(parts_.arm->axes());
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) motor_rad[i] = parts_.drives[i].drive.actual_rad();
+  // Gravity twists the gears; the twist of the last cycle is right to within a cycle's change of it.
+  measured_link_rad_ = motor_rad - (parts_.arm->motor_from_link(measured_link_rad_) - measured_link_rad_);
+  tool_W_ = parts_.arm->tool_pose(measured_link_rad_).translation();
+  R_WS_ = parts_.arm->sensor_pose(measured_link_rad_).linear();
+
+  sample_is_new_ = parts_.sensor->fresh();
+  if (sample_is_new_) {
+    const fieldbus::ForceSample& sample = parts_.sensor->latest();
+    reading_S_.force = Vec3(sample.wrench_S.data());
+    reading_S_.torque = Vec3(sample.wrench_S.data() + 3);
+  }
+  hand_W_ = parts_.compensation.hand_wrench_W(reading_S_, R_WS_);
+}
+
+void Cycle::judge(std::int64_t t_k_ns) noexcept {
+  if (stop_requested_.load(std::memory_order_relaxed)) supervisor_.handle(Event::stop);
+  judge_buses();
+  judge_drives();
+  judge_sensor();
+  if (overruns_in_a_row_ > settings_.max_overruns) {
+    raise(Fault::overrun, -1, overruns_in_a_row_, settings_.max_overruns);
+  }
+  if (supervisor_.phase() == Phase::rendering && !((tool_W_ - proxy_W_).norm() <= limits_.leash_m)) {
+    raise(Fault::leash_exceeded, -1, (tool_W_ - proxy_W_).norm(), limits_.leash_m);
+  }
+  enter(supervisor_.phase(), t_k_ns);
+}
+
+void Cycle::judge_sensor() noexcept {
+  missed_samples_ = sample_is_new_ ? 0 : missed_samples_ + 1;
+  if (missed_samples_ > settings_.max_missed_samples) {
+    raise(Fault::sensor_lost, -1, missed_samples_, settings_.max_missed_samples);
+  }
+  if (!sample_is_new_) return;
+  const fieldbus::ForceSample& sample = parts_.sensor->latest();
+  if (!reading_S_.force.allFinite() || !reading_S_.torque.allFinite()) return raise(Fault::force_not_finite, -1);
+  if (!sample.healthy) return raise(Fault::sensor_status, -1);
+  if (sample.saturated) return raise(Fault::sensor_saturated, -1);
+  const double force_N = hand_W_.force.norm();
+  if (supervisor_.phase() == Phase::rendering && force_N > limits_.max_force_N) {
+    raise(Fault::force_excessive, -1, force_N, limits_.max_force_N);
+  }
+}
+
+void Cycle::judge_drives() noexcept {
+  if (supervisor_.phase() == Phase::disabling || supervisor_.phase() == Phase::done) return;
+  for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
+    const fieldbus::ServoDrive& drive = parts_.drives[i].drive;
+    const auto where = static_cast<std::int32_t>(i);
+    if (drive.cycles_without_tpdo() > settings_.max_missed_feedback) {
+      raise(Fault::drive_silent, where, drive.cycles_without_tpdo(), settings_.max_missed_feedback);
+    }
+    switch (drive.fault()) {
+      case fieldbus::DriveFault::none:
+        break;
+      case fieldbus::DriveFault::left_operation:
+        raise(Fault::drive_disabled, where);
+        break;
+      case fieldbus::DriveFault::target_out_of_range:
+        raise(Fault::target_out_of_range, where);
+        break;
+      default:
+        raise(Fault::drive_fault, where);
+        break;
+    }
+  }
+}
+
+void Cycle::judge_buses() noexcept {
+  for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
+    const fieldbus::BusStatus& status = parts_.network.bus(bus).status();
+    const auto where = static_cast<std::int32_t>(bus);
+    if (status.state == fieldbus::BusState::bus_off) raise(Fault::bus_off, where);
+    if (status.receive_overflows > 0) {
+      raise(Fault::receive_overflow, where, static_cast<double>(status.receive_overflows));
+    }
+  }
+}
+
+// What a phase does when it begins.
+void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
+  if (phase == entered_phase_) return;
+  entered_phase_ = phase;
+  phase_since_ns_ = t_k_ns;
+  fieldbus::DriveGoal goal = fieldbus::DriveGoal::operation_enabled;
+  if (phase == Phase::disabling || phase == Phase::done) goal = fieldbus::DriveGoal::switched_off;
+  for (DriveOnBus& axis : parts_.drives) axis.drive.request(goal);
+  if (phase == Phase::taring) {
+    for (Eigen::Index i = 0; i < target_rad_.size(); ++i) target_rad_[i] = parts_.drives[i].drive.target_rad();
+  }
+  if (phase == Phase::rendering) start_rendering();
+  if (phase == Phase::stopping) {
+    double stop_s = settings_.period_s;
+    for (Eigen::Index i = 0; i < target_rad_.size(); ++i) {
+      const double deceleration = parts_.drives[i].drive.description().max_acceleration_rad_per_s2;
+      stop_s = std::max(stop_s, std::abs(target_rad_per_s_[i]) / deceleration);
+    }
+    run_out_rad_per_s_ = target_rad_per_s_;
+    run_out_scale_ = 1.0;
+    run_out_per_cycle_ = settings_.period_s / stop_s;
+  }
+}
+
+// A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one.
+void Cycle::choose_targets(std::int64_t t_k_ns) noexcept {
+  target_k1_rad_ = target_rad_;
+  act(t_k_ns);
+  if (supervisor_.phase() != entered_phase_) {
+    enter(supervisor_.phase(), t_k_ns);
+    act(t_k_ns);
+  }
+  target_rad_per_s_ = (target_rad_ - target_k1_rad_) / settings_.period_s;
+}
+
+void Cycle::act(std::int64_t t_k_ns) noexcept {
+  switch (supervisor_.phase()) {
+    case Phase::enabling:
+      await_enabled(t_k_ns);
+      break;
+    case Phase::taring:
+      tare(t_k_ns);
+      break;
+    case Phase::rendering:
+      render();
+      break;
+    case Phase::stopping:
+      run_out();
+      break;
+    case Phase::disabling:
+      await_disabled(t_k_ns);
+      break;
+    case Phase::idle:
+    case Phase::done:
+      break;
+  }
+}
+
+void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
+  const auto not_following = std::find_if(parts_.drives.begin(), parts_.drives.end(),
+                                          [](const DriveOnBus& a) { return !a.drive.following(); });
+  if (not_following == parts_.drives.end()) {
+    supervisor_.handle(Event::enabled);
+  } else if (static_cast<double>(t_k_ns - phase_since_ns_) * seconds_per_ns > settings_.enable_timeout_s) {
+    raise(Fault::drive_not_enabled, static_cast<std::int32_t>(not_following - parts_.drives.begin()),
+          settings_.enable_timeout_s, settings_.enable_timeout_s);
+  }
+}
+
+void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
+  const bool off = std::all_of(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& axis) {
+    return axis.drive.state() != fieldbus::DriveState::operation_enabled &&
+           axis.drive.state() != fieldbus::DriveState::quick_stop_active;
+  });
+  if (off || t_k_ns - phase_since_ns_ > disable_timeout_ns) supervisor_.handle(Event::disabled);
+}
+
+void Cycle::tare(std::int64_t t_k_ns) noexcept {
+  if (sample_is_new_) parts_.compensation.add_tare_sample(reading_S_, R_WS_);
+  const double spread_N = parts_.compensation.tare_spread_N();
+  if (spread_N > settings_.tare_spread_N) {
+    raise(Fault::force_at_start, -1, spread_N, settings_.tare_spread_N);
+  } else if (static_cast<double>(t_k_ns - phase_since_ns_) * seconds_per_ns >= settings_.tare_s) {
+    parts_.compensation.finish_tare();
+    hand_W_ = parts_.compensation.hand_wrench_W(reading_S_, R_WS_);
+    supervisor_.handle(Event::tared);
+  }
+}
+
+// The proxy starts at rest where the targets stand, so the first setpoint equals the last one.
+void Cycle::start_rendering() noexcept {
+  link_rad_ = parts_.arm->link_from_motor(target_rad_);
+  const models::Pose X_WT = parts_.arm->tool_pose(link_rad_);
+  proxy_W_ = X_WT.translation();
+  parts_.world->start(proxy_W_);
+  parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
+}
+
+void Cycle::render() noexcept {
+  const WorldStep step = parts_.world->step(hand_W_.force);
+  const ProxyFault turned = parts_.orientation.step(hand_W_.torque);
+  if (step.fault != ProxyFault::none || turned != ProxyFault::none) raise(Fault::proxy_not_finite, -1);
+  proxy_W_ = step.q_W;
+  record_.p_hat_W_m = triple(step.p_hat_W);
+  record_.contact_force_W_N = triple(step.f_W);
+  record_.normal_W = triple(step.normal_W);
+  record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
+  record_.set(RecordFlag::limit_orientation, parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
+  follow_proxy();
+  ++rendered_cycles_;
+}
+
+// Joint targets for the proxy's pose. A step that the joints can't take isn't sent: the last target stands, and the
+// stop that follows runs out from there.
+void Cycle::follow_proxy() noexcept {
+  models::Pose X_WT = models::Pose::Identity();
+  X_WT.translation() = proxy_W_;
+  X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
+  parts_.inverse.solve(link_rad_, X_WT, solution_);
+  if (solution_.status != models::InverseKinematicsResult::Status::converged) return raise(Fault::singular, -1);
+  const JointVector motor_rad = parts_.arm->motor_from_link(solution_.q);
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    const description::DriveDescription& drive = parts_.drives[i].drive.description();
+    const auto where = static_cast<std::int32_t>(i);
+    if (!(motor_rad[i] >= drive.range_rad[0] && motor_rad[i] <= drive.range_rad[1])) {
+      return raise(Fault::target_out_of_range, where, motor_rad[i],
+                   motor_rad[i] < drive.range_rad[0] ? drive.range_rad[0] : drive.range_rad[1]);
+    }
+    const double speed = std::abs(motor_rad[i] - target_rad_[i]) / settings_.period_s;
+    if (!(speed <= drive.max_speed_rad_per_s)) {
+      return raise(Fault::target_too_fast, where, speed, drive.max_speed_rad_per_s);
+    }
+  }
+  link_rad_ = solution_.q;
+  target_rad_ = motor_rad;
+}
+
+// Every joint keeps its share of the last motion while that shrinks to nothing, within each joint's deceleration.
+void Cycle::run_out() noexcept {
+  run_out_scale_ = std::max(0.0, run_out_scale_ - run_out_per_cycle_);
+  for (Eigen::Index i = 0; i < target_rad_.size(); ++i) {
+    const description::DriveDescription& drive = parts_.drives[i].drive.description();
+    target_rad_[i] = std::clamp(target_rad_[i] + run_out_scale_ * run_out_rad_per_s_[i] * settings_.period_s,
+                                drive.range_rad[0], drive.range_rad[1]);
+  }
+  if (run_out_scale_ <= 0.0) supervisor_.handle(Event::at_rest);
+}
+
+void Cycle::send_targets() noexcept {
+  fieldbus::CanFrame frame;
+  for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
+    fieldbus::ServoDrive& drive = parts_.drives[i].drive;
+    drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
+    if (drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame, static_cast<std::int32_t>(i));
+  }
+}
+
+void Cycle::send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept {
+  const fieldbus::SendResult result = parts_.network.bus(bus).send(frame);
+  if (result == fieldbus::SendResult::sent) return;
+  if (result == fieldbus::SendResult::bus_off) {
+    raise(Fault::bus_off, static_cast<std::int32_t>(bus));
+  } else {
+    raise(Fault::send_failed, drive);
+  }
+}
+
+void Cycle::raise(Fault fault, std::int32_t where, double value, double limit) noexcept {
+  supervisor_.raise({fault, where, cycle_, value, limit});
+}
+
+void Cycle::write_record(std::int64_t t_k_ns) noexcept {
+  record_.cycle = cycle_;
+  record_.time_ns = t_k_ns - first_cycle_ns_;
+  record_.phase = entered_phase_;
+  record_.axes = static_cast<std::uint8_t>(parts_.drives.size());
+  record_.set(RecordFlag::sample_held, !sample_is_new_);
+  record_.set(RecordFlag::overrun, overruns_in_a_row_ > 0);
+  record_.force_S_N = triple(reading_S_.force);
+  record_.torque_S_Nm = triple(reading_S_.torque);
+  record_.force_W_N = triple(hand_W_.force);
+  record_.torque_W_Nm = triple(hand_W_.torque);
+  record_.proxy_W_m = triple(proxy_W_);
+  record_.tool_W_m = triple(tool_W_);
+  for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
+    const fieldbus::ServoDrive& drive = parts_.drives[i].drive;
+    record_.target_counts[i] = drive.target_counts();
+    record_.actual_counts[i] = drive.actual_counts();
+    if (!drive.fresh()) record_.set(RecordFlag::feedback_missing);
+  }
+  record_.compute_ns = compute_ns_;
+  records_.push(record_);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,147 @@
+// One period of the session, the same lines on hardware, on vcan, in-process and in tests; only bus and clock differ.
+//
+//   t_k        SYNC on every drive bus, heartbeat where one is due, then the sensor's poll
+//   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
+//   then       judge ages and states, compensate, step the proxy (26), solve the arm, send the RPDOs, record
+//
+// The targets are latched by the drives at SYNC k+1 and, with their interpolation over the period, reached at k+2.
+//
+// run_cycle() neither allocates, locks, throws nor prints; all that it touches was built before. One thread calls it.
+// The supervisor's phase says what the targets are: the actual positions (enabling), still (taring, disabling), the
+// proxy's (rendering), or the last ones run out at the joints' own deceleration (stopping).
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "controller/cycle_record.hpp"
+#include "controller/orientation_proxy.hpp"
+#include "controller/rendered_world.hpp"
+#include "controller/session_settings.hpp"
+#include "controller/spsc_ring.hpp"
+#include "controller/supervisor.hpp"
+#include "controller/wrench_compensation.hpp"
+#include "fieldbus/can_network.hpp"
+#include "fieldbus/canopen_heartbeat.hpp"
+#include "fieldbus/canopen_sync.hpp"
+#include "fieldbus/cia402_drive.hpp"
+#include "fieldbus/force_sensor.hpp"
+#include "models/arm.hpp"
+#include "models/inverse_kinematics.hpp"
+
+namespace proxarm::controller {
+
+struct DriveOnBus {
+  fieldbus::ServoDrive drive;
+  std::size_t bus;  // index in the network
+};
+
+// A bus with drives: who gets SYNC and the controller's heartbeat.
+struct DriveBus {
+  std::size_t bus;
+  fieldbus::SyncProducer sync;
+  fieldbus::HeartbeatProducer heartbeat;
+};
+
+// All that a cycle works on, built and configured before the first one. Drives in the order of the arm's joints.
+struct CycleParts {
+  fieldbus::CanNetwork& network;
+  std::vector<DriveOnBus> drives;
+  std::vector<DriveBus> drive_buses;
+  std::unique_ptr<fieldbus::ForceSensor> sensor;
+  std::size_t sensor_bus;
+  std::unique_ptr<models::Arm> arm;  // in one place for good: the inverse kinematics refers to it
+  models::InverseKinematics inverse;
+  std::unique_ptr<RenderedWorld> world;
+  OrientationProxy orientation;
+  WrenchCompensation compensation;
+};
+
+class Cycle {
+ public:
+  // `record_capacity`: cycles that the ring holds until somebody pops them.
+  Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
+        std::size_t record_capacity);
+
+  // One period, begun at t_k.
+  void run_cycle(std::int64_t t_k_ns) noexcept;
+
+  // Any thread: asks for a controlled stop at the next cycle.
+  void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
+  // The loop's owner: this many cycles in a row were late.
+  void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
+
+  [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
+  [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return rendered_cycles_; }
+  [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
+  [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return records_; }
+
+ private:
+  using JointVector = models::JointVector;
+  using SteadyTime = std::chrono::steady_clock::time_point;
+
+  void begin_cycle(std::int64_t t_k_ns) noexcept;
+  void receive_until(std::int64_t deadline_ns) noexcept;
+  bool everything_received() const noexcept;
+  void measure() noexcept;
+  void judge(std::int64_t t_k_ns) noexcept;
+  void judge_sensor() noexcept;
+  void judge_drives() noexcept;
+  void judge_buses() noexcept;
+  void choose_targets(std::int64_t t_k_ns) noexcept;
+  void act(std::int64_t t_k_ns) noexcept;
+  void await_enabled(std::int64_t t_k_ns) noexcept;
+  void await_disabled(std::int64_t t_k_ns) noexcept;
+  void tare(std::int64_t t_k_ns) noexcept;
+  void start_rendering() noexcept;
+  void render() noexcept;
+  void follow_proxy() noexcept;
+  void run_out() noexcept;
+  void send_targets() noexcept;
+  void send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept;
+  void raise(Fault fault, std::int32_t where, double value = 0.0, double limit = 0.0) noexcept;
+  void write_record(std::int64_t t_k_ns) noexcept;
+  void enter(Phase phase, std::int64_t t_k_ns) noexcept;
+
+  CycleParts parts_;
+  SessionSettings settings_;
+  description::CellLimits limits_;
+  std::int64_t period_ns_;
+  std::int64_t receive_window_ns_;
+
+  Supervisor supervisor_;
+  Phase entered_phase_ = Phase::idle;
+  std::int64_t phase_since_ns_ = 0;
+  std::int64_t first_cycle_ns_ = 0;
+  std::uint64_t cycle_ = 0;
+  std::uint64_t rendered_cycles_ = 0;
+  std::uint32_t missed_samples_ = 0;
+  std::uint32_t overruns_in_a_row_ = 0;
+  std::atomic<bool> stop_requested_{false};
+
+  bool sample_is_new_ = false;
+  models::Wrench reading_S_;
+  models::Mat3 R_WS_ = models::Mat3::Identity();
+  models::Wrench hand_W_;
+  models::Vec3 tool_W_ = models::Vec3::Zero();  // by the encoders
+  models::Vec3 proxy_W_ = models::Vec3::Zero();
+  JointVector link_rad_;    // angles of the links at the target: what inverse kinematics starts from
+  JointVector target_rad_;  // motor side, what the drives are sent
+  JointVector target_k1_rad_;
+  JointVector target_rad_per_s_;  // of the last cycle: what a stop runs out
+  JointVector run_out_rad_per_s_;
+  JointVector measured_link_rad_;
+  models::InverseKinematicsResult solution_;
+  double run_out_scale_ = 1.0;
+  double run_out_per_cycle_ = 1.0;
+
+  std::int64_t compute_ns_ = 0;
+  CycleRecord record_;
+  SpscRing<CycleRecord> records_;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,49 @@
+// The proxy and its scene as the cycle sees them: a force in W goes in, the tool's next position in W comes out.
+//
+// The scene has n = 1, 2 or 3 dimensions; its space is o + U x with x in n coordinates and U an orthonormal 3×n basis.
+// What of the start position lies off that space is kept as it is, so that nothing jumps and the proxy moves along the
+// line or plane through the start.
+//
+//   x = Uᵀ(q_W − o),   h = Uᵀ h_W,   q_W = q_start + U (x − x_start)
+#pragma once
+
+#include <memory>
+
+#include "controller/admittance_proxy.hpp"
+#include "controller/session_settings.hpp"
+#include "models/geometry.hpp"
+#include "scenes/compile.hpp"
+
+namespace proxarm::controller {
+
+// What one step of the proxy did; all in W.
+struct WorldStep {
+  models::Vec3 q_W = models::Vec3::Zero();      // the new proxy
+  models::Vec3 p_hat_W = models::Vec3::Zero();  // where it would have gone
+  models::Vec3 f_W = models::Vec3::Zero();      // the world's force on it, (25a)
+  models::Vec3 v_W = models::Vec3::Zero();
+  models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
+  int contacts = 0;
+  bool slips = false;
+  ProxyFault fault = ProxyFault::none;
+};
+
+class RenderedWorld {
+ public:
+  RenderedWorld() = default;
+  RenderedWorld(const RenderedWorld&) = delete;
+  RenderedWorld& operator=(const RenderedWorld&) = delete;
+  virtual ~RenderedWorld() = default;
+
+  // Sets the proxy to rest at q_W; the spring, where there is one, pulls to it.
+  virtual void start(const models::Vec3& q_W) noexcept = 0;
+  // One period under the hand's force; q_W of the result is finite, and the one before where there was a fault.
+  virtual WorldStep step(const models::Vec3& h_W) noexcept = 0;
+};
+
+// `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the
+// result.
+std::unique_ptr<RenderedWorld> make_rendered_world(scenes::CompiledScene& scene, const SessionSettings& settings,
+                                                   double proxy_mass_kg);
+
+}  // namespace proxarm::controller

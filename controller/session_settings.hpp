@@ -1,0 +1,31 @@
+// What a session renders, apart from the cell and the scene: what a user may set on the command line.
+#pragma once
+
+#include <cstdint>
+
+namespace proxarm::controller {
+
+enum class OrientationMode : std::uint8_t {
+  held,  // the tool keeps the orientation of the start
+  free,  // the tool turns under the hand's torque with an inertia and a damping of its own
+};
+
+struct SessionSettings {
+  double period_s = 1e-3;         // T, the timestep of the cycle
+  double mass_kg = 4.0;           // what the hand feels, tool behind the sensor included
+  double damping_Ns_per_m = 0.0;  // B of design point "virtual damping": to the world, in the medium
+  double spring_N_per_m = 0.0;    // K_v, to the start position
+  int order = 1;                  // 1: (26); 2: its second-order sibling
+  OrientationMode orientation = OrientationMode::held;
+  double rotational_inertia_kg_m2 = 0.05;
+  double rotational_damping_Nms_per_rad = 0.5;
+
+  double tare_s = 0.2;         // how long the sensor is averaged at rest before rendering
+  double tare_spread_N = 5.0;  // a reading that far from the mean means a hand on the handle
+  double enable_timeout_s = 5.0;
+  std::uint32_t max_missed_samples = 3;   // cycles in a row without a complete sensor sample
+  std::uint32_t max_missed_feedback = 3;  // cycles in a row without a drive's TPDO
+  std::uint32_t max_overruns = 5;         // late cycles in a row
+};
+
+}  // namespace proxarm::controller

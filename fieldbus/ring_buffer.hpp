@@ -1,0 +1,41 @@
+// A first-in first-out queue of fixed capacity, for frames that wait on either side of a bus.
+// All memory is taken at construction. For one thread.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace proxarm::fieldbus {
+
+template <class T>
+class RingBuffer {
+ public:
+  explicit RingBuffer(std::size_t capacity) : items_(capacity) {}
+
+  // False when full: nothing was stored.
+  bool push(const T& item) noexcept {
+    if (size_ == items_.size()) return false;
+    std::size_t index = head_ + size_;
+    if (index >= items_.size()) index -= items_.size();
+    items_[index] = item;
+    ++size_;
+    return true;
+  }
+  // Oldest element; there must be one.
+  [[nodiscard]] const T& front() const noexcept { return items_[head_]; }
+  void pop() noexcept {
+    if (++head_ == items_.size()) head_ = 0;
+    --size_;
+  }
+  void clear() noexcept { head_ = size_ = 0; }
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] std::size_t capacity() const noexcept { return items_.size(); }
+
+ private:
+  std::vector<T> items_;
+  std::size_t head_ = 0;
+  std::size_t size_ = 0;
+};
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,52 @@
+// What goes wrong with a simulated device, and when: a script of faults for tests and for trying out one's own nerves.
+//
+// As text, for the command line:  DEVICE:KIND[=VALUE][@FROM[..UNTIL]]
+//   axis_3:silent                     drive of axis_3 says nothing, from the start
+//   axis_2:fault=0x4210@2s            drive reports EMCY 4210h (temperature) two seconds after power on
+//   sensor:frozen@1.5s..1.6s          repeats one sample for a tenth of a second
+//   sensor:status=0x4000@3s
+// DEVICE is a joint's name in the cell, or "sensor". Times count from power on and have a unit.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace proxarm::sim {
+
+enum class DeviceFaultKind : std::uint8_t {
+  // Drives
+  drive_silent,    // "silent": its bus connection is gone both ways; the firmware runs on
+  drive_fault,     // "fault": trips with EMCY code VALUE
+  device_type,     // "device_type": 1000h is VALUE; always, no times
+  heartbeat_lost,  // "heartbeat": no heartbeat leaves
+  sdo_silent,      // "sdo": SDO requests stay unanswered
+  power_loss,      // "power": off, and on again at the end
+  jammed,          // "jammed": the motor can't turn
+  // Sensor
+  sensor_silent,    // "silent": answers nothing
+  samples_missing,  // "samples": answers everything but polls
+  frozen,           // "frozen": repeats its last sample
+  half_sample,      // "half": the second frame of a sample is missing
+  swapped,          // "swapped": the second frame comes first
+  duplicated,       // "duplicated": each frame comes twice
+  short_frames,     // "short": each frame lacks a byte
+  status,           // "status": bits VALUE in the status word
+  delay,            // "delay": answers VALUE microseconds later
+};
+
+struct DeviceFault {
+  std::string device;
+  DeviceFaultKind kind = DeviceFaultKind::drive_silent;
+  std::uint32_t value = 0;
+  std::int64_t from_ns = 0;  // since power on
+  std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();
+};
+
+// Throws SetupError: unknown kind, missing or superfluous value, bad time. Whether the device exists is known only to
+// the cell.
+[[nodiscard]] DeviceFault parse_device_fault(std::string_view text);
+
+}  // namespace proxarm::sim

@@ -1,0 +1,309 @@
+#include "sim/simulated_cell.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::sim {
+
+namespace {
+
+using description::SetupError;
+
+// 6065h as such drives are delivered: at the joint. The master may set another.
+constexpr double kFollowingErrorWindow_rad = 0.05;
+
+double counts_per_rad(const description::DriveDescription& drive) noexcept { return std::abs(drive.counts_per_rad()); }
+
+std::uint32_t to_u32(double value) noexcept {
+  return static_cast<std::uint32_t>(std::clamp(std::nearbyint(value), 1.0, 4294967294.0));
+}
+
+std::int32_t to_i32(double value) noexcept {
+  return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), -2147483648.0, 2147483647.0));
+}
+
+DriveDeviceConfig drive_config(const description::DriveDescription& drive, const SimulatedCellConfig& config) {
+  DriveDeviceConfig c;
+  c.canopen.node = drive.node;
+  c.canopen.device_type = drive.device_type;
+  c.canopen.serial = drive.node;
+  c.canopen.revision = 0x00010000;
+  c.canopen.device_name = "simulated drive of " + drive.joint;
+  c.canopen.boot_time_ns = config.drive_boot_time_ns;
+  const double scale = counts_per_rad(drive);
+  c.following_error_window_counts = to_u32(kFollowingErrorWindow_rad * scale);
+  c.quick_stop_deceleration = to_u32(drive.max_acceleration_rad_per_s2 * scale);
+  c.profile_deceleration = to_u32(0.5 * drive.max_acceleration_rad_per_s2 * scale);
+  const double first = drive.offset_counts + drive.range_rad[0] * drive.counts_per_rad();
+  const double second = drive.offset_counts + drive.range_rad[1] * drive.counts_per_rad();
+  c.position_min = to_i32(std::min(first, second));
+  c.position_max = to_i32(std::max(first, second));
+  c.brake_release_ns = config.brake_release_ns;
+  return c;
+}
+
+}  // namespace
+
+// ---- Where devices meet the physics
+
+class SimulatedCell::PlantAxis final : public ServoAxis {
+ public:
+  PlantAxis(ServoLoop& servo, const description::DriveDescription& drive)
+      : servo_(servo), counts_per_rad_(drive.counts_per_rad()), max_torque_Nm_(drive.simulation.max_torque_Nm) {}
+
+  void enable(std::int64_t time_ns) noexcept override { servo_.enable(time_ns); }
+  void disable() noexcept override { servo_.disable(); }
+  void set_interpolation_period_ns(std::int64_t period_ns) noexcept override {
+    servo_.set_interpolation_period_ns(period_ns);
+  }
+  void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept override {
+    servo_.set_target(target_counts, time_ns);
+  }
+  void stop(double deceleration_counts_per_s2, std::int64_t time_ns) noexcept override {
+    servo_.stop(deceleration_counts_per_s2 / std::abs(counts_per_rad_), time_ns);
+  }
+  [[nodiscard]] std::int32_t position_counts() const noexcept override { return servo_.position_counts(); }
+  [[nodiscard]] std::int32_t demand_counts() const noexcept override { return servo_.demand_counts(); }
+  [[nodiscard]] double speed_counts_per_s() const noexcept override {
+    return servo_.speed_rad_per_s() * counts_per_rad_;
+  }
+  [[nodiscard]] double torque_ratio() const noexcept override {
+    return max_torque_Nm_ > 0.0 ? servo_.torque_Nm() / max_torque_Nm_ * (counts_per_rad_ > 0.0 ? 1.0 : -1.0) : 0.0;
+  }
+  [[nodiscard]] bool limited() const noexcept override { return servo_.limited(); }
+  [[nodiscard]] bool at_rest() const noexcept override { return servo_.at_rest(); }
+
+ private:
+  ServoLoop& servo_;
+  double counts_per_rad_, max_torque_Nm_;
+};
+
+class SimulatedCell::PlantGauges final : public GaugeSource {
+ public:
+  explicit PlantGauges(const Plant& plant) : plant_(plant) {}
+  [[nodiscard]] std::array<std::int16_t, 6> gauges(std::int64_t time_ns) noexcept override {
+    return plant_.force_sensor().sample(time_ns).gauges;
+  }
+
+ private:
+  const Plant& plant_;
+};
+
+// ---- Set-up
+
+SimulatedCell::SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
+                             const description::HandDescription& hand, fieldbus::EventQueue& events,
+                             const SimulatedCellConfig& config)
+    : cell_(cell),
+      events_(events),
+      tick_ns_(config.tick_ns),
+      faults_(config.faults),
+      plant_(cell, sensor, hand, events.now_ns(), config.plant) {
+  for (std::size_t axis = 0; axis < cell_.drives.size(); ++axis) add_drive(axis, config);
+  add_sensor(sensor);
+  check_faults();
+}
+
+SimulatedCell::~SimulatedCell() = default;
+
+void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& config) {
+  const description::DriveDescription& drive = cell_.drives[axis];
+  const std::size_t bus = bus_index(drive.bus, "drives[" + std::to_string(axis) + "].bus");
+  DriveDeviceConfig device = drive_config(drive, config);
+  for (const DeviceFault& fault : faults_) {
+    if (fault.device == drive.joint && fault.kind == DeviceFaultKind::device_type) {
+      device.canopen.device_type = fault.value;
+    }
+  }
+  Clockwork& clockwork = *this;
+  nodes_.push_back(std::make_unique<DeviceNode>(drive.joint, bus, events_, clockwork));
+  axes_.push_back(std::make_unique<PlantAxis>(plant_.servo(axis), drive));
+  drives_.push_back(std::make_unique<DriveDevice>(device, *axes_.back(), *nodes_.back()));
+  nodes_.back()->set_device(*drives_.back());
+}
+
+void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
+  if (sensor.protocol != "ati_net_can_oem") {
+    throw SetupError({.file = sensor.file.string(),
+                      .key = "protocol",
+                      .found = description::in_quotes(sensor.protocol),
+                      .expected = "ati_net_can_oem, which is what can be simulated"});
+  }
+  AtiDeviceConfig config;
+  config.base_id = cell_.sensor.base_id;
+  for (std::size_t row = 0; row < 6; ++row) {
+    for (std::size_t column = 0; column < 6; ++column) {
+      config.matrix[row][column] = static_cast<float>(sensor.simulation.matrix[row][column]);
+    }
+  }
+  config.counts_per_force = sensor.simulation.counts_per_N;
+  config.counts_per_torque = sensor.simulation.counts_per_Nm;
+  Clockwork& clockwork = *this;
+  const std::size_t bus = bus_index(cell_.sensor.bus, "sensor.bus");
+  nodes_.push_back(std::make_unique<DeviceNode>("sensor", bus, events_, clockwork));
+  gauges_ = std::make_unique<PlantGauges>(plant_);
+  sensor_ = std::make_unique<AtiDevice>(config, *gauges_, *nodes_.back());
+  nodes_.back()->set_device(*sensor_);
+}
+
+std::size_t SimulatedCell::bus_index(const std::string& name, const std::string& key) const {
+  for (std::size_t i = 0; i < cell_.buses.size(); ++i) {
+    if (cell_.buses[i].name == name) return i;
+  }
+  throw SetupError({.file = cell_.file.string(),
+                    .key = key,
+                    .found = description::in_quotes(name),
+                    .expected = "the name of one of the cell's buses"});
+}
+
+std::size_t SimulatedCell::axis_of(const std::string& joint) const noexcept {
+  std::size_t axis = 0;
+  while (axis < cell_.drives.size() && cell_.drives[axis].joint != joint) ++axis;
+  return axis;
+}
+
+void SimulatedCell::attach_to(fieldbus::SimulatedCanNetwork& network) {
+  for (const auto& node : nodes_) {
+    node->connect(network.simulated_bus(cell_.buses[node->bus()].name).attach(*node, node->name()));
+  }
+}
+
+// ---- Time
+
+void SimulatedCell::power_on() {
+  const std::int64_t now_ns = events_.now_ns();
+  advance_to(now_ns);
+  for (const auto& node : nodes_) node->set_power(true, now_ns);
+  schedule_faults();
+  events_.schedule(now_ns + tick_ns_, [this](std::int64_t time_ns) { tick(time_ns); });
+}
+
+void SimulatedCell::tick(std::int64_t time_ns) noexcept {
+  events_.schedule(time_ns + tick_ns_, [this](std::int64_t next_ns) { tick(next_ns); });
+  advance_to(time_ns);
+  for (const auto& node : nodes_) node->on_time(time_ns);
+}
+
+void SimulatedCell::advance_to(std::int64_t time_ns) noexcept {
+  if (!observer_) return plant_.advance_to(time_ns);
+  while (plant_.time_ns() + plant_.step_ns() <= time_ns) {
+    plant_.advance_to(plant_.time_ns() + plant_.step_ns());
+    observer_(present_truth());
+  }
+}
+
+Truth SimulatedCell::truth() noexcept {
+  advance_to(events_.now_ns());
+  return present_truth();
+}
+
+Truth SimulatedCell::present_truth() const noexcept {
+  const ToolState& tool = plant_.tool();
+  return {.time_ns = plant_.time_ns(),
+          .X_WT = tool.X_WT,
+          .velocity_W = tool.velocity_W,
+          .acceleration_W = tool.acceleration_W,
+          .hand_force_W = plant_.handle_force_W(),
+          .sensor_wrench_S = plant_.arm().sensor_wrench_S(),
+          .hand_started = plant_.hand_started(),
+          .hand_start_ns = plant_.hand_start_ns()};
+}
+
+// ---- Faults
+
+void SimulatedCell::check_faults() const {
+  for (const DeviceFault& fault : faults_) {
+    if (fault.device == "sensor" || axis_of(fault.device) < cell_.drives.size()) continue;
+    std::string names;
+    for (const auto& drive : cell_.drives) names += drive.joint + ", ";
+    throw SetupError({.key = "device fault",
+                      .found = description::in_quotes(fault.device),
+                      .expected = "one of " + names + "sensor"});
+  }
+}
+
+void SimulatedCell::schedule_faults() {
+  const std::int64_t start_ns = events_.now_ns();
+  for (std::size_t i = 0; i < faults_.size(); ++i) {
+    if (faults_[i].from_ns <= 0) {
+      set_fault(i, true, start_ns);
+    } else {
+      events_.schedule(start_ns + faults_[i].from_ns, [this, i](std::int64_t t) { set_fault(i, true, t); });
+    }
+    if (faults_[i].until_ns > fieldbus::EventQueue::never - start_ns) continue;
+    events_.schedule(start_ns + faults_[i].until_ns, [this, i](std::int64_t t) { set_fault(i, false, t); });
+  }
+}
+
+void SimulatedCell::set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept {
+  const DeviceFault& fault = faults_[index];
+  advance_to(time_ns);
+  const std::size_t axis = axis_of(fault.device);
+  if (axis < drives_.size()) {
+    set_drive_fault(axis, fault, on, time_ns);
+  } else {
+    set_sensor_fault(fault, on);
+  }
+}
+
+void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on,
+                                    std::int64_t time_ns) noexcept {
+  switch (fault.kind) {
+    case DeviceFaultKind::drive_silent:
+      return nodes_[axis]->cut(on);
+    case DeviceFaultKind::drive_fault:
+      if (on) drives_[axis]->inject_fault(static_cast<std::uint16_t>(fault.value), time_ns);
+      return;
+    case DeviceFaultKind::heartbeat_lost:
+      return drives_[axis]->canopen().mute_heartbeat(on);
+    case DeviceFaultKind::sdo_silent:
+      return drives_[axis]->canopen().mute_sdo(on);
+    case DeviceFaultKind::power_loss:
+      if (on) plant_.servo(axis).disable();
+      return nodes_[axis]->set_power(!on, time_ns);
+    case DeviceFaultKind::jammed:
+      return plant_.arm().jam(axis, on);
+    default:
+      return;
+  }
+}
+
+void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept {
+  AtiFaults& faults = sensor_->faults();
+  switch (fault.kind) {
+    case DeviceFaultKind::sensor_silent:
+      faults.silent = on;
+      return;
+    case DeviceFaultKind::samples_missing:
+      faults.silent_samples = on;
+      return;
+    case DeviceFaultKind::frozen:
+      faults.frozen = on;
+      return;
+    case DeviceFaultKind::half_sample:
+      faults.half_sample = on;
+      return;
+    case DeviceFaultKind::swapped:
+      faults.swapped = on;
+      return;
+    case DeviceFaultKind::duplicated:
+      faults.duplicated = on;
+      return;
+    case DeviceFaultKind::short_frames:
+      faults.short_frames = on;
+      return;
+    case DeviceFaultKind::status:
+      faults.status_bits = on ? static_cast<std::uint16_t>(fault.value) : std::uint16_t{0};
+      return;
+    case DeviceFaultKind::delay:
+      faults.delay_ns = on ? std::int64_t{fault.value} * 1'000 : 0;
+      return;
+    default:
+      return;
+  }
+}
+
+}  // namespace proxarm::sim

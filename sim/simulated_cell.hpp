@@ -1,0 +1,108 @@
+// The far end of all wires of a cell: arm, hand and physics, with a drive per joint and the force sensor on their
+// buses.
+//
+//   SimulatedCell far_end(cell, sensor, hand, network.events());
+//   far_end.attach_to(network);   // in-process; or connect() each node to a port of a real interface
+//   far_end.power_on();
+// From then on it lives by events and frames alone. It knows nothing of the controller.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fieldbus/simulated_can_network.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "sim/ati_device.hpp"
+#include "sim/device_fault.hpp"
+#include "sim/device_node.hpp"
+#include "sim/drive_device.hpp"
+#include "sim/plant.hpp"
+
+namespace proxarm::sim {
+
+struct SimulatedCellConfig {
+  PlantConfig plant;
+  std::vector<DeviceFault> faults;
+  std::int64_t tick_ns = 1'000'000;  // how often devices look at the clock; physics has its own step
+  std::int64_t drive_boot_time_ns = 20'000'000;
+  std::int64_t brake_release_ns = 30'000'000;
+};
+
+// What is really so, in W; the controller never sees it.
+struct Truth {
+  std::int64_t time_ns = 0;
+  models::Pose X_WT = models::Pose::Identity();        // rendered point of the handle
+  models::Vec3 velocity_W = models::Vec3::Zero();      // m/s
+  models::Vec3 acceleration_W = models::Vec3::Zero();  // m/s²
+  models::Vec3 hand_force_W = models::Vec3::Zero();    // N, of the hand on the handle at T
+  models::Wrench sensor_wrench_S;                      // load on the sensor, handle's weight and inertia included
+  bool hand_started = false;                           // all drives have been enabled once
+  std::int64_t hand_start_ns = 0;
+};
+
+class SimulatedCell final : private Clockwork {
+ public:
+  // Throws SetupError: what Plant refuses, a bus that the cell doesn't have, a fault for a device that isn't there.
+  SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
+                const description::HandDescription& hand, fieldbus::EventQueue& events,
+                const SimulatedCellConfig& config = {});
+  SimulatedCell(const SimulatedCell&) = delete;
+  SimulatedCell& operator=(const SimulatedCell&) = delete;
+  ~SimulatedCell() override;
+
+  // Nodes, one per drive in the cell's order and then the sensor: to be connected to their buses before power_on().
+  [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
+  [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
+
+  // Connects all nodes to the buses of these names.
+  void attach_to(fieldbus::SimulatedCanNetwork& network);
+
+  // Everything starts at the event queue's present time, and the physics and the devices' clocks with it.
+  void power_on();
+
+  // At the event queue's present time, up to one step of the physics before it.
+  [[nodiscard]] Truth truth() noexcept;
+  // Called after each step of the physics, in order of time; may allocate nothing where the run mustn't. Empty: none.
+  void set_observer(std::function<void(const Truth&)> observer) { observer_ = std::move(observer); }
+
+  [[nodiscard]] Plant& plant() noexcept { return plant_; }
+  [[nodiscard]] DriveDevice& drive(std::size_t axis) noexcept { return *drives_[axis]; }
+  [[nodiscard]] AtiDevice& sensor() noexcept { return *sensor_; }
+  [[nodiscard]] const description::Cell& cell() const noexcept { return cell_; }
+
+ private:
+  class PlantAxis;
+  class PlantGauges;
+
+  void advance_to(std::int64_t time_ns) noexcept override;
+  [[nodiscard]] Truth present_truth() const noexcept;
+  void add_drive(std::size_t axis, const SimulatedCellConfig& config);
+  void add_sensor(const description::SensorDescription& sensor);
+  void check_faults() const;
+  void schedule_faults();
+  void set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept;
+  void set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
+  void set_sensor_fault(const DeviceFault& fault, bool on) noexcept;
+  void tick(std::int64_t time_ns) noexcept;
+  [[nodiscard]] std::size_t bus_index(const std::string& name, const std::string& key) const;
+  [[nodiscard]] std::size_t axis_of(const std::string& joint) const noexcept;  // drives_.size(): none
+
+  description::Cell cell_;
+  fieldbus::EventQueue& events_;
+  std::int64_t tick_ns_;
+  std::vector<DeviceFault> faults_;
+  Plant plant_;
+  std::vector<std::unique_ptr<DeviceNode>> nodes_;
+  std::vector<std::unique_ptr<PlantAxis>> axes_;
+  std::unique_ptr<PlantGauges> gauges_;
+  std::vector<std::unique_ptr<DriveDevice>> drives_;
+  std::unique_ptr<AtiDevice> sensor_;
+  std::function<void(const Truth&)> observer_;
+};
+
+}  // namespace proxarm::sim
