@@ -103,7 +103,7 @@ class SummaryBuilder {
   std::unique_ptr<State> state_;
 };
 
-// One JSON object on one line: everything, for `--json`.
+// One JSON object on one line, without its end: everything, for `--json`.
 std::string summary_json(const Summary& summary);
 // For files: all that is the same in two runs with the same input, and the wall-clock figures, each on lines of their
 // own.

@@ -83,7 +83,7 @@ std::string summary_json(const Summary& s) {
   json["cycles"] = s.cycles;
   add_timing(json, s);
   add_repeatable(json, s);
-  return json.dump() + "\n";
+  return json.dump();
 }
 
 std::string repeatable_json(const Summary& s) {

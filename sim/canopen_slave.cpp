@@ -192,7 +192,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   }
   clear_error(emcy::pdo_too_short, time_ns);
   receive.last_ns = time_ns;
-  if (receive.overdue) clear_error(emcy::rpdo_timeout, time_ns);
+  clear_error(emcy::rpdo_timeout, time_ns);  // also one from before the PDO was configured anew
   receive.overdue = false;
   const std::int64_t window_ns = dictionary_.number(0x1007) * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());

@@ -210,7 +210,7 @@ void read_drives(const YamlNode& root, Cell& cell) {
 void read_start(const YamlNode& root, Cell& cell) {
   const YamlNode node = root.at("start_rad");
   const std::size_t n = cell.drives.size();
-  cell.start_rad = node.as_numbers(n, n, between(-1000.0, 1000.0));
+  cell.start_rad = node.as_numbers(n, n);
   const auto elements = node.as_list();
   for (std::size_t i = 0; i < n; ++i) {
     const auto [low, high] = cell.drives[i].range_rad;

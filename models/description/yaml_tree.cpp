@@ -7,6 +7,7 @@
 #include <yaml-cpp/exceptions.h>
 #include <yaml-cpp/parser.h>
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 #include <unordered_set>
@@ -19,7 +20,15 @@ namespace {
 
 constexpr std::size_t max_bytes = 16U << 20U;
 constexpr std::size_t max_depth = 32;
+constexpr std::size_t max_key_bytes = 100;
 constexpr std::size_t max_keys = 1000;  // of one map: lists are for the rest, and look-ups here are linear
+
+constexpr std::size_t max_values = 500'000;  // of a file; about 100 MB as a tree
+
+// yaml-cpp takes the end of the file for the end of a quote that nobody closed. A last line of our own shows it: a
+// comment to YAML, unless some quote swallows it.
+constexpr std::string_view last_line = "\n# end of file, unless in quotes: 5bd0d7a1\n";
+constexpr std::string_view last_words = "5bd0d7a1";
 
 SetupError mistake(const std::filesystem::path& file, int line, int column, std::string message,
                    std::string advice = {}) {
@@ -123,6 +132,9 @@ class YamlNode::Builder : public YAML::EventHandler {
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
     refuse(mark, tag, anchor);
+    if (value.find(last_words) != std::string::npos) {
+      throw fail(mark, "a quote or a block of text that begins here never ends");
+    }
     if (expects_key()) {
       set_key(mark, value);
       return;
@@ -169,6 +181,9 @@ class YamlNode::Builder : public YAML::EventHandler {
     Level& level = stack_.back();
     if (key.empty()) throw fail(mark, "a key is missing");
     if (key == "<<") throw fail(mark, "merge keys (<<) are not allowed");
+    if (key.size() > max_key_bytes || in_quotes(key, max_key_bytes).find("\\x") != std::string::npos) {
+      throw fail(mark, "a key must be a word: found " + in_quotes(key));
+    }
     if (!level.keys.insert(key).second) {
       int first = 0;
       for (const Item* item : level.item->children) {
@@ -183,6 +198,7 @@ class YamlNode::Builder : public YAML::EventHandler {
   }
 
   Item& add(const YAML::Mark& mark, Item::Kind kind) {
+    if (document_.items.size() >= max_values) throw fail(mark, "more than 500000 values in the file");
     Item& item = document_.items.emplace_back();
     item.kind = kind;
     item.line = item.key_line = mark.line + 1;
@@ -229,13 +245,14 @@ YamlNode YamlNode::parse(std::string_view text, const std::filesystem::path& fil
   document->folder = std::filesystem::absolute(file).parent_path();
   Builder builder(*document);
   try {
-    std::istringstream in{std::string(text)};
+    std::istringstream in(std::string(text).append(last_line));
     YAML::Parser parser(in);
     if (!parser.HandleNextDocument(builder) || document->items.empty() ||
         document->items.front().kind == Item::Kind::null) {
       throw mistake(file, 0, 0, "the file is empty");
     }
     Document rest;
+    rest.file = file;
     Builder ignored(rest);
     if (parser.HandleNextDocument(ignored)) throw mistake(file, 0, 0, "more than one document in the file (---)");
   } catch (const YAML::Exception& error) {

@@ -1,0 +1,40 @@
+// One line on a terminal that says how far a long run is: "  43 % [=========>           ]  4.3 of 10 s, sliding at 5.2
+// N".
+//
+// Drawn to standard error, and only if that is a terminal that can move its cursor; at most ten times a second. Not for
+// the cycle: whoever drains the records calls it.
+#pragma once
+
+#include <chrono>
+#include <cstdio>
+#include <string>
+#include <string_view>
+
+namespace proxarm::controller {
+
+class Progress {
+ public:
+  // `total_s` of what the run simulates or takes. `stream` is there for tests.
+  explicit Progress(double total_s, std::FILE* stream = stderr);
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  ~Progress() { clear(); }
+
+  // `done_s` of total_s are done; `note` is put behind it, cut to the line.
+  void update(double done_s, std::string_view note);
+  // Takes the line away, before anything else is printed.
+  void clear();
+
+  [[nodiscard]] bool enabled() const noexcept { return enabled_; }
+
+ private:
+  double total_s_;
+  std::FILE* stream_;
+  bool enabled_ = false, drawn_ = false;
+  std::chrono::steady_clock::time_point last_{};
+};
+
+// The line itself, at most `columns` wide.
+std::string progress_line(double done_s, double total_s, std::string_view note, std::size_t columns);
+
+}  // namespace proxarm::controller

@@ -1,0 +1,146 @@
+#include "sim/far_end_process.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+#include <utility>
+
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::sim {
+
+namespace {
+
+using description::SetupError;
+
+constexpr std::int64_t kLongestSleep = 20'000'000;  // so that the stop flag is seen
+
+// Identifiers of a drive's predefined connections that it uses, and those for all drives (node 0).
+bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
+  const std::uint32_t base = id & 0x780, number = id & 0x7F;
+  if (number == 0) return base == 0x000 || base == 0x080;
+  return number == node && base != 0x000 && base != 0x100 && base != 0x680 && base != 0x780;
+}
+
+// Two drives with one node number on one interface would answer each other's requests.
+void check_nodes(const description::Cell& cell, const std::vector<std::size_t>& interface_of_bus) {
+  if (interface_of_bus.size() != cell.buses.size()) {
+    throw SetupError({.file = cell.file.string(),
+                      .key = "buses",
+                      .found = std::to_string(interface_of_bus.size()) + " interfaces",
+                      .expected = "one for each of " + std::to_string(cell.buses.size()) + " buses"});
+  }
+  const auto interface_of = [&](const std::string& name) {
+    for (std::size_t i = 0; i < cell.buses.size(); ++i) {
+      if (cell.buses[i].name == name) return interface_of_bus[i];
+    }
+    return std::numeric_limits<std::size_t>::max();
+  };
+  for (std::size_t i = 0; i < cell.drives.size(); ++i) {
+    const bool with_sensor = interface_of(cell.drives[i].bus) == interface_of(cell.sensor.bus);
+    for (std::uint32_t operation = 0; with_sensor && operation < 16; ++operation) {
+      const std::uint32_t id = cell.sensor.base_id << 4 | operation;
+      if (!is_used_by(cell.drives[i].node, id)) continue;
+      char text[8];
+      std::snprintf(text, sizeof text, "0x%03X", id);
+      throw SetupError({.file = cell.file.string(),
+                        .bus = cell.sensor.bus,
+                        .node = cell.drives[i].node,
+                        .key = "sensor.base_id",
+                        .message = std::string("identifier ") + text + " would be the sensor's and, on the same " +
+                                   "interface, that of the drive of " + cell.drives[i].joint});
+    }
+    for (std::size_t j = 0; j < i; ++j) {
+      const bool same_wire = interface_of(cell.drives[i].bus) == interface_of(cell.drives[j].bus);
+      if (!same_wire || cell.drives[i].node != cell.drives[j].node) continue;
+      throw SetupError({.file = cell.file.string(),
+                        .bus = cell.drives[i].bus,
+                        .node = cell.drives[i].node,
+                        .key = "drives[" + std::to_string(i) + "].node",
+                        .message = "drives of " + cell.drives[j].joint + " and " + cell.drives[i].joint +
+                                   " have the same node on one interface"});
+    }
+  }
+}
+
+}  // namespace
+
+class FarEndProcess::InterfacePort final : public fieldbus::CanPort {
+ public:
+  explicit InterfacePort(fieldbus::CanBus& bus) : bus_(bus) {}
+  fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override { return bus_.send(frame); }
+
+ private:
+  fieldbus::CanBus& bus_;
+};
+
+FarEndProcess::FarEndProcess(const description::Cell& cell, const description::SensorDescription& sensor,
+                             const description::HandDescription& hand, fieldbus::CanNetwork& network,
+                             const std::vector<std::size_t>& interface_of_bus, const SimulatedCellConfig& config)
+    : network_(network), events_(network.now_ns()), interface_of_bus_(interface_of_bus), tick_ns_(config.tick_ns) {
+  check_nodes(cell, interface_of_bus);
+  cell_ = std::make_unique<SimulatedCell>(cell, sensor, hand, events_, config);
+  for (std::size_t i = 0; i < cell_->node_count(); ++i) {
+    DeviceNode& node = cell_->node(i);
+    ports_.push_back(std::make_unique<InterfacePort>(network.bus(interface_of_bus_[node.bus()])));
+    node.connect(*ports_.back());
+  }
+}
+
+FarEndProcess::~FarEndProcess() = default;
+
+void FarEndProcess::run(const std::atomic<bool>& stop, std::int64_t until_ns) {
+  if (!powered_) {
+    events_.advance_to(network_.now_ns());
+    cell_->power_on();
+    powered_ = true;
+  }
+  while (!stop.load(std::memory_order_relaxed)) {
+    const std::int64_t now_ns = network_.now_ns();
+    if (now_ns >= until_ns) break;
+    network_.wait_for_frame(std::min({events_.next_time(), until_ns, now_ns + kLongestSleep}));
+    ++statistics_.wake_ups;
+    receive_all();
+    run_events();
+  }
+}
+
+void FarEndProcess::receive_all() {
+  for (std::size_t interface = 0; interface < network_.bus_count(); ++interface) {
+    for (fieldbus::TimedFrame timed; network_.bus(interface).receive(timed);) deliver(interface, timed);
+  }
+}
+
+// What was due before the frame comes first. A time stamp that lies ahead of the clock, or before what has been
+// simulated already, can't be honoured.
+void FarEndProcess::deliver(std::size_t interface, const fieldbus::TimedFrame& timed) {
+  ++statistics_.frames_received;
+  const std::int64_t time_ns = std::max(std::min(timed.time_ns, network_.now_ns()), events_.now_ns());
+  events_.run_until(time_ns);
+  for (std::size_t i = 0; i < cell_->node_count(); ++i) {
+    DeviceNode& node = cell_->node(i);
+    if (interface_of_bus_[node.bus()] == interface) node.on_frame(timed.frame, time_ns);
+  }
+}
+
+void FarEndProcess::run_events() {
+  const std::int64_t now_ns = network_.now_ns(), due_ns = events_.next_time();
+  if (due_ns > now_ns) return;
+  const std::int64_t late_ns = now_ns - due_ns;
+  if (late_ns > tick_ns_) ++statistics_.late_wake_ups;
+  statistics_.latest_wake_up_ns = std::max(statistics_.latest_wake_up_ns, late_ns);
+  events_.run_until(now_ns);
+}
+
+FarEndStatistics FarEndProcess::statistics() const {
+  FarEndStatistics total = statistics_;
+  for (std::size_t i = 0; i < cell_->node_count(); ++i) {
+    total.frames_sent += cell_->node(i).frames_sent();
+    total.frames_not_sent += cell_->node(i).frames_not_sent();
+  }
+  for (std::size_t i = 0; i < network_.bus_count(); ++i)
+    total.frames_lost += network_.bus(i).status().receive_overflows;
+  return total;
+}
+
+}  // namespace proxarm::sim

@@ -1,0 +1,312 @@
+// The master's drives and sensor against the simulated ones, on buses with real bit timing. Master and peers were
+// written apart from each other, so that a misreading of the standards on one side shows here.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "fieldbus/ati_net_can_oem.hpp"
+#include "fieldbus/canopen_sync.hpp"
+#include "fieldbus/cia402_bring_up.hpp"
+#include "fieldbus/simulated_can_network.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "models/description/setup_error.hpp"
+#include "sim/simulated_cell.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+const std::filesystem::path source_dir = PROXARM_SOURCE_DIR;
+
+// The default cell with its simulated far end, and the master's side as the cycle uses it.
+struct SimulatedDrives : ::testing::Test {
+  description::Cell cell = description::load_cell(source_dir / "models/cells/default.yaml");
+  description::HandDescription hand{};
+  DriveSettings settings;
+  std::unique_ptr<SimulatedCanNetwork> network;
+  std::unique_ptr<sim::SimulatedCell> far_end;
+  std::vector<ServoDrive> drives;
+  std::vector<DriveSlot> slots;
+  std::vector<std::size_t> drive_buses;
+  std::unique_ptr<AtiNetCanOem> sensor;
+  std::size_t sensor_bus = 0;
+  SyncProducer sync;
+  HeartbeatProducer heartbeat{127, 20 * ms};
+  std::uint64_t cycles = 0;
+  std::int64_t t_ns = 0;
+  bool poll_sensor = false;
+
+  void build(std::vector<sim::DeviceFault> faults = {}) {
+    std::vector<SimulatedBusConfig> buses;
+    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .bitrate = bus.bitrate});
+    network = std::make_unique<SimulatedCanNetwork>(buses);
+    const auto sensor_file = description::load_sensor(source_dir / "models/sensors/ati_net_can_oem.yaml");
+    sim::SimulatedCellConfig config;
+    config.faults = std::move(faults);
+    far_end = std::make_unique<sim::SimulatedCell>(cell, sensor_file, hand, network->events(), config);
+    far_end->attach_to(*network);
+    far_end->power_on();
+    const auto bus_index = [this](const std::string& name) {
+      const auto bus =
+          std::find_if(cell.buses.begin(), cell.buses.end(), [&](const auto& b) { return b.name == name; });
+      return static_cast<std::size_t>(bus - cell.buses.begin());
+    };
+    for (const auto& drive : cell.drives) drives.emplace_back(drive, settings);
+    for (ServoDrive& drive : drives) {
+      slots.push_back({&drive, bus_index(drive.description().bus)});
+      if (std::find(drive_buses.begin(), drive_buses.end(), slots.back().bus) == drive_buses.end()) {
+        drive_buses.push_back(slots.back().bus);
+      }
+    }
+    sensor_bus = bus_index(cell.sensor.bus);
+    sensor = std::make_unique<AtiNetCanOem>(
+        AtiNetCanOemSettings{.bus_name = cell.sensor.bus, .base_id = cell.sensor.base_id});
+  }
+
+  void bring_up() {
+    sensor->start(*network, sensor_bus);
+    bring_up_drives(*network, slots);
+    t_ns = network->now_ns() + ms;
+  }
+
+  // One period, as run_cycle() has it.
+  template <typename Targets>
+  void cycle(Targets&& targets) {
+    network->sleep_until(t_ns);
+    CanFrame frame;
+    const bool beat = heartbeat.due(t_ns, cycles, frame);
+    for (const std::size_t bus : drive_buses) {
+      network->bus(bus).send(sync.next());
+      if (beat) network->bus(bus).send(frame);
+    }
+    for (ServoDrive& drive : drives) drive.on_sync(t_ns);
+    if (poll_sensor && sensor->poll(t_ns, frame)) network->bus(sensor_bus).send(frame);
+    const std::int64_t window_ns = t_ns + settings.period_ns * 45 / 100;
+    const auto all_in = [this] {
+      return std::all_of(drives.begin(), drives.end(), [](const ServoDrive& drive) { return drive.fresh(); }) &&
+             (!poll_sensor || sensor->fresh());
+    };
+    do {
+      TimedFrame received;
+      for (std::size_t bus = 0; bus < network->bus_count(); ++bus) {
+        while (network->bus(bus).receive(received)) {
+          bool taken = bus == sensor_bus && sensor->on_frame(received.frame, received.time_ns);
+          for (const DriveSlot& slot : slots) {
+            taken = taken || (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns));
+          }
+        }
+      }
+    } while (!all_in() && network->wait_for_frame(window_ns));
+    targets();
+    for (const DriveSlot& slot : slots) {
+      if (slot.drive->encode_rpdo(frame)) network->bus(slot.bus).send(frame);
+    }
+    ++cycles;
+    t_ns += settings.period_ns;
+  }
+  void cycle() {
+    cycle([] {});
+  }
+  [[nodiscard]] bool all_following() const {
+    return std::all_of(drives.begin(), drives.end(), [](const ServoDrive& drive) { return drive.following(); });
+  }
+  void enable() {
+    for (ServoDrive& drive : drives) drive.request(DriveGoal::operation_enabled);
+    for (int i = 0; i < 500 && !all_following(); ++i) cycle();
+    for (const ServoDrive& drive : drives) ASSERT_TRUE(drive.following()) << drive.describe();
+  }
+  void expect_no_faults() const {
+    for (const ServoDrive& drive : drives) EXPECT_EQ(drive.fault(), DriveFault::none) << drive.describe();
+  }
+};
+
+TEST_F(SimulatedDrives, AreBroughtUpEnabledMovedAndSwitchedOff) {
+  build();
+  bring_up();
+  EXPECT_LT(network->now_ns(), 400 * ms) << "six drives side by side";
+  RecordProperty("bring_up_ms", static_cast<int>(network->now_ns() / ms));
+  enable();
+  expect_no_faults();
+  std::vector<double> begin_rad;
+  for (const ServoDrive& drive : drives) begin_rad.push_back(drive.target_rad());
+  for (std::size_t i = 0; i < drives.size(); ++i) EXPECT_NEAR(drives[i].actual_rad(), cell.start_rad[i], 2e-3);
+
+  // Each axis out and back by 0.02 rad in a second: 1 − cos, so it starts and ends at rest.
+  double worst_rad = 0.0;
+  for (int k = 0; k < 1000; ++k) {
+    const double way_rad = 0.01 * (1.0 - std::cos(2.0 * std::numbers::pi * k * 1e-3));
+    cycle([&] {
+      for (std::size_t i = 0; i < drives.size(); ++i) {
+        worst_rad = std::max(worst_rad, std::abs(drives[i].actual_rad() - drives[i].target_rad()));
+        ASSERT_TRUE(drives[i].fresh()) << drives[i].describe();
+        ASSERT_TRUE(drives[i].set_target_rad(begin_rad[i] + way_rad));
+      }
+    });
+  }
+  expect_no_faults();
+  EXPECT_LT(worst_rad, 2e-3) << "actual against target, delays of the cycle included";
+
+  for (ServoDrive& drive : drives) drive.request(DriveGoal::switched_off);
+  for (int k = 0; k < 100; ++k) cycle();
+  for (const ServoDrive& drive : drives) EXPECT_EQ(drive.state(), DriveState::switch_on_disabled) << drive.describe();
+  shut_down_drives(*network, slots);
+  network->sleep_until(network->now_ns() + 10 * ms);
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    EXPECT_EQ(far_end->drive(i).canopen().state(), sim::NmtState::pre_operational);
+  }
+}
+
+TEST_F(SimulatedDrives, DoNotJumpWhileTheyAreEnabled) {
+  build();
+  bring_up();
+  std::vector<std::int32_t> begin(drives.size());
+  for (std::size_t i = 0; i < drives.size(); ++i) begin[i] = drives[i].scale().counts(cell.start_rad[i]).value();
+  for (ServoDrive& drive : drives) drive.request(DriveGoal::operation_enabled);
+  double worst_rad = 0.0;
+  for (int k = 0; k < 500; ++k) {
+    cycle();
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      if (drives[i].heard()) worst_rad = std::max(worst_rad, std::abs(drives[i].actual_rad() - cell.start_rad[i]));
+    }
+  }
+  EXPECT_TRUE(all_following());
+  // The links hang in their gears (gravity over gear stiffness) and the loop takes the load over: no more than that.
+  EXPECT_LT(worst_rad, 2e-3);
+}
+
+TEST_F(SimulatedDrives, StopByThemselvesWhenTheControllerDies) {
+  build();
+  bring_up();
+  enable();
+  std::vector<double> begin_rad;
+  for (const ServoDrive& drive : drives) begin_rad.push_back(drive.target_rad());
+  for (int k = 0; k < 100; ++k) {  // in motion at 0.2 rad/s
+    cycle([&] {
+      for (std::size_t i = 0; i < drives.size(); ++i)
+        drives[i].set_target_rad(begin_rad[i] + 0.2e-3 * std::min(k, 2 * k - 50));
+    });
+  }
+  const std::int64_t death_ns = network->now_ns();
+  // RPDO timeout: five periods; then the quick-stop ramp, and no torque at its end.
+  network->sleep_until(death_ns + 200 * ms);
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    EXPECT_NE(far_end->drive(i).state(), sim::DriveState::operation_enabled) << "drive " << i;
+  }
+}
+
+TEST_F(SimulatedDrives, AreTakenOverByTheNextControllerAfterOneDied) {
+  build();
+  bring_up();
+  enable();
+  network->sleep_until(network->now_ns() + 500 * ms);  // dead for half a second: the drives have faulted
+  drives.clear();
+  slots.clear();
+  for (const auto& drive : cell.drives) drives.emplace_back(drive, settings);
+  std::size_t i = 0;
+  for (ServoDrive& drive : drives) slots.push_back({&drive, i++ < 3 ? 0U : 1U});
+  heartbeat = HeartbeatProducer{127, 20 * ms};
+  bring_up();
+  enable();
+  expect_no_faults();
+}
+
+TEST_F(SimulatedDrives, AFaultOfOneIsSeenWithItsEmergency) {
+  build();
+  bring_up();
+  enable();
+  far_end->drive(2).inject_fault(0x4210, network->now_ns());
+  for (int k = 0; k < 5; ++k) cycle();
+  EXPECT_NE(drives[2].fault(), DriveFault::none);
+  EXPECT_EQ(drives[2].latest_emergency().code, 0x4210);
+  EXPECT_NE(drives[2].describe().find("EMCY 4210: excess temperature of the device"), std::string::npos)
+      << drives[2].describe();
+  for (const std::size_t other : {0U, 1U, 3U, 4U, 5U}) EXPECT_EQ(drives[other].fault(), DriveFault::none);
+}
+
+TEST_F(SimulatedDrives, AnotherDeviceAtANodeIsRefused) {
+  build({sim::parse_device_fault("axis_2:device_type=0x00030191")});
+  try {
+    bring_up();
+    FAIL() << "brought up";
+  } catch (const description::SetupError& error) {
+    EXPECT_EQ(error.node(), 2);
+    EXPECT_NE(std::string(error.what()).find("found 0x00030191"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(SimulatedDrives, TheSensorIsReadOncePerPoll) {
+  build();
+  bring_up();
+  poll_sensor = true;
+  for (int k = 0; k < 200; ++k) {
+    cycle();
+    ASSERT_TRUE(sensor->fresh()) << "cycle " << k;
+    ASSERT_TRUE(sensor->latest().healthy);
+    ASSERT_FALSE(sensor->latest().saturated);
+  }
+  EXPECT_EQ(sensor->dropped_frames(), 0U);
+  EXPECT_EQ(sensor->wrong_lengths(), 0U);
+}
+
+TEST_F(SimulatedDrives, TheSensorReadsTheToolsWeightAfterATareToIt) {
+  build();
+  bring_up();
+  const double weight_N = cell.tool.mass_kg * 9.80665;
+  sensor->tare(*network, sensor_bus, 100, ms, {0.0, 0.0, weight_N, 0.0, 0.0, 0.0});
+  Wrench sum{};
+  constexpr int samples = 200;
+  for (int k = 0; k < samples; ++k) {
+    network->sleep_until(network->now_ns() + ms);
+    CanFrame request;
+    ASSERT_TRUE(sensor->poll(network->now_ns(), request));
+    network->bus(sensor_bus).send(request);
+    pump_frames(
+        *network, network->now_ns() + ms / 2,
+        [&](std::size_t bus, const TimedFrame& received) {
+          if (bus == sensor_bus) sensor->on_frame(received.frame, received.time_ns);
+        },
+        [&](std::int64_t now_ns) { return sensor->fresh() ? pump_done : now_ns + ms; });
+    ASSERT_TRUE(sensor->fresh());
+    for (std::size_t i = 0; i < 6; ++i) sum[i] += sensor->latest().wrench_S[i] / samples;
+  }
+  // Two averages of white noise over 100 and 200 samples: sigma·√(1/100 + 1/200), five of them.
+  const double tolerance_N = 5.0 * std::max(cell.sensor.noise_N, 0.01) * std::sqrt(0.015);
+  EXPECT_NEAR(sum[0], 0.0, tolerance_N);
+  EXPECT_NEAR(sum[1], 0.0, tolerance_N);
+  EXPECT_NEAR(sum[2], weight_N, tolerance_N);
+}
+
+TEST_F(SimulatedDrives, AFaultySensorIsNeverMisread) {
+  struct Case {
+    const char* fault;
+    bool fresh;  // whether samples still come
+  };
+  for (const Case& c : {Case{"sensor:half@1s", false}, Case{"sensor:swapped@1s", false}, Case{"sensor:short@1s", false},
+                        Case{"sensor:duplicated@1s", true}, Case{"sensor:silent@1s", false},
+                        Case{"sensor:samples@1s", false}, Case{"sensor:frozen@1s", true}}) {
+    SCOPED_TRACE(c.fault);
+    drives.clear();
+    slots.clear();
+    drive_buses.clear();
+    build({sim::parse_device_fault(c.fault)});
+    sensor->start(*network, sensor_bus);
+    poll_sensor = true;
+    network->sleep_until(1100 * ms);
+    t_ns = network->now_ns() + ms;
+    for (int k = 0; k < 50; ++k) {
+      cycle();
+      EXPECT_EQ(sensor->fresh(), c.fresh) << "cycle " << k;
+    }
+    if (std::string(c.fault).find("frozen") != std::string::npos) {
+      EXPECT_GE(sensor->latest().repeats, 40U);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,181 @@
+// SocketCanNetwork and NodeLoop on a real kernel: run through tests/vcan/with-vcan, which brings vcan0, vcan1, vcan2.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <string>
+
+#include "fieldbus/node_loop.hpp"
+#include "fieldbus/socket_can_network.hpp"
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+using description::SetupError;
+using testing::AllOf;
+using testing::HasSubstr;
+
+struct Vcan : testing::Test {
+  void SetUp() override {
+    if (std::getenv("VCAN_USED") == nullptr) GTEST_SKIP() << "needs a real vcan: run by tests/vcan/with-vcan";
+  }
+  static bool virtual_clock() {
+    const char* clock = std::getenv("VCAN_CLOCK");
+    return clock != nullptr && std::strcmp(clock, "virtual") == 0;
+  }
+  static CanFrame frame_of(std::uint32_t id, std::uint8_t length = 0) {
+    CanFrame frame;
+    frame.id = id;
+    frame.length = length;
+    for (std::uint8_t i = 0; i < length; ++i) frame.data[i] = static_cast<std::uint8_t>(id + i);
+    return frame;
+  }
+};
+
+TEST_F(Vcan, CarriesEveryKindOfFrame) {
+  SocketCanNetwork here({"vcan0"}), there({"vcan0"});
+  ASSERT_TRUE(here.carries_fd(0));
+  std::vector<CanFrame> sent{frame_of(0x000), frame_of(0x7ff, 8), frame_of(0x1fffffff, 3), frame_of(0x123),
+                             frame_of(5, 64)};
+  sent[2].extended = true;
+  sent[3].remote = true;
+  sent[4].fd = sent[4].bit_rate_switch = true;
+  for (const CanFrame& frame : sent) {
+    ASSERT_EQ(here.bus(0).send(frame), SendResult::sent);
+    ASSERT_TRUE(there.wait_for_frame(there.now_ns() + 1'000'000'000));
+    TimedFrame timed;
+    ASSERT_TRUE(there.bus(0).receive(timed));
+    EXPECT_EQ(timed.frame, frame);
+    EXPECT_LE(timed.time_ns, there.now_ns());
+    EXPECT_GE(timed.time_ns, there.now_ns() - 100'000'000) << "taken over to another clock wrongly";
+  }
+  TimedFrame timed;
+  EXPECT_FALSE(here.bus(0).receive(timed)) << "own frames don't come back";
+}
+
+TEST_F(Vcan, LetsOnlyWantedFramesThrough) {
+  SocketCanNetwork here({"vcan0"}), there({"vcan0"});
+  there.set_filters(0, {{.id = 0x180, .mask = 0x780}});
+  CanFrame extended = frame_of(0x181);
+  extended.extended = true;
+  here.bus(0).send(frame_of(0x200));
+  here.bus(0).send(extended);
+  here.bus(0).send(frame_of(0x1ff, 1));
+  TimedFrame timed;
+  ASSERT_TRUE(there.wait_for_frame(there.now_ns() + 1'000'000'000));
+  ASSERT_TRUE(there.bus(0).receive(timed));
+  EXPECT_EQ(timed.frame.id, 0x1ffu);
+  EXPECT_FALSE(there.bus(0).receive(timed));
+  there.set_filters(0, {});
+  here.bus(0).send(frame_of(0x1ff));
+  EXPECT_FALSE(there.wait_for_frame(there.now_ns() + 2'000'000));
+}
+
+TEST_F(Vcan, CountsWhatItsBufferCouldNotHold) {
+  SocketCanNetwork here({"vcan0"}), there({"vcan0"}, {.receive_buffer_bytes = 20'000});
+  for (int i = 0; i < 5000; ++i) here.bus(0).send(frame_of(0x100));
+  TimedFrame timed;
+  std::uint64_t received = 0;
+  while (there.bus(0).receive(timed)) ++received;
+  here.bus(0).send(frame_of(0x101));  // the count comes with the next frame
+  ASSERT_TRUE(there.wait_for_frame(there.now_ns() + 1'000'000'000));
+  while (there.bus(0).receive(timed)) ++received;
+  EXPECT_LT(received, 5001u);
+  EXPECT_EQ(received + there.bus(0).status().receive_overflows, 5001u);
+}
+
+TEST_F(Vcan, HoldsMoreThanTheDefaultBufferWould) {
+  SocketCanNetwork here({"vcan0"}), there({"vcan0"});
+  for (int i = 0; i < 1000; ++i) here.bus(0).send(frame_of(0x100));
+  TimedFrame timed;
+  int received = 0;
+  while (there.bus(0).receive(timed)) ++received;
+  EXPECT_EQ(received, 1000) << "the default of 208 kB ends at 278";
+}
+
+TEST_F(Vcan, NoticesThatAnInterfaceGoesDownAndComesUpAgain) {
+  SocketCanNetwork here({"vcan2"}), there({"vcan2"});
+  ASSERT_EQ(std::system("ip link set down vcan2"), 0);
+  EXPECT_EQ(here.bus(0).send(frame_of(1)), SendResult::down);
+  EXPECT_FALSE(there.wait_for_frame(there.now_ns() + 5'000'000));
+  EXPECT_EQ(there.bus(0).status().state, BusState::down);
+  try {
+    SocketCanNetwork network({"vcan2"});
+    ADD_FAILURE();
+  } catch (const SetupError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("vcan2"), HasSubstr("down"), HasSubstr("ip link set up vcan2")));
+  }
+  ASSERT_EQ(std::system("ip link set up vcan2"), 0);
+  EXPECT_EQ(here.bus(0).send(frame_of(1)), SendResult::sent);
+  ASSERT_TRUE(there.wait_for_frame(there.now_ns() + 1'000'000'000));
+  EXPECT_EQ(there.bus(0).status().state, BusState::error_active);
+}
+
+TEST_F(Vcan, SaysWhatIsWrongWithAnInterface) {
+  EXPECT_TRUE(is_virtual_can("vcan0"));
+  EXPECT_FALSE(is_virtual_can("lo"));
+  const auto message_of = [](const std::string& name) -> std::string {
+    try {
+      SocketCanNetwork network({name});
+    } catch (const SetupError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(message_of("lo"), HasSubstr("not a CAN one"));
+  EXPECT_THAT(message_of("vcan77"), AllOf(HasSubstr("no such"), HasSubstr("vcan0, vcan1, vcan2")));
+}
+
+struct Echo : CanListener {
+  CanPort* port = nullptr;
+  std::uint32_t answer = 0;
+  int heard = 0;
+  void on_frame(const CanFrame& frame, std::int64_t) noexcept override {
+    ++heard;
+    if (frame.id != 0x080) return;
+    CanFrame out;
+    out.id = answer;
+    port->send(out);
+  }
+};
+
+// The node loop is in the same thread here: it is run after each send.
+TEST_F(Vcan, RunsNodesOnTheInterfacesEventsIncluded) {
+  SocketCanNetwork controller({"vcan0", "vcan1"}), peers({"vcan0", "vcan1"});
+  NodeLoop loop(peers);
+  Echo first, second, elsewhere;
+  first.port = &loop.attach(0, first);
+  second.port = &loop.attach(0, second);
+  elsewhere.port = &loop.attach(1, elsewhere);
+  first.answer = 0x181;
+  second.answer = 0x182;
+  elsewhere.answer = 0x183;
+  int ticks = 0;
+  std::int64_t worst_late_ns = 0;
+  const std::int64_t start = peers.now_ns();
+  std::function<void(std::int64_t)> tick = [&](std::int64_t time_ns) {
+    ++ticks;
+    worst_late_ns = std::max(worst_late_ns, peers.now_ns() - time_ns);
+    loop.events().schedule(time_ns + 1'000'000, [&tick](std::int64_t t) { tick(t); });
+  };
+  loop.events().schedule(start + 1'000'000, [&tick](std::int64_t t) { tick(t); });
+  controller.bus(0).send(frame_of(0x080));
+  loop.run_until(start + 20'500'000);
+  EXPECT_EQ(ticks, 20);
+  EXPECT_EQ(first.heard, 2) << "SYNC, and the answer of its neighbour";
+  EXPECT_EQ(second.heard, 2);
+  EXPECT_EQ(elsewhere.heard, 0);
+  TimedFrame timed;
+  std::vector<std::uint32_t> ids;
+  while (controller.bus(0).receive(timed)) ids.push_back(timed.frame.id);
+  EXPECT_THAT(ids, testing::ElementsAre(0x181, 0x182));
+  if (virtual_clock()) {
+    EXPECT_LT(worst_late_ns, 100'000) << "timer slack is 50 us";
+  }
+}
+
+}  // namespace
+}  // namespace proxarm::fieldbus
