@@ -7,10 +7,10 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::uint8_t kNewton = 2, kNewtonMetre = 3;
-constexpr std::uint8_t kCalibrations = 1;  // stored in this sensor
-constexpr std::uint16_t kAnyError = 0x8000;
-constexpr std::array<std::uint16_t, 6> kVoltages{2048, 2048, 3100, 2900, 2048, 1024};  // plausible, in ADC counts
+constexpr std::uint8_t newton = 2, newton_metre = 3;
+constexpr std::uint8_t calibrations = 1;  // stored in this sensor
+constexpr std::uint16_t any_error = 0x8000;
+constexpr std::array<std::uint16_t, 6> voltages{2048, 2048, 3100, 2900, 2048, 1024};  // plausible, in ADC counts
 
 void put_u16(std::span<std::uint8_t> to, std::size_t at, std::uint16_t value) noexcept {
   to[at] = static_cast<std::uint8_t>(value >> 8);
@@ -46,18 +46,18 @@ void AtiDevice::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) 
     std::copy_n(config_.serial_number.begin(), 8, bytes.begin());
     answer(operation, bytes, time_ns);
   } else if (operation == 0x6 && one_byte) {
-    if (argument < kCalibrations) calibration_ = argument;
+    if (argument < calibrations) calibration_ = argument;
     answer(operation, {&calibration_, 1}, time_ns);
   } else if (operation == 0x7 && empty) {
     put_u32(bytes, 0, config_.counts_per_force);
     put_u32(bytes, 4, config_.counts_per_torque);
     answer(operation, bytes, time_ns);
   } else if (operation == 0x8 && empty) {
-    bytes[0] = kNewton;
-    bytes[1] = kNewtonMetre;
+    bytes[0] = newton;
+    bytes[1] = newton_metre;
     answer(operation, std::span(bytes).first(2), time_ns);
-  } else if (operation == 0x9 && one_byte && argument < kVoltages.size()) {
-    put_u16(bytes, 0, kVoltages[argument]);
+  } else if (operation == 0x9 && one_byte && argument < voltages.size()) {
+    put_u16(bytes, 0, voltages[argument]);
     answer(operation, std::span(bytes).first(2), time_ns);
   } else if (operation == 0xC && empty) {
     power_on(time_ns);
@@ -87,7 +87,7 @@ void AtiDevice::send_sample(std::int64_t time_ns) noexcept {
   if (!faults_.frozen) last_ = gauges_.gauges(time_ns);
   std::array<std::uint8_t, 8> first{};
   std::array<std::uint8_t, 6> second{};
-  put_u16(first, 0, static_cast<std::uint16_t>(faults_.status_bits == 0 ? 0 : faults_.status_bits | kAnyError));
+  put_u16(first, 0, static_cast<std::uint16_t>(faults_.status_bits == 0 ? 0 : faults_.status_bits | any_error));
   for (std::size_t i = 0; i < 3; ++i) {
     put_u16(first, 2 + 2 * i, static_cast<std::uint16_t>(last_[2 * i]));
     put_u16(second, 2 * i, static_cast<std::uint16_t>(last_[2 * i + 1]));

@@ -6,8 +6,8 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::int64_t kMillisecond = 1'000'000;
-constexpr std::int64_t kSdoTimeout = 1'000 * kMillisecond;  // a transfer that the client left lying is given up
+constexpr std::int64_t millisecond = 1'000'000;
+constexpr std::int64_t sdo_timeout = 1'000 * millisecond;  // a transfer that the client left lying is given up
 
 fieldbus::CanFrame make_frame(std::uint32_t id, std::span<const std::uint8_t> bytes) noexcept {
   fieldbus::CanFrame frame;
@@ -23,7 +23,7 @@ CanopenSlave::CanopenSlave(const CanopenSlaveConfig& config, CanopenApplication&
     : config_(config), application_(application), port_(port) {
   errors_.reserve(16);
   add_communication_objects();
-  for (int number = 1; number <= kPdos; ++number) {
+  for (int number = 1; number <= pdos; ++number) {
     receive_.push_back(std::make_unique<Receive>(dictionary_, number, config.node));
     transmit_.push_back(std::make_unique<Transmit>(dictionary_, number, config.node));
   }
@@ -46,14 +46,14 @@ void CanopenSlave::add_communication_objects() {
   od.add_text(0x1009, 0, "simulated");
   od.add_text(0x100A, 0, "1.0");
   od.add(0x1014, 0, unsigned32, read_only, 0x80 + config_.node);
-  od.add(0x1016, 0, unsigned8, constant, kConsumers);
-  for (std::uint8_t i = 1; i <= kConsumers; ++i) {
+  od.add(0x1016, 0, unsigned8, constant, consumers);
+  for (std::uint8_t i = 1; i <= consumers; ++i) {
     ObjectEntry& entry = od.add(0x1016, i, unsigned32, read_write, 0);
     entry.before_write = [this, i](std::int64_t value) { return check_consumer(i, value); };
     entry.after_write = [this] { configure_consumers(); };
   }
   od.add(0x1017, 0, unsigned16, read_write, 0).after_write = [this] {
-    heartbeat_period_ns_ = dictionary_.number(0x1017) * kMillisecond;
+    heartbeat_period_ns_ = dictionary_.number(0x1017) * millisecond;
     heartbeat_ns_ = 0;  // the first one at once
   };
   od.add(0x1018, 0, unsigned8, constant, 4);
@@ -79,18 +79,18 @@ void CanopenSlave::start_over(bool whole_device, std::int64_t time_ns) {
   for (auto& receive : receive_) {
     receive->pdo.configure();
     receive->waiting = receive->overdue = false;
-    receive->last_ns = kNever;
+    receive->last_ns = never;
   }
   for (auto& transmit : transmit_) {
     transmit->pdo.configure();
-    transmit->last_ns = kNever;
+    transmit->last_ns = never;
     transmit->syncs = 0;
   }
   configure_consumers();
   heartbeat_period_ns_ = 0;
   sdo_.reset();
   errors_.clear();
-  last_sync_ns_ = kNever;
+  last_sync_ns_ = never;
   boot_ns_ = time_ns + config_.boot_time_ns;
   if (whole_device) application_.on_reset(time_ns);
 }
@@ -102,11 +102,11 @@ void CanopenSlave::enter(NmtState to, std::int64_t time_ns) {
   if (to != NmtState::operational) {
     for (auto& receive : receive_) {
       receive->waiting = receive->overdue = false;
-      receive->last_ns = kNever;
+      receive->last_ns = never;
     }
   } else {
     for (auto& transmit : transmit_) {
-      transmit->last_ns = kNever;
+      transmit->last_ns = never;
       transmit->syncs = 0;
     }
   }
@@ -196,7 +196,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   receive.overdue = false;
   const std::int64_t window_ns = dictionary_.number(0x1007) * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());
-  if (window_ns > 0 && last_sync_ns_ != kNever && time_ns - last_sync_ns_ > window_ns) return;
+  if (window_ns > 0 && last_sync_ns_ != never && time_ns - last_sync_ns_ > window_ns) return;
   std::copy_n(frame.data.begin(), 8, receive.data.begin());
   receive.waiting = true;
 }
@@ -217,8 +217,8 @@ void CanopenSlave::on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& fra
 
 void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
   if (state_ == NmtState::initialising) {
-    if (boot_ns_ == kNever || time_ns < boot_ns_) return;
-    boot_ns_ = kNever;
+    if (boot_ns_ == never || time_ns < boot_ns_) return;
+    boot_ns_ = never;
     send_state(NmtState::initialising, time_ns);
     heartbeat_ns_ = time_ns;
     enter(NmtState::pre_operational, time_ns);
@@ -228,7 +228,7 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
     heartbeat_ns_ += heartbeat_period_ns_;
     if (heartbeat_ns_ <= time_ns) heartbeat_ns_ = time_ns + heartbeat_period_ns_;
   }
-  if (time_ns - last_sdo_ns_ > kSdoTimeout) sdo_.reset();
+  if (time_ns - last_sdo_ns_ > sdo_timeout) sdo_.reset();
   check_heartbeats(time_ns);
   if (state_ != NmtState::operational) return;
   check_receive_pdos(time_ns);
@@ -237,7 +237,7 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
 
 void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
   for (Consumer& consumer : consumers_) {
-    if (consumer.limit_ns == 0 || consumer.last_ns == kNever || consumer.lost) continue;
+    if (consumer.limit_ns == 0 || consumer.last_ns == never || consumer.lost) continue;
     if (time_ns - consumer.last_ns <= consumer.limit_ns) continue;
     consumer.lost = true;
     raise_error(emcy::heartbeat_lost, error_register::communication, time_ns);
@@ -249,7 +249,7 @@ void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
 void CanopenSlave::check_receive_pdos(std::int64_t time_ns) {
   for (auto& receive : receive_) {
     const std::int64_t limit_ns = receive->pdo.event_timer_ns();
-    if (limit_ns == 0 || !receive->pdo.valid() || receive->overdue || receive->last_ns == kNever) continue;
+    if (limit_ns == 0 || !receive->pdo.valid() || receive->overdue || receive->last_ns == never) continue;
     if (time_ns - receive->last_ns <= limit_ns) continue;
     receive->overdue = true;
     raise_error(emcy::rpdo_timeout, error_register::communication, time_ns);
@@ -273,7 +273,7 @@ void CanopenSlave::transmit_on_sync(std::int64_t time_ns) noexcept {
     std::array<std::uint8_t, 8> data{};
     pdo->pdo.pack(data);
     const int every = pdo->pdo.transmission_type();
-    const bool changed = pdo->last_ns == kNever || data != pdo->last;
+    const bool changed = pdo->last_ns == never || data != pdo->last;
     if (every == 0 ? changed : ++pdo->syncs >= every) transmit(*pdo, data, time_ns + config_.pdo_answer_time_ns);
   }
 }
@@ -285,7 +285,7 @@ void CanopenSlave::transmit_events(std::int64_t time_ns) noexcept {
     if (!pdo->pdo.valid() || pdo->pdo.synchronous()) continue;
     std::array<std::uint8_t, 8> data{};
     pdo->pdo.pack(data);
-    const bool first = pdo->last_ns == kNever;
+    const bool first = pdo->last_ns == never;
     const std::int64_t since_ns = first ? 0 : time_ns - pdo->last_ns;
     const bool changed = data != pdo->last && since_ns >= pdo->pdo.inhibit_ns();
     const bool due = pdo->pdo.event_timer_ns() > 0 && since_ns >= pdo->pdo.event_timer_ns();
@@ -306,7 +306,7 @@ SdoAbort CanopenSlave::check_consumer(std::uint8_t subindex, std::int64_t value)
   const std::int64_t node = value >> 16 & 0xFF;
   if (value >> 24 != 0 || node > 127) return SdoAbort::invalid_value;
   if ((value & 0xFFFF) == 0 || node == 0) return SdoAbort::none;  // not used
-  for (std::uint8_t i = 1; i <= kConsumers; ++i) {
+  for (std::uint8_t i = 1; i <= consumers; ++i) {
     const std::int64_t other = dictionary_.number(0x1016, i);
     if (i != subindex && (other & 0xFFFF) != 0 && (other >> 16 & 0xFF) == node) {
       return SdoAbort::parameter_incompatibility;
@@ -316,12 +316,12 @@ SdoAbort CanopenSlave::check_consumer(std::uint8_t subindex, std::int64_t value)
 }
 
 void CanopenSlave::configure_consumers() noexcept {
-  for (std::uint8_t i = 0; i < kConsumers; ++i) {
+  for (std::uint8_t i = 0; i < consumers; ++i) {
     const std::int64_t value = dictionary_.number(0x1016, static_cast<std::uint8_t>(i + 1));
     const auto node = static_cast<std::uint8_t>(value >> 16 & 0xFF);
-    const std::int64_t limit_ns = node == 0 ? 0 : (value & 0xFFFF) * kMillisecond;
+    const std::int64_t limit_ns = node == 0 ? 0 : (value & 0xFFFF) * millisecond;
     if (consumers_[i].node == node && consumers_[i].limit_ns == limit_ns) continue;
-    consumers_[i] = {node, limit_ns, kNever, false};
+    consumers_[i] = {node, limit_ns, never, false};
   }
 }
 

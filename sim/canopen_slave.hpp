@@ -97,9 +97,9 @@ class CanopenSlave final : public BusDevice {
   void mute_sdo(bool mute) noexcept { sdo_muted_ = mute; }
 
  private:
-  static constexpr int kPdos = 4;
-  static constexpr int kConsumers = 4;
-  static constexpr std::int64_t kNever = INT64_MIN;
+  static constexpr int pdos = 4;
+  static constexpr int consumers = 4;
+  static constexpr std::int64_t never = INT64_MIN;
 
   struct Receive {
     Receive(ObjectDictionary& dictionary, int number, std::uint8_t node)
@@ -107,7 +107,7 @@ class CanopenSlave final : public BusDevice {
     SlavePdo pdo;
     std::array<std::uint8_t, 8> data{};  // waiting for SYNC
     bool waiting = false;
-    std::int64_t last_ns = kNever;  // supervised by the event timer once the first one has come
+    std::int64_t last_ns = never;  // supervised by the event timer once the first one has come
     bool overdue = false;
   };
   struct Transmit {
@@ -115,13 +115,13 @@ class CanopenSlave final : public BusDevice {
         : pdo(dictionary, SlavePdo::Direction::transmit, number, node, number == 1) {}
     SlavePdo pdo;
     std::array<std::uint8_t, 8> last{};
-    std::int64_t last_ns = kNever;
+    std::int64_t last_ns = never;
     int syncs = 0;  // since the last one was sent
   };
   struct Consumer {
     std::uint8_t node = 0;
     std::int64_t limit_ns = 0;
-    std::int64_t last_ns = kNever;  // monitored once the first heartbeat has come
+    std::int64_t last_ns = never;  // monitored once the first heartbeat has come
     bool lost = false;
   };
   struct Error {
@@ -158,14 +158,14 @@ class CanopenSlave final : public BusDevice {
   SdoServer sdo_{dictionary_};
   std::vector<std::unique_ptr<Receive>> receive_;
   std::vector<std::unique_ptr<Transmit>> transmit_;
-  std::array<Consumer, kConsumers> consumers_{};
+  std::array<Consumer, consumers> consumers_{};
   std::vector<Error> errors_;
 
   NmtState state_ = NmtState::initialising;
-  std::int64_t boot_ns_ = kNever;  // when initialising ends
+  std::int64_t boot_ns_ = never;  // when initialising ends
   std::int64_t heartbeat_ns_ = 0;  // when the next one is due
   std::int64_t heartbeat_period_ns_ = 0;
-  std::int64_t last_sync_ns_ = kNever;
+  std::int64_t last_sync_ns_ = never;
   std::int64_t last_sdo_ns_ = 0;
   bool heartbeat_muted_ = false;
   bool sdo_muted_ = false;

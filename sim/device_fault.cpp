@@ -21,7 +21,7 @@ struct KindName {
   Value value;
 };
 
-constexpr KindName kKinds[] = {
+constexpr KindName kinds[] = {
     {"silent", false, DeviceFaultKind::drive_silent, Value::none},
     {"fault", false, DeviceFaultKind::drive_fault, Value::needed},
     {"device_type", false, DeviceFaultKind::device_type, Value::needed},
@@ -46,7 +46,7 @@ constexpr KindName kKinds[] = {
 
 std::string names_for(bool sensor) {
   std::string names;
-  for (const KindName& kind : kKinds) {
+  for (const KindName& kind : kinds) {
     if (kind.of_sensor == sensor) names += (names.empty() ? "" : ", ") + std::string(kind.name);
   }
   return (sensor ? "for the sensor: " : "for a drive: ") + names;
@@ -84,7 +84,7 @@ DeviceFault parse_device_fault(std::string_view text) {
   const bool has_value = equals != std::string_view::npos;
   const bool sensor = fault.device == "sensor";
   const KindName* found = nullptr;
-  for (const KindName& kind : kKinds) {
+  for (const KindName& kind : kinds) {
     if (kind.of_sensor == sensor && what.substr(0, equals) == kind.name) found = &kind;
   }
   if (found == nullptr) refuse(all, names_for(sensor));

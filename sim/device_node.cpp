@@ -6,9 +6,9 @@ namespace proxarm::sim {
 
 DeviceNode::DeviceNode(std::string name, std::size_t bus, fieldbus::EventQueue& events, Clockwork& clockwork)
     : name_(std::move(name)), bus_(bus), events_(events), clockwork_(clockwork) {
-  constexpr std::size_t kUsual = 16;  // frames under way in normal operation; more are possible
-  waiting_.reserve(kUsual);
-  free_places_.reserve(kUsual);
+  constexpr std::size_t usually = 16;  // frames under way in normal operation; more are possible
+  waiting_.reserve(usually);
+  free_places_.reserve(usually);
 }
 
 void DeviceNode::set_power(bool on, std::int64_t time_ns) noexcept {

@@ -8,7 +8,7 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::int64_t kCyclicSynchronousPosition = 8;
+constexpr std::int64_t cyclic_synchronous_position = 8;
 
 bool is_moving_state(DriveState state) noexcept {
   return state == DriveState::operation_enabled || state == DriveState::quick_stop_active ||
@@ -59,7 +59,7 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   statusword_ = &od.add(0x6041, 0, unsigned16, read_only, 0, true);
   mode_ = &od.add(0x6060, 0, integer8, read_write, 0, true);
   mode_->before_write = [](std::int64_t mode) {
-    return mode == 0 || mode == kCyclicSynchronousPosition ? SdoAbort::none : SdoAbort::invalid_value;
+    return mode == 0 || mode == cyclic_synchronous_position ? SdoAbort::none : SdoAbort::invalid_value;
   };
   mode_display_ = &od.add(0x6061, 0, integer8, read_only, 0, true);
   demand_ = &od.add(0x6062, 0, integer32, read_only, 0, true);
@@ -69,7 +69,7 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   velocity_ = &od.add(0x606C, 0, integer32, read_only, 0, true);
   torque_ = &od.add(0x6077, 0, integer16, read_only, 0, true);
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
-  od.add(0x6502, 0, unsigned32, constant, 1 << (kCyclicSynchronousPosition - 1));
+  od.add(0x6502, 0, unsigned32, constant, 1 << (cyclic_synchronous_position - 1));
   refusal_ = &od.add(0x2001, 0, unsigned8, read_only, 0, true);
   od.add(0x2010, 0, unsigned8, constant, 1);
   od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
@@ -116,10 +116,10 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
 // ---- SYNC
 
 void DriveDevice::on_sync(std::int64_t time_ns) {
-  if (last_sync_ns_ != kNever) {
+  if (last_sync_ns_ != never) {
     intervals_ns_[interval_next_] = time_ns - last_sync_ns_;
-    interval_next_ = (interval_next_ + 1) % kIntervals;
-    interval_count_ = std::min(interval_count_ + 1, kIntervals);
+    interval_next_ = (interval_next_ + 1) % intervals;
+    interval_count_ = std::min(interval_count_ + 1, intervals);
   }
   last_sync_ns_ = time_ns;
   latch_target();
@@ -169,7 +169,7 @@ std::uint16_t DriveDevice::statusword() const noexcept {
   if (refusal_->number() != 0) word |= 0x0080u;
   if (powered_ && (target_limited_ || axis_.limited())) word |= 0x0800u;
   if (following_ && state_ == DriveState::operation_enabled) word |= 0x1000u;
-  if (following_error_since_ns_ != kNever) word |= 0x2000u;
+  if (following_error_since_ns_ != never) word |= 0x2000u;
   return static_cast<std::uint16_t>(word);
 }
 
@@ -236,7 +236,7 @@ void DriveDevice::execute(DriveTransition transition) {
 void DriveDevice::enter(DriveState to, int transition) {
   state_ = to;
   last_transition_ = transition;
-  following_error_since_ns_ = kNever;
+  following_error_since_ns_ = never;
   stopping_ = false;
   if (is_moving_state(to)) {
     if (!powered_) {
@@ -270,7 +270,7 @@ void DriveDevice::finish_stop() { enter(after_stop_, after_stop_transition_); }
 
 RefusalReason DriveDevice::refusal() const noexcept {
   if (slave_.state() != NmtState::operational) return RefusalReason::not_operational;
-  if (mode_display_->number() != kCyclicSynchronousPosition) return RefusalReason::mode_not_displayed;
+  if (mode_display_->number() != cyclic_synchronous_position) return RefusalReason::mode_not_displayed;
   const std::int64_t period = period_ns();
   if (period <= 0) return RefusalReason::interpolation_period_not_set;
   if (interval_count_ < 3) return RefusalReason::no_sync;
@@ -319,7 +319,7 @@ void DriveDevice::inject_fault(std::uint16_t code, std::int64_t time_ns) noexcep
 
 void DriveDevice::supervise_sync() {
   const std::int64_t tolerance = slave_.dictionary().number(0x2010, 1);
-  if (state_ != DriveState::operation_enabled || tolerance == 0 || last_sync_ns_ == kNever) return;
+  if (state_ != DriveState::operation_enabled || tolerance == 0 || last_sync_ns_ == never) return;
   if (now_ns_ - last_sync_ns_ > tolerance * period_ns()) trip(emcy::sync_controller, error_register::communication);
 }
 
@@ -330,10 +330,10 @@ void DriveDevice::supervise_following_error() {
   const std::int64_t window = od.number(0x6065);
   const std::int64_t error = std::llabs(std::int64_t{axis_.demand_counts()} - axis_.position_counts());
   if (window == 0xFFFFFFFF || error <= window) {
-    following_error_since_ns_ = kNever;
+    following_error_since_ns_ = never;
     return;
   }
-  if (following_error_since_ns_ == kNever) following_error_since_ns_ = now_ns_;
+  if (following_error_since_ns_ == never) following_error_since_ns_ = now_ns_;
   if (now_ns_ - following_error_since_ns_ >= od.number(0x6066) * 1'000'000) {
     trip(emcy::following_error, error_register::profile_specific);
   }
@@ -371,8 +371,8 @@ void DriveDevice::on_reset(std::int64_t time_ns) {
   stopping_ = false;
   fault_code_ = 0;
   target_fresh_ = false;
-  following_error_since_ns_ = kNever;
-  last_sync_ns_ = kNever;
+  following_error_since_ns_ = never;
+  last_sync_ns_ = never;
   interval_count_ = interval_next_ = 0;
 }
 

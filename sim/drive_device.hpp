@@ -61,8 +61,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void inject_fault(std::uint16_t code, std::int64_t time_ns) noexcept;
 
  private:
-  static constexpr std::int64_t kNever = INT64_MIN;
-  static constexpr int kIntervals = 8;
+  static constexpr std::int64_t never = INT64_MIN;
+  static constexpr int intervals = 8;
 
   void on_sync(std::int64_t time_ns) override;
   void on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns) override;
@@ -113,9 +113,9 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   bool target_fresh_ = false;     // 607Ah was written since the last SYNC
   bool following_ = false;        // bit 12
   bool target_limited_ = false;   // 607Dh
-  std::int64_t following_error_since_ns_ = kNever;
-  std::int64_t last_sync_ns_ = kNever;
-  std::int64_t intervals_ns_[kIntervals] = {};
+  std::int64_t following_error_since_ns_ = never;
+  std::int64_t last_sync_ns_ = never;
+  std::int64_t intervals_ns_[intervals] = {};
   int interval_count_ = 0, interval_next_ = 0;
 };
 

@@ -14,7 +14,7 @@ struct Row {
 using enum DriveState;
 using enum DriveCommand;
 
-constexpr Row kTransitions[] = {
+constexpr Row transitions[] = {
     {2, switch_on_disabled, shutdown, ready_to_switch_on},
     {3, ready_to_switch_on, switch_on, DriveState::switched_on},
     {3, ready_to_switch_on, enable_operation, DriveState::switched_on},  // and 4 right after it
@@ -44,7 +44,7 @@ DriveCommand decode_controlword(std::uint16_t word, std::uint16_t word_before) n
 }
 
 DriveTransition transition_for(DriveState from, DriveCommand command) noexcept {
-  for (const Row& row : kTransitions) {
+  for (const Row& row : transitions) {
     if (row.from == from && row.command == command) return {row.number, row.to};
   }
   return {0, from};

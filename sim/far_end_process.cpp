@@ -13,7 +13,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::int64_t kLongestSleep = 20'000'000;  // so that the stop flag is seen
+constexpr std::int64_t longest_sleep = 20'000'000;  // so that the stop flag is seen
 
 // Identifiers of a drive's predefined connections that it uses, and those for all drives (node 0).
 bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
@@ -98,7 +98,7 @@ void FarEndProcess::run(const std::atomic<bool>& stop, std::int64_t until_ns) {
   while (!stop.load(std::memory_order_relaxed)) {
     const std::int64_t now_ns = network_.now_ns();
     if (now_ns >= until_ns) break;
-    network_.wait_for_frame(std::min({events_.next_time(), until_ns, now_ns + kLongestSleep}));
+    network_.wait_for_frame(std::min({events_.next_time(), until_ns, now_ns + longest_sleep}));
     ++statistics_.wake_ups;
     receive_all();
     run_events();

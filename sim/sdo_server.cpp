@@ -6,8 +6,8 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::uint8_t kOwnBlockSize = 127;  // segments that this server takes in one sub-block; 1..127
-constexpr std::size_t kLongestDownload = std::size_t{1} << 20;  // bytes collected before the object is asked
+constexpr std::uint8_t own_block_size = 127;  // segments that this server takes in one sub-block; 1..127
+constexpr std::size_t longest_download = std::size_t{1} << 20;  // bytes collected before the object is asked
 
 std::uint32_t u32_at(const SdoServer::Message& m, std::size_t at) noexcept {
   return static_cast<std::uint32_t>(m[at]) | static_cast<std::uint32_t>(m[at + 1]) << 8 |
@@ -118,7 +118,7 @@ void SdoServer::begin_download(const Message& request) {
     return finish_download(object_message(0x60));
   }
   expected_ = size_indicated ? u32_at(request, 4) : 0;
-  if (expected_ > kLongestDownload) return abort(SdoAbort::out_of_memory);
+  if (expected_ > longest_download) return abort(SdoAbort::out_of_memory);
   if (const SdoAbort code = dictionary_.can_write(index_, subindex_, expected_); code != SdoAbort::none) {
     return abort(code);
   }
@@ -135,7 +135,7 @@ void SdoServer::download_segment(const Message& request) {
   if (toggle != toggle_) return abort(SdoAbort::toggle_bit_not_alternated);
   const std::size_t length = 7 - static_cast<std::size_t>(request[0] >> 1 & 0x07);
   data_.insert(data_.end(), request.begin() + 1, request.begin() + 1 + static_cast<std::ptrdiff_t>(length));
-  if (data_.size() > kLongestDownload) return abort(SdoAbort::out_of_memory);
+  if (data_.size() > longest_download) return abort(SdoAbort::out_of_memory);
   if (expected_ != 0 && data_.size() > expected_) return abort(SdoAbort::length_too_high);
   const Message message{static_cast<std::uint8_t>(0x20 | toggle << 4), 0, 0, 0, 0, 0, 0, 0};
   toggle_ ^= 1;
@@ -189,13 +189,13 @@ void SdoServer::begin_block_download(const Message& request) {
   remember_object(request);
   with_crc_ = (request[0] & 0x04) != 0;
   expected_ = (request[0] & 0x02) != 0 ? u32_at(request, 4) : 0;
-  if (expected_ > kLongestDownload) return abort(SdoAbort::out_of_memory);
+  if (expected_ > longest_download) return abort(SdoAbort::out_of_memory);
   if (const SdoAbort code = dictionary_.can_write(index_, subindex_, expected_); code != SdoAbort::none) {
     return abort(code);
   }
   data_.clear();
   sequence_ = 0;
-  block_size_ = kOwnBlockSize;
+  block_size_ = own_block_size;
   phase_ = Phase::block_download;
   Message message = object_message(0xA4);
   message[4] = block_size_;
@@ -212,7 +212,7 @@ void SdoServer::block_download_segment(const Message& request) {
   if (in_order) {
     data_.insert(data_.end(), request.begin() + 1, request.end());
     sequence_ = sequence;
-    if (data_.size() > kLongestDownload) return abort(SdoAbort::out_of_memory);
+    if (data_.size() > longest_download) return abort(SdoAbort::out_of_memory);
   }
   if (!last && sequence < block_size_) return;
   answer({0xA2, sequence_, block_size_, 0, 0, 0, 0, 0});

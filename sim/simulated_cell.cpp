@@ -13,7 +13,7 @@ namespace {
 using description::SetupError;
 
 // 6065h as such drives are delivered: at the joint. The master may set another.
-constexpr double kFollowingErrorWindow_rad = 0.05;
+constexpr double following_error_window_rad = 0.05;
 
 double counts_per_rad(const description::DriveDescription& drive) noexcept { return std::abs(drive.counts_per_rad()); }
 
@@ -34,7 +34,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.canopen.device_name = "simulated drive of " + drive.joint;
   c.canopen.boot_time_ns = config.drive_boot_time_ns;
   const double scale = counts_per_rad(drive);
-  c.following_error_window_counts = to_u32(kFollowingErrorWindow_rad * scale);
+  c.following_error_window_counts = to_u32(following_error_window_rad * scale);
   c.quick_stop_deceleration = to_u32(drive.max_acceleration_rad_per_s2 * scale);
   c.profile_deceleration = to_u32(0.5 * drive.max_acceleration_rad_per_s2 * scale);
   const double first = drive.offset_counts + drive.range_rad[0] * drive.counts_per_rad();

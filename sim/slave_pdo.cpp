@@ -6,8 +6,8 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::int64_t kNotValid = std::int64_t{1} << 31;
-constexpr std::int64_t kFlagBits = std::int64_t{7} << 29;
+constexpr std::int64_t not_valid = std::int64_t{1} << 31;
+constexpr std::int64_t flag_bits = std::int64_t{7} << 29;
 
 // Identifiers that no PDO may use (CiA 301, table 42).
 bool is_restricted(std::int64_t id) noexcept {
@@ -27,7 +27,7 @@ SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number
   dictionary.add(parameters_, 0, DataType::unsigned8, Access::constant, 5);
 
   ObjectEntry& identifier =
-      dictionary.add(parameters_, 1, DataType::unsigned32, Access::read_write, valid ? id : id | kNotValid);
+      dictionary.add(parameters_, 1, DataType::unsigned32, Access::read_write, valid ? id : id | not_valid);
   identifier.before_write = [this](std::int64_t value) { return check_identifier(value); };
   identifier.after_write = reconfigure;
 
@@ -63,7 +63,7 @@ void SlavePdo::set_default_mapping(std::initializer_list<std::uint32_t> objects)
 
 void SlavePdo::configure() noexcept {
   const std::int64_t identifier = dictionary_.number(parameters_, 1);
-  valid_ = (identifier & kNotValid) == 0;
+  valid_ = (identifier & not_valid) == 0;
   identifier_ = static_cast<std::uint32_t>(identifier & 0x7FF);
   type_ = static_cast<std::uint8_t>(dictionary_.number(parameters_, 2));
   inhibit_ns_ = dictionary_.number(parameters_, 3) * 100'000;
@@ -103,11 +103,11 @@ SdoAbort SlavePdo::resolve(std::uint32_t object, Mapped& mapped) const noexcept 
 
 // Bits 0..29 stay as they are while the PDO is valid; 29-bit identifiers (bit 29) aren't supported.
 SdoAbort SlavePdo::check_identifier(std::int64_t value) const noexcept {
-  const std::int64_t id = value & ~kFlagBits, present = dictionary_.number(parameters_, 1);
+  const std::int64_t id = value & ~flag_bits, present = dictionary_.number(parameters_, 1);
   if ((value >> 29 & 1) != 0 || id > 0x7FF) return SdoAbort::invalid_value;
-  const bool stays_valid = (present & kNotValid) == 0 && (value & kNotValid) == 0;
-  if (stays_valid && id != (present & ~kFlagBits)) return SdoAbort::invalid_value;
-  if ((value & kNotValid) == 0 && is_restricted(id)) return SdoAbort::invalid_value;
+  const bool stays_valid = (present & not_valid) == 0 && (value & not_valid) == 0;
+  if (stays_valid && id != (present & ~flag_bits)) return SdoAbort::invalid_value;
+  if ((value & not_valid) == 0 && is_restricted(id)) return SdoAbort::invalid_value;
   return SdoAbort::none;
 }
 
@@ -117,7 +117,7 @@ SdoAbort SlavePdo::check_type(std::int64_t value) const noexcept {
 
 // The mapping changes only while the PDO isn't valid, and becomes active when its number of objects is written.
 SdoAbort SlavePdo::check_count(std::int64_t value) const noexcept {
-  if ((dictionary_.number(parameters_, 1) & kNotValid) == 0) return SdoAbort::unsupported_access;
+  if ((dictionary_.number(parameters_, 1) & not_valid) == 0) return SdoAbort::unsupported_access;
   if (value > 8) return SdoAbort::pdo_length_exceeded;
   int length = 0;
   for (std::int64_t i = 1; i <= value; ++i) {
@@ -130,7 +130,7 @@ SdoAbort SlavePdo::check_count(std::int64_t value) const noexcept {
 }
 
 SdoAbort SlavePdo::check_object(std::int64_t value) const noexcept {
-  const bool valid = (dictionary_.number(parameters_, 1) & kNotValid) == 0;
+  const bool valid = (dictionary_.number(parameters_, 1) & not_valid) == 0;
   if (valid || dictionary_.number(mapping_, 0) != 0) return SdoAbort::unsupported_access;
   if (value == 0) return SdoAbort::none;  // an empty place
   Mapped mapped;

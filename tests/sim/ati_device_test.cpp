@@ -26,7 +26,7 @@ struct AtiDeviceTest : ::testing::Test {
     device->power_on(0);
   }
   std::vector<std::string> ask(const std::string& text) {
-    device->on_frame(testing::from_text(text), 100 * testing::kMs);
+    device->on_frame(testing::from_text(text), 100 * testing::ms);
     return port.take();
   }
   AtiDeviceConfig config;
@@ -57,7 +57,7 @@ TEST_F(AtiDeviceTest, SaysWhatItIs) {
 TEST_F(AtiDeviceTest, IsSilentForAWhileAfterAReset) {
   EXPECT_THAT(ask("68C#"), IsEmpty());
   EXPECT_THAT(ask("680#"), IsEmpty());
-  device->on_frame(testing::from_text("680#"), 100 * testing::kMs + config.start_time_ns);
+  device->on_frame(testing::from_text("680#"), 100 * testing::ms + config.start_time_ns);
   EXPECT_EQ(port.take().size(), 2u);
 }
 
@@ -67,13 +67,13 @@ TEST_F(AtiDeviceTest, LeavesOtherIdentifiersAndOtherLengthsAlone) {
   EXPECT_THAT(ask("680#00"), IsEmpty());
   fieldbus::CanFrame frame = testing::from_text("680#");
   frame.extended = true;
-  device->on_frame(frame, 100 * testing::kMs);
+  device->on_frame(frame, 100 * testing::ms);
   EXPECT_THAT(port.take(), IsEmpty());
 }
 
 TEST_F(AtiDeviceTest, AnswersAfterItsOwnTime) {
-  device->on_frame(testing::from_text("680#"), 100 * testing::kMs);
-  EXPECT_THAT(port.times_ns, ElementsAre(100 * testing::kMs + 30'000, 100 * testing::kMs + 30'000));
+  device->on_frame(testing::from_text("680#"), 100 * testing::ms);
+  EXPECT_THAT(port.times_ns, ElementsAre(100 * testing::ms + 30'000, 100 * testing::ms + 30'000));
 }
 
 TEST_F(AtiDeviceTest, HasFaultsThatCanBeSwitchedOn) {
@@ -100,16 +100,16 @@ TEST_F(AtiDeviceTest, HasFaultsThatCanBeSwitchedOn) {
 }
 
 TEST_F(AtiDeviceTest, SurvivesRandomFrames) {
-  constexpr unsigned kSeed = 6801;
-  std::mt19937 random(kSeed);
+  constexpr unsigned seed = 6801;
+  std::mt19937 random(seed);
   for (int i = 0; i < testing::scaled(100'000); ++i) {
     fieldbus::CanFrame frame;
     frame.id = random() % 4 == 0 ? random() % 0x800 : 0x680 + random() % 16;
     frame.extended = random() % 16 == 0;
     frame.length = static_cast<std::uint8_t>(random() % 9);
     for (std::size_t b = 0; b < frame.length; ++b) frame.data[b] = static_cast<std::uint8_t>(random());
-    device->on_frame(frame, 100 * testing::kMs + i);
-    ASSERT_LE(port.frames.size(), 3u) << "seed " << kSeed;
+    device->on_frame(frame, 100 * testing::ms + i);
+    ASSERT_LE(port.frames.size(), 3u) << "seed " << seed;
     port.take();
   }
 }

@@ -10,7 +10,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using testing::kMs;
+using testing::ms;
 
 struct Application final : CanopenApplication {
   void on_sync(std::int64_t) override { ++syncs; }
@@ -36,11 +36,11 @@ struct CanopenSlaveTest : ::testing::Test {
   }
   // Lets time pass in steps of 1 ms.
   std::vector<std::string> until(std::int64_t time_ms) {
-    for (; now_ms < time_ms; ++now_ms) slave.on_time((now_ms + 1) * kMs);
+    for (; now_ms < time_ms; ++now_ms) slave.on_time((now_ms + 1) * ms);
     return port.take();
   }
   std::vector<std::string> ask(const std::string& text) {
-    slave.on_frame(testing::from_text(text), now_ms * kMs);
+    slave.on_frame(testing::from_text(text), now_ms * ms);
     return port.take();
   }
   void expect_ok(const std::string& request) {
@@ -152,7 +152,7 @@ TEST_F(CanopenSlaveTest, MissesTheMastersHeartbeatOnlyAfterItHasHeardIt) {
 
 TEST_F(CanopenSlaveTest, BehavesOnErrorsAs1029Says) {
   for (const auto& [behaviour, state] : {std::pair{"01", NmtState::operational}, std::pair{"02", NmtState::stopped}}) {
-    slave.power_on(now_ms * kMs);
+    slave.power_on(now_ms * ms);
     until(now_ms + 30);
     expect_ok("605#2316100132007F00");
     expect_ok(std::string("605#2F291001") + behaviour + "000000");
@@ -270,8 +270,8 @@ TEST_F(CanopenSlaveTest, TellsOfASyncThatIsTooLong) {
 }
 
 TEST_F(CanopenSlaveTest, SurvivesRandomFrames) {
-  constexpr unsigned kSeed = 301;
-  std::mt19937 random(kSeed);
+  constexpr unsigned seed = 301;
+  std::mt19937 random(seed);
   const std::uint32_t ids[] = {0x000, 0x080, 0x205, 0x305, 0x605, 0x605, 0x77F, 0x701};
   std::int64_t time_ns = 0;
   for (int i = 0; i < testing::scaled(200'000); ++i) {
@@ -290,13 +290,13 @@ TEST_F(CanopenSlaveTest, SurvivesRandomFrames) {
     slave.on_frame(frame, time_ns);
     slave.on_time(time_ns += 250'000);
     for (const auto& sent : port.frames) {
-      ASSERT_LE(sent.length, 8) << "seed " << kSeed;
-      ASSERT_LT(sent.id, 0x800u) << "seed " << kSeed;
+      ASSERT_LE(sent.length, 8) << "seed " << seed;
+      ASSERT_LT(sent.id, 0x800u) << "seed " << seed;
     }
     port.take();
   }
   slave.power_on(time_ns);
-  slave.on_time(time_ns + 30 * kMs);
+  slave.on_time(time_ns + 30 * ms);
   EXPECT_THAT(port.take(), ElementsAre("705#00"));
 }
 

@@ -16,7 +16,7 @@
 
 namespace proxarm::sim::testing {
 
-constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t ms = 1'000'000;
 
 // "181#3712001000" as candump writes it.
 inline std::string to_text(const fieldbus::CanFrame& frame) {

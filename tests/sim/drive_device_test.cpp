@@ -10,8 +10,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
-using ::testing::IsEmpty;
-using testing::kMs;
+using testing::ms;
 
 struct DriveDeviceTest : ::testing::Test {
   DriveDeviceTest() {
@@ -26,13 +25,13 @@ struct DriveDeviceTest : ::testing::Test {
     c.following_error_window_counts = 500;
     c.following_error_time_ms = 5;
     c.quick_stop_deceleration = 1'000'000;
-    c.brake_release_ns = 5 * kMs;
+    c.brake_release_ns = 5 * ms;
     return c;
   }
   // Time in steps of 0.25 ms, without any frame.
-  void pass(std::int64_t ms) {
-    for (std::int64_t i = 0; i < 4 * ms; ++i) {
-      now_ns += kMs / 4;
+  void pass(std::int64_t duration_ms) {
+    for (std::int64_t i = 0; i < 4 * duration_ms; ++i) {
+      now_ns += ms / 4;
       axis.move(now_ns);
       drive.on_time(now_ns);
     }
@@ -341,8 +340,8 @@ TEST_F(DriveDeviceTest, CutsTargetsAtItsPositionLimitsAndSaysSo) {
 }
 
 TEST_F(DriveDeviceTest, SurvivesRandomMasters) {
-  constexpr unsigned kSeed = 402;
-  std::mt19937 random(kSeed);
+  constexpr unsigned seed = 402;
+  std::mt19937 random(seed);
   configure();
   for (int i = 0; i < testing::scaled(50'000); ++i) {
     const auto controlword = static_cast<std::uint16_t>(random() % 4 == 0 ? random() : random() % 16);
@@ -379,7 +378,7 @@ TEST_F(DriveDeviceTest, SurvivesRandomMasters) {
     const DriveState state = drive.state();
     const bool may_move = state == DriveState::operation_enabled || state == DriveState::quick_stop_active ||
                           state == DriveState::fault_reaction_active;
-    ASSERT_EQ(axis.enabled, may_move) << "seed " << kSeed << ", step " << i;
+    ASSERT_EQ(axis.enabled, may_move) << "seed " << seed << ", step " << i;
     port.take();
   }
 }

@@ -14,9 +14,9 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
-using testing::kMs;
+using testing::ms;
 
-const std::filesystem::path kSource = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = PROXARM_SOURCE_DIR;
 
 // A master that sends what it was told at given times and writes down what it hears.
 struct ScriptedMaster final : fieldbus::CanListener {
@@ -27,8 +27,8 @@ struct ScriptedMaster final : fieldbus::CanListener {
 };
 
 struct FarEndProcessTest : ::testing::Test {
-  FarEndProcessTest() : cell(description::load_cell(kSource / "models/cells/default.yaml")) {
-    sensor = description::load_sensor(kSource / "models/sensors/ati_net_can_oem.yaml");
+  FarEndProcessTest() : cell(description::load_cell(source / "models/cells/default.yaml")) {
+    sensor = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml");
   }
   description::Cell cell;
   description::SensorDescription sensor;
@@ -41,14 +41,14 @@ TEST_F(FarEndProcessTest, CarriesAllBusesOnOneInterface) {
   ScriptedMaster master;
   fieldbus::CanPort& port = network.simulated_bus(0).attach(master, "master");
   FarEndProcess process(cell, sensor, hand, network, {0, 0, 0});
-  process.run(stop, 50 * kMs);
+  process.run(stop, 50 * ms);
   EXPECT_THAT(master.heard, ElementsAre("701#00", "702#00", "703#00", "704#00", "705#00", "706#00"));
   master.heard.clear();
-  network.events().schedule(60 * kMs, [&] {
+  network.events().schedule(60 * ms, [&] {
     port.send(testing::from_text("605#4000100000000000"));
     port.send(testing::from_text("680#"));
   });
-  process.run(stop, 100 * kMs);
+  process.run(stop, 100 * ms);
   EXPECT_THAT(master.heard, Contains("585#4300100092010200"));
   EXPECT_EQ(master.heard.size(), 3u);
   EXPECT_EQ(process.statistics().frames_received, 2u);
@@ -61,7 +61,7 @@ TEST_F(FarEndProcessTest, KeepsBusesApartThatHaveInterfacesOfTheirOwn) {
   ScriptedMaster masters[3];
   for (std::size_t i = 0; i < 3; ++i) network.simulated_bus(i).attach(masters[i], "master");
   FarEndProcess process(cell, sensor, hand, network, {2, 1, 0});
-  process.run(stop, 50 * kMs);
+  process.run(stop, 50 * ms);
   EXPECT_THAT(masters[0].heard, IsEmpty());
   EXPECT_THAT(masters[1].heard, ElementsAre("704#00", "705#00", "706#00"));
   EXPECT_THAT(masters[2].heard, ElementsAre("701#00", "702#00", "703#00"));
@@ -70,10 +70,10 @@ TEST_F(FarEndProcessTest, KeepsBusesApartThatHaveInterfacesOfTheirOwn) {
 TEST_F(FarEndProcessTest, EndsWhenToldToStop) {
   fieldbus::SimulatedCanNetwork network({{.name = "vcan0"}});
   FarEndProcess process(cell, sensor, hand, network, {0, 0, 0});
-  network.events().schedule(30 * kMs, [this] { stop = true; });
+  network.events().schedule(30 * ms, [this] { stop = true; });
   process.run(stop);
-  EXPECT_GE(network.now_ns(), 30 * kMs);
-  EXPECT_LE(network.now_ns(), 51 * kMs);
+  EXPECT_GE(network.now_ns(), 30 * ms);
+  EXPECT_LE(network.now_ns(), 51 * ms);
 }
 
 TEST_F(FarEndProcessTest, RefusesTwoDrivesWithOneNodeOnOneInterface) {

@@ -16,9 +16,9 @@ namespace proxarm::sim {
 namespace {
 
 using ::testing::HasSubstr;
-using testing::kMs;
+using testing::ms;
 
-const std::filesystem::path kSource = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = PROXARM_SOURCE_DIR;
 
 struct MasterAndDrives : ::testing::Test {
   void start(const std::vector<std::string>& faults = {}) {
@@ -27,7 +27,7 @@ struct MasterAndDrives : ::testing::Test {
     network = std::make_unique<fieldbus::SimulatedCanNetwork>(buses);
     SimulatedCellConfig config;
     for (const auto& text : faults) config.faults.push_back(parse_device_fault(text));
-    const auto sensor = description::load_sensor(kSource / "models/sensors/ati_net_can_oem.yaml");
+    const auto sensor = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml");
     far_end = std::make_unique<SimulatedCell>(cell, sensor, description::HandDescription{}, network->events(), config);
     far_end->attach_to(*network);
     far_end->power_on();
@@ -64,10 +64,10 @@ struct MasterAndDrives : ::testing::Test {
       fieldbus::CanFrame frame;
       if (slot.drive->encode_rpdo(frame)) network->bus(slot.bus).send(frame);
     }
-    network->sleep_until(t + kMs);
+    network->sleep_until(t + ms);
   }
 
-  description::Cell cell = description::load_cell(kSource / "models/cells/default.yaml");
+  description::Cell cell = description::load_cell(source / "models/cells/default.yaml");
   std::unique_ptr<fieldbus::SimulatedCanNetwork> network;
   std::unique_ptr<SimulatedCell> far_end;
   std::vector<fieldbus::ServoDrive> drives;
@@ -96,7 +96,7 @@ TEST_F(MasterAndDrives, ComeUpTogetherMoveAndSwitchOff) {
   for (int i = 0; i < 200; ++i) cycle();
   for (std::size_t i = 0; i < drives.size(); ++i) EXPECT_EQ(far_end->drive(i).state(), DriveState::switch_on_disabled);
   fieldbus::shut_down_drives(*network, slots);
-  network->sleep_until(network->now_ns() + 10 * kMs);
+  network->sleep_until(network->now_ns() + 10 * ms);
   for (std::size_t i = 0; i < drives.size(); ++i) {
     EXPECT_EQ(far_end->drive(i).canopen().state(), NmtState::pre_operational);
   }
@@ -123,7 +123,7 @@ TEST_F(MasterAndDrives, TheDrivesStopByThemselvesWhenTheMasterDies) {
   // timer come before it, and the servo loop slows down a quarter of a period after the last target anyway.
   std::vector<double> then;
   for (std::size_t i = 0; i < 6; ++i) then.push_back(far_end->plant().arm().motor_angle_rad(i));
-  network->sleep_until(network->now_ns() + 100 * kMs);
+  network->sleep_until(network->now_ns() + 100 * ms);
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_NE(far_end->drive(i).state(), DriveState::operation_enabled) << i;
     EXPECT_FALSE(far_end->plant().servo(i).powered()) << i;
@@ -135,7 +135,7 @@ TEST_F(MasterAndDrives, TheSensorsMatrixComesOverTheWireUnchanged) {
   start();
   fieldbus::AtiNetCanOem master({.bus_name = "sensor", .base_id = 0x68});
   master.start(*network, 2);
-  const auto& simulation = description::load_sensor(kSource / "models/sensors/ati_net_can_oem.yaml").simulation;
+  const auto& simulation = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml").simulation;
   for (std::size_t row = 0; row < 6; ++row) {
     for (std::size_t column = 0; column < 6; ++column) {
       EXPECT_EQ(static_cast<float>(master.matrix()[row][column]), static_cast<float>(simulation.matrix[row][column]));

@@ -152,9 +152,9 @@ TEST_F(SdoServerTest, SwitchesABlockUploadToTheNormalOneBelowTheThreshold) {
 
 // Whatever comes, each request gets at most a sub-block of answers, and the server still works afterwards.
 TEST_F(SdoServerTest, SurvivesRandomRequests) {
-  constexpr unsigned kSeed = 20070322;
-  SCOPED_TRACE(kSeed);
-  std::mt19937 random(kSeed);
+  constexpr unsigned seed = 20070322;
+  SCOPED_TRACE(seed);
+  std::mt19937 random(seed);
   std::uniform_int_distribution<int> byte(0, 255);
   const std::uint16_t indices[] = {0x1000, 0x1008, 0x1017, 0x2100, 0x60C2, 0x1234};
   for (int i = 0; i < testing::scaled(200'000); ++i) {

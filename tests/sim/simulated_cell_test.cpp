@@ -12,13 +12,12 @@
 namespace proxarm::sim {
 namespace {
 
-using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::kMs;
+using testing::ms;
 
-const std::filesystem::path kSource = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = PROXARM_SOURCE_DIR;
 
 // A hand that holds still, or one that pushes along x.
 description::HandDescription still_hand() {
@@ -29,8 +28,8 @@ description::HandDescription still_hand() {
 
 class SimulatedCellTest : public ::testing::Test {
  protected:
-  SimulatedCellTest() : cell(description::load_cell(kSource / "models/cells/default.yaml")) {
-    sensor = description::load_sensor(kSource / "models/sensors/ati_net_can_oem.yaml");
+  SimulatedCellTest() : cell(description::load_cell(source / "models/cells/default.yaml")) {
+    sensor = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml");
   }
   void start(const std::vector<std::string>& faults = {}) {
     std::vector<fieldbus::SimulatedBusConfig> buses;
@@ -53,7 +52,7 @@ class SimulatedCellTest : public ::testing::Test {
   void pass(std::int64_t ns) { network->sleep_until(network->now_ns() + ns); }
   std::vector<std::string> ask(std::size_t bus, const std::string& text) {
     send(bus, text);
-    pass(kMs);
+    pass(ms);
     return receive(bus);
   }
   // RPDO1 {6040, 607A}, TPDO1 {6041, 6064}, every SYNC; mode 8; 1 ms.
@@ -86,7 +85,7 @@ class SimulatedCellTest : public ::testing::Test {
 
 TEST_F(SimulatedCellTest, BootsUpOnTheBusesOfTheCell) {
   start();
-  pass(50 * kMs);
+  pass(50 * ms);
   EXPECT_THAT(receive(0), ElementsAre("701#00", "702#00", "703#00"));
   EXPECT_THAT(receive(1), ElementsAre("704#00", "705#00", "706#00"));
   EXPECT_THAT(receive(2), IsEmpty());
@@ -98,7 +97,7 @@ TEST_F(SimulatedCellTest, BootsUpOnTheBusesOfTheCell) {
 // Where the arm stands at rest: 6064h is the start pose in counts, motor side, gears wound up by gravity.
 TEST_F(SimulatedCellTest, StandsAtTheStartPose) {
   start();
-  pass(50 * kMs);
+  pass(50 * ms);
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const auto& drive = cell.drives[axis];
     const auto counts = static_cast<double>(far_end->drive(axis).canopen().dictionary().number(0x6064));
@@ -115,7 +114,7 @@ TEST_F(SimulatedCellTest, StandsAtTheStartPose) {
 // Axis 1 by literal bytes: 06, 07, 0F at its own position, then 200 targets of 1000 counts each.
 TEST_F(SimulatedCellTest, MovesADriveThatAHandTypedMasterEnables) {
   start();
-  pass(50 * kMs);
+  pass(50 * ms);
   receive(0);
   configure(0, 1);
   send(0, "000#0101");
@@ -124,7 +123,7 @@ TEST_F(SimulatedCellTest, MovesADriveThatAHandTypedMasterEnables) {
   std::string last;
   const auto cycle = [&](int controlword) {
     send(0, "080#");
-    pass(kMs / 2);
+    pass(ms / 2);
     for (const auto& text : receive(0)) {
       if (text.substr(0, 4) == "181#") last = text;
     }
@@ -133,7 +132,7 @@ TEST_F(SimulatedCellTest, MovesADriveThatAHandTypedMasterEnables) {
     std::snprintf(rpdo, sizeof rpdo, "201#%02X00%02X%02X%02X%02X", static_cast<unsigned>(controlword), t & 0xFF,
                   t >> 8 & 0xFF, t >> 16 & 0xFF, t >> 24 & 0xFF);
     send(0, rpdo);
-    pass(kMs / 2);
+    pass(ms / 2);
   };
   for (int i = 0; i < 5; ++i) cycle(0x06);
   EXPECT_EQ(last.substr(4, 4), "3102");
@@ -160,14 +159,14 @@ TEST_F(SimulatedCellTest, ObserverSeesEachStepOnce) {
   start();
   std::vector<std::int64_t> times;
   far_end->set_observer([&](const Truth& truth) { times.push_back(truth.time_ns); });
-  pass(10 * kMs);
+  pass(10 * ms);
   ASSERT_EQ(times.size(), 40u);
-  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(times[i], static_cast<std::int64_t>(i + 1) * kMs / 4);
+  for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(times[i], static_cast<std::int64_t>(i + 1) * ms / 4);
 }
 
 TEST_F(SimulatedCellTest, FaultsAtStart) {
   start({"axis_3:silent", "axis_2:device_type=0x00030191", "sensor:silent"});
-  pass(50 * kMs);
+  pass(50 * ms);
   EXPECT_THAT(receive(0), ElementsAre("701#00", "702#00"));
   EXPECT_THAT(ask(0, "602#4000100000000000"), ElementsAre("582#4300100091010300"));
   EXPECT_THAT(ask(0, "603#4000100000000000"), IsEmpty());
@@ -177,16 +176,16 @@ TEST_F(SimulatedCellTest, FaultsAtStart) {
 TEST_F(SimulatedCellTest, FaultsComeAndGoAtTheirTimes) {
   start({"axis_1:fault=0x4210@100ms", "axis_2:power@100ms..200ms", "sensor:half@100ms..200ms",
          "axis_4:silent@100ms..200ms"});
-  pass(90 * kMs);
+  pass(90 * ms);
   EXPECT_EQ(ask(2, "680#").size(), 2u);
   receive(0);
-  pass(20 * kMs);
+  pass(20 * ms);
   EXPECT_THAT(receive(0), ElementsAre("081#1042210000000000"));
   EXPECT_EQ(ask(2, "680#").size(), 1u);
   EXPECT_THAT(ask(0, "602#4000100000000000"), IsEmpty());
   receive(1);
   EXPECT_THAT(ask(1, "604#4000100000000000"), IsEmpty());
-  pass(150 * kMs);
+  pass(150 * ms);
   EXPECT_THAT(receive(0), ElementsAre("702#00"));
   EXPECT_EQ(ask(2, "680#").size(), 2u);
   EXPECT_THAT(ask(1, "604#4000100000000000"), ElementsAre("584#4300100092010200"));
@@ -203,11 +202,11 @@ TEST_F(SimulatedCellTest, TwoRunsAreIdentical) {
     network->set_observer([&all](const fieldbus::WireFrame& wire) {
       all += std::to_string(wire.end_ns) + " " + testing::to_text(wire.frame) + "\n";
     });
-    pass(50 * kMs);
+    pass(50 * ms);
     for (int i = 0; i < 100; ++i) {
       send(2, "680#");
       send(0, "080#");
-      pass(kMs);
+      pass(ms);
     }
     return all;
   };
@@ -219,7 +218,7 @@ TEST_F(SimulatedCellTest, TwoRunsAreIdentical) {
 // How long the far end takes for a second of six axes in full exchange; a figure to look at, with a generous bound.
 TEST_F(SimulatedCellTest, TimingOfTheFarEnd) {
   start();
-  pass(50 * kMs);
+  pass(50 * ms);
   for (int node = 1; node <= 6; ++node) {
     receive(0);
     receive(1);
@@ -231,10 +230,10 @@ TEST_F(SimulatedCellTest, TimingOfTheFarEnd) {
   for (int i = 0; i < 1000; ++i) {
     for (std::size_t bus = 0; bus < 2; ++bus) send(bus, "080#");
     send(2, "680#");
-    pass(kMs / 2);
+    pass(ms / 2);
     for (const char* rpdo : {"201#060000000000", "202#060000000000", "203#060000000000"}) send(0, rpdo);
     for (const char* rpdo : {"204#060000000000", "205#060000000000", "206#060000000000"}) send(1, rpdo);
-    pass(kMs / 2);
+    pass(ms / 2);
     for (std::size_t bus = 0; bus < 3; ++bus) {
       fieldbus::TimedFrame timed;
       while (network->bus(bus).receive(timed)) {
