@@ -19,6 +19,34 @@
 
 namespace proxarm::models {
 
+// One step on one surface.
+template <int N>
+struct FaceStep {
+  Vec<N> r;  // p itself if nothing touches
+  bool touches = false;
+  bool slips = false;
+};
+
+template <int N>
+FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>& p, const Vec<N>& q) noexcept {
+  const Vec<N>& n = surface.normal();
+  const double n_p = surface.height(p);                         // nᵀp
+  if (n_p > 0.0) return {p, false, false};                      // (4), first case
+  if constexpr (N == 1) return {surface.point(), true, false};  // no tangent to slip along: the surface is a point
+
+  const Vec<N> p_sf = p - n * n_p;
+  const double n_q = surface.height(q);
+  const bool on_surface = std::abs(n_q) <= surface.rounding(q);
+  const Vec<N> q_sf = on_surface ? q : Vec<N>(q - n * n_q);
+  const Vec<N> d = p_sf - q_sf;
+  const double distance = d.norm();
+  // "Not greater", so that a distance too small for its square sticks and nothing is divided by zero below.
+  if (!(distance > -mu * n_p)) return {on_surface ? q : surface.projection(q_sf), true, false};  // (4), second case
+
+  // (4), third case; projected once more, against what rounding of a deep p left.
+  return {surface.projection(p_sf + (mu * n_p / distance) * d), true, mu > 0.0};
+}
+
 template <int N>
 class FrictionPlane final : public GeometricAlgorithm<N> {
  public:
@@ -33,23 +61,10 @@ class FrictionPlane final : public GeometricAlgorithm<N> {
   }
 
   Vec<N> operator()(double /*K*/, const Vec<N>& p, const Vec<N>& q) noexcept override {
-    const double n_p = surface_.height(p);  // nᵀp
-    touches_ = !(n_p > 0.0);
-    contact_.slips = false;
-    if (!touches_) return p;                        // (4), first case
-    if constexpr (N == 1) return surface_.point();  // no tangent to slip along: the surface is a point
-
-    const Vec<N> p_sf = p - surface_.normal() * n_p;
-    const double n_q = surface_.height(q);
-    const bool on_surface = std::abs(n_q) <= surface_.rounding(q);
-    const Vec<N> q_sf = on_surface ? q : Vec<N>(q - surface_.normal() * n_q);
-    const Vec<N> d = p_sf - q_sf;
-    const double distance = d.norm();
-    // "Not greater", so that a distance too small for its square sticks and nothing is divided by zero below.
-    if (!(distance > -mu_ * n_p)) return on_surface ? q : surface_.projection(q_sf);  // (4), second case
-
-    contact_.slips = mu_ > 0.0;
-    return surface_.projection(p_sf + (mu_ * n_p / distance) * d);  // (4), third case; projected against rounding
+    const FaceStep<N> step = step_on_face(surface_, mu_, p, q);
+    touches_ = step.touches;
+    contact_.slips = step.slips;
+    return step.r;
   }
 
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override {

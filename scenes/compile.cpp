@@ -4,9 +4,11 @@
 
 #include "models/coulomb_field.hpp"
 #include "models/description/setup_error.hpp"
+#include "models/embedded.hpp"
 #include "models/free_space.hpp"
 #include "models/friction_plane.hpp"
 #include "models/plane.hpp"
+#include "models/plane_composition.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -49,8 +51,35 @@ Cut<N> cut(const Scene& scene, const Object& object, const PlaneShape& plane) {
 }
 
 template <int N>
+using Planes = std::vector<std::pair<const Object*, Cut<N>>>;
+
+template <int N>
+std::unique_ptr<models::GeometricAlgorithm<N>> compose(const Planes<N>& planes, CompiledScene& out) {
+  std::vector<models::Face> faces;
+  bool friction = false;
+  for (const auto& [object, half_space] : planes) {
+    const double mu = N > 1 ? object->friction : 0.0;
+    friction = friction || mu > 0.0;
+    faces.push_back({models::FlatSurface<3>(models::Embedded<N>::lift(half_space.point),
+                                            models::Embedded<N>::lift(half_space.normal)),
+                     mu});
+  }
+  out.stages.push_back(
+      {"composition of " + std::to_string(faces.size()) + " planes" + (friction ? " with friction" : ""),
+       "sets of at most three contacts, solved directly"});
+  if (!friction) out.skipped.push_back({"friction", "μ = 0 everywhere"});
+  out.skipped.push_back({"motion", "nothing moves"});
+  auto space = std::make_unique<models::PlaneComposition>(std::move(faces));
+  if constexpr (N == 3) {
+    return space;
+  } else {
+    return std::make_unique<models::Embedded<N>>(std::move(space));
+  }
+}
+
+template <int N>
 std::unique_ptr<models::GeometricAlgorithm<N>> build(const Scene& scene, CompiledScene& out) {
-  std::vector<std::pair<const Object*, Cut<N>>> planes;
+  Planes<N> planes;
   for (const Object& object : scene.objects) {
     const Cut<N> half_space = cut<N>(scene, object, std::get<PlaneShape>(object.shape));
     if (half_space.nothing) {
@@ -59,10 +88,12 @@ std::unique_ptr<models::GeometricAlgorithm<N>> build(const Scene& scene, Compile
       planes.emplace_back(&object, half_space);
     }
   }
-  if (planes.size() > 1 || (!planes.empty() && scene.coulomb_force_N)) {
+  if (!planes.empty() && scene.coulomb_force_N) {
     throw SetupError({.file = scene.file.string(),
-                      .message = "found " + std::to_string(scene.objects.size()) +
-                                 " objects and fields that act together, expected one"});
+                      .line = scene.coulomb_line,
+                      .key = "coulomb_field",
+                      .found = "a field together with objects",
+                      .expected = "either"});
   }
   if (scene.coulomb_force_N) {
     out.stages.push_back(
@@ -76,6 +107,7 @@ std::unique_ptr<models::GeometricAlgorithm<N>> build(const Scene& scene, Compile
     out.skipped.push_back({"friction", "no objects"});
     return std::make_unique<models::FreeSpace<N>>();
   }
+  if (planes.size() > 1) return compose<N>(planes, out);
   const auto& [object, half_space] = planes.front();
   out.skipped.push_back({"composition", "a single object"});
   out.skipped.push_back({"motion", "nothing moves"});

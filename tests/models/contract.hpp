@@ -36,8 +36,10 @@ struct ContractOptions {
   // μ of each contact by object index; a single entry stands for all. Empty: reported contacts aren't checked.
   std::vector<double> friction{};
   bool forces_without_contact = false;  // a field or a layer acts on a proxy that touches nothing
-  // States to leave out, such as those where Coulomb's law has several solutions; they are counted and printed.
-  std::function<bool(double K, const models::Vec<N>& p, const models::Vec<N>& q, const models::Vec<N>& r)> leave_out{};
+  // Where Coulomb's law has several solutions (two faces that can jam, a proxy that flies far into a groove), the one
+  // that is found may change with κ. A failure of Assumption 1 is counted apart, not hidden, if both results satisfy
+  // (17) for each of their contacts; at most this share of all states may be of this kind.
+  double several = 0.0;
 };
 
 template <int N>
@@ -49,11 +51,48 @@ std::string state_text(double K, const models::Vec<N>& p, const models::Vec<N>& 
   return text.str();
 }
 
+// The rounding of f = K (r − p): K times that of r and p, and its own.
+template <int N>
+double force_rounding(double K, const models::Vec<N>& p, const models::Vec<N>& q, const models::Vec<N>& r) {
+  return 64.0 * std::numeric_limits<double>::epsilon() * K * (r.norm() + p.norm() + q.norm() + (r - p).norm());
+}
+
+// f = K (r − p) is a sum of forces that each contact can bear: of its friction cone if it sticks, of the cone's edge
+// against N Nᵀ (r − q) if it slips (17).
+template <int N>
+testing::AssertionResult obeys_17(std::span<const models::Contact<N>> contacts, const ContractOptions<N>& options,
+                                  double K, const models::Vec<N>& p, const models::Vec<N>& q, const models::Vec<N>& r) {
+  const auto in_space = [](const models::Vec<N>& v) {
+    models::Vec3 v3 = models::Vec3::Zero();
+    v3.template head<N>() = v;
+    return v3;
+  };
+  double tolerance = options.condition * force_rounding<N>(K, p, q, r);
+  std::vector<models::ForceCone> cones;
+  for (const auto& contact : contacts) {
+    const models::Vec3 n = in_space(contact.normal);
+    if (std::abs(n.norm() - 1.0) > 1e-14) return testing::AssertionFailure() << "normal of length " << n.norm();
+    const auto object = static_cast<std::size_t>(contact.object);
+    const double mu = N == 1 ? 0.0 : options.friction.size() == 1 ? options.friction[0] : options.friction.at(object);
+    const models::Vec3 v = in_space(r - q) - n * n.dot(in_space(r - q));
+    // The direction of a slip is as uncertain as its length's rounding over its length; below that, any will do.
+    const double uncertain = 16.0 * std::numeric_limits<double>::epsilon() * (r.norm() + q.norm()) / v.norm();
+    if (!contact.slips || !(uncertain < 1e-3)) {
+      cones.push_back({n, mu});
+    } else {
+      cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
+      tolerance += mu * K * (r - p).norm() * uncertain * options.condition;
+    }
+  }
+  if (models::in_sum_of_cones(in_space(K * (r - p)), cones, tolerance)) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "force outside what " << contacts.size() << " contacts can bear";
+}
+
 template <int N>
 void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>& options = {}) {
   using models::Vec;
   Random random(options.seed);
-  std::int64_t left_out = 0, pressed = 0, slipped = 0;
+  std::int64_t several = 0, pressed = 0, slipped = 0;
   const std::int64_t states = scaled(options.states);
   for (std::int64_t i = 0; i < states; ++i) {
     const double K = random.log_uniform(1.0, 1e7);
@@ -67,42 +106,29 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
     const auto state = [&] { return state_text<N>(K, p, q, r) + ", seed " + std::to_string(options.seed); };
     ASSERT_TRUE(r.allFinite()) << state();
     const std::vector<models::Contact<N>> contacts(g.contacts().begin(), g.contacts().end());
-    if (options.leave_out && options.leave_out(K, p, q, r)) {
-      ++left_out;
-      continue;
-    }
     const Vec<N> f = K * (r - p);  // (1b)
     pressed += contacts.empty() ? 0 : 1;
     for (const auto& contact : contacts) slipped += contact.slips ? 1 : 0;
 
-    // The force's own rounding: K times that of r and p.
-    const double force_rounding = 64.0 * std::numeric_limits<double>::epsilon() * options.condition *
-                                  (K * (r.norm() + p.norm() + q.norm()) + f.norm());
-    if (contacts.empty()) {
-      if (!options.forces_without_contact) {
-        ASSERT_LE(f.norm(), force_rounding) << "force without contact; " << state();
-      }
-    } else if (!options.friction.empty()) {
-      std::vector<models::ForceCone> cones;
-      for (const auto& contact : contacts) {
-        ASSERT_NEAR(contact.normal.norm(), 1.0, 1e-14) << state();
-        const auto object = static_cast<std::size_t>(contact.object);
-        const double mu = options.friction.size() == 1 ? options.friction[0] : options.friction.at(object);
-        models::Vec3 axis = models::Vec3::Zero();
-        axis.template head<N>() = contact.normal;
-        cones.push_back({axis, N == 1 ? 0.0 : mu});
-      }
-      models::Vec3 f3 = models::Vec3::Zero();
-      f3.template head<N>() = f;
-      ASSERT_TRUE(models::in_sum_of_cones(f3, cones, force_rounding)) << "force outside the cone; " << state();
+    if (contacts.empty() && !options.forces_without_contact) {
+      ASSERT_LE(f.norm(), options.condition * force_rounding<N>(K, p, q, r)) << "force without contact; " << state();
+    }
+    if (!options.friction.empty()) {
+      ASSERT_TRUE(obeys_17<N>(contacts, options, K, p, q, r)) << state();
     }
 
     // Assumption 1.
     for (int k = 0; k < 4; ++k) {
       const double kappa = K * std::pow(10.0, random.uniform(-options.kappa_decades, options.kappa_decades));
-      const Vec<N> r_kappa = g(kappa, r - f / kappa, q);
-      ASSERT_LE((r_kappa - r).norm(), options.condition * models::map_9_rounding<N>(r, q, f, K, kappa))
-          << "depends on K: κ = " << kappa << " gives [" << r_kappa.transpose() << "]; " << state();
+      const Vec<N> p_kappa = r - f / kappa, r_kappa = g(kappa, p_kappa, q);
+      const double error = (r_kappa - r).norm();
+      if (error <= options.condition * models::map_9_rounding<N>(r, q, f, K, kappa)) continue;
+      ++several;
+      const std::vector<models::Contact<N>> other(g.contacts().begin(), g.contacts().end());
+      ASSERT_TRUE(options.several > 0.0 && obeys_17<N>(other, options, kappa, p_kappa, q, r_kappa))
+          << "depends on K: κ = " << kappa << " gives [" << r_kappa.transpose() << "], off by " << error << " m; "
+          << state();
+      break;
     }
 
     if (!options.forces_without_contact) {
@@ -113,7 +139,8 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
     ASSERT_TRUE((again.array() == r.array()).all()) << "depends on what was asked before; " << state();
   }
   std::cout << "  " << states << " states, seed " << options.seed << ": " << pressed << " in contact, " << slipped
-            << " slipping contacts, " << left_out << " left out\n";
+            << " slipping contacts, " << several << " with several solutions\n";
+  EXPECT_LE(static_cast<double>(several), options.several * static_cast<double>(states));
 }
 
 }  // namespace proxarm::tests

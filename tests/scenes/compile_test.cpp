@@ -77,6 +77,25 @@ TEST(Compile, CutsAPlaneWithTheSpaceOfTheProxy) {
                description::SetupError);
 }
 
+TEST(Compile, ComposesPlanesInAnyDimension) {
+  const char* objects =
+      "objects:\n"
+      "  - plane: {point_m: [0, 0, 0], normal: [1, 0, 0], friction: 0.3}\n"
+      "  - plane: {point_m: [0, 0, 0], normal: [0, 1, 0], friction: 0.3}\n"
+      "  - plane: {point_m: [1, 0, 0], normal: [-1, 0, 0], friction: 0.3}\n";
+  const CompiledScene three = compile(parse_scene(objects, "c.yaml"));
+  EXPECT_TRUE(three.algorithm<3>()(1.0, {-1, -2, 0}, {0, 0, 0}).isZero(1e-15));
+  EXPECT_EQ(three.algorithm<3>().contacts().size(), 2u);
+  const CompiledScene two =
+      compile(parse_scene(std::string("dimensions: 2\nspace: {axes: [[1, 0, 0], [0, 1, 0]]}\n") + objects, "c.yaml"));
+  EXPECT_TRUE(two.algorithm<2>()(1.0, {-1, -2}, {0, 0}).isZero(1e-15));
+  EXPECT_EQ(two.algorithm<2>().contacts().size(), 2u);
+  const CompiledScene one =
+      compile(parse_scene(std::string("dimensions: 1\nspace: {axes: [[1, 0, 0]]}\n") + objects, "c.yaml"));
+  EXPECT_NEAR(one.algorithm<1>()(1.0, models::Vec<1>(-1.0), models::Vec<1>(0.5))[0], 0.0, 1e-15);
+  EXPECT_NEAR(one.algorithm<1>()(1.0, models::Vec<1>(3.0), models::Vec<1>(0.5))[0], 1.0, 1e-15);
+}
+
 TEST(SceneFile, NamesEveryMistakeWithItsPlace) {
   const auto problem = [](const std::string& text) {
     try {

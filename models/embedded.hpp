@@ -1,0 +1,43 @@
+// A world of fewer dimensions, rendered by a 𝒢 of three: what it has no coordinates for stays zero.
+//
+// Right wherever all normals lie in the first N dimensions: nothing then pushes out of them.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "models/geometric_algorithm.hpp"
+
+namespace proxarm::models {
+
+template <int N>
+class Embedded final : public GeometricAlgorithm<N> {
+ public:
+  explicit Embedded(std::unique_ptr<GeometricAlgorithm<3>> space) : space_(std::move(space)) {}
+
+  Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
+    const Vec<N> r = (*space_)(K, lift(p), lift(q)).template head<N>();
+    count_ = 0;
+    for (const Contact<3>& contact : space_->contacts()) {
+      if (count_ == contacts_.size()) break;
+      contacts_[count_++] = {contact.object, contact.feature, contact.slips, contact.normal.template head<N>()};
+    }
+    return r;
+  }
+
+  void set_time(const StepTime& time) noexcept override { space_->set_time(time); }
+  [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return {contacts_.data(), count_}; }
+
+  static Vec3 lift(const Vec<N>& x) noexcept {
+    Vec3 x3 = Vec3::Zero();
+    x3.template head<N>() = x;
+    return x3;
+  }
+
+ private:
+  std::unique_ptr<GeometricAlgorithm<3>> space_;
+  std::array<Contact<N>, 4> contacts_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace proxarm::models

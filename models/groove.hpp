@@ -1,0 +1,69 @@
+// Two flat surfaces at once: the proxy in the line where they meet, with friction on each side.
+//
+// The proxy at r = x₀ + s e is held by both. In units where K = 1 the force f = r − p is shared,
+//   Σ f_i (n_i − μ_i v_i/‖v_i‖) = r − p,   f_i ≥ 0,
+// where contact i slips along its own v_i = N_i N_iᵀ (r − q_i) = (s − s_i) e + w_i t_i, t_i = e × n_i, as (17) says
+// with v = (r − q)/T for each surface. (On arrival from beside the line v_i isn't along e: taking it so costs up to 18
+// % of the force.) Across e this is a 2 × 2 system for f₁, f₂ given s; along e it leaves one equation for s.
+//
+// A proxy that was in the line already (w_i = 0) has a closed form: f_i are those without friction and
+//   s = s_q if |s_p − s_q| ≤ μ₁f₁ + μ₂f₂,  else s_p ∓ (μ₁f₁ + μ₂f₂).
+// Here a sticking contact bears friction along e alone. Contacts that squeeze each other could hold more, but wherever
+// they can, the sliding solution exists too, and it is the one nearer to p, which is what is chosen.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/flat_surface.hpp"
+
+namespace proxarm::models {
+
+// A flat surface with friction.
+struct Face {
+  FlatSurface<3> surface;
+  double mu = 0.0;
+};
+
+// The line in which two faces meet.
+struct GrooveLine {
+  bool exists = false;  // false: the same direction or opposite ones, within rounding
+  Vec3 e = Vec3::Zero();
+  Vec3 x0 = Vec3::Zero();
+  Vec3 t1 = Vec3::Zero(), t2 = Vec3::Zero();
+  double cos = 1.0, sin = 0.0;  // between the normals
+
+  GrooveLine() = default;
+  GrooveLine(const FlatSurface<3>& a, const FlatSurface<3>& b) noexcept {
+    const Vec3 &n1 = a.normal(), &n2 = b.normal();
+    const Vec3 c = n1.cross(n2);
+    cos = n1.dot(n2);
+    sin = c.norm();
+    exists = sin > 1e-14;  // the cross product of unit vectors is rounded by 2e-16: below, e has less than two digits
+    if (!exists) return;
+    e = c / sin;
+    t1 = e.cross(n1);
+    t2 = e.cross(n2);
+    x0 = settle(a, b, settle(a, b, settle(a, b, 0.5 * (a.point() + b.point()))));
+  }
+
+  // The point of the line next to x. Repeated, it leaves heights of the size of x's own rounding, however acute the
+  // angle (the position along t₁ is then known to 1/sin of that).
+  [[nodiscard]] Vec3 settle(const FlatSurface<3>& a, const FlatSurface<3>& b, const Vec3& x) const noexcept {
+    const double h1 = a.height(x), h2 = b.height(x);
+    return x - h1 * a.normal() + ((h1 * cos - h2) / sin) * t1;
+  }
+};
+
+struct GrooveSolution {
+  bool found = false;
+  bool slips1 = false, slips2 = false;
+  Vec3 r = Vec3::Zero();
+};
+
+// The proxy held by both faces; not found if one of them would have to pull. q_a and q_b are the previous proxy as
+// each surface sees it: the same point unless the surfaces move.
+GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurface<3>& b, double mu_b,
+                            const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b) noexcept;
+
+}  // namespace proxarm::models
