@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::sim {
@@ -141,6 +142,17 @@ FarEndStatistics FarEndProcess::statistics() const {
   for (std::size_t i = 0; i < network_.bus_count(); ++i)
     total.frames_lost += network_.bus(i).status().receive_overflows;
   return total;
+}
+
+FarEndStatistics run_on_socketcan(const description::Cell& cell, const description::SensorDescription& sensor,
+                                  const description::HandDescription& hand, const std::vector<std::string>& interfaces,
+                                  const std::atomic<bool>& stop, const SimulatedCellConfig& config) {
+  fieldbus::SocketCanNetwork network(interfaces);
+  std::vector<std::size_t> interface_of_bus;
+  for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
+  FarEndProcess process(cell, sensor, hand, network, interface_of_bus, config);
+  process.run(stop);
+  return process.statistics();
 }
 
 }  // namespace proxarm::sim

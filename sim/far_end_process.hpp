@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "fieldbus/can_network.hpp"
@@ -60,5 +61,11 @@ class FarEndProcess {
   FarEndStatistics statistics_;
   bool powered_ = false;
 };
+
+// All of it: opens the kernel's interfaces, one name per bus of the cell (the same name twice is one logical bus), and
+// runs until `stop`. Throws SetupError as FarEndProcess does, and for interfaces that can't be opened.
+FarEndStatistics run_on_socketcan(const description::Cell& cell, const description::SensorDescription& sensor,
+                                  const description::HandDescription& hand, const std::vector<std::string>& interfaces,
+                                  const std::atomic<bool>& stop, const SimulatedCellConfig& config = {});
 
 }  // namespace proxarm::sim

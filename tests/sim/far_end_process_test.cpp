@@ -2,9 +2,10 @@
 #include "sim/far_end_process.hpp"
 
 #include <filesystem>
-#include <map>
+#include <thread>
 
 #include "fieldbus/simulated_can_network.hpp"
+#include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "tests/sim/device_harness.hpp"
 
@@ -95,6 +96,47 @@ TEST_F(FarEndProcessTest, RefusesASensorThatSpeaksWithADrivesIdentifiers) {
     cell.sensor.base_id = base;
     EXPECT_NO_THROW(FarEndProcess(cell, sensor, hand, network, {0, 0, 0})) << base;
   }
+}
+
+// The same on a real kernel's vcan0 and vcan1: the far end in a thread of its own, a master typed by hand in this one.
+// Bytes alone: how fast things are depends on the machine and its clock.
+TEST(FarEndVcan, AnswersOverARealKernelsInterfaces) {
+  const description::Cell cell = description::load_cell(source / "models/cells/default.yaml");
+  const auto sensor = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml");
+  fieldbus::SocketCanNetwork network({"vcan0", "vcan1"});
+  std::atomic<bool> stop{false};
+  FarEndStatistics statistics;
+  std::thread far_end([&] {
+    statistics = run_on_socketcan(cell, sensor, description::HandDescription{}, {"vcan0", "vcan0", "vcan1"}, stop);
+  });
+  const auto hear = [&](std::size_t bus, std::size_t count, std::int64_t patience_ns) {
+    std::vector<std::string> heard;
+    const std::int64_t deadline_ns = network.now_ns() + patience_ns;
+    while (heard.size() < count && network.now_ns() < deadline_ns) {
+      network.wait_for_frame(deadline_ns);
+      for (fieldbus::TimedFrame timed; network.bus(bus).receive(timed);) {
+        heard.push_back(testing::to_text(timed.frame));
+      }
+    }
+    return heard;
+  };
+  EXPECT_THAT(hear(0, 6, 5'000 * ms), ElementsAre("701#00", "702#00", "703#00", "704#00", "705#00", "706#00"));
+  network.bus(0).send(testing::from_text("604#4000100000000000"));
+  EXPECT_THAT(hear(0, 1, 2'000 * ms), ElementsAre("584#4300100092010200"));
+  network.bus(1).send(testing::from_text("688#"));
+  EXPECT_THAT(hear(1, 1, 2'000 * ms), ElementsAre("688#0203"));
+  network.bus(0).send(testing::from_text("602#2F00180201000000"));  // transmit PDO 1 of node 2 with every SYNC
+  EXPECT_THAT(hear(0, 1, 2'000 * ms), ElementsAre("582#6000180200000000"));
+  network.bus(0).send(testing::from_text("000#0102"));
+  for (int i = 0; i < 100; ++i) {
+    network.bus(0).send(testing::from_text("080#"));
+    EXPECT_THAT(hear(0, 1, 2'000 * ms), ElementsAre("182#5002")) << i;  // switch on disabled, voltage, remote
+  }
+  stop = true;
+  far_end.join();
+  EXPECT_EQ(statistics.frames_lost, 0u);
+  EXPECT_EQ(statistics.frames_not_sent, 0u);
+  EXPECT_EQ(statistics.frames_received, 104u);
 }
 
 }  // namespace
