@@ -317,6 +317,66 @@ TEST_F(DriveDeviceTest, StopsWhenSomebodyTakesItOutOfOperational) {
   EXPECT_EQ(drive.state(), DriveState::fault);
 }
 
+// 6007h: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop; 605Eh and 605Ah say how.
+TEST_F(DriveDeviceTest, ReactsToALostConnectionAs6007Says) {
+  struct Case {
+    const char* option;
+    DriveState soon, finally;
+  };
+  for (const Case& c : {Case{"00", DriveState::operation_enabled, DriveState::operation_enabled},
+                        Case{"01", DriveState::fault_reaction_active, DriveState::fault},
+                        Case{"02", DriveState::switch_on_disabled, DriveState::switch_on_disabled},
+                        Case{"03", DriveState::quick_stop_active, DriveState::switch_on_disabled}}) {
+    ask("000#8101");
+    pass(30);
+    position = axis.position_counts();
+    ask("601#2B00140504000000");  // 4 ms
+    ask(std::string("601#2B076000") + c.option + "000000");
+    configure();
+    cycles(4, 0x06, position);
+    cycles(2, 0x07, position);
+    cycles(8, 0x0F, position);
+    ASSERT_EQ(drive.state(), DriveState::operation_enabled) << c.option;
+    move(20, 100);
+    const auto sync_only = [&](int count) {
+      for (int i = 0; i < count; ++i) {
+        ask("080#");
+        pass(1);
+      }
+    };
+    sync_only(6);
+    EXPECT_EQ(drive.state(), c.soon) << c.option;
+    sync_only(150);
+    EXPECT_EQ(drive.state(), c.finally) << c.option;
+    EXPECT_EQ(axis.speed, 0.0) << c.option;
+  }
+}
+
+TEST_F(DriveDeviceTest, CoastsIntoItsBrakeOnAFaultWhen605eSaysSo) {
+  ask("601#2B5E600000000000");
+  enable();
+  move(20, 100);
+  drive.inject_fault(0x4210, now_ns);
+  EXPECT_EQ(drive.state(), DriveState::fault);
+  EXPECT_FALSE(axis.enabled);
+}
+
+TEST_F(DriveDeviceTest, RefusesAResetWhileTheMastersHeartbeatIsStillMissing) {
+  ask("601#231610010A007F00");
+  ask("601#2F29100101000000");  // stays operational
+  enable();
+  ask("77F#05");
+  for (int i = 0; i < 20; ++i) cycle(0x0F, 1000);
+  ASSERT_EQ(drive.state(), DriveState::fault);
+  cycles(2, 0x00, 1000);
+  cycles(2, 0x80, 1000);
+  EXPECT_EQ(drive.state(), DriveState::fault);
+  ask("77F#05");
+  cycles(2, 0x00, 1000);
+  cycles(2, 0x80, 1000);
+  EXPECT_EQ(drive.state(), DriveState::switch_on_disabled);
+}
+
 TEST_F(DriveDeviceTest, DropsPowerOnReset) {
   for (const char* reset : {"000#8101", "000#8201"}) {
     enable();

@@ -10,6 +10,7 @@
 #include "fieldbus/simulated_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/simulated_cell.hpp"
+#include "tests/sim/allocation_count.hpp"
 #include "tests/sim/device_harness.hpp"
 
 namespace proxarm::sim {
@@ -100,6 +101,18 @@ TEST_F(MasterAndDrives, ComeUpTogetherMoveAndSwitchOff) {
   for (std::size_t i = 0; i < drives.size(); ++i) {
     EXPECT_EQ(far_end->drive(i).canopen().state(), NmtState::pre_operational);
   }
+}
+
+// Everything at the far end lives inside the controller's calls to wait: it must not allocate there once it runs.
+TEST_F(MasterAndDrives, AllocateNothingInSteadyMotion) {
+  start();
+  ASSERT_EQ(failure(), "");
+  for (auto& drive : drives) drive.request(fieldbus::DriveGoal::operation_enabled);
+  step_rad = 1e-5;
+  for (int i = 0; i < 500; ++i) cycle();
+  const std::uint64_t before = testing::allocation_count();
+  for (int i = 0; i < 500; ++i) cycle();
+  EXPECT_EQ(testing::allocation_count() - before, 0u);
 }
 
 TEST_F(MasterAndDrives, SayWhichDriveDoesNotAnswer) {
