@@ -340,10 +340,13 @@ double Arm::potential_energy(const JointVector& q) const noexcept {
   return energy;
 }
 
-JointVector Arm::motor_from_link(const JointVector& q) const noexcept { return motor_from_link(q, Wrench{}); }
+JointVector Arm::motor_from_link(const JointVector& q) const noexcept { return twisted(q, gravity_torque(q)); }
 
 JointVector Arm::motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept {
-  const JointVector torque = holding_torque(q, wrench_W);
+  return twisted(q, holding_torque(q, wrench_W));
+}
+
+JointVector Arm::twisted(const JointVector& q, const JointVector& torque) const noexcept {
   JointVector motor = q;
   for (int i = 0; i < axes_; ++i) {
     if (gear_stiffness_[i] > 0.0) motor[i] += torque[i] / gear_stiffness_[i];
@@ -427,7 +430,7 @@ TipMass Arm::effective_mass_range(const JointVector& q) const noexcept {
   const Eigen::Matrix3d A = mobility(q);
   // The iterative solver: the closed form for 3×3 loses half the digits where eigenvalues are close.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
-  const Vec3 values = eigen.eigenvalues();
+  const Vec3& values = eigen.eigenvalues();
   TipMass tip;
   const double infinite = std::numeric_limits<double>::infinity();
   // An eigenvalue is exact to about n ε times the largest one; below that it says "can't move".

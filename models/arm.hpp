@@ -98,10 +98,11 @@ class Arm {
   };
   void forward(const JointVector& q, Frames& frames) const noexcept;
   [[nodiscard]] JointVector gravity_torque(const Frames& frames) const noexcept;
+  [[nodiscard]] JointVector twisted(const JointVector& q, const JointVector& torque) const noexcept;  // q + τ/k
   [[nodiscard]] Eigen::Matrix3d mobility(const JointVector& q) const noexcept;  // J M⁻¹ Jᵀ, translations
   void add_to_link(Link& link, double mass_kg, const Vec3& centre, const Mat3& inertia) const noexcept;
   void read_chain(const description::Cell& cell);
-  void read_tool(const description::Cell& cell, const Pose& X_lastL);
+  void read_tool(const description::Cell& cell, const Pose& X_nL);
 
   int axes_ = 0;
   std::vector<std::string> joint_names_;

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "models/description/setup_error.hpp"
+#include "tests/models/allocation_count.hpp"
 #include "tests/models/random_states.hpp"
 
 namespace proxarm::models {
@@ -310,6 +311,30 @@ TEST_F(InverseKinematicsTest, RefusesWhatItCantSolve) {
   EXPECT_THROW(InverseKinematics ik(pendulum), description::SetupError);
   config.max_step_rad[2] = -1.0;
   EXPECT_THROW(InverseKinematics ik(arm, config), description::SetupError);
+}
+
+TEST_F(InverseKinematicsTest, NeitherItNorTheArmTakesFromTheHeap) {
+  if (!tests::allocations_are_counted()) GTEST_SKIP() << "a sanitizer's malloc can't be counted";
+  const InverseKinematics ik(arm, config);
+  Random random(208);
+  InverseKinematicsResult result;
+  ToolKinematics at_q;
+  double sum = 0.0;
+  for (int n = 0; n < 500; ++n) {
+    JointVector q = random_angles(random);
+    if (n % 3 == 0) q[4] = 0.0;  // damped steps, too
+    const double size = random.log_uniform(1e-9, 1.0);
+    const Pose X = nearby(random, arm.tool_pose(q), size, size);
+    const std::uint64_t before = tests::allocation_count();
+    ik.solve(q, X, result);
+    arm.kinematics(q, at_q);
+    sum += arm.gravity_torque(q)[0] + arm.holding_torque(q, {})[1] + arm.potential_energy(q) +
+           arm.mass_matrix(q)(0, 0) + arm.effective_mass(q, Vec3::UnitX()) + arm.effective_mass_range(q).min_kg +
+           arm.motor_from_link(q)[2] + arm.motor_from_link(q, Wrench{})[2] + arm.link_from_motor(q)[3] +
+           arm.first_elastic_frequency_Hz(q) + arm.sensor_pose(q)(0, 3);
+    ASSERT_EQ(tests::allocation_count(), before);
+  }
+  EXPECT_TRUE(std::isfinite(sum) || sum > 0.0);
 }
 
 // Median over repetitions, so that a busy machine doesn't fail it; bounds are ten times what an idle one needs.
