@@ -14,8 +14,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::uint8_t op_gauges = 0x0, op_matrix = 0x2, op_serial = 0x5, op_counts = 0x7, op_units = 0x8,
-                       op_firmware = 0xF;
+constexpr std::uint8_t op_matrix = 0x2, op_serial = 0x5, op_counts = 0x7, op_units = 0x8, op_firmware = 0xF;
 
 struct Unit {
   std::uint8_t code;
