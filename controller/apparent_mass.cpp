@@ -88,8 +88,8 @@ void ApparentMass::end_segment() {
         aa_ += inner(s.a[axis], s.a[axis]);
         av_ += inner(s.a[axis], s.v[axis]);
         vv_ += inner(s.v[axis], s.v[axis]);
-        aF_ += inner(s.a[axis], s.F[axis]);
-        vF_ += inner(s.v[axis], s.F[axis]);
+        af_ += inner(s.a[axis], s.F[axis]);
+        vf_ += inner(s.v[axis], s.F[axis]);
       }
     }
     used_s_ += length_s;
@@ -102,7 +102,7 @@ std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
   const double determinant = aa_ * vv_ - av_ * av_;
   // Below a part in a million, a and v can't be told apart (a single exponential, say).
   if (!(aa_ > 0.0) || !(determinant > 1e-6 * aa_ * vv_)) return std::nullopt;
-  return Estimate{(aF_ * vv_ - vF_ * av_) / determinant, (vF_ * aa_ - aF_ * av_) / determinant, used_s_};
+  return Estimate{(af_ * vv_ - vf_ * av_) / determinant, (vf_ * aa_ - af_ * av_) / determinant, used_s_};
 }
 
 }  // namespace proxarm::controller

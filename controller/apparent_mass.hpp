@@ -43,7 +43,7 @@ class ApparentMass {
   double period_s_;
   std::vector<models::Vec3> force_, position_;
   // Normal equations: sums of Re(x* y) over the band.
-  double aa_ = 0.0, av_ = 0.0, vv_ = 0.0, aF_ = 0.0, vF_ = 0.0;
+  double aa_ = 0.0, av_ = 0.0, vv_ = 0.0, af_ = 0.0, vf_ = 0.0;
   double used_s_ = 0.0;
 };
 
