@@ -53,7 +53,8 @@ struct CycleRecord {
   Triple proxy_W_m{};                 // q(k)
   Triple contact_force_W_N{};         // f(k), (25a): on the proxy
   Triple normal_W{};                  // of the first contact; zero when free
-  double friction = 0.0;              // μ of the first contact
+  std::int32_t contact_object = -1;   // of the first contact, by its index in the scene; −1 when free
+  double friction = 0.0;              // its μ
   Triple tool_W_m{};                  // the rendered point by the encoders, at t_k
   double proxy_clearance_m = 0.0;     // signed distance of the proxy to the nearest surface; below 0: inside
   double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders

@@ -36,7 +36,10 @@ class WorldOfDimension final : public RenderedWorld {
     last_.f_W = basis_ * proxy_.f();
     last_.v_W = basis_ * proxy_.velocity();
     for (const models::Contact<N>& contact : scene_->algorithm<N>().contacts()) {
-      if (last_.contacts++ == 0) last_.normal_W = basis_ * contact.normal;
+      if (last_.contacts++ == 0) {
+        last_.normal_W = basis_ * contact.normal;
+        last_.object = contact.object;
+      }
       last_.slips = last_.slips || contact.slips;
     }
     return last_;

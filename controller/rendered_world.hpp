@@ -24,6 +24,7 @@ struct WorldStep {
   models::Vec3 v_W = models::Vec3::Zero();
   models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
   int contacts = 0;
+  std::int32_t object = -1;  // of the first contact, by its index in the scene; −1 when free
   bool slips = false;
   ProxyFault fault = ProxyFault::none;
 };
