@@ -37,11 +37,12 @@ void CanopenSlave::add_communication_objects() {
   od.add(0x1001, 0, unsigned8, read_only, 0, true);
   od.add(0x1003, 0, unsigned8, read_write, 0).maximum = 0;  // only 0 may be written: it clears the history
   for (std::uint8_t i = 1; i <= 8; ++i) od.add(0x1003, i, unsigned32, read_only, 0);
-  od.add(0x1005, 0, unsigned32, read_write, 0x80).before_write = [](std::int64_t value) {
+  sync_id_ = &od.add(0x1005, 0, unsigned32, read_write, 0x80);
+  sync_id_->before_write = [](std::int64_t value) {
     return (value & ~0x7FF) == 0 ? SdoAbort::none : SdoAbort::invalid_value;  // bit 30: doesn't generate SYNC
   };
   od.add(0x1006, 0, unsigned32, read_write, 0);
-  od.add(0x1007, 0, unsigned32, read_write, 0);
+  sync_window_ = &od.add(0x1007, 0, unsigned32, read_write, 0);
   od.add_text(0x1008, 0, config_.device_name);
   od.add_text(0x1009, 0, "simulated");
   od.add_text(0x100A, 0, "1.0");
@@ -146,7 +147,7 @@ void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_n
     return on_heartbeat(static_cast<std::uint8_t>(frame.id - 0x700), frame, time_ns);
   }
   if (talks() && frame.id == 0x600u + config_.node) return on_sdo(frame, time_ns);
-  if (talks() && frame.id == static_cast<std::uint32_t>(dictionary_.number(0x1005))) return on_sync(frame, time_ns);
+  if (talks() && frame.id == static_cast<std::uint32_t>(sync_id_->number())) return on_sync(frame, time_ns);
   if (state_ != NmtState::operational) return;
   for (auto& receive : receive_) {
     if (receive->pdo.valid() && receive->pdo.identifier() == frame.id) on_receive_pdo(*receive, frame, time_ns);
@@ -194,7 +195,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   receive.last_ns = time_ns;
   clear_error(emcy::rpdo_timeout, time_ns);  // also one from before the PDO was configured anew
   receive.overdue = false;
-  const std::int64_t window_ns = dictionary_.number(0x1007) * 1'000;
+  const std::int64_t window_ns = sync_window_->number() * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());
   if (window_ns > 0 && last_sync_ns_ != never && time_ns - last_sync_ns_ > window_ns) return;
   std::copy_n(frame.data.begin(), 8, receive.data.begin());

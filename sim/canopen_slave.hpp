@@ -156,13 +156,14 @@ class CanopenSlave final : public BusDevice {
   DevicePort& port_;
   ObjectDictionary dictionary_;
   SdoServer sdo_{dictionary_};
+  ObjectEntry *sync_id_ = nullptr, *sync_window_ = nullptr;  // 1005h, 1007h
   std::vector<std::unique_ptr<Receive>> receive_;
   std::vector<std::unique_ptr<Transmit>> transmit_;
   std::array<Consumer, consumers> consumers_{};
   std::vector<Error> errors_;
 
   NmtState state_ = NmtState::initialising;
-  std::int64_t boot_ns_ = never;  // when initialising ends
+  std::int64_t boot_ns_ = never;   // when initialising ends
   std::int64_t heartbeat_ns_ = 0;  // when the next one is due
   std::int64_t heartbeat_period_ns_ = 0;
   std::int64_t last_sync_ns_ = never;

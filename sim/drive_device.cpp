@@ -18,7 +18,10 @@ bool is_moving_state(DriveState state) noexcept {
 }  // namespace
 
 DriveDevice::DriveDevice(const DriveDeviceConfig& config, ServoAxis& axis, DevicePort& port)
-    : slave_(config.canopen, *this, port), axis_(axis), brake_release_ns_(config.brake_release_ns) {
+    : slave_(config.canopen, *this, port),
+      axis_(axis),
+      brake_release_ns_(config.brake_release_ns),
+      sdo_request_id_(0x600u + config.canopen.node) {
   add_objects(config);
   add_option_codes();
   add_cyclic_objects(config);
@@ -33,7 +36,7 @@ void DriveDevice::power_on(std::int64_t time_ns) noexcept {
 
 void DriveDevice::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
   now_ns_ = time_ns;
-  publish();
+  if (frame.id == sdo_request_id_) publish();
   slave_.on_frame(frame, time_ns);
 }
 
@@ -109,8 +112,13 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   const auto not_while_moving = [this](std::int64_t) {
     return state_ == DriveState::operation_enabled ? SdoAbort::not_in_present_device_state : SdoAbort::none;
   };
-  od.add(0x60C2, 1, unsigned8, read_write, 0).before_write = not_while_moving;
-  od.add(0x60C2, 2, integer8, read_write, -3).before_write = not_while_moving;
+  period_value_ = &od.add(0x60C2, 1, unsigned8, read_write, 0);
+  period_index_ = &od.add(0x60C2, 2, integer8, read_write, -3);
+  for (ObjectEntry* entry : {period_value_, period_index_}) {
+    entry->before_write = not_while_moving;
+    entry->after_write = [this] { set_period(); };
+  }
+  following_window_ = &od.at(0x6065);
 }
 
 // ---- SYNC
@@ -139,11 +147,11 @@ void DriveDevice::latch_target() {
   target_limited_ = low < high && (target < low || target > high);
   if (target_limited_) target = std::clamp(target, low, high);
   // The first target after the brake has opened must be where the axis is: nothing jumps.
-  if (!target_taken_ && std::llabs(target - axis_.position_counts()) > od.number(0x6065)) {
+  if (!target_taken_ && std::llabs(target - axis_.position_counts()) > following_window_->number()) {
     return trip(emcy::following_error, error_register::profile_specific);
   }
   target_taken_ = true;
-  axis_.set_interpolation_period_ns(period_ns());
+  axis_.set_interpolation_period_ns(period_ns_);
   axis_.set_target(static_cast<std::int32_t>(target), now_ns_);
   following_ = !target_limited_;
 }
@@ -271,27 +279,24 @@ void DriveDevice::finish_stop() { enter(after_stop_, after_stop_transition_); }
 RefusalReason DriveDevice::refusal() const noexcept {
   if (slave_.state() != NmtState::operational) return RefusalReason::not_operational;
   if (mode_display_->number() != cyclic_synchronous_position) return RefusalReason::mode_not_displayed;
-  const std::int64_t period = period_ns();
-  if (period <= 0) return RefusalReason::interpolation_period_not_set;
+  if (period_ns_ <= 0) return RefusalReason::interpolation_period_not_set;
   if (interval_count_ < 3) return RefusalReason::no_sync;
   std::int64_t sum = 0;
   for (int i = 0; i < interval_count_; ++i) sum += intervals_ns_[i];
-  const double ratio = static_cast<double>(sum) / interval_count_ / static_cast<double>(period);
+  const double ratio = static_cast<double>(sum) / interval_count_ / static_cast<double>(period_ns_);
   if (!(ratio > 0.8 && ratio < 1.2)) return RefusalReason::sync_period_mismatch;
   const std::int64_t distance = std::llabs(target_->number() - axis_.position_counts());
-  if (distance > slave_.dictionary().number(0x6065)) return RefusalReason::target_far_from_actual;
+  if (distance > following_window_->number()) return RefusalReason::target_far_from_actual;
   return RefusalReason::none;
 }
 
 bool DriveDevice::energised() const noexcept { return powered_; }
 
-// 60C2h: value u8 · 10^(exponent i8) s. 0 when not set, or when it can't be held in nanoseconds.
-std::int64_t DriveDevice::period_ns() const noexcept {
-  const ObjectDictionary& od = slave_.dictionary();
+// 60C2h: value u8 · 10^(exponent i8) s. 0 when not set, or when it is no time that a cycle can have.
+void DriveDevice::set_period() {
   const double period_s =
-      static_cast<double>(od.number(0x60C2, 1)) * std::pow(10.0, static_cast<double>(od.number(0x60C2, 2)));
-  if (!(period_s > 0.0) || period_s > 1.0) return 0;
-  return std::llround(period_s * 1e9);
+      static_cast<double>(period_value_->number()) * std::pow(10.0, static_cast<double>(period_index_->number()));
+  period_ns_ = period_s > 0.0 && period_s <= 1.0 ? std::llround(period_s * 1e9) : 0;
 }
 
 double DriveDevice::deceleration(std::uint16_t object) const noexcept {
@@ -320,14 +325,14 @@ void DriveDevice::inject_fault(std::uint16_t code, std::int64_t time_ns) noexcep
 void DriveDevice::supervise_sync() {
   const std::int64_t tolerance = slave_.dictionary().number(0x2010, 1);
   if (state_ != DriveState::operation_enabled || tolerance == 0 || last_sync_ns_ == never) return;
-  if (now_ns_ - last_sync_ns_ > tolerance * period_ns()) trip(emcy::sync_controller, error_register::communication);
+  if (now_ns_ - last_sync_ns_ > tolerance * period_ns_) trip(emcy::sync_controller, error_register::communication);
 }
 
 // 8611h when the window (6065h) is left for longer than 6066h says.
 void DriveDevice::supervise_following_error() {
   if (!energised() || !brake_open()) return;
   const ObjectDictionary& od = slave_.dictionary();
-  const std::int64_t window = od.number(0x6065);
+  const std::int64_t window = following_window_->number();
   const std::int64_t error = std::llabs(std::int64_t{axis_.demand_counts()} - axis_.position_counts());
   if (window == 0xFFFFFFFF || error <= window) {
     following_error_since_ns_ = never;
@@ -374,6 +379,7 @@ void DriveDevice::on_reset(std::int64_t time_ns) {
   following_error_since_ns_ = never;
   last_sync_ns_ = never;
   interval_count_ = interval_next_ = 0;
+  set_period();
 }
 
 }  // namespace proxarm::sim

@@ -83,7 +83,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   [[nodiscard]] RefusalReason refusal() const noexcept;
   [[nodiscard]] bool energised() const noexcept;
   [[nodiscard]] bool brake_open() const noexcept { return powered_ && now_ns_ >= brake_open_ns_; }
-  [[nodiscard]] std::int64_t period_ns() const noexcept;
+  void set_period();
   [[nodiscard]] double deceleration(std::uint16_t object) const noexcept;
   void latch_target();
   void supervise_sync();
@@ -93,11 +93,14 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   CanopenSlave slave_;
   ServoAxis& axis_;
   std::int64_t brake_release_ns_;
+  std::uint32_t sdo_request_id_;
+  std::int64_t period_ns_ = 0;  // 60C2h; 0: not set
 
   // Entries used in every cycle
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
-              *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr;
+              *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
+              *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr;
 
   std::int64_t now_ns_ = 0;
   DriveState state_ = DriveState::not_ready_to_switch_on;

@@ -1,8 +1,8 @@
 // The default cell's far end on the in-process buses, with a master whose frames are typed by hand.
 #include "sim/simulated_cell.hpp"
 
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <filesystem>
 
 #include "fieldbus/simulated_can_network.hpp"
@@ -226,7 +226,7 @@ TEST_F(SimulatedCellTest, TimingOfTheFarEnd) {
   }
   send(0, "000#0100");
   send(1, "000#0100");
-  const auto began = std::chrono::steady_clock::now();
+  const std::clock_t began = std::clock();  // of this process, whatever else the machine does
   for (int i = 0; i < 1000; ++i) {
     for (std::size_t bus = 0; bus < 2; ++bus) send(bus, "080#");
     send(2, "680#");
@@ -240,10 +240,9 @@ TEST_F(SimulatedCellTest, TimingOfTheFarEnd) {
       }
     }
   }
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
-  RecordProperty("seconds_per_simulated_second", std::to_string(took.count()));
-  std::printf("far end: %.1f ms for 1 s of six axes\n", 1e3 * took.count());
-  EXPECT_LT(took.count(), 5.0);
+  const double took_s = static_cast<double>(std::clock() - began) / CLOCKS_PER_SEC;
+  std::printf("far end: %.1f ms of processor time for 1 s of six axes\n", 1e3 * took_s);
+  EXPECT_LT(took_s, 5.0);
 }
 
 TEST(DeviceFault, IsReadFromText) {
