@@ -112,6 +112,10 @@ struct SimulatedDrives : ::testing::Test {
   void cycle() {
     cycle([] {});
   }
+  // Where the drive's encoder really is now.
+  [[nodiscard]] std::int32_t position(std::size_t i) {
+    return static_cast<std::int32_t>(far_end->drive(i).canopen().dictionary().number(0x6064));
+  }
   [[nodiscard]] bool all_following() const {
     return std::all_of(drives.begin(), drives.end(), [](const ServoDrive& drive) { return drive.following(); });
   }
@@ -185,18 +189,81 @@ TEST_F(SimulatedDrives, StopByThemselvesWhenTheControllerDies) {
   enable();
   std::vector<double> begin_rad;
   for (const ServoDrive& drive : drives) begin_rad.push_back(drive.target_rad());
-  for (int k = 0; k < 100; ++k) {  // in motion at 0.2 rad/s
+  // Up to 0.2 rad/s in 100 ms, and on at that speed.
+  constexpr double speed = 0.2, ramp_s = 0.1;
+  for (int k = 0; k < 200; ++k) {
+    const double t = k * 1e-3;
+    const double way_rad = t < ramp_s ? 0.5 * speed * t * t / ramp_s : speed * (t - 0.5 * ramp_s);
     cycle([&] {
-      for (std::size_t i = 0; i < drives.size(); ++i)
-        drives[i].set_target_rad(begin_rad[i] + 0.2e-3 * std::min(k, 2 * k - 50));
+      for (std::size_t i = 0; i < drives.size(); ++i) drives[i].set_target_rad(begin_rad[i] + way_rad);
     });
   }
+  expect_no_faults();
+  // Killed between two frames: the last target is latched by nobody, since there is no SYNC any more.
   const std::int64_t death_ns = network->now_ns();
-  // RPDO timeout: five periods; then the quick-stop ramp, and no torque at its end.
-  network->sleep_until(death_ns + 200 * ms);
+  std::vector<double> death_rad;
+  for (std::size_t i = 0; i < drives.size(); ++i) death_rad.push_back(drives[i].scale().angle_rad(position(i)));
+  // RPDO timeout (5 periods) or three missing SYNCs, whichever the drive notices first, then its quick-stop ramp at
+  // max_acceleration; a tick of the drive's clock (1 ms) and a period of interpolation on top, and 30 ms for the
+  // elastic gears to swing out.
+  for (std::int64_t after_ns = 0; after_ns < 60 * ms; after_ns += ms) {
+    network->sleep_until(death_ns + after_ns);
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      const double ramp_rad = speed * speed / (2.0 * cell.drives[i].max_acceleration_rad_per_s2);
+      const double way_rad = drives[i].scale().angle_rad(position(i)) - death_rad[i];
+      ASSERT_LT(way_rad, speed * 7e-3 + ramp_rad + 1e-3) << "drive " << i << " after " << after_ns / ms << " ms";
+    }
+  }
   for (std::size_t i = 0; i < drives.size(); ++i) {
     EXPECT_NE(far_end->drive(i).state(), sim::DriveState::operation_enabled) << "drive " << i;
   }
+}
+
+TEST_F(SimulatedDrives, StopWhenOnlyTheCycleHangs) {
+  build();
+  bring_up();
+  enable();
+  // The program lives on, and something of it keeps SYNC running, but no target comes: the RPDO timer ends it.
+  for (int k = 0; k < 50; ++k) {
+    network->sleep_until(t_ns);
+    for (const std::size_t bus : drive_buses) network->bus(bus).send(sync.next());
+    t_ns += ms;
+  }
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    EXPECT_NE(far_end->drive(i).state(), sim::DriveState::operation_enabled) << "drive " << i;
+  }
+}
+
+TEST_F(SimulatedDrives, ResetOrStoppedBySomeoneElseAreNoticed) {
+  for (const NmtCommand command : {NmtCommand::enter_pre_operational, NmtCommand::stop, NmtCommand::reset_node}) {
+    SCOPED_TRACE(static_cast<int>(command));
+    drives.clear();
+    slots.clear();
+    drive_buses.clear();
+    heartbeat = HeartbeatProducer{127, 20 * ms};
+    build();
+    bring_up();
+    enable();
+    network->bus(1).send(nmt_frame(command, 4));  // as a second master would
+    for (int k = 0; k < 200 && drives[3].fault() == DriveFault::none; ++k) cycle();
+    // Seen in its heartbeat, its boot-up message, or in that it left operation; always within a heartbeat's time-out.
+    EXPECT_NE(drives[3].fault(), DriveFault::none);
+    for (const std::size_t other : {0U, 1U, 2U, 4U, 5U}) EXPECT_EQ(drives[other].fault(), DriveFault::none);
+    for (int k = 0; k < 100; ++k) cycle();
+    EXPECT_NE(far_end->drive(3).state(), sim::DriveState::operation_enabled);
+  }
+}
+
+TEST_F(SimulatedDrives, CutOffIsNoticedByItsSilence) {
+  build();
+  bring_up();
+  enable();
+  far_end->node(1).cut(true);
+  for (int k = 0; k < 3; ++k) cycle();
+  EXPECT_EQ(drives[1].cycles_without_tpdo(), 2U) << "the third is only over at the next SYNC";
+  EXPECT_FALSE(drives[1].fresh());
+  for (int k = 0; k < 200; ++k) cycle();
+  EXPECT_EQ(drives[1].fault(), DriveFault::heartbeat_lost);
 }
 
 TEST_F(SimulatedDrives, AreTakenOverByTheNextControllerAfterOneDied) {
