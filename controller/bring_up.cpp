@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fieldbus/ati_net_can_oem.hpp"
+#include "fieldbus/identifier_check.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::controller {
@@ -82,6 +83,26 @@ std::vector<fieldbus::DriveSlot> slots(CycleParts& parts) {
   return slots;
 }
 
+// Several of the cell's buses may be on one interface; the controller itself has NMT, SYNC and its heartbeat there.
+void refuse_shared_identifiers(CycleParts& parts) {
+  std::vector<fieldbus::UsedIdentifier> used;
+  std::vector<std::string> names;
+  for (std::size_t bus = 0; bus < parts.network.bus_count(); ++bus) names.push_back(parts.network.bus(bus).name());
+  for (const DriveBus& bus : parts.drive_buses) {
+    for (const std::uint32_t id :
+         {0x000U, fieldbus::sync_id, fieldbus::heartbeat_id(fieldbus::DriveSettings{}.master_node)}) {
+      used.push_back({bus.bus, id, "the controller"});
+    }
+  }
+  for (const DriveOnBus& axis : parts.drives) {
+    for (const std::uint32_t id : axis.drive.used_ids()) {
+      used.push_back({axis.bus, id, "drive of " + axis.drive.description().joint});
+    }
+  }
+  for (const std::uint32_t id : parts.sensor->wanted_ids()) used.push_back({parts.sensor_bus, id, "force sensor"});
+  fieldbus::refuse_shared_identifiers(used, names);
+}
+
 }  // namespace
 
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
@@ -119,6 +140,7 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
 }
 
 Identities bring_up(CycleParts& parts) {
+  refuse_shared_identifiers(parts);
   Identities lines;
   parts.sensor->start(parts.network, parts.sensor_bus);
   lines.push_back("sensor: " + parts.sensor->identity());

@@ -16,6 +16,11 @@ std::array<std::uint32_t, 4> ServoDrive::wanted_ids() const noexcept {
           heartbeat_id(node())};
 }
 
+std::array<std::uint32_t, 6> ServoDrive::used_ids() const noexcept {
+  const auto [tpdo, emcy, sdo, heartbeat] = wanted_ids();
+  return {tpdo, emcy, sdo, heartbeat, pdo_id(PdoDirection::receive, 1, node()), SdoClient::request_id(node())};
+}
+
 void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
   cycling_ = true;
   heartbeat_.restart(now_ns);

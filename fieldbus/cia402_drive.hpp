@@ -65,6 +65,8 @@ class ServoDrive {
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
   // What the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
   [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
+  // All identifiers that the drive and the master use between them: those, RPDO1 and SDO requests.
+  [[nodiscard]] std::array<std::uint32_t, 6> used_ids() const noexcept;
   [[nodiscard]] std::uint8_t node() const noexcept { return description_.node; }
   [[nodiscard]] const description::DriveDescription& description() const noexcept { return description_; }
   [[nodiscard]] const DriveSettings& settings() const noexcept { return settings_; }
