@@ -12,7 +12,7 @@ namespace {
 
 using models::Vec3;
 
-constexpr double shortest_slide_s = 0.1;
+constexpr double shortest_slide_s = 0.1, shortest_slide_m = 1e-3;
 
 // Durations up to 1 ms in bins of 10 ns, so that a median over hours needs no more memory than one over seconds.
 class Durations {
@@ -61,7 +61,7 @@ struct Spread {
 };
 
 struct Slide {
-  double tangential = 0.0, limit = 0.0, length_s = 0.0;
+  double tangential = 0.0, limit = 0.0, length_s = 0.0, travel_m = 0.0;
 };
 
 constexpr std::uint32_t limit_flags =
@@ -207,10 +207,12 @@ void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& 
   current_slide.tangential += resistance.dot(along.normalized());
   current_slide.limit += -now.friction * n.dot(resistance);
   current_slide.length_s += config.period_s;
+  current_slide.travel_m += along.norm();
 }
 
 void SummaryBuilder::State::end_slide() {
-  if (current_slide.length_s >= shortest_slide_s && current_slide.limit > 0.0) {
+  if (current_slide.length_s >= shortest_slide_s && current_slide.travel_m >= shortest_slide_m &&
+      current_slide.limit > 0.0) {
     const double error = current_slide.tangential / current_slide.limit - 1.0;
     if (!worst_slide || std::abs(error) > std::abs(*worst_slide)) worst_slide = error;
   }
