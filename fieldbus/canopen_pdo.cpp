@@ -65,8 +65,8 @@ std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   steps.push_back(sdo_write({communication, 2}, 1, pdo.transmission_type,
                             receive ? "RPDO transmission type" : "TPDO transmission type"));
   if (pdo.event_timer_ms > 0) {
-    steps.push_back(optional(sdo_write({communication, 5}, 2, pdo.event_timer_ms,
-                                       receive ? "RPDO event timer (timeout)" : "TPDO event timer")));
+    steps.push_back(if_present(sdo_write({communication, 5}, 2, pdo.event_timer_ms,
+                                         receive ? "RPDO event timer (timeout)" : "TPDO event timer")));
   }
   steps.push_back(
       cob_id_step(pdo.direction, pdo.number, pdo.id, receive ? "RPDO COB-ID (enable)" : "TPDO COB-ID (enable)"));
@@ -75,8 +75,8 @@ std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
 
 SdoStep disable_pdo_step(PdoDirection direction, std::uint8_t number, std::uint8_t node) {
   SdoStep step =
-      optional(cob_id_step(direction, number, does_not_exist | pdo_id(direction, number, node),
-                           direction == PdoDirection::receive ? "unused RPDO COB-ID" : "unused TPDO COB-ID"));
+      if_present(cob_id_step(direction, number, does_not_exist | pdo_id(direction, number, node),
+                             direction == PdoDirection::receive ? "unused RPDO COB-ID" : "unused TPDO COB-ID"));
   step.mask = does_not_exist;  // which identifier an unused one keeps doesn't matter
   return step;
 }

@@ -46,7 +46,7 @@ SdoStep sdo_write(ObjectAddress object, std::uint8_t bytes, std::uint32_t value,
   return step;
 }
 
-SdoStep optional(SdoStep step) {
+SdoStep if_present(SdoStep step) {
   step.is_optional = true;
   return step;
 }

@@ -36,7 +36,7 @@ struct SdoStep {
 [[nodiscard]] SdoStep sdo_expect(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name,
                                  const char* advice = "", std::uint32_t mask = 0xFFFFFFFF);
 [[nodiscard]] SdoStep sdo_write(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name);
-[[nodiscard]] SdoStep optional(SdoStep step);
+[[nodiscard]] SdoStep if_present(SdoStep step);  // for objects that the standard leaves to the maker
 
 struct SdoSequenceConfig {
   SdoClientConfig client{};
@@ -62,6 +62,7 @@ class SdoSequence {
   void poll(std::int64_t now_ns);
 
   [[nodiscard]] bool finished() const noexcept { return problem_ || next_ >= steps_.size(); }
+  [[nodiscard]] bool answered() const noexcept { return answered_ever_; }
   [[nodiscard]] const std::optional<description::SetupProblem>& problem() const noexcept { return problem_; }
   [[nodiscard]] const std::vector<Value>& values() const noexcept { return values_; }
   [[nodiscard]] std::optional<std::uint32_t> value_of(ObjectAddress object) const noexcept;  // the last one read

@@ -58,8 +58,24 @@ void throw_problems(Slots drives, const std::vector<SdoSequence>& sequences) {
     }
   }
   if (!first) return;
+  for (const DriveSlot& slot : drives) {
+    if (slot.drive->node() != first->node || slot.drive->emergencies() == 0) continue;
+    if (slot.drive->description().bus != first->bus) continue;
+    first->advice += (first->advice.empty() ? "" : "; ") + std::string("the drive also sent ") +
+                     describe(slot.drive->latest_emergency());
+  }
   if (!others.empty()) first->advice += (first->advice.empty() ? "" : "; ") + others;
   throw SetupError(*first);
+}
+
+void refuse_restart(const ServoDrive& drive, std::uint64_t boot_ups) {
+  if (drive.boot_ups() == boot_ups) return;
+  throw SetupError({.bus = drive.description().bus,
+                    .node = drive.node(),
+                    .message = "drive of " + drive.description().joint,
+                    .found = "a restart while it was configured",
+                    .expected = "a drive that stays on",
+                    .advice = "look at its supply; is another master on the bus?"});
 }
 
 DriveIdentity identity_of(const SdoSequence& sequence) {
@@ -77,10 +93,14 @@ std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const Fr
                            "drive of " + drive.description().joint, drive.configuration_steps(), drive.settings().sdo);
   }
   for (SdoSequence& sequence : sequences) sequence.start(network.now_ns());
+  std::vector<std::uint64_t> boot_ups(drives.size());  // at its first answer: one that restarts later forgets it all
   const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
     bool taken = false;
     for (std::size_t i = 0; i < sequences.size() && !taken; ++i) {
-      if (drives[i].bus == bus) taken = sequences[i].on_frame(received.frame, received.time_ns);
+      if (drives[i].bus != bus) continue;
+      const bool answered = sequences[i].answered();
+      taken = sequences[i].on_frame(received.frame, received.time_ns);
+      if (!answered && sequences[i].answered()) boot_ups[i] = drives[i].drive->boot_ups();
     }
     if (!taken) handler(bus, received);
   };
@@ -98,6 +118,7 @@ std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const Fr
     return done ? pump_done : wake_ns;
   });
   throw_problems(drives, sequences);
+  for (std::size_t i = 0; i < drives.size(); ++i) refuse_restart(*drives[i].drive, boot_ups[i]);
   std::vector<DriveIdentity> identities;
   for (const SdoSequence& sequence : sequences) identities.push_back(identity_of(sequence));
   return identities;

@@ -50,9 +50,9 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
       sdo_expect({0x1000, 0}, 4, drive.device_type, "device type",
                  "is another device set to this node, or is device_type in the cell's file not this drive's?"));
   steps.push_back(sdo_read({0x1018, 1}, 4, "vendor-ID"));
-  steps.push_back(optional(sdo_read({0x1018, 2}, 4, "product code")));
-  steps.push_back(optional(sdo_read({0x1018, 3}, 4, "revision number")));
-  steps.push_back(optional(sdo_read({0x1018, 4}, 4, "serial number")));
+  steps.push_back(if_present(sdo_read({0x1018, 2}, 4, "product code")));
+  steps.push_back(if_present(sdo_read({0x1018, 3}, 4, "revision number")));
+  steps.push_back(if_present(sdo_read({0x1018, 4}, 4, "serial number")));
   constexpr std::uint32_t csp_supported = 1U << (csp - 1);
   steps.push_back(sdo_expect({0x6502, 0}, 4, csp_supported, "supported drive modes",
                              "the drive can't do cyclic synchronous position (mode 8)", csp_supported));
@@ -85,13 +85,13 @@ void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings
       static_cast<std::uint32_t>(settings.master_node) << 16 | settings.master_heartbeat_timeout_ms;
   steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
-  steps.push_back(optional(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
+  steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
   steps.push_back(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"));
-  steps.push_back(optional(sdo_write({0x605A, 0}, 2, 2, "quick stop option code (quick-stop ramp, then disabled)")));
-  steps.push_back(optional(sdo_write({0x605B, 0}, 2, 1, "shutdown option code (slow down, then disable)")));
-  steps.push_back(optional(sdo_write({0x605C, 0}, 2, 1, "disable operation option code (slow down, then disable)")));
-  steps.push_back(optional(sdo_write({0x605D, 0}, 2, 1, "halt option code (slow down on ramp)")));
-  steps.push_back(optional(sdo_write({0x605E, 0}, 2, 2, "fault reaction option code (quick-stop ramp)")));
+  steps.push_back(if_present(sdo_write({0x605A, 0}, 2, 2, "quick stop option code (quick-stop ramp, then disabled)")));
+  steps.push_back(if_present(sdo_write({0x605B, 0}, 2, 1, "shutdown option code (slow down, then disable)")));
+  steps.push_back(if_present(sdo_write({0x605C, 0}, 2, 1, "disable operation option code (slow down, then disable)")));
+  steps.push_back(if_present(sdo_write({0x605D, 0}, 2, 1, "halt option code (slow down on ramp)")));
+  steps.push_back(if_present(sdo_write({0x605E, 0}, 2, 2, "fault reaction option code (quick-stop ramp)")));
 }
 
 }  // namespace
@@ -151,16 +151,16 @@ std::vector<SdoStep> ServoDrive::configuration_steps() const {
   steps.push_back(sdo_write({0x60C2, 1}, 1, period.units, "interpolation time period value"));
   steps.push_back(sdo_write({0x60C2, 2}, 1, as_u8(period.exponent), "interpolation time index"));
   steps.push_back(
-      optional(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
+      if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
   append_reactions(steps, settings_);
   // Ramps of the stops above, in counts/s² (the profile's default unit).
   if (const auto ramp = scale_.size_counts(description_.max_acceleration_rad_per_s2); ramp && *ramp > 0) {
-    steps.push_back(optional(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
-    steps.push_back(optional(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
+    steps.push_back(if_present(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
+    steps.push_back(if_present(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
   }
   steps.push_back(
       sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"));
-  steps.push_back(optional(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
+  steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
   steps.push_back(sdo_write({0x6060, 0}, 1, csp, "modes of operation"));
   SdoStep display = sdo_expect({0x6061, 0}, 1, csp, "modes of operation display",
                                "the drive took mode 8 (cyclic synchronous position) but didn't change to it");

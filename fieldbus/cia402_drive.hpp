@@ -105,6 +105,7 @@ class ServoDrive {
   [[nodiscard]] bool internal_limit() const noexcept { return (statusword_ & statusword::internal_limit_active) != 0; }
   [[nodiscard]] bool warning() const noexcept { return (statusword_ & statusword::warning) != 0; }
   [[nodiscard]] NmtState nmt_state() const noexcept { return heartbeat_.state(); }
+  [[nodiscard]] std::uint64_t boot_ups() const noexcept { return heartbeat_.boot_ups(); }
 
   [[nodiscard]] DriveFault fault() const noexcept { return fault_; }  // the first one, kept until clear_fault()
   [[nodiscard]] std::int64_t fault_time_ns() const noexcept { return fault_time_ns_; }

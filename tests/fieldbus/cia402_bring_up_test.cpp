@@ -219,6 +219,28 @@ TEST_F(Cia402BringUpTest, WaitsAWhileForTheModeToChangeThenSaysSo) {
   EXPECT_GE(network.time_ns - begin_ns, 500 * ms);
 }
 
+TEST_F(Cia402BringUpTest, RefusesADriveThatRestartsWhileItIsConfigured) {
+  int exchange = 0;
+  network.bus(1).on_send = [&](const CanFrame& frame) {
+    if (++exchange == 50) network.bus(1).arrive("703#00");
+    three.on_frame(frame);
+  };
+  has(refusal(), "bus axes_3, node 3: drive of axis_3: found a restart while it was configured");
+}
+
+TEST_F(Cia402BringUpTest, ABootUpMessageBeforeTheFirstAnswerIsFine) {
+  network.bus(1).arrive("703#00", 10'000);
+  EXPECT_NO_THROW(bring_up());
+}
+
+TEST_F(Cia402BringUpTest, RepeatsWhatTheDriveSaidByItself) {
+  network.bus(1).arrive("083#1032040000000000");
+  three.aborts[{0x6060, 0}] = 0x08000022;
+  has(refusal(),
+      "because of the present device state, expected to write 0x08 (8); the drive also sent EMCY 3210: DC link over "
+      "voltage (error register 04: voltage)");
+}
+
 TEST_F(Cia402BringUpTest, SaysWhenADriveDoesNotStart) {
   three.starts = false;
   try {
