@@ -227,8 +227,10 @@ double DriveDescription::counts_per_rad() const noexcept {
   return direction * counts_per_motor_revolution * gear_ratio / turn;
 }
 
-Cell load_cell(const std::filesystem::path& file) {
-  const YamlNode root = YamlNode::load(file);
+Cell load_cell(const std::filesystem::path& file) { return read_cell(YamlNode::load(file)); }
+
+Cell read_cell(const YamlNode& root) {
+  const std::filesystem::path& file = root.file();
   Cell cell;
   cell.file = std::filesystem::absolute(file).lexically_normal();
   cell.name = root.string_or("name", file.stem().string());

@@ -13,6 +13,8 @@
 
 namespace proxarm::description {
 
+class YamlNode;
+
 // A pose as files give it: metres, and roll, pitch, yaw in radians (fixed axes x, y, z: R = Rz(y) Ry(p) Rx(r), as
 // URDF).
 struct PoseDescription {
@@ -111,5 +113,7 @@ struct Cell {
 // Reads and checks a cell: all that can be checked without its URDF. The file's keys are the names of the fields above,
 // nested as the structs are; fields with a default may be left out. Throws SetupError, with file, line and key.
 Cell load_cell(const std::filesystem::path& file);
+// The same of a file that has been read already.
+Cell read_cell(const YamlNode& root);
 
 }  // namespace proxarm::description

@@ -26,8 +26,10 @@ Sine read_sine(const YamlNode& node) {
 
 }  // namespace
 
-HandDescription load_hand(const std::filesystem::path& file) {
-  const YamlNode root = YamlNode::load(file);
+HandDescription load_hand(const std::filesystem::path& file) { return read_hand(YamlNode::load(file)); }
+
+HandDescription read_hand(const YamlNode& root) {
+  const std::filesystem::path& file = root.file();
   HandDescription hand;
   hand.file = std::filesystem::absolute(file).lexically_normal();
   hand.name = root.string_or("name", file.stem().string());

@@ -13,6 +13,8 @@
 
 namespace proxarm::description {
 
+class YamlNode;
+
 struct Waypoint {
   double time_s = 0.0;               // strictly rising along the list
   std::array<double, 3> offset_m{};  // in W, from where the tool is at the start
@@ -37,5 +39,7 @@ struct HandDescription {
 
 // Throws SetupError, with file, line and key.
 HandDescription load_hand(const std::filesystem::path& file);
+// The same of a file that has been read already.
+HandDescription read_hand(const YamlNode& root);
 
 }  // namespace proxarm::description

@@ -70,8 +70,10 @@ SensorSimulation read_simulation(const YamlNode& node) {
 
 }  // namespace
 
-SensorDescription load_sensor(const std::filesystem::path& file) {
-  const YamlNode root = YamlNode::load(file);
+SensorDescription load_sensor(const std::filesystem::path& file) { return read_sensor(YamlNode::load(file)); }
+
+SensorDescription read_sensor(const YamlNode& root) {
+  const std::filesystem::path& file = root.file();
   SensorDescription sensor;
   sensor.file = std::filesystem::absolute(file).lexically_normal();
   sensor.name = root.string("name");

@@ -11,6 +11,8 @@
 
 namespace proxarm::description {
 
+class YamlNode;
+
 // The sensor as the far end of the wire. With gauges g (counts) and wrench w = (Fx, Fy, Fz in N, Tx, Ty, Tz in Nm):
 //   w = matrix · (g − bias) / (counts_per_N, …, counts_per_Nm, …)
 struct SensorSimulation {
@@ -32,5 +34,7 @@ struct SensorDescription {
 
 // Throws SetupError, with file, line and key.
 SensorDescription load_sensor(const std::filesystem::path& file);
+// The same of a file that has been read already.
+SensorDescription read_sensor(const YamlNode& root);
 
 }  // namespace proxarm::description

@@ -301,6 +301,7 @@ std::filesystem::path YamlNode::existing_file(std::string_view key) const {
   };
   if (!std::filesystem::exists(status)) throw fails("doesn't exist");
   if (std::filesystem::is_directory(status)) throw fails("is a folder");
+  if (!std::filesystem::is_regular_file(status)) throw fails("is no file to read");  // a pipe would wait for ever
   if (!std::ifstream(file).good()) throw fails("can't be read; look at its permissions");
   return file;
 }

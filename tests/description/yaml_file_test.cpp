@@ -297,8 +297,8 @@ TEST(YamlFile, FilesThatCantBeReadAreNamed) {
 }
 
 TEST(YamlFile, PathsAreRelativeToTheFile) {
-  const YamlNode root =
-      YamlNode::parse("a: ../meshes/x.stl\nb: /etc/passwd\nc: gone.stl\nd: \".\"\n", "/data/scenes/wall.yaml");
+  const YamlNode root = YamlNode::parse(
+      "a: ../meshes/x.stl\nb: /etc/passwd\nc: gone.stl\nd: \".\"\ne: /tmp\nf: /dev/zero\n", "/data/scenes/wall.yaml");
   EXPECT_EQ(root.path_of("a"), "/data/meshes/x.stl");
   EXPECT_EQ(root.path_of("b"), "/etc/passwd");
   const auto existing = [&](const char* key) -> std::string {
@@ -313,6 +313,8 @@ TEST(YamlFile, PathsAreRelativeToTheFile) {
             "/data/scenes/wall.yaml:3: c: found \"gone.stl\", expected a readable file; "
             "\"/data/scenes/gone.stl\" doesn't exist");
   EXPECT_THAT(existing("d"), HasSubstr("doesn't exist"));
+  EXPECT_THAT(existing("e"), HasSubstr("is a folder"));
+  EXPECT_THAT(existing("f"), HasSubstr("is no file to read"));
 }
 
 TEST(YamlFile, WhatStrangersWriteDoesntReachTheTerminalAsItIs) {
