@@ -21,11 +21,11 @@ using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 using RowMatX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // Mechanical end stops sit this far past the URDF's limits (software limits come first): 3 degrees.
-constexpr double kEndStopMargin_rad = 0.05;
+constexpr double end_stop_margin_rad = 0.05;
 // A gear given as rigid (stiffness 0) is as stiff as the step allows: 200 Hz against its own link's inertia.
-constexpr double kRigidGear_rad_per_s = 2.0 * M_PI * 200.0;
+constexpr double rigid_gear_rad_per_s = 2.0 * M_PI * 200.0;
 // Symplectic Euler is unstable from ωh = 2 on; damping and rotors bring that down a little.
-constexpr double kLargestPhaseStep = 1.5;
+constexpr double largest_phase_step = 1.5;
 
 Mat3 inertia_matrix(const std::array<double, 6>& i) {
   Mat3 m;
@@ -90,8 +90,8 @@ ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, dou
     axis.half_backlash_rad = 0.5 * drive.simulation.backlash_rad;
     axes_.push_back(axis);
     const bool limited = m.jnt_limited[joint] != 0;
-    l.lower_stop.push_back(limited ? m.jnt_range[2 * joint] - kEndStopMargin_rad : -mjMAXVAL);
-    l.upper_stop.push_back(limited ? m.jnt_range[2 * joint + 1] + kEndStopMargin_rad : mjMAXVAL);
+    l.lower_stop.push_back(limited ? m.jnt_range[2 * joint] - end_stop_margin_rad : -mjMAXVAL);
+    l.upper_stop.push_back(limited ? m.jnt_range[2 * joint + 1] + end_stop_margin_rad : mjMAXVAL);
   }
   if (m.nv != static_cast<int>(axes_.size())) {
     throw SetupError(
@@ -112,8 +112,8 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
     Axis& axis = axes_[i];
     if (!(axis.stiffness_Nm_per_rad > 0.0)) {
       const double inertia = l.data->qM[l.model->dof_Madr[axis.dof]];  // the diagonal of M comes first in its row
-      axis.stiffness_Nm_per_rad = inertia * kRigidGear_rad_per_s * kRigidGear_rad_per_s;
-      axis.damping_Nms_per_rad = 0.1 * inertia * kRigidGear_rad_per_s;
+      axis.stiffness_Nm_per_rad = inertia * rigid_gear_rad_per_s * rigid_gear_rad_per_s;
+      axis.damping_Nms_per_rad = 0.1 * inertia * rigid_gear_rad_per_s;
     }
     const double torque = static_torque_Nm(i);
     const double flank = torque == 0.0 ? 0.0 : std::copysign(axis.half_backlash_rad, torque);
@@ -124,12 +124,12 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
     axis.jammed = false;
   }
   const double highest = 2.0 * M_PI * locked_modes_Hz().back();
-  if (!(highest * step_s_ < kLargestPhaseStep)) {
+  if (!(highest * step_s_ < largest_phase_step)) {
     throw SetupError(
         {.key = "gear_stiffness_Nm_per_rad",
          .message = "the arm's highest mode is too fast for the simulation's step",
          .found = description::number_text(highest / (2.0 * M_PI)) + " Hz",
-         .expected = "at most " + description::number_text(kLargestPhaseStep / (2.0 * M_PI * step_s_)) + " Hz",
+         .expected = "at most " + description::number_text(largest_phase_step / (2.0 * M_PI * step_s_)) + " Hz",
          .advice = "raise servo_rate_Hz, or lower the stiffness"});
   }
   std::vector<double> torque(axes_.size());

@@ -16,8 +16,8 @@ namespace {
 using description::Cell;
 using description::SetupError;
 
-constexpr const char* kHandle = "proxarm_handle";
-constexpr const char* kHand = "proxarm_hand";
+constexpr const char* handle_link = "proxarm_handle";
+constexpr const char* hand_link = "proxarm_hand";
 
 std::string numbers(const double* values, std::size_t count) {
   std::string text;
@@ -102,13 +102,14 @@ void add_payloads(const Cell& cell, double hand_mass_kg, tinyxml2::XMLElement& r
   const auto& tool = cell.tool;
   if (tool.mass_kg > 0.0) {
     const bool point = tool.inertia_kg_m2 == std::array<double, 6>{};
-    add_payload(robot, {kHandle, cell.sensor.link, cell.sensor.pose_link, tool.mass_kg, tool.centre_of_mass_S_m,
+    add_payload(robot, {handle_link, cell.sensor.link, cell.sensor.pose_link, tool.mass_kg, tool.centre_of_mass_S_m,
                         point ? point_inertia(tool.mass_kg) : tool.inertia_kg_m2});
   }
   if (hand_mass_kg > 0.0) {
     const models::Vec3 p = (to_pose(cell.sensor.pose_link) * to_pose(tool.handle_S)).translation();
-    add_payload(robot,
-                {kHand, cell.sensor.link, {{p.x(), p.y(), p.z()}, {}}, hand_mass_kg, {}, point_inertia(hand_mass_kg)});
+    add_payload(
+        robot,
+        {hand_link, cell.sensor.link, {{p.x(), p.y(), p.z()}, {}}, hand_mass_kg, {}, point_inertia(hand_mass_kg)});
   }
 }
 
