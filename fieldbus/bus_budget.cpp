@@ -13,8 +13,6 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::int64_t ns_per_s = 1'000'000'000;
-
 // Decimal with at most `digits` places, no trailing zeros.
 std::string number(double value, int digits) {
   char text[64];
