@@ -31,7 +31,8 @@ class Changed {
  public:
   explicit Changed(const std::string& original) : text_(read(source_dir / original)) {
     file_ = std::filesystem::path(testing::TempDir()) / ("proxarm_changed_" + std::to_string(getpid()) + ".yaml");
-    replace("../", (source_dir / "models").string() + "/", false);
+    replace("../../../", source_dir.string() + "/", false);
+    replace("../../", (source_dir / "tests").string() + "/", false);
   }
   ~Changed() { std::filesystem::remove(file_); }
   Changed(const Changed&) = delete;
@@ -63,6 +64,7 @@ class Changed {
     return "no error";
   }
   [[nodiscard]] int line_of(const std::string& words) const {
+    if (text_.find(words) == std::string::npos) return -1;
     return static_cast<int>(std::count(text_.begin(), text_.begin() + static_cast<long>(text_.find(words)), '\n')) + 1;
   }
 
@@ -72,6 +74,7 @@ class Changed {
 };
 
 constexpr const char* default_cell = "models/cells/default.yaml";
+constexpr const char* fixed_cell = "tests/description/data/default.yaml";
 constexpr const char* default_sensor = "models/sensors/ati_net_can_oem.yaml";
 
 TEST(Cell, TheDefaultOneLoads) {
@@ -107,7 +110,7 @@ struct Mistake {
 class CellMistakes : public testing::TestWithParam<Mistake> {};
 
 TEST_P(CellMistakes, AreTold) {
-  Changed cell(default_cell);
+  Changed cell(fixed_cell);
   cell.replace(GetParam().from, GetParam().to);
   EXPECT_THAT(cell.told(load_cell), HasSubstr(GetParam().told));
 }
@@ -116,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(
     All, CellMistakes,
     testing::Values(
         Mistake{"urdf: ", "urfd: ", "urdf: found nothing, expected a file's path; is \"urfd\" below meant to be it?"},
-        Mistake{"arms/arm150.urdf", "arms/arm15.urdf", "urdf: found"},
+        Mistake{"data/arm150.urdf", "data/arm15.urdf", "urdf: found"},
         Mistake{"node: 2", "node: 1",
                 "drives[1].node: found 1, expected a node that is free on bus axes_1_3; joint \"axis_1\" "
                 "has it already"},
@@ -177,7 +180,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "buses: found nothing, expected a list of 1 to 16 entries; is \"busses\" below meant"}));
 
 TEST(Cell, LinesAreThoseOfTheFile) {
-  Changed cell(default_cell);
+  Changed cell(fixed_cell);
   cell.replace("gear_stiffness_Nm_per_rad: 310000", "gear_stiffness_Nm_per_rad: -310000");
   EXPECT_THAT(cell.told(load_cell), HasSubstr(".yaml:" + std::to_string(cell.line_of("rad: -310000")) +
                                               ": drives[1].gear_stiffness_Nm_per_rad"));
@@ -186,14 +189,14 @@ TEST(Cell, LinesAreThoseOfTheFile) {
 TEST(Cell, InertiasOnTheEdgeOfThePhysicalAreTaken) {
   for (const char* inertia :
        {"[0, 0, 0, 0, 0, 0]", "[1, 1, 2, 0, 0, 0]", "[1, 1, 2.00001, 0, 0, 0]", "[2, 2, 2, 0.5, 0.5, 0.5]"}) {
-    Changed cell(default_cell);
+    Changed cell(fixed_cell);
     cell.replace("[3.25e-4, 3.25e-4, 5.0e-5, 0, 0, 0]", inertia);
     EXPECT_EQ(cell.told(load_cell), "no error") << inertia;
   }
 }
 
 TEST(Cell, DefaultsMayBeLeftOut) {
-  Changed cell(default_cell);
+  Changed cell(fixed_cell);
   for (const char* line : {"default_period_s: 0.001\n", "default_mass_kg: 4\n", "profile: cia402\n", "mode: csp\n"}) {
     cell.replace(line, "\n");
   }
@@ -297,7 +300,7 @@ TEST(DamagedFiles, NeverDoMoreThanFail) {
   const auto below = [&](std::size_t n) { return std::uniform_int_distribution<std::size_t>(0, n - 1)(engine); };
   const char* scale_text = std::getenv("PROXARM_TEST_SCALE");
   const double scale = scale_text != nullptr ? std::atof(scale_text) : 1.0;
-  const std::array<std::string, 3> originals{default_cell, default_sensor, "sim/hands/touch.yaml"};
+  const std::array<std::string, 3> originals{fixed_cell, default_sensor, "sim/hands/touch.yaml"};
   const std::string salad = "[]{}:,-#&*!|>'\"%@`? \n\t~<0123456789.eE+\\\x00\x80\xff";
   for (int n = 0; n < 1500 * scale; ++n) {
     const std::size_t kind = below(3);

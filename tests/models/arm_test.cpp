@@ -339,6 +339,8 @@ TEST(Arm, DrivesMayBeListedInAnyOrder) {
 
 // ---- mistakes -------------------------------------------------------------------------------------------------------
 
+Cell fixed_cell() { return description::load_cell(source_dir / "tests/description/data/default.yaml"); }
+
 std::string message(const Cell& cell) {
   try {
     const Arm arm(cell);
@@ -354,9 +356,9 @@ std::string read(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// The default cell with its URDF changed in one place.
+// The fixed cell with its URDF changed in one place.
 Cell with_urdf(const std::string& from, const std::string& to) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   std::string text = read(cell.urdf);
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
@@ -368,7 +370,7 @@ Cell with_urdf(const std::string& from, const std::string& to) {
 }
 
 TEST(ArmMistakes, AMissingJointIsNamedWithThoseThatExist) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   cell.drives[2].joint = "axis3";
   const std::string text = message(cell);
   EXPECT_THAT(text, HasSubstr("default.yaml:"));
@@ -384,14 +386,14 @@ TEST(ArmMistakes, AJointThatSlidesIsRefused) {
 }
 
 TEST(ArmMistakes, AJointWithoutADriveIsRefused) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   cell.drives.pop_back();
   cell.start_rad.pop_back();
   EXPECT_THAT(message(cell), HasSubstr("revolute joint \"axis_6\" has no drive in default.yaml; add a drive"));
 }
 
 TEST(ArmMistakes, AJointBeyondTheSensorIsRefused) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   cell.sensor.link = "link_5";
   EXPECT_THAT(message(cell),
               HasSubstr("drives[5].joint: found \"axis_6\", expected a joint between the URDF's root and "
@@ -399,7 +401,7 @@ TEST(ArmMistakes, AJointBeyondTheSensorIsRefused) {
 }
 
 TEST(ArmMistakes, AnUnknownSensorLinkIsNamed) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   cell.sensor.link = "flang";
   EXPECT_THAT(message(cell),
               testing::AllOf(HasSubstr("sensor.link: found \"flang\""), HasSubstr("did you mean \"flange\"?")));
@@ -411,7 +413,7 @@ TEST(ArmMistakes, MimicIsRefused) {
 }
 
 TEST(ArmMistakes, ARangeBeyondTheUrdfsIsRefused) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   cell.drives[0].range_rad[1] = 3.0;
   EXPECT_THAT(message(cell),
               HasSubstr("drives[0].range_rad: found [-2.9, 3], expected a range within the URDF's limits of "
@@ -429,7 +431,7 @@ TEST(ArmMistakes, ALinkThatIsNotThereIsNamed) {
 }
 
 TEST(ArmMistakes, FilesThatAreNoUrdfAreRefused) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   cell.urdf = "/nonexistent/arm.urdf";
   EXPECT_THAT(message(cell), HasSubstr("/nonexistent/arm.urdf: no such file"));
   cell.urdf = source_dir;
@@ -439,7 +441,7 @@ TEST(ArmMistakes, FilesThatAreNoUrdfAreRefused) {
 }
 
 TEST(ArmMistakes, TruncatedUrdfsNeverCrash) {
-  Cell cell = default_cell();
+  Cell cell = fixed_cell();
   const std::string text = read(cell.urdf);
   cell.urdf = std::filesystem::path(testing::TempDir()) / "proxarm_truncated.urdf";
   Random random(108);

@@ -392,8 +392,12 @@ TEST_F(InverseKinematicsTest, TimingOfACycle) {
       "kinematics and Jacobian %.0f ns, inverse %.0f ns (%d steps), in a singularity %.0f ns, gravity %.0f ns, "
       "link from motor %.0f ns\n",
       forward, inverse, result.iterations, damped, gravity, deflection);
-  EXPECT_LT(forward, 1e4);
-  EXPECT_LT(inverse, 4e4);
+#ifdef __OPTIMIZE__
+  if (tests::allocations_are_counted()) {  // no sanitizer
+    EXPECT_LT(forward, 1e4);
+    EXPECT_LT(inverse, 4e4);
+  }
+#endif
 }
 
 }  // namespace
