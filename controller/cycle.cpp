@@ -279,6 +279,7 @@ void Cycle::render() noexcept {
   record_.contact_force_W_N = triple(step.f_W);
   record_.normal_W = triple(step.normal_W);
   record_.contact_object = step.object;
+  record_.contact_count = static_cast<std::uint8_t>(step.contacts);
   record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
   record_.set(RecordFlag::limit_orientation, parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy();

@@ -44,6 +44,7 @@ struct CycleRecord {
   std::int64_t time_ns = 0;  // t_k, as scheduled, from the first cycle of the session
   Phase phase = Phase::idle;
   ContactPhase contact = ContactPhase::free;
+  std::uint8_t contact_count = 0;  // how many things press at once
   std::uint8_t axes = 0;
   std::uint32_t flags = 0;  // RecordFlag
 

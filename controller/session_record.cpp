@@ -121,7 +121,7 @@ std::string signals_header(const std::vector<std::string>& axis_names, bool with
   triple_columns("proxy_W", "m");
   triple_columns("contact_force_W", "N");
   triple_columns("normal_W", "1");
-  header += ",contact_object,friction_1";
+  header += ",contacts,contact_object,friction_1";
   triple_columns("tool_W", "m");
   header += ",proxy_clearance_m,tool_clearance_m";
   for (const char* what : {"_target_counts", "_actual_counts"}) {
@@ -148,6 +148,8 @@ void append_signals(std::string& row, const CycleRecord& r, std::size_t axes, bo
                                &r.contact_force_W_N, &r.normal_W}) {
     append_triple(row, *values);
   }
+  row += ',';
+  append_number(row, static_cast<int>(r.contact_count));
   row += ',';
   append_number(row, r.contact_object);
   row += ',';

@@ -13,6 +13,7 @@ namespace {
 using models::Vec3;
 
 constexpr double shortest_slide_s = 0.1, shortest_slide_m = 1e-3;
+constexpr double free_force_N = 1e-3;  // far above rounding (κ times an ulp of q), far below what a hand feels
 
 // Durations up to 1 ms in bins of 10 ns, so that a median over hours needs no more memory than one over seconds.
 class Durations {
@@ -79,7 +80,6 @@ struct SummaryBuilder::State {
   void penetrate(const CycleRecord& record);
   void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
   void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
-  void end_slide();
 
   SummaryConfig config;
   Summary summary;
@@ -87,9 +87,9 @@ struct SummaryBuilder::State {
   Durations durations;
   Spread tracking, contact_force;
   ApparentMass apparent;
-  Slide current_slide;
-  std::optional<double> worst_slide;
+  Slide sliding;
   double contact_s = 0.0;          // how long the contact has lasted
+  std::optional<Vec3> start;       // x₀ of the spring
   std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
 };
 
@@ -105,10 +105,10 @@ void SummaryBuilder::add(const CycleRecord& record) {
   if (record.phase != Phase::rendering || !follows) {
     s.recent.clear();
     s.apparent.end_segment();
-    s.end_slide();
     s.contact_s = 0.0;
   }
   if (record.phase != Phase::rendering) return;
+  if (!s.start) s.start = vec3(record.proxy_W_m);
   s.summary.rendered_time_s += s.config.period_s;
   s.recent.push_back(record);
   s.penetrate(record);
@@ -140,8 +140,9 @@ void SummaryBuilder::State::penetrate(const CycleRecord& record) {
     contact_s += config.period_s;
     summary.contact_time_s += config.period_s;
     if (record.contact == ContactPhase::slip) summary.sliding_time_s += config.period_s;
-    summary.pulling_force_max_N =
-        std::max(summary.pulling_force_max_N, -vec3(record.normal_W).dot(vec3(record.contact_force_W_N)));
+    const double pull = -vec3(record.normal_W).dot(vec3(record.contact_force_W_N));
+    // Of several contacts only the sum of their forces is known.
+    if (record.contact_count <= 1) summary.pulling_force_max_N = std::max(summary.pulling_force_max_N, pull);
   }
   summary.penetration_max_m = std::max(summary.penetration_max_m, -record.proxy_clearance_m);
   const double depth = -record.tool_clearance_m;
@@ -170,18 +171,16 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   const Vec3 a = (tool(after) - 2.0 * x + tool(before)) / (T * T);
   const Vec3 hand = truth ? vec3(now.hand_force_W_N) : Vec3(vec3(now.force_W_N) + m * a);
 
+  const Vec3 spring = config.spring_N_per_m * (x - *start);
   if (now.contact == ContactPhase::free) {
-    apparent.add(hand, x);
-    end_slide();
-    return;
+    // A world without contacts may act all the same: a field of friction, a soft layer.
+    if (vec3(now.contact_force_W_N).norm() < free_force_N) return apparent.add(hand - spring, x);
   }
   apparent.end_segment();
+  if (now.contact == ContactPhase::free) return;
   // `contact_s` is that of `after`: one period more than that of `now`, unless the contact ends there.
   const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
-  if (!established) {
-    end_slide();
-    return;
-  }
+  if (!established) return;
   // (24): M_p ∇²q(k)/T² + B ∇q(k)/T = h(k) + f(k), with the differences that end at q(k).
   const std::size_t i = recent.size() - 2;
   const Vec3 q = vec3(now.proxy_W_m), q1 = vec3(before.proxy_W_m);
@@ -189,40 +188,28 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   const Vec3 n = vec3(now.normal_W);
   if (i >= 2) {
     const Vec3 a_q = (q - 2.0 * q1 + q2) / (T * T), v_q = (q - q1) / T;
-    const double push = -n.dot(hand - m * a - (M - m) * a_q - B * v_q);
+    const Vec3 pull_back = config.spring_N_per_m * (q - *start);
+    const double push = -n.dot(hand - m * a - (M - m) * a_q - B * v_q - pull_back);
     contact_force.add(n.dot(vec3(now.contact_force_W_N)) - push);
   }
-  slide(before, now, hand - M * a - B * v);
+  if (contact_s - T > config.settle_s) slide(before, now, hand - M * a - B * v - spring);
 }
 
 void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance) {
-  if (now.contact != ContactPhase::slip || !(now.friction > 0.0)) {
-    end_slide();
-    return;
-  }
+  if (now.contact != ContactPhase::slip || !(now.friction > 0.0) || now.contact_count > 1) return;
   const Vec3 n = vec3(now.normal_W);
   const Vec3 step = vec3(now.proxy_W_m) - vec3(before.proxy_W_m);
   const Vec3 along = step - n.dot(step) * n;
   if (!(along.norm() > 0.0)) return;
-  current_slide.tangential += resistance.dot(along.normalized());
-  current_slide.limit += -now.friction * n.dot(resistance);
-  current_slide.length_s += config.period_s;
-  current_slide.travel_m += along.norm();
-}
-
-void SummaryBuilder::State::end_slide() {
-  if (current_slide.length_s >= shortest_slide_s && current_slide.travel_m >= shortest_slide_m &&
-      current_slide.limit > 0.0) {
-    const double error = current_slide.tangential / current_slide.limit - 1.0;
-    if (!worst_slide || std::abs(error) > std::abs(*worst_slide)) worst_slide = error;
-  }
-  current_slide = {};
+  sliding.tangential += resistance.dot(along.normalized());
+  sliding.limit += -now.friction * n.dot(resistance);
+  sliding.length_s += config.period_s;
+  sliding.travel_m += along.norm();
 }
 
 Summary SummaryBuilder::finish() {
   State& s = *state_;
   s.apparent.end_segment();
-  s.end_slide();
   Summary summary = s.summary;
   summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
   summary.tracking_rms_m = s.tracking.rms();
@@ -233,7 +220,9 @@ Summary SummaryBuilder::finish() {
   }
   summary.contact_force_error_N = s.contact_force.rms();
   summary.contact_force_error_max_N = s.contact_force.largest();
-  summary.friction_ratio_error = s.worst_slide;
+  if (s.sliding.length_s >= shortest_slide_s && s.sliding.travel_m >= shortest_slide_m && s.sliding.limit > 0.0) {
+    summary.friction_ratio_error = s.sliding.tangential / s.sliding.limit - 1.0;
+  }
   summary.setpoint_sha256 = s.hash.hex();
   summary.felt_mass_kg = s.config.felt_mass_kg;
   return summary;

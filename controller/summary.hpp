@@ -7,22 +7,24 @@
 // "Hand's force" F_h and "tool" x are the simulation's truth where the records hold it; else F_h is the measured force,
 // compensated, plus the handle's inertia (which the sensor doesn't see: it sits before the handle), and x comes from
 // the encoders. `source` says which. a, v: central differences of x. n: contact normal of the record; f: (25a). m, M_p,
-// M: mass of the handle, of the proxy, and their sum, which is what the hand feels.
+// M: mass of the handle, of the proxy, and their sum, which is what the hand feels. A virtual spring's force K_v (x −
+// x₀) is taken off F_h beforehand.
 //
 //   penetration_max_m       max(0, −signed distance of the proxy)
 //   tool_penetration_max_m  the same of the tool; …_touch_… within the first touch_s of a contact, …_sliding_… after
 //                           that while the proxy slips
 //   tracking_rms_m, _max_m  ‖x(t_k) − q(k − delay)‖, delay = 2 cycles: a target sent in cycle k is latched at SYNC k+1
 //                           and, interpolated, reached at k+2
-//   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion (apparent_mass.hpp);
+//   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while the world's force on
+//                           the proxy is below 1 mN (apparent_mass.hpp);
 //                           apparent_damping_Ns_per_m is its Im
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
 //                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
-//   friction_ratio_error    t·R / (−μ n·R) − 1 with R = F_h − M a − B v, t the direction of the slide: summed over a
-//                           slide (established contact, slipping, at least 0.1 s and 1 mm), the slide with the largest
-//                           error
-//   pulling_force_max_N     max(0, −n·f) over all cycles in contact
+//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − M a − B v, t the direction of the slide: over all
+//                           cycles that slip on one thing, from settle_s after the contact began (before, the arm
+//                           still rings from the touch, and M a is not of the slide); at least 0.1 s and 1 mm of it
+//   pulling_force_max_N     max(0, −n·f) over all cycles in contact with one thing
 //   setpoint_sha256         all target counts of all cycles (setpoint_hash.hpp), whatever the phase
 #pragma once
 
@@ -43,8 +45,10 @@ struct SummaryConfig {
   double felt_mass_kg = 4.0;      // M: proxy and handle
   double handle_mass_kg = 0.0;    // m: what moves after the sensor
   double damping_Ns_per_m = 0.0;  // B
+  double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
   int setpoint_delay_cycles = 2;
-  double touch_s = 0.1;  // how long a contact counts as a touch
+  double touch_s = 0.1;   // how long a contact counts as a touch
+  double settle_s = 0.5;  // how long the arm may ring from it
 };
 
 struct FaultSummary {

@@ -14,6 +14,7 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   config.felt_mass_kg = session.settings.mass_kg;
   config.handle_mass_kg = session.cell.tool.mass_kg;
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
+  config.spring_N_per_m = session.settings.spring_N_per_m;
   return config;
 }
 

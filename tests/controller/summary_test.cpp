@@ -22,6 +22,8 @@ struct Session {
   double force_error_N = 0.0;   // of the contact force
   double lag_m = 0.0;           // of the tool, along y
   double tool_depth_m = 0.0;    // while in contact
+  double spring = 0.0;          // K_v
+  double field_N = 0.0;         // of a field of friction, in which nothing is touched
   bool truth = true;
 
   static double x(double t) { return 0.05 * std::sin(2 * std::numbers::pi * 0.7 * t); }
@@ -31,7 +33,7 @@ struct Session {
     return -0.05 * w * w * std::sin(w * t);
   }
 
-  // Free for 4 s, then in contact for 0.3 s (a slide in one direction: 4.0 to 4.3 s is within the sine's rising part).
+  // Free for 4 s, then in contact for 0.63 s (the sine turns at 4.643 s), of which 0.13 s count for friction.
   CycleRecord record(std::uint64_t k) const {
     const double t = static_cast<double>(k) * T;
     CycleRecord r;
@@ -42,14 +44,15 @@ struct Session {
     r.compute_ns = 1000 + static_cast<std::int64_t>(k % 100) * 10;
     r.target_counts.fill(static_cast<std::int32_t>(k));
     r.set(RecordFlag::truth, truth);
-    const bool contact = t > 4.0 && t < 4.3;
+    const bool contact = t > 4.0 && t < 4.63;
     r.true_tool_W_m = {x(t), lag_m, contact ? -tool_depth_m : 0.01};
     r.tool_W_m = r.true_tool_W_m;
     r.proxy_W_m = {x(t + 2 * T), 0.0, contact ? 0.0 : 0.01};
-    const double inertial = mass_kg * ax(t) + damping * vx(t);
+    const double inertial = mass_kg * ax(t) + damping * vx(t) + spring * x(t) + (vx(t) > 0 ? field_N : -field_N);
     const double normal = contact ? 5.0 : 0.0;
     const double slide = contact ? friction * normal * (1 + friction_error) * (vx(t) > 0 ? 1.0 : -1.0) : 0.0;
-    r.hand_force_W_N = {inertial + slide, 0.0, -normal};
+    r.hand_force_W_N = {inertial + slide, 0.0, -normal + (contact ? -0.01 * spring : 0.0)};
+    r.contact_force_W_N = {vx(t) > 0 ? -field_N : field_N, 0.0, 0.0};
     r.force_W_N = {inertial + slide - handle_kg * ax(t), 0.0, -normal};
     r.proxy_clearance_m = contact ? 0.0 : 0.01;
     r.tool_clearance_m = contact ? -tool_depth_m : 0.01;
@@ -63,8 +66,11 @@ struct Session {
   }
 
   Summary run(std::uint64_t cycles = 5000) const {
-    SummaryBuilder builder(
-        {.period_s = T, .felt_mass_kg = mass_kg, .handle_mass_kg = handle_kg, .damping_Ns_per_m = damping});
+    SummaryBuilder builder({.period_s = T,
+                            .felt_mass_kg = mass_kg,
+                            .handle_mass_kg = handle_kg,
+                            .damping_Ns_per_m = damping,
+                            .spring_N_per_m = spring});
     for (std::uint64_t k = 0; k < cycles; ++k) builder.add(record(k));
     return builder.finish();
   }
@@ -91,7 +97,7 @@ TEST(Summary, OfAPerfectSessionHasNoErrors) {
     EXPECT_EQ(s.penetration_max_m, 0.0);
     EXPECT_EQ(s.tool_penetration_max_m, 0.0);
     EXPECT_EQ(s.contacts, 1u);
-    EXPECT_NEAR(s.contact_time_s, 0.3, 2e-3);
+    EXPECT_NEAR(s.contact_time_s, 0.63, 2e-3);
     EXPECT_EQ(s.sliding_time_s, s.contact_time_s);
     EXPECT_TRUE(s.faults.empty());
   }
@@ -121,6 +127,35 @@ TEST(Summary, FindsWhatIsWrong) {
   Session pulling;
   pulling.force_error_N = -7.0;
   EXPECT_NEAR(pulling.run().pulling_force_max_N, 2.0, 1e-12);
+}
+
+TEST(Summary, TakesTheSpringOff) {
+  Session session;
+  session.spring = 300.0;
+  const Summary s = session.run();
+  EXPECT_NEAR(*s.apparent_mass_kg, 4.0, 4e-3);
+  // The spring pulls to the proxy's first position, 0.44 mm from x = 0: 0.13 N of the 1.5 N of friction.
+  EXPECT_NEAR(*s.friction_ratio_error, 0.0, 0.1);
+}
+
+TEST(Summary, TakesNoMassInAFieldOfFriction) {
+  Session session;
+  session.field_N = 2.0;
+  EXPECT_FALSE(session.run(4000).apparent_mass_kg);
+}
+
+TEST(Summary, LeavesFrictionAndPullOutWhereTwoThingsPress) {
+  SummaryBuilder builder({});
+  Session session;
+  session.force_error_N = -7.0;
+  for (std::uint64_t k = 0; k < 5000; ++k) {
+    CycleRecord r = session.record(k);
+    if (r.contact != ContactPhase::free) r.contact_count = 2;
+    builder.add(r);
+  }
+  const Summary s = builder.finish();
+  EXPECT_FALSE(s.friction_ratio_error);
+  EXPECT_EQ(s.pulling_force_max_N, 0.0);
 }
 
 TEST(Summary, SeesDeepestPenetrationOfTheProxy) {
