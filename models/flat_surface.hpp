@@ -31,6 +31,15 @@ class FlatSurface {
     if (!point_m.allFinite()) throw std::invalid_argument("a surface needs a finite point");
   }
 
+  // The same from a normal that is of length one already; both finite. For tangent planes, within a step.
+  static FlatSurface of_unit(const Vec<N>& point_m, const Vec<N>& unit_normal) noexcept {
+    FlatSurface surface;
+    surface.point_ = point_m;
+    surface.normal_ = unit_normal;
+    surface.point_size_ = point_m.template lpNorm<1>();
+    return surface;
+  }
+
   [[nodiscard]] const Vec<N>& point() const noexcept { return point_; }
   [[nodiscard]] const Vec<N>& normal() const noexcept { return normal_; }
 
@@ -54,6 +63,8 @@ class FlatSurface {
   [[nodiscard]] bool holds(const Vec<N>& x) const noexcept { return std::abs(height(x)) <= rounding(x); }
 
  private:
+  FlatSurface() = default;
+
   Vec<N> point_;
   Vec<N> normal_;
   double point_size_;  // ‖point‖₁

@@ -1,5 +1,7 @@
 #include "models/groove.hpp"
 
+#include <limits>
+
 namespace proxarm::models {
 namespace {
 
@@ -35,14 +37,37 @@ struct CrossSection {
     return out;
   }
 
+  // Where the slide ends if w is nothing beside it.
+  [[nodiscard]] double guess() const noexcept {
+    const double f_2 = F_t / sin, f_1 = F_n - cos * f_2;
+    return s_p - std::copysign(mu[0] * f_1 + mu[1] * f_2, s_p - s_q[0]);
+  }
+
   // g of a root is its slope times a unit in the last place of s; beside a pole it is anything but small.
   [[nodiscard]] bool is_root(double s, const Shares& shares) const noexcept {
-    return std::abs(shares.g) <= 1e-9 * (std::abs(F_n) + std::abs(F_t) + std::abs(s - s_p));
+    constexpr double eps = std::numeric_limits<double>::epsilon();
+    return std::abs(shares.g) <=
+           1e-9 * (std::abs(F_n) + std::abs(F_t) + std::abs(s - s_p)) + 16.0 * eps * (std::abs(s) + std::abs(s_p));
   }
 };
 
-// The root of g between lo and hi, where g(lo) ≤ 0 ≤ g(hi): false position (Illinois), halving where that is slow.
+// The root of g between lo and hi, where g(lo) ≤ 0 ≤ g(hi). Mostly q is in the line but for the surfaces' curvature,
+// and g nearly linear from the slide that the closed form would give: a few secant steps. Else false position
+// (Illinois), halving where that is slow.
 double root(const CrossSection& c, double lo, double hi) noexcept {
+  double at = std::clamp(c.guess(), lo, hi), g_at = c.at(at).g, next = std::clamp(at - g_at, lo, hi);
+  for (int k = 0; k < 8 && next != at; ++k) {
+    const double g_next = c.at(next).g;
+    if (g_next == 0.0) return next;
+    const double step = (next - at) * g_next / (g_at - g_next);
+    if (!(std::abs(g_next) < std::abs(g_at))) break;
+    at = next;
+    g_at = g_next;
+    next = at + step;
+    if (!(next >= lo && next <= hi)) break;
+    if (next == at) return at;
+  }
+
   double g_lo = c.at(lo).g, g_hi = c.at(hi).g;
   if (!(g_lo < 0.0)) return lo;
   if (!(g_hi > 0.0)) return hi;
@@ -71,7 +96,8 @@ double root(const CrossSection& c, double lo, double hi) noexcept {
 }  // namespace
 
 GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurface<3>& b, double mu_b,
-                            const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b) noexcept {
+                            const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b,
+                            bool may_pull) noexcept {
   GrooveSolution out;
   if (!line.exists) return out;
   const Vec3 d_p = p - line.x0, d_1 = q_a - line.x0, d_2 = q_b - line.x0;
@@ -82,7 +108,7 @@ GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurf
   const double w_rounding = rounding / line.sin;  // what w may be for a proxy that is in the line
   const bool in_line_1 = std::abs(w_1) <= w_rounding, in_line_2 = std::abs(w_2) <= w_rounding;
   // The normal forces (over K) may miss zero by the rounding of p: such a contact touches.
-  const double least = -w_rounding;
+  const double least = may_pull ? -std::numeric_limits<double>::infinity() : -w_rounding;
   const auto place = [&](double s) { return line.settle(a, b, line.settle(a, b, line.x0 + s * line.e)); };
 
   if (in_line_1 && in_line_2 && s_1 == s_2) {
@@ -100,6 +126,14 @@ GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurf
     return out;
   }
 
+  if (may_pull) {
+    const double f_2 = F_t / line.sin, f_1 = F_n - line.cos * f_2;
+    if (f_1 < 0.0 || f_2 < 0.0) {  // friction of a contact that pulls would lead nowhere
+      out.found = true;
+      out.r = place(s_p);
+      return out;
+    }
+  }
   const CrossSection c{line.cos, line.sin,     F_n,        F_t,
                        s_p,      {mu_a, mu_b}, {s_1, s_2}, {in_line_1 ? 0.0 : w_1, in_line_2 ? 0.0 : w_2}};
   double lo = std::min({s_p, s_1, s_2}), hi = std::max({s_p, s_1, s_2});
@@ -129,7 +163,7 @@ GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurf
   }
   const double s = root(c, lo, hi);
   const CrossSection::Shares shares = c.at(s);
-  if (c.is_root(s, shares)) {
+  if (c.is_root(s, shares) || may_pull) {
     accept(s, shares, true, true);
   } else {
     // Where p is far deeper than q was away, friction on arrival can outweigh the faces' own directions, and g jumps

@@ -63,7 +63,9 @@ struct GrooveSolution {
 
 // The proxy held by both faces; not found if one of them would have to pull. q_a and q_b are the previous proxy as
 // each surface sees it: the same point unless the surfaces move.
+// may_pull: found even then, for the tangent planes of curved surfaces on the way to where they settle.
 GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurface<3>& b, double mu_b,
-                            const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b) noexcept;
+                            const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b,
+                            bool may_pull = false) noexcept;
 
 }  // namespace proxarm::models

@@ -35,6 +35,9 @@ struct ContractOptions {
   double inside_tolerance_m = 1e-12;               // relative to a 1 m scene
   // μ of each contact by object index; a single entry stands for all. Empty: reported contacts aren't checked.
   std::vector<double> friction{};
+  bool near_surface = false;            // q is brought to a surface, and p starts from there
+  double reach_m = 1e300;               // κ is drawn so that ‖f‖/κ stays below this
+  bool soft = false;                    // a layer: a proxy in it doesn't rest without a force
   bool forces_without_contact = false;  // a field or a layer acts on a proxy that touches nothing
   // Where Coulomb's law has several solutions (two faces that can jam, a proxy that flies far into a groove), the one
   // that is found may change with κ. A failure of Assumption 1 is counted apart, not hidden, if both results satisfy
@@ -100,6 +103,12 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
     // A proxy is where the world let it go: half of them have slid there, half were resting where they are.
     Vec<N> q = g(K, start, options.centre + random.in_box<N>(options.size_m));
     if (random.chance(0.5)) q = g(K, start, start);
+    if (options.near_surface) {
+      // Flown at the origin of the states and back, half of them slid a little further.
+      q = options.centre + 2.0 * random.direction<N>();
+      q = g(K, options.centre + 0.3 * random.in_box<N>(1.0), g(K, q, q));
+      if (random.chance(0.5)) q = g(K, q + options.size_m * random.direction<N>(), q);
+    }
     const Vec<N> p = q + random.log_uniform(options.smallest_depth_m, options.size_m) * random.direction<N>();
 
     const Vec<N> r = g(K, p, q);
@@ -119,7 +128,8 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
 
     // Assumption 1.
     for (int k = 0; k < 4; ++k) {
-      const double kappa = K * std::pow(10.0, random.uniform(-options.kappa_decades, options.kappa_decades));
+      const double kappa = std::max(K * std::pow(10.0, random.uniform(-options.kappa_decades, options.kappa_decades)),
+                                    f.norm() / options.reach_m);
       const Vec<N> p_kappa = r - f / kappa, r_kappa = g(kappa, p_kappa, q);
       const double error = (r_kappa - r).norm();
       if (error <= options.condition * models::map_9_rounding<N>(r, q, f, K, kappa)) continue;
@@ -131,7 +141,7 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
       break;
     }
 
-    if (!options.forces_without_contact) {
+    if (!options.forces_without_contact && !options.soft) {
       const Vec<N> rest = g(K, r, r);
       ASSERT_LE((rest - r).norm(), options.inside_tolerance_m) << "inside; " << state();
     }

@@ -1,0 +1,82 @@
+// A tree of boxes over many objects: which are near, and how near is the nearest? Built once; queries allocate nothing.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+class BoundsTree {
+ public:
+  struct Leaf {
+    Bounds bounds;
+    std::size_t index = 0;
+  };
+
+  BoundsTree() = default;
+  explicit BoundsTree(std::vector<Leaf> leaves);
+
+  // Calls visit(index) for each leaf whose box comes within `radius` of x.
+  template <typename Visit>
+  void within(const Vec3& x, double radius, Visit visit) const noexcept {
+    if (nodes_.empty()) return;
+    std::uint32_t stack[kDepth];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const Node& node = nodes_[stack[--top]];
+      if (!(distance2(node.bounds, x) <= radius * radius)) continue;
+      if (node.leaf) {
+        visit(node.index);
+      } else {
+        stack[top++] = node.left;
+        stack[top++] = node.right;
+      }
+    }
+  }
+
+  // The least of distance(index) over all leaves, and at most `least`; boxes farther away than the best are skipped.
+  template <typename Distance>
+  [[nodiscard]] double nearest(const Vec3& x, double least, Distance distance) const noexcept {
+    if (nodes_.empty()) return least;
+    std::uint32_t stack[kDepth];
+    int top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const Node& node = nodes_[stack[--top]];
+      const double bound = std::sqrt(distance2(node.bounds, x));
+      if (!(bound < least)) continue;
+      if (node.leaf) {
+        least = std::min(least, distance(node.index));
+      } else {
+        const bool left_first = distance2(nodes_[node.left].bounds, x) < distance2(nodes_[node.right].bounds, x);
+        stack[top++] = left_first ? node.right : node.left;  // the nearer one is looked at next
+        stack[top++] = left_first ? node.left : node.right;
+      }
+    }
+    return least;
+  }
+
+ private:
+  struct Node {
+    Bounds bounds;
+    std::uint32_t left = 0, right = 0;
+    std::size_t index = 0;
+    bool leaf = false;
+  };
+  static constexpr int kDepth = 80;  // halving: 2³² leaves need 33, and each level leaves one on the stack
+
+  static double distance2(const Bounds& b, const Vec3& x) noexcept {
+    return ((b.low - x).cwiseMax(x - b.high).cwiseMax(0.0)).squaredNorm();
+  }
+  std::uint32_t build(std::vector<Leaf>& leaves, std::size_t begin, std::size_t end);
+
+  std::vector<Node> nodes_;
+};
+
+}  // namespace proxarm::models

@@ -1,0 +1,156 @@
+#include "models/box_obstacle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "models/friction_plane.hpp"
+
+namespace proxarm::models {
+
+std::array<FlatSurface<3>, 6> BoxObstacle::faces(const Pose& X, const Vec3& size_m) {
+  const auto face = [&](int k, double sign) {
+    const Vec3 n = sign * X.linear().col(k);
+    return FlatSurface<3>(X.translation() + 0.5 * size_m[k] * n, n);
+  };
+  return {face(0, 1.0), face(0, -1.0), face(1, 1.0), face(1, -1.0), face(2, 1.0), face(2, -1.0)};
+}
+
+BoxObstacle::BoxObstacle(const Pose& X, const Vec3& size_m, double friction)
+    : centre_(X.translation()), axes_(X.linear()), half_(0.5 * size_m), mu_(friction), faces_(faces(X, size_m)) {
+  if (!size_m.allFinite() || !(size_m.minCoeff() > 0.0))
+    throw std::invalid_argument("a box needs finite, positive sizes");
+  if (!std::isfinite(friction) || !(friction >= 0.0)) {
+    throw std::invalid_argument("a friction coefficient must be finite and not negative");
+  }
+}
+
+double BoxObstacle::rounding(const Vec3& x) const noexcept {
+  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+  return 16.0 * u * (x.lpNorm<1>() + centre_.lpNorm<1>() + half_.sum());
+}
+
+// Where the way from q to p is inside all three slabs: from `enter` (through face `face`) to `leave`.
+struct BoxObstacle::Crossing {
+  double enter = -std::numeric_limits<double>::infinity();
+  double leave = std::numeric_limits<double>::infinity();
+  int face = -1;  // -1: q is inside
+  int exit = -1;
+  std::array<double, 6> enters{};  // of each face that q is outside of or on; negative where it isn't
+
+  [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
+};
+
+BoxObstacle::Crossing BoxObstacle::cross(const Vec3& q, const Vec3& p) const noexcept {
+  Crossing c;
+  c.enters.fill(-1.0);
+  const Vec3 a = local(q), b = local(p);
+  const double tolerance = rounding(q);
+  for (int k = 0; k < 3; ++k) {
+    for (int s = 0; s < 2; ++s) {
+      const double sign = s == 0 ? 1.0 : -1.0, from = sign * a[k] - half_[k], to = sign * b[k] - half_[k];
+      const int face = 2 * k + s;
+      if (from >= -tolerance) {  // outside of this face or on it
+        if (!(to < 0.0)) {
+          c.enter = std::numeric_limits<double>::infinity();  // and stays so
+          continue;
+        }
+        const double t = from > tolerance ? from / (from - to) : 0.0;
+        c.enters[static_cast<std::size_t>(face)] = t;
+        if (t > c.enter) {
+          c.enter = t;
+          c.face = face;
+        }
+      } else if (to > 0.0) {
+        const double t = from / (from - to);
+        if (t < c.leave) {
+          c.leave = t;
+          c.exit = face;
+        }
+      }
+    }
+  }
+  return c;
+}
+
+Obstacle::Step BoxObstacle::step(double /*K*/, const Vec3& p, const Vec3& q) const noexcept {
+  Crossing c = cross(q, p);
+  if (!c.any()) return {p, Vec3::UnitZ(), 0, false, false};
+  const Vec3 p_l = local(p);
+  if (c.face < 0) {
+    // q is inside: out through the face next to it.
+    const Vec3 q_l = local(q);
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 3; ++k) {
+      for (int s = 0; s < 2; ++s) {
+        const double depth = half_[k] - (s == 0 ? q_l[k] : -q_l[k]);
+        if (depth < least) {
+          least = depth;
+          c.face = 2 * k + s;
+        }
+      }
+    }
+    c.enters[static_cast<std::size_t>(c.face)] = c.enter = 0.0;
+  }
+  const double tolerance = rounding(q);
+  const auto on_face = [&](int face, const Vec3& r) {
+    const Vec3 r_l = local(r);
+    for (int k = 0; k < 3; ++k) {
+      if (k != face / 2 && std::abs(r_l[k]) > half_[k] + tolerance) return false;
+    }
+    return true;
+  };
+  // The face that is entered first; of several at once (from an edge), the one that ends nearest to p; then those that
+  // would be entered later.
+  Step best;
+  double best_t = -1.0, best_distance = 0.0;
+  for (int face = 0; face < 6; ++face) {
+    const double t = c.enters[static_cast<std::size_t>(face)];
+    if (t < 0.0) continue;
+    const FaceStep<3> s = step_on_face(faces_[static_cast<std::size_t>(face)], mu_, p, q);
+    if (!s.touches || !on_face(face, s.r)) continue;
+    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // one that sticks is preferred
+    if (t > best_t || (t == best_t && distance < best_distance)) {
+      best = {s.r, faces_[static_cast<std::size_t>(face)].normal(), face, true, s.slips};
+      best_t = t;
+      best_distance = distance;
+    }
+  }
+  if (best.touches) return best;
+
+  // Off the entered face. Past the edge on p's side nothing holds it.
+  const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(c.face)];
+  const FaceStep<3> s = step_on_face(entered, mu_, p, q);
+  if (!s.touches) return {p, entered.normal(), 0, false, false};
+  const Vec3 r_l = local(s.r);
+  Vec3 held = s.r;
+  for (int k = 0; k < 3; ++k) {
+    if (k == c.face / 2 || std::abs(r_l[k]) <= half_[k]) continue;
+    if (std::abs(p_l[k]) > half_[k] && (p_l[k] > 0.0) == (r_l[k] > 0.0)) return {p, entered.normal(), 0, false, false};
+    held -= (r_l[k] - std::copysign(half_[k], r_l[k])) * axes_.col(k);
+  }
+  return {held, entered.normal(), c.face, true, false};
+}
+
+bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
+  const Vec3 r_l = local(r);
+  if ((half_ - r_l.cwiseAbs()).minCoeff() > 2.0 * rounding(r)) return true;
+  const Crossing c = cross(q, r);
+  return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // beyond it, and it wouldn't have let the proxy around
+}
+
+Obstacle::Tangent BoxObstacle::tangent(const Vec3& /*r*/, std::int32_t feature) const noexcept {
+  return {faces_[static_cast<std::size_t>(feature)], mu_};
+}
+
+double BoxObstacle::distance(const Vec3& x) const noexcept {
+  const Vec3 d = local(x).cwiseAbs() - half_;
+  return d.cwiseMax(0.0).norm() + std::min(0.0, d.maxCoeff());
+}
+
+Bounds BoxObstacle::bounds() const noexcept {
+  const Vec3 reach = axes_.cwiseAbs() * half_;
+  return {centre_ - reach, centre_ + reach};
+}
+
+}  // namespace proxarm::models

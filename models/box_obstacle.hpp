@@ -1,0 +1,42 @@
+// A solid box.
+//
+// The proxy enters the straight way's first face and slides on it by (4). Past the face's edge it is free again (the
+// world around a box isn't convex: it goes around). Where friction would hold it beside the face that it came to from
+// beside it, it is held at that face's edge.
+#pragma once
+
+#include <array>
+
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+class BoxObstacle final : public Obstacle {
+ public:
+  // size_m: full edge lengths, finite and positive (10 µm will do for a plate). X: of the box in W.
+  // Throws std::invalid_argument otherwise, and for a friction that isn't finite and ≥ 0.
+  BoxObstacle(const Pose& X, const Vec3& size_m, double friction);
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
+  [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override;
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override;
+  [[nodiscard]] Bounds bounds() const noexcept override;
+
+  // Faces 2 k and 2 k + 1: along +axis k and −axis k. Shared with boxes from inside.
+  static std::array<FlatSurface<3>, 6> faces(const Pose& X, const Vec3& size_m);
+
+ private:
+  struct Crossing;  // of the straight way from q to p with the box
+  [[nodiscard]] Crossing cross(const Vec3& q, const Vec3& p) const noexcept;
+  [[nodiscard]] Vec3 local(const Vec3& x) const noexcept { return axes_.transpose() * (x - centre_); }
+  [[nodiscard]] double rounding(const Vec3& x) const noexcept;
+
+  Vec3 centre_;
+  Mat3 axes_;
+  Vec3 half_;
+  double mu_;
+  std::array<FlatSurface<3>, 6> faces_;
+};
+
+}  // namespace proxarm::models

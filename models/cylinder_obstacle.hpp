@@ -1,0 +1,41 @@
+// A solid cylinder with flat ends.
+//
+// As a box: the proxy enters through the side or an end, slides there exactly, is free past the rim, and is held at the
+// rim where friction would hold it beside the face that it came to from beside it.
+#pragma once
+
+#include "models/plane_obstacle.hpp"
+#include "models/round_obstacle.hpp"
+
+namespace proxarm::models {
+
+class CylinderObstacle final : public Obstacle {
+ public:
+  // From the middle of one end to that of the other. Throws std::invalid_argument for ends that coincide, and for a
+  // radius or a friction that isn't finite or negative.
+  CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction);
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
+  [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override;
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override;
+  [[nodiscard]] Bounds bounds() const noexcept override;
+
+ private:
+  enum Feature : std::int32_t { side = 0, far_end = 1, near_end = 2 };
+  struct Crossing;
+
+  [[nodiscard]] Crossing cross(const Vec3& q, const Vec3& p) const noexcept;
+  [[nodiscard]] double along(const Vec3& x) const noexcept { return e_.dot(x - middle_); }
+  [[nodiscard]] Vec3 radial(const Vec3& x) const noexcept { return (x - middle_) - e_ * along(x); }
+  [[nodiscard]] double rounding(const Vec3& x) const noexcept;
+
+  Vec3 middle_;
+  Vec3 e_;
+  double half_;
+  double R_;
+  RoundBar side_;
+  PlaneObstacle end_[2];  // far, near
+};
+
+}  // namespace proxarm::models

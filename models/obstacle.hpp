@@ -1,0 +1,69 @@
+// One thing to touch, as a world of many sees it.
+//
+// A World asks each obstacle near the step what it would do alone, and combines those that matter by their tangent
+// planes. To add a kind of object, implement this; a mesh and a moving object are obstacles too.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+
+#include "models/flat_surface.hpp"
+
+namespace proxarm::models {
+
+// Axis-aligned, in W, metres; infinite where an object is (a plane, a cavity's outside).
+struct Bounds {
+  Vec3 low = Vec3::Constant(-std::numeric_limits<double>::infinity());
+  Vec3 high = Vec3::Constant(std::numeric_limits<double>::infinity());
+
+  [[nodiscard]] bool finite() const noexcept { return low.allFinite() && high.allFinite(); }
+};
+
+class Obstacle {
+ public:
+  // What the proxy does if nothing else is there: r = p and touches = false if p is reached without contact.
+  struct Step {
+    Vec3 r = Vec3::Zero();
+    Vec3 normal = Vec3::Zero();  // unit, out of the object
+    std::int32_t feature = 0;    // face, edge or region; an argument of tangent()
+    bool touches = false;
+    bool slips = false;
+  };
+
+  // The object's surface as the proxy at r sees it.
+  struct Tangent {
+    FlatSurface<3> surface;
+    double mu = 0.0;
+  };
+
+  Obstacle() = default;
+  Obstacle(const Obstacle&) = default;
+  Obstacle& operator=(const Obstacle&) = default;
+  virtual ~Obstacle() = default;
+
+  // 𝒢 of this object alone, for stiffness K; exact in the sense of (17): the force is K (r − p), friction acts against
+  // N Nᵀ (r − q) at the normal of r. All these calls are noexcept, allocate nothing and lock nothing.
+  [[nodiscard]] virtual Step step(double K, const Vec3& p, const Vec3& q) const noexcept = 0;
+
+  // True if r can't be where a proxy from q ends: inside by more than rounding, or on the far side of a thin object.
+  [[nodiscard]] virtual bool excludes(const Vec3& q, const Vec3& r) const noexcept = 0;
+
+  // The tangent plane at the point of the surface next to r; `feature` is the one that step() found.
+  [[nodiscard]] virtual Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept = 0;
+
+  // Signed distance: exact outside up to its sign and rounding, negative inside.
+  [[nodiscard]] virtual double distance(const Vec3& x) const noexcept = 0;
+
+  [[nodiscard]] virtual Bounds bounds() const noexcept = 0;
+
+  // Where the object's own motion takes the point q until now; q itself for what stands still.
+  [[nodiscard]] virtual Vec3 carry(const Vec3& q) const noexcept { return q; }
+
+  // How fast any point of the surface can move, m/s; bounds how long a clearance holds.
+  [[nodiscard]] virtual double speed() const noexcept { return 0.0; }
+
+  virtual void set_time(double /*time_s*/, double /*period_s*/) noexcept {}
+};
+
+}  // namespace proxarm::models

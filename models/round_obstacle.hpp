@@ -1,0 +1,256 @@
+// Spheres, capsules and round bars, solid or seen from inside: all points at a distance R from a core, which is a
+// point, a segment or a line. R may be zero.
+//
+// At r the normal runs along the line from the core through r. With friction −λ N Nᵀ (r − q), λ ≥ 0, the tangential
+// part of f = r − p (in units where K = 1) vanishes at the mix p' = (p + λ q)/(1 + λ) instead of p: r is the point of
+// the surface next to p'. So with τ = λ/(1 + λ) all that is left is one equation,
+//   r(τ) = next to p + τ (q − p),   ‖f_t(r(τ))‖ = μ f_n(r(τ)),   0 ≤ τ ≤ 1,
+// where τ = 0 is frictionless and τ = 1 is stick (r next to q). On a plane this is (4) and linear in τ.
+//
+// A solid one is not convex to the proxy: if p is past it, the proxy sticks if it can and otherwise goes around.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+// Where the way q + t d, 0 ≤ t ≤ 1, is closest to a point.
+inline double closest_to_point(const Vec3& q, const Vec3& d, const Vec3& x) noexcept {
+  const double length2 = d.squaredNorm();
+  return length2 > 0.0 ? std::clamp(d.dot(x - q) / length2, 0.0, 1.0) : 0.0;
+}
+
+// The same for the endless line through a along e (unit); any t where they are parallel.
+inline double closest_to_line(const Vec3& q, const Vec3& d, const Vec3& a, const Vec3& e) noexcept {
+  const Vec3 across = d - e * e.dot(d);
+  return closest_to_point(q, across, q + (a - q) - e * e.dot(a - q));
+}
+
+struct PointCore {
+  Vec3 centre = Vec3::Zero();
+
+  [[nodiscard]] Vec3 nearest(const Vec3& /*x*/) const noexcept { return centre; }
+  [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
+    return closest_to_point(q, d, centre);
+  }
+  [[nodiscard]] double size() const noexcept { return centre.lpNorm<1>(); }
+  [[nodiscard]] Vec3 any_normal() const noexcept { return Vec3::UnitZ(); }
+  [[nodiscard]] Bounds bounds() const noexcept { return {centre, centre}; }
+};
+
+struct SegmentCore {
+  SegmentCore(const Vec3& from, const Vec3& to) noexcept
+      : a(from), length((to - from).norm()), e(length > 0.0 ? Vec3((to - from) / length) : Vec3(Vec3::UnitZ())) {}
+
+  [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), 0.0, length) * e; }
+  // The distance from a segment is that from its line or from one of its ends; along the way each has one minimum.
+  [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
+    double best = 0.0, least = std::numeric_limits<double>::infinity();
+    for (const double t :
+         {closest_to_line(q, d, a, e), closest_to_point(q, d, a), closest_to_point(q, d, a + length * e)}) {
+      const Vec3 x = q + t * d;
+      const double distance = (x - nearest(x)).squaredNorm();
+      if (distance < least) {
+        least = distance;
+        best = t;
+      }
+    }
+    return best;
+  }
+  [[nodiscard]] double size() const noexcept { return a.lpNorm<1>() + length; }
+  [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
+  [[nodiscard]] Bounds bounds() const noexcept {
+    const Vec3 b = a + length * e;
+    return {a.cwiseMin(b), a.cwiseMax(b)};
+  }
+
+  Vec3 a;
+  double length;
+  Vec3 e;
+};
+
+// Endless along e; a cylinder's side, cut off by its ends.
+struct LineCore {
+  Vec3 a = Vec3::Zero();
+  Vec3 e = Vec3::UnitZ();  // unit
+
+  [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + e.dot(x - a) * e; }
+  [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
+    return closest_to_line(q, d, a, e);
+  }
+  [[nodiscard]] double size() const noexcept { return a.lpNorm<1>(); }
+  [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
+  [[nodiscard]] Bounds bounds() const noexcept { return {}; }
+};
+
+// An elastic layer: the surface gives way along its normal by f_n / stiffness until the rigid core is reached.
+struct Layer {
+  double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: none
+  double thickness_m = 0.0;
+
+  [[nodiscard]] bool soft() const noexcept { return thickness_m > 0.0; }
+};
+
+template <typename Core>
+class RoundObstacle final : public Obstacle {
+ public:
+  // inside: the free side is towards the core. Throws std::invalid_argument for a radius that isn't finite and ≥ 0 (or,
+  // from inside, positive), and for a friction that isn't finite and ≥ 0.
+  RoundObstacle(const Core& core, double radius_m, double friction, bool inside, const Layer& layer = {})
+      : core_(core), R_(radius_m), mu_(friction), sign_(inside ? -1.0 : 1.0), layer_(layer) {
+    if (!std::isfinite(radius_m) || radius_m < 0.0 || (inside && !(radius_m > 0.0))) {
+      throw std::invalid_argument("a radius must be finite and positive");
+    }
+    if (!std::isfinite(friction) || !(friction >= 0.0)) {
+      throw std::invalid_argument("a friction coefficient must be finite and not negative");
+    }
+  }
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
+    const At at_p = at(p, q);
+    if (!(at_p.height < 0.0) && !(sign_ > 0.0 && passes(q, p))) return {p, at_p.normal, 0, false, false};
+
+    const At at_q = at(q, p);
+    const double q_rounding = rounding(q);
+    // τ = 1: sticks where it is, or below it.
+    Trial trial = stick(K, p, q, at_q, q_rounding);
+    if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
+    if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid one
+
+    // τ = 0 leaves no tangential force, so the excess is −μ f_n there. False position (Illinois).
+    double low = 0.0, high = 1.0;
+    Trial slide = place(K, p, at_p);
+    double excess_low = -mu_ * slide.f_n, excess_high = trial.excess;
+    if (!(mu_ > 0.0)) return {slide.r, slide.normal, 0, true, false};
+    const double small = 0.25 * rounding(p);
+    for (int k = 0, side = 0; k < 100; ++k) {
+      double tau = (low * excess_high - high * excess_low) / (excess_high - excess_low);
+      if (k % 8 == 7 || !(tau > low && tau < high)) tau = 0.5 * (low + high);
+      if (!(tau > low && tau < high)) break;
+      const Vec3 mix = p + tau * (q - p);
+      slide = place(K, p, at(mix, q));
+      if (std::abs(slide.excess) <= small) break;
+      if (slide.excess < 0.0) {
+        low = tau;
+        excess_low = slide.excess;
+        if (side == -1) excess_high *= 0.5;
+        side = -1;
+      } else {
+        high = tau;
+        excess_high = slide.excess;
+        if (side == 1) excess_low *= 0.5;
+        side = 1;
+      }
+    }
+    return {slide.r, slide.normal, 0, true, true};
+  }
+
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
+    const double hard = at(r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
+    if (hard < -4.0 * rounding(r)) return true;
+    return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // beyond it, and it would have held the proxy
+  }
+
+  [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t /*feature*/) const noexcept override {
+    const At here = at(r, r);
+    return {FlatSurface<3>::of_unit(here.foot + sign_ * R_ * here.normal, here.normal), mu_};
+  }
+
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return at(x, x).height; }
+
+  [[nodiscard]] Bounds bounds() const noexcept override {
+    if (sign_ < 0.0) return {};
+    const Bounds core = core_.bounds();
+    return {core.low - Vec3::Constant(R_), core.high + Vec3::Constant(R_)};
+  }
+
+  [[nodiscard]] double friction() const noexcept { return mu_; }
+
+ private:
+  // A point, seen from the core.
+  struct At {
+    Vec3 foot;      // the point of the core next to it
+    Vec3 normal;    // of the surface next to it
+    double height;  // above the surface, positive on the free side
+  };
+
+  struct Trial {
+    Vec3 r;
+    Vec3 normal;
+    double f_n = 0.0;     // over K
+    double excess = 0.0;  // ‖f_t‖ − μ f_n, over K
+  };
+
+  // In the middle of the core every direction is normal: the one towards `other` is taken.
+  [[nodiscard]] At at(const Vec3& x, const Vec3& other) const noexcept {
+    const Vec3 foot = core_.nearest(x);
+    Vec3 d = x - foot;
+    double distance = d.norm();
+    const double measured = distance;
+    if (!(distance > 0.0)) {
+      d = other - core_.nearest(other);
+      distance = d.norm();
+      if (!(distance > 0.0)) {
+        d = core_.any_normal();
+        distance = 1.0;
+      }
+    }
+    return {foot, (sign_ / distance) * d, sign_ * (measured - R_)};
+  }
+
+  // As FlatSurface::rounding, with the core in the place of the point and a few units more for the square root.
+  [[nodiscard]] double rounding(const Vec3& x) const noexcept {
+    constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+    return 16.0 * u * (x.lpNorm<1>() + core_.size() + R_);
+  }
+
+  // The proxy on the normal through `line`; its normal force settles its height if there is a layer.
+  [[nodiscard]] Trial place(double K, const Vec3& p, const At& line) const noexcept {
+    const Vec3& n = line.normal;
+    const double along_p = n.dot(p - line.foot);  // of p, from the core along the normal
+    double along = sign_ * R_;
+    if (layer_.soft()) {
+      // K (along − along_p) = k (surface − along), no deeper than the layer.
+      const double k = layer_.stiffness_N_per_m;
+      along = std::max((K * along_p + k * along) / (K + k), along - layer_.thickness_m);
+    }
+    return judge(p, line.foot + along * n, n);
+  }
+
+  [[nodiscard]] Trial stick(double K, const Vec3& p, const Vec3& q, const At& at_q, double q_rounding) const noexcept {
+    if (!layer_.soft() && std::abs(at_q.height) <= q_rounding) return judge(p, q, at_q.normal);  // bit for bit
+    Trial trial = place(K, p, at_q);
+    if (layer_.soft() && (trial.r - q).norm() <= q_rounding) trial.r = q;
+    return trial;
+  }
+
+  [[nodiscard]] Trial judge(const Vec3& p, const Vec3& r, const Vec3& n) const noexcept {
+    Trial trial{r, n};
+    const Vec3 f = r - p;
+    trial.f_n = n.dot(f);
+    trial.excess = (f - trial.f_n * n).norm() - mu_ * trial.f_n;
+    return trial;
+  }
+
+  // Does the straight way from q to p pass through the inside?
+  [[nodiscard]] bool passes(const Vec3& q, const Vec3& p) const noexcept {
+    const Vec3 x = q + core_.closest_on_way(q, p - q) * (p - q);
+    return (x - core_.nearest(x)).norm() < R_ - rounding(x);
+  }
+
+  Core core_;
+  double R_;
+  double mu_;
+  double sign_;
+  Layer layer_;
+};
+
+using Sphere = RoundObstacle<PointCore>;
+using Capsule = RoundObstacle<SegmentCore>;
+using RoundBar = RoundObstacle<LineCore>;
+
+}  // namespace proxarm::models

@@ -1,0 +1,319 @@
+#include "models/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/corner.hpp"
+#include "models/groove.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// Curved surfaces gain the factor penetration / radius with each new tangent plane: forty times a half is rounding.
+constexpr int kSettle = 40;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// No closer than rounding lets it: either nothing moves, or the moves are tiny and have stopped shrinking (a slip that
+// is short against a deep p amplifies rounding, so a fixed threshold would not do).
+bool has_settled(double move, double last_move, const Vec3& r) noexcept {
+  const double size = 1e-3 + r.lpNorm<1>();
+  return move <= 1e-16 * size || (move <= 1e-9 * size && move > 0.5 * last_move);
+}
+
+}  // namespace
+
+// The obstacles that may be part of the solution, and what each would do alone.
+struct World::Candidates {
+  static constexpr std::size_t kMost = 12;
+  std::array<std::size_t, kMost> index{};
+  std::array<Obstacle::Step, kMost> alone{};
+  std::size_t count = 0;
+  bool grew = false;
+
+  [[nodiscard]] bool has(std::size_t i) const noexcept {
+    return std::find(index.begin(), index.begin() + static_cast<std::ptrdiff_t>(count), i) !=
+           index.begin() + static_cast<std::ptrdiff_t>(count);
+  }
+  void add(std::size_t i, const Obstacle::Step& step) noexcept {
+    if (count == kMost || has(i)) return;
+    index[count] = i;
+    alone[count++] = step;
+    grew = true;
+  }
+};
+
+struct World::Choice {
+  double distance2 = kInfinity;  // ‖r − p‖²
+  Vec3 r = Vec3::Zero();
+  std::array<Contact<3>, 3> contacts{};
+  std::size_t count = 0;
+
+  [[nodiscard]] bool found() const noexcept { return distance2 < kInfinity; }
+  // True if this one is better than what was there; then the caller fills in the contacts.
+  bool better(const Vec3& p, const Vec3& at, std::size_t contact_count) noexcept {
+    const double d2 = (at - p).squaredNorm();
+    if (!(d2 < distance2)) return false;
+    distance2 = d2;
+    r = at;
+    count = contact_count;
+    return true;
+  }
+};
+
+World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
+  std::vector<BoundsTree::Leaf> leaves;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    const Bounds bounds = obstacle.bounds();
+    if (obstacle.speed() > 0.0) {
+      moving_.push_back(i);
+    } else if (bounds.finite()) {
+      leaves.push_back({bounds, i});
+    } else {
+      unbounded_.push_back(i);
+    }
+  }
+  tree_ = BoundsTree(std::move(leaves));
+  near_.reserve(entries_.size());
+}
+
+void World::set_time(const StepTime& time) noexcept {
+  for (const std::size_t i : moving_) entries_[i].obstacle->set_time(time.time_s, time.period_s);
+}
+
+// All obstacles that the step can meet. What a step does stays within the ball whose diameter is the way from q to p
+// (the force on it never does work: (r − p)ᵀ(r − q) ≤ 0), which around convex bodies of radius R is exceeded by ‖r −
+// q‖²/2R at most; twice that ball covers it.
+void World::gather(const Vec3& p, const Vec3& q) noexcept {
+  const Vec3 middle = 0.5 * (p + q);
+  const double radius = (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>());
+  near_.resize(near_fixed_);
+  if (!((middle - near_centre_).norm() + radius <= near_radius_)) {
+    // A millimetre more than needed, so that a proxy in contact asks once in many steps.
+    near_radius_ = 2.0 * radius + 1e-3;
+    near_centre_ = middle;
+    near_.clear();
+    for (const std::size_t i : unbounded_) {
+      if (entries_[i].obstacle->distance(middle) <= near_radius_) near_.push_back(i);
+    }
+    tree_.within(middle, near_radius_, [&](std::size_t i) { near_.push_back(i); });
+    std::sort(near_.begin(), near_.end());  // so that nothing depends on how they were found
+    near_fixed_ = near_.size();
+  }
+  for (const std::size_t i : moving_) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    if (obstacle.distance(middle) <= radius + (obstacle.carry(q) - q).norm()) near_.push_back(i);
+  }
+}
+
+void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept {
+  for (const std::size_t i : near_) {
+    const Obstacle::Step s = entries_[i].obstacle->step(K, p, q);
+    if (s.touches) candidates.add(i, s);
+  }
+}
+
+bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
+                 const Vec3& p) const noexcept {
+  bool all = true;
+  for (const std::size_t i : near_) {
+    if (std::find(contacts.begin(), contacts.end(), i) != contacts.end()) continue;
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    if (!obstacle.excludes(obstacle.carry(q), r)) continue;
+    all = false;
+    if (!candidates.has(i)) {
+      // It isn't in the way of p, but of the trial: what it would do to that tells its feature.
+      Obstacle::Step s = obstacle.step(K, r, q);
+      s.touches = s.touches && obstacle.step(K, p, q).touches;
+      candidates.add(i, s);
+    }
+  }
+  return all;
+}
+
+void World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
+  for (std::size_t c = 0; c < candidates.count; ++c) {
+    const Obstacle::Step& s = candidates.alone[c];
+    const std::size_t i[1] = {candidates.index[c]};
+    if (!s.touches || !fits(q, s.r, i, candidates, K, p) || !choice.better(p, s.r, 1)) continue;
+    const Entry& entry = entries_[i[0]];
+    choice.contacts[0] = {entry.object, entry.feature < 0 ? s.feature : entry.feature, s.slips, s.normal};
+  }
+}
+
+void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
+  for (std::size_t c = 1; c < candidates.count; ++c) {
+    for (std::size_t d = 0; d < c; ++d) {
+      const std::size_t m[2] = {std::min(candidates.index[c], candidates.index[d]),
+                                std::max(candidates.index[c], candidates.index[d])};
+      const std::size_t first = m[0] == candidates.index[d] ? d : c, second = first == d ? c : d;
+      const Obstacle &a = *entries_[m[0]].obstacle, &b = *entries_[m[1]].obstacle;
+      const Vec3 q_a = a.carry(q), q_b = b.carry(q);
+      Vec3 r = q;
+      Obstacle::Tangent t_a = a.tangent(r, candidates.alone[first].feature);
+      Obstacle::Tangent t_b = b.tangent(r, candidates.alone[second].feature);
+      GrooveSolution s;
+      double last_move = kInfinity;
+      for (int k = 0; k < kSettle; ++k) {
+        const GrooveLine line(t_a.surface, t_b.surface);
+        s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b);
+        const bool presses = s.found;
+        if (!presses) s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b, true);
+        if (!s.found || !s.r.allFinite()) break;
+        const double move = (s.r - r).norm();
+        r = s.r;
+        const Obstacle::Tangent n_a = a.tangent(r, candidates.alone[first].feature);
+        const Obstacle::Tangent n_b = b.tangent(r, candidates.alone[second].feature);
+        const bool flat = n_a.surface.normal() == t_a.surface.normal() && n_b.surface.normal() == t_b.surface.normal();
+        s.found = presses;
+        if (flat || has_settled(move, last_move, r)) break;
+        s.found = false;
+        last_move = move;
+        t_a = n_a;
+        t_b = n_b;
+      }
+      if (!s.found || !fits(q, r, m, candidates, K, p) || !choice.better(p, r, 2)) continue;
+      const bool slips[2] = {s.slips1, s.slips2};
+      const Obstacle::Tangent* const tangents[2] = {&t_a, &t_b};
+      const std::size_t own[2] = {first, second};
+      for (std::size_t j = 0; j < 2; ++j) {
+        const Entry& entry = entries_[m[j]];
+        choice.contacts[j] = {entry.object, entry.feature < 0 ? candidates.alone[own[j]].feature : entry.feature,
+                              slips[j], tangents[j]->surface.normal()};
+      }
+    }
+  }
+}
+
+void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
+  for (std::size_t c = 2; c < candidates.count; ++c) {
+    for (std::size_t d = 1; d < c; ++d) {
+      for (std::size_t e = 0; e < d; ++e) {
+        const std::size_t own[3] = {e, d, c};
+        const std::size_t m[3] = {candidates.index[e], candidates.index[d], candidates.index[c]};
+        Vec3 r = q, carried[3];
+        const Vec3* q_each[3];
+        for (std::size_t j = 0; j < 3; ++j) {
+          carried[j] = entries_[m[j]].obstacle->carry(q);
+          q_each[j] = &carried[j];
+        }
+        const auto tangent = [&](std::size_t j) {
+          return entries_[m[j]].obstacle->tangent(r, candidates.alone[own[j]].feature);
+        };
+        std::array<Obstacle::Tangent, 3> t{tangent(0), tangent(1), tangent(2)};
+        CornerSolution s;
+        double last_move = kInfinity;
+        for (int k = 0; k < kSettle; ++k) {
+          const FlatSurface<3>* const surfaces[3] = {&t[0].surface, &t[1].surface, &t[2].surface};
+          const double mu[3] = {t[0].mu, t[1].mu, t[2].mu};
+          const CornerPoint point(t[0].surface, t[1].surface, t[2].surface);
+          s = solve_corner(surfaces, mu, point, p, q_each);
+          if (!point.exists || !s.r.allFinite()) {
+            s.found = false;
+            break;
+          }
+          const double move = (s.r - r).norm();
+          r = s.r;
+          const std::array<Obstacle::Tangent, 3> next{tangent(0), tangent(1), tangent(2)};
+          bool flat = true;
+          for (std::size_t j = 0; j < 3; ++j) flat = flat && next[j].surface.normal() == t[j].surface.normal();
+          if (flat || has_settled(move, last_move, r)) break;
+          s.found = false;
+          last_move = move;
+          t = next;
+        }
+        if (!s.found || !fits(q, r, m, candidates, K, p) || !choice.better(p, r, 3)) continue;
+        for (std::size_t j = 0; j < 3; ++j) {
+          const Entry& entry = entries_[m[j]];
+          choice.contacts[j] = {entry.object, entry.feature < 0 ? candidates.alone[own[j]].feature : entry.feature,
+                                s.slips[j], t[j].surface.normal()};
+        }
+      }
+    }
+  }
+}
+
+bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
+  do {
+    candidates.grew = false;
+    try_singles(K, p, q, candidates, choice);
+    if (choice.found()) return true;
+    if (candidates.grew) continue;
+    try_pairs(K, p, q, candidates, choice);
+    if (choice.found()) return true;
+    if (candidates.grew) continue;
+    try_triples(K, p, q, candidates, choice);
+    if (choice.found()) return true;
+  } while (candidates.grew);
+  return false;
+}
+
+// Nothing is complete: the proxy stays where it is if it may, else it is brought out of the nearest thing.
+void World::hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
+  bool allowed = true;
+  for (const std::size_t i : near_) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    allowed = allowed && !obstacle.excludes(obstacle.carry(q), q);
+  }
+  for (std::size_t c = 0; c < candidates.count; ++c) {
+    const Obstacle::Step& s = candidates.alone[c];
+    if (!s.touches) continue;
+    const Entry& entry = entries_[candidates.index[c]];
+    const Contact<3> contact{entry.object, entry.feature < 0 ? s.feature : entry.feature, false, s.normal};
+    if (allowed) {
+      if (choice.count < choice.contacts.size()) choice.contacts[choice.count++] = contact;
+    } else if (choice.better(p, s.r, 1)) {
+      choice.contacts[0] = contact;
+    }
+  }
+  if (allowed || choice.count == 0) choice.r = q;
+}
+
+double World::distance(const Vec3& x) const noexcept {
+  double least = kInfinity;
+  for (const std::size_t i : unbounded_) least = std::min(least, entries_[i].obstacle->distance(x));
+  for (const std::size_t i : moving_) least = std::min(least, entries_[i].obstacle->distance(x));
+  return tree_.nearest(x, least, [&](std::size_t i) { return entries_[i].obstacle->distance(x); });
+}
+
+Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
+  count_ = 0;
+  if ((p - clear_at_).squaredNorm() < clearance_ * clearance_ &&
+      (q - clear_at_).squaredNorm() < clearance_ * clearance_ && clearance_ > 0.0) {
+    return p;
+  }
+  gather(p, q);
+  Candidates candidates;
+  add_candidates(K, p, q, candidates);
+  if (candidates.count == 0) {
+    // Nothing in the way. How much room is there? Only what stands still is remembered.
+    if (moving_.empty()) {
+      double room = kInfinity;
+      for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
+      clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });
+      clearance_ -= 1e-12 * (1.0 + p.lpNorm<1>());  // rounding of distances
+      clear_at_ = p;
+    }
+    return p;
+  }
+  Choice choice;
+  if (!search(K, p, q, candidates, choice)) {
+    // A tool so deep that tangent planes lead nowhere (beyond the radius of a curved surface): as far as a shorter step
+    // leads, or where it was.
+    ++unresolved_;
+    Vec3 nearer = p;
+    for (int k = 0; k < 6 && !choice.found(); ++k) {
+      nearer = 0.5 * (nearer + q);
+      Candidates fewer;
+      add_candidates(K, nearer, q, fewer);
+      if (fewer.count > 0) search(K, nearer, q, fewer, choice);
+    }
+    if (!choice.found()) hold(p, q, candidates, choice);
+  }
+  contacts_ = choice.contacts;
+  count_ = choice.count;
+  return choice.r;
+}
+
+}  // namespace proxarm::models

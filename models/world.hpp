@@ -1,0 +1,76 @@
+// Any number of obstacles at once.
+//
+// Each obstacle near the step says what it would do alone. If the others allow that point, it is the solution;
+// otherwise pairs and triples of contacts are solved as in a PlaneComposition, on the tangent planes at the solution
+// itself: a curved surface's plane is taken again at each new point until it stays (the error shrinks by penetration
+// over radius each time). The choice among complete sets is the same: fewest contacts, then the smallest ‖q − p‖.
+//
+// A step is first compared with the last known clearance: if both q and p are within it, nothing can be touched.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "models/bounds_tree.hpp"
+#include "models/geometric_algorithm.hpp"
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+class World final : public GeometricAlgorithm<3> {
+ public:
+  // `index` of an obstacle is what contacts report as their object: a box from inside is six obstacles, one object.
+  struct Entry {
+    std::unique_ptr<Obstacle> obstacle;
+    std::int32_t object = 0;
+    std::int32_t feature = -1;  // reported; -1: the obstacle's own
+  };
+  explicit World(std::vector<Entry> entries);
+
+  Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  void set_time(const StepTime& time) noexcept override;
+  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
+
+  // Signed distance to the nearest obstacle, metres; infinite if there is none.
+  [[nodiscard]] double distance(const Vec3& x) const noexcept;
+
+  // Steps so far for which no set of contacts was complete (a jam, or a tool deeper than a curved surface's radius):
+  // the proxy then goes as far as a shorter step leads, or stays.
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept { return unresolved_; }
+
+ private:
+  struct Candidates;
+  struct Choice;
+
+  void gather(const Vec3& p, const Vec3& q) noexcept;
+  void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept;
+  bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
+            const Vec3& p) const noexcept;
+  void try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  void try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  void try_triples(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+
+  void hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept;
+
+  std::vector<Entry> entries_;
+  std::vector<std::size_t> unbounded_;  // obstacles without finite bounds
+  std::vector<std::size_t> moving_;     // those that move, bounded or not
+  BoundsTree tree_;                     // all others
+  // What a step may meet: first what stands still and comes within near_radius_ of near_centre_, which is asked for
+  // again only when a step leaves that ball; then the movers that are close now.
+  std::vector<std::size_t> near_;
+  std::size_t near_fixed_ = 0;
+  Vec3 near_centre_ = Vec3::Zero();
+  double near_radius_ = -1.0;
+  std::array<Contact<3>, 3> contacts_{};
+  std::size_t count_ = 0;
+  std::uint64_t unresolved_ = 0;
+  // No obstacle is closer than clearance_ to clear_at_ (less what movers have come since).
+  Vec3 clear_at_ = Vec3::Zero();
+  double clearance_ = -1.0;
+};
+
+}  // namespace proxarm::models
