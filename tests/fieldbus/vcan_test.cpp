@@ -1,12 +1,17 @@
 // SocketCanNetwork and NodeLoop on a real kernel: run through tests/vcan/with-vcan, which brings vcan0, vcan1, vcan2.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
+#include "fieldbus/candump_log.hpp"
 #include "fieldbus/node_loop.hpp"
 #include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
@@ -127,6 +132,88 @@ TEST_F(Vcan, SaysWhatIsWrongWithAnInterface) {
   };
   EXPECT_THAT(message_of("lo"), HasSubstr("not a CAN one"));
   EXPECT_THAT(message_of("vcan77"), AllOf(HasSubstr("no such"), HasSubstr("vcan0, vcan1, vcan2")));
+}
+
+// --- can-utils as independent witnesses
+
+std::string temporary_file(const char* name) {
+  return (std::filesystem::temp_directory_path() / ("proxarm_vcan_" + std::to_string(::getpid()) + "_" + name))
+      .string();
+}
+
+TEST_F(Vcan, HearsACandumpLogThatCanplayerPlays) {
+  const std::string path = temporary_file("play.log");
+  std::vector<CanFrame> sent{frame_of(0x680, 8), frame_of(0x681, 6), frame_of(0x12345678, 2), frame_of(0x123, 12)};
+  sent[2].extended = true;
+  sent[3].fd = sent[3].bit_rate_switch = true;
+  {
+    CandumpLogWriter log(path);
+    for (std::size_t i = 0; i < sent.size(); ++i)
+      log.write(static_cast<std::int64_t>(i) * 5'000'000, "sensor", sent[i]);
+    log.finish();
+  }
+  SocketCanNetwork network({"vcan0"});
+  const std::int64_t start = network.now_ns();
+  ASSERT_EQ(std::system(("canplayer -I " + path + " vcan0=sensor").c_str()), 0);
+  std::filesystem::remove(path);
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    TimedFrame timed;
+    ASSERT_TRUE(network.wait_for_frame(network.now_ns() + 1'000'000'000)) << i;
+    ASSERT_TRUE(network.bus(0).receive(timed));
+    EXPECT_EQ(timed.frame, sent[i]);
+    EXPECT_GE(timed.time_ns, start + static_cast<std::int64_t>(i) * 4'000'000)
+        << "the time of reception, not of reading";
+  }
+}
+
+TEST_F(Vcan, SendsWhatCandumpSees) {
+  const std::string path = temporary_file("seen.log");
+  std::vector<CanFrame> sent{frame_of(0x201, 6), frame_of(0x1abcdef0, 3), frame_of(0x702), frame_of(0x7ff, 64)};
+  sent[1].extended = true;
+  sent[2].remote = true;
+  sent[3].fd = true;
+  ASSERT_EQ(std::system(("candump -L -n 4 -T 3000 vcan1 >" + path + " & sleep 0.3").c_str()), 0);
+  SocketCanNetwork network({"vcan1"});
+  for (const CanFrame& frame : sent) {
+    ASSERT_EQ(network.bus(0).send(frame), SendResult::sent);
+    network.sleep_until(network.now_ns() + 1'000'000);
+  }
+  for (int tries = 0; tries < 20 && std::filesystem::file_size(path) == 0; ++tries) {
+    network.sleep_until(network.now_ns() + 100'000'000);  // candump flushes as it ends
+  }
+  network.sleep_until(network.now_ns() + 100'000'000);
+  const std::vector<CandumpEntry> seen = read_candump_log(path);
+  std::filesystem::remove(path);
+  ASSERT_EQ(seen.size(), sent.size());
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_EQ(seen[i].frame, sent[i]) << i;
+    EXPECT_EQ(seen[i].interface, "vcan1");
+    if (i == 0) continue;
+    EXPECT_NEAR(static_cast<double>(seen[i].time_ns - seen[i - 1].time_ns), 1e6, virtual_clock() ? 2e5 : 1e8);
+  }
+}
+
+TEST_F(Vcan, LosesNoWantedFrameInAFloodOfOthers) {
+  SocketCanNetwork here({"vcan0"}), there({"vcan0"}, {.receive_buffer_bytes = 20'000});
+  there.set_filters(0, {{.id = 0x181, .mask = 0x7ff}});
+  ASSERT_EQ(std::system("timeout 0.25 cangen vcan0 -g 0.01 -I 700 -L 8 >/dev/null 2>&1 &"), 0);
+  TimedFrame timed;
+  int received = 0;
+  const std::int64_t start = here.now_ns();
+  for (int k = 0; k < 200; ++k) {
+    here.sleep_until(start + k * std::int64_t{1'000'000});
+    ASSERT_EQ(here.bus(0).send(frame_of(0x181, 8)), SendResult::sent);
+    while (there.bus(0).receive(timed)) received += timed.frame.id == 0x181 ? 1 : 1000;
+  }
+  while (there.wait_for_frame(there.now_ns() + 10'000'000)) {
+    while (there.bus(0).receive(timed)) received += timed.frame.id == 0x181 ? 1 : 1000;
+  }
+  EXPECT_EQ(received, 200);
+  EXPECT_EQ(there.bus(0).status().receive_overflows, 0u);
+  int flood = 0;
+  while (here.bus(0).receive(timed)) ++flood;
+  EXPECT_GT(flood, 1000) << "there was no flood";
+  here.sleep_until(start + 500'000'000);  // it is over for the tests that follow
 }
 
 struct Echo : CanListener {
