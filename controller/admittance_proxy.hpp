@@ -21,7 +21,8 @@
 // Time labels. At order 1, q(k) made of h(k) = h(t_k) is the state at t_{k+1} (Störmer–Verlet, shifted by one sample),
 // which is when the next SYNC makes it effective. The history that start() sets is exact for it: free flight under a
 // constant force lands on the parabola to rounding. At order 2, q(k) is the state at t_k; with `matched_labels` h(k) is
-// replaced by 2h(k) − h(k−1), so that it is t_{k+1} as well, and noise in h is amplified by √5.
+// replaced by 2h(k) − h(k−1), so that it is t_{k+1} as well, which costs noise: white
+// noise of 1 N at 1 kg becomes 1.00 m/s² at order 1, 0.71 at order 2 and 1.36 with matched labels.
 //
 // All vectors in one frame, metres, newtons, seconds. n = 1, 2 or 3. One caller at a time; step() and the setters are
 // for the cycle: they neither allocate, lock, throw nor print.

@@ -23,7 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 using models::Vec3;
 
-constexpr std::size_t most_samples = 6000;
+constexpr std::size_t most_samples = 4000;
 
 // A folder that goes away with its contents.
 class TemporaryFolder {

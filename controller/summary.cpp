@@ -88,9 +88,10 @@ struct SummaryBuilder::State {
   Spread tracking, contact_force;
   ApparentMass apparent;
   Slide sliding;
-  double contact_s = 0.0;          // how long the contact has lasted
-  std::optional<Vec3> start;       // x₀ of the spring
-  std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
+  double contact_s = 0.0;                                  // how long the contact has lasted
+  std::uint64_t rendered = 0, touching = 0, slipping = 0;  // cycles
+  std::optional<Vec3> start;                               // x₀ of the spring
+  std::deque<CycleRecord> recent;                          // consecutive cycles of rendering, newest last
 };
 
 SummaryBuilder::SummaryBuilder(const SummaryConfig& config) : state_(std::make_unique<State>(config)) {}
@@ -109,7 +110,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   }
   if (record.phase != Phase::rendering) return;
   if (!s.start) s.start = vec3(record.proxy_W_m);
-  s.summary.rendered_time_s += s.config.period_s;
+  ++s.rendered;
   s.recent.push_back(record);
   s.penetrate(record);
   s.track(record);
@@ -138,8 +139,8 @@ void SummaryBuilder::State::penetrate(const CycleRecord& record) {
   } else {
     if (contact_s == 0.0) ++summary.contacts;
     contact_s += config.period_s;
-    summary.contact_time_s += config.period_s;
-    if (record.contact == ContactPhase::slip) summary.sliding_time_s += config.period_s;
+    ++touching;
+    if (record.contact == ContactPhase::slip) ++slipping;
     const double pull = -vec3(record.normal_W).dot(vec3(record.contact_force_W_N));
     // Of several contacts only the sum of their forces is known.
     if (record.contact_count <= 1) summary.pulling_force_max_N = std::max(summary.pulling_force_max_N, pull);
@@ -211,6 +212,10 @@ Summary SummaryBuilder::finish() {
   State& s = *state_;
   s.apparent.end_segment();
   Summary summary = s.summary;
+  const double T = s.config.period_s;
+  summary.rendered_time_s = T * static_cast<double>(s.rendered);
+  summary.contact_time_s = T * static_cast<double>(s.touching);
+  summary.sliding_time_s = T * static_cast<double>(s.slipping);
   summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
   summary.tracking_rms_m = s.tracking.rms();
   summary.tracking_max_m = s.tracking.largest();

@@ -1,0 +1,76 @@
+// What a step of the proxy, its record and the stability check cost.
+#include <benchmark/benchmark.h>
+
+#include "controller/admittance_proxy.hpp"
+#include "controller/cycle_record.hpp"
+#include "controller/session_record.hpp"
+#include "controller/spsc_ring.hpp"
+#include "controller/stability.hpp"
+#include "controller/summary.hpp"
+#include "models/friction_plane.hpp"
+
+namespace {
+
+using namespace proxarm;
+using models::Vec3;
+
+// A slide along the default scene's wall, pushed to and fro.
+void proxy_step(benchmark::State& state) {
+  models::FrictionPlane<3> wall(Vec3(0.9, 0.0, 0.6), Vec3(-1.0, 0.0, 0.0), 0.3);
+  controller::AdmittanceProxy<3> proxy({.mass_kg = 4.0, .order = static_cast<int>(state.range(0))}, wall);
+  proxy.start({.q = Vec3(0.9, 0.0, 0.6), .v = Vec3::Zero(), .a = Vec3::Zero()});
+  int k = 0;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(proxy.step(Vec3(10.0, ++k % 200 < 100 ? 6.0 : -6.0, 0.0)));
+  }
+}
+BENCHMARK(proxy_step)->Arg(1)->Arg(2);
+
+void ring_push_and_pop(benchmark::State& state) {
+  controller::SpscRing<controller::CycleRecord> ring(1024);
+  controller::CycleRecord record;
+  for (auto _ : state) {
+    ring.push(record);
+    ring.pop(record);
+    benchmark::DoNotOptimize(record);
+  }
+}
+BENCHMARK(ring_push_and_pop);
+
+void summary_per_record(benchmark::State& state) {
+  controller::SummaryBuilder builder({});
+  controller::CycleRecord record;
+  record.phase = controller::Phase::rendering;
+  record.axes = 6;
+  record.set(controller::RecordFlag::truth);
+  for (auto _ : state) {
+    ++record.cycle;
+    record.true_tool_W_m[0] += 1e-5;
+    builder.add(record);
+  }
+}
+BENCHMARK(summary_per_record);
+
+void signals_row(benchmark::State& state) {
+  controller::CycleRecord record;
+  record.set(controller::RecordFlag::truth);
+  record.proxy_W_m = record.tool_W_m = record.p_hat_W_m =
+      record.true_tool_W_m = {0.123456789012345, 1.0 / 3.0, 2.0 / 7.0};
+  record.force_S_N = record.force_W_N = record.hand_force_W_N =
+      record.contact_force_W_N = {1.0 / 7.0, 2.0 / 3.0, 9.0 / 7.0};
+  std::string row;
+  for (auto _ : state) {
+    row.clear();
+    controller::append_signals(row, record, 6, true);
+    benchmark::DoNotOptimize(row.data());
+  }
+}
+BENCHMARK(signals_row);
+
+void stability_check(benchmark::State& state) {
+  const controller::LoopModel loop{.delay_s = 2e-3, .drive_time_constant_s = 1.6e-3, .handle_mass_kg = 0.25};
+  for (auto _ : state) benchmark::DoNotOptimize(controller::smallest_stable_mass({}, loop));
+}
+BENCHMARK(stability_check)->Unit(benchmark::kMicrosecond);
+
+}  // namespace
