@@ -21,6 +21,7 @@ std::size_t index_of(const description::Cell& cell, const std::string& bus) {
 fieldbus::DriveSettings drive_settings(const SessionSettings& settings) {
   fieldbus::DriveSettings drive;
   drive.period_ns = std::llround(settings.period_s * 1e9);
+  drive.heartbeat_in_operation = false;
   return drive;
 }
 
@@ -114,6 +115,7 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
   }
   auto arm = std::make_unique<models::Arm>(cell);
   models::InverseKinematics inverse(*arm, inverse_config(cell, settings.period_s));
+  ElasticSetpoint elastic(*arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s);
   std::vector<DriveBus> buses = drive_buses(drives);
   return CycleParts{network,
                     std::move(drives),
@@ -122,6 +124,7 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
                     bus_indices[index_of(cell, cell.sensor.bus)],
                     std::move(arm),
                     std::move(inverse),
+                    std::move(elastic),
                     make_rendered_world(scene, settings, proxy_mass(cell, settings)),
                     OrientationProxy(orientation_config(settings)),
                     WrenchCompensation(cell)};
@@ -150,11 +153,6 @@ Identities bring_up(CycleParts& parts) {
     lines.push_back("drive of " + parts.drives[i].drive.description().joint + ": " + describe(identities[i]));
   }
   return lines;
-}
-
-void shut_down(CycleParts& parts) noexcept {
-  const std::vector<fieldbus::DriveSlot> drives = slots(parts);
-  fieldbus::shut_down_drives(parts.network, drives);
 }
 
 }  // namespace proxarm::controller

@@ -31,7 +31,5 @@ using Identities = std::vector<std::string>;
 
 // NMT, SDO configuration written and read back, sensor calibration read; drives end in NMT operational, not enabled.
 Identities bring_up(CycleParts& parts);
-// After the last cycle: drives back to NMT pre-operational. Never fails.
-void shut_down(CycleParts& parts) noexcept;
 
 }  // namespace proxarm::controller

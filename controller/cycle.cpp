@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fieldbus/canopen_nmt.hpp"
+
 namespace proxarm::controller {
 
 using models::JointVector;
@@ -11,9 +13,6 @@ using models::Vec3;
 namespace {
 
 constexpr double seconds_per_ns = 1e-9;
-
-// Of the period; what is left must carry the targets and be computed in (see bus_plan.hpp).
-constexpr double receive_window = 0.45;
 
 // How long the drives may take to switch off before the run ends without them.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
@@ -44,10 +43,16 @@ void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
   measure();
   judge(t_k_ns);
   choose_targets(t_k_ns);
-  send_targets();
+  send_targets(t_k_ns);
   compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
   write_record(t_k_ns);
   ++cycle_;
+}
+
+void Cycle::shut_down() noexcept {
+  for (const DriveOnBus& axis : parts_.drives) {
+    send(axis.bus, fieldbus::nmt_frame(fieldbus::NmtCommand::enter_pre_operational, axis.drive.node()), -1);
+  }
 }
 
 void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
@@ -61,7 +66,6 @@ void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
   fieldbus::CanFrame frame;
   for (DriveBus& bus : parts_.drive_buses) {
     send(bus.bus, bus.sync.next(), -1);
-    if (bus.heartbeat.due(t_k_ns, cycle_, frame)) send(bus.bus, frame, -1);
   }
   for (DriveOnBus& axis : parts_.drives) axis.drive.on_sync(t_k_ns);
   if (parts_.sensor->poll(t_k_ns, frame)) send(parts_.sensor_bus, frame, -1);
@@ -265,6 +269,7 @@ void Cycle::tare(std::int64_t t_k_ns) noexcept {
 void Cycle::start_rendering() noexcept {
   link_rad_ = parts_.arm->link_from_motor(target_rad_);
   const models::Pose X_WT = parts_.arm->tool_pose(link_rad_);
+  parts_.elastic.start(link_rad_);
   proxy_W_ = X_WT.translation();
   parts_.world->start(proxy_W_);
   parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
@@ -294,7 +299,7 @@ void Cycle::follow_proxy() noexcept {
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
   parts_.inverse.solve(link_rad_, X_WT, solution_);
   if (solution_.status != models::InverseKinematicsResult::Status::converged) return raise(Fault::singular, -1);
-  const JointVector motor_rad = parts_.arm->motor_from_link(solution_.q);
+  const JointVector motor_rad = parts_.elastic.step(solution_.q);
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const description::DriveDescription& drive = parts_.drives[i].drive.description();
     const auto where = static_cast<std::int32_t>(i);
@@ -322,12 +327,15 @@ void Cycle::run_out() noexcept {
   if (run_out_scale_ <= 0.0) supervisor_.handle(Event::at_rest);
 }
 
-void Cycle::send_targets() noexcept {
+void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
   fieldbus::CanFrame frame;
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     fieldbus::ServoDrive& drive = parts_.drives[i].drive;
     drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
     if (drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame, static_cast<std::int32_t>(i));
+  }
+  for (DriveBus& bus : parts_.drive_buses) {
+    if (bus.heartbeat.due(t_k_ns, cycle_, frame)) send(bus.bus, frame, -1);
   }
 }
 

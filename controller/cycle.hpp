@@ -1,8 +1,9 @@
 // One period of the session, the same lines on hardware, on vcan, in-process and in tests; only bus and clock differ.
 //
-//   t_k        SYNC on every drive bus, heartbeat where one is due, then the sensor's poll
+//   t_k        SYNC on every drive bus, then the sensor's poll
 //   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
-//   then       judge ages and states, compensate, step the proxy (26), solve the arm, send the RPDOs, record
+//   then       judge ages and states, compensate, step the proxy (26), solve the arm, send the RPDOs (and, after them,
+//              the heartbeat where one is due), record
 //
 // The targets are latched by the drives at SYNC k+1 and, with their interpolation over the period, reached at k+2.
 //
@@ -19,6 +20,7 @@
 #include <vector>
 
 #include "controller/cycle_record.hpp"
+#include "controller/elastic_setpoint.hpp"
 #include "controller/orientation_proxy.hpp"
 #include "controller/rendered_world.hpp"
 #include "controller/session_settings.hpp"
@@ -34,6 +36,10 @@
 #include "models/inverse_kinematics.hpp"
 
 namespace proxarm::controller {
+
+// How long a cycle waits for feedback and samples, as a fraction of T; in what is left the targets are computed and
+// sent.
+inline constexpr double receive_window = 0.45;
 
 struct DriveOnBus {
   fieldbus::ServoDrive drive;
@@ -56,6 +62,7 @@ struct CycleParts {
   std::size_t sensor_bus;
   std::unique_ptr<models::Arm> arm;  // in one place for good: the inverse kinematics refers to it
   models::InverseKinematics inverse;
+  ElasticSetpoint elastic;
   std::unique_ptr<RenderedWorld> world;
   OrientationProxy orientation;
   WrenchCompensation compensation;
@@ -74,6 +81,9 @@ class Cycle {
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
   // The loop's owner: this many cycles in a row were late.
   void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
+
+  // After the last cycle: drives back to NMT pre-operational. Never fails.
+  void shut_down() noexcept;
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return rendered_cycles_; }
@@ -101,7 +111,7 @@ class Cycle {
   void render() noexcept;
   void follow_proxy() noexcept;
   void run_out() noexcept;
-  void send_targets() noexcept;
+  void send_targets(std::int64_t t_k_ns) noexcept;
   void send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept;
   void raise(Fault fault, std::int32_t where, double value = 0.0, double limit = 0.0) noexcept;
   void write_record(std::int64_t t_k_ns) noexcept;

@@ -7,6 +7,7 @@
 //   x = Uᵀ(q_W − o),   h = Uᵀ h_W,   q_W = q_start + U (x − x_start)
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "controller/admittance_proxy.hpp"
@@ -23,8 +24,8 @@ struct WorldStep {
   models::Vec3 f_W = models::Vec3::Zero();      // the world's force on it, (25a)
   models::Vec3 v_W = models::Vec3::Zero();
   models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
+  std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
   int contacts = 0;
-  std::int32_t object = -1;  // of the first contact, by its index in the scene; −1 when free
   bool slips = false;
   ProxyFault fault = ProxyFault::none;
 };

@@ -190,10 +190,10 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   if (i >= 2) {
     const Vec3 a_q = (q - 2.0 * q1 + q2) / (T * T), v_q = (q - q1) / T;
     const Vec3 pull_back = config.spring_N_per_m * (q - *start);
-    const double push = -n.dot(hand - m * a - (M - m) * a_q - B * v_q - pull_back);
-    contact_force.add(n.dot(vec3(now.contact_force_W_N)) - push);
+    const Vec3 resistance = hand - m * a - (M - m) * a_q - B * v_q - pull_back;
+    contact_force.add(n.dot(vec3(now.contact_force_W_N)) + n.dot(resistance));
+    if (contact_s - T > config.settle_s) slide(before, now, resistance);
   }
-  if (contact_s - T > config.settle_s) slide(before, now, hand - M * a - B * v - spring);
 }
 
 void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance) {

@@ -47,6 +47,7 @@ class HeartbeatConsumer {
   [[nodiscard]] bool lost(std::int64_t now_ns) const noexcept {
     return timeout_ns_ > 0 && heard_ && now_ns - last_ns_ > timeout_ns_;
   }
+  void stop_watching() noexcept { timeout_ns_ = 0; }
   void restart(std::int64_t now_ns) noexcept {
     heard_ = true;
     last_ns_ = now_ns;

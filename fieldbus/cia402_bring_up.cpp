@@ -84,16 +84,19 @@ DriveIdentity identity_of(const SdoSequence& sequence) {
           value(0x1018, 4), value(0x6502, 0), sequence.missing()};
 }
 
-std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler) {
+// The same exchange with every drive, side by side.
+template <class StepsOf>
+std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler, StepsOf steps_of) {
   std::vector<SdoSequence> sequences;
   sequences.reserve(drives.size());
   for (const DriveSlot& slot : drives) {
     const ServoDrive& drive = *slot.drive;
     sequences.emplace_back(network.bus(slot.bus), drive.node(), drive.description().bus,
-                           "drive of " + drive.description().joint, drive.configuration_steps(), drive.settings().sdo);
+                           "drive of " + drive.description().joint, steps_of(drive), drive.settings().sdo);
   }
   for (SdoSequence& sequence : sequences) sequence.start(network.now_ns());
-  std::vector<std::uint64_t> boot_ups(drives.size());  // at its first answer: one that restarts later forgets it all
+  std::vector<std::uint64_t> boot_ups;  // at its first answer: one that restarts later forgets it all
+  for (const DriveSlot& slot : drives) boot_ups.push_back(slot.drive->boot_ups());
   const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
     bool taken = false;
     for (std::size_t i = 0; i < sequences.size() && !taken; ++i) {
@@ -167,12 +170,14 @@ std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, co
     if (other) other(bus, received);
   };
   send_nmt(network, drives, NmtCommand::enter_pre_operational, "enter pre-operational");
-  std::vector<DriveIdentity> identities = configure(network, drives, handler);
+  std::vector<DriveIdentity> identities =
+      configure(network, drives, handler, [](const ServoDrive& drive) { return drive.configuration_steps(); });
   wait_for_state(network, drives, handler, NmtState::pre_operational,
                  "it took its configuration but doesn't stay in pre-operational: is another master on the bus?");
   send_nmt(network, drives, NmtCommand::start, "start");
   wait_for_state(network, drives, handler, NmtState::operational,
                  "it took its configuration but doesn't start: look at its display or its error list (1003h)");
+  configure(network, drives, handler, [](const ServoDrive& drive) { return drive.operation_steps(); });
   for (const DriveSlot& slot : drives) slot.drive->start_cycle(network.now_ns());
   return identities;
 }

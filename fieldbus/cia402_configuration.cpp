@@ -96,6 +96,11 @@ void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings
 
 }  // namespace
 
+std::vector<SdoStep> ServoDrive::operation_steps() const {
+  if (settings_.heartbeat_in_operation) return {};
+  return {sdo_write({0x1017, 0}, 2, 0, "producer heartbeat time")};
+}
+
 void DriveSettings::validate() const {
   const auto refuse_setting = [](const char* key, std::string found, std::string expected, std::string advice = "") {
     throw SetupError(

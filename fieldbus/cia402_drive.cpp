@@ -23,7 +23,11 @@ std::array<std::uint32_t, 6> ServoDrive::used_ids() const noexcept {
 
 void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
   cycling_ = true;
-  heartbeat_.restart(now_ns);
+  if (settings_.heartbeat_in_operation) {
+    heartbeat_.restart(now_ns);
+  } else {
+    heartbeat_.stop_watching();
+  }
   boot_ups_at_start_ = heartbeat_.boot_ups();
   cycles_without_tpdo_ = 0;
   fresh_ = true;  // nothing was due before the first SYNC

@@ -34,9 +34,12 @@ struct DriveSettings {
   std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01: without it the drives stop by themselves
   std::uint16_t drive_heartbeat_ms = 50;           // 1017h
   std::uint16_t drive_heartbeat_timeout_ms = 150;  // of the master for the drives
-  std::uint16_t rpdo_timeout_periods = 5;          // 1400h:05, rounded up to whole milliseconds
-  double following_error_window_rad = 0.05;        // 6065h, at the joint
-  std::uint16_t following_error_time_ms = 10;      // 6066h
+  // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which ends with NMT operational as well,
+  // says the same a hundred times as often, and heartbeats that coincide would cost a full bus its setpoints' deadline.
+  bool heartbeat_in_operation = true;
+  std::uint16_t rpdo_timeout_periods = 5;      // 1400h:05, rounded up to whole milliseconds
+  double following_error_window_rad = 0.05;    // 6065h, at the joint
+  std::uint16_t following_error_time_ms = 10;  // 6066h
   SdoSequenceConfig sdo{};
   std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
 
@@ -63,6 +66,8 @@ class ServoDrive {
 
   // ---- set-up ----
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
+  // What is left to write once it is in operational.
+  [[nodiscard]] std::vector<SdoStep> operation_steps() const;
   // What the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
   [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
   // All identifiers that the drive and the master use between them: those, RPDO1 and SDO requests.

@@ -51,6 +51,7 @@ class Arm {
   [[nodiscard]] const JointVector& lower_rad() const noexcept { return lower_rad_; }
   [[nodiscard]] const JointVector& upper_rad() const noexcept { return upper_rad_; }
   [[nodiscard]] const JointVector& start_rad() const noexcept { return start_rad_; }
+  [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept { return gear_stiffness_; }  // 0: rigid
 
   // Poses and Jacobian of T and S.
   void kinematics(const JointVector& q, ToolKinematics& out) const noexcept;

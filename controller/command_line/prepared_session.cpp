@@ -31,6 +31,11 @@ double sensor_delay_s(const description::SensorPlacement& sensor) {
   return delay_s;
 }
 
+// Of ElasticSetpoint's critically damped filter: 2/ω.
+double setpoint_filter_delay_s(const description::Cell& cell) {
+  return cell.limits.setpoint_bandwidth_Hz > 0.0 ? 2.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz) : 0.0;
+}
+
 // The slowest drive sets the pace.
 double drive_time_constant_s(const description::Cell& cell) {
   double slowest_s = 0.0;
@@ -56,7 +61,8 @@ PreparedSession prepare(const RunOptions& options) {
 
   // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
   session.loop.period_s = session.settings.period_s;
-  session.loop.delay_s = session.settings.period_s + sensor_delay_s(session.cell.sensor);
+  session.loop.delay_s =
+      session.settings.period_s + sensor_delay_s(session.cell.sensor) + setpoint_filter_delay_s(session.cell);
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
   session.loop.handle_mass_kg = session.cell.tool.mass_kg;
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
@@ -76,6 +82,10 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
                                    .expected = "--bus sim: an unstable mass is for simulation only"});
   }
   controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+}
+
+double motion_delay_s(const PreparedSession& session) {
+  return 2.0 * session.settings.period_s + setpoint_filter_delay_s(session.cell);
 }
 
 double total_delay_s(const PreparedSession& session) {

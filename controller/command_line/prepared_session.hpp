@@ -29,6 +29,10 @@ PreparedSession prepare(const RunOptions& options);
 // would be unstable (unless forced, which only a simulation may be).
 void require_stable(const PreparedSession& session, const RunOptions& options);
 
+// From the proxy's step to the links being where it went: latched at the next SYNC, reached a period later, and what
+// the filter of the setpoints takes.
+double motion_delay_s(const PreparedSession& session);
+
 // Total delay from a force on the handle to the arm being where the proxy went, in seconds.
 double total_delay_s(const PreparedSession& session);
 

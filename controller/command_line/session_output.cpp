@@ -1,5 +1,6 @@
 #include "controller/command_line/session_output.hpp"
 
+#include <cmath>
 #include <cstdio>
 
 #include "controller/command_line/effective_config.hpp"
@@ -8,6 +9,14 @@
 namespace proxarm::command_line {
 namespace {
 
+namespace fs = std::filesystem;
+using controller::CycleRecord;
+using controller::Fault;
+using controller::Summary;
+
+constexpr int fault_ended_the_run = 1;
+constexpr const char* default_plot = "proxarm-run.svg";
+
 controller::SummaryConfig summary_config(const PreparedSession& session) {
   controller::SummaryConfig config;
   config.period_s = session.settings.period_s;
@@ -15,6 +24,7 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   config.handle_mass_kg = session.cell.tool.mass_kg;
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
+  config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
   return config;
 }
 
@@ -24,77 +34,101 @@ std::vector<std::string> joint_names(const description::Cell& cell) {
   return names;
 }
 
-// Where the plot goes: as asked; with a record into its folder; else beside the user, but not under a program that
-// reads JSON.
-std::filesystem::path plot_file(const RunOptions& options) {
-  if (!options.plot) return {};
-  if (!options.plot_file.empty()) return options.plot_file;
-  if (!options.record_dir.empty()) return options.record_dir / "plot.svg";
-  return options.json ? std::filesystem::path() : std::filesystem::path("proxarm-run.svg");
+std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts) {
+  if (report.where < 0) return "";
+  const auto where = static_cast<std::size_t>(report.where);
+  if (report.fault == Fault::bus_off || report.fault == Fault::receive_overflow) {
+    return "bus " + parts.network.bus(where).name();
+  }
+  const fieldbus::ServoDrive& drive = parts.drives[where].drive;
+  std::string place = "drive of " + drive.description().joint + ", bus " + drive.description().bus + ", node " +
+                      std::to_string(drive.node());
+  if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled) place += ": " + drive.describe();
+  return place;
 }
 
 std::string plot_title(const PreparedSession& session) {
-  char text[200];
-  std::snprintf(text, sizeof text, "%s, %.4g kg, T = %.4g ms", session.scene.name.c_str(), session.settings.mass_kg,
+  char figures[96];
+  std::snprintf(figures, sizeof figures, ": %.4g kg felt, T = %.4g ms", session.settings.mass_kg,
                 1e3 * session.settings.period_s);
-  return text;
+  return session.scene.name + figures;
 }
 
 }  // namespace
 
 SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
     : session_(session), options_(options), builder_(summary_config(session)), progress_(session.duration_s) {
-  if (!plot_file(options).empty()) plot_.emplace(plot_title(session));
+  const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
+  if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, joint_names(session.cell), with_truth);
   writer_->write_file("effective.yaml", effective_config(session));
 }
 
-void SessionOutput::add(controller::CycleRecord record) {
-  using controller::RecordFlag;
-  const auto& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+void SessionOutput::introduce(const controller::CycleParts& parts) const {
+  if (options_.json) return;  // nothing but the summary goes to standard output then
+  const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad());
+  std::printf("%s, scene %s: %.4g kg felt, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
+              session_.scene.name.c_str(), session_.settings.mass_kg, 1e3 * session_.settings.period_s,
+              1e3 * total_delay_s(session_));
+  std::printf("the arm itself, without control: %.0f to %.0f kg at the tip, first mode %.1f Hz\n", tip.min_kg,
+              tip.max_kg, parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad()));
+  std::fflush(stdout);
+}
+
+void SessionOutput::add(CycleRecord record) {
+  const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
   record.proxy_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(record.proxy_W_m));
   record.tool_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(tool));
-  const auto object = static_cast<std::size_t>(record.contact_object);
-  if (record.contact_object >= 0 && object < session_.scene.objects.size()) {
-    record.friction = session_.scene.objects[object].friction;
+  if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session_.scene.objects.size()) {
+    record.friction = session_.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
   }
   builder_.add(record);
   if (writer_) writer_->add(record);
   if (plot_) plot_->add(record);
-  if (record.phase == controller::Phase::rendering && progress_.enabled()) show_progress(record);
-}
-
-void SessionOutput::show_progress(const controller::CycleRecord& record) {
-  if (begun_ns_ < 0) begun_ns_ = record.time_ns;
-  char note[64];
-  std::snprintf(note, sizeof note, "%s, hand %.1f N", controller::contact_phase_name(record.contact),
-                controller::vec3(record.force_W_N).norm());
-  progress_.update(1e-9 * static_cast<double>(record.time_ns - begun_ns_), note);
+  if (progress_.enabled()) {
+    const bool rendering = record.phase == controller::Phase::rendering;
+    progress_.update(static_cast<double>(record.time_ns) * 1e-9,
+                     rendering ? controller::contact_phase_name(record.contact) : controller::phase_name(record.phase));
+  }
 }
 
 void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
   if (writer_) writer_->add_frame(bus, frame, time_ns);
 }
 
-void SessionOutput::finish(const controller::Summary& summary) {
-  progress_.clear();
-  if (writer_) writer_->finish(summary);
-  std::string drawn;
-  if (plot_) {
-    const std::filesystem::path file = plot_file(options_);
-    const std::string warning = plot_->write(file);
-    if (!warning.empty()) std::fprintf(stderr, "warning: %s\n", warning.c_str());
-    if (warning.empty()) drawn = file.string();
+Summary SessionOutput::summary(const controller::Cycle& cycle) {
+  Summary summary = builder_.finish();
+  const controller::FaultReport& report = cycle.supervisor().report();
+  if (report.fault != Fault::none) {
+    summary.faults.push_back({report.fault, report.cycle, describe(report, place_of(report, cycle.parts()))});
   }
+  return summary;
+}
+
+int SessionOutput::finish(const Summary& summary) {
+  progress_.clear();
   if (options_.json) {
     std::printf("%s\n", controller::summary_json(summary).c_str());
   } else {
     std::printf("%s", controller::summary_text(summary).c_str());
-    if (!drawn.empty()) std::printf("  plot:                     %s\n", drawn.c_str());
-    if (writer_) std::printf("  record:                   %s\n", writer_->folder().string().c_str());
   }
   std::fflush(stdout);
+  draw_plot();
+  if (writer_) writer_->finish(summary);
+  return summary.faults.empty() ? 0 : fault_ended_the_run;
+}
+
+void SessionOutput::draw_plot() {
+  if (!plot_) return;
+  fs::path file = options_.plot_file;
+  if (file.empty()) file = options_.record_dir.empty() ? fs::path(default_plot) : options_.record_dir / "plot.svg";
+  const std::string warning = plot_->write(file);
+  if (!warning.empty()) {
+    std::fprintf(stderr, "proxarm: %s\n", warning.c_str());
+  } else if (!options_.json) {
+    std::printf("  plot:                     %s\n", file.c_str());
+  }
 }
 
 }  // namespace proxarm::command_line

@@ -2,12 +2,11 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 
 #include "controller/command_line/prepared_session.hpp"
-#include "controller/cycle_record.hpp"
+#include "controller/cycle.hpp"
 #include "controller/plot.hpp"
 #include "controller/progress.hpp"
 #include "controller/session_record.hpp"
@@ -21,27 +20,26 @@ class SessionOutput {
   // truth.
   SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
 
-  // Adds the distances to the scene and the friction of what is touched, which the cycle has no need of, and passes the
-  // record on. On a terminal it shows how far the run is.
+  // What the user should know before the arm moves.
+  void introduce(const controller::CycleParts& parts) const;
+  // Adds what only the scene knows (distances, friction), and passes the record on.
   void add(controller::CycleRecord record);
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
 
-  // Of all that was added; the caller fills in what only it knows before finish().
-  [[nodiscard]] controller::Summary summary() { return builder_.finish(); }
-  // Writes files, draws the plot (a warning on standard error where that isn't possible), prints the summary to
-  // standard output.
-  void finish(const controller::Summary& summary);
+  // Of all that was added and what the cycle found; the caller fills in what only it knows before finish().
+  [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle);
+  // Writes files, draws the plot, prints the summary to standard output. Returns the exit status.
+  int finish(const controller::Summary& summary);
 
  private:
-  void show_progress(const controller::CycleRecord& record);
+  void draw_plot();
 
   const PreparedSession& session_;
   const RunOptions& options_;
   controller::SummaryBuilder builder_;
-  std::unique_ptr<controller::SessionWriter> writer_;
-  std::optional<controller::PlotBuilder> plot_;
   controller::Progress progress_;
-  std::int64_t begun_ns_ = -1;  // of rendering
+  std::unique_ptr<controller::PlotBuilder> plot_;
+  std::unique_ptr<controller::SessionWriter> writer_;
 };
 
 }  // namespace proxarm::command_line

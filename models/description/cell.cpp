@@ -170,6 +170,7 @@ CellLimits read_limits(const YamlNode& node) {
       node.number_or("max_tool_acceleration_m_per_s2", limits.max_tool_acceleration_m_per_s2, above(0.0, 1000.0));
   limits.max_force_N = node.number_or("max_force_N", limits.max_force_N, above(0.0, 1e5));
   limits.leash_m = node.number_or("leash_m", limits.leash_m, above(0.0, 1.0));
+  limits.setpoint_bandwidth_Hz = node.number_or("setpoint_bandwidth_Hz", limits.setpoint_bandwidth_Hz, 0.0, 500.0);
   return limits;
 }
 

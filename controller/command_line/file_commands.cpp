@@ -1,0 +1,89 @@
+#include <yaml-cpp/yaml.h>
+
+#include <cstdio>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/data_files.hpp"
+#include "models/arm.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "models/description/setup_error.hpp"
+#include "scenes/compile.hpp"
+#include "scenes/scene_file.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int not_valid = 2;
+
+// What a file is, by a key that only its kind has.
+enum class Kind { cell, scene, hand, sensor };
+
+Kind kind_of(const fs::path& file) {
+  try {
+    const YAML::Node root = YAML::LoadFile(file.string());
+    if (root.IsMap()) {
+      if (root["drives"] || root["urdf"]) return Kind::cell;
+      if (root["protocol"]) return Kind::sensor;
+      if (root["waypoints"] || root["multisine"] || root["stiffness_N_per_m"]) return Kind::hand;
+    }
+  } catch (const YAML::Exception&) {  // the strict loader says what is wrong, and where
+  }
+  return Kind::scene;
+}
+
+const char* check(const fs::path& file) {
+  switch (kind_of(file)) {
+    case Kind::cell: {
+      const description::Cell cell = description::load_cell(file);
+      const models::Arm arm(cell);
+      description::load_sensor((cell.file.parent_path() / cell.sensor.description).lexically_normal());
+      return "cell";
+    }
+    case Kind::sensor:
+      description::load_sensor(file);
+      return "sensor";
+    case Kind::hand:
+      description::load_hand(file);
+      return "hand";
+    case Kind::scene:
+      scenes::compile(scenes::load_scene(file));
+      return "scene";
+  }
+  return "";
+}
+
+}  // namespace
+
+int check_command(const FileOptions& options) {
+  int status = 0;
+  for (const fs::path& given : options.files) {
+    try {
+      const char* kind = check(user_file(given));
+      std::printf("%s: fine, a %s\n", given.c_str(), kind);
+    } catch (const description::SetupError& error) {
+      std::fprintf(stderr, "proxarm: %s\n", error.what());
+      status = not_valid;
+    }
+  }
+  return status;
+}
+
+int explain_command(const FileOptions& options) {
+  for (const fs::path& given : options.files) {
+    const scenes::Scene scene = scenes::load_scene(user_file(given));
+    const scenes::CompiledScene compiled = scenes::compile(scene);
+    std::printf("%s: %s, %d dimensions\n", given.c_str(), compiled.name.c_str(), compiled.dimensions());
+    std::printf("a step goes through\n");
+    for (const scenes::Stage& stage : compiled.stages) std::printf("  %s: %s\n", stage.what.c_str(), stage.why.c_str());
+    std::printf("skipped\n");
+    for (const scenes::Stage& stage : compiled.skipped)
+      std::printf("  %s: %s\n", stage.what.c_str(), stage.why.c_str());
+  }
+  return 0;
+}
+
+}  // namespace proxarm::command_line

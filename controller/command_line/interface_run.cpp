@@ -1,0 +1,135 @@
+#include "controller/command_line/interface_run.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "controller/bring_up.hpp"
+#include "controller/command_line/bus_plan.hpp"
+#include "controller/command_line/realtime.hpp"
+#include "controller/command_line/session_output.hpp"
+#include "controller/command_line/signal_watch.hpp"
+#include "controller/frame_tap.hpp"
+#include "controller/session.hpp"
+#include "fieldbus/socket_can_network.hpp"
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using controller::Cycle;
+using controller::CycleRecord;
+using fieldbus::SocketCanNetwork;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, should a disk take that long
+constexpr std::size_t frame_capacity = 262144;
+constexpr auto drain_interval = std::chrono::milliseconds(5);
+
+std::vector<std::string> bus_names(const description::Cell& cell) {
+  std::vector<std::string> names;
+  for (const description::BusDescription& bus : cell.buses) names.push_back(bus.name);
+  return names;
+}
+
+void refuse_real_interfaces(const std::vector<std::string>& interfaces) {
+  for (const std::string& interface : interfaces) {
+    if (fieldbus::is_virtual_can(interface)) continue;
+    throw description::SetupError(
+        {.bus = interface,
+         .message = "this is a real CAN interface, and this version enables drives on virtual ones only (vcan, vxcan)",
+         .advice =
+             "limits and supervision for a person next to a moving arm aren't complete yet; use --bus sim or vcan"});
+  }
+}
+
+controller::BusIndices indices_in(const SocketCanNetwork& network, std::size_t buses) {
+  controller::BusIndices indices;
+  for (std::size_t i = 0; i < buses; ++i) indices.push_back(network.bus_of(i));
+  return indices;
+}
+
+void set_filters(SocketCanNetwork& network, const controller::CycleParts& parts) {
+  for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
+    std::vector<fieldbus::CanFilter> filters;
+    for (const std::uint32_t id : controller::wanted_ids(parts, bus)) filters.push_back({.id = id, .mask = 0x7FF});
+    network.set_filters(bus, filters);
+  }
+}
+
+// Takes records and frames out of the cycle's rings and hands them on, in a thread of its own.
+class Drain {
+ public:
+  Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output)
+      : records_(records), tap_(tap), output_(output), thread_([this] { loop(); }) {}
+  Drain(const Drain&) = delete;
+  Drain& operator=(const Drain&) = delete;
+  ~Drain() { finish(); }
+
+  void finish() {
+    if (!thread_.joinable()) return;
+    ended_.store(true, std::memory_order_release);
+    thread_.join();
+    drain();
+  }
+
+ private:
+  void loop() {
+    while (!ended_.load(std::memory_order_acquire)) {
+      drain();
+      std::this_thread::sleep_for(drain_interval);
+    }
+  }
+  void drain() {
+    CycleRecord record;
+    while (records_.pop(record)) output_.add(record);
+    controller::TappedFrame tapped;
+    while (tap_.frames().pop(tapped)) output_.add_frame(tap_.bus(tapped.bus).name(), tapped.frame, tapped.time_ns);
+  }
+
+  controller::SpscRing<CycleRecord>& records_;
+  controller::FrameTap& tap_;
+  SessionOutput& output_;
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+int run_on_interfaces(const PreparedSession& session, const RunOptions& options) {
+  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
+  SocketCanNetwork network(interfaces);
+  refuse_real_interfaces(interfaces);
+  const controller::BusIndices indices = indices_in(network, interfaces.size());
+  warn_if_not_carried(session, indices);
+
+  scenes::CompiledScene scene = scenes::compile(session.scene);
+  controller::FrameTap tap(network, frame_capacity);
+  controller::CycleParts parts =
+      controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices);
+  set_filters(network, parts);
+  SessionOutput output(session, options, false);
+  output.introduce(parts);
+  controller::bring_up(parts);
+
+  Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
+  SignalWatch signals([&](int) { cycle.request_stop(); });
+  Drain drain(cycle.records(), tap, output);
+  const SteadyClock::time_point begun = SteadyClock::now();
+  controller::SessionTally tally;
+  {
+    const RealtimeThread realtime;
+    tally = controller::run_session(cycle, tap, session.settings.period_s, session.duration_s, {});
+  }
+  const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
+  cycle.shut_down();
+  drain.finish();
+
+  controller::Summary summary = output.summary(cycle);
+  summary.wall_time_s = wall_s;
+  summary.overruns = tally.overruns;
+  return output.finish(summary);
+}
+
+}  // namespace proxarm::command_line

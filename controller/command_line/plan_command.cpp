@@ -1,0 +1,39 @@
+#include <cstdio>
+#include <numeric>
+
+#include "controller/command_line/bus_plan.hpp"
+#include "controller/command_line/commands.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+constexpr int not_carried = 1;
+
+// --bus maps several buses of the cell to one interface: they share its bits.
+controller::BusIndices indices_of(const std::vector<std::string>& interfaces) {
+  controller::BusIndices indices;
+  std::vector<std::string> seen;
+  for (const std::string& interface : interfaces) {
+    const auto found = std::find(seen.begin(), seen.end(), interface);
+    indices.push_back(static_cast<std::size_t>(found - seen.begin()));
+    if (found == seen.end()) seen.push_back(interface);
+  }
+  return indices;
+}
+
+}  // namespace
+
+int plan_command(const RunOptions& options) {
+  const PreparedSession session = prepare(options);
+  std::vector<std::string> names;
+  for (const description::BusDescription& bus : session.cell.buses) names.push_back(bus.name);
+  const controller::BusIndices indices = indices_of(options.bus.simulated() ? names : options.bus.interfaces(names));
+  bool all_fit = true;
+  for (const fieldbus::BusPlan& plan : plan_buses(session, indices)) {
+    std::printf("%s", fieldbus::plan_text(plan).c_str());
+    all_fit = all_fit && plan.fits;
+  }
+  return all_fit ? 0 : not_carried;
+}
+
+}  // namespace proxarm::command_line

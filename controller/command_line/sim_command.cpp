@@ -1,0 +1,41 @@
+#include <atomic>
+#include <cstdio>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/prepared_session.hpp"
+#include "controller/command_line/signal_watch.hpp"
+#include "fieldbus/socket_can_network.hpp"
+#include "models/description/setup_error.hpp"
+#include "sim/far_end_process.hpp"
+
+namespace proxarm::command_line {
+
+// Runs until SIGINT or SIGTERM.
+int sim_command(const RunOptions& options) {
+  if (options.bus.simulated()) {
+    throw description::SetupError({.key = "--bus",
+                                   .found = "sim",
+                                   .expected = "the CAN interfaces on which the simulated arm answers",
+                                   .advice = "for both in one process: proxarm run"});
+  }
+  const PreparedSession session = prepare(options);
+  std::vector<std::string> names;
+  for (const description::BusDescription& bus : session.cell.buses) names.push_back(bus.name);
+  std::atomic<bool> stop{false};
+  SignalWatch signals([&](int) { stop.store(true); });
+  std::fprintf(stderr, "proxarm sim: %s on the wire; Ctrl-C ends it\n", session.cell.name.c_str());
+  const sim::FarEndStatistics statistics =
+      sim::run_on_socketcan(session.cell, session.sensor, session.hand, options.bus.interfaces(names), stop);
+  std::fprintf(
+      stderr,
+      "proxarm sim: %llu frames received, %llu sent, %llu lost, %llu not sent; %llu late wake-ups, the latest by "
+      "%.3g ms\n",
+      static_cast<unsigned long long>(statistics.frames_received),
+      static_cast<unsigned long long>(statistics.frames_sent), static_cast<unsigned long long>(statistics.frames_lost),
+      static_cast<unsigned long long>(statistics.frames_not_sent),
+      static_cast<unsigned long long>(statistics.late_wake_ups),
+      1e-6 * static_cast<double>(statistics.latest_wake_up_ns));
+  return 0;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,90 @@
+#include "controller/command_line/simulated_run.hpp"
+
+#include <chrono>
+#include <numeric>
+
+#include "controller/command_line/signal_watch.hpp"
+#include "controller/session.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using controller::Cycle;
+using controller::CycleRecord;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::size_t record_capacity = 64;  // drained after every cycle
+
+std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
+  std::vector<fieldbus::SimulatedBusConfig> buses;
+  for (const description::BusDescription& bus : cell.buses) {
+    fieldbus::SimulatedBusConfig config;
+    config.name = bus.name;
+    config.bitrate = bus.bitrate;
+    config.data_bitrate = bus.data_bitrate;
+    buses.push_back(config);
+  }
+  return buses;
+}
+
+}  // namespace
+
+SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& options)
+    : session_(session),
+      options_(options),
+      network_(simulated_buses(session.cell)),
+      far_end_(session.cell, session.sensor, session.hand, network_.events()),
+      scene_(scenes::compile(session.scene)),
+      output_(session, options, true) {}
+
+int SimulatedRun::run() {
+  controller::BusIndices indices(session_.cell.buses.size());
+  std::iota(indices.begin(), indices.end(), std::size_t{0});
+  controller::CycleParts parts =
+      controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_, indices);
+  output_.introduce(parts);
+  if (!options_.record_dir.empty()) {
+    network_.set_observer(
+        [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
+  }
+  far_end_.attach_to(network_);
+  far_end_.power_on();
+  controller::bring_up(parts);
+  if (options_.pace == Pace::realtime) network_.follow_real_time();
+  return run_cycles(std::move(parts));
+}
+
+int SimulatedRun::run_cycles(controller::CycleParts parts) {
+  Cycle cycle(std::move(parts), session_.settings, session_.cell.limits, record_capacity);
+  SignalWatch signals([&](int) { cycle.request_stop(); });
+  for (std::size_t i = 0; i < network_.bus_count(); ++i) {
+    network_.simulated_bus(i).statistics().reset(network_.now_ns());
+  }
+  const SteadyClock::time_point begun = SteadyClock::now();
+  const controller::SessionHooks hooks{[this](std::int64_t) { truth_ = far_end_.truth(); },
+                                       [&] { drain(cycle.records()); }};
+  const controller::SessionTally tally =
+      controller::run_session(cycle, network_, session_.settings.period_s, session_.duration_s, hooks);
+  const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
+  cycle.shut_down();
+
+  controller::Summary summary = output_.summary(cycle);
+  summary.wall_time_s = wall_s;
+  summary.overruns = tally.overruns;
+  for (std::size_t i = 0; i < network_.bus_count(); ++i) {
+    summary.bus_load[network_.bus(i).name()] = network_.simulated_bus(i).load();
+  }
+  return output_.finish(summary);
+}
+
+void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
+  CycleRecord record;
+  while (records.pop(record)) {
+    record.set(controller::RecordFlag::truth);
+    record.true_tool_W_m = controller::triple(truth_.X_WT.translation());
+    record.hand_force_W_N = controller::triple(truth_.hand_force_W);
+    output_.add(record);
+  }
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,33 @@
+// `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
+#pragma once
+
+#include "controller/bring_up.hpp"
+#include "controller/command_line/prepared_session.hpp"
+#include "controller/command_line/session_output.hpp"
+#include "fieldbus/simulated_can_network.hpp"
+#include "sim/simulated_cell.hpp"
+
+namespace proxarm::command_line {
+
+class SimulatedRun {
+ public:
+  // Throws SetupError. `session` and `options` must outlive the run.
+  SimulatedRun(const PreparedSession& session, const RunOptions& options);
+
+  // Returns the exit status; throws SetupError while nothing has moved.
+  int run();
+
+ private:
+  int run_cycles(controller::CycleParts parts);
+  void drain(controller::SpscRing<controller::CycleRecord>& records);
+
+  const PreparedSession& session_;
+  const RunOptions& options_;
+  fieldbus::SimulatedCanNetwork network_;
+  sim::SimulatedCell far_end_;
+  scenes::CompiledScene scene_;
+  SessionOutput output_;
+  sim::Truth truth_;  // at the present cycle's SYNC
+};
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,45 @@
+// Motor setpoints that move the links, through gears that give, where the proxy wants them.
+//
+// Encoders sit on the motors, so a drive that follows exactly leaves the links ringing at the arm's elastic modes
+// (8–20 Hz, hardly damped). What moves after the force sensor then feeds that motion back as force, and below a few
+// kilograms of felt mass the loop is unstable: with a mass m_h after the sensor and a delay L, a mode ω of damping ζ
+// needs m_h/M < 2ζ/(ω L). So the setpoints are made from the arm's model instead:
+//
+//   q̈_f = ω²(q − q_f) − 2ω q̇_f                     a critically damped filter of the links' wanted angles q
+//   θ = q_f + K⁻¹[M(q_f) q̈_f + τ_g(q_f)]            motor angles whose gears carry just that acceleration and gravity
+//
+// Links that obey the model follow q_f without ringing and, at a wall, without overshoot; the price is a delay of 2/ω,
+// which the stability check counts. Coriolis torques are left out: at 0.5 m/s they bend the gears by some micrometres.
+// The hand's wrench isn't compensated: its reaction on the wrist, where the hand's mass is of the links' own size,
+// comes back too late and was found to make contact with a wall chatter. The filter is exact for a q that holds still
+// over the period. bandwidth_Hz = 0 leaves it out, and only gravity is compensated.
+//
+// Neither allocates, locks nor throws after construction.
+#pragma once
+
+#include "models/arm.hpp"
+
+namespace proxarm::controller {
+
+class ElasticSetpoint {
+ public:
+  // `arm` must outlive this.
+  ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s);
+
+  // At rest at these angles of the links.
+  void start(const models::JointVector& link_rad) noexcept;
+  // One period towards these angles; returns the motors'.
+  models::JointVector step(const models::JointVector& link_rad) noexcept;
+
+  // Where the links are meant to be now.
+  [[nodiscard]] const models::JointVector& link_rad() const noexcept { return angle_rad_; }
+
+ private:
+  const models::Arm* arm_;
+  double omega_rad_per_s_;
+  double decay_;  // exp(−ωT)
+  double period_s_;
+  models::JointVector angle_rad_, speed_rad_per_s_, inverse_stiffness_;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,44 @@
+// A network that is listened to: passes everything through, and leaves a copy of every frame in a ring.
+//
+// For records of runs on real interfaces, where nothing else sees all frames. Sent frames carry the time of send(), so
+// they are earlier in the log than on the wire by what the interface's queue and the bus make of them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "controller/spsc_ring.hpp"
+#include "fieldbus/can_network.hpp"
+
+namespace proxarm::controller {
+
+struct TappedFrame {
+  fieldbus::CanFrame frame;
+  std::int64_t time_ns = 0;
+  std::uint32_t bus = 0;
+};
+
+class FrameTap final : public fieldbus::CanNetwork {
+ public:
+  // `network` must outlive the tap.
+  FrameTap(fieldbus::CanNetwork& network, std::size_t capacity);
+  ~FrameTap() override;
+
+  [[nodiscard]] SpscRing<TappedFrame>& frames() noexcept { return frames_; }
+
+  [[nodiscard]] std::size_t bus_count() const noexcept override;
+  [[nodiscard]] fieldbus::CanBus& bus(std::size_t index) noexcept override;
+  [[nodiscard]] std::int64_t now_ns() const noexcept override { return network_.now_ns(); }
+  void sleep_until(std::int64_t deadline_ns) noexcept override { network_.sleep_until(deadline_ns); }
+  bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return network_.wait_for_frame(deadline_ns); }
+
+ private:
+  class TappedBus;
+
+  fieldbus::CanNetwork& network_;
+  SpscRing<TappedFrame> frames_;
+  std::vector<std::unique_ptr<TappedBus>> buses_;
+};
+
+}  // namespace proxarm::controller
