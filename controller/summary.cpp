@@ -168,7 +168,7 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   const double T = config.period_s, m = config.handle_mass_kg, M = config.felt_mass_kg, B = config.damping_Ns_per_m;
   const bool truth = before.has(RecordFlag::truth) && now.has(RecordFlag::truth) && after.has(RecordFlag::truth);
   const auto tool = [truth](const CycleRecord& r) { return vec3(truth ? r.true_tool_W_m : r.tool_W_m); };
-  const Vec3 x = tool(now), v = (tool(after) - tool(before)) / (2.0 * T);
+  const Vec3 x = tool(now);
   const Vec3 a = (tool(after) - 2.0 * x + tool(before)) / (T * T);
   const Vec3 hand = truth ? vec3(now.hand_force_W_N) : Vec3(vec3(now.force_W_N) + m * a);
 

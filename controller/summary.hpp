@@ -21,9 +21,9 @@
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
 //                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
-//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − M a − B v, t the direction of the slide: over all
-//                           cycles that slip on one thing, from settle_s after the contact began (before, the arm
-//                           still rings from the touch, and M a is not of the slide); at least 0.1 s and 1 mm of it
+//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, t the direction of the slide:
+//                           over all cycles that slip on one thing, from settle_s after the contact began; at least
+//                           0.1 s and 1 mm of it
 //   pulling_force_max_N     max(0, −n·f) over all cycles in contact with one thing
 //   setpoint_sha256         all target counts of all cycles (setpoint_hash.hpp), whatever the phase
 #pragma once
