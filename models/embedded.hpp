@@ -28,6 +28,8 @@ class Embedded final : public GeometricAlgorithm<N> {
   void set_time(const StepTime& time) noexcept override { space_->set_time(time); }
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return space_->unresolved_steps(); }
+
   static Vec3 lift(const Vec<N>& x) noexcept {
     Vec3 x3 = Vec3::Zero();
     x3.template head<N>() = x;

@@ -56,6 +56,10 @@ class GeometricAlgorithm {
 
   // The contacts of the last step that press (empty: free). Valid until the next call.
   [[nodiscard]] virtual std::span<const Contact<N>> contacts() const noexcept { return {}; }
+
+  // Steps so far for which the world had no answer that keeps all its laws (a proxy squeezed between moving objects,
+  // two faces that jam it) and a law was given up; worth a warning, and a fault if it goes on.
+  [[nodiscard]] virtual std::uint64_t unresolved_steps() const noexcept { return 0; }
 };
 
 }  // namespace proxarm::models

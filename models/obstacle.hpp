@@ -60,8 +60,7 @@ class Obstacle {
   // Where the object's own motion takes the point q until now; q itself for what stands still.
   [[nodiscard]] virtual Vec3 carry(const Vec3& q) const noexcept { return q; }
 
-  // How fast any point of the surface can move, m/s; bounds how long a clearance holds.
-  [[nodiscard]] virtual double speed() const noexcept { return 0.0; }
+  [[nodiscard]] virtual bool moves() const noexcept { return false; }
 
   virtual void set_time(double /*time_s*/, double /*period_s*/) noexcept {}
 };

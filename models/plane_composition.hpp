@@ -32,7 +32,7 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
 
   // Steps so far in which no set of contacts was complete and friction was left out. Zero unless faces meet at less
   // than 2 atan μ.
-  [[nodiscard]] std::uint64_t steps_without_friction() const noexcept { return without_friction_; }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return without_friction_; }
 
  private:
   struct Candidates;

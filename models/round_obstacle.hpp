@@ -98,12 +98,12 @@ struct Layer {
 template <typename Core>
 class RoundObstacle final : public Obstacle {
  public:
-  // inside: the free side is towards the core. Throws std::invalid_argument for a radius that isn't finite and ≥ 0 (or,
-  // from inside, positive), and for a friction that isn't finite and ≥ 0.
+  // inside: the free side is towards the core; with R = 0 the proxy is held on the core itself: a guide. Throws
+  // std::invalid_argument for a radius or a friction that isn't finite and ≥ 0.
   RoundObstacle(const Core& core, double radius_m, double friction, bool inside, const Layer& layer = {})
       : core_(core), R_(radius_m), mu_(friction), sign_(inside ? -1.0 : 1.0), layer_(layer) {
-    if (!std::isfinite(radius_m) || radius_m < 0.0 || (inside && !(radius_m > 0.0))) {
-      throw std::invalid_argument("a radius must be finite and positive");
+    if (!std::isfinite(radius_m) || !(radius_m >= 0.0)) {
+      throw std::invalid_argument("a radius must be finite and not negative");
     }
     if (!std::isfinite(friction) || !(friction >= 0.0)) {
       throw std::invalid_argument("a friction coefficient must be finite and not negative");

@@ -66,7 +66,7 @@ World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Obstacle& obstacle = *entries_[i].obstacle;
     const Bounds bounds = obstacle.bounds();
-    if (obstacle.speed() > 0.0) {
+    if (obstacle.moves()) {
       moving_.push_back(i);
     } else if (bounds.finite()) {
       leaves.push_back({bounds, i});

@@ -38,7 +38,7 @@ class World final : public GeometricAlgorithm<3> {
 
   // Steps so far for which no set of contacts was complete (a jam, or a tool deeper than a curved surface's radius):
   // the proxy then goes as far as a shorter step leads, or stays.
-  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept { return unresolved_; }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
 
  private:
   struct Candidates;

@@ -1,0 +1,111 @@
+// What acts on the proxy without a surface: viscous and Coulomb media, everywhere or within a shape, over any 𝒢.
+//
+// A viscous medium of b (Ns/m) adds −(b/T)(r − q) to ℳ. With the rest of the world as 𝒢', that is a stiffer coupling:
+//   𝒢(K, p, q) = 𝒢'(K + b/T, (K p + (b/T) q)/(K + b/T), q),
+// which alone gives q(k) = (K p + (b/T) q)/(K + b/T). A Coulomb medium of force F adds −F (r − q)/‖r − q‖ (16), which
+// is a viscous one of λ = F/‖r − q‖: with τ = λ/(κ + λ), κ = K + b/T,
+//   r(τ) = 𝒢'(κ/(1 − τ), p' + τ (q − p'), q),   κ τ/(1 − τ) ‖r(τ) − q‖ = F,
+// linear in τ where 𝒢' is free or slides on a plane; (3) is its solution there. Whether a medium acts is decided at q.
+// T is the step's period (at order 2 the effective one), so media need set_time().
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "models/geometric_algorithm.hpp"
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+struct Medium {
+  double damping_Ns_per_m = 0.0;
+  double force_N = 0.0;             // Coulomb
+  std::unique_ptr<Obstacle> shape;  // acts where its distance isn't positive; null: everywhere
+};
+
+template <int N>
+class Media final : public GeometricAlgorithm<N> {
+ public:
+  Media(std::unique_ptr<GeometricAlgorithm<N>> rest, std::vector<Medium> media, double period_s = 1e-3)
+      : rest_(std::move(rest)), media_(std::move(media)), T_(period_s) {}
+
+  Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
+    double c = 0.0, F = 0.0;
+    for (const Medium& medium : media_) {
+      if (medium.shape != nullptr && medium.shape->distance(lift(q)) > 0.0) continue;
+      c += medium.damping_Ns_per_m / T_;
+      F += medium.force_N;
+    }
+    const double kappa = K + c;
+    const Vec<N> p_v = c > 0.0 ? Vec<N>(q + (K / kappa) * (p - q)) : p;
+    return F > 0.0 ? coulomb(kappa, F, p_v, q) : (*rest_)(kappa, p_v, q);
+  }
+
+  void set_time(const StepTime& time) noexcept override {
+    if (time.period_s > 0.0) T_ = time.period_s;
+    rest_->set_time(time);
+  }
+  [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return rest_->contacts(); }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return rest_->unresolved_steps(); }
+
+ private:
+  static Vec3 lift(const Vec<N>& x) noexcept {
+    Vec3 x3 = Vec3::Zero();
+    x3.template head<N>() = x;
+    return x3;
+  }
+
+  Vec<N> coulomb(double kappa, double F, const Vec<N>& p, const Vec<N>& q) noexcept {
+    const Vec<N> d = q - p;
+    const auto at = [&](double tau) { return (*rest_)(kappa / (1.0 - tau), Vec<N>(p + tau * d), q); };
+    const auto excess = [&](double tau, const Vec<N>& r) { return kappa * tau / (1.0 - tau) * (r - q).norm() - F; };
+    // Free or at rest, (3) is the answer.
+    const double size = d.norm();
+    if (!(kappa * size > F)) {
+      // Nothing pulls harder than F, and contacts only take from it. They may still have moved onto the proxy.
+      const Vec<N> r = at(kHeld);
+      return (r - q).norm() <= kHeldMove * size ? q : r;
+    }
+    double low = 0.0, high = kHeld, tau = std::min(F / (kappa * size), kHeld);
+    Vec<N> r = at(tau);
+    double e = excess(tau, r), e_low = -F, e_high = 0.0;
+    if (std::abs(e) <= kClose * F) return r;
+    const Vec<N> held = at(kHeld);
+    e_high = excess(kHeld, held);
+    if (!(e_high > 0.0)) return q;  // even next to rest the world takes all but F
+    for (int k = 0, side = 0; k < 100; ++k) {
+      if (e < 0.0) {
+        low = tau;
+        e_low = e;
+        if (side == -1) e_high *= 0.5;
+        side = -1;
+      } else {
+        high = tau;
+        e_high = e;
+        if (side == 1) e_low *= 0.5;
+        side = 1;
+      }
+      tau = (low * e_high - high * e_low) / (e_high - e_low);
+      if (k % 8 == 7 || !(tau > low && tau < high)) tau = 0.5 * (low + high);
+      if (!(tau > low && tau < high)) break;
+      r = at(tau);
+      e = excess(tau, r);
+      if (std::abs(e) <= kClose * F) break;
+    }
+    return r;
+  }
+
+  // The limit τ → 1, where the proxy rests, is taken a millionth before it: the step there is a millionth of the way to
+  // p, far above rounding, and surfaces are flat at that scale.
+  static constexpr double kHeld = 1.0 - 1e-6;
+  static constexpr double kHeldMove = 1e-3;  // of the way to p; beyond this something has pushed the proxy
+  static constexpr double kClose = 1e-14;
+
+  std::unique_ptr<GeometricAlgorithm<N>> rest_;
+  std::vector<Medium> media_;
+  double T_;
+};
+
+}  // namespace proxarm::models
