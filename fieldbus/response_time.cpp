@@ -73,8 +73,8 @@ class Analysis {
     }
   }
 
-  // In step with every cycle, so that its place in the cycle is known.
-  [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time && frames_[k].every_cycles == 1; }
+  // Its place in the cycle is known, though it may not come in each.
+  [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time; }
   [[nodiscard]] std::int64_t every_ns(std::size_t k) const { return period_ns_ * frames_[k].every_cycles; }
 
   [[nodiscard]] FrameWindow release_of(std::size_t m) const {
@@ -175,11 +175,12 @@ class Analysis {
   [[nodiscard]] std::int64_t releases(const Competitor& k, std::int64_t start_ns, std::int64_t end_ns,
                                       bool phase_known) const {
     if (end_ns < start_ns) return 0;
-    if (!phase_known || !in_step(k.frame)) return 1 + (end_ns - start_ns + k.jitter_ns) / every_ns(k.frame);
+    const std::int64_t at_any_phase = 1 + (end_ns - start_ns + k.jitter_ns) / every_ns(k.frame);
+    if (!phase_known || !in_step(k.frame)) return at_any_phase;
     const std::int64_t release_ns = windows_[k.frame].release_ns;
     const std::int64_t last = last_cycle(k, end_ns);
     const std::int64_t before = floor_divide(start_ns - release_ns - k.jitter_ns - 1, period_ns_);
-    return std::max<std::int64_t>(last - before, 0);
+    return std::clamp<std::int64_t>(last - before, 0, at_any_phase);
   }
 
   // Start of m's transmission at worst, in a busy period that begins at start_ns; or no_bound.

@@ -168,6 +168,26 @@ TEST(BusBudget, TakesAFrameAsUrgentAsTheWeakestBeforeItInItsQueue) {
   EXPECT_EQ(plan.frames[2].response_ns, 3 * 55'000);  // the weak one is on the wire, the urgent one comes next
 }
 
+// Rare frames in step: the controller's heartbeat, behind its RPDOs once in 40 cycles, must not make the SYNC of the
+// next cycle wait, as it would if it could be queued at any moment.
+TEST(BusBudget, KnowsTheMomentOfARareFrameInStep) {
+  PlannedBus bus = axes_bus(3);
+  bus.frames.push_back({.name = "heartbeat",
+                        .id = 0x77f,
+                        .shape = {.bytes = 1},
+                        .sender = "controller",
+                        .release = 0.45,
+                        .every_cycles = 40});
+  bus.frames.push_back(
+      {.name = "a drive's heartbeat", .id = 0x701, .shape = {.bytes = 1}, .sender = "drives", .any_time = true});
+  const BusPlan plan = plan_bus(bus, ms);
+  EXPECT_TRUE(plan.fits);
+  EXPECT_EQ(plan.worst_bits, 745 + 2 * 65);
+  EXPECT_EQ(plan.frames[0].response_ns, 65'000 + 55'000);
+  EXPECT_EQ(plan.frames[3].finish_ns, 65'000 + 55'000 + 3 * 115'000) << "the last TPDO";
+  EXPECT_EQ(plan.frames[6].finish_ns, std::max(450'000 + 65'000, 465'000) + 3 * 115'000) << "the last RPDO";
+}
+
 std::string message_of(const PlannedBus& bus, std::int64_t period_ns = ms) {
   try {
     (void)plan_bus(bus, period_ns);
