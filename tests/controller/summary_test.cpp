@@ -120,8 +120,10 @@ TEST(Summary, FindsWhatIsWrong) {
   EXPECT_DOUBLE_EQ(s.tool_penetration_max_m, 2e-4);
   EXPECT_DOUBLE_EQ(s.tool_penetration_touch_max_m, 2e-4);
   EXPECT_DOUBLE_EQ(s.tool_penetration_sliding_max_m, 2e-4);
-  EXPECT_NEAR(*s.apparent_damping_Ns_per_m, 6.0, 0.03);
-  EXPECT_NEAR(*s.apparent_mass_kg, 4.0, 8e-3);
+  // As above, and B acts on the velocity 1.5 T later, which is felt as B · 1.5 T of mass.
+  const double w = 2 * std::numbers::pi * 0.7;
+  EXPECT_NEAR(*s.apparent_damping_Ns_per_m, 6.0 - 3.7 * w * w * T, 0.03);
+  EXPECT_NEAR(*s.apparent_mass_kg, 4.0 + 6.0 * 1.5 * T, 8e-3);
 
   Session lagging;
   lagging.lag_m = 1e-4;
