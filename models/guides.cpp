@@ -105,7 +105,7 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   if (direction == 0 && !corner) return report(on ? q : q_on, p, i, false);
   for (std::size_t visited = 0; visited <= 2 * pieces_.size(); ++visited) {
     const Piece& piece = pieces_[i];
-    if (to >= piece.begin && to <= piece.length && direction != 0 && to != s) {
+    if (to >= piece.begin && to <= piece.length && direction != 0) {
       return report(piece.a + to * piece.e, p, i, mu_ > 0.0);
     }
     // The end of the piece (or it doesn't move on it): does the next one lead on?
