@@ -24,6 +24,28 @@ std::uint64_t arbitration_key(const CanFrame& frame) noexcept {
   return (base << 22) | (3ull << 20) | (extension << 2) | (remote << 1) | fd;
 }
 
+// What a rule does to the content of a frame that it matches.
+void alter(CanFrame& frame, const FaultRule& rule) noexcept {
+  if (rule.action == FaultAction::corrupt) {
+    for (const BitFlip flip : rule.flips) {
+      if (flip.byte < frame.length) frame.data[flip.byte] ^= static_cast<std::uint8_t>(1u << (flip.bit & 7u));
+    }
+  } else if (rule.action == FaultAction::resize && is_valid_length(rule.length, frame.fd)) {
+    for (std::size_t i = rule.length; i < frame.data.size(); ++i) frame.data[i] = 0;
+    frame.length = rule.length;
+  }
+}
+
+bool fails_a_port(FaultAction action) noexcept {
+  return action == FaultAction::bus_off || action == FaultAction::port_down || action == FaultAction::error_passive;
+}
+
+BusState failed_state(FaultAction action) noexcept {
+  return action == FaultAction::bus_off     ? BusState::bus_off
+         : action == FaultAction::port_down ? BusState::down
+                                            : BusState::error_passive;
+}
+
 bool is_off(BusState state) noexcept { return state == BusState::bus_off || state == BusState::down; }
 
 void check(const SimulatedBusConfig& config) {
@@ -227,11 +249,7 @@ void SimulatedCanBus::pick_faults() noexcept {
     const std::uint64_t number = ++faults_[i].seen;
     if (number < rule.first || number - rule.first >= rule.count) continue;
     matched_.push_back(i);
-    if (rule.action == FaultAction::corrupt && rule.receiver.empty()) {
-      for (const BitFlip flip : rule.flips) {
-        if (flip.byte < current_.length) current_.data[flip.byte] ^= static_cast<std::uint8_t>(1u << (flip.bit & 7u));
-      }
-    }
+    if (rule.receiver.empty()) alter(current_, rule);
     if (rule.action == FaultAction::destroy) idle_ns_ += error_frame_ns_;
   }
 }
@@ -288,11 +306,7 @@ void SimulatedCanBus::deliver_to(Port& port) {
     if (!rule.receiver.empty() && rule.receiver != port.name()) continue;
     if (rule.action == FaultAction::drop) return;
     if (rule.action == FaultAction::delay) delay_ns += rule.delay_ns;
-    if (rule.action == FaultAction::corrupt && !rule.receiver.empty()) {
-      for (const BitFlip flip : rule.flips) {
-        if (flip.byte < frame.length) frame.data[flip.byte] ^= static_cast<std::uint8_t>(1u << (flip.bit & 7u));
-      }
-    }
+    if (!rule.receiver.empty()) alter(frame, rule);
   }
   if (delay_ns > 0) {
     deliver_later(port, frame, delay_ns);
@@ -342,24 +356,18 @@ void SimulatedCanBus::add_fault(const FaultRule& rule) {
                       .expected = "a port of this bus: " + names});
   };
   if (!rule.receiver.empty()) check_port(rule.receiver, "receiver");
-  switch (rule.action) {
-    case FaultAction::bus_off:
-    case FaultAction::port_down: {
-      check_port(rule.port, "port");
-      Port* port = find_port(rule.port);
-      const BusState state = rule.action == FaultAction::bus_off ? BusState::bus_off : BusState::down;
-      events_.schedule(rule.from_ns, [this, port, state] { change_state(*port, state); });
-      if (rule.to_ns != FaultRule::forever) {
-        events_.schedule(rule.to_ns, [this, port] { change_state(*port, BusState::error_active); });
-      }
-      return;
+  if (fails_a_port(rule.action)) {
+    check_port(rule.port, "port");
+    Port* port = find_port(rule.port);
+    events_.schedule(rule.from_ns, [this, port, state = failed_state(rule.action)] { change_state(*port, state); });
+    if (rule.to_ns != FaultRule::forever) {
+      events_.schedule(rule.to_ns, [this, port] { change_state(*port, BusState::error_active); });
     }
-    case FaultAction::babble:
-      babble(rule);
-      return;
-    default:
-      faults_.push_back({rule, 0});
-      matched_.reserve(faults_.size());
+  } else if (rule.action == FaultAction::babble) {
+    babble(rule);
+  } else {
+    faults_.push_back({rule, 0});
+    matched_.reserve(faults_.size());
   }
 }
 

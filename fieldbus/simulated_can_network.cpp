@@ -40,7 +40,8 @@ void SimulatedCanNetwork::apply(const FaultScript& script) {
       simulated_bus(rule.bus).add_fault(rule);
       continue;
     }
-    const bool fails_port = rule.action == FaultAction::bus_off || rule.action == FaultAction::port_down;
+    const bool fails_port = rule.action == FaultAction::bus_off || rule.action == FaultAction::port_down ||
+                            rule.action == FaultAction::error_passive;
     const std::string& port = fails_port ? rule.port : rule.receiver;
     bool found = false;
     for (const auto& bus : buses_) {

@@ -412,6 +412,31 @@ TEST_F(FaultScriptTest, CorruptsForOneReceiverOnly) {
   EXPECT_EQ(other.seen[0].frame.data[0], 1);
 }
 
+TEST_F(FaultScriptTest, CutsAFrameShortOrFillsItUp) {
+  apply({.action = FaultAction::resize, .id = 0x181, .mask = 0x7ff, .count = 1, .length = 2});
+  apply({.action = FaultAction::resize, .id = 0x182, .mask = 0x7ff, .receiver = "controller", .length = 8});
+  port.send(frame_of(0x181, {1, 2, 3, 4}));
+  port.send(frame_of(0x182, {1, 2, 3, 4}));
+  network.sleep_until(1'000'000);
+  TimedFrame timed;
+  ASSERT_TRUE(bus.receive(timed));
+  EXPECT_EQ(timed.frame, frame_of(0x181, {1, 2}));
+  ASSERT_TRUE(bus.receive(timed));
+  EXPECT_EQ(timed.frame, frame_of(0x182, {1, 2, 3, 4, 0, 0, 0, 0}));
+  ASSERT_EQ(other.seen.size(), 2u);
+  EXPECT_EQ(other.seen[1].frame.length, 4);
+}
+
+TEST_F(FaultScriptTest, ReportsErrorPassiveWhileTheTrafficGoesOn) {
+  apply({.action = FaultAction::error_passive, .from_ns = 1'000'000, .to_ns = 2'000'000});
+  network.sleep_until(1'500'000);
+  EXPECT_EQ(bus.status().state, BusState::error_passive);
+  EXPECT_EQ(bus.send(frame_of(1)), SendResult::sent);
+  network.sleep_until(2'000'000);
+  EXPECT_EQ(bus.status().state, BusState::error_active);
+  EXPECT_EQ(node.ids().size(), 1u);
+}
+
 TEST_F(FaultScriptTest, DuplicatesOnTheWire) {
   apply({.action = FaultAction::duplicate, .count = 1});
   port.send(frame_of(0x100));
