@@ -329,6 +329,9 @@ class PlanRunner {
 
 PlannedBus random_bus(std::mt19937& random) {
   PlannedBus bus{.name = "random", .frames = {{.name = "SYNC", .id = 0x080, .sender = "controller", .sync = true}}};
+  const bool fd = random() % 4 == 0;
+  if (fd) bus.data_bitrate = random() % 2 == 0 ? 2'000'000 : 5'000'000;
+  if (random() % 4 == 0) bus.bitrate = 500'000;
   const std::size_t count = 2 + random() % 7;
   std::vector<std::uint32_t> ids;
   for (std::size_t i = 0; i < count; ++i) {
@@ -338,7 +341,11 @@ PlannedBus random_bus(std::mt19937& random) {
       frame.id = static_cast<std::uint32_t>(random() % 0x7ff);
     } while (frame.id == 0x080 || std::find(ids.begin(), ids.end(), frame.id) != ids.end());
     ids.push_back(frame.id);
-    frame.shape.bytes = static_cast<int>(random() % 9);
+    frame.shape.extended = random() % 5 == 0;
+    if (frame.shape.extended) frame.id = frame.id << 18 | static_cast<std::uint32_t>(random() % 0x3ffff);
+    frame.shape.fd = fd && random() % 3 != 0;
+    frame.shape.bit_rate_switch = frame.shape.fd && random() % 4 != 0;
+    frame.shape.bytes = padded_length(static_cast<int>(random() % (frame.shape.fd ? 40 : 9)), frame.shape.fd);
     frame.sender = random() % 3 == 0 ? "controller" : "node " + std::to_string(random() % 3);
     const auto kind = static_cast<unsigned>(random() % 4);
     if (kind == 0 && frame.sender != "controller") {
@@ -387,7 +394,7 @@ TEST(BusBudget, NeverPredictsAResponseBelowOneSeen) {
     PlanRunner runner(bus, ms, seed);
     const BusStatistics& seen = runner.run(200);
     for (const FramePlan& frame : plan.frames) {
-      const IdentifierStatistics* statistics = seen.find(frame.id);
+      const IdentifierStatistics* statistics = seen.find(frame.id, frame.extended);
       if (statistics == nullptr) continue;
       ASSERT_LE(statistics->worst_response_ns, frame.response_ns) << "seed 21, bus " << n << ", " << frame.name << "\n"
                                                                   << plan_text(plan) << describe(bus);
