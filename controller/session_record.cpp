@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "fieldbus/candump_log.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::controller {
@@ -72,37 +73,6 @@ void append_flags(std::string& row, const CycleRecord& record) {
     if (!first) row += '|';
     row += flag.name;
     first = false;
-  }
-}
-
-// "(0000000001.000250) vcan0 181#0123456789AB", as candump -L has it. CAN FD: 181##1…, the first digit holds the flags
-// (bit 0: bit rate switch); remote: 181#R8; error frames: SocketCAN's eight digits with CAN_ERR_FLAG.
-void append_candump(std::string& line, std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
-  constexpr char digits[] = "0123456789ABCDEF";
-  constexpr std::uint32_t error_flag = 0x20000000u;
-  const std::uint64_t us = static_cast<std::uint64_t>(std::max<std::int64_t>(time_ns, 0)) / 1000;
-  const std::string seconds = std::to_string(us / 1'000'000);
-  line += '(';
-  line.append(seconds.size() < 10 ? 10 - seconds.size() : 0, '0');
-  line += seconds + "." + std::to_string(1'000'000 + us % 1'000'000).substr(1) + ") ";
-  line += bus;
-  line += ' ';
-  const bool eight = frame.extended || frame.error;
-  const std::uint32_t id = frame.error ? frame.id | error_flag : frame.id;
-  for (int shift = eight ? 28 : 8; shift >= 0; shift -= 4) line += digits[id >> shift & 0xF];
-  line += '#';
-  if (frame.remote) {
-    line += 'R';
-    if (frame.length > 0) line += std::to_string(frame.length);
-    return;
-  }
-  if (frame.fd) {
-    line += '#';
-    line += frame.bit_rate_switch ? '1' : '0';
-  }
-  for (const std::uint8_t byte : frame.bytes()) {
-    line += digits[byte >> 4];
-    line += digits[byte & 0xF];
   }
 }
 
@@ -231,8 +201,8 @@ void SessionWriter::add(const CycleRecord& record) {
 }
 
 void SessionWriter::add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
-  append_candump(frames_.buffer, bus, frame, time_ns);
-  frames_.buffer += '\n';
+  fieldbus::CandumpLine line;
+  frames_.buffer.append(line.data(), fieldbus::format_candump_line(line, time_ns, bus, frame));
   if (frames_.buffer.size() >= buffer_bytes) flush(frames_);
 }
 
