@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "models/flat_surface.hpp"
 
@@ -23,6 +24,8 @@ namespace proxarm::models {
 struct Face {
   FlatSurface<3> surface;
   double mu = 0.0;
+  std::int32_t object = -1;  // what contacts report; −1: its index
+  std::int32_t feature = 0;
 };
 
 // The line in which two faces meet.

@@ -173,8 +173,9 @@ Vec3 PlaneComposition::operator()(double /*K*/, const Vec3& p, const Vec3& q) no
     if (!search(p, q, candidates, choice)) return q;
   }
   for (std::size_t c = 0; c < 3 && choice.face[c] != kNone; ++c) {
-    contacts_[c] = {static_cast<std::int32_t>(choice.face[c]), 0, choice.slips[c],
-                    faces_[choice.face[c]].surface.normal()};
+    const Face& face = faces_[choice.face[c]];
+    contacts_[c] = {face.object < 0 ? static_cast<std::int32_t>(choice.face[c]) : face.object, face.feature,
+                    choice.slips[c], face.surface.normal()};
     ++count_;
   }
   return choice.r;

@@ -1,14 +1,21 @@
 #include "scenes/compile.hpp"
 
+#include <algorithm>
 #include <limits>
 
+#include "models/box_obstacle.hpp"
 #include "models/coulomb_field.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/embedded.hpp"
 #include "models/free_space.hpp"
 #include "models/friction_plane.hpp"
+#include "models/guides.hpp"
+#include "models/media.hpp"
 #include "models/plane.hpp"
 #include "models/plane_composition.hpp"
+#include "models/plane_obstacle.hpp"
+#include "models/world.hpp"
+#include "scenes/obstacles.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -18,20 +25,54 @@ using description::SetupError;
 using models::Vec;
 using models::Vec3;
 
-// A plane of W cut by the proxy's space: a half-space of fewer dimensions, or nothing.
 template <int N>
-struct Cut {
-  bool nothing = false;
+using Algorithm = CompiledScene::Algorithm<N>;
+
+SetupError refusal(const Scene& scene, int line, std::string message, std::string advice) {
+  return SetupError(
+      {.file = scene.file.string(), .line = line, .message = std::move(message), .advice = std::move(advice)});
+}
+
+// A plane of W cut by the proxy's space: a half-space of fewer dimensions.
+template <int N>
+struct HalfSpace {
+  const Object* object = nullptr;
+  std::int32_t index = 0;    // of the object in the scene
+  std::int32_t feature = 0;  // of the object
   Vec<N> point = Vec<N>::Zero();
   Vec<N> normal = Vec<N>::Zero();
 };
 
+// A sphere cut by the space: one of fewer dimensions.
+struct Ball {
+  const Object* object = nullptr;
+  std::int32_t index = 0;
+  Vec3 centre = Vec3::Zero();  // in coordinates of the space, then zeros
+  double radius_m = 0.0;
+  bool inside_out = false;
+};
+
+// All that the proxy's space has of a scene, sorted by what it takes to render it.
+template <int N>
+struct Cut {
+  std::vector<HalfSpace<N>> planes;  // flat, rigid and still, faces of boxes from inside among them
+  std::vector<Ball> balls;           // with N < 3 only
+  std::vector<std::pair<const Object*, std::int32_t>> others;
+};
+
+SetupError inside(const Scene& scene, const Object& object) {
+  return refusal(scene, object.line, "the proxy's space lies inside the object " + object.name,
+                 "move `space` or the object");
+}
+
 // n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W, not of length one where the cut is oblique.
 template <int N>
-Cut<N> cut(const Scene& scene, const Object& object, const PlaneShape& plane) {
+void cut_plane(const Scene& scene, const Object& object, std::int32_t index, std::int32_t feature,
+               const PlaneShape& plane, Cut<N>& cut, CompiledScene& out) {
   if constexpr (N == 3) {
     if (scene.space.axes.isIdentity(0.0) && scene.space.origin_m.isZero(0.0)) {
-      return {.point = plane.point_m, .normal = plane.normal};
+      cut.planes.push_back({&object, index, feature, plane.point_m, plane.normal});
+      return;
     }
   }
   const auto A = scene.space.axes.leftCols<N>();
@@ -41,35 +82,78 @@ Cut<N> cut(const Scene& scene, const Object& object, const PlaneShape& plane) {
   const double height = n.dot(scene.space.origin_m + A * near - plane.point_m);
   // A space that is parallel to the plane within rounding of both meets it nowhere or lies in it.
   if (m.norm() < 1e-12) {
-    if (height >= 0.0) return {.nothing = true};
-    throw SetupError({.file = scene.file.string(),
-                      .line = object.line,
-                      .message = "the proxy's space lies inside the object " + object.name,
-                      .advice = "move `space` or the object"});
+    if (height < 0.0) throw inside(scene, object);
+    out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
+    return;
   }
-  return {.point = near - m * (height / m.squaredNorm()), .normal = m};
+  cut.planes.push_back({&object, index, feature, near - m * (height / m.squaredNorm()), m});
 }
 
 template <int N>
-using Planes = std::vector<std::pair<const Object*, Cut<N>>>;
+void cut_sphere(const Scene& scene, const Object& object, std::int32_t index, const SphereShape& sphere, Cut<N>& cut,
+                CompiledScene& out) {
+  const auto A = scene.space.axes.leftCols<N>();
+  const Vec<N> near = A.transpose() * (sphere.centre_m - scene.space.origin_m);
+  const double away = (scene.space.origin_m + A * near - sphere.centre_m).norm();
+  if (!(away < sphere.radius_m)) {
+    if (sphere.inside_out) throw inside(scene, object);
+    out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
+    return;
+  }
+  cut.balls.push_back({&object, index, models::Embedded<N>::lift(near),
+                       std::sqrt((sphere.radius_m - away) * (sphere.radius_m + away)), sphere.inside_out});
+}
 
 template <int N>
-std::unique_ptr<models::GeometricAlgorithm<N>> compose(const Planes<N>& planes, CompiledScene& out) {
-  std::vector<models::Face> faces;
-  bool friction = false;
-  for (const auto& [object, half_space] : planes) {
-    const double mu = N > 1 ? object->friction : 0.0;
-    friction = friction || mu > 0.0;
-    faces.push_back({models::FlatSurface<3>(models::Embedded<N>::lift(half_space.point),
-                                            models::Embedded<N>::lift(half_space.normal)),
-                     mu});
+Cut<N> cut_scene(const Scene& scene, CompiledScene& out) {
+  Cut<N> cut;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const Object& object = scene.objects[i];
+    const auto index = static_cast<std::int32_t>(i);
+    const bool plain = !object.layer && !object.motion;
+    if (const auto* plane = std::get_if<PlaneShape>(&object.shape); plane != nullptr && plain) {
+      cut_plane<N>(scene, object, index, 0, *plane, cut, out);
+      continue;
+    }
+    if (const auto* box = std::get_if<BoxShape>(&object.shape); box != nullptr && plain && box->inside_out) {
+      std::int32_t feature = 0;
+      for (const auto& face : models::BoxObstacle::faces(box->pose_W, box->size_m)) {
+        cut_plane<N>(scene, object, index, feature++, {face.point(), Vec3(-face.normal())}, cut, out);
+      }
+      continue;
+    }
+    if constexpr (N < 3) {
+      const auto* sphere = std::get_if<SphereShape>(&object.shape);
+      if (sphere == nullptr || !plain) {
+        throw refusal(scene, object.line,
+                      "found " + object.name + " (" + kind_of(object.shape) + (object.layer ? " with a layer" : "") +
+                          (object.motion ? " that moves" : "") + ") in a scene of " + std::to_string(N) +
+                          (N == 1 ? " dimension" : " dimensions"),
+                      "use planes, spheres and boxes from inside there, or `dimensions: 3`");
+      }
+      cut_sphere<N>(scene, object, index, *sphere, cut, out);
+    } else {
+      cut.others.emplace_back(&object, index);
+    }
   }
-  out.stages.push_back(
-      {"composition of " + std::to_string(faces.size()) + " planes" + (friction ? " with friction" : ""),
-       "sets of at most three contacts, solved directly"});
-  if (!friction) out.skipped.push_back({"friction", "μ = 0 everywhere"});
-  out.skipped.push_back({"motion", "nothing moves"});
-  auto space = std::make_unique<models::PlaneComposition>(std::move(faces));
+  return cut;
+}
+
+template <int N>
+Algorithm<N> one_plane(const HalfSpace<N>& plane, CompiledScene& out) {
+  const Object& object = *plane.object;
+  out.skipped.push_back({"composition", "a single surface"});
+  if (object.friction > 0.0 && N > 1) {
+    out.stages.push_back({"wall with friction, equation (4)", object.name + ", μ = " + number_text(object.friction)});
+    return std::make_unique<models::FrictionPlane<N>>(plane.point, plane.normal, object.friction);
+  }
+  out.stages.push_back({"wall, equation (2)", object.name});
+  out.skipped.push_back({"friction", object.friction > 0.0 ? "a line has no tangent to slip along" : "μ = 0"});
+  return std::make_unique<models::Plane<N>>(plane.point, plane.normal);
+}
+
+template <int N>
+Algorithm<N> in_space(std::unique_ptr<models::GeometricAlgorithm<3>> space) {
   if constexpr (N == 3) {
     return space;
   } else {
@@ -78,49 +162,157 @@ std::unique_ptr<models::GeometricAlgorithm<N>> compose(const Planes<N>& planes, 
 }
 
 template <int N>
-std::unique_ptr<models::GeometricAlgorithm<N>> build(const Scene& scene, CompiledScene& out) {
-  Planes<N> planes;
-  for (const Object& object : scene.objects) {
-    const Cut<N> half_space = cut<N>(scene, object, std::get<PlaneShape>(object.shape));
-    if (half_space.nothing) {
-      out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
-    } else {
-      planes.emplace_back(&object, half_space);
-    }
+Algorithm<N> several_planes(const Cut<N>& cut, CompiledScene& out) {
+  std::vector<models::Face> faces;
+  bool friction = false;
+  for (const auto& plane : cut.planes) {
+    const double mu = N > 1 ? plane.object->friction : 0.0;
+    friction = friction || mu > 0.0;
+    faces.push_back(
+        {models::FlatSurface<3>(models::Embedded<N>::lift(plane.point), models::Embedded<N>::lift(plane.normal)), mu,
+         plane.index, plane.feature});
   }
-  if (!planes.empty() && scene.coulomb_force_N) {
-    throw SetupError({.file = scene.file.string(),
-                      .line = scene.coulomb_line,
-                      .key = "coulomb_field",
-                      .found = "a field together with objects",
-                      .expected = "either"});
-  }
-  if (scene.coulomb_force_N) {
-    out.stages.push_back(
-        {"Coulomb field, equation (3)", "coulomb_field of " + number_text(*scene.coulomb_force_N) + " N"});
-    out.skipped.push_back({"contacts", "no objects"});
-    return std::make_unique<models::CoulombField<N>>(*scene.coulomb_force_N);
-  }
-  if (planes.empty()) {
-    out.stages.push_back({"free space, q = p", "nothing to touch"});
-    out.skipped.push_back({"contacts", "no objects"});
-    out.skipped.push_back({"friction", "no objects"});
-    return std::make_unique<models::FreeSpace<N>>();
-  }
-  if (planes.size() > 1) return compose<N>(planes, out);
-  const auto& [object, half_space] = planes.front();
-  out.skipped.push_back({"composition", "a single object"});
-  out.skipped.push_back({"motion", "nothing moves"});
-  if (object->friction > 0.0 && N > 1) {
-    out.stages.push_back({"wall with friction, equation (4)", object->name + ", μ = " + number_text(object->friction)});
-    return std::make_unique<models::FrictionPlane<N>>(half_space.point, half_space.normal, object->friction);
-  }
-  out.stages.push_back({"wall, equation (2)", object->name});
-  out.skipped.push_back({"friction", object->friction > 0.0 ? "a line has no tangent to slip along" : "μ = 0"});
-  return std::make_unique<models::Plane<N>>(half_space.point, half_space.normal);
+  out.stages.push_back(
+      {"composition of " + std::to_string(faces.size()) + " planes" + (friction ? " with friction" : ""),
+       "sets of at most three contacts, solved directly"});
+  if (!friction) out.skipped.push_back({"friction", "μ = 0 everywhere"});
+  out.skipped.push_back({"search", "all surfaces are flat and few"});
+  return in_space<N>(std::make_unique<models::PlaneComposition>(std::move(faces)));
 }
 
-double distance(const PlaneShape& plane, const Vec3& x) { return plane.normal.normalized().dot(x - plane.point_m); }
+std::unique_ptr<models::Obstacle> moved(std::unique_ptr<models::Obstacle> still, const Object& object,
+                                        std::int32_t index, CompiledScene& out) {
+  if (!object.motion) return still;
+  if (!object.motion->driven) {
+    return std::make_unique<models::MovingObstacle>(std::move(still), script_of(*object.motion));
+  }
+  auto driven = std::make_unique<models::MovingObstacle>(std::move(still), models::Pose::Identity());
+  out.driven.emplace_back(index, driven.get());
+  return driven;
+}
+
+template <int N>
+Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
+  std::vector<models::World::Entry> entries;
+  std::size_t moving = 0, layers = 0, rubbing = 0;
+  for (const auto& plane : cut.planes) {
+    const double mu = N > 1 ? plane.object->friction : 0.0;
+    entries.push_back({std::make_unique<models::PlaneObstacle>(models::Embedded<N>::lift(plane.point),
+                                                               models::Embedded<N>::lift(plane.normal), mu),
+                       plane.index, plane.feature});
+  }
+  for (const Ball& ball : cut.balls) {
+    const double mu = N > 1 ? ball.object->friction : 0.0;
+    entries.push_back(
+        {std::make_unique<models::Sphere>(models::PointCore{ball.centre}, ball.radius_m, mu, ball.inside_out),
+         ball.index, 0});
+  }
+  for (const auto& [object, index] : cut.others) {
+    for (Part& part : parts_of(scene, *object)) {
+      entries.push_back({moved(std::move(part.obstacle), *object, index, out), index, part.feature});
+    }
+    layers += object->layer ? 1 : 0;
+  }
+  for (const Object& object : scene.objects) {
+    moving += object.motion ? 1 : 0;
+    rubbing += object.friction > 0.0 ? 1 : 0;
+  }
+  if (layers > 0 && scene.objects.size() > 1) {
+    throw refusal(scene, scene.objects.front().line, "found an elastic layer in a scene of several objects",
+                  "give a layer to an object that is alone in its scene (media may act with it)");
+  }
+  const bool many = entries.size() > 1;
+  out.stages.push_back({"clearance", moving > 0 ? "of no use here: something moves"
+                                                : "a step that can't reach anything is q = p, without a look"});
+  if (many)
+    out.stages.push_back({"search among " + std::to_string(entries.size()) + " surfaces", "by a tree of boxes"});
+  out.stages.push_back({std::string("contact") + (rubbing > 0 ? " with friction" : ""),
+                        "each surface alone, exactly" + std::string(many ? "; then pairs and triples" : "")});
+  if (layers > 0) out.stages.push_back({"elastic layer", scene.objects.front().name});
+  if (moving > 0) out.stages.push_back({"motion", std::to_string(moving) + " objects; q is carried along"});
+  if (!many) out.skipped.push_back({"composition", "a single surface"});
+  if (rubbing == 0) out.skipped.push_back({"friction", "μ = 0 everywhere"});
+  if (moving == 0) out.skipped.push_back({"motion", "nothing moves"});
+  if (layers == 0) out.skipped.push_back({"elastic layers", "none"});
+  return in_space<N>(std::make_unique<models::World>(std::move(entries)));
+}
+
+Algorithm<3> guide(const Scene& scene, const GuideDescription& guide, CompiledScene& out) {
+  if (!scene.objects.empty()) {
+    throw refusal(scene, guide.line_number, "found a guide together with objects", "use one of them in a scene");
+  }
+  out.skipped.push_back({"contacts", "no objects"});
+  if (!(guide.friction > 0.0)) out.skipped.push_back({"friction", "μ = 0"});
+  switch (guide.kind) {
+    case GuideDescription::Kind::plane:
+      out.stages.push_back({"guide", "on a plane, from both sides"});
+      return std::make_unique<models::PlaneGuide>(guide.points_m.front(), guide.direction, guide.friction);
+    case GuideDescription::Kind::polyline:
+      out.stages.push_back({"guide", "along " + std::to_string(guide.points_m.size()) + " points"});
+      return std::make_unique<models::PolylineGuide>(guide.points_m, guide.closed, guide.friction);
+    case GuideDescription::Kind::line:
+      break;
+  }
+  out.stages.push_back({"guide", "on a line"});
+  return std::make_unique<models::PolylineGuide>(
+      models::PolylineGuide::line(guide.points_m.front(), guide.direction, guide.friction));
+}
+
+template <int N>
+Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
+  if (scene.guide) {
+    if constexpr (N == 3) {
+      return guide(scene, *scene.guide, out);
+    } else {
+      throw refusal(scene, scene.guide->line_number, "found a guide in a scene of fewer than three dimensions",
+                    "a space of one or two dimensions is a guide already");
+    }
+  }
+  const Cut<N> cut = cut_scene<N>(scene, out);
+  if (cut.balls.empty() && cut.others.empty()) {
+    if (cut.planes.empty()) {
+      out.skipped.push_back({"contacts", "nothing to touch"});
+      return nullptr;
+    }
+    out.skipped.push_back({"motion", "nothing moves"});
+    if (cut.planes.size() == 1) return one_plane<N>(cut.planes.front(), out);
+    // Flat surfaces have no bounds that a tree could use; looking at each is as good, and this many are few.
+    if (cut.planes.size() <= 64) return several_planes<N>(cut, out);
+  }
+  return world<N>(scene, cut, out);
+}
+
+template <int N>
+Algorithm<N> build(const Scene& scene, CompiledScene& out) {
+  Algorithm<N> g = contacts<N>(scene, out);
+  std::vector<models::Medium> media;
+  for (const MediumDescription& medium : scene.media) {
+    if (medium.within && N < 3) {
+      throw refusal(scene, medium.line, "found a medium within a shape in a scene of fewer than three dimensions",
+                    "let it act everywhere, or use `dimensions: 3`");
+    }
+    media.push_back({medium.damping_Ns_per_m, medium.force_N, medium.within ? region_of(*medium.within) : nullptr});
+    out.stages.push_back({medium.force_N > 0.0 ? "Coulomb medium" : "viscous medium",
+                          medium.within ? "within a " + kind_of(*medium.within) : "everywhere"});
+  }
+  if (scene.coulomb_force_N) {
+    if (!g && media.empty()) {
+      out.stages.push_back({"Coulomb field, equation (3)", number_text(*scene.coulomb_force_N) + " N everywhere"});
+      return std::make_unique<models::CoulombField<N>>(*scene.coulomb_force_N);
+    }
+    media.push_back({0.0, *scene.coulomb_force_N, nullptr});
+    out.stages.push_back({"Coulomb field", number_text(*scene.coulomb_force_N) + " N everywhere, over the rest"});
+  }
+  if (!g) {
+    out.stages.push_back({"free space, q = p", "nothing to touch"});
+    g = std::make_unique<models::FreeSpace<N>>();
+  }
+  if (media.empty()) {
+    out.skipped.push_back({"media", "none"});
+    return g;
+  }
+  return std::make_unique<models::Media<N>>(std::move(g), std::move(media));
+}
 
 }  // namespace
 
@@ -142,11 +334,15 @@ CompiledScene compile(const Scene& scene) {
   return out;
 }
 
+void CompiledScene::drive(std::size_t object, const models::Pose& X) noexcept {
+  for (const auto& [index, part] : driven) {
+    if (static_cast<std::size_t>(index) == object) part->drive(X);
+  }
+}
+
 double clearance_m(const Scene& scene, const Vec3& x_W) {
   double least = std::numeric_limits<double>::infinity();
-  for (const Object& object : scene.objects) {
-    least = std::min(least, std::visit([&](const auto& shape) { return distance(shape, x_W); }, object.shape));
-  }
+  for (const Object& object : scene.objects) least = std::min(least, distance_to(object, x_W));
   return least;
 }
 

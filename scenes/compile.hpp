@@ -8,10 +8,12 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "models/geometric_algorithm.hpp"
+#include "models/moving_obstacle.hpp"
 #include "scenes/scene.hpp"
 
 namespace proxarm::scenes {
@@ -40,6 +42,11 @@ struct CompiledScene {
     return *std::get<Algorithm<N>>(any_algorithm);
   }
 
+  // Moves an object whose motion is `driven` (by its index in the scene) to X, relative to where it was described. Call
+  // it once before each step; the proxy feels the motion from the last call to this one.
+  void drive(std::size_t object, const models::Pose& X) noexcept;
+  std::vector<std::pair<std::int32_t, models::MovingObstacle*>> driven;  // parts of any_algorithm
+
   // Coordinates of the space ↔ points of W.
   template <int N>
   [[nodiscard]] models::Vec3 to_W(const models::Vec<N>& x) const noexcept {
@@ -55,8 +62,8 @@ struct CompiledScene {
 // say.
 CompiledScene compile(const Scene& scene);
 
-// How far x_W is from the nearest object, in metres; negative inside one. Infinite in an empty scene. For summaries and
-// tests, not for the cycle.
+// How far x_W is from the nearest object, in metres; negative inside one. Infinite in an empty scene. Objects that move
+// count where they are described, layers as gone. For summaries and tests, not for the cycle.
 double clearance_m(const Scene& scene, const models::Vec3& x_W);
 
 }  // namespace proxarm::scenes

@@ -29,13 +29,81 @@ struct PlaneShape {
   models::Vec3 normal = models::Vec3::UnitZ();  // any length but zero; points to the free side
 };
 
-using Shape = std::variant<PlaneShape>;
+// inside_out, of these and below: the proxy is held inside.
+struct BoxShape {
+  models::Pose pose_W = models::Pose::Identity();  // of its middle
+  models::Vec3 size_m = models::Vec3::Ones();      // full edges
+  bool inside_out = false;
+};
+
+struct SphereShape {
+  models::Vec3 centre_m = models::Vec3::Zero();
+  double radius_m = 1.0;
+  bool inside_out = false;
+};
+
+// All points within radius_m of the segment from from_m to to_m.
+struct CapsuleShape {
+  models::Vec3 from_m = models::Vec3::Zero();
+  models::Vec3 to_m = models::Vec3::UnitZ();
+  double radius_m = 1.0;
+  bool inside_out = false;
+};
+
+// With flat ends, in the middles from_m and to_m.
+struct CylinderShape {
+  models::Vec3 from_m = models::Vec3::Zero();
+  models::Vec3 to_m = models::Vec3::UnitZ();
+  double radius_m = 1.0;
+  bool inside_out = false;
+};
+
+using Shape = std::variant<PlaneShape, BoxShape, SphereShape, CapsuleShape, CylinderShape>;
+
+// The outer skin of an object, of this thickness, gives way by force over stiffness.
+struct ElasticLayer {
+  double thickness_m = 0.0;
+  double stiffness_N_per_m = 0.0;
+};
+
+// x(t) = c + R(ω t)(x − c) + v t + a sin(2π f t + φ), of an object that is described as it stands without all that.
+struct Motion {
+  models::Vec3 velocity_m_per_s = models::Vec3::Zero();
+  models::Vec3 amplitude_m = models::Vec3::Zero();
+  double frequency_Hz = 0.0;
+  double phase_rad = 0.0;
+  models::Vec3 axis = models::Vec3::UnitZ();  // any length but zero
+  models::Vec3 centre_m = models::Vec3::Zero();
+  double turn_rad_per_s = 0.0;
+  bool driven = false;  // by CompiledScene::drive() instead
+};
 
 struct Object {
   std::string name;  // unique in a scene; "plane 1" where the file gives none
   Shape shape;
   double friction = 0.0;  // μ, no unit
-  int line = 0;           // in the scene's file, for messages; 0: unknown
+  std::optional<ElasticLayer> layer;
+  std::optional<Motion> motion;
+  int line = 0;  // in the scene's file, for messages; 0: unknown
+};
+
+// Resists motion through it; see models/media.hpp.
+struct MediumDescription {
+  double damping_Ns_per_m = 0.0;
+  double force_N = 0.0;
+  std::optional<Shape> within;  // none: everywhere
+  int line = 0;
+};
+
+// Holds the proxy on a line, a plane or a polyline; see models/guides.hpp.
+struct GuideDescription {
+  enum class Kind { line, plane, polyline };
+  Kind kind = Kind::line;
+  std::vector<models::Vec3> points_m;              // one, or those of the polyline
+  models::Vec3 direction = models::Vec3::UnitX();  // of the line, or the plane's normal
+  bool closed = false;
+  double friction = 0.0;
+  int line_number = 0;
 };
 
 struct Scene {
@@ -43,8 +111,10 @@ struct Scene {
   std::string name;
   Space space;
   std::vector<Object> objects;
-  std::optional<double> coulomb_force_N;  // dry friction everywhere, equation (3)
+  std::vector<MediumDescription> media;
+  std::optional<double> coulomb_force_N;  // dry friction everywhere, equation (3); like a medium without `within`
   int coulomb_line = 0;
+  std::optional<GuideDescription> guide;
 };
 
 // What a shape is called in files and messages: "plane".

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "models/description/yaml_file.hpp"
@@ -17,44 +18,109 @@ using models::Vec3;
 // Coordinates beyond a hundred kilometres are a mistake of the unit, and would cost the proxy its exactness.
 constexpr description::Range kCoordinate = between(-1e5, 1e5);
 constexpr description::Range kFriction = between(0.0, 100.0);
+// Below a nanometre it is a mistake; the arm knows its position to micrometres.
+constexpr description::Range kLength = between(1e-9, 1e5);
+constexpr description::Range kSpeed = between(-100.0, 100.0);
 
 Vec3 vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
+Vec3 point_of(const YamlNode& node, std::string_view key) { return vector_of(node.vec3(key, kCoordinate)); }
+
 Vec3 direction_of(const YamlNode& node, std::string_view key) {
-  const Vec3 v = vector_of(node.vec3(key, kCoordinate));
+  const Vec3 v = point_of(node, key);
   if (!(v.norm() > 0.0))
     throw node.error_at(key, "a direction: three numbers, not all zero", "a vector of length zero");
   return v;
 }
 
 PlaneShape read_plane(const YamlNode& node) {
-  return {.point_m = vector_of(node.vec3("point_m", kCoordinate)), .normal = direction_of(node, "normal")};
+  return {.point_m = point_of(node, "point_m"), .normal = direction_of(node, "normal")};
 }
 
-Shape read_shape(const std::string& kind, const YamlNode& node) {
-  (void)kind;
-  return read_plane(node);
+BoxShape read_box(const YamlNode& node) {
+  BoxShape box;
+  box.pose_W.translation() = point_of(node, "centre_m");
+  const Vec3 rpy =
+      vector_of(node.vec3_or("rpy_rad", {0, 0, 0}, between(-2.0 * std::numbers::pi, 2.0 * std::numbers::pi)));
+  box.pose_W.linear() = (Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
+                         Eigen::AngleAxisd(rpy.x(), Vec3::UnitX()))
+                            .toRotationMatrix();
+  box.size_m = vector_of(node.vec3("size_m", kLength));
+  box.inside_out = node.boolean_or("inside_out", false);
+  return box;
+}
+
+SphereShape read_sphere(const YamlNode& node) {
+  return {.centre_m = point_of(node, "centre_m"),
+          .radius_m = node.number("radius_m", kLength),
+          .inside_out = node.boolean_or("inside_out", false)};
+}
+
+template <typename Bar>
+Bar read_bar(const YamlNode& node, bool may_be_short) {
+  Bar bar{.from_m = point_of(node, "from_m"),
+          .to_m = point_of(node, "to_m"),
+          .radius_m = node.number("radius_m", kLength),
+          .inside_out = node.boolean_or("inside_out", false)};
+  if (!may_be_short && !((bar.to_m - bar.from_m).norm() >= kLength.min)) {
+    throw node.error_at("to_m", "another point than from_m");
+  }
+  return bar;
 }
 
 const std::vector<std::string>& kinds() {
-  static const std::vector<std::string> all{"plane"};
+  static const std::vector<std::string> all{"plane", "box", "sphere", "capsule", "cylinder"};
   return all;
 }
 
-Object read_object(const YamlNode& entry) {
-  if (!entry.is_map()) throw entry.error("an object, such as `plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}`");
+Shape read_shape(const std::string& kind, const YamlNode& node) {
+  if (kind == "box") return read_box(node);
+  if (kind == "sphere") return read_sphere(node);
+  if (kind == "capsule") return read_bar<CapsuleShape>(node, true);
+  if (kind == "cylinder") return read_bar<CylinderShape>(node, false);
+  return read_plane(node);
+}
+
+// The one entry of `node` that names a shape.
+std::pair<std::string, YamlNode> shape_node(const YamlNode& node) {
+  if (!node.is_map()) throw node.error("an object, such as `plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}`");
   for (const std::string& kind : kinds()) {
-    const auto node = entry.find_map(kind);
-    if (!node) continue;
-    Object object;
-    object.line = node->line();
-    object.shape = read_shape(kind, *node);
-    object.name = node->string_or("name", "");
-    object.friction = node->number_or("friction", 0.0, kFriction);
-    return object;
+    if (const auto found = node.find_map(kind)) return {kind, *found};
   }
-  entry.finish();  // names an unknown kind, and the nearest known one
-  throw entry.error("an object: one of plane", "an empty map");
+  node.finish();  // names an unknown kind, and the nearest known one
+  throw node.error("an object: plane, box, sphere, capsule or cylinder", "an empty map");
+}
+
+Motion read_motion(const YamlNode& node) {
+  Motion motion;
+  motion.driven = node.boolean_or("driven", false);
+  motion.velocity_m_per_s = vector_of(node.vec3_or("velocity_m_per_s", {0, 0, 0}, kSpeed));
+  if (const auto swing = node.find_map("swing")) {
+    motion.amplitude_m = vector_of(swing->vec3("amplitude_m", between(-100.0, 100.0)));
+    motion.frequency_Hz = swing->number("frequency_Hz", above(0.0, 1000.0));
+    motion.phase_rad = swing->number_or("phase_rad", 0.0, between(-10.0, 10.0));
+  }
+  if (const auto turn = node.find_map("turn")) {
+    motion.axis = direction_of(*turn, "axis");
+    motion.centre_m = point_of(*turn, "centre_m");
+    motion.turn_rad_per_s = turn->number("speed_rad_per_s", kSpeed);
+  }
+  return motion;
+}
+
+Object read_object(const YamlNode& entry) {
+  const auto [kind, node] = shape_node(entry);
+  Object object;
+  object.line = node.line();
+  object.shape = read_shape(kind, node);
+  object.name = node.string_or("name", "");
+  object.friction = node.number_or("friction", 0.0, kFriction);
+  if (const auto layer = node.find_map("layer")) {
+    object.layer = ElasticLayer{.thickness_m = layer->number("thickness_m", kLength),
+                                .stiffness_N_per_m = layer->number("stiffness_N_per_m", above(0.0, 1e12))};
+  }
+  if (const auto motion = node.find_map("motion")) object.motion = read_motion(*motion);
+  return object;
 }
 
 Space read_space(const YamlNode& root) {
@@ -94,6 +160,58 @@ Space read_space(const YamlNode& root) {
   return space;
 }
 
+MediumDescription read_medium(const YamlNode& entry) {
+  if (!entry.is_map()) throw entry.error("a medium, such as `viscous: {damping_Ns_per_m: 20}`");
+  MediumDescription medium;
+  auto node = entry.find_map("viscous");
+  if (node) {
+    medium.damping_Ns_per_m = node->number("damping_Ns_per_m", above(0.0, 1e6));
+  } else if ((node = entry.find_map("coulomb"))) {
+    medium.force_N = node->number("force_N", above(0.0, 1e6));
+  } else {
+    entry.finish();
+    throw entry.error("a medium: viscous or coulomb", "an empty map");
+  }
+  medium.line = node->line();
+  if (const auto within = node->find_map("within")) {
+    const auto [kind, shape] = shape_node(*within);
+    medium.within = read_shape(kind, shape);
+  }
+  return medium;
+}
+
+GuideDescription read_guide(const YamlNode& guide_node) {
+  GuideDescription guide;
+  auto node = guide_node.find_map("line");
+  if (node) {
+    guide.points_m = {point_of(*node, "point_m")};
+    guide.direction = direction_of(*node, "direction");
+  } else if ((node = guide_node.find_map("plane"))) {
+    guide.kind = GuideDescription::Kind::plane;
+    guide.points_m = {point_of(*node, "point_m")};
+    guide.direction = direction_of(*node, "normal");
+  } else if ((node = guide_node.find_map("polyline"))) {
+    guide.kind = GuideDescription::Kind::polyline;
+    for (const YamlNode& point : node->list("points_m", 2, 100'000)) {
+      guide.points_m.push_back(vector_of(point.as_vec3(kCoordinate)));
+      const std::size_t n = guide.points_m.size();
+      if (n > 1 && guide.points_m[n - 1] == guide.points_m[n - 2]) {
+        throw point.error("another point than the one before");
+      }
+    }
+    guide.closed = node->boolean_or("closed", false);
+    if (guide.closed && guide.points_m.front() == guide.points_m.back()) {
+      throw node->error_at("points_m", "a last point that isn't the first again; `closed` leads back to it");
+    }
+  } else {
+    guide_node.finish();
+    throw guide_node.error("a guide: line, plane or polyline", "an empty map");
+  }
+  guide.friction = node->number_or("friction", 0.0, kFriction);
+  guide.line_number = node->line();
+  return guide;
+}
+
 Scene read_scene(const YamlNode& root) {
   Scene scene;
   scene.file = root.file();
@@ -103,25 +221,26 @@ Scene read_scene(const YamlNode& root) {
   if (root.has("objects")) {
     for (const YamlNode& entry : root.list("objects", 0, 1'000'000)) {
       Object object = read_object(entry);
-      const bool named = !object.name.empty();
-      if (!named) object.name = kind_of(object.shape) + " " + std::to_string(scene.objects.size() + 1);
-      if (!names.insert(object.name).second) {
-        throw entry.error("a name of its own for each object", object.name);
-      }
+      if (object.name.empty()) object.name = kind_of(object.shape) + " " + std::to_string(scene.objects.size() + 1);
+      if (!names.insert(object.name).second) throw entry.error("a name of its own for each object", object.name);
       scene.objects.push_back(std::move(object));
     }
+  }
+  if (root.has("media")) {
+    for (const YamlNode& entry : root.list("media", 0, 1000)) scene.media.push_back(read_medium(entry));
   }
   if (const auto field = root.find_map("coulomb_field")) {
     scene.coulomb_force_N = field->number("force_N", above(0.0, 1e6));
     scene.coulomb_line = field->line();
   }
+  if (const auto guide = root.find_map("guide")) scene.guide = read_guide(*guide);
   root.finish();
   return scene;
 }
 
 }  // namespace
 
-std::string kind_of(const Shape& /*shape*/) { return "plane"; }
+std::string kind_of(const Shape& shape) { return kinds()[shape.index()]; }
 
 Scene load_scene(const std::filesystem::path& file) { return read_scene(YamlNode::load(file)); }
 

@@ -96,6 +96,78 @@ TEST(Compile, ComposesPlanesInAnyDimension) {
   EXPECT_NEAR(one.algorithm<1>()(1.0, models::Vec<1>(3.0), models::Vec<1>(0.5))[0], 1.0, 1e-15);
 }
 
+TEST(Compile, KnowsEveryShape) {
+  const CompiledScene room = compile(load_scene(kScenes / "room.yaml"));
+  auto& g = room.algorithm<3>();
+  // Into the corner of the room: three faces of one box.
+  Vec3 q(0.7, 0, 0.6);
+  for (int k = 0; k < 50; ++k) q = g(1.0, q + Vec3(-0.02, 0.03, 0.05), q);
+  EXPECT_LE((q - Vec3(0.45, 0.25, 0.85)).norm(), 1e-14);
+  for (const auto& contact : g.contacts()) EXPECT_EQ(contact.object, 0);
+  // Down onto the ball.
+  q = Vec3(0.88, 0.1, 0.6);
+  for (int k = 0; k < 50; ++k) q = g(1.0, q - Vec3(0, 0, 0.01), q);
+  EXPECT_LE((q - Vec3(0.88, 0.1, 0.49)).norm(), 1e-14);
+  ASSERT_EQ(g.contacts().size(), 1u);
+  EXPECT_EQ(g.contacts()[0].object, 1);
+}
+
+TEST(Compile, GivesWayUnderALayer) {
+  auto scene = compile(load_scene(kScenes / "soft_wall.yaml"));
+  auto& g = scene.algorithm<3>();
+  Vec3 q(0.88, 0, 0.6);
+  for (int k = 0; k < 5000; ++k) q = g(1e6, q + Vec3(10.0 / 1e6, 0, 0), q);  // 10 N
+  EXPECT_NEAR(q.x(), 0.885, 1e-6);  // settled to e⁻¹⁰ of 5 mm
+}
+
+TEST(Compile, MovesWhatMoves) {
+  auto scene = compile(load_scene(kScenes / "moving_plate.yaml"));
+  auto& g = scene.algorithm<3>();
+  Vec3 q(0.85, 0, 0.6);
+  const double T = 1e-3;
+  double least = 1.0;
+  for (int k = 1; k <= 5000; ++k) {
+    g.set_time({.time_s = k * T, .period_s = T});
+    q = g(1e6, q, q);
+    least = std::min(least, q.x());
+  }
+  EXPECT_NEAR(least, 0.79, 1e-12);  // the plate's face at its foremost
+}
+
+TEST(Compile, DrivesFromOutside) {
+  auto scene = compile(parse_scene(
+      "objects:\n  - plane: {point_m: [0, 0, 0], normal: [0, 0, 1], motion: {driven: true}}\n", "driven.yaml"));
+  models::Pose X = models::Pose::Identity();
+  X.translation().z() = 0.3;
+  scene.drive(0, X);
+  const Vec3 q(0, 0, 0.1);
+  EXPECT_NEAR(scene.algorithm<3>()(1.0, q, q).z(), 0.3, 1e-15);
+}
+
+TEST(Compile, RefusesWhatCantBe) {
+  const auto refuses = [](const std::string& text) {
+    EXPECT_THROW(compile(parse_scene(text, "scene.yaml")), description::SetupError) << text;
+  };
+  const std::string two = "dimensions: 2\nspace: {axes: [[1, 0, 0], [0, 1, 0]]}\n";
+  refuses(two + "objects:\n  - capsule: {from_m: [0, 0, 0], to_m: [1, 0, 0], radius_m: 0.1}\n");
+  refuses(two + "guide: {line: {point_m: [0, 0, 0], direction: [1, 0, 0]}}\n");
+  refuses(two + "objects:\n  - sphere: {centre_m: [0, 0, 2], radius_m: 1, inside_out: true}\n");
+  refuses(
+      "objects:\n  - box: {centre_m: [0, 0, 0], size_m: [1, 1, 1], layer: {thickness_m: 0.1, stiffness_N_per_m: 1}}\n");
+  refuses(
+      "guide: {line: {point_m: [0, 0, 0], direction: [1, 0, 0]}}\n"
+      "objects:\n  - plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}\n");
+}
+
+TEST(Compile, CutsSpheresInFewerDimensions) {
+  const std::string ball =
+      "objects:\n  - sphere: {centre_m: [0, 0, 0.3], radius_m: 0.5, inside_out: true, friction: 0.3}\n";
+  auto two = compile(parse_scene("dimensions: 2\nspace: {axes: [[1, 0, 0], [0, 1, 0]]}\n" + ball, "two.yaml"));
+  EXPECT_NEAR(two.algorithm<2>()(1.0, {3, 4}, {0, 0}).norm(), 0.4, 1e-15);
+  auto one = compile(parse_scene("dimensions: 1\nspace: {axes: [[1, 0, 0]]}\n" + ball, "one.yaml"));
+  EXPECT_NEAR(one.algorithm<1>()(1.0, models::Vec<1>(-2.0), models::Vec<1>(0.1))[0], -0.4, 1e-15);
+}
+
 TEST(SceneFile, NamesEveryMistakeWithItsPlace) {
   const auto problem = [](const std::string& text) {
     try {
@@ -118,6 +190,14 @@ TEST(SceneFile, NamesEveryMistakeWithItsPlace) {
   has(problem("objects:\n  - plan: {point_m: [0, 0, 0], normal: [0, 0, 1]}\n"), "plane");
   has(problem("objects:\n  - {}\n"), "plane");
   has(problem("objects:\n  - 3\n"), "plane");
+  has(problem("objects:\n  - sphere: {centre_m: [0, 0, 0], radius_m: 0}\n"), "radius_m");
+  has(problem("objects:\n  - box: {centre_m: [0, 0, 0], size_m: [1, -1, 1]}\n"), "size_m");
+  has(problem("objects:\n  - cylinder: {from_m: [0, 0, 0], to_m: [0, 0, 0], radius_m: 1}\n"), "to_m");
+  has(problem("objects:\n  - sphere: {centre_m: [0, 0, 0], radius_m: 1, motion: {swing: {amplitude_m: [1, 0, 0]}}}\n"),
+      "frequency_Hz");
+  has(problem("guide: {polyline: {points_m: [[0, 0, 0], [0, 0, 0]]}}\n"), "another point");
+  has(problem("guide: {circle: {}}\n"), "circle");
+  has(problem("media:\n  - viscous: {damping_Ns_per_m: -1}\n"), "damping_Ns_per_m");
   has(problem("coulomb_field: {force_N: 0}\n"), "force_N");
   has(problem("dimensions: 4\n"), "dimensions");
   has(problem("dimensions: 2\n"), "space");

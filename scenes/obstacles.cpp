@@ -1,0 +1,131 @@
+#include "scenes/obstacles.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/box_obstacle.hpp"
+#include "models/cylinder_obstacle.hpp"
+#include "models/description/setup_error.hpp"
+#include "models/plane_obstacle.hpp"
+#include "models/round_obstacle.hpp"
+
+namespace proxarm::scenes {
+namespace {
+
+using models::Layer;
+using models::Vec3;
+
+Vec3 direction(const CylinderShape& c) { return (c.to_m - c.from_m).normalized(); }
+
+std::vector<Part> one(std::unique_ptr<models::Obstacle> obstacle) {
+  std::vector<Part> parts;
+  parts.push_back({std::move(obstacle), -1});
+  return parts;
+}
+
+struct MakeParts {
+  double mu;
+  Layer layer;
+
+  std::vector<Part> operator()(const PlaneShape& s) const {
+    return one(std::make_unique<models::PlaneObstacle>(s.point_m, s.normal, mu, layer));
+  }
+  std::vector<Part> operator()(const SphereShape& s) const {
+    return one(std::make_unique<models::Sphere>(models::PointCore{s.centre_m}, s.radius_m, mu, s.inside_out, layer));
+  }
+  std::vector<Part> operator()(const CapsuleShape& s) const {
+    return one(
+        std::make_unique<models::Capsule>(models::SegmentCore(s.from_m, s.to_m), s.radius_m, mu, s.inside_out, layer));
+  }
+  std::vector<Part> operator()(const BoxShape& s) const {
+    if (!s.inside_out) return one(std::make_unique<models::BoxObstacle>(s.pose_W, s.size_m, mu));
+    std::vector<Part> parts;
+    for (const auto& face : models::BoxObstacle::faces(s.pose_W, s.size_m)) {
+      parts.push_back({std::make_unique<models::PlaneObstacle>(face.point(), Vec3(-face.normal()), mu),
+                       static_cast<std::int32_t>(parts.size())});
+    }
+    return parts;
+  }
+  std::vector<Part> operator()(const CylinderShape& s) const {
+    if (!s.inside_out) return one(std::make_unique<models::CylinderObstacle>(s.from_m, s.to_m, s.radius_m, mu));
+    std::vector<Part> parts;
+    const Vec3 e = direction(s);
+    parts.push_back({std::make_unique<models::RoundBar>(models::LineCore{s.from_m, e}, s.radius_m, mu, true), 0});
+    parts.push_back({std::make_unique<models::PlaneObstacle>(s.to_m, Vec3(-e), mu), 1});
+    parts.push_back({std::make_unique<models::PlaneObstacle>(s.from_m, e, mu), 2});
+    return parts;
+  }
+};
+
+double segment_distance(const Vec3& a, const Vec3& b, const Vec3& x) {
+  return (x - models::SegmentCore(a, b).nearest(x)).norm();
+}
+
+struct Distance {
+  Vec3 x;
+
+  double operator()(const PlaneShape& s) const { return s.normal.normalized().dot(x - s.point_m); }
+  double operator()(const SphereShape& s) const { return side(s.inside_out, (x - s.centre_m).norm() - s.radius_m); }
+  double operator()(const CapsuleShape& s) const {
+    return side(s.inside_out, segment_distance(s.from_m, s.to_m, x) - s.radius_m);
+  }
+  double operator()(const BoxShape& s) const {
+    const Vec3 d = (s.pose_W.inverse() * x).cwiseAbs() - 0.5 * s.size_m;
+    return side(s.inside_out, d.cwiseMax(0.0).norm() + std::min(0.0, d.maxCoeff()));
+  }
+  double operator()(const CylinderShape& s) const {
+    const Vec3 e = direction(s), d = x - 0.5 * (s.from_m + s.to_m);
+    const double z = std::abs(e.dot(d)) - 0.5 * (s.to_m - s.from_m).norm();
+    const double across = (d - e * e.dot(d)).norm() - s.radius_m;
+    return side(s.inside_out, std::hypot(std::max(z, 0.0), std::max(across, 0.0)) + std::min(0.0, std::max(z, across)));
+  }
+
+ private:
+  static double side(bool inside_out, double distance) { return inside_out ? -distance : distance; }
+};
+
+}  // namespace
+
+std::vector<Part> parts_of(const Scene& scene, const Object& object) {
+  Layer layer;
+  if (object.layer) {
+    const bool smooth = std::holds_alternative<PlaneShape>(object.shape) ||
+                        std::holds_alternative<SphereShape>(object.shape) ||
+                        std::holds_alternative<CapsuleShape>(object.shape);
+    if (!smooth) {
+      throw description::SetupError({.file = scene.file.string(),
+                                     .line = object.line,
+                                     .key = "layer",
+                                     .found = "a layer on " + object.name,
+                                     .expected = "a plane, a sphere or a capsule under an elastic layer"});
+    }
+    layer = {object.layer->stiffness_N_per_m, object.layer->thickness_m};
+  }
+  return std::visit(MakeParts{object.friction, layer}, object.shape);
+}
+
+std::unique_ptr<models::Obstacle> region_of(const Shape& shape) {
+  Shape solid = shape;
+  std::visit(
+      [](auto& s) {
+        if constexpr (requires { s.inside_out; }) s.inside_out = false;
+      },
+      solid);
+  return std::move(std::visit(MakeParts{0.0, {}}, solid).front().obstacle);
+}
+
+models::ScriptedMotion script_of(const Motion& motion) {
+  return {.velocity_m_per_s = motion.velocity_m_per_s,
+          .amplitude_m = motion.amplitude_m,
+          .frequency_Hz = motion.frequency_Hz,
+          .phase_rad = motion.phase_rad,
+          .axis = motion.axis.normalized(),
+          .centre_m = motion.centre_m,
+          .turn_rad_per_s = motion.turn_rad_per_s};
+}
+
+double distance_to(const Object& object, const Vec3& x_W) {
+  return std::visit(Distance{x_W}, object.shape) + (object.layer ? object.layer->thickness_m : 0.0);
+}
+
+}  // namespace proxarm::scenes

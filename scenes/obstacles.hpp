@@ -1,0 +1,30 @@
+// From a scene's shapes to what a World is made of.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "models/moving_obstacle.hpp"
+#include "models/obstacle.hpp"
+#include "scenes/scene.hpp"
+
+namespace proxarm::scenes {
+
+// One obstacle of an object; several make a box or a cylinder that is seen from inside.
+struct Part {
+  std::unique_ptr<models::Obstacle> obstacle;
+  std::int32_t feature = -1;  // to be reported; −1: the obstacle's own
+};
+
+// The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on something with edges.
+std::vector<Part> parts_of(const Scene& scene, const Object& object);
+
+// The same shape as a region: solid, without friction.
+std::unique_ptr<models::Obstacle> region_of(const Shape& shape);
+
+models::ScriptedMotion script_of(const Motion& motion);
+
+// Signed distance from an object that stands where it was described; to what is rigid of it.
+double distance_to(const Object& object, const models::Vec3& x_W);
+
+}  // namespace proxarm::scenes
