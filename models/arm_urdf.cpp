@@ -4,6 +4,8 @@
 #include <tinyxml2.h>
 
 #include <array>
+#include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <set>
 #include <utility>
@@ -40,6 +42,40 @@ std::string linked(const Urdf& urdf, const tinyxml2::XMLElement& joint, const ch
   return attribute(urdf, *element, "link");
 }
 
+// What MuJoCo would pass over for links that don't move, or say without a line.
+void check_mass(const Urdf& urdf, const tinyxml2::XMLElement& link) {
+  const tinyxml2::XMLElement* inertial = link.FirstChildElement("inertial");
+  const tinyxml2::XMLElement* mass = inertial != nullptr ? inertial->FirstChildElement("mass") : nullptr;
+  if (mass == nullptr) return;
+  const std::string text = attribute(urdf, *mass, "value");
+  double value_kg = 0.0;
+  if (mass->QueryDoubleAttribute("value", &value_kg) == tinyxml2::XML_SUCCESS && value_kg >= 0.0 &&
+      std::isfinite(value_kg)) {
+    return;
+  }
+  throw SetupError({.file = urdf.file.string(),
+                    .line = mass->GetLineNum(),
+                    .key = "mass",
+                    .found = in_quotes(text),
+                    .expected = "a number of kg, zero or more"});
+}
+
+void check_axis(const Urdf& urdf, const tinyxml2::XMLElement& joint) {
+  const tinyxml2::XMLElement* axis = joint.FirstChildElement("axis");
+  if (axis == nullptr) return;  // URDF's default, x
+  const std::string text = attribute(urdf, *axis, "xyz");
+  double x = 0.0, y = 0.0, z = 0.0;
+  char rest = 0;
+  const int numbers = std::sscanf(text.c_str(), "%lf %lf %lf %c", &x, &y, &z, &rest);
+  const double length = std::hypot(x, y, z);
+  if (numbers == 3 && std::isfinite(length) && length > 0.0) return;
+  throw SetupError({.file = urdf.file.string(),
+                    .line = axis->GetLineNum(),
+                    .key = "axis",
+                    .found = in_quotes(text),
+                    .expected = "three numbers, not all zero"});
+}
+
 void read_joint(Urdf& urdf, const tinyxml2::XMLElement& element) {
   UrdfJoint joint{.name = attribute(urdf, element, "name"),
                   .type = attribute(urdf, element, "type"),
@@ -51,6 +87,7 @@ void read_joint(Urdf& urdf, const tinyxml2::XMLElement& element) {
                   "joint " + in_quotes(joint.name) + " has <mimic>, which isn't supported",
                   "replace the joint by a fixed one, or drive it");
   }
+  check_axis(urdf, element);
   for (const UrdfJoint& other : urdf.joints) {
     if (other.name == joint.name) {
       throw mistake(urdf.file, joint.line, "a second joint named " + in_quotes(joint.name),
@@ -74,6 +111,7 @@ void read_link(Urdf& urdf, tinyxml2::XMLElement& element) {
                     "the first is in line " + std::to_string(other.line));
     }
   }
+  check_mass(urdf, element);
   for (const char* shape : {"visual", "collision"}) {
     while (auto* child = element.FirstChildElement(shape)) element.DeleteChild(child);
   }

@@ -29,6 +29,12 @@ std::string numbers(const double* values, std::size_t count) {
   return text;
 }
 
+std::string one_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  for (std::size_t at = text.find('\n'); at != std::string::npos; at = text.find('\n', at)) text.replace(at, 1, ", ");
+  return text;
+}
+
 void read_urdf(const Cell& cell, tinyxml2::XMLDocument& document) {
   const std::string path = cell.urdf.string();
   if (document.LoadFile(path.c_str()) == tinyxml2::XML_SUCCESS) return;
@@ -133,7 +139,7 @@ ModelPointer compile(const Cell& cell, const std::string& urdf) {
   std::array<char, 1000> error{};
   ModelPointer model(mj_loadXML(name, vfs.get(), error.data(), static_cast<int>(error.size())));
   mj_deleteVFS(vfs.get());
-  if (!model) throw SetupError({.file = cell.urdf.string(), .message = std::string("MuJoCo: ") + error.data()});
+  if (!model) throw SetupError({.file = cell.urdf.string(), .message = "MuJoCo: " + one_line(error.data())});
   return model;
 }
 

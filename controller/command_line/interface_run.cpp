@@ -10,6 +10,7 @@
 #include "controller/command_line/realtime.hpp"
 #include "controller/command_line/session_output.hpp"
 #include "controller/command_line/signal_watch.hpp"
+#include "controller/command_line/start_check.hpp"
 #include "controller/frame_tap.hpp"
 #include "controller/session.hpp"
 #include "fieldbus/socket_can_network.hpp"
@@ -99,6 +100,7 @@ class Drain {
 
 int run_on_interfaces(const PreparedSession& session, const RunOptions& options) {
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
+  require_nodes_apart(session, interfaces);
   SocketCanNetwork network(interfaces);
   refuse_real_interfaces(interfaces);
   const controller::BusIndices indices = indices_in(network, interfaces.size());
@@ -110,8 +112,8 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
       controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices);
   set_filters(network, parts);
   SessionOutput output(session, options, false);
-  output.introduce(parts);
   controller::bring_up(parts);
+  output.introduce(parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
   SignalWatch signals([&](int) { cycle.request_stop(); });

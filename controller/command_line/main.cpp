@@ -2,6 +2,7 @@
 //
 // Exit status: 0 fine, 1 a fault ended the run, 2 set-up mistake.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <functional>
@@ -10,6 +11,8 @@
 #include "controller/command_line/commands.hpp"
 #include "models/description/quantity.hpp"
 #include "models/description/setup_error.hpp"
+#include "models/description/text.hpp"
+#include "sim/device_fault.hpp"
 
 namespace {
 
@@ -27,6 +30,38 @@ CLI::callback_t quantity(Parse parse, Store store) {
     store(parse(words.back()));
     return true;
   };
+}
+
+// One word out of a few.
+template <typename Value, typename Store>
+CLI::callback_t choice(std::string option, std::map<std::string, Value> choices, Store store) {
+  return [option = std::move(option), choices = std::move(choices), store](const CLI::results_t& words) {
+    const auto found = choices.find(words.back());
+    if (found == choices.end()) {
+      std::vector<std::string> known;
+      for (const auto& [word, value] : choices) known.push_back(word);
+      throw description::SetupError(
+          {.key = option, .found = description::in_quotes(words.back()), .expected = description::one_of(known)});
+    }
+    store(found->second);
+    return true;
+  };
+}
+
+// Scripted faults of simulated devices.
+void add_fault_option(CLI::App& app, RunOptions& options) {
+  app.add_option(
+         "--fault", CLI::callback_t([&](const CLI::results_t& words) {
+           for (const std::string& word : words) options.faults.push_back(sim::parse_device_fault(word));
+           return true;
+         }),
+         "simulated devices only, may be repeated: let one fail, as DEVICE:KIND[=VALUE][@FROM[..UNTIL]], times "
+         "counted from power on. DEVICE is a joint (KIND: silent, fault=EMCY code, device_type=VALUE, heartbeat, sdo, "
+         "power, jammed) or sensor (KIND: silent, samples, frozen, half, swapped, duplicated, short, status=BITS, "
+         "delay=US). Such as axis_2:silent@2s, axis_3:fault=0x4210@2s, sensor:frozen@1s..1.5s")
+      ->type_name("TEXT")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 void add_session_options(CLI::App& app, RunOptions& options) {
@@ -67,21 +102,60 @@ void add_session_options(CLI::App& app, RunOptions& options) {
 
 void add_run_options(CLI::App& app, RunOptions& options) {
   add_session_options(app, options);
-  const std::map<std::string, Pace> paces{{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}};
-  app.add_option("--pace", options.pace, "virtual (default in-process) or realtime")
-      ->transform(CLI::CheckedTransformer(paces).description("virtual|realtime"));
-  app.add_option("--order", options.settings.order, "1: eq. (26) (default); 2: its second-order sibling")
-      ->check(CLI::IsMember({1, 2}));
-  const std::map<std::string, controller::OrientationMode> modes{{"held", controller::OrientationMode::held},
-                                                                 {"free", controller::OrientationMode::free}};
-  app.add_option("--orientation", options.settings.orientation, "held (default) or free")
-      ->transform(CLI::CheckedTransformer(modes).description("held|free"));
+  add_fault_option(app, options);
+  app.add_option("--pace",
+                 choice<Pace>("--pace", {{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}},
+                              [&](Pace value) { options.pace = value; }),
+                 "virtual (default in-process) or realtime")
+      ->type_name("PACE");
+  app.add_option("--order",
+                 choice<int>("--order", {{"1", 1}, {"2", 2}}, [&](int value) { options.settings.order = value; }),
+                 "1: eq. (26) (default); 2: its second-order sibling")
+      ->type_name("1|2");
+  using controller::OrientationMode;
+  app.add_option(
+         "--orientation",
+         choice<OrientationMode>("--orientation", {{"held", OrientationMode::held}, {"free", OrientationMode::free}},
+                                 [&](OrientationMode value) { options.settings.orientation = value; }),
+         "held (default) or free")
+      ->type_name("held|free");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
   app.add_flag("!--no-plot", options.plot, "draw no plot");
   app.add_flag("--json", options.json, "print the summary as one JSON object");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");
+}
+
+// CLI11's message in one line, with the nearest word that is known.
+int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
+  std::vector<std::string> commands;
+  for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
+  const CLI::App* chosen = app.get_subcommands().empty() ? nullptr : app.get_subcommands().front();
+  std::string message = error.what(), advice = "see proxarm --help";
+  if (chosen != nullptr) {
+    advice = "see proxarm " + chosen->get_name() + " --help";
+    std::vector<std::string> known;
+    for (const CLI::Option* option : chosen->get_options()) {
+      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    }
+    for (int i = 2; i < argc; ++i) {
+      const std::string word = argv[i], name = word.substr(0, word.find('='));
+      if (word.substr(0, 2) != "--" || std::find(known.begin(), known.end(), name) != known.end()) continue;
+      message = "unknown option " + description::in_quotes(name);
+      const std::string near = description::nearest(name, known);
+      if (!near.empty()) message += "; did you mean " + near + "?";
+      break;
+    }
+  } else {
+    const std::string word = argc > 1 ? argv[1] : "";
+    message = (word.empty() ? "found no command" : "found " + description::in_quotes(word)) + ", expected " +
+              description::one_of(commands);
+    const std::string near = description::nearest(word, commands);
+    if (!near.empty()) message += "; did you mean " + near + "?";
+  }
+  std::fprintf(stderr, "proxarm: %s; %s\n", message.c_str(), advice.c_str());
+  return set_up_mistake;
 }
 
 int run(int argc, char** argv) {
@@ -100,6 +174,7 @@ int run(int argc, char** argv) {
 
   CLI::App* sim_app = app.add_subcommand("sim", "the simulated arm as a process of its own on CAN interfaces");
   add_session_options(*sim_app, sim_options);
+  add_fault_option(*sim_app, sim_options);
   sim_app->callback([&] { command = [&] { return command_line::sim_command(sim_options); }; });
 
   CLI::App* plan_app = app.add_subcommand("plan", "bus budget of a cell; status 1 if it can't be carried");
@@ -117,7 +192,8 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error, std::cout, std::cerr) == 0 ? 0 : set_up_mistake;
+    if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);  // help, version
+    return refuse_command_line(app, argc, argv, error);
   }
   return command();
 }

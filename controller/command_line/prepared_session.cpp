@@ -1,9 +1,13 @@
 #include "controller/command_line/prepared_session.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "controller/command_line/data_files.hpp"
+#include "fieldbus/cia402_units.hpp"
 #include "models/description/setup_error.hpp"
 #include "scenes/scene_file.hpp"
 
@@ -45,6 +49,28 @@ double drive_time_constant_s(const description::Cell& cell) {
   return slowest_s;
 }
 
+// Below, no machine's cycle can be; above, no hand would call it touch. What a drive can hold exactly is in between.
+constexpr double shortest_period_s = 50e-6, longest_period_s = 0.1;
+
+void require_period(const PreparedSession& session, const RunOptions& options) {
+  const double period_s = session.settings.period_s;
+  std::array<char, 32> found{};
+  std::snprintf(found.data(), found.size(), "%.9g ms", 1e3 * period_s);
+  const auto refuse = [&](const char* expected, const char* advice) {
+    throw description::SetupError({.file = options.period_s ? "" : session.cell.file.string(),
+                                   .key = options.period_s ? "--timestep" : "default_period_s",
+                                   .found = found.data(),
+                                   .expected = expected,
+                                   .advice = advice});
+  };
+  if (!(period_s >= shortest_period_s && period_s <= longest_period_s)) refuse("0.05 to 100 ms", "");
+  const std::int64_t period_ns = std::llround(1e9 * period_s);
+  if (period_ns % 1000 != 0 || !fieldbus::interpolation_period(period_ns)) {
+    refuse("what drives can hold exactly: 1 to 255 times a power of ten of seconds (60C2h), in whole microseconds",
+           "such as 0.5ms, 1ms, 1.5ms, 2ms, 4ms");
+  }
+}
+
 }  // namespace
 
 PreparedSession prepare(const RunOptions& options) {
@@ -58,6 +84,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.settings.period_s = options.period_s.value_or(session.cell.default_period_s);
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
   session.duration_s = options.duration_s;
+  require_period(session, options);
 
   // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
   session.loop.period_s = session.settings.period_s;
@@ -81,7 +108,15 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
                                    .found = "a bus that isn't simulated",
                                    .expected = "--bus sim: an unstable mass is for simulation only"});
   }
-  controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+  try {
+    controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+  } catch (const description::SetupError& error) {
+    if (options.mass_kg) throw;
+    description::SetupProblem problem = error.problem();
+    problem.file = session.cell.file.string();
+    problem.key = "default_mass_kg";
+    throw description::SetupError(problem);
+  }
 }
 
 double motion_delay_s(const PreparedSession& session) {

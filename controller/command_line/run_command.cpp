@@ -3,22 +3,38 @@
 #include "controller/command_line/interface_run.hpp"
 #include "controller/command_line/prepared_session.hpp"
 #include "controller/command_line/simulated_run.hpp"
+#include "controller/command_line/start_check.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::command_line {
 
-int run_command(const RunOptions& options) {
-  const PreparedSession session = prepare(options);
-  require_stable(session, options);
-  if (options.bus.simulated()) {
-    require_carried(session);
-    return SimulatedRun(session, options).run();
+namespace {
+
+void refuse_for_interfaces(const RunOptions& options) {
+  if (!options.faults.empty()) {
+    throw description::SetupError({.key = "--fault",
+                                   .found = "a bus that isn't simulated",
+                                   .expected = "--bus sim, where devices can be made to fail",
+                                   .advice = "on an interface, give it to `proxarm sim`"});
   }
   if (options.pace == Pace::virtual_time) {
     throw description::SetupError({.key = "--pace",
                                    .found = "virtual with --bus on an interface",
                                    .expected = "realtime: the kernel's interfaces live by the machine's clock",
                                    .advice = "leave --pace away, or use --bus sim"});
+  }
+}
+
+}  // namespace
+
+int run_command(const RunOptions& options) {
+  if (!options.bus.simulated()) refuse_for_interfaces(options);
+  const PreparedSession session = prepare(options);
+  require_usable_start(session);
+  require_stable(session, options);
+  if (options.bus.simulated()) {
+    require_carried(session);
+    return SimulatedRun(session, options).run();
   }
   return run_on_interfaces(session, options);
 }

@@ -34,7 +34,9 @@ BusMapping BusMapping::parse(const std::string& text) {
       continue;
     }
     const std::string bus = part.substr(0, equals), interface = part.substr(equals + 1);
-    if (bus.empty() || interface.empty()) refuse("'" + part + "'", "NAME=INTERFACE");
+    if (bus.empty() || interface.empty() || interface.find('=') != std::string::npos) {
+      refuse("'" + part + "'", "NAME=INTERFACE");
+    }
     if (!mapping.by_bus_.emplace(bus, interface).second) refuse("'" + bus + "' twice", "each bus once");
   }
   if (mapping.simulated()) refuse("'" + text + "'", "sim, one interface, or NAME=INTERFACE,NAME=INTERFACE,…");

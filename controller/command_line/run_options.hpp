@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controller/session_settings.hpp"
+#include "sim/device_fault.hpp"
 
 namespace proxarm::command_line {
 
@@ -44,6 +45,7 @@ struct RunOptions {
   bool plot = true;
   bool json = false;
   bool force_unstable = false;
+  std::vector<sim::DeviceFault> faults;  // of the simulated devices
 };
 
 }  // namespace proxarm::command_line

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "controller/command_line/effective_config.hpp"
+#include "models/description/setup_error.hpp"
 #include "scenes/compile.hpp"
 
 namespace proxarm::command_line {
@@ -58,11 +59,22 @@ std::string plot_title(const PreparedSession& session) {
 
 SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
     : session_(session), options_(options), builder_(summary_config(session)), progress_(session.duration_s) {
+  refuse_lost_plot();
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, joint_names(session.cell), with_truth);
   writer_->write_file("effective.yaml", effective_config(session));
+}
+
+// Better now than after the run that it was to show.
+void SessionOutput::refuse_lost_plot() const {
+  const fs::path folder = options_.plot_file.parent_path();
+  std::error_code ignored;
+  if (folder.empty() || fs::is_directory(folder, ignored)) return;
+  throw description::SetupError({.key = "--plot",
+                                 .found = description::in_quotes(options_.plot_file.string()),
+                                 .expected = "a file in a folder that is there"});
 }
 
 void SessionOutput::introduce(const controller::CycleParts& parts) const {

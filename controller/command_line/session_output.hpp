@@ -32,6 +32,7 @@ class SessionOutput {
   int finish(const controller::Summary& summary);
 
  private:
+  void refuse_lost_plot() const;
   void draw_plot();
 
   const PreparedSession& session_;

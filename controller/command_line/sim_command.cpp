@@ -4,6 +4,7 @@
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/prepared_session.hpp"
 #include "controller/command_line/signal_watch.hpp"
+#include "controller/command_line/start_check.hpp"
 #include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/far_end_process.hpp"
@@ -22,10 +23,18 @@ int sim_command(const RunOptions& options) {
   std::vector<std::string> names;
   for (const description::BusDescription& bus : session.cell.buses) names.push_back(bus.name);
   std::atomic<bool> stop{false};
+  const std::vector<std::string> interfaces = options.bus.interfaces(names);
+  require_nodes_apart(session, interfaces);
+  fieldbus::SocketCanNetwork network(interfaces);
+  std::vector<std::size_t> interface_of_bus;
+  for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
+  sim::SimulatedCellConfig config;
+  config.faults = options.faults;
+  sim::FarEndProcess process(session.cell, session.sensor, session.hand, network, interface_of_bus, config);
   SignalWatch signals([&](int) { stop.store(true); });
   std::fprintf(stderr, "proxarm sim: %s on the wire; Ctrl-C ends it\n", session.cell.name.c_str());
-  const sim::FarEndStatistics statistics =
-      sim::run_on_socketcan(session.cell, session.sensor, session.hand, options.bus.interfaces(names), stop);
+  process.run(stop);
+  const sim::FarEndStatistics statistics = process.statistics();
   std::fprintf(
       stderr,
       "proxarm sim: %llu frames received, %llu sent, %llu lost, %llu not sent; %llu late wake-ups, the latest by "

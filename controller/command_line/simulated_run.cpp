@@ -27,13 +27,19 @@ std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cel
   return buses;
 }
 
+sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
+  sim::SimulatedCellConfig config;
+  config.faults = options.faults;
+  return config;
+}
+
 }  // namespace
 
 SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& options)
     : session_(session),
       options_(options),
       network_(simulated_buses(session.cell)),
-      far_end_(session.cell, session.sensor, session.hand, network_.events()),
+      far_end_(session.cell, session.sensor, session.hand, network_.events(), far_end_config(options)),
       scene_(scenes::compile(session.scene)),
       output_(session, options, true) {}
 
@@ -42,7 +48,6 @@ int SimulatedRun::run() {
   std::iota(indices.begin(), indices.end(), std::size_t{0});
   controller::CycleParts parts =
       controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_, indices);
-  output_.introduce(parts);
   if (!options_.record_dir.empty()) {
     network_.set_observer(
         [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
@@ -50,6 +55,7 @@ int SimulatedRun::run() {
   far_end_.attach_to(network_);
   far_end_.power_on();
   controller::bring_up(parts);
+  output_.introduce(parts);
   if (options_.pace == Pace::realtime) network_.follow_real_time();
   return run_cycles(std::move(parts));
 }

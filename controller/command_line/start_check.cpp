@@ -1,0 +1,98 @@
+#include "controller/command_line/start_check.hpp"
+
+#include <cstdio>
+#include <limits>
+
+#include "models/arm.hpp"
+#include "models/description/setup_error.hpp"
+#include "models/inverse_kinematics.hpp"
+#include "scenes/compile.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using description::SetupError;
+using models::Vec3;
+
+std::string point_text(const Vec3& point_W) {
+  char text[96];
+  std::snprintf(text, sizeof text, "x %.4f, y %.4f, z %.4f m", point_W.x(), point_W.y(), point_W.z());
+  return text;
+}
+
+void require_regular(const PreparedSession& session, const models::Arm& arm) {
+  const models::InverseKinematics inverse(arm);
+  models::InverseKinematicsResult result;
+  inverse.solve(arm.start_rad(), arm.tool_pose(arm.start_rad()), result);
+  const double smallest = result.smallest_singular_value_m_per_rad, limit = inverse.config().singular_m_per_rad;
+  if (smallest >= limit) return;
+  char found[160];
+  std::snprintf(found, sizeof found, "a singular pose (smallest singular value %.2g m/rad)", smallest);
+  throw SetupError({.file = session.cell.file.string(),
+                    .key = "start_rad",
+                    .found = found,
+                    .expected = "a pose from which the tool can move in all directions, at least " +
+                                description::number_text(limit) + " m/rad",
+                    .advice = "bend the elbow and the wrist, such as axes 3 and 5"});
+}
+
+// The object that the point is deepest in, as a scene of its own has it.
+const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
+  const scenes::Object* found = nullptr;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const scenes::Object& object : scene.objects) {
+    scenes::Scene alone;
+    alone.objects.push_back(object);
+    const double clearance_m = scenes::clearance_m(alone, point_W);
+    if (clearance_m >= least_m) continue;
+    least_m = clearance_m;
+    found = &object;
+  }
+  return found;
+}
+
+void require_outside(const PreparedSession& session, const Vec3& start_W) {
+  const double clearance_m = scenes::clearance_m(session.scene, start_W);
+  if (clearance_m >= 0.0) return;
+  const scenes::Object* object = deepest(session.scene, start_W);
+  char depth[32];
+  std::snprintf(depth, sizeof depth, "%.3g m", -clearance_m);
+  throw SetupError({.file = session.scene.file.string(),
+                    .line = object != nullptr ? object->line : 0,
+                    .key = object != nullptr ? object->name : "objects",
+                    .found = "the start of the tool (" + point_text(start_W) + ") " + depth + " inside",
+                    .expected = "a start in free space",
+                    .advice = "move or turn the object, or change start_rad in the cell file"});
+}
+
+}  // namespace
+
+void require_usable_start(const PreparedSession& session) {
+  const models::Arm arm(session.cell);
+  require_regular(session, arm);
+  require_outside(session, arm.tool_pose(arm.start_rad()).translation());
+}
+
+void require_nodes_apart(const PreparedSession& session, const std::vector<std::string>& interfaces) {
+  const auto interface_of = [&](const description::DriveDescription& drive) {
+    std::size_t i = 0;
+    while (i + 1 < interfaces.size() && session.cell.buses[i].name != drive.bus) ++i;
+    return interfaces[i];
+  };
+  const auto& drives = session.cell.drives;
+  for (std::size_t second = 0; second < drives.size(); ++second) {
+    for (std::size_t first = 0; first < second; ++first) {
+      if (drives[first].node != drives[second].node) continue;
+      if (interface_of(drives[first]) != interface_of(drives[second])) continue;
+      throw SetupError({.bus = interface_of(drives[second]),
+                        .node = drives[second].node,
+                        .key = "--bus",
+                        .found = "the drives of " + drives[first].joint + " and " + drives[second].joint +
+                                 " with one node on one interface",
+                        .expected = "each node once on an interface",
+                        .advice = "set one of them to another node, or give their buses an interface each"});
+    }
+  }
+}
+
+}  // namespace proxarm::command_line

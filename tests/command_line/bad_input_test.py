@@ -1,0 +1,307 @@
+"""Bad input: one clear line each, exit status 2, nothing on standard output, nothing enabled."""
+import os
+import subprocess
+import unittest
+
+from harness import SOURCE, ProgramTest, program
+
+CELL = "models/cells/default.yaml"
+URDF = "models/arms/arm150.urdf"
+START = "start_rad: [0, 0.0675, 0.5008, 0, 1.0025, 0]"
+
+
+class Files(ProgramTest):
+    def test_a_missing_file_is_named(self):
+        for option in ([], ["--scene"], ["--hand"]):
+            self.assert_refused(self.call("run", *option, "nowhere.yaml"), "nowhere.yaml: no such file")
+        self.assert_refused(self.call("check", "nowhere.yaml"), "nowhere.yaml: no such file")
+
+    def test_a_folder_is_no_file(self):
+        for option in ([], ["--scene"], ["--hand"]):
+            self.assert_refused(self.call("run", *option, "/tmp"), "/tmp: is a folder")
+
+    def test_an_unreadable_file_is_named(self):
+        file = self.written("secret.yaml", "name: secret\n")
+        file.chmod(0)
+        if os.access(file, os.R_OK):
+            self.skipTest("this user reads files whatever their mode")
+        self.assert_refused(self.call("run", "--scene", file), "secret.yaml", "permission")
+
+    def test_a_binary_is_no_text(self):
+        file = self.folder / "binary.yaml"
+        file.write_bytes(b"name: \xff\xfe\x00\x01")
+        for option in ([], ["--scene"], ["--hand"]):
+            self.assert_refused(self.call("run", *option, file), "binary.yaml:1")
+
+    def test_the_program_itself_is_no_cell(self):
+        self.assert_refused(self.call("run", program()))
+
+    def test_an_empty_file_is_called_empty(self):
+        for option in ([], ["--scene"], ["--hand"]):
+            self.assert_refused(self.call("run", *option, self.written("empty.yaml", "")), "empty.yaml", "empty")
+
+    def test_broken_yaml_has_its_line(self):
+        scene = self.written("broken.yaml", "name: open\nobjects: [\n")
+        self.assert_refused(self.call("run", "--scene", scene), "broken.yaml:", "not YAML")
+
+    def test_a_scene_may_come_through_a_pipe(self):
+        reader, writer = os.pipe()
+        os.write(writer, b"name: piped\n")
+        os.close(writer)
+        done = subprocess.run([program(), "run", "--scene", f"/dev/fd/{reader}", "--duration", "10ms", "--json"],
+                              pass_fds=[reader], capture_output=True, cwd=self.folder, timeout=60)
+        os.close(reader)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+
+class CellFile(ProgramTest):
+    def refuse(self, old, new, *fragments):
+        cell = self.changed(CELL, (old, new))
+        text = cell.read_text()
+        self.assert_refused(self.call("run", cell), *fragments)
+        cell.write_text(text.replace(new, old, 1))
+
+    def test_an_unknown_key_gets_the_nearest_one(self):
+        self.refuse("gravity_W_m", "gravty_W_m", "default.yaml:8: gravty_W_m_per_s2: unknown key",
+                    'did you mean "gravity_W_m_per_s2"')
+
+    def test_wrong_types_and_values_show_what_was_found_and_expected(self):
+        expected = "expected a number from 0 to 1000 kg"
+        for value, found in (("heavy", '"heavy"'), ("-1", "-1"), (".nan", '".nan"'), (".inf", '".inf"'),
+                             ("[1]", "a list"), ("", "no value")):
+            self.refuse("mass_kg: 0.25", f"mass_kg: {value}", "default.yaml:12: tool.mass_kg: found " + found, expected)
+
+    def test_whole_numbers_stay_in_their_range(self):
+        self.refuse("node: 2", "node: 200", "default.yaml:54: drives[1].node: found 200", "from 1 to 127")
+        self.refuse("node: 2", "node: 0", "found 0", "from 1 to 127")
+        self.refuse("bitrate: 1000000", "bitrate: 7", "buses[0].bitrate: found 7", "bit/s")
+
+    def test_a_key_that_stands_twice_is_no_choice(self):
+        self.refuse("  leash_m: 0.02\n", "  leash_m: 0.02\n  leash_m: 0.03\n", "default.yaml:204", '"leash_m"', "twice",
+                    "line 203")
+
+    def test_two_drives_of_a_bus_have_two_nodes(self):
+        self.refuse("node: 2", "node: 1", "default.yaml:54: drives[1].node: found 1", 'bus axes_1_3', '"axis_1"')
+
+    def test_a_bus_must_be_one_of_the_cells(self):
+        self.refuse("bus: sensor", "bus: nobus", 'sensor.bus: found "nobus"', "axes_1_3, axes_4_6 or sensor")
+
+    def test_counts_must_fit_32_bits(self):
+        self.refuse("counts_per_motor_revolution: 1048576", "counts_per_motor_revolution: 104857600",
+                    "drives[0].range_rad", "32 bits")
+
+    def test_files_that_the_cell_names_must_be_there(self):
+        self.refuse("default_scene: ../../scenes/wall.yaml", "default_scene: lost.yaml", "lost.yaml", "no such file")
+        self.refuse("urdf: ../arms/arm150.urdf", "urdf: lost.urdf", "default.yaml:6: urdf", "lost.urdf", "doesn't exist")
+
+    def test_a_joint_that_the_urdf_lacks_is_named_with_those_it_has(self):
+        self.refuse("joint: axis_3", "joint: elbow", 'default.yaml:79: drives[2].joint: found "elbow"', "arm150.urdf",
+                    "axis_1, axis_2, axis_3")
+
+    def test_a_start_outside_of_a_joints_range_is_unreachable(self):
+        self.refuse(START, "start_rad: [0, 5, 0.5, 0, 1, 0]", "default.yaml:9: start_rad[1]: found 5", '"axis_2"',
+                    "-1.6 to 2.3 rad")
+
+    def test_a_start_in_a_singularity_is_refused(self):
+        self.refuse(START, "start_rad: [0, 0, 0, 0, 0, 0]", "start_rad", "singular", "expected a pose")
+        self.refuse(START, "start_rad: [0, 0.0675, 0.5008, 0, 0, 0]", "start_rad", "singular")  # wrist stretched
+
+    def test_defaults_of_the_cell_are_judged_as_options_are(self):
+        self.refuse("default_mass_kg: 4", "default_mass_kg: 0.2", "default_mass_kg: found 0.2 kg", "0.25 kg")
+        self.refuse("default_period_s: 0.001", "default_period_s: 0.0010001", "default_period_s", "60C2h")
+
+
+class UrdfFile(ProgramTest):
+    def refuse(self, replacements, *fragments):
+        self.changed(URDF, *replacements)
+        self.assert_refused(self.call("run", self.copies() / CELL), "arm150.urdf", *fragments)
+
+    def test_without_the_named_joint(self):
+        self.refuse([('name="axis_3"', 'name="axis_drei"')], 'drives[2].joint: found "axis_3"', "axis_drei")
+
+    def test_that_is_no_xml_has_its_line(self):
+        self.refuse([("</robot>", "</robo>")], "arm150.urdf:", "not XML")
+
+    def test_with_a_link_that_is_not_there(self):
+        self.refuse([('<child link="flange"', '<child link="flansch"')], "arm150.urdf:", '"flansch"')
+
+    def test_with_an_axis_of_no_length(self):
+        self.refuse([('<axis xyz="0 0 1"', '<axis xyz="0 0 0"')], "arm150.urdf:30: axis", '"0 0 0"', "not all zero")
+
+    def test_with_a_negative_mass(self):
+        file = self.copies() / URDF
+        mass = file.read_text().split("<mass value=", 1)[1].split('"')[1]
+        self.refuse([(f'<mass value="{mass}"', '<mass value="-1"')], "arm150.urdf:14: mass", '"-1"', "zero or more")
+
+
+class SceneFile(ProgramTest):
+    def refuse(self, text, *fragments):
+        self.assert_refused(self.call("run", "--scene", self.written("scene.yaml", text)), "scene.yaml", *fragments)
+
+    def test_mistakes_have_their_line(self):
+        self.refuse("objects:\n  - plan: {point_m: [1, 0, 0], normal: [1, 0, 0]}\n", ":2: objects[0].plan: unknown key",
+                    'did you mean "plane"')
+        self.refuse("objects:\n  - plane: {point_m: [1, 0, 0], normal: [0, 0, 0]}\n", ":2:", "not all zero")
+        self.refuse("objects:\n  - plane: {point_m: [1, 0, 0], normal: [-1, 0, 0], friction: -1}\n",
+                    ":2: objects[0].plane.friction: found -1", "from 0 to 100")
+        self.refuse("objects: 3\n", ":1: objects: found 3")
+        self.refuse("dimensions: 4\n", ":1: dimensions: found 4", "from 1 to 3")
+        self.refuse("dimensions: 2\n", "space")
+
+    def test_that_the_start_is_inside_of_is_refused(self):
+        self.refuse("objects:\n  - plane: {name: wall, point_m: [0.5, 0, 0.6], normal: [-1, 0, 0]}\n", ":2: wall",
+                    "x 0.7000, y 0.0000, z 0.6000 m", "0.2 m inside", "free space", "start_rad")
+
+    def test_without_any_free_place_is_refused_at_its_deepest_object(self):
+        self.refuse("objects:\n  - plane: {name: front, point_m: [0.71, 0, 0], normal: [-1, 0, 0]}\n"
+                    "  - plane: {name: back, point_m: [0.74, 0, 0], normal: [1, 0, 0]}\n", ":3: back", "0.04 m inside")
+
+
+class Options(ProgramTest):
+    def refuse(self, *arguments_and_fragments):
+        arguments, fragments = arguments_and_fragments[0], arguments_and_fragments[1:]
+        self.assert_refused(self.call(*arguments.split()), *fragments)
+
+    def test_a_number_without_its_unit_is_ambiguous(self):
+        self.refuse("run --timestep 1", '--timestep: found "1"', "the unit is missing", "1ms")
+        self.refuse("run --duration 10", '--duration: found "10"', "the unit is missing")
+
+    def test_durations_are_above_zero(self):
+        for value in ("0ms", "-1ms", "nan", "inf", "1e999s", "ms", "1 parsec"):
+            self.assert_refused(self.call("run", f"--timestep={value}"), "--timestep")
+        for value in ("0s", "-1s", "nan"):
+            self.assert_refused(self.call("run", f"--duration={value}"), "--duration")
+
+    def test_half_a_millisecond_is_refused_with_the_arithmetic(self):
+        self.refuse("run --timestep 0.5ms", "--timestep", "bus axes_1_3", "810 bits", "1 Mbit/s", "810 us", "500 us",
+                    "would fit", "1 ms", "CAN FD")
+
+    def test_timesteps_that_drives_can_not_hold(self):
+        self.refuse("run --timestep 1.0001ms", "--timestep: found 1.0001 ms", "60C2h", "such as 0.5ms, 1ms")
+        self.refuse("run --timestep 2.57ms", "--timestep: found 2.57 ms", "60C2h")  # 257 units: one byte holds 255
+        self.refuse("run --timestep 1ns", "--timestep", "0.05 to 100 ms")
+        self.refuse("run --timestep 10s", "--timestep: found 10000 ms", "0.05 to 100 ms")
+
+    def test_masses_that_nobody_can_feel(self):
+        for value in ("0", "-1", "nan", "inf", "4x", "-inf"):
+            self.assert_refused(self.call("run", f"--mass={value}"), "--mass", "mass above zero")
+        for value in ("0.25", "0.1", "250g"):
+            self.assert_refused(self.call("run", "--mass", value), "--mass", "more than the handle's own 0.25 kg")
+
+    def test_an_unstable_mass_names_the_smallest_that_is_not(self):
+        outcome = self.call("run", "--mass", "0.5")
+        self.assert_refused(outcome, "--mass: found 0.5 kg", "expected at least", "--force-unstable", "500 N/m",
+                            "20 Ns/m", "1 kg")
+        smallest = outcome.err.split("at least ")[1].split(" kg")[0]
+        self.assertLess(float(smallest), 2.0)
+        self.summary("--mass", smallest, "--duration", "0.1s")
+        forced = self.call("run", "--mass", "0.5", "--force-unstable", "--duration", "0.1s", "--json")
+        self.assertIn(forced.status, (0, 1), forced.err)
+        self.refuse("run --mass 0.2 --force-unstable", "0.25 kg")
+        self.refuse("run --force-unstable --bus vcan0", "--force-unstable", "--bus sim")
+
+    def test_words_and_numbers_that_an_option_does_not_know(self):
+        self.refuse("run --pace fast", '--pace: found "fast", expected realtime or virtual')
+        self.refuse("run --order 3", '--order: found "3", expected 1 or 2')
+        self.refuse("run --orientation up", '--orientation: found "up", expected free or held')
+        self.refuse("run --damping -1", '--damping: found "-1"', "Ns/m")
+        self.refuse("run --spring nan", '--spring: found "nan"', "N/m")
+
+    def test_unknown_commands_and_options_get_the_nearest_one(self):
+        self.refuse("runn", 'found "runn"', "did you mean run?")
+        self.refuse("run --massa 3", 'unknown option "--massa"', "did you mean --mass?")
+        self.refuse("run --mass", "--mass")
+        self.refuse("run one.yaml two.yaml", "two.yaml")
+        self.refuse("check", "files")
+        self.assert_refused(self.call(), "found no command", "run, sim, plan, check or explain")
+
+    def test_help_and_version_are_no_mistakes(self):
+        for arguments in (["--help"], ["--version"], ["run", "--help"], ["sim", "--help"]):
+            outcome = self.call(*arguments)
+            self.assertEqual((outcome.status, outcome.err), (0, ""))
+        self.assertIn("--fault", self.call("run", "--help").out)
+        self.assertIn("--fault", self.call("sim", "--help").out)
+
+    def test_a_record_never_overwrites_what_is_not_one(self):
+        self.assert_refused(self.call("run", "--record", SOURCE / "scenes"), "--record", "scenes")
+        self.assert_refused(self.call("run", "--record", program()), "--record")
+        self.assert_refused(self.call("run", "--record", "/proc/nowhere"), "--record", "/proc/nowhere")
+
+    def test_a_plot_needs_a_folder_that_is_there(self):
+        self.assert_refused(self.call("run", "--plot", "nowhere/plot.svg"), "--plot", "nowhere")
+
+
+class Buses(ProgramTest):
+    def test_mappings(self):
+        for text in ("", ",", "a,b", "a=b=c", "=can0", "axes_1_3=", "sim,sim"):
+            self.assert_refused(self.call("run", f"--bus={text}"), "--bus")
+        self.assert_refused(self.call("run", "--bus", "axes_1_3=x=y"), "--bus: found 'axes_1_3=x=y'", "NAME=INTERFACE")
+        self.assert_refused(self.call("run", "--bus", "nobus=vcan0"), "'nobus'", "axes_1_3, axes_4_6, sensor")
+        self.assert_refused(self.call("run", "--bus", "axes_1_3=vcan0"), "no interface for 'axes_4_6'")
+        self.assert_refused(self.call("run", "--bus", "sensor=a,sensor=b"), "'sensor' twice")
+
+    def test_an_interface_that_is_not_there(self):
+        # Where the kernel has no CAN at all, that is what it says.
+        for command in ("run", "sim"):
+            outcome = self.call(command, "--bus", "nocan7")
+            self.assert_refused(outcome, "bus nocan7")
+            self.assertTrue("no CAN" in outcome.err or "no such" in outcome.err or "exist" in outcome.err, outcome.err)
+
+    def test_loopback_is_no_can_interface(self):
+        self.assert_refused(self.call("run", "--bus", "lo"), "bus lo")
+
+    def test_one_node_twice_on_one_interface(self):
+        cell = self.changed(CELL, ("node: 4", "node: 1"))
+        self.summary(cell, "--duration", "10ms")  # on buses of their own that is fine
+        mapping = "axes_1_3=vcan0,axes_4_6=vcan0,sensor=vcan1"
+        for command in ("run", "sim"):
+            self.assert_refused(self.call(command, cell, "--bus", mapping), "bus vcan0", "node 1", "axis_1", "axis_4")
+
+    def test_virtual_time_is_for_simulated_buses(self):
+        self.assert_refused(self.call("run", "--pace", "virtual", "--bus", "vcan0"), "--pace", "realtime")
+
+    def test_the_simulated_arm_alone_needs_interfaces(self):
+        for arguments in (["sim"], ["sim", "--bus", "sim"]):
+            self.assert_refused(self.call(*arguments), "--bus", "proxarm run")
+
+
+class Devices(ProgramTest):
+    """What bring-up finds: bus, node, object and what to do; no drive is ever enabled."""
+
+    def refuse(self, fault, *fragments):
+        record = self.folder / "record"
+        outcome = self.call("run", "--json", "--fault", fault, "--record", record, "--duration", "10ms")
+        self.assert_refused(outcome, *fragments)
+        for line in (record / "frames.log").read_text().splitlines():
+            identifier, _, data = line.split(" ")[2].partition("#")
+            self.assertFalse(0x201 <= int(identifier, 16) <= 0x27F, line)  # RPDO1, where the controlword is
+            self.assertNotEqual(data[:2] if identifier == "000" else "", "01", line)  # NMT start
+
+    def test_a_drive_that_does_not_answer(self):
+        self.refuse("axis_2:silent", "bus axes_1_3, node 2, object 1000h:00", "axis_2", "no answer", "powered")
+        self.refuse("axis_5:sdo", "bus axes_4_6, node 5", "axis_5")
+        self.refuse("axis_6:power", "bus axes_4_6, node 6", "no answer")
+
+    def test_a_drive_with_another_device_type(self):
+        self.refuse("axis_4:device_type=0x00030192", "bus axes_4_6, node 4, object 1000h:00", "found 0x00030192",
+                    "expected 0x00020192", "device_type")
+
+    def test_a_sensor_that_is_silent(self):
+        self.refuse("sensor:silent", "bus sensor", "base id 0x68", "no answer", "powered")
+        self.refuse("sensor:samples", "bus sensor", "no whole sample")
+        self.refuse("sensor:short", "bus sensor", "wrong length")
+        self.refuse("sensor:status=0x4000", "bus sensor", "status", "expected no error")
+
+    def test_faults_are_for_simulated_devices(self):
+        self.assert_refused(self.call("run", "--fault", "axis_1:silent", "--bus", "vcan0"), "--fault", "proxarm sim")
+
+    def test_faults_that_are_misspelt(self):
+        self.assert_refused(self.call("run", "--fault", "axis_9:silent"), '"axis_9"', "axis_1", "sensor")
+        self.assert_refused(self.call("run", "--fault", "silent"), '"silent"', "DEVICE:KIND")
+        self.assert_refused(self.call("run", "--fault", "axis_1:loud"), '"axis_1:loud"', "silent")
+        self.assert_refused(self.call("run", "--fault", "axis_1:silent@1"), "unit")
+        self.assert_refused(self.call("run", "--fault", "sensor:silent=3"), "no value")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
