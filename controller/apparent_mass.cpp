@@ -1,5 +1,6 @@
 #include "controller/apparent_mass.hpp"
 
+#include <Eigen/LU>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -37,7 +38,8 @@ double inner(const Complex& x, const Complex& y) { return x.real() * y.real() + 
 
 struct Spectrum {
   Complex window;
-  Complex3 F, a, v;
+  Complex3 F;
+  std::array<Complex3, 3> x;  // a, v, ȧ
 };
 
 }  // namespace
@@ -54,7 +56,7 @@ void ApparentMass::end_segment() {
   const double length_s = static_cast<double>(samples) * T;
   // With fewer than 16 samples there is no band to speak of, whatever T is.
   if (samples >= 16 && length_s >= shortest_segment_s && travel(position_) >= least_travel_m) {
-    const std::size_t count = samples - 2;  // central differences lose one at either end
+    const std::size_t count = samples - 4;  // central differences lose two at either end
     std::vector<Spectrum> band;
     for (int line = 0; low_Hz + line * step_Hz < high_Hz + 0.5 * step_Hz; ++line) {
       const double omega = 2.0 * std::numbers::pi * (low_Hz + line * step_Hz);
@@ -63,13 +65,16 @@ void ApparentMass::end_segment() {
       Spectrum s{};
       for (std::size_t i = 0; i < count; ++i) {
         const Complex weight = window(i, count) * phase;
-        const Vec3 &x0 = position_[i], &x1 = position_[i + 1], &x2 = position_[i + 2];
+        const Vec3* x = &position_[i + 2];
+        const Vec3 acceleration = (x[1] - 2.0 * x[0] + x[-1]) / (T * T), velocity = (x[1] - x[-1]) / (2.0 * T);
+        const Vec3 jerk = (x[2] - 2.0 * x[1] + 2.0 * x[-1] - x[-2]) / (2.0 * T * T * T);
         s.window += weight;
         for (std::size_t axis = 0; axis < 3; ++axis) {
           const auto j = static_cast<Eigen::Index>(axis);
-          s.F[axis] += weight * force_[i + 1][j];
-          s.v[axis] += weight * ((x2[j] - x0[j]) / (2.0 * T));
-          s.a[axis] += weight * ((x2[j] - 2.0 * x1[j] + x0[j]) / (T * T));
+          s.F[axis] += weight * force_[i + 2][j];
+          s.x[0][axis] += weight * acceleration[j];
+          s.x[1][axis] += weight * velocity[j];
+          s.x[2][axis] += weight * jerk[j];
         }
         phase *= turn;
       }
@@ -78,18 +83,24 @@ void ApparentMass::end_segment() {
     // Takes the constant off: what of y lies along the window's own transform.
     double ww = 0.0;
     for (const Spectrum& s : band) ww += std::norm(s.window);
+    const auto take_off_constant = [&band, ww](auto&& signal) {
+      double wy = 0.0;
+      for (Spectrum& s : band) wy += inner(s.window, signal(s));
+      for (Spectrum& s : band) signal(s) -= wy / ww * s.window;
+    };
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (Complex3 Spectrum::*signal : {&Spectrum::F, &Spectrum::a, &Spectrum::v}) {
-        double wy = 0.0;
-        for (const Spectrum& s : band) wy += inner(s.window, (s.*signal)[axis]);
-        for (Spectrum& s : band) (s.*signal)[axis] -= wy / ww * s.window;
+      take_off_constant([axis](Spectrum& s) -> Complex& { return s.F[axis]; });
+      for (std::size_t i = 0; i < 3; ++i) {
+        take_off_constant([axis, i](Spectrum& s) -> Complex& { return s.x[i][axis]; });
       }
       for (const Spectrum& s : band) {
-        aa_ += inner(s.a[axis], s.a[axis]);
-        av_ += inner(s.a[axis], s.v[axis]);
-        vv_ += inner(s.v[axis], s.v[axis]);
-        af_ += inner(s.a[axis], s.F[axis]);
-        vf_ += inner(s.v[axis], s.F[axis]);
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto row = static_cast<Eigen::Index>(i);
+          with_force_[row] += inner(s.x[i][axis], s.F[axis]);
+          for (std::size_t j = 0; j < 3; ++j) {
+            regressors_(row, static_cast<Eigen::Index>(j)) += inner(s.x[i][axis], s.x[j][axis]);
+          }
+        }
       }
     }
     used_s_ += length_s;
@@ -99,10 +110,17 @@ void ApparentMass::end_segment() {
 }
 
 std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
-  const double determinant = aa_ * vv_ - av_ * av_;
-  // Below a part in a million, a and v can't be told apart (a single exponential, say).
-  if (!(aa_ > 0.0) || !(determinant > 1e-6 * aa_ * vv_)) return std::nullopt;
-  return Estimate{(af_ * vv_ - vf_ * av_) / determinant, (vf_ * aa_ - af_ * av_) / determinant, used_s_};
+  const Eigen::Vector3d size = regressors_.diagonal().cwiseSqrt();
+  if (!(size.minCoeff() > 0.0)) return std::nullopt;
+  // Scaled to ones on the diagonal. Below a part in a million, a and v can't be told apart (a single exponential, say).
+  const Eigen::Matrix3d scaled = size.cwiseInverse().asDiagonal() * regressors_ * size.cwiseInverse().asDiagonal();
+  const Eigen::Vector3d force = with_force_.cwiseQuotient(size);
+  const Eigen::Matrix2d two = scaled.topLeftCorner<2, 2>();
+  if (!(two.determinant() > 1e-6)) return std::nullopt;
+  const Eigen::Vector2d mass_and_damping = two.inverse() * force.head<2>();
+  Estimate estimate{mass_and_damping[0] / size[0], mass_and_damping[1] / size[1], used_s_};
+  if (scaled.determinant() > 1e-6) estimate.mass_kg = (scaled.inverse() * force)[0] / size[0];
+  return estimate;
 }
 
 }  // namespace proxarm::controller

@@ -1,13 +1,14 @@
 // How heavy the tool feels in free motion: Re(F/a) between 0.3 and 2 Hz, from the hand's force F and the tool's
 // acceleration a.
 //
-// F̂, â, v̂ are the windowed Fourier transforms of force, acceleration and velocity over a segment of free motion. For
-// F = M a + B v they satisfy F̂(ω) = M â(ω) + B v̂(ω) at every ω and for any window, so M and B follow by least squares
-// over the band, all axes and all segments:
-//   [M, B] = argmin Σ |F̂ − M â − B v̂|²,   ω = 2π · (0.3, 0.35, … 2.0 Hz)
-// M is Re(F/a): in a long record a and v are orthogonal, and M = Re Σ F̂ â* / Σ |â|². B, Im(F/a) times ω, is the
-// damping. A constant force (an offset of the sensor, a hand that leans) is taken off per segment and axis by
-// projecting out the window's own transform.
+// F̂, â, v̂, ĵ are the windowed Fourier transforms of force, acceleration, velocity and jerk over a segment of free
+// motion. For F = M a + B v + N ȧ they satisfy F̂(ω) = M â(ω) + B v̂(ω) + N ĵ(ω) at every ω and for any window, so M
+// follows by least squares over the band, all axes and all segments:
+//   [M, B, N] = argmin Σ |F̂ − M â − B v̂ − N ĵ|²,   ω = 2π · (0.3, 0.35, … 2.0 Hz)
+// M is Re(F/a): in a long record a is orthogonal to v and ȧ, and M = Re Σ F̂ â* / Σ |â|². In a short one it isn't, and a
+// tool that lags (F = M a(t + τ), so N = Mτ) would seem lighter without the third term. The damping is Im(F/a) times ω
+// as one number: B of the fit without ĵ. A lag makes it negative, by about Mω²τ. A constant force (an offset of the
+// sensor, a hand that leans) is taken off per segment and axis by projecting out the window's own transform.
 //
 // Works for a short move between two contacts as well as for minutes of a multisine; a segment is cut at 10 s, and one
 // that is shorter than 0.5 s or moves less than 1 mm says nothing and is left out. Memory is bounded by one segment.
@@ -42,8 +43,9 @@ class ApparentMass {
  private:
   double period_s_;
   std::vector<models::Vec3> force_, position_;
-  // Normal equations: sums of Re(x* y) over the band.
-  double aa_ = 0.0, av_ = 0.0, vv_ = 0.0, af_ = 0.0, vf_ = 0.0;
+  // Normal equations: sums of Re(x* y) over the band, for the regressors a, v, ȧ and for the force.
+  Eigen::Matrix3d regressors_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d with_force_ = Eigen::Vector3d::Zero();
   double used_s_ = 0.0;
 };
 

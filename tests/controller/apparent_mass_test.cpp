@@ -112,6 +112,20 @@ TEST(ApparentMass, WithstandsNoiseOffsetDelayAndResonance) {
   EXPECT_NEAR(estimate(reach(0.3, 1.2), hand, 0.0, 1.0).mass_kg, 4.0, 0.04);
 }
 
+// A lag of 15 ms, as of an arm whose setpoints are smoothed: the mass is still right in one short reach, the damping
+// says it.
+TEST(ApparentMass, TellsLagFromLightness) {
+  for (const double until : {0.8, 1.0, 1.3}) {
+    const auto result = estimate(reach(0.2, 1.5), {.mass_kg = 4.0, .delay_s = 15e-3}, 0.0, 1.5 * until);
+    EXPECT_NEAR(result.mass_kg, 4.0, 0.04) << until;
+    EXPECT_LT(result.damping_Ns_per_m, 0.0);
+  }
+  const auto steady = estimate(multisine(), {.mass_kg = 4.0, .delay_s = 15e-3}, 0.0, 60.0);
+  // Re(F/a) is M cos(ωτ), which falls to 3.93 kg at 2 Hz.
+  EXPECT_GT(steady.mass_kg, 3.93);
+  EXPECT_LT(steady.mass_kg, 4.0);
+}
+
 TEST(ApparentMass, PoolsSegments) {
   ApparentMass estimator(period_s);
   for (int i = 0; i < 5; ++i) feed(estimator, reach(0.2 - 0.05 * i, 1.0), {.mass_kg = 6.0}, 0.0, 1.0);
