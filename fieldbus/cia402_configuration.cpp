@@ -83,6 +83,8 @@ void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, std::uint16_t t
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings) {
   const std::uint32_t consumer =
       static_cast<std::uint32_t>(settings.master_node) << 16 | settings.master_heartbeat_timeout_ms;
+  // Off first: a drive that still watches for the last session's controller would trip in the middle of this set-up.
+  steps.push_back(sdo_write({0x1016, 1}, 4, 0, "consumer heartbeat time (of the controller)"));
   steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
   steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));

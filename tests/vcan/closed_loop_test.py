@@ -1,0 +1,100 @@
+"""The whole main job on a real vcan: `proxarm run` and `proxarm sim` as two processes, candump as the witness."""
+import tempfile
+import unittest
+
+import can  # python3-can
+
+import two_processes as two
+
+
+class ClosedLoop:
+    """6 s of the default scene: through free space, touch, and along the wall."""
+
+    bus = None
+
+    @classmethod
+    def setUpClass(cls):
+        cls.record = tempfile.TemporaryDirectory()
+        cls.session = two.Session(cls.bus, "6s", cls.record.name)
+        cls.recorded = cls.session.recorded() if cls.session.status == 0 else []
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.record.cleanup()
+
+    def test_ends_well(self):
+        self.assertEqual(self.session.status, 0, self.session.errors)
+        self.assertEqual(self.session.arm_status, 0, self.session.arm_errors)
+        summary = self.session.summary
+        self.assertEqual(summary["faults"], [])
+        self.assertEqual(summary["overruns"], 0)
+        self.assertEqual(summary["held_samples"], 0, "every cycle had its own sample")
+        self.assertEqual(summary["limited_cycles"], 0)
+        self.assertAlmostEqual(summary["rendered_time_s"], 6.0)
+        self.assertIn(" 0 lost, 0 not sent; 0 late", self.session.arm_errors)
+
+    def test_feels_like_the_wall_and_the_mass(self):
+        summary = self.session.summary
+        self.assertEqual(summary["penetration_max_m"], 0.0)
+        self.assertGreaterEqual(summary["contacts"], 1)
+        self.assertGreater(summary["contact_time_s"], 2.0)
+        self.assertGreater(summary["sliding_time_s"], 0.5)
+        self.assertEqual(summary["pulling_force_max_N"], 0.0)
+        self.assertAlmostEqual(summary["apparent_mass_kg"] / summary["felt_mass_kg"], 1.0, delta=0.05)
+        self.assertLess(summary["tracking_max_m"], 0.5e-3)
+        # Encoders stand in for the simulation's truth here.
+        self.assertEqual(summary["source"], "sensor and encoders")
+        self.assertLess(summary["tool_penetration_touch_max_m"], 1e-3)
+        self.assertLess(summary["tool_penetration_sliding_max_m"], 0.2e-3)
+
+    def test_candump_saw_what_the_record_says(self):
+        seen, recorded = two.by_identifier(self.session.seen), two.by_identifier(self.recorded)
+        self.assertGreater(len(self.recorded), 6000 * 15)
+        self.assertEqual(set(recorded) - set(seen), set())
+        for key, frames in recorded.items():
+            with self.subTest(key=key):
+                self.assertEqual([f.data for f in frames], [f.data for f in seen[key][:len(frames)]])
+        # Once the controller is gone, it records nothing; the drives miss its heartbeat and say so (8130h).
+        for key, frames in seen.items():
+            for frame in frames[len(recorded[key]):]:
+                self.assertIn(frame.id, [two.EMCY + node for node in two.NODES])
+                self.assertEqual(frame.data[:2], bytes([0x30, 0x81]))
+
+    def test_candump_saw_it_when_the_record_says(self):
+        """Both stamp each frame on the same kernel: the clocks' difference is one constant, within 0.1 ms."""
+        seen, recorded = two.by_identifier(self.session.seen), two.by_identifier(self.recorded)
+        offsets = [s.time_us - r.time_us for key in recorded for s, r in zip(seen[key], recorded[key])]
+        self.assertLess(max(offsets) - min(offsets), 100)
+
+    def test_targets_on_the_wire_have_the_hash_of_the_summary(self):
+        self.assertEqual(two.setpoints_sha256(self.session.seen), self.session.summary["setpoint_sha256"])
+
+    def test_every_interface_with_drives_has_its_sync_every_millisecond(self):
+        with_drives = {f.interface for f in self.session.seen if f.id == two.RPDO + 1 or f.id == two.RPDO + 6}
+        for interface in with_drives:
+            syncs = [f.time_us for f in self.session.seen if f.id == two.SYNC and f.interface == interface]
+            self.assertEqual(len(syncs), self.session.summary["cycles"])
+            steps = [b - a for a, b in zip(syncs, syncs[1:])]
+            self.assertLess(max(abs(step - 1000) for step in steps), 10)
+
+    def test_python_can_reads_the_record(self):
+        read = sum(1 for _ in can.CanutilsLogReader(str(self.session.folder / "frames.log")))
+        self.assertEqual(read, len(self.recorded))
+
+    def test_drives_end_switched_off(self):
+        for node in two.NODES:
+            self.assertNotIn(two.of_node(self.session.seen, two.TPDO, node)[-1].data[0] & 0x6F, (0x27, 0x07))
+        last = [f for f in self.session.seen if f.id == two.NMT][-6:]
+        self.assertEqual(sorted(f.data for f in last), [bytes([0x80, node]) for node in two.NODES])
+
+
+class OnOneInterface(ClosedLoop, unittest.TestCase):
+    bus = two.ONE
+
+
+class OnThreeInterfaces(ClosedLoop, unittest.TestCase):
+    bus = two.THREE
+
+
+if __name__ == "__main__":
+    two.main()

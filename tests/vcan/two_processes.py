@@ -1,0 +1,184 @@
+"""The controller, the simulated arm and can-utils as processes on the interfaces of a real kernel.
+
+For tests that with-vcan runs. All times are those of the kernel's clock there.
+"""
+import collections
+import hashlib
+import json
+import os
+import re
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+PROGRAM = os.environ.get("PROXARM", "proxarm")
+ONE = "vcan0"
+THREE = "axes_1_3=vcan0,axes_4_6=vcan1,sensor=vcan2"
+INTERFACES = ("vcan0", "vcan1", "vcan2")
+NODES = range(1, 7)
+
+# CiA 301: predefined identifiers. SYNC, EMCY, TPDO1, RPDO1, SDO answer and request, heartbeat; node added.
+NMT, SYNC, EMCY, TPDO, RPDO, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x000, 0x080, 0x080, 0x180, 0x200, 0x580, 0x600, 0x700
+MASTER_HEARTBEAT = HEARTBEAT + 127
+SENSOR_IDS = range(0x680, 0x690)
+
+Frame = collections.namedtuple("Frame", "time_us interface id data")
+LOG_LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]{3})#([0-9A-F]*)$")
+
+
+def read_log(path):
+    """Frames of a log as candump -L writes it; every line has to be one."""
+    frames = []
+    for number, line in enumerate(Path(path).read_text().splitlines(), 1):
+        match = LOG_LINE.match(line)
+        if not match:
+            raise ValueError(f"{path}:{number}: not a frame: {line!r}")
+        seconds, micros, interface, identifier, data = match.groups()
+        frames.append(
+            Frame(int(seconds) * 1_000_000 + int(micros), interface, int(identifier, 16), bytes.fromhex(data)))
+    return frames
+
+
+def write_log(path, frames):
+    with open(path, "w") as log:
+        for f in frames:
+            seconds, micros = divmod(f.time_us, 1_000_000)
+            log.write(f"({seconds:010d}.{micros:06d}) {f.interface} {f.id:03X}#{f.data.hex().upper()}\n")
+
+
+def by_identifier(frames):
+    """(interface, identifier) -> its frames, in their order."""
+    found = collections.defaultdict(list)
+    for frame in frames:
+        found[frame.interface, frame.id].append(frame)
+    return found
+
+
+def of_node(frames, function, node):
+    return [f for f in frames if f.id == function + node]
+
+
+def setpoints(frames):
+    """Targets in counts, one list per node, out of its RPDOs: 6040h (16 bits), 607Ah (32 bits), little-endian."""
+    return [[struct.unpack("<Hi", f.data)[1] for f in of_node(frames, RPDO, node)] for node in NODES]
+
+
+def setpoints_sha256(frames):
+    """The summary's setpoint_sha256, from nothing but frames: int32 little-endian, axis order, every cycle."""
+    digest = hashlib.sha256()
+    for cycle in zip(*setpoints(frames), strict=True):
+        digest.update(struct.pack("<6i", *cycle))
+    return digest.hexdigest()
+
+
+class Process:
+    """A process with its output in files; ended, if by nothing else, at the end of the with block."""
+
+    def __init__(self, *command):
+        self.out, self.err = tempfile.TemporaryFile("w+"), tempfile.TemporaryFile("w+")
+        self.process = subprocess.Popen([str(word) for word in command], stdout=self.out, stderr=self.err)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        self.out.close()
+        self.err.close()
+
+    def send(self, number):
+        self.process.send_signal(number)
+
+    def wait(self, timeout_s=60):
+        return self.process.wait(timeout_s)
+
+    def stop(self, number=signal.SIGTERM):
+        self.send(number)
+        return self.wait()
+
+    def output(self):
+        return self._read(self.out)
+
+    def errors(self):
+        return self._read(self.err)
+
+    @staticmethod
+    def _read(file):
+        file.seek(0)
+        return file.read()
+
+
+def simulated_arm(bus, *options):
+    process = Process(PROGRAM, "sim", "--bus", bus, *options)
+    time.sleep(0.2)
+    return process
+
+
+def controller(bus, duration, record=None, *options):
+    return Process(PROGRAM, "run", "--bus", bus, "--duration", duration, "--json", "--no-plot",
+                   *(["--record", record] if record else []), *options)
+
+
+def candump(*interfaces):
+    """Its output is the log. -r: room for all frames of a second, should it be late."""
+    process = Process("candump", "-L", "-r", 8_000_000, *interfaces)
+    time.sleep(0.05)
+    return process
+
+
+def frames_of(process):
+    """What a candump has seen; ends it."""
+    time.sleep(0.05)
+    process.stop()
+    with tempfile.NamedTemporaryFile("w+") as log:
+        log.write(process.output())
+        log.flush()
+        return read_log(log.name)
+
+
+class Session:
+    """One run of both processes from begin to end, with candump as the witness."""
+
+    def __init__(self, bus, duration, folder):
+        self.folder = Path(folder)
+        with simulated_arm(bus) as arm, candump(*INTERFACES) as witness:
+            with controller(bus, duration, self.folder) as run:
+                self.status = run.wait()
+                self.errors = run.errors()
+                output = run.output()
+            time.sleep(0.2)  # longer than the drives wait for the controller's heartbeat
+            self.seen = frames_of(witness)
+            self.arm_status = arm.stop()
+            self.arm_errors = arm.errors()
+        self.summary = json.loads(output) if output else None
+
+    def recorded(self):
+        return read_log(self.folder / "frames.log")
+
+
+class VcanTestCase(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def assert_drives_off(self, seen):
+        """By the last word of every drive: 6041h says anything but operation enabled or quick stop active."""
+        for node in NODES:
+            word = struct.unpack("<Hi", of_node(seen, TPDO, node)[-1].data)[0]
+            self.assertNotIn(word & 0x6F, (0x27, 0x07), f"node {node}: {word:04X}")
+
+
+def main():
+    """Status 77, skipped, where there is no vcan or its clock can't promise deadlines."""
+    if os.environ.get("VCAN_CLOCK") != "virtual":
+        print("needs the virtual clock: VCAN_BACKEND=uml tests/vcan/with-vcan ...", file=sys.stderr)
+        sys.exit(77)
+    unittest.main(verbosity=2)
