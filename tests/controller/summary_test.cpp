@@ -49,8 +49,8 @@ struct Session {
     r.tool_W_m = r.true_tool_W_m;
     r.proxy_W_m = {x(t + 2 * T), 0.0, contact ? 0.0 : 0.01};
     // The handle moves as the tool does at t; (26) moves the proxy's mass, whose differences end at x(t + 2T).
-    const double inertial =
-        handle_kg * ax(t) + (mass_kg - handle_kg) * ax(t + T) + damping * vx(t + 1.5 * T) + spring * x(t) + (vx(t) > 0 ? field_N : -field_N);
+    const double inertial = handle_kg * ax(t) + (mass_kg - handle_kg) * ax(t + T) + damping * vx(t + 1.5 * T) +
+                            spring * x(t) + (vx(t) > 0 ? field_N : -field_N);
     const double normal = contact ? 5.0 : 0.0;
     const double slide = contact ? friction * normal * (1 + friction_error) * (vx(t) > 0 ? 1.0 : -1.0) : 0.0;
     r.hand_force_W_N = {inertial + slide, 0.0, -normal + (contact ? -0.01 * spring : 0.0)};
