@@ -85,7 +85,7 @@ ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, dou
     axis.rotor_inertia_kg_m2 = drive.rotor_inertia_kg_m2;
     axis.coulomb_Nm = drive.simulation.coulomb_friction_Nm;
     axis.viscous_Nms_per_rad = drive.simulation.viscous_friction_Nms_per_rad;
-    axis.stiffness_Nm_per_rad = drive.gear_stiffness_Nm_per_rad;
+    axis.stiffness_Nm_per_rad = drive.gear_stiffness_Nm_per_rad * drive.simulation.gear_stiffness_ratio;
     axis.damping_Nms_per_rad = drive.simulation.gear_damping_Nms_per_rad;
     axis.half_backlash_rad = 0.5 * drive.simulation.backlash_rad;
     axes_.push_back(axis);

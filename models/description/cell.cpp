@@ -94,6 +94,7 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.viscous_friction_Nms_per_rad =
       node.number_or("viscous_friction_Nms_per_rad", s.viscous_friction_Nms_per_rad, 0.0, 1e6);
   s.gear_damping_Nms_per_rad = node.number_or("gear_damping_Nms_per_rad", s.gear_damping_Nms_per_rad, 0.0, 1e6);
+  s.gear_stiffness_ratio = node.number_or("gear_stiffness_ratio", s.gear_stiffness_ratio, 0.1, 10.0);
   s.backlash_rad = node.number_or("backlash_rad", s.backlash_rad, 0.0, 0.1);
   s.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
   s.position_gain_per_s = node.number("position_gain_per_s", above(0.0, 1e4));

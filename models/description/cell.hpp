@@ -33,6 +33,7 @@ struct SimulatedDrive {
   double coulomb_friction_Nm = 0.0;  // at the joint, motor side of the gear
   double viscous_friction_Nms_per_rad = 0.0;
   double gear_damping_Nms_per_rad = 0.0;  // of the gear's elasticity
+  double gear_stiffness_ratio = 1.0;      // real stiffness over gear_stiffness_Nm_per_rad: no data sheet is exact
   double backlash_rad = 0.0;              // total play at the joint
   double max_torque_Nm = 0.0;             // current limit, as torque at the joint
   double position_gain_per_s = 0.0;       // outer loop of the cascade

@@ -361,6 +361,14 @@ TEST(ArmDynamics, TakesAGearWithoutAStiffnessAsRigid) {
   EXPECT_GT(arm.locked_modes_Hz().front(), 60.0);
 }
 
+// The controller believes the data sheet; the gears need not.
+TEST(ArmDynamics, HasTheGearsThatTheCellGivesItRatherThanThoseOfTheDataSheet) {
+  description::Cell cell = default_cell();
+  const double before = ArmDynamics(cell, 1.0).locked_modes_Hz().front();
+  for (auto& drive : cell.drives) drive.simulation.gear_stiffness_ratio = 0.81;
+  EXPECT_NEAR(ArmDynamics(cell, 1.0).locked_modes_Hz().front(), 0.9 * before, 1e-9 * before);  // ω ~ √k
+}
+
 TEST(ArmDynamics, RefusesAGearTooStiffForItsStep) {
   description::Cell cell = default_cell();
   cell.drives[5].gear_stiffness_Nm_per_rad *= 100.0;
