@@ -1,9 +1,9 @@
 #include "fieldbus/simulated_can_bus.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
+#include "fieldbus/simulated_can_port.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::fieldbus {
@@ -11,42 +11,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::uint64_t no_frame = std::numeric_limits<std::uint64_t>::max();
 constexpr int error_frame_bits = 17;  // error flag 6, delimiter 8, interframe space 3: after the frame itself
-
-// The bits of arbitration, first on the wire = most significant; the lowest number wins. Up to the BRS bit:
-//   11-bit: id 11, RTR, IDE 0, FDF
-//   29-bit: id 11, SRR 1, IDE 1, id 18, RTR, FDF
-std::uint64_t arbitration_key(const CanFrame& frame) noexcept {
-  const std::uint64_t remote = frame.remote ? 1 : 0, fd = frame.fd ? 1 : 0;
-  if (!frame.extended) return (std::uint64_t{frame.id} << 22) | (remote << 21) | (fd << 19);
-  const std::uint64_t base = frame.id >> 18, extension = frame.id & 0x3ffff;
-  return (base << 22) | (3ull << 20) | (extension << 2) | (remote << 1) | fd;
-}
-
-// What a rule does to the content of a frame that it matches.
-void alter(CanFrame& frame, const FaultRule& rule) noexcept {
-  if (rule.action == FaultAction::corrupt) {
-    for (const BitFlip flip : rule.flips) {
-      if (flip.byte < frame.length) frame.data[flip.byte] ^= static_cast<std::uint8_t>(1u << (flip.bit & 7u));
-    }
-  } else if (rule.action == FaultAction::resize && is_valid_length(rule.length, frame.fd)) {
-    for (std::size_t i = rule.length; i < frame.data.size(); ++i) frame.data[i] = 0;
-    frame.length = rule.length;
-  }
-}
-
-bool fails_a_port(FaultAction action) noexcept {
-  return action == FaultAction::bus_off || action == FaultAction::port_down || action == FaultAction::error_passive;
-}
-
-BusState failed_state(FaultAction action) noexcept {
-  return action == FaultAction::bus_off     ? BusState::bus_off
-         : action == FaultAction::port_down ? BusState::down
-                                            : BusState::error_passive;
-}
-
-bool is_off(BusState state) noexcept { return state == BusState::bus_off || state == BusState::down; }
 
 void check(const SimulatedBusConfig& config) {
   const auto refuse = [&config](const char* key, std::int64_t found, const char* expected) {
@@ -61,48 +26,6 @@ void check(const SimulatedBusConfig& config) {
 }
 
 }  // namespace
-
-class SimulatedCanBus::Port final : public CanPort {
- public:
-  struct Queued {
-    CanFrame frame;
-    std::int64_t time_ns = 0;
-  };
-
-  Port(SimulatedCanBus& bus, std::string name, CanListener* listener, std::size_t queue_length)
-      : name_(std::move(name)), listener_(listener), queue_(queue_length + 1), bus_(bus) {}
-
-  SendResult send(const CanFrame& frame) noexcept override { return bus_.queue_frame(*this, frame); }
-
-  bool push(const CanFrame& frame, std::int64_t time_ns) noexcept {
-    if (!queue_.push({frame, time_ns})) return false;
-    if (queue_.size() == 1) key_ = arbitration_key(frame);
-    return true;
-  }
-  void pop() noexcept {
-    queue_.pop();
-    key_ = queue_.empty() ? no_frame : arbitration_key(queue_.front().frame);
-  }
-  void purge() noexcept {
-    queue_.clear();
-    key_ = no_frame;
-  }
-  [[nodiscard]] const Queued& head() const noexcept { return queue_.front(); }
-  [[nodiscard]] std::size_t queue_size() const noexcept { return queue_.size(); }
-  [[nodiscard]] std::uint64_t key() const noexcept { return key_; }  // of the head; no_frame: nothing to send
-  [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  [[nodiscard]] CanListener* listener() const noexcept { return listener_; }
-  [[nodiscard]] BusState state() const noexcept { return state_; }
-  void set_state(BusState state) noexcept { state_ = state; }
-
- private:
-  std::uint64_t key_ = no_frame;
-  BusState state_ = BusState::error_active;
-  std::string name_;
-  CanListener* listener_;  // nullptr: the controller, or a babbling node
-  RingBuffer<Queued> queue_;
-  SimulatedCanBus& bus_;
-};
 
 SimulatedCanBus::SimulatedCanBus(SimulatedBusConfig config, std::size_t index, EventQueue& events,
                                  std::size_t& frames_waiting)
@@ -138,6 +61,7 @@ CanPort& SimulatedCanBus::attach(CanListener& listener, std::string name, NodeFo
                       .advice = "give the bus a data_bitrate, with FD nodes only on it"});
   }
   ports_.push_back(std::make_unique<Port>(*this, std::move(name), &listener, config_.node_transmit_queue_length));
+  if (!transmitting_) request_arbitration();  // frames may have waited for an acknowledgement
   return *ports_.back();
 }
 
@@ -196,6 +120,7 @@ void SimulatedCanBus::change_state(Port& port, BusState state) noexcept {
     if (sender_ == &port) sender_ = nullptr;  // its frame is cut off: nobody receives it
   }
   port.set_state(state);
+  if (!is_off(state) && !transmitting_) request_arbitration();  // frames may have waited for an acknowledgement
   if (&port == ports_.front().get()) {
     if (state == BusState::bus_off && status_.state != state) ++status_.error_frames;
     status_.state = state;
@@ -223,10 +148,29 @@ SimulatedCanBus::Port* SimulatedCanBus::arbitration_winner() noexcept {
   return winner;
 }
 
+bool SimulatedCanBus::is_acknowledged(const Port& sender) const noexcept {
+  return std::any_of(ports_.begin(), ports_.end(), [&](const auto& port) {
+    return port.get() != &sender && !is_off(port->state()) && port->receives();
+  });
+}
+
 void SimulatedCanBus::arbitrate() {
   arbitration_requested_ = false;
   Port* winner = arbitration_winner();
   if (winner == nullptr) return;
+  if (!is_acknowledged(*winner)) {
+    // A real controller repeats the frame for ever, error passive; here it waits in silence for someone to join.
+    if (winner == ports_.front().get() && status_.state != BusState::error_passive) {
+      change_state(*winner, BusState::error_passive);
+      ++status_.error_frames;
+      alone_ = true;
+    }
+    return;
+  }
+  if (alone_) {
+    alone_ = false;
+    change_state(*ports_.front(), BusState::error_active);
+  }
   sender_ = winner;
   transmitting_ = true;
   current_ = winner->head().frame;
@@ -238,20 +182,6 @@ void SimulatedCanBus::arbitrate() {
   if (!faults_.empty()) pick_faults();
   statistics_.add_frame(current_, bits, current_start_ns_, idle_ns_);
   events_.schedule(idle_ns_ - interframe_ns_, [this] { complete(); });
-}
-
-void SimulatedCanBus::pick_faults() noexcept {
-  for (std::size_t i = 0; i < faults_.size(); ++i) {
-    const FaultRule& rule = faults_[i].rule;
-    if (rule.action == FaultAction::duplicate && repeating_) continue;
-    if (current_start_ns_ < rule.from_ns || current_start_ns_ >= rule.to_ns) continue;
-    if ((current_.id & rule.mask) != (rule.id & rule.mask)) continue;
-    const std::uint64_t number = ++faults_[i].seen;
-    if (number < rule.first || number - rule.first >= rule.count) continue;
-    matched_.push_back(i);
-    if (rule.receiver.empty()) alter(current_, rule);
-    if (rule.action == FaultAction::destroy) idle_ns_ += error_frame_ns_;
-  }
 }
 
 // End of the EOF field: all receive, then the next arbitration.
@@ -294,27 +224,6 @@ void SimulatedCanBus::log(bool lost) const {
   observer_({current_, current_queued_ns_, current_start_ns_, events_.now_ns(), index_, config_.name, sender, lost});
 }
 
-void SimulatedCanBus::deliver_to(Port& port) {
-  if (matched_.empty()) {
-    deliver(port, current_);
-    return;
-  }
-  CanFrame frame = current_;
-  std::int64_t delay_ns = 0;
-  for (const std::size_t i : matched_) {
-    const FaultRule& rule = faults_[i].rule;
-    if (!rule.receiver.empty() && rule.receiver != port.name()) continue;
-    if (rule.action == FaultAction::drop) return;
-    if (rule.action == FaultAction::delay) delay_ns += rule.delay_ns;
-    if (!rule.receiver.empty()) alter(frame, rule);
-  }
-  if (delay_ns > 0) {
-    deliver_later(port, frame, delay_ns);
-  } else {
-    deliver(port, frame);
-  }
-}
-
 void SimulatedCanBus::deliver(Port& port, const CanFrame& frame) noexcept {
   if (is_off(port.state())) return;
   if (port.listener() != nullptr) {
@@ -327,70 +236,6 @@ void SimulatedCanBus::deliver(Port& port, const CanFrame& frame) noexcept {
       ++status_.receive_overflows;
     }
   }
-}
-
-void SimulatedCanBus::deliver_later(Port& port, const CanFrame& frame, std::int64_t delay_ns) {
-  if (free_delayed_.empty()) {
-    delayed_.emplace_back();
-    free_delayed_.reserve(delayed_.capacity());
-    free_delayed_.push_back(delayed_.size() - 1);
-  }
-  const std::size_t place = free_delayed_.back();
-  free_delayed_.pop_back();
-  delayed_[place] = {frame, &port};
-  events_.schedule_after(delay_ns, [this, place] {
-    const DelayedFrame late = delayed_[place];
-    free_delayed_.push_back(place);
-    deliver(*late.receiver, late.frame);
-  });
-}
-
-void SimulatedCanBus::add_fault(const FaultRule& rule) {
-  const auto check_port = [this](const std::string& port, const char* key) {
-    if (find_port(port) != nullptr) return;
-    std::string names;
-    for (const auto& known : ports_) names += (names.empty() ? "" : ", ") + known->name();
-    throw SetupError({.bus = config_.name,
-                      .key = std::string("fault rule: ") + key,
-                      .found = description::in_quotes(port),
-                      .expected = "a port of this bus: " + names});
-  };
-  if (!rule.receiver.empty()) check_port(rule.receiver, "receiver");
-  if (fails_a_port(rule.action)) {
-    check_port(rule.port, "port");
-    Port* port = find_port(rule.port);
-    events_.schedule(rule.from_ns, [this, port, state = failed_state(rule.action)] { change_state(*port, state); });
-    if (rule.to_ns != FaultRule::forever) {
-      events_.schedule(rule.to_ns, [this, port] { change_state(*port, BusState::error_active); });
-    }
-  } else if (rule.action == FaultAction::babble) {
-    babble(rule);
-  } else {
-    faults_.push_back({rule, 0});
-    matched_.reserve(faults_.size());
-  }
-}
-
-void SimulatedCanBus::babble(const FaultRule& rule) {
-  if (rule.period_ns <= 0 || !can_carry(rule.frame)) {
-    throw SetupError({.bus = config_.name,
-                      .key = "fault rule: babble",
-                      .message = "needs a period above 0 and a frame that this bus can carry"});
-  }
-  Port* port = ports_.emplace_back(std::make_unique<Port>(*this, "babbling node", nullptr, 1)).get();
-  // Kept among the faults for its frame; the empty time window keeps it from matching any.
-  ActiveFault fault{rule, 0};
-  fault.rule.first = std::numeric_limits<std::uint64_t>::max();
-  faults_.push_back(fault);
-  matched_.reserve(faults_.size());
-  events_.schedule(rule.from_ns, [this, place = faults_.size() - 1, port] { babble_once(place, *port); });
-}
-
-void SimulatedCanBus::babble_once(std::size_t fault, Port& port) {
-  const FaultRule& rule = faults_[fault].rule;
-  if (events_.now_ns() >= rule.to_ns) return;
-  port.send(rule.frame);
-  events_.schedule_after(rule.period_ns, [this, fault, &port] { babble_once(fault, port); });
 }
 
 }  // namespace proxarm::fieldbus

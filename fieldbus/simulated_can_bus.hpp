@@ -5,6 +5,9 @@
 // ports wins and occupies the bus for its exact length (can_timing.hpp). All other ports receive it at the end of its
 // EOF field; the next frame may start three bits later. A frame queued during another one waits for its end.
 //
+// A frame that nobody else is there to acknowledge isn't delivered: the controller turns error passive, its queue fills
+// up, and it goes on when a node is attached or comes back.
+//
 // Arbitration is bit by bit: the lower base identifier wins; then a data frame over a remote one, an 11-bit over a
 // 29-bit identifier, a classic over an FD frame.
 #pragma once
@@ -98,6 +101,7 @@ class SimulatedCanBus final : public CanBus {
   void change_state(Port& port, BusState state) noexcept;
   void request_arbitration();
   void arbitrate();
+  [[nodiscard]] bool is_acknowledged(const Port& sender) const noexcept;
   [[nodiscard]] Port* arbitration_winner() noexcept;
   void pick_faults() noexcept;
   void complete();
@@ -129,6 +133,7 @@ class SimulatedCanBus final : public CanBus {
   bool transmitting_ = false;
   bool repeating_ = false;  // this is the second of a duplicated frame
   bool arbitration_requested_ = false;
+  bool alone_ = false;        // the controller is error passive because nobody acknowledges
   std::int64_t idle_ns_ = 0;  // the next frame may start from here
 
   std::vector<ActiveFault> faults_;

@@ -240,6 +240,29 @@ TEST_F(SimulatedCanBusTest, CountsAFrameThatCompletesAtTheDeadlineAsInTime) {
   EXPECT_TRUE(network.wait_for_frame(50'000));
 }
 
+TEST(SimulatedCanBus, DeliversNothingThatNobodyAcknowledges) {
+  SimulatedCanNetwork network({{.name = "sensor"}});
+  SimulatedCanBus& bus = network.simulated_bus(0);
+  for (int i = 0; i < 11; ++i) EXPECT_EQ(bus.send(frame_of(1)), SendResult::sent);
+  network.sleep_until(50'000'000);
+  EXPECT_EQ(bus.send(frame_of(1)), SendResult::queue_full) << "a controller repeats the first for ever";
+  EXPECT_EQ(bus.status().state, BusState::error_passive);
+  EXPECT_EQ(bus.status().error_frames, 1u);
+  Node node;
+  bus.attach(node, "node");
+  network.sleep_until(100'000'000);
+  EXPECT_EQ(node.seen.size(), 11u);
+  EXPECT_EQ(bus.status().state, BusState::error_active);
+  bus.set_state("node", BusState::down);
+  bus.send(frame_of(2));
+  network.sleep_until(200'000'000);
+  EXPECT_EQ(bus.status().state, BusState::error_passive);
+  bus.set_state("node", BusState::error_active);
+  network.sleep_until(300'000'000);
+  EXPECT_EQ(node.seen.size(), 12u);
+  EXPECT_EQ(bus.status().state, BusState::error_active);
+}
+
 TEST_F(SimulatedCanBusTest, AnswersAFrameInTheNextArbitration) {
   node.answer = [&](const CanFrame& frame, std::int64_t) {
     if (frame.id == 0x080) port.send(frame_of(0x181));
