@@ -61,21 +61,24 @@ class Media final : public GeometricAlgorithm<N> {
     const Vec<N> d = q - p;
     const auto at = [&](double tau) { return (*rest_)(kappa / (1.0 - tau), Vec<N>(p + tau * d), q); };
     const auto excess = [&](double tau, const Vec<N>& r) { return kappa * tau / (1.0 - tau) * (r - q).norm() - F; };
-    // Free or at rest, (3) is the answer.
     const double size = d.norm();
-    if (!(kappa * size > F)) {
-      // Nothing pulls harder than F, and contacts only take from it. They may still have moved onto the proxy.
-      const Vec<N> r = at(kHeld);
-      return (r - q).norm() <= kHeldMove * size ? q : r;
-    }
-    double low = 0.0, high = kHeld, tau = std::min(F / (kappa * size), kHeld);
-    Vec<N> r = at(tau);
-    double e = excess(tau, r), e_low = -F, e_high = 0.0;
-    if (std::abs(e) <= kClose * F) return r;
+    // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R.
     const Vec<N> held = at(kHeld);
-    e_high = excess(kHeld, held);
-    if (!(e_high > 0.0)) return q;  // even next to rest the world takes all but F
+    const Vec<N> R = (held - q) / (1.0 - kHeld);
+    const double pull = kappa * R.norm();
+    // (3), first case; unless something that moves has come onto the proxy.
+    if (!(pull > F) || (!(kappa * size > F) && !(R.norm() > 2.0 * size))) return q;
+    if (F >= kHeld * pull) return q + (1.0 - F / pull) * R;
+
+    double low = 0.0, high = kHeld, e_low = -F, e_high = excess(kHeld, held);
+    double tau = std::min(F / pull, kHeld);
+    Vec<N> r = held;
     for (int k = 0, side = 0; k < 100; ++k) {
+      if (!(tau > low && tau < high)) tau = 0.5 * (low + high);
+      if (!(tau > low && tau < high)) break;
+      r = at(tau);
+      const double e = excess(tau, r);
+      if (std::abs(e) <= kClose * F) break;
       if (e < 0.0) {
         low = tau;
         e_low = e;
@@ -87,20 +90,13 @@ class Media final : public GeometricAlgorithm<N> {
         if (side == 1) e_low *= 0.5;
         side = 1;
       }
-      tau = (low * e_high - high * e_low) / (e_high - e_low);
-      if (k % 8 == 7 || !(tau > low && tau < high)) tau = 0.5 * (low + high);
-      if (!(tau > low && tau < high)) break;
-      r = at(tau);
-      e = excess(tau, r);
-      if (std::abs(e) <= kClose * F) break;
+      tau = k % 8 == 7 ? 0.5 * (low + high) : (low * e_high - high * e_low) / (e_high - e_low);
     }
     return r;
   }
 
-  // The limit τ → 1, where the proxy rests, is taken a millionth before it: the step there is a millionth of the way to
-  // p, far above rounding, and surfaces are flat at that scale.
-  static constexpr double kHeld = 1.0 - 1e-6;
-  static constexpr double kHeldMove = 1e-3;  // of the way to p; beyond this something has pushed the proxy
+  // Where rest is looked at from: a hundredth of the way to p, far above rounding.
+  static constexpr double kHeld = 0.99;
   static constexpr double kClose = 1e-14;
 
   std::unique_ptr<GeometricAlgorithm<N>> rest_;

@@ -84,7 +84,25 @@ struct Distance {
   static double side(bool inside_out, double distance) { return inside_out ? -distance : distance; }
 };
 
+struct Middle {
+  Vec3 operator()(const PlaneShape& s) const { return s.point_m; }
+  Vec3 operator()(const BoxShape& s) const { return s.pose_W.translation(); }
+  Vec3 operator()(const SphereShape& s) const { return s.centre_m; }
+  Vec3 operator()(const CapsuleShape& s) const { return 0.5 * (s.from_m + s.to_m); }
+  Vec3 operator()(const CylinderShape& s) const { return 0.5 * (s.from_m + s.to_m); }
+};
+struct Size {
+  double operator()(const PlaneShape&) const { return 0.5; }
+  double operator()(const BoxShape& s) const { return 0.5 * s.size_m.norm(); }
+  double operator()(const SphereShape& s) const { return s.radius_m; }
+  double operator()(const CapsuleShape& s) const { return 0.5 * (s.to_m - s.from_m).norm() + s.radius_m; }
+  double operator()(const CylinderShape& s) const { return 0.5 * (s.to_m - s.from_m).norm() + s.radius_m; }
+};
+
 }  // namespace
+
+Vec3 middle_of(const Shape& shape) { return std::visit(Middle{}, shape); }
+double size_of(const Shape& shape) { return std::visit(Size{}, shape); }
 
 std::vector<Part> parts_of(const Scene& scene, const Object& object) {
   Layer layer;

@@ -24,6 +24,10 @@ std::unique_ptr<models::Obstacle> region_of(const Shape& shape);
 
 models::ScriptedMotion script_of(const Motion& motion);
 
+// Where to look for an object, and about how far it reaches from there (half a metre for a plane).
+models::Vec3 middle_of(const Shape& shape);
+double size_of(const Shape& shape);
+
 // Signed distance from an object that stands where it was described; to what is rigid of it.
 double distance_to(const Object& object, const models::Vec3& x_W);
 

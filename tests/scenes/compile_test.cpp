@@ -117,7 +117,7 @@ TEST(Compile, GivesWayUnderALayer) {
   auto& g = scene.algorithm<3>();
   Vec3 q(0.88, 0, 0.6);
   for (int k = 0; k < 5000; ++k) q = g(1e6, q + Vec3(10.0 / 1e6, 0, 0), q);  // 10 N
-  EXPECT_NEAR(q.x(), 0.885, 1e-6);  // settled to e⁻¹⁰ of 5 mm
+  EXPECT_NEAR(q.x(), 0.885, 1e-6);                                           // settled to e⁻¹⁰ of 5 mm
 }
 
 TEST(Compile, MovesWhatMoves) {

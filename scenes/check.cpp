@@ -1,0 +1,314 @@
+#include "scenes/check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <sstream>
+
+#include "models/cone_sum.hpp"
+#include "models/mechanistic_map.hpp"
+#include "scenes/compile.hpp"
+#include "scenes/obstacles.hpp"
+
+namespace proxarm::scenes {
+namespace {
+
+using models::Vec;
+using models::Vec3;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class Random {
+ public:
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
+  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
+  template <int N>
+  Vec<N> in_box(double half) {
+    Vec<N> v;
+    for (int i = 0; i < N; ++i) v[i] = uniform(-half, half);
+    return v;
+  }
+  template <int N>
+  Vec<N> direction() {
+    std::normal_distribution<double> normal;
+    Vec<N> v;
+    do {
+      for (int i = 0; i < N; ++i) v[i] = normal(engine_);
+    } while (!(v.norm() > 1e-3));
+    return v.normalized();
+  }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+template <int N>
+Vec3 lift(const Vec<N>& v) {
+  Vec3 v3 = Vec3::Zero();
+  v3.template head<N>() = v;
+  return v3;
+}
+
+// One state and what came of it.
+template <int N>
+struct State {
+  double K = 0.0;
+  Vec<N> p, q, r;
+  std::vector<models::Contact<N>> contacts;
+
+  [[nodiscard]] Vec<N> f() const { return K * (r - p); }
+  [[nodiscard]] double size() const { return 0.1 + r.norm() + p.norm() + q.norm() + (r - p).norm(); }
+  [[nodiscard]] std::string text() const {
+    std::ostringstream out;
+    out.precision(17);
+    const auto vector = [&](const char* name, const Vec<N>& v) {
+      out << ", " << name << " = [";
+      for (int i = 0; i < N; ++i) out << (i > 0 ? ", " : "") << v[i];
+      out << "]";
+    };
+    out << "K = " << K;
+    vector("p", p);
+    vector("q", q);
+    vector("r", r);
+    return out.str();
+  }
+};
+
+template <int N>
+State<N> ask(models::GeometricAlgorithm<N>& g, double K, const Vec<N>& p, const Vec<N>& q) {
+  State<N> s{K, p, q, g(K, p, q), {}};
+  s.contacts.assign(g.contacts().begin(), g.contacts().end());
+  return s;
+}
+
+// Near-parallel contacts amplify rounding by one over the sine of their angle.
+template <int N>
+double condition(const State<N>& s) {
+  double least = 1.0;
+  for (std::size_t i = 0; i < s.contacts.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double cos = s.contacts[i].normal.dot(s.contacts[j].normal);
+      least = std::min(least, std::sqrt(std::max(0.0, 1.0 - cos * cos)));
+    }
+  }
+  return 4.0 / std::max(least, 1e-8);
+}
+
+// How far f is from what the contacts can bear, in parts of what rounding explains (0 or 2: a test, not a distance).
+template <int N>
+double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
+  double tolerance = condition(s) * 64.0 * kEps * s.K * s.size();
+  const Vec3 f = lift<N>(s.f()), motion = lift<N>(s.r - s.q);
+  std::vector<models::ForceCone> cones;
+  for (const auto& contact : s.contacts) {
+    const Vec3 n = lift<N>(contact.normal);
+    const auto object = static_cast<std::size_t>(contact.object);
+    if (!region.friction) {
+      cones.push_back({n, 1e6});  // all but pulling
+      continue;
+    }
+    const double mu = N == 1 || object >= region.friction->size() ? 0.0 : (*region.friction)[object];
+    const Vec3 v = motion - n * n.dot(motion);
+    const double uncertain = 16.0 * kEps * s.size() / v.norm();
+    if (contact.slips && uncertain < 1e-3) {
+      cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
+      tolerance += mu * f.norm() * uncertain * condition(s);
+    } else {
+      cones.push_back({n, mu});
+    }
+  }
+  return models::in_sum_of_cones(f, cones, tolerance) ? 0.0 : 2.0;
+}
+
+enum Figure { finite, repeatable, independent, laws, rest, figure_count };
+
+template <int N>
+class Checker {
+ public:
+  Checker(models::GeometricAlgorithm<N>& g, const CheckRegion<N>& region, const CheckOptions& options)
+      : g_(g), region_(region), options_(options), random_(options.seed) {
+    report_.several_allowed = options.several_allowed;
+    report_.figures.resize(figure_count);
+    report_.figures[finite].what = "finite";
+    report_.figures[repeatable].what = "repeatable";
+    report_.figures[independent].what = "independent of K";
+    report_.figures[laws].what = region.friction ? "force within its laws" : "force doesn't pull";
+    report_.figures[rest].what = "rests where it is";
+  }
+
+  CheckReport run() {
+    for (std::int64_t i = 0; i < options_.states; ++i) one();
+    return report_;
+  }
+
+ private:
+  void note(Figure figure, double worst, const State<N>& s, const std::string& more = {}) {
+    CheckFigure& f = report_.figures[figure];
+    if (!(worst <= 1.0)) ++f.failures;
+    if (!(worst <= f.worst)) {
+      f.worst = worst;
+      f.state = s.text() + more;
+    }
+  }
+
+  Vec<N> start() {
+    if (region_.places.empty()) return region_.centre + random_.template in_box<N>(region_.size_m);
+    const auto k = static_cast<std::size_t>(random_.uniform(0.0, static_cast<double>(region_.places.size())));
+    return region_.places[std::min(k, region_.places.size() - 1)];
+  }
+
+  void one() {
+    ++report_.states;
+    const double K = random_.log_uniform(1.0, 1e7);
+    // A proxy is where the world let it go: rested, and two thirds of them slid a little.
+    const Vec<N> x = start();
+    Vec<N> q = g_(K, x, g_(K, x, x));
+    const int slides = static_cast<int>(random_.uniform(0.0, 3.0));
+    for (int k = 0; k < slides; ++k) q = g_(K, q + options_.deepest_m * random_.template direction<N>(), q);
+    const Vec<N> p = q + random_.log_uniform(1e-9, options_.deepest_m) * random_.template direction<N>();
+    const State<N> s = ask<N>(g_, K, p, q);
+    if (!s.r.allFinite()) return note(finite, kInfinity, s);
+    report_.in_contact += s.contacts.empty() ? 0 : 1;
+    for (const auto& contact : s.contacts) report_.slipping += contact.slips ? 1 : 0;
+
+    if (!region_.acts_without_contact) note(laws, outside_laws(s, region_), s);
+    for (int k = 0; k < 3; ++k) other_stiffness(s);
+    if (!region_.acts_without_contact && !region_.soft) {
+      const Vec<N> stays = g_(K, s.r, s.r);
+      note(rest, (stays - s.r).norm() / (1e-12 * std::max(1.0, s.r.norm())), s);
+    }
+    const Vec<N> again = g_(K, p, q);
+    note(repeatable, (again.array() == s.r.array()).all() ? 0.0 : 2.0, s);
+  }
+
+  void other_stiffness(const State<N>& s) {
+    const Vec<N> f = s.f();
+    const double decades = random_.uniform(-options_.kappa_decades, options_.kappa_decades);
+    const double kappa = std::max(s.K * std::pow(10.0, decades), f.norm() / options_.deepest_m);
+    const State<N> other = ask<N>(g_, kappa, Vec<N>(s.r - f / kappa), s.q);
+    const double allowed =
+        condition(s) * 64.0 * kEps * ((0.1 + s.r.norm() + s.q.norm()) * (1.0 + s.K / kappa) + f.norm() / kappa);
+    const double error = (other.r - s.r).norm() / allowed;
+    // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
+    const bool lawful =
+        region_.bends || (region_.friction && !region_.acts_without_contact && !(outside_laws(other, region_) > 1.0));
+    if (!(error <= 1.0) && other.r.allFinite() && lawful) {
+      ++report_.several;
+      return;
+    }
+    note(independent, error, s, ", κ = " + std::to_string(kappa));
+  }
+
+  models::GeometricAlgorithm<N>& g_;
+  const CheckRegion<N>& region_;
+  const CheckOptions& options_;
+  Random random_;
+  CheckReport report_;
+};
+
+// Points just outside of an object's surface, by walking along the distance's slope.
+std::vector<Vec3> around(const Object& object, Random& random, int count) {
+  const Vec3 middle = middle_of(object.shape);
+  const double size = size_of(object.shape);
+  std::vector<Vec3> places;
+  for (int i = 0; i < count; ++i) {
+    Vec3 x = middle + random.in_box<3>(1.2 * size);
+    for (int k = 0; k < 20; ++k) {
+      const double d = distance_to(object, x), h = 1e-6 * size;
+      Vec3 slope;
+      for (int a = 0; a < 3; ++a) slope[a] = (distance_to(object, x + h * Vec3::Unit(a)) - d) / h;
+      x -= (d - 1e-3 * size) * slope;
+      if (std::abs(d - 1e-3 * size) < 1e-4 * size) break;
+    }
+    places.push_back(x);
+  }
+  return places;
+}
+
+template <int N>
+CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, const CheckOptions& options) {
+  const CompiledScene compiled = compile(scene);
+  models::GeometricAlgorithm<N>& g = compiled.algorithm<N>();
+  g.set_time({.time_s = 0.0, .period_s = 0.0});  // everything stands still
+  CheckRegion<N> region;
+  region.friction.emplace();
+  for (const Object& object : scene.objects) {
+    region.friction->push_back(object.friction);
+    region.soft = region.soft || object.layer.has_value();
+  }
+  region.acts_without_contact = !scene.media.empty() || scene.coulomb_force_N || scene.guide;
+  region.bends = scene.guide && scene.guide->kind == GuideDescription::Kind::polyline;
+  if (scene.guide) region.centre = compiled.from_W<N>(scene.guide->points_m.front());
+  for (const Vec3& x : places) {
+    // Nowhere inside anything else.
+    if (clearance_m(scene, x) >= 0.0) region.places.push_back(compiled.from_W<N>(x));
+  }
+  return Checker<N>(g, region, options).run();
+}
+
+CheckReport check_scene_once(const Scene& scene, const std::vector<Vec3>& places, const CheckOptions& options) {
+  if (scene.space.dimensions == 1) return check_whole<1>(scene, places, options);
+  if (scene.space.dimensions == 2) return check_whole<2>(scene, places, options);
+  return check_whole<3>(scene, places, options);
+}
+
+}  // namespace
+
+bool CheckReport::passed() const noexcept {
+  for (const CheckFigure& figure : figures) {
+    if (figure.failures > 0) return false;
+  }
+  return static_cast<double>(several) <= several_allowed * static_cast<double>(states);
+}
+
+std::string CheckReport::text() const {
+  std::ostringstream out;
+  out.precision(3);
+  out << subject << ": " << (passed() ? "fine" : "NOT fine") << " in " << states << " states, " << in_contact
+      << " in contact, " << slipping << " slipping contacts";
+  if (several > 0) out << ", " << several << " where Coulomb's law has several solutions";
+  out << "\n";
+  for (const CheckFigure& figure : figures) {
+    out << "  " << figure.what << ": worst " << figure.worst << " of what rounding explains";
+    if (figure.failures > 0) out << ", " << figure.failures << " failures, worst at " << figure.state;
+    out << "\n";
+  }
+  return out.str();
+}
+
+template <int N>
+CheckReport check_algorithm(models::GeometricAlgorithm<N>& g, const CheckRegion<N>& region,
+                            const CheckOptions& options) {
+  CheckReport report = Checker<N>(g, region, options).run();
+  report.subject = "algorithm";
+  return report;
+}
+
+template CheckReport check_algorithm<1>(models::GeometricAlgorithm<1>&, const CheckRegion<1>&, const CheckOptions&);
+template CheckReport check_algorithm<2>(models::GeometricAlgorithm<2>&, const CheckRegion<2>&, const CheckOptions&);
+template CheckReport check_algorithm<3>(models::GeometricAlgorithm<3>&, const CheckRegion<3>&, const CheckOptions&);
+
+std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& options) {
+  std::vector<CheckReport> reports;
+  Random random(options.seed);
+  std::vector<Vec3> all;
+  for (const Object& object : scene.objects) {
+    const std::vector<Vec3> places = around(object, random, scene.objects.size() > 100 ? 4 : 200);
+    all.insert(all.end(), places.begin(), places.end());
+    if (scene.objects.size() < 2 || scene.objects.size() > 100) continue;
+    Scene alone = scene;
+    alone.objects = {object};
+    CheckReport report = check_scene_once(alone, places, options);
+    report.subject = object.name;
+    reports.push_back(std::move(report));
+  }
+  CheckReport whole = check_scene_once(scene, all, options);
+  whole.subject = scene.objects.size() > 1 ? scene.name + ", all together" : scene.name;
+  reports.push_back(std::move(whole));
+  return reports;
+}
+
+}  // namespace proxarm::scenes
