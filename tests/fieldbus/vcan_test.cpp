@@ -1,18 +1,15 @@
-// SocketCanNetwork and NodeLoop on a real kernel: run through tests/vcan/with-vcan, which brings vcan0, vcan1, vcan2.
+// SocketCanNetwork on a real kernel: run through tests/vcan/with-vcan, which brings vcan0, vcan1, vcan2.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "fieldbus/candump_log.hpp"
-#include "fieldbus/node_loop.hpp"
 #include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 
@@ -216,52 +213,22 @@ TEST_F(Vcan, LosesNoWantedFrameInAFloodOfOthers) {
   here.sleep_until(start + 500'000'000);  // it is over for the tests that follow
 }
 
-struct Echo : CanListener {
-  CanPort* port = nullptr;
-  std::uint32_t answer = 0;
-  int heard = 0;
-  void on_frame(const CanFrame& frame, std::int64_t) noexcept override {
-    ++heard;
-    if (frame.id != 0x080) return;
-    CanFrame out;
-    out.id = answer;
-    port->send(out);
-  }
-};
-
-// The node loop is in the same thread here: it is run after each send.
-TEST_F(Vcan, RunsNodesOnTheInterfacesEventsIncluded) {
-  SocketCanNetwork controller({"vcan0", "vcan1"}), peers({"vcan0", "vcan1"});
-  NodeLoop loop(peers);
-  Echo first, second, elsewhere;
-  first.port = &loop.attach(0, first);
-  second.port = &loop.attach(0, second);
-  elsewhere.port = &loop.attach(1, elsewhere);
-  first.answer = 0x181;
-  second.answer = 0x182;
-  elsewhere.answer = 0x183;
-  int ticks = 0;
-  std::int64_t worst_late_ns = 0;
-  const std::int64_t start = peers.now_ns();
-  std::function<void(std::int64_t)> tick = [&](std::int64_t time_ns) {
-    ++ticks;
-    worst_late_ns = std::max(worst_late_ns, peers.now_ns() - time_ns);
-    loop.events().schedule(time_ns + 1'000'000, [&tick](std::int64_t t) { tick(t); });
-  };
-  loop.events().schedule(start + 1'000'000, [&tick](std::int64_t t) { tick(t); });
-  controller.bus(0).send(frame_of(0x080));
-  loop.run_until(start + 20'500'000);
-  EXPECT_EQ(ticks, 20);
-  EXPECT_EQ(first.heard, 2) << "SYNC, and the answer of its neighbour";
-  EXPECT_EQ(second.heard, 2);
-  EXPECT_EQ(elsewhere.heard, 0);
-  TimedFrame timed;
-  std::vector<std::uint32_t> ids;
-  while (controller.bus(0).receive(timed)) ids.push_back(timed.frame.id);
-  EXPECT_THAT(ids, testing::ElementsAre(0x181, 0x182));
+TEST_F(Vcan, WakesUpForAFrameOrAtTheDeadline) {
+  SocketCanNetwork here({"vcan0", "vcan1"}), there({"vcan0", "vcan1"});
+  const std::int64_t start = here.now_ns();
+  EXPECT_FALSE(there.wait_for_frame(start + 3'000'000));
+  EXPECT_GE(there.now_ns(), start + 3'000'000);
+  there.sleep_until(start + 5'000'000);
+  const std::int64_t late_ns = there.now_ns() - (start + 5'000'000);
+  EXPECT_GE(late_ns, 0);
   if (virtual_clock()) {
-    EXPECT_LT(worst_late_ns, 100'000) << "timer slack is 50 us";
+    EXPECT_LT(late_ns, 100'000) << "timer slack is 50 us";
   }
+  here.bus(1).send(frame_of(0x123));
+  EXPECT_TRUE(there.wait_for_frame(there.now_ns() + 1'000'000'000)) << "on whichever bus";
+  TimedFrame timed;
+  EXPECT_FALSE(there.bus(0).receive(timed));
+  EXPECT_TRUE(there.bus(1).receive(timed));
 }
 
 }  // namespace
