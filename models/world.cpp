@@ -10,8 +10,8 @@
 namespace proxarm::models {
 namespace {
 
-// Curved surfaces gain the factor penetration / radius with each new tangent plane: forty times a half is rounding.
-constexpr int kSettle = 40;
+// Curved surfaces gain the factor penetration / radius with each new tangent plane, and more where they are slow.
+constexpr int kSettle = 60;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // No closer than rounding lets it: either nothing moves, or the moves are tiny and have stopped shrinking (a slip that
@@ -150,9 +150,10 @@ void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candid
       const std::size_t first = m[0] == candidates.index[d] ? d : c, second = first == d ? c : d;
       const Obstacle &a = *entries_[m[0]].obstacle, &b = *entries_[m[1]].obstacle;
       const Vec3 q_a = a.carry(q), q_b = b.carry(q);
-      Vec3 r = q;
-      Obstacle::Tangent t_a = a.tangent(r, candidates.alone[first].feature);
-      Obstacle::Tangent t_b = b.tangent(r, candidates.alone[second].feature);
+      const std::int32_t feature_a = candidates.alone[first].feature, feature_b = candidates.alone[second].feature;
+      // r = solution(at), on the tangent planes at `at`; at = r is wanted.
+      Vec3 r = q, at = q, last_r = q, last_f = Vec3::Zero();
+      Obstacle::Tangent t_a = a.tangent(at, feature_a), t_b = b.tangent(at, feature_b);
       GrooveSolution s;
       double last_move = kInfinity;
       for (int k = 0; k < kSettle; ++k) {
@@ -160,16 +161,27 @@ void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candid
         s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b);
         const bool presses = s.found;
         if (!presses) s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b, true);
-        if (!s.found || !s.r.allFinite()) break;
-        const double move = (s.r - r).norm();
+        if (!s.found || !s.r.allFinite()) {
+          s.found = false;
+          break;
+        }
         r = s.r;
-        const Obstacle::Tangent n_a = a.tangent(r, candidates.alone[first].feature);
-        const Obstacle::Tangent n_b = b.tangent(r, candidates.alone[second].feature);
-        const bool flat = n_a.surface.normal() == t_a.surface.normal() && n_b.surface.normal() == t_b.surface.normal();
         s.found = presses;
-        if (flat || has_settled(move, last_move, r)) break;
-        s.found = false;
+        const Vec3 f = r - at;
+        const double move = f.norm();
+        if (has_settled(move, last_move, r)) break;
+        // Where each step only takes a part of the error off, the steps of one and the next tell where they lead.
+        const Vec3 bend = f - last_f;
+        const double theta = k < 2 ? 0.0 : f.dot(bend) / std::max(bend.squaredNorm(), 1e-300);
+        const Vec3 ahead = r - theta * (r - last_r);
+        last_r = r;
+        last_f = f;
         last_move = move;
+        at = (ahead - r).norm() <= 10.0 * move ? ahead : r;
+        const Obstacle::Tangent n_a = a.tangent(at, feature_a), n_b = b.tangent(at, feature_b);
+        if (n_a.surface.normal() == t_a.surface.normal() && n_b.surface.normal() == t_b.surface.normal())
+          break;  // flat
+        s.found = false;
         t_a = n_a;
         t_b = n_b;
       }
