@@ -135,6 +135,9 @@ void Cycle::judge_sensor() noexcept {
   if (!reading_S_.force.allFinite() || !reading_S_.torque.allFinite()) return raise(Fault::force_not_finite, -1);
   if (!sample.healthy) return raise(Fault::sensor_status, -1);
   if (sample.saturated) return raise(Fault::sensor_saturated, -1);
+  if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
+    return raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
+  }
   const double force_N = hand_W_.force.norm();
   if (supervisor_.phase() == Phase::rendering && force_N > limits_.max_force_N) {
     raise(Fault::force_excessive, -1, force_N, limits_.max_force_N);

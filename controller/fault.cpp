@@ -25,6 +25,8 @@ constexpr std::array texts{
               "power-cycle the sensor; look up the status bits in its manual"},
     FaultText{Fault::sensor_saturated, "sensor_saturated", "a gauge of the force sensor is at its rail", nullptr,
               "push less, or use a sensor with a larger range"},
+    FaultText{Fault::sensor_frozen, "sensor_frozen", "the force sensor repeats one reading to the last digit",
+              "samples", "power-cycle the sensor; if it is that quiet, set sensor.noise_N to 0 in the cell file"},
     FaultText{Fault::force_not_finite, "force_not_finite", "the decoded force isn't a finite number", nullptr,
               "check the sensor's calibration matrix"},
     FaultText{Fault::force_excessive, "force_excessive", "force beyond limits.max_force_N", "N",

@@ -15,6 +15,7 @@ enum class Fault : std::uint8_t {
   sensor_lost,          // no complete sample for more than max_missed_samples cycles: controlled stop
   sensor_status,        // the sensor's status word reports an error: controlled stop
   sensor_saturated,     // a gauge at its rail, so the force is unknown: controlled stop
+  sensor_frozen,        // one reading for more than max_repeated_samples cycles: controlled stop
   force_not_finite,     // decoded force is NaN or infinite: controlled stop
   force_excessive,      // beyond the cell's max_force_N: controlled stop
   force_at_start,       // the handle was pushed while the sensor was tared: nothing is enabled

@@ -49,6 +49,13 @@ double drive_time_constant_s(const description::Cell& cell) {
   return slowest_s;
 }
 
+// A sensor without noise repeats itself, and one that is slower than the cycle is read several times per sample.
+std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, const controller::SessionSettings& settings) {
+  if (!(sensor.noise_N > 0.0)) return 0;
+  const double reads = sensor.sample_rate_Hz > 0.0 ? 1.0 / (settings.period_s * sensor.sample_rate_Hz) : 1.0;
+  return settings.max_repeated_samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
+}
+
 // Below, no machine's cycle can be; above, no hand would call it touch. What a drive can hold exactly is in between.
 constexpr double shortest_period_s = 50e-6, longest_period_s = 0.1;
 
@@ -83,6 +90,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.settings = options.settings;
   session.settings.period_s = options.period_s.value_or(session.cell.default_period_s);
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
+  session.settings.max_repeated_samples = repeats_allowed(session.cell.sensor, session.settings);
   session.duration_s = options.duration_s;
   require_period(session, options);
 

@@ -1,0 +1,112 @@
+// The whole chain in one process for tests: default cell, touch of the wall, controller and simulated arm on three
+// in-process buses, with whatever shall fail.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "controller/bring_up.hpp"
+#include "controller/cycle.hpp"
+#include "controller/session.hpp"
+#include "fieldbus/simulated_can_network.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "scenes/compile.hpp"
+#include "scenes/scene_file.hpp"
+#include "sim/simulated_cell.hpp"
+
+namespace proxarm::controller::testing {
+
+inline std::filesystem::path source_file(const std::string& path) {
+  return std::filesystem::path(PROXARM_SOURCE_DIR) / path;
+}
+
+struct RigOptions {
+  std::vector<std::string> device_faults{};  // as on the command line
+  fieldbus::FaultScript script{};
+  double duration_s = 2.5;
+  std::string scene = "scenes/wall.yaml";
+  std::string hand = "sim/hands/touch.yaml";
+  SessionSettings settings{};
+  std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
+};
+
+class ClosedLoopRig {
+ public:
+  explicit ClosedLoopRig(const RigOptions& rig)
+      : options(rig),
+        cell(description::load_cell(source_file("models/cells/default.yaml"))),
+        sensor(biased(description::load_sensor(source_file("models/sensors/ati_net_can_oem.yaml")), rig)),
+        hand(description::load_hand(source_file(rig.hand))),
+        scene(scenes::load_scene(source_file(rig.scene))),
+        compiled(scenes::compile(scene)),
+        network({{.name = "axes_1_3"}, {.name = "axes_4_6"}, {.name = "sensor"}}),
+        far_end(cell, sensor, hand, network.events(), with_faults(rig)) {
+    far_end.attach_to(network);
+    network.apply(rig.script);
+    far_end.power_on();
+  }
+
+  // Bring-up and the whole session. `through`: what the controller talks to, such as a recorder before the network.
+  void run(fieldbus::CanNetwork& through) {
+    cycle = std::make_unique<Cycle>(prepared_parts(through), options.settings, cell.limits, 64);
+    const SessionHooks hooks{[this](std::int64_t t_k_ns) {
+                               if (records.empty()) first_cycle_ns = t_k_ns;
+                               truths.push_back(far_end.truth());
+                             },
+                             [this] { drain(); }};
+    tally = run_session(*cycle, through, options.settings.period_s, options.duration_s, hooks);
+    cycle->shut_down();
+    network.sleep_until(network.now_ns() + 1'500'000'000);  // the drives stop, and the gears ring out
+  }
+  void run() { run(network); }
+
+  CycleParts prepared_parts(fieldbus::CanNetwork& through) {
+    CycleParts parts = build_parts(cell, sensor, compiled, options.settings, through, {0, 1, 2});
+    bring_up(parts);
+    return parts;
+  }
+
+  // The cycle that begins at or after this time since power on.
+  [[nodiscard]] std::size_t cycle_at(double time_s) const {
+    return static_cast<std::size_t>(std::ceil((time_s * 1e9 - static_cast<double>(first_cycle_ns)) / 1e6));
+  }
+  [[nodiscard]] const FaultReport& fault() const { return cycle->supervisor().report(); }
+
+  RigOptions options;
+  description::Cell cell;
+  description::SensorDescription sensor;
+  description::HandDescription hand;
+  scenes::Scene scene;
+  scenes::CompiledScene compiled;
+  fieldbus::SimulatedCanNetwork network;
+  sim::SimulatedCell far_end;
+  std::unique_ptr<Cycle> cycle;
+  std::vector<CycleRecord> records;
+  std::vector<sim::Truth> truths;  // at each record's t_k
+  SessionTally tally;
+  std::int64_t first_cycle_ns = 0;
+
+ private:
+  static description::SensorDescription biased(description::SensorDescription sensor, const RigOptions& rig) {
+    for (std::size_t i = 0; i < 6; ++i) sensor.simulation.bias_counts[i] += rig.sensor_bias_counts[i];
+    return sensor;
+  }
+  static sim::SimulatedCellConfig with_faults(const RigOptions& rig) {
+    sim::SimulatedCellConfig config;
+    for (const std::string& text : rig.device_faults) config.faults.push_back(sim::parse_device_fault(text));
+    return config;
+  }
+  void drain() {
+    CycleRecord record;
+    while (cycle->records().pop(record)) records.push_back(record);
+  }
+};
+
+}  // namespace proxarm::controller::testing

@@ -1,0 +1,264 @@
+// Controller against the simulated arm while something fails in the middle of a motion: the right fault, soon, and the
+// arm comes to rest in a controlled way.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+
+#include "tests/controller/closed_loop_rig.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using testing::ClosedLoopRig;
+using testing::RigOptions;
+
+// Since power on: cycles begin at 0.2 s, the hand at 0.44 s; at 1.9 s it moves the tool at about 0.1 m/s through free
+// space.
+constexpr double failure_s = 1.9;
+constexpr std::int64_t failure_ns = 1'900'000'000;
+
+// Brakes are on by then, but the hand still pulls: it goes on at 0.1 m/s, so its 500 N/m pull 50 N/s harder, on an arm
+// that gives way by 1 mm in 50 N or more. That is 1 mm/s.
+constexpr double at_rest_m_per_s = 1e-3;
+
+// Setpoints of the stop: each joint goes on in its direction, slower every cycle, with no more than its deceleration,
+// and stands still in the end. Rounding to counts is worth half a count per setpoint, two in a second difference.
+void expect_targets_run_out(const ClosedLoopRig& rig, int but_of_axis = -1) {
+  const auto& records = rig.records;
+  const auto first = static_cast<std::size_t>(rig.fault().cycle);
+  ASSERT_GT(first, 2u);
+  // Then the drives are switched off, and their targets follow where they stand.
+  std::size_t last = first;
+  while (last + 1 < records.size() && records[last].phase <= Phase::stopping) ++last;
+  ASSERT_GT(last, first);
+  const double T = rig.options.settings.period_s;
+  double fastest = 0.0;
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    if (static_cast<int>(axis) == but_of_axis) continue;
+    const description::DriveDescription& drive = rig.cell.drives[axis];
+    const double most_counts = drive.max_acceleration_rad_per_s2 * std::abs(drive.counts_per_rad()) * T * T + 2.0;
+    for (std::size_t k = first; k <= last; ++k) {
+      const double step = records[k].target_counts[axis] - records[k - 1].target_counts[axis];
+      const double step_k1 = records[k - 1].target_counts[axis] - records[k - 2].target_counts[axis];
+      if (k == first) fastest = std::max(fastest, std::abs(step_k1) / std::abs(drive.counts_per_rad()) / T);
+      EXPECT_LE(std::abs(step - step_k1), most_counts) << drive.joint << " in cycle " << k;
+      EXPECT_LE(std::abs(step), std::abs(step_k1) + 1.0) << drive.joint << " in cycle " << k;
+      EXPECT_GE(step * step_k1, -2.0) << drive.joint << " turns back in cycle " << k;
+    }
+    EXPECT_LE(std::abs(records[last].target_counts[axis] - records[last - 1].target_counts[axis]), 1) << drive.joint;
+  }
+  EXPECT_GT(fastest, 0.05) << "rad/s: the arm was to be moving when it failed";
+}
+
+// The tool itself: by how much it goes on, and that it stands. `free_axis` may do what its drive does by itself.
+void expect_arm_at_rest(ClosedLoopRig& rig, double most_m) {
+  const auto first = static_cast<std::size_t>(rig.fault().cycle);
+  const models::Vec3 at_fault = rig.truths[first].X_WT.translation();
+  const sim::Truth last = rig.far_end.truth();
+  EXPECT_LT((last.X_WT.translation() - at_fault).norm(), most_m);
+  EXPECT_LT(last.velocity_W.norm(), at_rest_m_per_s);
+}
+
+void expect_drives_off(ClosedLoopRig& rig, int but_of_axis = -1) {
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    if (static_cast<int>(axis) == but_of_axis) continue;
+    EXPECT_FALSE(rig.far_end.drive(axis).state() == sim::DriveState::operation_enabled) << rig.cell.drives[axis].joint;
+  }
+}
+
+// Everything at once. `most_cycles`: from the failure to the first setpoint of the stop.
+void expect_controlled_stop(ClosedLoopRig& rig, Fault fault, std::int32_t where, std::size_t most_cycles) {
+  ASSERT_EQ(fault_name(rig.fault().fault), std::string(fault_name(fault)));
+  EXPECT_EQ(rig.fault().where, where);
+  const std::size_t failed = rig.cycle_at(failure_s);
+  EXPECT_GE(rig.fault().cycle + 1, failed);
+  EXPECT_LE(rig.fault().cycle, failed + most_cycles);
+  ::testing::Test::RecordProperty("cycles_until_reaction",
+                                  static_cast<int>(rig.fault().cycle) - static_cast<int>(failed));
+  EXPECT_EQ(rig.cycle->supervisor().phase(), Phase::done);
+  // The setpoint of a drive that is off by itself follows it.
+  const bool is_off = fault == Fault::drive_fault || fault == Fault::drive_silent;
+  expect_targets_run_out(rig, is_off ? where : -1);
+  expect_arm_at_rest(rig, 0.01);
+  const bool without_power =
+      !rig.options.device_faults.empty() && rig.options.device_faults[0].find("power") != std::string::npos;
+  expect_drives_off(rig, without_power ? where : -1);
+}
+
+RigOptions failing_device(const std::string& fault) { return {.device_faults = {fault + "@1.9s"}}; }
+
+TEST(ClosedLoop, WithoutAFaultRunsToItsEndAndSwitchesOff) {
+  ClosedLoopRig rig({});
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+  EXPECT_EQ(rig.cycle->supervisor().phase(), Phase::done);
+  EXPECT_EQ(rig.cycle->rendered_cycles(), 2500u);
+  expect_drives_off(rig);
+}
+
+// Missed are 3 samples, which are tolerated, and then one more.
+TEST(ClosedLoop, StopsInFourCyclesWhenTheSensorIsLost) {
+  for (const char* fault : {"sensor:silent", "sensor:samples", "sensor:half", "sensor:short"}) {
+    SCOPED_TRACE(fault);
+    ClosedLoopRig rig(failing_device(fault));
+    rig.run();
+    expect_controlled_stop(rig, Fault::sensor_lost, -1, 4);
+  }
+}
+
+TEST(ClosedLoop, RidesThroughThreeMissedSamples) {
+  ClosedLoopRig rig({.device_faults = {"sensor:samples@1.9s..1.903s"}});
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+  EXPECT_EQ(std::count_if(rig.records.begin(), rig.records.end(),
+                          [](const CycleRecord& r) { return r.has(RecordFlag::sample_held); }),
+            3);
+}
+
+// 20 repeats are tolerated; the sample before the first of them was a fresh one.
+TEST(ClosedLoop, StopsInTwentyTwoCyclesWhenTheSensorFreezes) {
+  ClosedLoopRig rig(failing_device("sensor:frozen"));
+  rig.run();
+  expect_controlled_stop(rig, Fault::sensor_frozen, -1, 22);
+}
+
+TEST(ClosedLoop, StopsAtOnceWhenTheSensorReportsAnError) {
+  ClosedLoopRig rig(failing_device("sensor:status=0x4000"));
+  rig.run();
+  expect_controlled_stop(rig, Fault::sensor_status, -1, 1);
+}
+
+// At rest, gauge 0 stands 150 counts (some 3 N) from one of its rails: the push against the wall takes it to one of
+// them.
+TEST(ClosedLoop, StopsWhenAGaugeComesToItsRail) {
+  RigOptions options;
+  const int at_rest = ClosedLoopRig(options).far_end.plant().force_sensor().sample(0).gauges[0];
+  options.duration_s = 7.0;
+  int saturated = 0;
+  for (const int wanted : {32767 - 150, -32767 + 150}) {
+    options.sensor_bias_counts[0] = wanted - at_rest;
+    ClosedLoopRig rig(options);
+    rig.run();
+    if (rig.fault().fault == Fault::none) continue;
+    ++saturated;
+    EXPECT_EQ(fault_name(rig.fault().fault), std::string("sensor_saturated"));
+    expect_arm_at_rest(rig, 0.01);
+    expect_drives_off(rig);
+  }
+  EXPECT_GE(saturated, 1);
+}
+
+TEST(ClosedLoop, StopsTheOthersWhenADriveTrips) {
+  for (const std::int32_t axis : {0, 2, 4}) {
+    SCOPED_TRACE(axis);
+    ClosedLoopRig rig(failing_device("axis_" + std::to_string(axis + 1) + ":fault=0x4210"));
+    rig.run();
+    expect_controlled_stop(rig, Fault::drive_fault, axis, 2);
+  }
+}
+
+TEST(ClosedLoop, StopsTheOthersWhenADriveFallsSilent) {
+  for (const char* kind : {":silent", ":power"}) {
+    SCOPED_TRACE(kind);
+    ClosedLoopRig rig(failing_device(std::string("axis_2") + kind));
+    rig.run();
+    expect_controlled_stop(rig, Fault::drive_silent, 1, 4);
+  }
+}
+
+// Nothing can be sent on that bus any more; the drives there stop by themselves when the controller's RPDOs stay away.
+TEST(ClosedLoop, StopsTheOtherBusAtOnceWhenACableIsCut) {
+  ClosedLoopRig rig(
+      {.script = {{{.action = fieldbus::FaultAction::bus_off, .bus = "axes_1_3", .from_ns = failure_ns}}}});
+  rig.run();
+  expect_controlled_stop(rig, Fault::bus_off, 0, 1);
+}
+
+TEST(ClosedLoop, StopsTheOtherBusAtOnceWhenAnInterfaceGoesDown) {
+  ClosedLoopRig rig(
+      {.script = {{{.action = fieldbus::FaultAction::port_down, .bus = "axes_4_6", .from_ns = failure_ns}}}});
+  rig.run();
+  EXPECT_NE(rig.fault().fault, Fault::none);
+  EXPECT_LE(rig.fault().cycle, rig.cycle_at(failure_s) + 1);
+  expect_targets_run_out(rig);
+  expect_arm_at_rest(rig, 0.01);
+}
+
+// Somebody's EMCY in the name of node 5, which itself feels fine: 4210h, excess temperature.
+TEST(ClosedLoop, StopsWhenADriveSendsAnEmergencyMessage) {
+  fieldbus::CanFrame emergency;
+  emergency.id = 0x085;
+  emergency.length = 8;
+  emergency.data = {0x10, 0x42, 0x09};
+  ClosedLoopRig rig({.script = {{{.action = fieldbus::FaultAction::babble,
+                                  .bus = "axes_4_6",
+                                  .from_ns = failure_ns,
+                                  .to_ns = failure_ns + 1,
+                                  .frame = emergency,
+                                  .period_ns = 1'000'000'000}}}});
+  rig.run();
+  expect_controlled_stop(rig, Fault::drive_fault, 4, 2);
+}
+
+// Somebody else switches a drive off: shutdown (0006h) in an RPDO for node 3, right after ours.
+TEST(ClosedLoop, StopsTheOthersWhenADriveLeavesOperation) {
+  fieldbus::CanFrame shutdown;
+  shutdown.id = 0x203;
+  shutdown.length = 2;
+  shutdown.data = {0x06, 0x00};
+  ClosedLoopRig rig({.script = {{{.action = fieldbus::FaultAction::babble,
+                                  .bus = "axes_1_3",
+                                  .from_ns = failure_ns + 900'000,
+                                  .to_ns = failure_ns + 20'000'000,
+                                  .frame = shutdown,
+                                  .period_ns = 1'000'000}}}});
+  rig.run();
+  ASSERT_NE(rig.fault().fault, Fault::none);
+  EXPECT_EQ(rig.fault().where, 2) << fault_name(rig.fault().fault);
+  EXPECT_LE(rig.fault().cycle, rig.cycle_at(failure_s) + 4);
+  expect_targets_run_out(rig, 2);
+  expect_arm_at_rest(rig, 0.02);
+  expect_drives_off(rig);
+}
+
+// A stop that is asked for isn't a fault, but ends in the same way.
+TEST(ClosedLoop, RunsOutWhenAskedToStop) {
+  ClosedLoopRig rig({.duration_s = 1.46});
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none);
+  const auto stopping = std::find_if(rig.records.begin(), rig.records.end(),
+                                     [](const CycleRecord& r) { return r.phase == Phase::stopping; });
+  ASSERT_NE(stopping, rig.records.end());
+  EXPECT_LT((rig.far_end.truth().X_WT.translation() - rig.truths[stopping->cycle].X_WT.translation()).norm(), 0.01);
+  EXPECT_LT(rig.far_end.truth().velocity_W.norm(), at_rest_m_per_s);
+  expect_drives_off(rig);
+}
+
+// While drives are enabled, a target that isn't where the drive stands would be a jump. A standing drive's reading may
+// waver by the count that it is between, and its link sags when the brake lets go.
+TEST(ClosedLoop, StartsWithoutAJump) {
+  ClosedLoopRig rig({.duration_s = 0.05});
+  rig.run();
+  const auto& records = rig.records;
+  bool rendered = false;
+  for (std::size_t k = 1; k < records.size() && !rendered; ++k) {
+    rendered = records[k].phase == Phase::rendering;
+    for (std::size_t axis = 0; axis < 6; ++axis) {
+      const double per_rad = std::abs(rig.cell.drives[axis].counts_per_rad());
+      const double off_rad = (records[k].target_counts[axis] - records[k].actual_counts[axis]) / per_rad;
+      EXPECT_LT(std::abs(off_rad), 1e-4) << rig.cell.drives[axis].joint << " in cycle " << k;
+      if (records[k].phase == Phase::taring && records[k - 1].phase == Phase::taring) {
+        EXPECT_EQ(records[k].target_counts[axis], records[k - 1].target_counts[axis]) << "a setpoint that moves";
+      }
+      if (rendered) {
+        EXPECT_LE(std::abs(records[k].target_counts[axis] - records[k - 1].target_counts[axis]), 1)
+            << rig.cell.drives[axis].joint << ": the first rendered setpoint";
+      }
+    }
+  }
+  EXPECT_TRUE(rendered);
+}
+
+}  // namespace
+}  // namespace proxarm::controller
