@@ -1,0 +1,112 @@
+// The cycle takes nothing from the heap, whatever it goes through: a session is recorded, and then played to a
+// controller that runs alone, so that what is counted is its own.
+#include <gtest/gtest.h>
+
+#include "tests/controller/closed_loop_rig.hpp"
+#include "tests/controller/replay_network.hpp"
+#include "tests/models/allocation_count.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using testing::ClosedLoopRig;
+using testing::RecordingNetwork;
+using testing::ReplayNetwork;
+using testing::RigOptions;
+
+static_assert(noexcept(std::declval<Cycle&>().run_cycle(0)), "no exception leaves the cycle");
+static_assert(noexcept(std::declval<Cycle&>().request_stop()));
+static_assert(noexcept(std::declval<Cycle&>().shut_down()));
+static_assert(noexcept(std::declval<RenderedWorld&>().step(std::declval<const models::Vec3&>())));
+static_assert(noexcept(std::declval<fieldbus::ServoDrive&>().encode_rpdo(std::declval<fieldbus::CanFrame&>())));
+
+struct Played {
+  std::vector<CycleRecord> records;
+  std::uint64_t allocations = 0;
+  std::uint64_t first_cycle_with_one = 0;
+  Fault fault = Fault::none;
+  std::uint64_t contact_cycles = 0, slip_cycles = 0;
+};
+
+Played play(const RigOptions& options, std::vector<CycleRecord>* recorded) {
+  ClosedLoopRig rig(options);
+  RecordingNetwork recorder(rig.network);
+  rig.run(recorder);
+  if (recorded != nullptr) *recorded = rig.records;
+
+  ClosedLoopRig parts_of(options);  // for its descriptions and its scene; its far end stays alone
+  ReplayNetwork network(recorder.recording(), {"axes_1_3", "axes_4_6", "sensor"});
+  Cycle cycle(parts_of.prepared_parts(network), options.settings, parts_of.cell.limits, 64);
+  Played played;
+  played.records.reserve(rig.records.size() + 10);
+  const auto wanted = static_cast<std::uint64_t>(std::ceil(options.duration_s / options.settings.period_s - 1e-9));
+  for (std::int64_t t_k_ns = rig.first_cycle_ns; cycle.supervisor().phase() != Phase::done; t_k_ns += 1'000'000) {
+    network.sleep_until(t_k_ns);
+    const std::uint64_t before = tests::allocation_count();
+    cycle.run_cycle(t_k_ns);
+    if (cycle.rendered_cycles() >= wanted) cycle.request_stop();
+    const std::uint64_t taken = tests::allocation_count() - before;
+    if (taken > 0 && played.allocations == 0) played.first_cycle_with_one = played.records.size();
+    played.allocations += taken;
+    CycleRecord record;
+    while (cycle.records().pop(record)) {
+      played.contact_cycles += record.contact_count > 0 ? 1 : 0;
+      played.slip_cycles += record.contact == ContactPhase::slip ? 1 : 0;
+      played.records.push_back(record);
+    }
+    if (played.records.size() > rig.records.size() + 5) break;  // it isn't the same session
+  }
+  played.fault = cycle.supervisor().report().fault;
+  return played;
+}
+
+void expect_no_allocation(const RigOptions& options, Fault fault, Played* out = nullptr) {
+  if (!tests::allocations_are_counted()) GTEST_SKIP() << "a sanitizer's malloc can't be counted";
+  std::vector<CycleRecord> recorded;
+  const Played played = play(options, &recorded);
+  EXPECT_EQ(played.allocations, 0u) << "the first in cycle " << played.first_cycle_with_one;
+  EXPECT_EQ(fault_name(played.fault), std::string(fault_name(fault)));
+  // What was counted is what ran in the closed loop, setpoint by setpoint.
+  ASSERT_EQ(played.records.size(), recorded.size());
+  for (std::size_t k = 0; k < recorded.size(); ++k) {
+    ASSERT_EQ(played.records[k].target_counts, recorded[k].target_counts) << "cycle " << k;
+  }
+  if (out != nullptr) *out = played;
+}
+
+TEST(CycleAllocation, IsNoneFromTheFirstCycleThroughContactToTheStop) {
+  Played played;
+  expect_no_allocation({.duration_s = 9.0}, Fault::none, &played);
+  if (IsSkipped()) return;
+  EXPECT_GT(played.records.size(), 9000u);
+  EXPECT_GT(played.contact_cycles, 3000u);
+  EXPECT_GT(played.slip_cycles, 1000u);
+}
+
+TEST(CycleAllocation, IsNoneInTwoContactsAtOnce) {
+  expect_no_allocation({.duration_s = 3.0, .scene = "scenes/groove.yaml"}, Fault::none);
+}
+
+TEST(CycleAllocation, IsNoneWithATurningTool) {
+  RigOptions options{.duration_s = 2.0};
+  options.settings.orientation = OrientationMode::free;
+  expect_no_allocation(options, Fault::none);
+}
+
+TEST(CycleAllocation, IsNoneWithTheSecondOrderProxy) {
+  RigOptions options{.duration_s = 6.0};
+  options.settings.order = 2;
+  options.settings.damping_Ns_per_m = 20.0;
+  options.settings.spring_N_per_m = 50.0;
+  expect_no_allocation(options, Fault::none);
+}
+
+TEST(CycleAllocation, IsNoneInAFaultAndTheStopAfterIt) {
+  expect_no_allocation({.device_faults = {"sensor:silent@1.9s"}}, Fault::sensor_lost);
+  expect_no_allocation({.device_faults = {"axis_3:fault=0x4210@1.9s"}}, Fault::drive_fault);
+  expect_no_allocation({.device_faults = {"axis_2:silent@1.9s"}}, Fault::drive_silent);
+  expect_no_allocation({.device_faults = {"sensor:frozen@1.9s"}}, Fault::sensor_frozen);
+}
+
+}  // namespace
+}  // namespace proxarm::controller
