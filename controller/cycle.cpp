@@ -17,6 +17,12 @@ constexpr double seconds_per_ns = 1e-9;
 // How long the drives may take to switch off before the run ends without them.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
 
+// By its last word, which a drive that has gone silent can't take back.
+bool is_off(const DriveOnBus& axis) noexcept {
+  return axis.drive.state() != fieldbus::DriveState::operation_enabled &&
+         axis.drive.state() != fieldbus::DriveState::quick_stop_active;
+}
+
 }  // namespace
 
 Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
@@ -249,12 +255,16 @@ void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
 }
 
 void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
-  const bool off = std::all_of(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& axis) {
-    return axis.drive.state() != fieldbus::DriveState::operation_enabled &&
-           axis.drive.state() != fieldbus::DriveState::quick_stop_active;
-  });
-  if (off || t_k_ns - phase_since_ns_ > disable_timeout_ns) supervisor_.handle(Event::disabled);
+  if (!drives_off()) {
+    if (t_k_ns - phase_since_ns_ <= disable_timeout_ns) return;
+    const auto still_on =
+        std::find_if(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& axis) { return !is_off(axis); });
+    raise(Fault::drive_not_disabled, static_cast<std::int32_t>(still_on - parts_.drives.begin()));
+  }
+  supervisor_.handle(Event::disabled);
 }
+
+bool Cycle::drives_off() const noexcept { return std::all_of(parts_.drives.begin(), parts_.drives.end(), is_off); }
 
 void Cycle::tare(std::int64_t t_k_ns) noexcept {
   if (sample_is_new_) parts_.compensation.add_tare_sample(reading_S_, R_WS_);

@@ -87,6 +87,8 @@ class Cycle {
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return rendered_cycles_; }
+  // After the last cycle: whether every drive has said that it doesn't hold its axis any more.
+  [[nodiscard]] bool drives_off() const noexcept;
   [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return records_; }
 

@@ -16,6 +16,9 @@ struct FaultText {
 };
 
 constexpr const char* stopped = "the arm made a controlled stop and the drives were switched off";
+constexpr const char* unconfirmed =
+    "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
+    "off";
 
 constexpr std::array texts{
     FaultText{Fault::none, "none", "no fault", nullptr, ""},
@@ -41,6 +44,8 @@ constexpr std::array texts{
               "check the drive's enable input, its supply and STO"},
     FaultText{Fault::drive_not_enabled, "drive_not_enabled", "a drive didn't reach operation enabled", "s",
               "check the drive's power stage, STO and enable input"},
+    FaultText{Fault::drive_not_disabled, "drive_not_disabled", "a drive didn't confirm that it is switched off",
+              nullptr, "switch the drives' power off; then check the drive's cable and supply"},
     FaultText{Fault::target_out_of_range, "target_out_of_range", "the motion would leave a joint's range", "rad",
               "keep away from that end of the range, or move the scene"},
     FaultText{Fault::target_too_fast, "target_too_fast", "the motion would exceed a joint's speed", "rad/s",
@@ -72,7 +77,7 @@ const FaultText& text_of(Fault fault) noexcept {
 
 const char* fault_name(Fault fault) noexcept { return text_of(fault).name; }
 
-std::string describe(const FaultReport& report, const std::string& where) {
+std::string describe(const FaultReport& report, const std::string& where, bool drives_off) {
   const FaultText& text = text_of(report.fault);
   std::string line = text.name;
   if (!where.empty()) line += " (" + where + ")";
@@ -83,7 +88,8 @@ std::string describe(const FaultReport& report, const std::string& where) {
     std::snprintf(figures.data(), figures.size(), " (%.4g %s, limit %.4g)", report.value, text.unit, report.limit);
     line += figures.data();
   }
-  line += " at cycle " + std::to_string(report.cycle) + "; " + stopped + "; " + text.advice;
+  line +=
+      " at cycle " + std::to_string(report.cycle) + "; " + (drives_off ? stopped : unconfirmed) + "; " + text.advice;
   return line;
 }
 

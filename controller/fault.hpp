@@ -23,6 +23,7 @@ enum class Fault : std::uint8_t {
   drive_fault,          // a drive reports the state fault, or an EMCY: controlled stop of the others
   drive_disabled,       // a drive left operation enabled by itself: controlled stop of the others
   drive_not_enabled,    // a drive didn't reach operation enabled in time: nothing moves
+  drive_not_disabled,   // a drive didn't confirm within a second that it is switched off
   target_out_of_range,  // a setpoint would leave a joint's range or its counts: controlled stop
   target_too_fast,      // a setpoint would exceed a joint's speed: controlled stop
   singular,             // inverse kinematics found no bounded step: controlled stop
@@ -46,7 +47,8 @@ struct FaultReport {
 // The name of the enumerator: "sensor_lost".
 const char* fault_name(Fault fault) noexcept;
 
-// Cause, what the arm did, and what to do, in one line; `where` is the name of the drive, joint or bus.
-std::string describe(const FaultReport& report, const std::string& where);
+// Cause, what the arm did, and what to do, in one line; `where` is the name of the drive, joint or bus. `drives_off`:
+// every drive has confirmed that it is switched off.
+std::string describe(const FaultReport& report, const std::string& where, bool drives_off = true);
 
 }  // namespace proxarm::controller

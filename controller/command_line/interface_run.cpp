@@ -59,6 +59,19 @@ void set_filters(SocketCanNetwork& network, const controller::CycleParts& parts)
   }
 }
 
+// Whoever has no answer on a virtual interface has most likely no simulated arm there.
+void bring_up_devices(controller::CycleParts& parts) {
+  try {
+    controller::bring_up(parts);
+  } catch (const description::SetupError& error) {
+    if (error.found().find("no answer") == std::string::npos) throw;
+    description::SetupProblem problem = error.problem();
+    problem.advice = "is `proxarm sim` running on the same interfaces?" +
+                     (problem.advice.empty() ? "" : " Or, with devices of your own: " + problem.advice);
+    throw description::SetupError(problem);
+  }
+}
+
 // Takes records and frames out of the cycle's rings and hands them on, in a thread of its own.
 class Drain {
  public:
@@ -112,7 +125,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
       controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices);
   set_filters(network, parts);
   SessionOutput output(session, options, false);
-  controller::bring_up(parts);
+  bring_up_devices(parts);
   output.introduce(parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);

@@ -113,7 +113,8 @@ Summary SessionOutput::summary(const controller::Cycle& cycle) {
   Summary summary = builder_.finish();
   const controller::FaultReport& report = cycle.supervisor().report();
   if (report.fault != Fault::none) {
-    summary.faults.push_back({report.fault, report.cycle, describe(report, place_of(report, cycle.parts()))});
+    summary.faults.push_back(
+        {report.fault, report.cycle, describe(report, place_of(report, cycle.parts()), cycle.drives_off())});
   }
   return summary;
 }

@@ -6,8 +6,10 @@
 
 namespace {
 
+using proxarm::controller::describe;
 using proxarm::controller::Event;
 using proxarm::controller::Fault;
+using proxarm::controller::FaultReport;
 using proxarm::controller::Phase;
 using proxarm::controller::Supervisor;
 
@@ -71,6 +73,16 @@ TEST(FaultText, EveryFaultHasANameOfItsOwn) {
   for (int i = 1; i <= static_cast<int>(Fault::overrun); ++i) {
     EXPECT_STRNE(proxarm::controller::fault_name(static_cast<Fault>(i)), "none") << i;
   }
+}
+
+TEST(FaultText, DoesNotClaimDrivesToBeOffThatHaveNotSaidSo) {
+  const FaultReport report{Fault::drive_silent, 2, 100, 5.0, 4.0};
+  const std::string confirmed = describe(report, "drive of axis_3"), not_confirmed = describe(report, "", false);
+  EXPECT_NE(confirmed.find("the drives were switched off"), std::string::npos) << confirmed;
+  EXPECT_EQ(not_confirmed.find("the drives were switched off"), std::string::npos) << not_confirmed;
+  EXPECT_NE(not_confirmed.find("not every drive has confirmed it"), std::string::npos) << not_confirmed;
+  EXPECT_NE(describe({Fault::drive_not_disabled, 2, 100}, "", false).find("drive_not_disabled: a drive didn't confirm"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -143,6 +143,14 @@ def frames_of(process):
         return read_log(log.name)
 
 
+def write_hand(folder, name):
+    """The file of a hand that stays where the tool starts."""
+    path = Path(folder) / f"{name}.yaml"
+    path.write_text("name: at rest\nmass_kg: 1.0\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
+                    "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n")
+    return path
+
+
 class Session:
     """One run of both processes from begin to end, with candump as the witness."""
 
