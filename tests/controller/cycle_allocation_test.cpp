@@ -4,7 +4,7 @@
 
 #include "tests/controller/closed_loop_rig.hpp"
 #include "tests/controller/replay_network.hpp"
-#include "tests/models/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 
 namespace proxarm::controller {
 namespace {

@@ -15,7 +15,7 @@
 
 #include "fieldbus/can_timing.hpp"
 #include "models/description/setup_error.hpp"
-#include "tests/fieldbus/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -200,9 +200,9 @@ TEST(CandumpLog, NeverWritesPastALineWhateverTheInput) {
 TEST(CandumpLog, FormatsWithoutAllocation) {
   const CanFrame frame = frame_of(0x181, {1, 2, 3, 4, 5, 6});
   CandumpLine line;
-  const std::uint64_t before = allocation_count();
+  const std::uint64_t before = tests::allocation_count();
   for (int i = 0; i < 1000; ++i) format_candump_line(line, i, "axes_1_3", frame);
-  EXPECT_EQ(allocation_count(), before);
+  EXPECT_EQ(tests::allocation_count(), before);
 }
 
 TEST(CandumpLog, WritesFilesThatItReads) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "models/description/setup_error.hpp"
-#include "tests/fieldbus/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 #include "tests/fieldbus/sanitized.hpp"
 
 namespace proxarm::fieldbus {
@@ -604,9 +604,9 @@ TEST(SimulatedCanNetwork, AllocatesNothingInSteadyState) {
   CellTraffic cell;
   cell.network.apply({{{.action = FaultAction::delay, .id = 0x681, .mask = 0x7ff, .delay_ns = 1000}}});
   for (std::int64_t k = 0; k < 10; ++k) cell.cycle(k * 1'000'000);
-  const std::uint64_t before = allocation_count();
+  const std::uint64_t before = tests::allocation_count();
   for (std::int64_t k = 10; k < 5000; ++k) cell.cycle(k * 1'000'000);
-  EXPECT_EQ(allocation_count() - before, 0u);
+  EXPECT_EQ(tests::allocation_count() - before, 0u);
 }
 
 TEST(SimulatedCanNetwork, CostsLittleComparedWithTheCycle) {

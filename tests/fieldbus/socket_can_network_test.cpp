@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "models/description/setup_error.hpp"
-#include "tests/fieldbus/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -452,10 +452,10 @@ TEST_F(SocketCanNetworkTest, NeitherAllocatesWhileItSendsAndReceives) {
   for (int i = 0; i < 64; ++i) arrive({raw_classic(0x181, {1, 2, 3})});
   std::uint64_t allocated = 0;
   for (int i = 0; i < 64; ++i) {
-    const std::uint64_t before = allocation_count();
+    const std::uint64_t before = tests::allocation_count();
     bus.send(frame);
     bus.receive(timed);
-    allocated += allocation_count() - before;
+    allocated += tests::allocation_count() - before;
   }
   EXPECT_EQ(allocated, 0u);
 }

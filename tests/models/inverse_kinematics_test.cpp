@@ -6,7 +6,7 @@
 #include <chrono>
 
 #include "models/description/setup_error.hpp"
-#include "tests/models/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 #include "tests/models/random_states.hpp"
 
 namespace proxarm::models {

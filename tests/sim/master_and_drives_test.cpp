@@ -10,7 +10,7 @@
 #include "fieldbus/simulated_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/simulated_cell.hpp"
-#include "tests/sim/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 #include "tests/sim/device_harness.hpp"
 
 namespace proxarm::sim {
@@ -110,9 +110,9 @@ TEST_F(MasterAndDrives, AllocateNothingInSteadyMotion) {
   for (auto& drive : drives) drive.request(fieldbus::DriveGoal::operation_enabled);
   step_rad = 1e-5;
   for (int i = 0; i < 500; ++i) cycle();
-  const std::uint64_t before = testing::allocation_count();
+  const std::uint64_t before = tests::allocation_count();
   for (int i = 0; i < 500; ++i) cycle();
-  EXPECT_EQ(testing::allocation_count() - before, 0u);
+  EXPECT_EQ(tests::allocation_count() - before, 0u);
 }
 
 TEST_F(MasterAndDrives, SayWhichDriveDoesNotAnswer) {

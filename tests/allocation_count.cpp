@@ -1,4 +1,4 @@
-#include "tests/models/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 
 #include <gtest/gtest.h>
 
