@@ -13,6 +13,8 @@ using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
 
+// For the last frames to get onto the wire and to the drives: the longest queue of a cycle is through in a millisecond.
+constexpr std::int64_t last_words_ns = 5'000'000;
 constexpr std::size_t record_capacity = 64;  // drained after every cycle
 
 std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
@@ -72,14 +74,14 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_.settings.period_s, session_.duration_s, hooks);
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
-  cycle.shut_down();
-
   controller::Summary summary = output_.summary(cycle);
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     summary.bus_load[network_.bus(i).name()] = network_.simulated_bus(i).load();
   }
+  cycle.shut_down();
+  network_.sleep_until(network_.now_ns() + last_words_ns);
   return output_.finish(summary);
 }
 

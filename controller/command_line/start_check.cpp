@@ -14,6 +14,10 @@ namespace {
 using description::SetupError;
 using models::Vec3;
 
+// A start on a surface is fine. start_rad has four decimals in most files: half of the last one on an arm of 1.4 m is
+// 0.07 mm; the first step brings the proxy out of that.
+constexpr double start_tolerance_m = 1e-4;
+
 std::string point_text(const Vec3& point_W) {
   char text[96];
   std::snprintf(text, sizeof text, "x %.4f, y %.4f, z %.4f m", point_W.x(), point_W.y(), point_W.z());
@@ -53,7 +57,7 @@ const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
 
 void require_outside(const PreparedSession& session, const Vec3& start_W) {
   const double clearance_m = scenes::clearance_m(session.scene, start_W);
-  if (clearance_m >= 0.0) return;
+  if (clearance_m >= -start_tolerance_m) return;
   const scenes::Object* object = deepest(session.scene, start_W);
   char depth[32];
   std::snprintf(depth, sizeof depth, "%.3g m", -clearance_m);

@@ -152,6 +152,12 @@ class SceneFile(ProgramTest):
         self.refuse("objects:\n  - plane: {name: wall, point_m: [0.5, 0, 0.6], normal: [-1, 0, 0]}\n", ":2: wall",
                     "x 0.7000, y 0.0000, z 0.6000 m", "0.2 m inside", "free space", "start_rad")
 
+    def test_that_begins_at_the_start_is_fine_up_to_a_tenth_of_a_millimetre(self):
+        wall = "objects:\n  - plane: {{point_m: [{x}, 0, 0], normal: [-1, 0, 0]}}\n"
+        # The start is at 0.70000 to within 0.02 mm.
+        self.summary("--scene", self.written("near.yaml", wall.format(x=0.69995)), "--duration", "0.2s")
+        self.refuse(wall.format(x=0.69985), "inside")
+
     def test_without_any_free_place_is_refused_at_its_deepest_object(self):
         self.refuse("objects:\n  - plane: {name: front, point_m: [0.71, 0, 0], normal: [-1, 0, 0]}\n"
                     "  - plane: {name: back, point_m: [0.74, 0, 0], normal: [1, 0, 0]}\n", ":3: back", "0.04 m inside")
