@@ -57,8 +57,11 @@ class FlatSurface {
   // ‖n‖ = 1 + O(u); eight are taken.
   [[nodiscard]] double rounding(const Vec<N>& x) const noexcept {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-    return 8.0 * u * (x.template lpNorm<1>() + point_size_);
+    return 16.0 * u * (x.template lpNorm<1>() + point_size_);
   }
+
+  // ‖point‖₁: how far from the origin its coordinates are.
+  [[nodiscard]] double size() const noexcept { return point_size_; }
 
   [[nodiscard]] bool holds(const Vec<N>& x) const noexcept { return std::abs(height(x)) <= rounding(x); }
 

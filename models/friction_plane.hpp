@@ -39,12 +39,15 @@ FaceStep<N> step_on_face(const FlatSurface<N>& surface, double mu, const Vec<N>&
   const bool on_surface = std::abs(n_q) <= surface.rounding(q);
   const Vec<N> q_sf = on_surface ? q : Vec<N>(q - n * n_q);
   const Vec<N> d = p_sf - q_sf;
-  const double distance = d.norm();
+  const double distance2 = d.squaredNorm(), reach = -mu * n_p;
   // "Not greater", so that a distance too small for its square sticks and nothing is divided by zero below.
-  if (!(distance > -mu * n_p)) return {on_surface ? q : surface.projection(q_sf), true, false};  // (4), second case
+  if (!(distance2 > reach * reach))
+    return {on_surface ? q : surface.projection(q_sf), true, false};  // (4), second case
 
-  // (4), third case; projected once more, against what rounding of a deep p left.
-  return {surface.projection(p_sf + (mu * n_p / distance) * d), true, mu > 0.0};
+  const Vec<N> r = p_sf - (reach / std::sqrt(distance2)) * d;  // (4), third case
+  // From deeper than the scene is wide, rounding of n_p leaves r off the surface: projected once more.
+  if (-n_p > 1e-3 + surface.size() + q.template lpNorm<1>()) return {surface.projection(r), true, mu > 0.0};
+  return {r, true, mu > 0.0};
 }
 
 template <int N>

@@ -22,7 +22,7 @@ struct CrossSection {
     double A[2][2] = {{1.0, 0.0}, {cos, sin}};
     double along[2] = {0.0, 0.0};
     for (int i = 0; i < 2; ++i) {
-      const double v_e = s - s_q[i], v = std::hypot(v_e, w[i]);
+      const double v_e = s - s_q[i], v = std::sqrt(v_e * v_e + w[i] * w[i]);
       if (((mask >> i) & 1) == 0 || !(v > 0.0)) continue;
       const double across = mu[i] * (w[i] / v);
       along[i] = mu[i] * (v_e / v);
@@ -55,12 +55,14 @@ struct CrossSection {
 // and g nearly linear from the slide that the closed form would give: a few secant steps. Else false position
 // (Illinois), halving where that is slow.
 double root(const CrossSection& c, double lo, double hi) noexcept {
+  const double small = 2.0 * std::numeric_limits<double>::epsilon() * (std::abs(c.s_p) + std::abs(c.s_q[0]));
   double at = std::clamp(c.guess(), lo, hi), g_at = c.at(at).g, next = std::clamp(at - g_at, lo, hi);
+  if (std::abs(g_at) <= small) return at;
   for (int k = 0; k < 8 && next != at; ++k) {
     const double g_next = c.at(next).g;
-    if (g_next == 0.0) return next;
-    const double step = (next - at) * g_next / (g_at - g_next);
+    if (std::abs(g_next) <= small) return next;
     if (!(std::abs(g_next) < std::abs(g_at))) break;
+    const double step = (next - at) * g_next / (g_at - g_next);
     at = next;
     g_at = g_next;
     next = at + step;
@@ -109,7 +111,7 @@ GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurf
   const bool in_line_1 = std::abs(w_1) <= w_rounding, in_line_2 = std::abs(w_2) <= w_rounding;
   // The normal forces (over K) may miss zero by the rounding of p: such a contact touches.
   const double least = may_pull ? -std::numeric_limits<double>::infinity() : -w_rounding;
-  const auto place = [&](double s) { return line.settle(a, b, line.settle(a, b, line.x0 + s * line.e)); };
+  const auto place = [&](double s) { return line.settle(a, b, line.x0 + s * line.e); };
 
   if (in_line_1 && in_line_2 && s_1 == s_2) {
     const double f_2 = F_t / line.sin, f_1 = F_n - line.cos * f_2;

@@ -37,7 +37,12 @@ struct GrooveLine {
   double cos = 1.0, sin = 0.0;  // between the normals
 
   GrooveLine() = default;
-  GrooveLine(const FlatSurface<3>& a, const FlatSurface<3>& b) noexcept {
+  GrooveLine(const FlatSurface<3>& a, const FlatSurface<3>& b) noexcept
+      : GrooveLine(a, b, Vec3(0.5 * (a.point() + b.point()))) {
+    if (exists) x0 = settle(a, b, settle(a, b, x0));
+  }
+  // x₀ next to a point that is close to the line already: one step then settles it.
+  GrooveLine(const FlatSurface<3>& a, const FlatSurface<3>& b, const Vec3& near) noexcept {
     const Vec3 &n1 = a.normal(), &n2 = b.normal();
     const Vec3 c = n1.cross(n2);
     cos = n1.dot(n2);
@@ -47,7 +52,7 @@ struct GrooveLine {
     e = c / sin;
     t1 = e.cross(n1);
     t2 = e.cross(n2);
-    x0 = settle(a, b, settle(a, b, settle(a, b, 0.5 * (a.point() + b.point()))));
+    x0 = settle(a, b, near);
   }
 
   // The point of the line next to x. Repeated, it leaves heights of the size of x's own rounding, however acute the

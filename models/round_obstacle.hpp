@@ -121,30 +121,23 @@ class RoundObstacle final : public Obstacle {
     if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
     if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid one
 
-    // τ = 0 leaves no tangential force, so the excess is −μ f_n there. False position (Illinois).
-    double low = 0.0, high = 1.0;
+    // τ = 0 leaves no tangential force, so the excess is −μ f_n there. Between them it is nearly linear (on a plane it
+    // is): secants, within what is known to hold the root.
     Trial slide = place(K, p, at_p);
-    double excess_low = -mu_ * slide.f_n, excess_high = trial.excess;
     if (!(mu_ > 0.0)) return {slide.r, slide.normal, 0, true, false};
     const double small = 0.25 * rounding(p);
-    for (int k = 0, side = 0; k < 100; ++k) {
-      double tau = (low * excess_high - high * excess_low) / (excess_high - excess_low);
-      if (k % 8 == 7 || !(tau > low && tau < high)) tau = 0.5 * (low + high);
-      if (!(tau > low && tau < high)) break;
-      const Vec3 mix = p + tau * (q - p);
-      slide = place(K, p, at(mix, q));
-      if (std::abs(slide.excess) <= small) break;
-      if (slide.excess < 0.0) {
-        low = tau;
-        excess_low = slide.excess;
-        if (side == -1) excess_high *= 0.5;
-        side = -1;
-      } else {
-        high = tau;
-        excess_high = slide.excess;
-        if (side == 1) excess_low *= 0.5;
-        side = 1;
-      }
+    double low = 0.0, high = 1.0, last = 1.0, last_excess = trial.excess, tau = 0.0, excess = -mu_ * slide.f_n;
+    for (int k = 0; k < 100; ++k) {
+      double next = tau - excess * (tau - last) / (excess - last_excess);
+      if (k % 8 == 7 || !(next > low && next < high)) next = 0.5 * (low + high);
+      if (!(next > low && next < high)) break;
+      last = tau;
+      last_excess = excess;
+      tau = next;
+      slide = place(K, p, at(p + tau * (q - p), q));
+      excess = slide.excess;
+      if (std::abs(excess) <= small) break;
+      (excess < 0.0 ? low : high) = tau;
     }
     return {slide.r, slide.normal, 0, true, true};
   }

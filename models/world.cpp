@@ -14,11 +14,13 @@ namespace {
 constexpr int kSettle = 60;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// No closer than rounding lets it: either nothing moves, or the moves are tiny and have stopped shrinking (a slip that
-// is short against a deep p amplifies rounding, so a fixed threshold would not do).
+// No closer than rounding lets it: the next move, were it to shrink as the last one has, would be nothing, or the moves
+// are tiny and have stopped shrinking (a slip that is short against a deep p amplifies rounding, so a fixed threshold
+// would not do).
 bool has_settled(double move, double last_move, const Vec3& r) noexcept {
-  const double size = 1e-3 + r.lpNorm<1>();
-  return move <= 1e-16 * size || (move <= 1e-9 * size && move > 0.5 * last_move);
+  const double size = 1e-3 + r.lpNorm<1>(), nothing = 5e-17 * size;
+  return move <= nothing || (last_move < kInfinity && move * move <= nothing * last_move) ||
+         (move <= 1e-9 * size && move > 0.5 * last_move);
 }
 
 }  // namespace
@@ -157,7 +159,7 @@ void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candid
       GrooveSolution s;
       double last_move = kInfinity;
       for (int k = 0; k < kSettle; ++k) {
-        const GrooveLine line(t_a.surface, t_b.surface);
+        const GrooveLine line(t_a.surface, t_b.surface, at);
         s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b);
         const bool presses = s.found;
         if (!presses) s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b, true);
