@@ -243,7 +243,9 @@ void Cycle::act(std::int64_t t_k_ns) noexcept {
   }
 }
 
+// A drive that already follows while others don't yet stays where it was told to be when it was enabled.
 void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
+  for (Eigen::Index i = 0; i < target_rad_.size(); ++i) target_rad_[i] = parts_.drives[i].drive.target_rad();
   const auto not_following = std::find_if(parts_.drives.begin(), parts_.drives.end(),
                                           [](const DriveOnBus& a) { return !a.drive.following(); });
   if (not_following == parts_.drives.end()) {
