@@ -23,7 +23,7 @@ struct SessionSettings {
   double tare_s = 0.2;         // how long the sensor is averaged at rest before rendering
   double tare_spread_N = 5.0;  // a reading that far from the mean means a hand on the handle
   double enable_timeout_s = 5.0;
-  std::uint32_t max_missed_samples = 3;   // cycles in a row without a complete sensor sample
+  std::uint32_t max_missed_samples = 3;  // cycles in a row without a complete sensor sample
   // Samples in a row with exactly the reading of the one before, all six gauges; 0: not judged. With a noise of half a
   // count (standard deviation) per gauge, a sample repeats the last one with probability 0.49⁶ = 0.013, and 20 in a row
   // come with 0.013²⁰ = 3e-38; with 0.2 counts with 5e-14, once in 600 years at 1 kHz. A quieter sensor needs more.

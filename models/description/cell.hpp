@@ -91,7 +91,7 @@ struct CellLimits {
   double max_tool_acceleration_m_per_s2 = 20.0;
   double max_force_N = 200.0;  // above it the sensor's reading is taken as a fault
   double leash_m = 0.02;
-  double setpoint_bandwidth_Hz = 25.0;    // of the filter that keeps elastic gears from ringing; 0: none
+  double setpoint_bandwidth_Hz = 25.0;  // of the filter that keeps elastic gears from ringing; 0: none
 };
 
 struct Cell {

@@ -2,9 +2,9 @@
 // controller that runs alone, so that what is counted is its own.
 #include <gtest/gtest.h>
 
+#include "tests/allocation_count.hpp"
 #include "tests/controller/closed_loop_rig.hpp"
 #include "tests/controller/replay_network.hpp"
-#include "tests/allocation_count.hpp"
 
 namespace proxarm::controller {
 namespace {
