@@ -1,4 +1,6 @@
 """The whole main job on a real vcan: `proxarm run` and `proxarm sim` as two processes, candump as the witness."""
+import json
+import subprocess
 import tempfile
 import unittest
 
@@ -94,6 +96,19 @@ class OnOneInterface(ClosedLoop, unittest.TestCase):
 
 class OnThreeInterfaces(ClosedLoop, unittest.TestCase):
     bus = two.THREE
+
+
+class OverAVxcanPair(two.VcanTestCase):
+    """A virtual cable, one process at each end: the other kind of interface on which drives may be enabled."""
+
+    def test_ends_well(self):
+        subprocess.run(["ip", "link", "add", "vxcan0", "type", "vxcan", "peer", "name", "vxcan1"], check=True)
+        for end in ("vxcan0", "vxcan1"):
+            subprocess.run(["ip", "link", "set", end, "up"], check=True)
+        with two.simulated_arm("vxcan1"), two.controller("vxcan0", "0.5s") as run:
+            self.assertEqual(run.wait(), 0, run.errors())
+            summary = json.loads(run.output())
+        self.assertEqual((summary["faults"], summary["overruns"], summary["held_samples"]), ([], 0, 0))
 
 
 if __name__ == "__main__":
