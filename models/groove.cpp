@@ -46,8 +46,8 @@ struct CrossSection {
   // g of a root is its slope times a unit in the last place of s; beside a pole it is anything but small.
   [[nodiscard]] bool is_root(double s, const Shares& shares) const noexcept {
     constexpr double eps = std::numeric_limits<double>::epsilon();
-    return std::abs(shares.g) <=
-           1e-9 * (std::abs(F_n) + std::abs(F_t) + std::abs(s - s_p)) + 16.0 * eps * (std::abs(s) + std::abs(s_p));
+    return std::abs(shares.g) <= 1e-9 * (std::abs(F_n) + std::abs(F_t) + std::abs(s - s_p)) +
+                                     16.0 * eps * (std::abs(s) + std::abs(s_p) + std::abs(s_q[0]));
   }
 };
 

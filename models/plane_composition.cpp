@@ -73,14 +73,16 @@ PlaneComposition::PlaneComposition(std::vector<Face> faces) : faces_(std::move(f
   }
 }
 
-bool PlaneComposition::fits(const Vec3& r, std::size_t i, std::size_t j, std::size_t k,
+bool PlaneComposition::fits(const Vec3& q, const Vec3& r, std::size_t i, std::size_t j, std::size_t k, bool creeps,
                             Candidates& candidates) const noexcept {
   bool fits = true;
   for (std::size_t m = 0; m < faces_.size(); ++m) {
     if (m == i || m == j || m == k) continue;
     const FlatSurface<3>& surface = faces_[m].surface;
     const double height = surface.height(r);
-    if (height < 0.0 && height < -surface.rounding(r)) {
+    // Within rounding it is on the face; but a face that q was on is not to be entered even by so little, or a proxy
+    // that is held by two of them would creep along while one alone can't quite hold it.
+    if (height < 0.0 && (height < -surface.rounding(r) || (creeps && height < surface.height(q)))) {
       candidates.add(m);
       fits = false;
     }
@@ -93,7 +95,7 @@ void PlaneComposition::try_singles(const Vec3& p, const Vec3& q, Candidates& can
   for (std::size_t c = 0; c < candidates.count; ++c) {
     const std::size_t i = candidates.index[c];
     const FaceStep step = step_on_face(faces_[i].surface, candidates.friction ? faces_[i].mu : 0.0, p, q);
-    if (step.touches && fits(step.r, i, kNone, kNone, candidates)) {
+    if (step.touches && fits(q, step.r, i, kNone, kNone, step.slips, candidates)) {
       choice.consider(p, step.r, {i, kNone, kNone}, {step.slips, false, false});
     }
   }
@@ -111,7 +113,7 @@ void PlaneComposition::try_pairs(const Vec3& p, const Vec3& q, Candidates& candi
       };
       const GrooveSolution s =
           lines_.empty() ? solve(GrooveLine(faces_[i].surface, faces_[j].surface)) : solve(lines_[i * n + j]);
-      if (s.found && fits(s.r, i, j, kNone, candidates)) {
+      if (s.found && fits(q, s.r, i, j, kNone, false, candidates)) {
         choice.consider(p, s.r, {i, j, kNone}, {s.slips1, s.slips2, false});
       }
     }
@@ -134,7 +136,7 @@ void PlaneComposition::try_corners(const Vec3& p, const Vec3& q, Candidates& can
         const CornerSolution s =
             corners_.empty() ? solve_corner(surfaces, mu, CornerPoint(*surfaces[0], *surfaces[1], *surfaces[2]), p, qs)
                              : solve_corner(surfaces, mu, corners_[(i * n + j) * n + k], p, qs);
-        if (s.found && fits(s.r, i, j, k, candidates)) {
+        if (s.found && fits(q, s.r, i, j, k, false, candidates)) {
           choice.consider(p, s.r, m, {s.slips[0], s.slips[1], s.slips[2]});
         }
       }

@@ -38,7 +38,8 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
   struct Candidates;
   struct Choice;
 
-  bool fits(const Vec3& r, std::size_t i, std::size_t j, std::size_t k, Candidates& candidates) const noexcept;
+  bool fits(const Vec3& q, const Vec3& r, std::size_t i, std::size_t j, std::size_t k, bool creeps,
+            Candidates& candidates) const noexcept;
   void try_singles(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   void try_pairs(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   void try_corners(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;

@@ -31,8 +31,9 @@ struct ContractOptions {
   double size_m = 1.0;                             // within this half-width
   double smallest_depth_m = 1e-9;                  // ‖p − q‖ is drawn log-uniformly between this and size_m
   double kappa_decades = 6.0;                      // on either side of K
-  double condition = 1.0;                          // multiplies the allowance for rounding
-  double inside_tolerance_m = 1e-12;               // relative to a 1 m scene
+  double scene_m = 0.0;    // how far from the origin the world's own coordinates are, where states are nearer
+  double condition = 1.0;  // multiplies the allowance for rounding
+  double inside_tolerance_m = 1e-12;  // relative to a 1 m scene
   // μ of each contact by object index; a single entry stands for all. Empty: reported contacts aren't checked.
   std::vector<double> friction{};
   bool near_surface = false;            // q is brought to a surface, and p starts from there
@@ -132,7 +133,8 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
                                     f.norm() / options.reach_m);
       const Vec<N> p_kappa = r - f / kappa, r_kappa = g(kappa, p_kappa, q);
       const double error = (r_kappa - r).norm();
-      if (error <= options.condition * models::map_9_rounding<N>(r, q, f, K, kappa)) continue;
+      const double scene = 64.0 * std::numeric_limits<double>::epsilon() * options.scene_m * (1.0 + K / kappa);
+      if (error <= options.condition * (models::map_9_rounding<N>(r, q, f, K, kappa) + scene)) continue;
       ++several;
       const std::vector<models::Contact<N>> other(g.contacts().begin(), g.contacts().end());
       ASSERT_TRUE(options.several > 0.0 && obeys_17<N>(other, options, kappa, p_kappa, q, r_kappa))

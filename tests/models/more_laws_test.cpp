@@ -193,7 +193,7 @@ TEST(Guides, PolylineTurnsItsCorners) {
 TEST(Contract, Guides) {
   ContractOptions<3> options;
   options.forces_without_contact = true;
-  options.condition = 100.0;  // the guide's own point is 0.4 m away where r may be at the origin
+  options.scene_m = 0.4;
   expect_contract<3>(PolylineGuide::line({0.1, 0.2, 0.3}, {1, 2, 3}, 0.3), options);
   expect_contract<3>(PlaneGuide({0.1, 0.2, 0.3}, {1, 2, 3}, 0.3), options);
 }
