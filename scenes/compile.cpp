@@ -346,4 +346,14 @@ double clearance_m(const Scene& scene, const Vec3& x_W) {
   return least;
 }
 
+double clearance_m(const Scene& scene, const Vec3& x_W, double time_s) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Object& object : scene.objects) {
+    const bool moves = object.motion && !object.motion->driven;
+    const Vec3 x = moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) * x_W : x_W;
+    least = std::min(least, distance_to(object, x));
+  }
+  return least;
+}
+
 }  // namespace proxarm::scenes

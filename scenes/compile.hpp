@@ -65,5 +65,8 @@ CompiledScene compile(const Scene& scene);
 // How far x_W is from the nearest object, in metres; negative inside one. Infinite in an empty scene. Objects that move
 // count where they are described, layers as gone. For summaries and tests, not for the cycle.
 double clearance_m(const Scene& scene, const models::Vec3& x_W);
+// The same at a time of the scene's scripts, which the k-th step of a proxy (from 1) takes to be k T. Objects that are
+// driven count where they are described.
+double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s);
 
 }  // namespace proxarm::scenes

@@ -90,8 +90,10 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
 
 void SessionOutput::add(CycleRecord record) {
   const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
-  record.proxy_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(record.proxy_W_m));
-  record.tool_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(tool));
+  if (record.phase == controller::Phase::rendering) ++proxy_steps_;
+  const double scene_time_s = static_cast<double>(proxy_steps_) * session_.settings.period_s;
+  record.proxy_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(record.proxy_W_m), scene_time_s);
+  record.tool_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(tool), scene_time_s);
   if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session_.scene.objects.size()) {
     record.friction = session_.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
   }
@@ -111,6 +113,8 @@ void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& fr
 
 Summary SessionOutput::summary(const controller::Cycle& cycle) {
   Summary summary = builder_.finish();
+  // A medium takes its share along the surface, too, which the ratio would count as friction.
+  if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
   const controller::FaultReport& report = cycle.supervisor().report();
   if (report.fault != Fault::none) {
     summary.faults.push_back(

@@ -41,6 +41,7 @@ class SessionOutput {
   controller::Progress progress_;
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
+  std::uint64_t proxy_steps_ = 0;
 };
 
 }  // namespace proxarm::command_line

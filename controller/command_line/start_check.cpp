@@ -47,7 +47,7 @@ const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
   for (const scenes::Object& object : scene.objects) {
     scenes::Scene alone;
     alone.objects.push_back(object);
-    const double clearance_m = scenes::clearance_m(alone, point_W);
+    const double clearance_m = scenes::clearance_m(alone, point_W, 0.0);
     if (clearance_m >= least_m) continue;
     least_m = clearance_m;
     found = &object;
@@ -56,7 +56,7 @@ const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
 }
 
 void require_outside(const PreparedSession& session, const Vec3& start_W) {
-  const double clearance_m = scenes::clearance_m(session.scene, start_W);
+  const double clearance_m = scenes::clearance_m(session.scene, start_W, 0.0);
   if (clearance_m >= -start_tolerance_m) return;
   const scenes::Object* object = deepest(session.scene, start_W);
   char depth[32];

@@ -223,6 +223,9 @@ class Scenes(ProgramTest):
                 summary = self.summary("--scene", scene)
                 self.assertEqual(summary["faults"], [])
                 self.assertEqual(summary["pulling_force_max_N"], 0.0)
+                self.assertLessEqual(summary["penetration_max_m"], 1e-12)
+                if summary["friction_ratio_error"] is not None:
+                    self.assertLessEqual(abs(summary["friction_ratio_error"]), 0.02)
 
     def test_a_line_keeps_the_tool_on_it(self):
         # n = 1: along x; the wall of the default scene is a point on it.

@@ -34,6 +34,7 @@ struct RigOptions {
   std::string scene = "scenes/wall.yaml";
   std::string hand = "sim/hands/touch.yaml";
   SessionSettings settings{};
+  std::array<double, 6> start_error_rad{};     // by which the controller is wrong about where the arm stands
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
 };
 
@@ -68,7 +69,9 @@ class ClosedLoopRig {
   void run() { run(network); }
 
   CycleParts prepared_parts(fieldbus::CanNetwork& through) {
-    CycleParts parts = build_parts(cell, sensor, compiled, options.settings, through, {0, 1, 2});
+    description::Cell believed = cell;
+    for (std::size_t i = 0; i < 6; ++i) believed.start_rad[i] += options.start_error_rad[i];
+    CycleParts parts = build_parts(believed, sensor, compiled, options.settings, through, {0, 1, 2});
     bring_up(parts);
     return parts;
   }

@@ -264,6 +264,17 @@ TEST(ClosedLoop, StartsWithoutAJump) {
   expect_no_jump(rig);
 }
 
+// The arm stands where it was left, whatever the cell's file says.
+TEST(ClosedLoop, StartsWithoutAJumpFromAnotherPoseThanTheFiles) {
+  RigOptions options{.duration_s = 1.0};
+  options.start_error_rad = {0.3, -0.2, 0.15, 0.1, -0.2, 0.5};
+  ClosedLoopRig rig(options);
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+  expect_no_jump(rig);
+  EXPECT_LT((vec3(rig.records.back().tool_W_m) - rig.truths.back().X_WT.translation()).norm(), 1e-3);
+}
+
 // While one drive took longer to enable (it had a fault to be reset), the others, enabled already, were sent the start
 // angles of the cell's file instead of where they stood: axis 2, which its gear's twist keeps off those, moved by 0.4
 // mrad at once, and an arm that isn't at its start pose would have gone there.

@@ -215,5 +215,14 @@ TEST(Clearance, IsTheDistanceToTheNearestSurface) {
   EXPECT_EQ(clearance_m(load_scene(kScenes / "free.yaml"), Vec3::Zero()), std::numeric_limits<double>::infinity());
 }
 
+// The plate of moving_plate.yaml is 20 mm thick and swings by 0.1 m along x about x = 0.9, once in 5 s.
+TEST(Clearance, IsToWhereThingsAreByThen) {
+  const scenes::Scene scene = load_scene(kScenes / "moving_plate.yaml");
+  const Vec3 x(0.7, 0.0, 0.6);
+  EXPECT_NEAR(clearance_m(scene, x, 0.0), 0.19, 1e-12);
+  EXPECT_NEAR(clearance_m(scene, x, 1.25), 0.29, 1e-12);
+  EXPECT_NEAR(clearance_m(scene, x, 3.75), 0.09, 1e-12);
+}
+
 }  // namespace
 }  // namespace proxarm::tests
