@@ -1,0 +1,152 @@
+// A surface of triangles, and what the proxy asks of it: which faces are near, which does a way run into first, how far
+// is the next. Double precision; built once, then constant: queries allocate nothing and may come from any thread.
+//
+// A face is seen counter-clockwise from its front (outside, for a mesh of a body). Nothing passes a face either way, so
+// a mesh may be open, closed or a soup; how faces are connected is not needed: who is where follows from coordinates.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "models/flat_surface.hpp"
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+// Indexed triangles as files have them. Metres, in the frame that the proxy moves in.
+struct TriangleSoup {
+  std::vector<Vec3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+class TriangleMesh {
+ public:
+  // What is known of a face without looking at its vertices.
+  struct Face {
+    Vec3 corner;         // its first vertex
+    Vec3 normal;         // unit within 2u, out of its front
+    double trust = 1.0;  // 1; infinite for a triangle so thin that its normal can't be computed to that
+  };
+
+  // Vertices with the same coordinates become one; triangles without an area are left out (as sets of points they are
+  // part of their neighbours' sides). Throws std::invalid_argument: no triangle (left), an index out of range, a
+  // coordinate that isn't finite or beyond 1e9 m.
+  explicit TriangleMesh(TriangleSoup soup);
+
+  [[nodiscard]] std::size_t size() const noexcept { return triangles_.size(); }
+  [[nodiscard]] const std::array<std::uint32_t, 3>& triangle(std::uint32_t face) const noexcept {
+    return triangles_[face];
+  }
+  [[nodiscard]] const Vec3& vertex(std::uint32_t index) const noexcept { return vertices_[index]; }
+  [[nodiscard]] const Vec3& corner(std::uint32_t face, std::size_t k) const noexcept {
+    return vertices_[triangles_[face][k]];
+  }
+  [[nodiscard]] const Face& face(std::uint32_t face) const noexcept { return faces_[face]; }
+
+  [[nodiscard]] Bounds bounds() const noexcept { return {nodes_[0].low, nodes_[0].high}; }
+  [[nodiscard]] double mean_edge_m() const noexcept { return mean_edge_; }
+  [[nodiscard]] std::size_t dropped_triangles() const noexcept { return dropped_; }
+  [[nodiscard]] bool closed() const noexcept { return closed_; }  // each edge has one face on either side
+
+  // How far the surface that a proxy touches is in front of the one that it may not reach, metres: so that rounding
+  // can't take a proxy in contact through the latter.
+  //
+  // A proxy's height over the first is rounded by FlatSurface::rounding, at most 16 u S with S the largest ‖vertex‖₁;
+  // its corner is rounded by 3 u S, and normals (2 u) tilt it by 4 u S over the mesh: together 23 u S. As much again
+  // lets a computed height prove the side (32 u S, see proves_side). So 64 u S: 2e-14 m for a mesh within one metre.
+  [[nodiscard]] double lift_m() const noexcept { return lift_; }
+
+  // nᵀ(x − corner), and how large it must be to prove on which side x is.
+  [[nodiscard]] static double height(const Face& face, const Vec3& x) noexcept {
+    return face.normal.dot(x - face.corner);
+  }
+  [[nodiscard]] static double doubt(const Face& face, double size_of_x) noexcept {
+    constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+    return face.trust * 16.0 * u * (size_of_x + face.corner.lpNorm<1>());
+  }
+
+  // Exactly: on which side of the face's plane, and does a closed segment touch the closed face?
+  [[nodiscard]] int side(std::uint32_t face, const Vec3& x) const noexcept;
+  [[nodiscard]] bool touched_by(std::uint32_t face, const Vec3& x, const Vec3& y) const noexcept;
+
+  // The first face that the segment touches, and about where (a share of the way from x to y).
+  struct Hit {
+    std::uint32_t face = 0;
+    double share = std::numeric_limits<double>::infinity();
+    [[nodiscard]] bool any() const noexcept { return share <= 1.0; }
+    void consider(std::uint32_t other, double at) noexcept {
+      if (at < share || (at == share && other < face)) {
+        share = at;
+        face = other;
+      }
+    }
+  };
+  [[nodiscard]] Hit first_hit(const Vec3& x, const Vec3& y) const noexcept;
+  void test(std::uint32_t index, const Face& face, const Vec3& x, const Vec3& y, double size_x, double size_y,
+            Hit& hit) const noexcept {
+    const double h_x = height(face, x), h_y = height(face, y);
+    const double d_x = doubt(face, size_x), d_y = doubt(face, size_y);
+    if ((h_x > d_x && h_y > d_y) || (h_x < -d_x && h_y < -d_y)) return;
+    test_exactly(index, h_x, h_y, x, y, hit);
+  }
+
+  // Calls visit(face) for each face whose box comes within `radius` of x; stops when it returns false.
+  template <typename Visit>
+  void within(const Vec3& x, double radius, Visit visit) const noexcept {
+    std::uint32_t stack[kDepth];
+    int top = 0;
+    stack[top++] = 0;
+    const double r2 = radius * radius;
+    while (top > 0) {
+      const Node& node = nodes_[stack[--top]];
+      if (!(node.distance2(x) <= r2)) continue;
+      if (node.count > 0) {
+        for (std::uint32_t k = 0; k < node.count; ++k) {
+          if (!visit(order_[node.first + k])) return;
+        }
+      } else {
+        stack[top++] = node.first;
+        stack[top++] = node.first + 1;
+      }
+    }
+  }
+
+  // Distance from x to the nearest face, or `most` if none is nearer. `near` is where to look first (any face), and
+  // becomes the nearest.
+  [[nodiscard]] double distance(const Vec3& x, double most, std::uint32_t& near) const noexcept;
+
+  // How often the surface goes around x (solid angle over 4π): about 1 inside a closed mesh, 0 outside. Visits all
+  // faces: for setting up.
+  [[nodiscard]] double winding(const Vec3& x) const noexcept;
+
+ private:
+  struct Node {
+    Vec3 low, high;
+    std::uint32_t first = 0;  // of its faces in order_, or the first of its two nodes
+    std::uint32_t count = 0;  // faces; 0: an inner node
+    [[nodiscard]] double distance2(const Vec3& x) const noexcept {
+      return (low - x).cwiseMax(x - high).cwiseMax(0.0).squaredNorm();
+    }
+  };
+  static constexpr int kDepth = 64;  // halving by number of faces: 33 levels at most, one node of each waits
+
+  void weld(TriangleSoup& soup);
+  void make_faces();
+  void check_closed();
+  void build();
+  [[nodiscard]] double face_distance2(std::uint32_t face, const Vec3& x) const noexcept;
+  void test_exactly(std::uint32_t index, double h_x, double h_y, const Vec3& x, const Vec3& y, Hit& hit) const noexcept;
+
+  std::vector<Vec3> vertices_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<Face> faces_;
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> order_;
+  double mean_edge_ = 0.0, lift_ = 0.0;
+  std::size_t dropped_ = 0;
+  bool closed_ = false;
+};
+
+}  // namespace proxarm::models

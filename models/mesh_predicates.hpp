@@ -1,0 +1,25 @@
+// Which side of a plane is a point on, and does a segment touch a triangle? Exactly, whatever the coordinates.
+//
+// A mesh's barrier stands on these answers alone: computed heights decide where the proxy goes, never whether it may.
+// The determinant is evaluated in doubles with a bound of its error first (J. R. Shewchuk, "Adaptive precision
+// floating-point arithmetic and fast robust geometric predicates", Discrete & Computational Geometry 18, 1997), and
+// only if that leaves its sign open as an exact sum of doubles.
+//
+// Exact for coordinates that are zero or between 1e-60 and 1e60 in magnitude: outside, products under- or overflow.
+#pragma once
+
+#include "models/geometry.hpp"
+
+namespace proxarm::models {
+
+// The sign (−1, 0, 1) of det[b − a, c − a, x − a]: 1 if x is in front of the triangle a b c, that is where it is seen
+// counter-clockwise; 0 if x is in its plane.
+int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x) noexcept;
+
+// True if the three are on a line, or two of them the same.
+bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
+
+// True if the closed segment from x to y has a point in common with the closed triangle (not a collinear one).
+bool segment_touches_triangle(const Vec3& x, const Vec3& y, const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
+
+}  // namespace proxarm::models

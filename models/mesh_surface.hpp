@@ -1,0 +1,83 @@
+// 𝒢 of a triangle mesh with friction, for a proxy that is a point.
+//
+// The proxy goes from q along straight pieces that touch no triangle, so it can't pass the surface, however it is made:
+// each piece is tested exactly (mesh_predicates.hpp) against all faces that could be near. Where the pieces go:
+//   1. towards p. If nothing is in the way, that is the step.
+//   2. Else, from where the way is blocked, towards what holds the proxy: of the faces that it touches there,
+//        one face     (4), with q projected onto the face's plane; also when the step has crossed an edge, as (17) says
+//                     with v = (q(k) − q(k−1))/T
+//        two faces    solve_groove, in a groove as on a convex edge
+//        three faces  solve_corner
+//      whichever is complete (nothing pulls, nothing else is in the way), fewest contacts first, then nearest to p.
+//   3. Where that leads past a face's side it goes on from there with the faces around; where it runs into another
+//      face that one joins in.
+// If no set of faces is complete the proxy is held where it is (a vertex can do that).
+//
+// Faces that touch are known by exact sides and by heights within the lift (TriangleMesh::lift_m): the surface that the
+// proxy glides on is that much in front of the triangles, 2e-14 m for a mesh within one metre, which is units in the
+// last place. A proxy that is on it and sticks is returned bit for bit. K does not appear. What was asked before speeds
+// up the next step and does not change it.
+//
+// Both sides of a face hold: a body is solid for a proxy outside, and a cavity for one inside.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "models/geometric_algorithm.hpp"
+#include "models/mesh.hpp"
+
+namespace proxarm::models {
+
+class MeshSurface final : public GeometricAlgorithm<3> {
+ public:
+  // A mesh may serve several surfaces. Throws std::invalid_argument for a friction that isn't finite and ≥ 0.
+  MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction);
+
+  Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+
+  // Contact::feature is the face's index in the mesh; its normal is on the proxy's side.
+  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
+
+  // Steps in which no set of faces was complete: the proxy stayed where it was held.
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
+
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  [[nodiscard]] double friction() const noexcept { return mu_; }
+
+ private:
+  struct Walk;  // one step on its way
+
+  [[nodiscard]] bool is_clear(const Vec3& p, const Vec3& q) const noexcept;
+  void find_clearance(const Vec3& q) noexcept;
+  [[nodiscard]] bool has_near(const Vec3& x) const noexcept;
+  void come_near(const Vec3& x, double reach) noexcept;
+  [[nodiscard]] TriangleMesh::Hit first_hit(const Vec3& x, const Vec3& y) noexcept;
+
+  std::shared_ptr<const TriangleMesh> mesh_;
+  double mu_;
+  double lift_;
+  std::array<Contact<3>, 3> contacts_{};
+  std::size_t count_ = 0;
+  std::uint64_t unresolved_ = 0;
+
+  // All faces that come within near_radius_ of near_centre_: asked for again when a way leaves that ball.
+  struct Near {
+    std::uint32_t index;
+    TriangleMesh::Face face;
+  };
+  static constexpr std::size_t kNear = 96;
+  std::vector<Near> near_;
+  Vec3 near_centre_ = Vec3::Zero();
+  double near_radius_ = -1.0;
+  double last_move_ = 0.0;
+
+  // No face is closer than clearance_ to clear_at_.
+  Vec3 clear_at_ = Vec3::Zero();
+  double clearance_ = -1.0;
+  std::uint32_t nearest_face_ = 0;
+};
+
+}  // namespace proxarm::models

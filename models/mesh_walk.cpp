@@ -1,0 +1,370 @@
+#include "models/mesh_walk.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/cone_sum.hpp"
+#include "models/corner.hpp"
+#include "models/friction_plane.hpp"
+#include "models/groove.hpp"
+
+namespace proxarm::models {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr int kPieces = 512;  // straight pieces of one step: more are given up, and the proxy stays where they led
+
+// In lifts. A face holds the proxy until it is `kPast` past its side. There it is in front of the next face as well if
+// that turns away by an angle φ of less than 165° (its height there: cos φ + kPast sin φ > 0). On an edge's own line
+// the proxy is past both faces' sides by tan(φ/2): kAround takes angles up to 172°.
+constexpr double kPast = 4.0;
+constexpr double kAround = 16.0;
+// Heights over the touched surface at which a face counts as touched: down to the face itself (−1), and up as far as
+// going past a side leads (cos φ + kPast sin φ − 1 ≤ 3.2).
+constexpr double kBelow = -1.5, kAbove = 4.0;
+constexpr double kSharpest = 0.0078;  // 1 + cos φ at 172°
+
+}  // namespace
+
+MeshSurface::Walk::Walk(MeshSurface& surface, const Vec3& to, const Vec3& from) noexcept
+    : s(surface),
+      mesh(*surface.mesh_),
+      lift(surface.mesh_->lift_m()),
+      p(to),
+      q(from),
+      c(from),
+      p_at(to),
+      came_from(kNone) {
+  const double far = (p - q).lpNorm<1>();
+  if (far > 1e12) p_at = q + (p - q) * (1e12 / far);  // beyond any mesh, and within what predicates are exact for
+  for (double& x : c) {
+    if (std::abs(x) < 1e-60) x = 0.0;
+  }
+  for (double& x : p_at) {
+    if (std::abs(x) < 1e-60) x = 0.0;
+  }
+}
+
+Vec3 MeshSurface::Walk::run() noexcept {
+  if (!p.allFinite() || !q.allFinite() || p == q) return q;
+  touch();
+  if (count == 0) {
+    s.find_clearance(q);
+    if (s.is_clear(p, q)) return p;
+  }
+  Went went = leave_planes() ? Went::on : Went::nowhere;
+  Vec3 start = c;
+  for (int piece = 0; piece < kPieces && went == Went::on; ++piece) {
+    went = try_free();
+    if (went == Went::nowhere) went = try_singles();
+    if (went == Went::nowhere) went = try_pairs();
+    if (went == Went::nowhere) went = try_triples();
+  }
+  if (went != Went::arrived) hold();
+  s.last_move_ = (c - start).norm();
+  return c;
+}
+
+bool MeshSurface::Walk::touches(std::uint32_t index) const noexcept {
+  for (std::size_t i = 0; i < count; ++i) {
+    if (touched[i].face == index) return true;
+  }
+  return false;
+}
+
+// By index, so that nothing depends on the order in which faces are found.
+void MeshSurface::Walk::add(std::uint32_t index, const TriangleMesh::Face& face, int side) noexcept {
+  std::size_t at = count;
+  while (at > 0 && touched[at - 1].face > index) --at;
+  if (at == kMost) return;
+  if (count == kMost) --count;
+  for (std::size_t i = count; i > at; --i) touched[i] = touched[i - 1];
+  const Vec3 n = side < 0 ? Vec3(-face.normal) : face.normal;
+  touched[at] = {index, side, face.corner + lift * n, n};
+  ++count;
+}
+
+void MeshSurface::Walk::touch(std::uint32_t index, const TriangleMesh::Face& face) noexcept {
+  const double h = TriangleMesh::height(face, c);
+  if (std::abs(h) > (kAbove + 1.0) * lift || face.trust > 1.0) return;
+  if (!is_around(index, c, kAround)) return;
+  const int side = mesh.side(index, c);
+  const double over = (side * h - lift);
+  if (over >= kBelow * lift && over <= kAbove * lift) add(index, face, side);
+}
+
+void MeshSurface::Walk::touch() noexcept {
+  count = 0;
+  if (!s.has_near(c) && !s.is_clear(c, c)) s.come_near(c, s.last_move_);
+  if (s.has_near(c)) {
+    for (const Near& near : s.near_) touch(near.index, near.face);
+  } else {
+    mesh.within(c, 2.0 * kAround * lift, [this](std::uint32_t f) {
+      touch(f, mesh.face(f));
+      return true;
+    });
+  }
+}
+
+// A q exactly in a triangle's plane counts as in front of it.
+bool MeshSurface::Walk::leave_planes() noexcept {
+  for (int round = 0; round < 4; ++round) {
+    Vec3 out = Vec3::Zero();
+    bool inside = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (touched[i].side != 0) continue;
+      inside = true;
+      out += touched[i].normal;
+    }
+    if (!inside) return true;
+    const double size = out.norm();
+    if (!(size > 0.1)) return false;
+    c += (lift / size) * out;
+    touch();
+  }
+  return false;
+}
+
+bool MeshSurface::Walk::is_around(std::uint32_t face, const Vec3& x, double lifts) const noexcept {
+  const Vec3& n = mesh.face(face).normal;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& a = mesh.corner(face, k);
+    const Vec3 out = (mesh.corner(face, (k + 1) % 3) - a).cross(n);
+    const double past = out.dot(x - a);
+    if (past > 0.0 && past * past > lifts * lifts * lift * lift * out.squaredNorm()) return false;
+  }
+  return true;
+}
+
+// How far the face holds the proxy on the way from c: 1 if all the way, 0 if it doesn't.
+double MeshSurface::Walk::share_on(std::uint32_t face, const Vec3& to, std::size_t& exit) const noexcept {
+  const Vec3& n = mesh.face(face).normal;
+  double share = 1.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& a = mesh.corner(face, k);
+    const Vec3 out = (mesh.corner(face, (k + 1) % 3) - a).cross(n);
+    const double past_to = out.dot(to - a);
+    if (!(past_to > 0.0)) continue;
+    const double size = out.norm(), there = past_to / size - kPast * lift;
+    if (!(there > 0.0)) continue;
+    const double here = out.dot(c - a) / size - kPast * lift;
+    if (here >= -lift) return 0.0;
+    const double at = -here / (there - here);
+    if (at < share) {
+      share = at;
+      exit = k;
+    }
+  }
+  return share;
+}
+
+// Back over the side by which it has just left the other face: neither holds the proxy alone, the edge may.
+bool MeshSurface::Walk::goes_back(const Target& target) const noexcept {
+  if (came_from == kNone || target.exit > 2) return false;
+  const auto &own = mesh.triangle(touched[target.of[0]].face), &other = mesh.triangle(came_from);
+  const auto has = [&other](std::uint32_t v) { return std::find(other.begin(), other.end(), v) != other.end(); };
+  return touched[target.of[0]].face != came_from && has(own[target.exit]) && has(own[(target.exit + 1) % 3]);
+}
+
+// Up to a face that is in the way; it joins those that are touched.
+MeshSurface::Walk::Went MeshSurface::Walk::run_into(const TriangleMesh::Hit& hit, const Vec3& towards) noexcept {
+  const TriangleMesh::Face& face = mesh.face(hit.face);
+  if (touches(hit.face) || face.trust > 1.0) return Went::nowhere;
+  const int side = mesh.side(hit.face, c);
+  if (side == 0) return Went::nowhere;
+  const double over = side * TriangleMesh::height(face, c) - lift;
+  const double there = side * TriangleMesh::height(face, towards) - lift;
+  if (over > 0.0 && there < over) {
+    const Vec3 x = c + (over / (over - there)) * (towards - c);
+    if (x.allFinite() && !s.first_hit(c, x).any()) {
+      c = x;
+      touch();
+    }
+  }
+  if (!touches(hit.face)) add(hit.face, face, side);
+  return Went::on;
+}
+
+MeshSurface::Walk::Went MeshSurface::Walk::go(const Target& target) noexcept {
+  const bool whole = target.share >= 1.0;
+  if (!whole && goes_back(target)) return Went::nowhere;
+  const Vec3 x = whole ? target.r : Vec3(c + target.share * (target.r - c));
+  if (!x.allFinite()) return Went::nowhere;
+  if (x != c) {
+    const TriangleMesh::Hit hit = s.first_hit(c, x);
+    if (hit.any()) return run_into(hit, x);
+  }
+  if (whole) report(target.count, target.of, target.slips);
+  c = x;
+  if (whole) return Went::arrived;
+  came_from = target.count == 1 ? touched[target.of[0]].face : kNone;
+  touch();
+  return Went::on;
+}
+
+MeshSurface::Walk::Went MeshSurface::Walk::try_free() noexcept {
+  const double size_c = c.lpNorm<1>(), size_p = p_at.lpNorm<1>();
+  TriangleMesh::Hit hit;
+  for (std::size_t i = 0; i < count && !hit.any(); ++i) {
+    mesh.test(touched[i].face, mesh.face(touched[i].face), c, p_at, size_c, size_p, hit);
+  }
+  if (hit.any()) return Went::nowhere;
+  hit = s.first_hit(c, p_at);
+  if (hit.any()) return run_into(hit, p_at);
+  c = p;
+  return Went::arrived;
+}
+
+MeshSurface::Walk::Went MeshSurface::Walk::try_singles() noexcept {
+  std::array<Target, kMost> targets;
+  std::array<double, kMost> distance2;
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const FaceStep<3> step = step_on_face(touched[i].surface(), s.mu_, p, q);
+    if (!step.touches) continue;
+    std::size_t exit = 3;
+    const double share = share_on(touched[i].face, step.r, exit);
+    if (!(share > 0.0)) continue;
+    targets[found] = {step.r, share, {i, 0, 0}, {step.slips, false, false}, 1, exit};
+    // Those that hold all the way come first. At a convex edge the proxy may be able to stick on one face and to slide
+    // on the other: the nearer to p is taken, which is the choice that depends least on K.
+    distance2[found++] = (step.r - p).squaredNorm() * (share < 1.0 ? 1e100 : 1.0);
+  }
+  for (std::size_t tried = 0; tried < found; ++tried) {
+    const auto best = std::min_element(distance2.begin(), distance2.begin() + static_cast<std::ptrdiff_t>(found));
+    const Went went = go(targets[static_cast<std::size_t>(best - distance2.begin())]);
+    if (went != Went::nowhere) return went;
+    *best = kInfinity;
+  }
+  return Went::nowhere;
+}
+
+MeshSurface::Walk::Went MeshSurface::Walk::try_pairs() noexcept {
+  for (std::size_t j = 1; j < count; ++j) {
+    for (std::size_t i = 0; i < j; ++i) {
+      const Went went = try_pair(i, j);
+      if (went != Went::nowhere) return went;
+    }
+  }
+  return Went::nowhere;
+}
+
+MeshSurface::Walk::Went MeshSurface::Walk::try_pair(std::size_t i, std::size_t j) noexcept {
+  const auto &a = mesh.triangle(touched[i].face), &b = mesh.triangle(touched[j].face);
+  std::array<std::uint32_t, 3> shared;
+  const auto shares = std::copy_if(a.begin(), a.end(), shared.begin(),
+                                   [&](std::uint32_t v) { return std::find(b.begin(), b.end(), v) != b.end(); });
+  const bool edge = shares - shared.begin() == 2;
+  if (!edge && count > kAll) return Went::nowhere;
+
+  const FlatSurface<3> f = touched[i].surface(), g = touched[j].surface();
+  GrooveLine line(f, g);
+  if (!line.exists || 1.0 + line.cos < kSharpest) return Went::nowhere;
+  // The line's origin is put beside q, so that short slides aren't lost beside large coordinates.
+  double begin = 0.0, end = 0.0;  // of the edge, along the line
+  if (edge) {
+    // From the vertices: where the planes meet is known no better than rounding over the angle between them.
+    const Vec3 &start = mesh.vertex(shared[0]), along = mesh.vertex(shared[1]) - start;
+    const double length = along.norm();
+    const bool forth = line.e.dot(along) > 0.0;
+    line.x0 = start + lift / (1.0 + line.cos) * (f.normal() + g.normal());
+    line.e = (forth ? along : Vec3(-along)) / length;
+    line.t1 = line.e.cross(f.normal());
+    line.t2 = line.e.cross(g.normal());
+    const double beside_q = line.e.dot(q - line.x0);
+    line.x0 += beside_q * line.e;
+    begin = (forth ? 0.0 : -length) - beside_q;
+    end = begin + length;
+  } else {
+    for (int k = 0; k < 3; ++k) line.x0 = line.settle(f, g, k == 0 ? q : line.x0);
+  }
+  // A q within a few lifts of both counts as in the line.
+  const bool in_line = std::abs(f.height(q)) <= kAbove * lift && std::abs(g.height(q)) <= kAbove * lift;
+  const Vec3 from = !in_line || (f.holds(q) && g.holds(q)) ? q : line.settle(f, g, line.settle(f, g, q));
+  const GrooveSolution solution = solve_groove(f, s.mu_, g, s.mu_, line, p, from, from);
+  if (!solution.found) return Went::nowhere;
+  Target target{solution.r, 1.0, {i, j, 0}, {solution.slips1, solution.slips2, false}, 2};
+  if (edge) {
+    if (target.r != q) target.r = line.x0 + line.e * line.e.dot(target.r - line.x0);
+    const double to = line.e.dot(target.r - line.x0), here = line.e.dot(c - line.x0);
+    const double past = std::max(begin - to, to - end), here_past = to < begin ? begin - here : here - end;
+    if (past > kPast * lift) {
+      if (here_past >= (kPast - 1.0) * lift) return Went::nowhere;
+      target.share = (kPast * lift - here_past) / (past - here_past);
+    }
+  } else {
+    std::size_t exit = 3;
+    target.share = std::min(share_on(touched[i].face, target.r, exit), share_on(touched[j].face, target.r, exit));
+    if (!(target.share > 0.0)) return Went::nowhere;
+  }
+  return go(target);
+}
+
+MeshSurface::Walk::Went MeshSurface::Walk::try_triples() noexcept {
+  if (count > kAll) return Went::nowhere;
+  for (std::size_t k = 2; k < count; ++k) {
+    for (std::size_t j = 1; j < k; ++j) {
+      for (std::size_t i = 0; i < j; ++i) {
+        const std::size_t of[3] = {i, j, k};
+        const FlatSurface<3> surface[3] = {touched[i].surface(), touched[j].surface(), touched[k].surface()};
+        const FlatSurface<3>* const surfaces[3] = {&surface[0], &surface[1], &surface[2]};
+        const double mu[3] = {s.mu_, s.mu_, s.mu_};
+        const Vec3* const qs[3] = {&q, &q, &q};
+        const CornerSolution solution =
+            solve_corner(surfaces, mu, CornerPoint(surface[0], surface[1], surface[2]), p, qs);
+        if (!solution.found) continue;
+        bool around = true;
+        for (const std::size_t m : of) around = around && is_around(touched[m].face, solution.r, kAround);
+        if (!around) continue;
+        const Went went =
+            go({solution.r, 1.0, {i, j, k}, {solution.slips[0], solution.slips[1], solution.slips[2]}, 3});
+        if (went != Went::nowhere) return went;
+      }
+    }
+  }
+  return Went::nowhere;
+}
+
+void MeshSurface::Walk::report(std::size_t contacts, const std::array<std::size_t, 3>& of,
+                               const std::array<bool, 3>& slips) noexcept {
+  s.count_ = contacts;
+  for (std::size_t k = 0; k < contacts; ++k) {
+    const Side& side = touched[of[k]];
+    s.contacts_[k] = {0, static_cast<std::int32_t>(side.face), slips[k], side.normal};
+  }
+}
+
+// Whether the force from p lies in the sum of these faces' friction cones, at rest.
+bool MeshSurface::Walk::can_hold(std::size_t contacts, const std::array<std::size_t, 3>& of) const noexcept {
+  std::array<ForceCone, 3> cones;
+  for (std::size_t k = 0; k < contacts; ++k) cones[k] = {touched[of[k]].normal, s.mu_};
+  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+  return in_sum_of_cones(c - p, {cones.data(), contacts}, lift + 8.0 * u * p.lpNorm<1>());
+}
+
+// No set of faces lets it go anywhere: it is held, as a vertex does. The faces that do so are at most three.
+void MeshSurface::Walk::hold() noexcept {
+  if (c != q && (c - q).norm() <= kAround * lift) c = q;  // no more than what leaving a plane moved it
+  const std::size_t n = std::min(count, std::size_t{16});
+  constexpr std::array<bool, 3> at_rest{false, false, false};
+  for (std::size_t i = 0; i < n; ++i) {
+    if (can_hold(1, {i, 0, 0})) return report(1, {i, 0, 0}, at_rest);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (can_hold(2, {i, j, 0})) return report(2, {i, j, 0}, at_rest);
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      for (std::size_t k = 0; k < j; ++k) {
+        if (can_hold(3, {i, j, k})) return report(3, {i, j, k}, at_rest);
+      }
+    }
+  }
+  ++s.unresolved_;
+  report(std::min(count, std::size_t{3}), {0, 1, 2}, at_rest);
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,177 @@
+// Nothing passes a mesh: random steps against everything that makes meshes leak.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "models/mesh_predicates.hpp"
+#include "models/mesh_surface.hpp"
+#include "tests/models/mesh_shapes.hpp"
+#include "tests/models/random_states.hpp"
+
+namespace proxarm::tests {
+namespace {
+
+using models::MeshSurface;
+using models::orientation;
+using models::TriangleMesh;
+using models::TriangleSoup;
+using models::Vec3;
+
+// Shells about the origin that every ray from it meets once: which side x is on is told exactly, by the face whose cone
+// from the origin holds x. 1: within.
+int within_shell(const TriangleMesh& shell, const Vec3& x) {
+  const Vec3 o = Vec3::Zero();
+  for (std::uint32_t f = 0; f < shell.size(); ++f) {
+    const Vec3 &a = shell.corner(f, 0), &b = shell.corner(f, 1), &c = shell.corner(f, 2);
+    if (orientation(o, a, b, x) >= 0 && orientation(o, b, c, x) >= 0 && orientation(o, c, a, x) >= 0) {
+      return -orientation(a, b, c, x);
+    }
+  }
+  return 0;
+}
+
+// Where a step goes: anywhere, near or far, or exactly to a vertex, an edge's middle, a point of a face.
+Vec3 aim(const TriangleMesh& mesh, const Vec3& q, Random& random) {
+  const int kind = random.below(10);
+  if (kind < 6) return q + random.log_uniform(1e-12, 1.0) * random.direction<3>();
+  const auto face = static_cast<std::uint32_t>(random.below(static_cast<int>(mesh.size())));
+  const Vec3 &a = mesh.corner(face, 0), &b = mesh.corner(face, 1), &c = mesh.corner(face, 2);
+  if (kind == 6) return a;
+  if (kind == 7) return 0.5 * (a + b);
+  if (kind == 8) return (a + b + c) / 3.0;
+  // A little beyond a vertex, as seen from here: the way meets it nearly or exactly.
+  return a + random.log_uniform(1e-9, 0.1) * (a - q);
+}
+
+struct Shape {
+  const char* name;
+  std::uint32_t rings, sectors;
+  double squeeze;
+  double bumps;
+};
+
+void expect_sealed(const Shape& shape, double steps, std::uint64_t seed) {
+  Random random(seed);
+  const auto radius = [&](double scale) {
+    return [&shape, scale](double theta, double phi) {
+      return scale * (0.4 + shape.bumps * std::sin(5.0 * theta) * std::sin(7.0 * phi + theta));
+    };
+  };
+  // Two shells 10 µm apart.
+  const TriangleSoup inner = globe(shape.rings, shape.sectors, radius(1.0), shape.squeeze);
+  const TriangleSoup outer = globe(shape.rings, shape.sectors, radius(1.0 + 2.5e-5), shape.squeeze);
+  TriangleSoup both = inner;
+  join(both, outer);
+  // Every triangle's vertices once more, triangles of zero area over its sides, and some triangles twice.
+  const std::size_t count = both.triangles.size();
+  for (std::size_t t = 0; t < count; ++t) {
+    const auto [a, b, c] = both.triangles[t];
+    const auto first = static_cast<std::uint32_t>(both.vertices.size());
+    for (const auto v : {a, b, c}) both.vertices.push_back(both.vertices[v]);
+    both.triangles[t] = {first, first + 1, first + 2};
+    if (t % 3 == 0) both.triangles.push_back({a, b, b});
+    if (t % 7 == 0) both.triangles.push_back({c, a, b});
+  }
+  const TriangleMesh in(inner), out(outer);
+  const auto mesh = std::make_shared<const TriangleMesh>(both);
+  std::uint64_t unresolved = 0;
+  std::int64_t contacts = 0;
+  for (int region = 0; region < 3; ++region) {
+    for (const double mu : {0.0, 0.4}) {
+      MeshSurface g(mesh, mu);
+      const Vec3 along = Vec3(0.3, 0.4, 0.5).normalized();
+      Vec3 q = Vec3::Zero();
+      if (region > 0) {
+        // Between the shells, or outside.
+        double lo = 0.0, hi = 2.0;
+        for (int k = 0; k < 60; ++k) {
+          const double mid = 0.5 * (lo + hi);
+          (within_shell(in, mid * along) > 0 ? lo : hi) = mid;
+        }
+        q = region == 1 ? Vec3((lo + 4e-6) * along) : Vec3(0.9 * along);
+      }
+      const int side_in = region == 0 ? 1 : -1, side_out = region == 2 ? -1 : 1;
+      ASSERT_EQ(within_shell(in, q), side_in);
+      ASSERT_EQ(within_shell(out, q), side_out);
+      const Vec3 start = q;
+      const std::int64_t n = scaled(steps / 6.0);
+      for (std::int64_t i = 0; i < n; ++i) {
+        const Vec3 p = aim(*mesh, q, random), r = g(1e6, p, q);
+        ASSERT_TRUE(r.allFinite());
+        contacts += static_cast<std::int64_t>(g.contacts().size());
+        if (i % 4 == 0 || i + 1 == n) {
+          ASSERT_EQ(within_shell(in, r), side_in) << shape.name << ", region " << region << ", step " << i << " from "
+                                                  << q.transpose() << " to " << p.transpose();
+          ASSERT_EQ(within_shell(out, r), side_out) << shape.name << ", region " << region << ", step " << i;
+        }
+        q = r.norm() > 1.5 || random.chance(1e-4) ? start : r;
+      }
+      unresolved += g.unresolved_steps();
+    }
+  }
+  std::cout << "  " << shape.name << ": " << mesh->size() << " faces, " << contacts << " contacts, " << unresolved
+            << " unresolved, seed " << seed << "\n";
+  EXPECT_LE(static_cast<double>(unresolved), 0.01 * steps);
+}
+
+TEST(MeshBarrier, HoldsOnEvenTriangles) { expect_sealed({"even", 16, 24, 1.0, 0.05}, 60'000, 801); }
+TEST(MeshBarrier, HoldsOnFiftyFacesAroundAVertex) { expect_sealed({"fifty", 10, 50, 1.0, 0.05}, 60'000, 802); }
+TEST(MeshBarrier, HoldsOnSlivers) { expect_sealed({"slivers", 24, 12, 0.1, 0.02}, 60'000, 803); }
+TEST(MeshBarrier, HoldsOnTheThinnestSlivers) { expect_sealed({"thinnest", 24, 9, 0.03, 0.0}, 60'000, 804); }
+TEST(MeshBarrier, HoldsOnCoarseSharpBodies) { expect_sealed({"coarse", 4, 5, 1.0, 0.15}, 60'000, 805); }
+
+// An open sheet that sticks out of a block through its walls, both one mesh that no vertices join: what is above the
+// sheet stays above, what is below stays below, and neither leaves the block.
+TEST(MeshBarrier, HoldsOnBothSidesOfAnOpenSheet) {
+  Random random(806);
+  const TriangleSoup sheet_soup = field(12, 1.0, [](double x, double y) { return 0.1 * std::sin(6 * x) * y; });
+  const TriangleMesh sheet(sheet_soup);
+  TriangleSoup soup = block({1.2, 1.2, 1.2});
+  join(soup, sheet_soup);
+  const auto mesh = std::make_shared<const TriangleMesh>(soup);
+  EXPECT_FALSE(mesh->closed());
+  const auto above = [&](const Vec3& x) {
+    const Vec3 up(0, 0, 4);
+    for (std::uint32_t f = 0; f < sheet.size(); ++f) {
+      const Vec3 v[3] = {sheet.corner(f, 0), sheet.corner(f, 1), sheet.corner(f, 2)};
+      bool over = true;
+      for (int k = 0; k < 3 && over; ++k) over = orientation(v[k], v[(k + 1) % 3], v[k] + up, x) <= 0;
+      if (over) return orientation(v[0], v[1], v[2], x);
+    }
+    return 0;
+  };
+  for (const int side : {1, -1}) {
+    for (const double mu : {0.0, 0.4}) {
+      MeshSurface g(mesh, mu);
+      Vec3 q(0.01, 0.02, side * 0.3);
+      ASSERT_EQ(above(q), side);
+      for (std::int64_t i = 0; i < scaled(20'000); ++i) {
+        const Vec3 p = aim(*mesh, q, random);
+        q = g(1e6, p, q);
+        ASSERT_EQ(above(q), side) << "step " << i;
+        ASSERT_LT(q.cwiseAbs().maxCoeff(), 0.6);
+      }
+      std::cout << "  unresolved " << g.unresolved_steps() << "\n";
+    }
+  }
+}
+
+// A user's q may be exactly on a face, an edge, a vertex: it counts as in front.
+TEST(MeshBarrier, FromExactlyOnTheSurfaceLeadsToTheFront) {
+  Random random(807);
+  const auto mesh = std::make_shared<const TriangleMesh>(globe(6, 7, 0.5));
+  for (std::int64_t i = 0; i < scaled(20'000); ++i) {
+    const auto face = static_cast<std::uint32_t>(random.below(static_cast<int>(mesh->size())));
+    const Vec3 &a = mesh->corner(face, 0), &b = mesh->corner(face, 1);
+    const Vec3 q = random.chance(0.5) ? a : Vec3(0.5 * (a + b));
+    MeshSurface g(mesh, 0.3);
+    // Rounded, the edge's middle may be within, where the proxy is in a cavity.
+    if (q != a && within_shell(*mesh, q) > 0) continue;
+    const Vec3 r = g(1e6, q + random.log_uniform(1e-9, 1.0) * random.direction<3>(), q);
+    ASSERT_TRUE(r == q || within_shell(*mesh, r) < 0) << q.transpose() << " to " << r.transpose();
+  }
+}
+
+}  // namespace
+}  // namespace proxarm::tests
