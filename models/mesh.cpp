@@ -205,14 +205,14 @@ void TriangleMesh::test_exactly(std::uint32_t f, double h_x, double h_y, const V
   hit.consider(f, share > 0.0 ? std::min(share, 1.0) : 0.0);
 }
 
-TriangleMesh::Hit TriangleMesh::first_hit(const Vec3& x, const Vec3& y) const noexcept {
-  Hit hit;
-  const double size_x = x.lpNorm<1>(), size_y = y.lpNorm<1>();
+// Calls visit(face) for all faces in boxes that the way from x to y passes before `share()` of it.
+template <typename Share, typename Visit>
+void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit) const noexcept {
   // Slabs. The box is passed if the way is within its bounds on all axes at once; rounding of the shares is paid for by
   // letting boxes be a little larger than they are.
   const Vec3 d = y - x;
   const Vec3 one_over(1.0 / d.x(), 1.0 / d.y(), 1.0 / d.z());
-  const double margin = 16.0 * u * (size_x + size_y);
+  const double margin = 16.0 * u * (x.lpNorm<1>() + y.lpNorm<1>());
   std::uint32_t stack[kDepth];
   int top = 0;
   stack[top++] = 0;
@@ -232,18 +232,42 @@ TriangleMesh::Hit TriangleMesh::first_hit(const Vec3& x, const Vec3& y) const no
       leave = std::min(leave, std::max(a, b));
     }
     constexpr double slack = 1e-14;  // two roundings of shares of about one, many times over
-    if (apart || enter > leave * (1.0 + slack) + slack || enter > hit.share + slack) continue;
+    if (apart || enter > leave + slack || enter > share() + slack) continue;
     if (node.count > 0) {
-      for (std::uint32_t k = 0; k < node.count; ++k) {
-        const std::uint32_t f = order_[node.first + k];
-        test(f, faces_[f], x, y, size_x, size_y, hit);
-      }
+      for (std::uint32_t k = 0; k < node.count; ++k) visit(order_[node.first + k]);
     } else {
       stack[top++] = node.first;
       stack[top++] = node.first + 1;
     }
   }
+}
+
+TriangleMesh::Hit TriangleMesh::first_hit(const Vec3& x, const Vec3& y) const noexcept {
+  Hit hit;
+  const double size_x = x.lpNorm<1>(), size_y = y.lpNorm<1>();
+  along(
+      x, y, [&hit] { return hit.share; }, [&](std::uint32_t f) { test(f, faces_[f], x, y, size_x, size_y, hit); });
   return hit;
+}
+
+// By how often a way out passes the surface; ways that meet an edge or a vertex are not counted but replaced.
+bool TriangleMesh::encloses(const Vec3& x) const noexcept {
+  const double reach = 2.0 * ((bounds().high - bounds().low).norm() + (x - bounds().low).norm());
+  for (int attempt = 1; attempt <= 8; ++attempt) {
+    const Vec3 away(std::sin(1.7 * attempt), std::cos(2.3 * attempt), std::sin(0.9 * attempt + 0.5));
+    const Vec3 y = x + reach * away.normalized();
+    bool odd = false, clean = true;
+    along(
+        x, y, [] { return 1.0; },
+        [&](std::uint32_t f) {
+          if (!touched_by(f, x, y)) return;
+          odd = !odd;
+          for (std::size_t k = 0; k < 3; ++k)
+            clean = clean && orientation(x, y, corner(f, k), corner(f, (k + 1) % 3)) != 0;
+        });
+    if (clean) return odd;
+  }
+  return std::abs(winding(x)) > 0.5;
 }
 
 // The squared distance to a triangle: to its plane's point if that is within all three sides, else to the nearest side.

@@ -117,6 +117,9 @@ class TriangleMesh {
   // becomes the nearest.
   [[nodiscard]] double distance(const Vec3& x, double most, std::uint32_t& near) const noexcept;
 
+  // Whether x is inside a closed mesh.
+  [[nodiscard]] bool encloses(const Vec3& x) const noexcept;
+
   // How often the surface goes around x (solid angle over 4π): about 1 inside a closed mesh, 0 outside. Visits all
   // faces: for setting up.
   [[nodiscard]] double winding(const Vec3& x) const noexcept;
@@ -132,6 +135,8 @@ class TriangleMesh {
   };
   static constexpr int kDepth = 64;  // halving by number of faces: 33 levels at most, one node of each waits
 
+  template <typename Share, typename Visit>
+  void along(const Vec3& x, const Vec3& y, Share share, Visit visit) const noexcept;
   void weld(TriangleSoup& soup);
   void make_faces();
   void check_closed();

@@ -9,7 +9,7 @@
 #include "models/mesh_predicates.hpp"
 #include "models/mesh_surface.hpp"
 #include "models/plane_composition.hpp"
-#include "tests/models/allocation_count.hpp"
+#include "tests/allocation_count.hpp"
 #include "tests/models/contract.hpp"
 #include "tests/models/exact_reference.hpp"
 #include "tests/models/mesh_shapes.hpp"
@@ -112,6 +112,11 @@ TEST(TriangleMesh, WeldsVerticesAndDropsTrianglesWithoutArea) {
   EXPECT_TRUE(mesh.closed());
   EXPECT_NEAR(mesh.winding({0.1, 0.2, 0.3}), 1.0, 1e-12);
   EXPECT_NEAR(mesh.winding({0.1, 0.2, 0.6}), 0.0, 1e-12);
+  Random random(700);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 x = random.in_box<3>(1.0);
+    ASSERT_EQ(mesh.encloses(x), x.cwiseAbs().maxCoeff() < 0.5);
+  }
   soup.triangles.pop_back();
   soup.triangles.pop_back();
   EXPECT_FALSE(TriangleMesh(soup).closed());

@@ -1,0 +1,64 @@
+// A triangle mesh among other obstacles. Each has its own, since it remembers where the proxy was; the TriangleMesh may
+// be shared.
+//
+// Where the mesh holds the proxy with several of its own faces, the others see the one that presses most: a groove of
+// the mesh together with another object is solved only as far as that goes, and the World holds the proxy beyond.
+#pragma once
+
+#include <memory>
+
+#include "models/mesh_surface.hpp"
+#include "models/obstacle.hpp"
+
+namespace proxarm::models {
+
+class MeshObstacle final : public Obstacle {
+ public:
+  // Throws std::invalid_argument for a friction that isn't finite and ≥ 0.
+  MeshObstacle(std::shared_ptr<const TriangleMesh> mesh, double friction) : surface_(std::move(mesh), friction) {}
+
+  // feature: the face's index, or its complement if its back is touched.
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
+    Step out;
+    out.r = surface_(K, p, q);
+    out.normal = Vec3::UnitZ();
+    out.touches = out.r != p;
+    const Contact<3>* most = nullptr;
+    for (const Contact<3>& contact : surface_.contacts()) {
+      if (most == nullptr || contact.normal.dot(out.r - p) > most->normal.dot(out.r - p)) most = &contact;
+    }
+    if (most == nullptr) return out;
+    out.touches = true;
+    out.slips = most->slips;
+    out.normal = most->normal;
+    const bool front = mesh().face(static_cast<std::uint32_t>(most->feature)).normal.dot(most->normal) > 0.0;
+    out.feature = front ? most->feature : ~most->feature;
+    return out;
+  }
+
+  // A point that the mesh lets the proxy reach is one where it ends if it wants to get there; a few lifts are what the
+  // tangent planes of two faces differ by where they meet.
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
+    return (surface_(1.0, r, q) - r).norm() > 8.0 * mesh().lift_m();
+  }
+
+  [[nodiscard]] Tangent tangent(const Vec3& /*r*/, std::int32_t feature) const noexcept override {
+    const TriangleMesh::Face& face = mesh().face(static_cast<std::uint32_t>(feature < 0 ? ~feature : feature));
+    const Vec3 n = feature < 0 ? Vec3(-face.normal) : face.normal;
+    return {FlatSurface<3>::of_unit(face.corner + mesh().lift_m() * n, n), surface_.friction()};
+  }
+
+  // Not signed: both sides of a mesh hold.
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override {
+    return mesh().distance(x, std::numeric_limits<double>::infinity(), near_);
+  }
+  [[nodiscard]] Bounds bounds() const noexcept override { return mesh().bounds(); }
+
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface_.mesh(); }
+
+ private:
+  mutable MeshSurface surface_;  // what it remembers changes how fast it answers, not what
+  mutable std::uint32_t near_ = 0;
+};
+
+}  // namespace proxarm::models
