@@ -121,7 +121,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->type_name("held|free");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
-  app.add_flag("!--no-plot", options.plot, "draw no plot");
+  app.add_flag_callback(
+      "--no-plot", [&] { options.plot = false; }, "draw no plot");
   app.add_flag("--json", options.json, "print the summary as one JSON object");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");
@@ -159,7 +160,7 @@ int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseEr
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"Hold an industrial robot arm and feel a virtual world through it."};
+  CLI::App app{"Hold an industrial robot arm and feel a virtual world through it.", "proxarm"};
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("proxarm ") + PROXARM_VERSION);
   app.set_help_all_flag("--help-all", "help of all commands");
