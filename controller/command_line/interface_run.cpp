@@ -1,8 +1,10 @@
 #include "controller/command_line/interface_run.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <thread>
 
 #include "controller/bring_up.hpp"
@@ -13,6 +15,7 @@
 #include "controller/command_line/start_check.hpp"
 #include "controller/frame_tap.hpp"
 #include "controller/session.hpp"
+#include "fieldbus/can_timing.hpp"
 #include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 
@@ -72,11 +75,31 @@ void bring_up_devices(controller::CycleParts& parts) {
   }
 }
 
-// Takes records and frames out of the cycle's rings and hands them on, in a thread of its own.
+// Bitrates by bus of the network: the slowest of the cell's buses that share an interface.
+std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const controller::BusIndices& indices) {
+  std::vector<fieldbus::BitRates> rates(*std::max_element(indices.begin(), indices.end()) + 1, {0, 0});
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    fieldbus::BitRates& shared = rates[indices[i]];
+    if (shared.nominal == 0 || cell.buses[i].bitrate < shared.nominal) {
+      shared = {cell.buses[i].bitrate, cell.buses[i].data_bitrate};
+    }
+  }
+  return rates;
+}
+
+// Takes records and frames out of the cycle's rings and hands them on, in a thread of its own. Counts how long the
+// frames would occupy a bus of the cell's bitrates, since a virtual interface takes no time.
 class Drain {
  public:
-  Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output)
-      : records_(records), tap_(tap), output_(output), thread_([this] { loop(); }) {}
+  Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
+        std::vector<fieldbus::BitRates> rates)
+      : records_(records),
+        tap_(tap),
+        output_(output),
+        rates_(std::move(rates)),
+        busy_ns_(rates_.size()),
+        begun_ns_(tap.now_ns()),
+        thread_([this] { loop(); }) {}
   Drain(const Drain&) = delete;
   Drain& operator=(const Drain&) = delete;
   ~Drain() { finish(); }
@@ -86,6 +109,15 @@ class Drain {
     ended_.store(true, std::memory_order_release);
     thread_.join();
     drain();
+  }
+
+  // After finish(): the load of each interface, by its name.
+  [[nodiscard]] std::map<std::string, double> loads() const {
+    std::map<std::string, double> loads;
+    for (std::size_t bus = 0; bus < busy_ns_.size() && last_ns_ > begun_ns_; ++bus) {
+      loads[tap_.bus(bus).name()] = static_cast<double>(busy_ns_[bus]) / static_cast<double>(last_ns_ - begun_ns_);
+    }
+    return loads;
   }
 
  private:
@@ -99,12 +131,21 @@ class Drain {
     CycleRecord record;
     while (records_.pop(record)) output_.add(record);
     controller::TappedFrame tapped;
-    while (tap_.frames().pop(tapped)) output_.add_frame(tap_.bus(tapped.bus).name(), tapped.frame, tapped.time_ns);
+    while (tap_.frames().pop(tapped)) {
+      output_.add_frame(tap_.bus(tapped.bus).name(), tapped.frame, tapped.time_ns);
+      if (tapped.time_ns < begun_ns_) continue;
+      busy_ns_[tapped.bus] += fieldbus::wire_time_ns(tapped.frame, rates_[tapped.bus]);
+      last_ns_ = std::max(last_ns_, tapped.time_ns);
+    }
   }
 
   controller::SpscRing<CycleRecord>& records_;
   controller::FrameTap& tap_;
   SessionOutput& output_;
+  std::vector<fieldbus::BitRates> rates_;
+  std::vector<std::int64_t> busy_ns_;
+  std::int64_t begun_ns_;
+  std::int64_t last_ns_ = 0;
   std::atomic<bool> ended_{false};
   std::thread thread_;
 };
@@ -130,7 +171,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
   SignalWatch signals([&](int) { cycle.request_stop(); });
-  Drain drain(cycle.records(), tap, output);
+  Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices));
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::SessionTally tally;
   {
@@ -144,6 +185,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
   controller::Summary summary = output.summary(cycle);
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
+  summary.bus_load = drain.loads();
   return output.finish(summary);
 }
 
