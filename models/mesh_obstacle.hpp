@@ -36,10 +36,12 @@ class MeshObstacle final : public Obstacle {
     return out;
   }
 
-  // A point that the mesh lets the proxy reach is one where it ends if it wants to get there; a few lifts are what the
-  // tangent planes of two faces differ by where they meet.
+  // A point that the mesh lets the proxy reach is one where it ends if it wants to get there, or one within the few
+  // lifts by which tangent planes of two faces differ where they meet; but never, exactly, one behind a face.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
-    return (surface_(1.0, r, q) - r).norm() > 8.0 * mesh().lift_m();
+    const Vec3 reached = surface_(1.0, r, q);
+    if (reached == r) return false;
+    return !((reached - r).norm() <= 8.0 * mesh().lift_m()) || mesh().first_hit(reached, r).any();
   }
 
   [[nodiscard]] Tangent tangent(const Vec3& /*r*/, std::int32_t feature) const noexcept override {

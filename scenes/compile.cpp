@@ -11,6 +11,7 @@
 #include "models/friction_plane.hpp"
 #include "models/guides.hpp"
 #include "models/media.hpp"
+#include "models/mesh_surface.hpp"
 #include "models/plane.hpp"
 #include "models/plane_composition.hpp"
 #include "models/plane_obstacle.hpp"
@@ -258,6 +259,24 @@ Algorithm<3> guide(const Scene& scene, const GuideDescription& guide, CompiledSc
       models::PolylineGuide::line(guide.points_m.front(), guide.direction, guide.friction));
 }
 
+// A mesh that is all there is, without a world around it.
+Algorithm<3> one_mesh(const Object& object, const MeshShape& shape, CompiledScene& out) {
+  const models::TriangleMesh& mesh = *shape.mesh;
+  out.stages.push_back({"clearance", "a step that can't reach anything is q = p, without a look"});
+  out.stages.push_back(
+      {"faces near the proxy", "of " + std::to_string(mesh.size()) + ", by a tree of boxes, once in many steps"});
+  out.stages.push_back(
+      {"mesh" + std::string(object.friction > 0.0 ? " with friction, μ = " + number_text(object.friction) : ""),
+       object.name + (mesh.closed() ? ", closed" : ", open: both sides hold")});
+  if (mesh.dropped_triangles() > 0) {
+    out.skipped.push_back({std::to_string(mesh.dropped_triangles()) + " triangles", "without an area"});
+  }
+  out.skipped.push_back({"composition", "a single object"});
+  if (!(object.friction > 0.0)) out.skipped.push_back({"friction", "μ = 0"});
+  out.skipped.push_back({"motion", "nothing moves"});
+  return std::make_unique<models::MeshSurface>(shape.mesh, object.friction);
+}
+
 template <int N>
 Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
   if (scene.guide) {
@@ -278,6 +297,13 @@ Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
     if (cut.planes.size() == 1) return one_plane<N>(cut.planes.front(), out);
     // Flat surfaces have no bounds that a tree could use; looking at each is as good, and this many are few.
     if (cut.planes.size() <= 64) return several_planes<N>(cut, out);
+  }
+  if constexpr (N == 3) {
+    if (cut.planes.empty() && cut.others.size() == 1 && cut.others.front().second == 0) {
+      const Object& object = *cut.others.front().first;
+      const auto* mesh = std::get_if<MeshShape>(&object.shape);
+      if (mesh != nullptr && !object.motion && !object.layer) return one_mesh(object, *mesh, out);
+    }
   }
   return world<N>(scene, cut, out);
 }

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "models/box_obstacle.hpp"
 #include "models/cylinder_obstacle.hpp"
 #include "models/description/setup_error.hpp"
+#include "models/mesh_obstacle.hpp"
 #include "models/plane_obstacle.hpp"
 #include "models/round_obstacle.hpp"
 
@@ -55,6 +57,9 @@ struct MakeParts {
     parts.push_back({std::make_unique<models::PlaneObstacle>(s.from_m, e, mu), 2});
     return parts;
   }
+  std::vector<Part> operator()(const MeshShape& s) const {
+    return one(std::make_unique<models::MeshObstacle>(s.mesh, mu));
+  }
 };
 
 double segment_distance(const Vec3& a, const Vec3& b, const Vec3& x) {
@@ -79,6 +84,13 @@ struct Distance {
     const double across = (d - e * e.dot(d)).norm() - s.radius_m;
     return side(s.inside_out, std::hypot(std::max(z, 0.0), std::max(across, 0.0)) + std::min(0.0, std::max(z, across)));
   }
+  // Of an open mesh without a sign.
+  double operator()(const MeshShape& s) const {
+    std::uint32_t near = 0;
+    const double distance = s.mesh->distance(x, std::numeric_limits<double>::infinity(), near);
+    if (!s.mesh->closed()) return distance;
+    return side(s.inside_out, s.mesh->encloses(x) ? -distance : distance);
+  }
 
  private:
   static double side(bool inside_out, double distance) { return inside_out ? -distance : distance; }
@@ -90,6 +102,7 @@ struct Middle {
   Vec3 operator()(const SphereShape& s) const { return s.centre_m; }
   Vec3 operator()(const CapsuleShape& s) const { return 0.5 * (s.from_m + s.to_m); }
   Vec3 operator()(const CylinderShape& s) const { return 0.5 * (s.from_m + s.to_m); }
+  Vec3 operator()(const MeshShape& s) const { return 0.5 * (s.mesh->bounds().low + s.mesh->bounds().high); }
 };
 struct Size {
   double operator()(const PlaneShape&) const { return 0.5; }
@@ -97,6 +110,7 @@ struct Size {
   double operator()(const SphereShape& s) const { return s.radius_m; }
   double operator()(const CapsuleShape& s) const { return 0.5 * (s.to_m - s.from_m).norm() + s.radius_m; }
   double operator()(const CylinderShape& s) const { return 0.5 * (s.to_m - s.from_m).norm() + s.radius_m; }
+  double operator()(const MeshShape& s) const { return 0.5 * (s.mesh->bounds().high - s.mesh->bounds().low).norm(); }
 };
 
 }  // namespace
@@ -118,6 +132,14 @@ std::vector<Part> parts_of(const Scene& scene, const Object& object) {
                                      .expected = "a plane, a sphere or a capsule under an elastic layer"});
     }
     layer = {object.layer->stiffness_N_per_m, object.layer->thickness_m};
+  }
+  if (object.motion && std::holds_alternative<MeshShape>(object.shape)) {
+    // Carried to and fro, coordinates are rounded by more than the proxy is in front of a mesh.
+    throw description::SetupError({.file = scene.file.string(),
+                                   .line = object.line,
+                                   .key = "motion",
+                                   .found = "motion of the mesh " + object.name,
+                                   .expected = "a mesh that stands still"});
   }
   return std::visit(MakeParts{object.friction, layer}, object.shape);
 }

@@ -6,12 +6,14 @@
 
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "models/geometry.hpp"
+#include "models/mesh.hpp"
 
 namespace proxarm::scenes {
 
@@ -58,7 +60,17 @@ struct CylinderShape {
   bool inside_out = false;
 };
 
-using Shape = std::variant<PlaneShape, BoxShape, SphereShape, CapsuleShape, CylinderShape>;
+// A surface of triangles, read when its scene is; see scenes/mesh_file.hpp. Both its sides hold the proxy, so a closed
+// one is a body for a proxy outside and a cavity for one inside.
+struct MeshShape {
+  std::filesystem::path file;
+  double scale_m = 1.0;  // metres per unit of the file
+  models::Pose pose_W = models::Pose::Identity();
+  bool inside_out = false;                           // of a closed mesh: which side is free
+  std::shared_ptr<const models::TriangleMesh> mesh;  // in W
+};
+
+using Shape = std::variant<PlaneShape, BoxShape, SphereShape, CapsuleShape, CylinderShape, MeshShape>;
 
 // The outer skin of an object, of this thickness, gives way by force over stiffness.
 struct ElasticLayer {

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "models/description/yaml_file.hpp"
+#include "scenes/mesh_file.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -35,6 +36,31 @@ Vec3 direction_of(const YamlNode& node, std::string_view key) {
 
 PlaneShape read_plane(const YamlNode& node) {
   return {.point_m = point_of(node, "point_m"), .normal = direction_of(node, "normal")};
+}
+
+models::Pose pose_of(const YamlNode& node) {
+  models::Pose pose = models::Pose::Identity();
+  pose.translation() = vector_of(node.vec3_or("position_m", {0, 0, 0}, kCoordinate));
+  const Vec3 rpy =
+      vector_of(node.vec3_or("rpy_rad", {0, 0, 0}, between(-2.0 * std::numbers::pi, 2.0 * std::numbers::pi)));
+  if (rpy.isZero(0.0)) return pose;  // a rotation by nothing keeps coordinates bit for bit
+  pose.linear() = (Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
+                   Eigen::AngleAxisd(rpy.x(), Vec3::UnitX()))
+                      .toRotationMatrix();
+  return pose;
+}
+
+MeshShape read_mesh(const YamlNode& node) {
+  MeshShape mesh;
+  mesh.file = node.existing_file("file");
+  mesh.scale_m = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
+  mesh.pose_W = pose_of(node);
+  mesh.inside_out = node.boolean_or("inside_out", false);
+  mesh.mesh = load_mesh(mesh.file, mesh.scale_m, mesh.pose_W);
+  if (mesh.inside_out && !mesh.mesh->closed()) {
+    throw node.error_at("inside_out", "a closed mesh; both sides of an open one hold anyway", "an open mesh");
+  }
+  return mesh;
 }
 
 BoxShape read_box(const YamlNode& node) {
@@ -69,7 +95,7 @@ Bar read_bar(const YamlNode& node, bool may_be_short) {
 }
 
 const std::vector<std::string>& kinds() {
-  static const std::vector<std::string> all{"plane", "box", "sphere", "capsule", "cylinder"};
+  static const std::vector<std::string> all{"plane", "box", "sphere", "capsule", "cylinder", "mesh"};
   return all;
 }
 
@@ -78,6 +104,7 @@ Shape read_shape(const std::string& kind, const YamlNode& node) {
   if (kind == "sphere") return read_sphere(node);
   if (kind == "capsule") return read_bar<CapsuleShape>(node, true);
   if (kind == "cylinder") return read_bar<CylinderShape>(node, false);
+  if (kind == "mesh") return read_mesh(node);
   return read_plane(node);
 }
 
@@ -88,7 +115,7 @@ std::pair<std::string, YamlNode> shape_node(const YamlNode& node) {
     if (const auto found = node.find_map(kind)) return {kind, *found};
   }
   node.finish();  // names an unknown kind, and the nearest known one
-  throw node.error("an object: plane, box, sphere, capsule or cylinder", "an empty map");
+  throw node.error("an object: plane, box, sphere, capsule, cylinder or mesh", "an empty map");
 }
 
 Motion read_motion(const YamlNode& node) {
@@ -175,6 +202,7 @@ MediumDescription read_medium(const YamlNode& entry) {
   medium.line = node->line();
   if (const auto within = node->find_map("within")) {
     const auto [kind, shape] = shape_node(*within);
+    if (kind == "mesh") throw within->error("a box, sphere, capsule, cylinder or plane as a region", "a mesh");
     medium.within = read_shape(kind, shape);
   }
   return medium;

@@ -1,0 +1,97 @@
+#include "scenes/mesh_file.hpp"
+
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cctype>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::scenes {
+namespace {
+
+using description::in_quotes;
+using description::SetupError;
+using models::TriangleSoup;
+using models::Vec3;
+
+constexpr const char* kExpected = "a mesh: STL, OBJ or PLY, with triangles";
+
+std::string extension_of(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+}  // namespace
+
+TriangleSoup read_mesh_file(const std::filesystem::path& file) {
+  const std::string extension = extension_of(file);
+  if (extension != ".stl" && extension != ".obj" && extension != ".ply") {
+    throw SetupError({.file = file.string(),
+                      .found = extension.empty() ? "a file without an extension" : in_quotes(extension),
+                      .expected = "a mesh: .stl, .obj or .ply"});
+  }
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw SetupError({.file = file.string(), .found = "no such file", .expected = kExpected});
+  }
+  Assimp::Importer importer;
+  // Only what a surface needs; node transforms are applied. Vertices are welded later, exactly.
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
+                                                          aiComponent_COLORS | aiComponent_TEXCOORDS |
+                                                          aiComponent_TEXTURES | aiComponent_MATERIALS);
+  const aiScene* const scene = importer.ReadFile(
+      file.string(), aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_PreTransformVertices);
+  if (scene == nullptr || scene->mNumMeshes == 0) {
+    const std::string why = importer.GetErrorString();
+    throw SetupError({.file = file.string(),
+                      .found = why.empty() ? "nothing that can be read" : in_quotes(why, 160),
+                      .expected = kExpected});
+  }
+  TriangleSoup soup;
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene->mMeshes[m];
+    const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+    soup.vertices.reserve(soup.vertices.size() + mesh.mNumVertices);
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+      const aiVector3D& x = mesh.mVertices[v];
+      soup.vertices.emplace_back(x.x, x.y, x.z);
+    }
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      if (face.mNumIndices != 3) continue;
+      for (unsigned k = 0; k < 3; ++k) {
+        if (face.mIndices[k] >= mesh.mNumVertices) {
+          throw SetupError({.file = file.string(),
+                            .found = "vertex " + std::to_string(face.mIndices[k]) + " in face " + std::to_string(f),
+                            .expected = "a vertex below " + std::to_string(mesh.mNumVertices)});
+        }
+      }
+      soup.triangles.push_back({first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+    }
+  }
+  if (soup.triangles.empty()) {
+    throw SetupError({.file = file.string(), .found = "no triangles", .expected = kExpected});
+  }
+  return soup;
+}
+
+std::shared_ptr<const models::TriangleMesh> load_mesh(const std::filesystem::path& file, double scale,
+                                                      const models::Pose& pose_W) {
+  TriangleSoup soup = read_mesh_file(file);
+  for (Vec3& x : soup.vertices) x = pose_W * Vec3(scale * x);
+  try {
+    return std::make_shared<const models::TriangleMesh>(std::move(soup));
+  } catch (const std::invalid_argument& mistake) {
+    throw SetupError({.file = file.string(), .message = mistake.what(), .advice = "check the mesh and its scale"});
+  }
+}
+
+}  // namespace proxarm::scenes
