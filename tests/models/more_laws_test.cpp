@@ -158,6 +158,50 @@ TEST(MovingObstacle, GrooveTakesTheProxyAlong) {
   }
 }
 
+// A press that closes on the proxy: no point keeps all laws then. It stays finite, and says so.
+TEST(MovingObstacle, SqueezesTheProxyWithoutLosingIt) {
+  for (const double speed : {0.01, 1.0}) {
+    ScriptedMotion down;
+    down.velocity_m_per_s = Vec3(0, 0, -speed);
+    std::vector<World::Entry> entries;
+    entries.push_back({std::make_unique<PlaneObstacle>(Vec3::Zero(), Vec3::UnitZ(), 0.3), 0, -1});
+    entries.push_back(
+        {std::make_unique<MovingObstacle>(std::make_unique<PlaneObstacle>(Vec3(0, 0, 0.05), -Vec3::UnitZ(), 0.3), down),
+         1, -1});
+    World g(std::move(entries));
+    const double T = 1e-3;
+    Vec3 q(0, 0, 0.02);
+    for (int k = 1; k * T * speed < 0.06; ++k) {
+      g.set_time({.time_s = k * T, .period_s = T});
+      q = g(1e6, q - Vec3(0, 0, 5e-6), q);
+      ASSERT_TRUE(q.allFinite());
+      const double gap = 0.05 - speed * k * T;
+      if (gap > 1e-9) {
+        ASSERT_GE(q.z(), -1e-12);
+        ASSERT_LE(q.z(), gap + 1e-12);
+        ASSERT_EQ(g.unresolved_steps(), 0u);
+      } else {
+        ASSERT_LE(std::abs(q.z()), 0.02);
+      }
+    }
+    EXPECT_GT(g.unresolved_steps(), 0u);
+  }
+}
+
+// What is asked with numbers that are none may give none, but leaves nothing behind.
+TEST(World, ForgetsANonFiniteStep) {
+  auto g = single(std::make_unique<Sphere>(PointCore{Vec3::Zero()}, 0.1, 0.3, false));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Vec3 p(0.01, 0, 0.09), q(0, 0, 0.12), far(0, 0, 5);
+  const Vec3 expected = (*g)(1e6, p, q);
+  for (const Vec3& bad : {Vec3(nan, 0, 0), Vec3(0, 0, std::numeric_limits<double>::infinity())}) {
+    (*g)(1e6, bad, q);
+    (*g)(1e6, p, bad);
+    EXPECT_EQ((*g)(1e6, p, q), expected);
+    EXPECT_EQ((*g)(1e6, far, far), far);
+  }
+}
+
 TEST(MovingObstacle, IsDrivenFromOutside) {
   auto plate = std::make_unique<MovingObstacle>(std::make_unique<PlaneObstacle>(Vec3::Zero(), Vec3::UnitZ(), 0.0),
                                                 Pose::Identity());
