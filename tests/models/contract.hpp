@@ -152,7 +152,8 @@ void expect_contract(models::GeometricAlgorithm<N>&& g, const ContractOptions<N>
   }
   std::cout << "  " << states << " states, seed " << options.seed << ": " << pressed << " in contact, " << slipped
             << " slipping contacts, " << several << " with several solutions\n";
-  EXPECT_LE(static_cast<double>(several), options.several * static_cast<double>(states));
+  // Three are no share at all where few states are asked for.
+  EXPECT_LE(static_cast<double>(several), std::max(3.0, options.several * static_cast<double>(states)));
 }
 
 }  // namespace proxarm::tests
