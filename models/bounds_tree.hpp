@@ -25,7 +25,7 @@ class BoundsTree {
   template <typename Visit>
   void within(const Vec3& x, double radius, Visit visit) const noexcept {
     if (nodes_.empty()) return;
-    std::uint32_t stack[kDepth];
+    std::uint32_t stack[stack_depth_];
     int top = 0;
     stack[top++] = 0;
     while (top > 0) {
@@ -44,7 +44,7 @@ class BoundsTree {
   template <typename Distance>
   [[nodiscard]] double nearest(const Vec3& x, double least, Distance distance) const noexcept {
     if (nodes_.empty()) return least;
-    std::uint32_t stack[kDepth];
+    std::uint32_t stack[stack_depth_];
     int top = 0;
     stack[top++] = 0;
     while (top > 0) {
@@ -69,7 +69,7 @@ class BoundsTree {
     std::size_t index = 0;
     bool leaf = false;
   };
-  static constexpr int kDepth = 80;  // halving: 2³² leaves need 33, and each level leaves one on the stack
+  static constexpr int stack_depth_ = 80;  // halving: 2³² leaves need 33, and each level leaves one on the stack
 
   static double distance2(const Bounds& b, const Vec3& x) noexcept {
     return ((b.low - x).cwiseMax(x - b.high).cwiseMax(0.0)).squaredNorm();

@@ -8,7 +8,7 @@
 namespace proxarm::models {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 void check_friction(double friction) {
   if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -39,7 +39,7 @@ PolylineGuide::PolylineGuide(const std::vector<Vec3>& points_m, bool closed, dou
   if (points_m.size() < 2) throw std::invalid_argument("a polyline needs two points or more");
   const std::size_t pieces = points_m.size() - (closed ? 0 : 1);
   for (std::size_t i = 0; i < pieces; ++i) {
-    const Vec3 a = points_m[i], b = points_m[(i + 1) % points_m.size()];
+    const Vec3 &a = points_m[i], &b = points_m[(i + 1) % points_m.size()];
     if (!a.allFinite() || !b.allFinite()) throw std::invalid_argument("a polyline needs finite points");
     pieces_.push_back({a, unit<3>(b - a), (b - a).norm(), 0.0});
   }
@@ -49,14 +49,14 @@ PolylineGuide PolylineGuide::line(const Vec3& point_m, const Vec3& direction, do
   check_friction(friction);
   PolylineGuide guide;
   guide.mu_ = friction;
-  guide.pieces_.push_back({point_m, unit<3>(direction), kInfinity, -kInfinity});
+  guide.pieces_.push_back({point_m, unit<3>(direction), infinity, -infinity});
   return guide;
 }
 
 // Of pieces that are as near as each other (at a corner), the first.
 std::size_t PolylineGuide::nearest_piece(const Vec3& q) const noexcept {
   std::size_t best = 0;
-  double least = kInfinity;
+  double least = infinity;
   for (std::size_t i = 0; i < pieces_.size(); ++i) {
     const Piece& piece = pieces_[i];
     const double s = std::clamp(piece.e.dot(q - piece.a), piece.begin, piece.length);

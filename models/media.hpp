@@ -63,22 +63,22 @@ class Media final : public GeometricAlgorithm<N> {
     const auto excess = [&](double tau, const Vec<N>& r) { return kappa * tau / (1.0 - tau) * (r - q).norm() - F; };
     const double size = d.norm();
     // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R.
-    const Vec<N> held = at(kHeld);
-    const Vec<N> R = (held - q) / (1.0 - kHeld);
+    const Vec<N> held = at(held_at_);
+    const Vec<N> R = (held - q) / (1.0 - held_at_);
     const double pull = kappa * R.norm();
     // (3), first case; unless something that moves has come onto the proxy.
     if (!(pull > F) || (!(kappa * size > F) && !(R.norm() > 2.0 * size))) return q;
-    if (F >= kHeld * pull) return q + (1.0 - F / pull) * R;
+    if (F >= held_at_ * pull) return q + (1.0 - F / pull) * R;
 
-    double low = 0.0, high = kHeld, e_low = -F, e_high = excess(kHeld, held);
-    double tau = std::min(F / pull, kHeld);
+    double low = 0.0, high = held_at_, e_low = -F, e_high = excess(held_at_, held);
+    double tau = std::min(F / pull, held_at_);
     Vec<N> r = held;
     for (int k = 0, side = 0; k < 100; ++k) {
       if (!(tau > low && tau < high)) tau = 0.5 * (low + high);
       if (!(tau > low && tau < high)) break;
       r = at(tau);
       const double e = excess(tau, r);
-      if (std::abs(e) <= kClose * F) break;
+      if (std::abs(e) <= close_enough_ * F) break;
       if (e < 0.0) {
         low = tau;
         e_low = e;
@@ -96,8 +96,8 @@ class Media final : public GeometricAlgorithm<N> {
   }
 
   // Where rest is looked at from: a hundredth of the way to p, far above rounding.
-  static constexpr double kHeld = 0.99;
-  static constexpr double kClose = 1e-14;
+  static constexpr double held_at_ = 0.99;
+  static constexpr double close_enough_ = 1e-14;
 
   std::unique_ptr<GeometricAlgorithm<N>> rest_;
   std::vector<Medium> media_;

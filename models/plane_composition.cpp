@@ -6,16 +6,16 @@
 namespace proxarm::models {
 namespace {
 
-constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-constexpr std::size_t kStoredLines = 32;   // 32² lines of 160 bytes: 160 kB
-constexpr std::size_t kStoredCorners = 8;  // 8³ corners of 104 bytes: 53 kB
+constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+constexpr std::size_t stored_lines = 32;   // 32² lines of 160 bytes: 160 kB
+constexpr std::size_t stored_corners = 8;  // 8³ corners of 104 bytes: 53 kB
 
 }  // namespace
 
 // The faces that may be part of the solution: those that p is behind, and those that a trial ran into.
 struct PlaneComposition::Candidates {
-  static constexpr std::size_t kMost = 12;
-  std::array<std::size_t, kMost> index{};
+  static constexpr std::size_t most = 12;
+  std::array<std::size_t, most> index{};
   std::size_t count = 0;
   bool friction = true;
   bool grew = false;
@@ -24,7 +24,7 @@ struct PlaneComposition::Candidates {
     for (std::size_t c = 0; c < count; ++c) {
       if (index[c] == i) return;
     }
-    if (count == kMost) return;
+    if (count == most) return;
     index[count++] = i;
     grew = true;
   }
@@ -33,7 +33,7 @@ struct PlaneComposition::Candidates {
 struct PlaneComposition::Choice {
   double distance2 = std::numeric_limits<double>::infinity();  // ‖r − p‖²
   Vec3 r = Vec3::Zero();
-  std::array<std::size_t, 3> face{kNone, kNone, kNone};
+  std::array<std::size_t, 3> face{none, none, none};
   std::array<bool, 3> slips{};
 
   [[nodiscard]] bool found() const noexcept { return distance2 < std::numeric_limits<double>::infinity(); }
@@ -55,13 +55,13 @@ PlaneComposition::PlaneComposition(std::vector<Face> faces) : faces_(std::move(f
       throw std::invalid_argument("a friction coefficient must be finite and not negative");
     }
   }
-  if (n <= kStoredLines) {
+  if (n <= stored_lines) {
     lines_.resize(n * n);
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = i + 1; j < n; ++j) lines_[i * n + j] = GrooveLine(faces_[i].surface, faces_[j].surface);
     }
   }
-  if (n <= kStoredCorners) {
+  if (n <= stored_corners) {
     corners_.resize(n * n * n);
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t j = i + 1; j < n; ++j) {
@@ -95,8 +95,8 @@ void PlaneComposition::try_singles(const Vec3& p, const Vec3& q, Candidates& can
   for (std::size_t c = 0; c < candidates.count; ++c) {
     const std::size_t i = candidates.index[c];
     const FaceStep step = step_on_face(faces_[i].surface, candidates.friction ? faces_[i].mu : 0.0, p, q);
-    if (step.touches && fits(q, step.r, i, kNone, kNone, step.slips, candidates)) {
-      choice.consider(p, step.r, {i, kNone, kNone}, {step.slips, false, false});
+    if (step.touches && fits(q, step.r, i, none, none, step.slips, candidates)) {
+      choice.consider(p, step.r, {i, none, none}, {step.slips, false, false});
     }
   }
 }
@@ -113,8 +113,8 @@ void PlaneComposition::try_pairs(const Vec3& p, const Vec3& q, Candidates& candi
       };
       const GrooveSolution s =
           lines_.empty() ? solve(GrooveLine(faces_[i].surface, faces_[j].surface)) : solve(lines_[i * n + j]);
-      if (s.found && fits(q, s.r, i, j, kNone, false, candidates)) {
-        choice.consider(p, s.r, {i, j, kNone}, {s.slips1, s.slips2, false});
+      if (s.found && fits(q, s.r, i, j, none, false, candidates)) {
+        choice.consider(p, s.r, {i, j, none}, {s.slips1, s.slips2, false});
       }
     }
   }
@@ -174,7 +174,7 @@ Vec3 PlaneComposition::operator()(double /*K*/, const Vec3& p, const Vec3& q) no
     candidates.friction = false;
     if (!search(p, q, candidates, choice)) return q;
   }
-  for (std::size_t c = 0; c < 3 && choice.face[c] != kNone; ++c) {
+  for (std::size_t c = 0; c < 3 && choice.face[c] != none; ++c) {
     const Face& face = faces_[choice.face[c]];
     contacts_[c] = {face.object < 0 ? static_cast<std::int32_t>(choice.face[c]) : face.object, face.feature,
                     choice.slips[c], face.surface.normal()};

@@ -11,15 +11,15 @@ namespace proxarm::models {
 namespace {
 
 // Curved surfaces gain the factor penetration / radius with each new tangent plane, and more where they are slow.
-constexpr int kSettle = 60;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int most_settling = 60;
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // No closer than rounding lets it: the next move, were it to shrink as the last one has, would be nothing, or the moves
 // are tiny and have stopped shrinking (a slip that is short against a deep p amplifies rounding, so a fixed threshold
 // would not do).
 bool has_settled(double move, double last_move, const Vec3& r) noexcept {
   const double size = 1e-3 + r.lpNorm<1>(), nothing = 5e-17 * size;
-  return move <= nothing || (last_move < kInfinity && move * move <= nothing * last_move) ||
+  return move <= nothing || (last_move < infinity && move * move <= nothing * last_move) ||
          (move <= 1e-9 * size && move > 0.5 * last_move);
 }
 
@@ -27,9 +27,9 @@ bool has_settled(double move, double last_move, const Vec3& r) noexcept {
 
 // The obstacles that may be part of the solution, and what each would do alone.
 struct World::Candidates {
-  static constexpr std::size_t kMost = 12;
-  std::array<std::size_t, kMost> index{};
-  std::array<Obstacle::Step, kMost> alone{};
+  static constexpr std::size_t most = 12;
+  std::array<std::size_t, most> index{};
+  std::array<Obstacle::Step, most> alone{};
   std::size_t count = 0;
   bool grew = false;
 
@@ -38,7 +38,7 @@ struct World::Candidates {
            index.begin() + static_cast<std::ptrdiff_t>(count);
   }
   void add(std::size_t i, const Obstacle::Step& step) noexcept {
-    if (count == kMost || has(i)) return;
+    if (count == most || has(i)) return;
     index[count] = i;
     alone[count++] = step;
     grew = true;
@@ -46,12 +46,12 @@ struct World::Candidates {
 };
 
 struct World::Choice {
-  double distance2 = kInfinity;  // ‖r − p‖²
+  double distance2 = infinity;  // ‖r − p‖²
   Vec3 r = Vec3::Zero();
   std::array<Contact<3>, 3> contacts{};
   std::size_t count = 0;
 
-  [[nodiscard]] bool found() const noexcept { return distance2 < kInfinity; }
+  [[nodiscard]] bool found() const noexcept { return distance2 < infinity; }
   // True if this one is better than what was there; then the caller fills in the contacts.
   bool better(const Vec3& p, const Vec3& at, std::size_t contact_count) noexcept {
     const double d2 = (at - p).squaredNorm();
@@ -157,8 +157,8 @@ void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candid
       Vec3 r = q, at = q, last_r = q, last_f = Vec3::Zero();
       Obstacle::Tangent t_a = a.tangent(at, feature_a), t_b = b.tangent(at, feature_b);
       GrooveSolution s;
-      double last_move = kInfinity;
-      for (int k = 0; k < kSettle; ++k) {
+      double last_move = infinity;
+      for (int k = 0; k < most_settling; ++k) {
         const GrooveLine line(t_a.surface, t_b.surface, at);
         s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b);
         const bool presses = s.found;
@@ -217,8 +217,8 @@ void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& cand
         };
         std::array<Obstacle::Tangent, 3> t{tangent(0), tangent(1), tangent(2)};
         CornerSolution s;
-        double last_move = kInfinity;
-        for (int k = 0; k < kSettle; ++k) {
+        double last_move = infinity;
+        for (int k = 0; k < most_settling; ++k) {
           const FlatSurface<3>* const surfaces[3] = {&t[0].surface, &t[1].surface, &t[2].surface};
           const double mu[3] = {t[0].mu, t[1].mu, t[2].mu};
           const CornerPoint point(t[0].surface, t[1].surface, t[2].surface);
@@ -285,7 +285,7 @@ void World::hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Cho
 }
 
 double World::distance(const Vec3& x) const noexcept {
-  double least = kInfinity;
+  double least = infinity;
   for (const std::size_t i : unbounded_) least = std::min(least, entries_[i].obstacle->distance(x));
   for (const std::size_t i : moving_) least = std::min(least, entries_[i].obstacle->distance(x));
   return tree_.nearest(x, least, [&](std::size_t i) { return entries_[i].obstacle->distance(x); });
@@ -303,7 +303,7 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   if (candidates.count == 0) {
     // Nothing in the way. How much room is there? Only what stands still is remembered.
     if (moving_.empty()) {
-      double room = kInfinity;
+      double room = infinity;
       for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
       clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });
       clearance_ -= 1e-12 * (1.0 + p.lpNorm<1>());  // rounding of distances

@@ -17,8 +17,8 @@ namespace {
 using models::Vec;
 using models::Vec3;
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 class Random {
  public:
@@ -100,7 +100,7 @@ double condition(const State<N>& s) {
 // How far f is from what the contacts can bear, in parts of what rounding explains (0 or 2: a test, not a distance).
 template <int N>
 double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
-  double tolerance = condition(s) * 64.0 * kEps * s.K * s.size();
+  double tolerance = condition(s) * 64.0 * epsilon * s.K * s.size();
   const Vec3 f = lift<N>(s.f()), motion = lift<N>(s.r - s.q);
   std::vector<models::ForceCone> cones;
   for (const auto& contact : s.contacts) {
@@ -112,7 +112,7 @@ double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
     }
     const double mu = N == 1 || object >= region.friction->size() ? 0.0 : (*region.friction)[object];
     const Vec3 v = motion - n * n.dot(motion);
-    const double uncertain = 16.0 * kEps * s.size() / v.norm();
+    const double uncertain = 16.0 * epsilon * s.size() / v.norm();
     if (contact.slips && uncertain < 1e-3) {
       cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
       tolerance += mu * f.norm() * uncertain * condition(s);
@@ -170,7 +170,7 @@ class Checker {
     for (int k = 0; k < slides; ++k) q = g_(K, q + options_.deepest_m * random_.template direction<N>(), q);
     const Vec<N> p = q + random_.log_uniform(1e-9, options_.deepest_m) * random_.template direction<N>();
     const State<N> s = ask<N>(g_, K, p, q);
-    if (!s.r.allFinite()) return note(finite, kInfinity, s);
+    if (!s.r.allFinite()) return note(finite, infinity, s);
     report_.in_contact += s.contacts.empty() ? 0 : 1;
     for (const auto& contact : s.contacts) report_.slipping += contact.slips ? 1 : 0;
 
@@ -190,7 +190,7 @@ class Checker {
     const double kappa = std::max(s.K * std::pow(10.0, decades), f.norm() / options_.deepest_m);
     const State<N> other = ask<N>(g_, kappa, Vec<N>(s.r - f / kappa), s.q);
     const double allowed =
-        condition(s) * 64.0 * kEps * ((0.1 + s.r.norm() + s.q.norm()) * (1.0 + s.K / kappa) + f.norm() / kappa);
+        condition(s) * 64.0 * epsilon * ((0.1 + s.r.norm() + s.q.norm()) * (1.0 + s.K / kappa) + f.norm() / kappa);
     const double error = (other.r - s.r).norm() / allowed;
     // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
     const bool lawful =

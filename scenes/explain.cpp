@@ -17,18 +17,18 @@ using models::Vec3;
 // Median over blocks of the time of one step, with p moving a micrometre each time as it does at 1 kHz.
 template <int N>
 double median_ns(models::GeometricAlgorithm<N>& g, const Vec<N>& q_start, const Vec<N>& push) {
-  constexpr int kBlocks = 41, kSteps = 500;
+  constexpr int blocks_measured = 41, steps_measured = 500;
   std::vector<double> blocks;
   Vec<N> q = q_start;
   Vec<N> side = push.norm() > 0.0 ? push : Vec<N>::Constant(1e-6);
-  for (int b = 0; b < kBlocks; ++b) {
+  for (int b = 0; b < blocks_measured; ++b) {
     const auto begin = std::chrono::steady_clock::now();
-    for (int k = 0; k < kSteps; ++k) q = g(1e6, q + push + (k % 2 == 0 ? 0.1 : -0.1) * side, q);
+    for (int k = 0; k < steps_measured; ++k) q = g(1e6, q + push + (k % 2 == 0 ? 0.1 : -0.1) * side, q);
     const std::chrono::duration<double, std::nano> time = std::chrono::steady_clock::now() - begin;
-    blocks.push_back(time.count() / kSteps);
+    blocks.push_back(time.count() / steps_measured);
   }
-  std::nth_element(blocks.begin(), blocks.begin() + kBlocks / 2, blocks.end());
-  return blocks[kBlocks / 2];
+  std::nth_element(blocks.begin(), blocks.begin() + blocks_measured / 2, blocks.end());
+  return blocks[blocks_measured / 2];
 }
 
 template <int N>

@@ -17,15 +17,15 @@ using description::YamlNode;
 using models::Vec3;
 
 // Coordinates beyond a hundred kilometres are a mistake of the unit, and would cost the proxy its exactness.
-constexpr description::Range kCoordinate = between(-1e5, 1e5);
-constexpr description::Range kFriction = between(0.0, 100.0);
+constexpr description::Range coordinate_range = between(-1e5, 1e5);
+constexpr description::Range friction_range = between(0.0, 100.0);
 // Below a nanometre it is a mistake; the arm knows its position to micrometres.
-constexpr description::Range kLength = between(1e-9, 1e5);
-constexpr description::Range kSpeed = between(-100.0, 100.0);
+constexpr description::Range length_range = between(1e-9, 1e5);
+constexpr description::Range speed_range = between(-100.0, 100.0);
 
 Vec3 vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
-Vec3 point_of(const YamlNode& node, std::string_view key) { return vector_of(node.vec3(key, kCoordinate)); }
+Vec3 point_of(const YamlNode& node, std::string_view key) { return vector_of(node.vec3(key, coordinate_range)); }
 
 Vec3 direction_of(const YamlNode& node, std::string_view key) {
   const Vec3 v = point_of(node, key);
@@ -71,14 +71,14 @@ BoxShape read_box(const YamlNode& node) {
   box.pose_W.linear() = (Eigen::AngleAxisd(rpy.z(), Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Vec3::UnitY()) *
                          Eigen::AngleAxisd(rpy.x(), Vec3::UnitX()))
                             .toRotationMatrix();
-  box.size_m = vector_of(node.vec3("size_m", kLength));
+  box.size_m = vector_of(node.vec3("size_m", length_range));
   box.inside_out = node.boolean_or("inside_out", false);
   return box;
 }
 
 SphereShape read_sphere(const YamlNode& node) {
   return {.centre_m = point_of(node, "centre_m"),
-          .radius_m = node.number("radius_m", kLength),
+          .radius_m = node.number("radius_m", length_range),
           .inside_out = node.boolean_or("inside_out", false)};
 }
 
@@ -86,9 +86,9 @@ template <typename Bar>
 Bar read_bar(const YamlNode& node, bool may_be_short) {
   Bar bar{.from_m = point_of(node, "from_m"),
           .to_m = point_of(node, "to_m"),
-          .radius_m = node.number("radius_m", kLength),
+          .radius_m = node.number("radius_m", length_range),
           .inside_out = node.boolean_or("inside_out", false)};
-  if (!may_be_short && !((bar.to_m - bar.from_m).norm() >= kLength.min)) {
+  if (!may_be_short && !((bar.to_m - bar.from_m).norm() >= length_range.min)) {
     throw node.error_at("to_m", "another point than from_m");
   }
   return bar;
@@ -121,7 +121,7 @@ std::pair<std::string, YamlNode> shape_node(const YamlNode& node) {
 Motion read_motion(const YamlNode& node) {
   Motion motion;
   motion.driven = node.boolean_or("driven", false);
-  motion.velocity_m_per_s = vector_of(node.vec3_or("velocity_m_per_s", {0, 0, 0}, kSpeed));
+  motion.velocity_m_per_s = vector_of(node.vec3_or("velocity_m_per_s", {0, 0, 0}, speed_range));
   if (const auto swing = node.find_map("swing")) {
     motion.amplitude_m = vector_of(swing->vec3("amplitude_m", between(-100.0, 100.0)));
     motion.frequency_Hz = swing->number("frequency_Hz", above(0.0, 1000.0));
@@ -130,7 +130,7 @@ Motion read_motion(const YamlNode& node) {
   if (const auto turn = node.find_map("turn")) {
     motion.axis = direction_of(*turn, "axis");
     motion.centre_m = point_of(*turn, "centre_m");
-    motion.turn_rad_per_s = turn->number("speed_rad_per_s", kSpeed);
+    motion.turn_rad_per_s = turn->number("speed_rad_per_s", speed_range);
   }
   return motion;
 }
@@ -141,9 +141,9 @@ Object read_object(const YamlNode& entry) {
   object.line = node.line();
   object.shape = read_shape(kind, node);
   object.name = node.string_or("name", "");
-  object.friction = node.number_or("friction", 0.0, kFriction);
+  object.friction = node.number_or("friction", 0.0, friction_range);
   if (const auto layer = node.find_map("layer")) {
-    object.layer = ElasticLayer{.thickness_m = layer->number("thickness_m", kLength),
+    object.layer = ElasticLayer{.thickness_m = layer->number("thickness_m", length_range),
                                 .stiffness_N_per_m = layer->number("stiffness_N_per_m", above(0.0, 1e12))};
   }
   if (const auto motion = node.find_map("motion")) object.motion = read_motion(*motion);
@@ -160,13 +160,13 @@ Space read_space(const YamlNode& root) {
     }
     return space;
   }
-  space.origin_m = vector_of(node->vec3_or("origin_m", {0, 0, 0}, kCoordinate));
+  space.origin_m = vector_of(node->vec3_or("origin_m", {0, 0, 0}, coordinate_range));
   const auto axes =
       node->list("axes", static_cast<std::size_t>(space.dimensions), static_cast<std::size_t>(space.dimensions));
   // Gram-Schmidt, so that axes that are given in round numbers span what they say.
   for (int i = 0; i < space.dimensions; ++i) {
     const YamlNode& axis_node = axes[static_cast<std::size_t>(i)];
-    Vec3 axis = vector_of(axis_node.as_vec3(kCoordinate));
+    Vec3 axis = vector_of(axis_node.as_vec3(coordinate_range));
     const double length = axis.norm();
     for (int pass = 0; pass < 2; ++pass) {
       for (int j = 0; j < i; ++j) axis -= space.axes.col(j) * space.axes.col(j).dot(axis);
@@ -221,7 +221,7 @@ GuideDescription read_guide(const YamlNode& guide_node) {
   } else if ((node = guide_node.find_map("polyline"))) {
     guide.kind = GuideDescription::Kind::polyline;
     for (const YamlNode& point : node->list("points_m", 2, 100'000)) {
-      guide.points_m.push_back(vector_of(point.as_vec3(kCoordinate)));
+      guide.points_m.push_back(vector_of(point.as_vec3(coordinate_range)));
       const std::size_t n = guide.points_m.size();
       if (n > 1 && guide.points_m[n - 1] == guide.points_m[n - 2]) {
         throw point.error("another point than the one before");
@@ -235,7 +235,7 @@ GuideDescription read_guide(const YamlNode& guide_node) {
     guide_node.finish();
     throw guide_node.error("a guide: line, plane or polyline", "an empty map");
   }
-  guide.friction = node->number_or("friction", 0.0, kFriction);
+  guide.friction = node->number_or("friction", 0.0, friction_range);
   guide.line_number = node->line();
   return guide;
 }

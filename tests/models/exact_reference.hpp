@@ -64,11 +64,11 @@ class ExactReference {
   }
 
  private:
-  static constexpr Real kZero = 1e-13L;  // inputs are doubles of about a metre
+  static constexpr Real zero_ = 1e-13L;  // inputs are doubles of about a metre
 
   bool feasible(const RVec& r) const {
     for (const auto& face : faces_) {
-      if (face.n.dot(r - face.x) < -kZero) return false;
+      if (face.n.dot(r - face.x) < -zero_) return false;
     }
     return true;
   }
@@ -84,7 +84,7 @@ class ExactReference {
   // v_i/‖v_i‖ of (17), or zero at rest.
   static RVec slip(const ReferenceFace& face, const RVec& r, const RVec& q) {
     const RVec v = (r - q) - face.n * face.n.dot(r - q);
-    return v.norm() > kZero ? RVec(v / v.norm()) : RVec(RVec::Zero());
+    return v.norm() > zero_ ? RVec(v / v.norm()) : RVec(RVec::Zero());
   }
 
   static std::vector<RVec> pair(const ReferenceFace& a, const ReferenceFace& b, const RVec& p, const RVec& q) {
@@ -116,7 +116,7 @@ class ExactReference {
     if (rests_a || rests_b) {
       const Real g = left(s_q, !rests_a, !rests_b, f);
       const Real reach = (rests_a ? a.mu * f[0] : 0) + (rests_b ? b.mu * f[1] : 0);
-      if (f[0] >= -kZero && f[1] >= -kZero && std::abs(g) <= reach) out.push_back(at_q);
+      if (f[0] >= -zero_ && f[1] >= -zero_ && std::abs(g) <= reach) out.push_back(at_q);
     }
     // Slipping: scan between rest and where p pulls.
     const int steps = 400;
@@ -137,7 +137,7 @@ class ExactReference {
         }
         const Real g_end = left(hi, true, true, f);
         const bool crossing = std::abs(g_end) < 1e-9L;  // a pole changes sign too
-        if (crossing && f[0] >= -kZero && f[1] >= -kZero) out.push_back(at(hi));
+        if (crossing && f[0] >= -zero_ && f[1] >= -zero_) out.push_back(at(hi));
       }
       last_s = s;
       last_g = g;
@@ -157,7 +157,7 @@ class ExactReference {
     }
     if (at_rest == 3) return true;  // all other sets have failed
     const RVec f = A.inverse() * (r - p);
-    return at_rest > 0 || f.minCoeff() >= -kZero;
+    return at_rest > 0 || f.minCoeff() >= -zero_;
   }
 
   std::vector<ReferenceFace> faces_;

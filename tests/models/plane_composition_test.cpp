@@ -18,7 +18,7 @@ using models::FlatSurface;
 using models::PlaneComposition;
 using models::Vec3;
 
-constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double degree = std::numbers::pi / 180.0;
 
 // A groove that opens by `opening` along a random line through `origin`.
 std::vector<Face> groove(Random& random, double opening, const Vec3& origin, double mu_1, double mu_2) {
@@ -81,7 +81,7 @@ TEST(PlaneComposition, GroovesFrom4To176DegreesAreExact) {
   Random random(501);
   Tally wide, sharp;
   for (std::int64_t i = 0; i < scaled(4000); ++i) {
-    const double opening = random.uniform(4.0, 176.0) * kDegree, mu_1 = random.uniform(0.0, 0.6),
+    const double opening = random.uniform(4.0, 176.0) * degree, mu_1 = random.uniform(0.0, 0.6),
                  mu_2 = random.chance(0.3) ? mu_1 : random.uniform(0.0, 0.6);
     const Vec3 origin = random.in_box<3>(0.5);
     const auto faces = groove(random, opening, origin, mu_1, mu_2);
@@ -149,10 +149,10 @@ TEST(PlaneComposition, FrictionInAGrooveIsExact) {
   Random random(504);
   const double K = 1e6;
   for (std::int64_t i = 0; i < scaled(20'000); ++i) {
-    const double opening = random.uniform(40.0, 176.0) * kDegree, mu_1 = random.uniform(0.01, 0.3);
+    const double opening = random.uniform(40.0, 176.0) * degree, mu_1 = random.uniform(0.01, 0.3);
     // Where a face leans by less than atan μ it can hold the push alone, and if it is the rougher one, hold more than
     // both share while sliding: Coulomb's law then has two solutions, and the one with fewer contacts is taken.
-    const double mu_2 = opening < 146.0 * kDegree ? random.uniform(0.01, 0.3) : mu_1;
+    const double mu_2 = opening < 146.0 * degree ? random.uniform(0.01, 0.3) : mu_1;
     const double push = random.log_uniform(0.1, 50.0);
     const Vec3 origin = random.in_box<3>(0.5);
     const auto faces = groove(random, opening, origin, mu_1, mu_2);
@@ -196,11 +196,11 @@ TEST(Contract, PlaneComposition) {
   for (const double opening : {40.0, 60.0, 90.0, 120.0, 150.0, 176.0}) {
     for (const double mu : {0.0, 0.1, 0.3}) {
       // A face that leans by less than atan μ can hold alone what both hold while they slip.
-      const bool holds_alone = 90.0 - 0.5 * opening < std::atan(mu) / kDegree;
+      const bool holds_alone = 90.0 - 0.5 * opening < std::atan(mu) / degree;
       const double several = mu == 0.0 ? 0.0 : holds_alone ? 3e-2 : 1e-3;
-      expect_contract<3>(PlaneComposition(groove(random, opening * kDegree, {0.1, 0.2, 0.3}, mu, 0.5 * mu)),
+      expect_contract<3>(PlaneComposition(groove(random, opening * degree, {0.1, 0.2, 0.3}, mu, 0.5 * mu)),
                          {.centre = {0.1, 0.2, 0.3},
-                          .condition = 4.0 / std::sin(opening * kDegree),
+                          .condition = 4.0 / std::sin(opening * degree),
                           .friction = {mu, 0.5 * mu},
                           .several = several});
     }

@@ -14,10 +14,10 @@ namespace {
 
 using models::Vec3;
 
-const std::filesystem::path kScenes = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
+const std::filesystem::path scenes_folder = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
 
 TEST(Check, PassesEveryShippedScene) {
-  for (const auto& entry : std::filesystem::directory_iterator(kScenes)) {
+  for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
     if (entry.path().extension() != ".yaml") continue;
     for (const auto& report : check_scene(scenes::load_scene(entry.path()), {.states = 4000})) {
       EXPECT_TRUE(report.passed()) << entry.path() << "\n" << report.text();
@@ -68,7 +68,7 @@ TEST(Check, FindsAWrongFriction) {
 }
 
 TEST(Explain, SaysWhatAStepCosts) {
-  const std::string text = explain(scenes::load_scene(kScenes / "room.yaml"));
+  const std::string text = explain(scenes::load_scene(scenes_folder / "room.yaml"));
   EXPECT_NE(text.find("in contact: "), std::string::npos) << text;
   EXPECT_NE(text.find("free: "), std::string::npos) << text;
   std::cout << text;

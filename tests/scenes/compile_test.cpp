@@ -21,7 +21,7 @@ using scenes::CompiledScene;
 using scenes::load_scene;
 using scenes::parse_scene;
 
-const std::filesystem::path kScenes = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
+const std::filesystem::path scenes_folder = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
 
 template <typename Algorithm, int N>
 bool is(const CompiledScene& scene) {
@@ -29,21 +29,21 @@ bool is(const CompiledScene& scene) {
 }
 
 TEST(Compile, MakesTheSmallestAlgorithm) {
-  EXPECT_TRUE((is<models::FreeSpace<3>, 3>(compile(load_scene(kScenes / "free.yaml")))));
-  EXPECT_TRUE((is<models::Plane<3>, 3>(compile(load_scene(kScenes / "frictionless_wall.yaml")))));
-  EXPECT_TRUE((is<models::FrictionPlane<3>, 3>(compile(load_scene(kScenes / "wall.yaml")))));
-  EXPECT_TRUE((is<models::CoulombField<3>, 3>(compile(load_scene(kScenes / "coulomb.yaml")))));
+  EXPECT_TRUE((is<models::FreeSpace<3>, 3>(compile(load_scene(scenes_folder / "free.yaml")))));
+  EXPECT_TRUE((is<models::Plane<3>, 3>(compile(load_scene(scenes_folder / "frictionless_wall.yaml")))));
+  EXPECT_TRUE((is<models::FrictionPlane<3>, 3>(compile(load_scene(scenes_folder / "wall.yaml")))));
+  EXPECT_TRUE((is<models::CoulombField<3>, 3>(compile(load_scene(scenes_folder / "coulomb.yaml")))));
 }
 
 TEST(Compile, EveryShippedSceneLoads) {
-  for (const auto& entry : std::filesystem::directory_iterator(kScenes)) {
+  for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
     if (entry.path().extension() != ".yaml") continue;
     EXPECT_NO_THROW(compile(load_scene(entry.path()))) << entry.path();
   }
 }
 
 TEST(Compile, SaysWhatIsSkippedAndWhy) {
-  const CompiledScene scene = compile(load_scene(kScenes / "frictionless_wall.yaml"));
+  const CompiledScene scene = compile(load_scene(scenes_folder / "frictionless_wall.yaml"));
   ASSERT_EQ(scene.stages.size(), 1u);
   EXPECT_EQ(scene.stages[0].what, "wall, equation (2)");
   bool friction = false;
@@ -97,7 +97,7 @@ TEST(Compile, ComposesPlanesInAnyDimension) {
 }
 
 TEST(Compile, KnowsEveryShape) {
-  const CompiledScene room = compile(load_scene(kScenes / "room.yaml"));
+  const CompiledScene room = compile(load_scene(scenes_folder / "room.yaml"));
   auto& g = room.algorithm<3>();
   // Into the corner of the room: three faces of one box.
   Vec3 q(0.7, 0, 0.6);
@@ -113,7 +113,7 @@ TEST(Compile, KnowsEveryShape) {
 }
 
 TEST(Compile, GivesWayUnderALayer) {
-  auto scene = compile(load_scene(kScenes / "soft_wall.yaml"));
+  auto scene = compile(load_scene(scenes_folder / "soft_wall.yaml"));
   auto& g = scene.algorithm<3>();
   Vec3 q(0.88, 0, 0.6);
   for (int k = 0; k < 5000; ++k) q = g(1e6, q + Vec3(10.0 / 1e6, 0, 0), q);  // 10 N
@@ -121,7 +121,7 @@ TEST(Compile, GivesWayUnderALayer) {
 }
 
 TEST(Compile, MovesWhatMoves) {
-  auto scene = compile(load_scene(kScenes / "moving_plate.yaml"));
+  auto scene = compile(load_scene(scenes_folder / "moving_plate.yaml"));
   auto& g = scene.algorithm<3>();
   Vec3 q(0.85, 0, 0.6);
   const double T = 1e-3;
@@ -209,15 +209,16 @@ TEST(SceneFile, NamesEveryMistakeWithItsPlace) {
 }
 
 TEST(Clearance, IsTheDistanceToTheNearestSurface) {
-  const scenes::Scene scene = load_scene(kScenes / "wall.yaml");
+  const scenes::Scene scene = load_scene(scenes_folder / "wall.yaml");
   EXPECT_NEAR(clearance_m(scene, {0.7, 3.0, -2.0}), 0.2, 1e-15);
   EXPECT_NEAR(clearance_m(scene, {1.0, 3.0, -2.0}), -0.1, 1e-15);
-  EXPECT_EQ(clearance_m(load_scene(kScenes / "free.yaml"), Vec3::Zero()), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(clearance_m(load_scene(scenes_folder / "free.yaml"), Vec3::Zero()),
+            std::numeric_limits<double>::infinity());
 }
 
 // The plate of moving_plate.yaml is 20 mm thick and swings by 0.1 m along x about x = 0.9, once in 5 s.
 TEST(Clearance, IsToWhereThingsAreByThen) {
-  const scenes::Scene scene = load_scene(kScenes / "moving_plate.yaml");
+  const scenes::Scene scene = load_scene(scenes_folder / "moving_plate.yaml");
   const Vec3 x(0.7, 0.0, 0.6);
   EXPECT_NEAR(clearance_m(scene, x, 0.0), 0.19, 1e-12);
   EXPECT_NEAR(clearance_m(scene, x, 1.25), 0.29, 1e-12);
