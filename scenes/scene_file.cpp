@@ -40,7 +40,7 @@ PlaneShape read_plane(const YamlNode& node) {
 
 models::Pose pose_of(const YamlNode& node) {
   models::Pose pose = models::Pose::Identity();
-  pose.translation() = vector_of(node.vec3_or("position_m", {0, 0, 0}, kCoordinate));
+  pose.translation() = vector_of(node.vec3_or("position_m", {0, 0, 0}, coordinate_range));
   const Vec3 rpy =
       vector_of(node.vec3_or("rpy_rad", {0, 0, 0}, between(-2.0 * std::numbers::pi, 2.0 * std::numbers::pi)));
   if (rpy.isZero(0.0)) return pose;  // a rotation by nothing keeps coordinates bit for bit
