@@ -49,7 +49,7 @@ class Files(ProgramTest):
         os.write(writer, b"name: piped\n")
         os.close(writer)
         done = subprocess.run([program(), "run", "--scene", f"/dev/fd/{reader}", "--duration", "10ms", "--json"],
-                              pass_fds=[reader], capture_output=True, cwd=self.folder, timeout=60)
+                              pass_fds=[reader], capture_output=True, cwd=self.folder, timeout=300)
         os.close(reader)
         self.assertEqual(done.returncode, 0, done.stderr)
 

@@ -177,7 +177,7 @@ class Signals(ProgramTest):
         while time.monotonic() < begun + 60 and "rendering" not in self.tail(record / "signals.csv"):
             time.sleep(0.05)  # the record is written in blocks: it comes some time after the fact
         process.send_signal(number)
-        out, err = process.communicate(timeout=30)
+        out, err = process.communicate(timeout=300)
         self.assertEqual((process.returncode, err), (0, ""))
         summary = json.loads(out)
         self.assertEqual(summary["faults"], [])
