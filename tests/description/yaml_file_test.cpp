@@ -266,7 +266,7 @@ TEST(YamlFile, ABombOfAliasesIsRefusedAtOnce) {
   }
   const auto start = std::chrono::steady_clock::now();
   EXPECT_THAT(told(bomb), HasSubstr("anchors (&name) are not allowed"));
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(1));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(30)) << "it would take years";
 }
 
 TEST(YamlFile, FilesThatCantBeReadAreNamed) {
