@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fieldbus/ati_net_can_oem.hpp"
+#include "fieldbus/canopen_pdo.hpp"
 #include "fieldbus/identifier_check.hpp"
 #include "models/description/setup_error.hpp"
 
@@ -11,6 +12,8 @@ namespace proxarm::controller {
 namespace {
 
 using description::SetupError;
+
+constexpr std::int64_t rate_measurement_ns = 250'000'000;
 
 std::size_t index_of(const description::Cell& cell, const std::string& bus) {
   const auto found = std::find_if(cell.buses.begin(), cell.buses.end(),
@@ -29,6 +32,7 @@ std::vector<DriveBus> drive_buses(const std::vector<DriveOnBus>& drives) {
   const fieldbus::DriveSettings defaults;
   std::vector<DriveBus> buses;
   for (const DriveOnBus& axis : drives) {
+    if (axis.on_can == nullptr) continue;
     const bool known = std::any_of(buses.begin(), buses.end(), [&](const DriveBus& b) { return b.bus == axis.bus; });
     if (known) continue;
     buses.push_back(
@@ -48,6 +52,39 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
   }
   throw SetupError(
       {.file = sensor.file.string(), .key = "protocol", .found = sensor.protocol, .expected = "ati_net_can_oem"});
+}
+
+DriveOnBus make_drive(const description::Cell& cell, const description::DriveDescription& drive,
+                      const SessionSettings& settings, const BusIndices& bus_indices) {
+  if (drive.on_can()) {
+    auto servo = std::make_unique<fieldbus::ServoDrive>(drive, drive_settings(settings));
+    fieldbus::ServoDrive& on_can = *servo;
+    return {std::move(servo), on_can, &on_can, bus_indices[index_of(cell, drive.bus)]};
+  }
+  auto modbus = std::make_unique<fieldbus::ModbusDrive>(drive, description::load_modbus_drive(drive.description),
+                                                        std::llround(settings.period_s * 1e9));
+  fieldbus::ModbusDrive& on_line = *modbus;
+  return {std::move(modbus), on_line, nullptr, DriveOnBus::no_bus};
+}
+
+// One worker and one connection per line. A TCP drive has an address of its own, and thereby a line of its own; units
+// behind a gateway share its.
+std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const description::Cell& cell,
+                                                                std::vector<DriveOnBus>& drives,
+                                                                const ModbusOpener& open_line) {
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines;
+  for (const description::ModbusLineDescription& line : cell.modbus_lines) {
+    std::vector<fieldbus::ModbusDrive*> on_it;
+    for (DriveOnBus& axis : drives) {
+      if (axis.on_can != nullptr || axis.drive.description().bus != line.name) continue;
+      on_it.push_back(static_cast<fieldbus::ModbusDrive*>(&axis.drive));
+    }
+    if (on_it.empty()) continue;
+    double timeout_s = 0.0;
+    for (const auto* drive : on_it) timeout_s = std::max(timeout_s, drive->registers().response_timeout_s);
+    lines.push_back(std::make_unique<fieldbus::ModbusLine>(line, open_line(line, timeout_s), on_it));
+  }
+  return lines;
 }
 
 // One joint per cycle may turn as far as its speed allows.
@@ -80,7 +117,9 @@ OrientationConfig orientation_config(const SessionSettings& settings) {
 
 std::vector<fieldbus::DriveSlot> slots(CycleParts& parts) {
   std::vector<fieldbus::DriveSlot> slots;
-  for (DriveOnBus& axis : parts.drives) slots.push_back({&axis.drive, axis.bus});
+  for (DriveOnBus& axis : parts.drives) {
+    if (axis.on_can != nullptr) slots.push_back({axis.on_can, axis.bus});
+  }
   return slots;
 }
 
@@ -96,7 +135,8 @@ void refuse_shared_identifiers(CycleParts& parts) {
     }
   }
   for (const DriveOnBus& axis : parts.drives) {
-    for (const std::uint32_t id : axis.drive.used_ids()) {
+    if (axis.on_can == nullptr) continue;
+    for (const std::uint32_t id : axis.on_can->used_ids()) {
       used.push_back({axis.bus, id, "drive of " + axis.drive.description().joint});
     }
   }
@@ -108,11 +148,12 @@ void refuse_shared_identifiers(CycleParts& parts) {
 
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
-                       const BusIndices& bus_indices) {
+                       const BusIndices& bus_indices, const ModbusOpener& open_line) {
   std::vector<DriveOnBus> drives;
   for (const description::DriveDescription& drive : cell.drives) {
-    drives.push_back({fieldbus::ServoDrive(drive, drive_settings(settings)), bus_indices[index_of(cell, drive.bus)]});
+    drives.push_back(make_drive(cell, drive, settings, bus_indices));
   }
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines = modbus_lines(cell, drives, open_line);
   auto arm = std::make_unique<models::Arm>(cell);
   models::InverseKinematics inverse(*arm, inverse_config(cell, settings.period_s));
   ElasticSetpoint elastic(*arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s);
@@ -120,6 +161,7 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
   return CycleParts{network,
                     std::move(drives),
                     std::move(buses),
+                    std::move(lines),
                     make_sensor(cell, sensor),
                     bus_indices[index_of(cell, cell.sensor.bus)],
                     std::move(arm),
@@ -133,8 +175,16 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
 std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) {
   std::vector<std::uint32_t> ids;
   for (const DriveOnBus& axis : parts.drives) {
-    if (axis.bus != bus) continue;
-    for (const std::uint32_t id : axis.drive.wanted_ids()) ids.push_back(id);
+    if (axis.on_can == nullptr || axis.bus != bus) continue;
+    for (const std::uint32_t id : axis.on_can->wanted_ids()) ids.push_back(id);
+    // Of another master.
+    ids.push_back(fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, axis.on_can->node()));
+  }
+  if (!ids.empty()) {
+    for (const std::uint32_t id :
+         {0x000U, fieldbus::sync_id, fieldbus::heartbeat_id(fieldbus::DriveSettings{}.master_node)}) {
+      ids.push_back(id);
+    }
   }
   if (bus == parts.sensor_bus) {
     for (const std::uint32_t id : parts.sensor->wanted_ids()) ids.push_back(id);
@@ -142,15 +192,25 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
   return ids;
 }
 
-Identities bring_up(CycleParts& parts) {
+Identities bring_up(CycleParts& parts, const LineStarter& start_line) {
   refuse_shared_identifiers(parts);
   Identities lines;
   parts.sensor->start(parts.network, parts.sensor_bus);
   lines.push_back("sensor: " + parts.sensor->identity());
+  for (const auto& line : parts.modbus_lines) {
+    line->start_up(parts.network.now_ns());
+    start_line(*line);
+  }
+  if (!parts.modbus_lines.empty()) parts.network.sleep_until(parts.network.now_ns() + rate_measurement_ns);
   const std::vector<fieldbus::DriveSlot> drives = slots(parts);
   const std::vector<fieldbus::DriveIdentity> identities = fieldbus::bring_up_drives(parts.network, drives);
   for (std::size_t i = 0; i < identities.size(); ++i) {
-    lines.push_back("drive of " + parts.drives[i].drive.description().joint + ": " + describe(identities[i]));
+    lines.push_back("drive of " + drives[i].drive->description().joint + ": " + describe(identities[i]));
+  }
+  for (DriveOnBus& axis : parts.drives) {
+    if (axis.on_can != nullptr) continue;
+    axis.drive.on_sync(parts.network.now_ns());
+    lines.push_back(axis.drive.describe());
   }
   return lines;
 }

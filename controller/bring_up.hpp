@@ -3,6 +3,7 @@
 // Nothing moves here. Throws SetupError that names file and key, or bus, node and object; then nothing was enabled.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,10 +19,14 @@ namespace proxarm::controller {
 // Where each bus of the cell is in the network; two buses on one interface have one index.
 using BusIndices = std::vector<std::size_t>;
 
+// Opens a Modbus line; the response timeout is that of its slowest drive.
+using ModbusOpener = std::function<std::unique_ptr<fieldbus::ModbusClient>(const description::ModbusLineDescription&,
+                                                                           double response_timeout_s)>;
+
 // `scene` must outlive the parts.
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
-                       const BusIndices& bus_indices);
+                       const BusIndices& bus_indices, const ModbusOpener& open_line = fieldbus::open_modbus);
 
 // Identifiers that a bus of the network must let through, for the kernel's filters.
 std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus);
@@ -29,7 +34,12 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus);
 // What the devices said of themselves, a line each.
 using Identities = std::vector<std::string>;
 
+// Sets a Modbus line's worker going: a thread, or what a simulation has for one.
+using LineStarter = std::function<void(fieldbus::ModbusLine&)>;
+
 // NMT, SDO configuration written and read back, sensor calibration read; drives end in NMT operational, not enabled.
-Identities bring_up(CycleParts& parts);
+// Modbus lines are left running, and their rates have been measured for a quarter of a second.
+Identities bring_up(
+    CycleParts& parts, const LineStarter& start_line = [](fieldbus::ModbusLine& line) { line.start(); });
 
 }  // namespace proxarm::controller

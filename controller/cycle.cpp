@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "fieldbus/canopen_nmt.hpp"
+#include "fieldbus/canopen_pdo.hpp"
 
 namespace proxarm::controller {
 
@@ -13,6 +14,8 @@ using models::Vec3;
 namespace {
 
 constexpr double seconds_per_ns = 1e-9;
+
+constexpr std::uint32_t nmt_id = 0x000;
 
 // How long the drives may take to switch off before the run ends without them.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
@@ -57,7 +60,8 @@ void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
 
 void Cycle::shut_down() noexcept {
   for (const DriveOnBus& axis : parts_.drives) {
-    send(axis.bus, fieldbus::nmt_frame(fieldbus::NmtCommand::enter_pre_operational, axis.drive.node()), -1);
+    if (axis.on_can == nullptr) continue;
+    send(axis.bus, fieldbus::nmt_frame(fieldbus::NmtCommand::enter_pre_operational, axis.on_can->node()), -1);
   }
 }
 
@@ -83,15 +87,35 @@ void Cycle::receive_until(std::int64_t deadline_ns) noexcept {
   do {
     const SteadyTime begun = std::chrono::steady_clock::now();
     for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
-      while (parts_.network.bus(bus).receive(received)) {
-        if (bus == parts_.sensor_bus && parts_.sensor->on_frame(received.frame, received.time_ns)) continue;
-        for (DriveOnBus& axis : parts_.drives) {
-          if (axis.bus == bus && axis.drive.on_frame(received.frame, received.time_ns)) break;
-        }
-      }
+      while (parts_.network.bus(bus).receive(received)) deliver(bus, received);
     }
     compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
   } while (!everything_received() && parts_.network.wait_for_frame(deadline_ns));
+}
+
+void Cycle::deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexcept {
+  if (bus == parts_.sensor_bus && parts_.sensor->on_frame(received.frame, received.time_ns)) return;
+  for (DriveOnBus& axis : parts_.drives) {
+    if (axis.bus == bus && axis.drive.on_frame(received.frame, received.time_ns)) return;
+  }
+  // Own frames don't come back: somebody else has sent it.
+  if (is_masters_own(bus, received.frame)) {
+    raise(Fault::second_master, static_cast<std::int32_t>(bus), received.frame.id);
+  }
+}
+
+// NMT commands, SYNC, the controller's heartbeat and setpoints of its drives are for it alone to send.
+bool Cycle::is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) const noexcept {
+  if (frame.extended || frame.remote || frame.error) return false;
+  const bool drives_here = std::any_of(parts_.drive_buses.begin(), parts_.drive_buses.end(),
+                                       [&](const DriveBus& b) { return b.bus == bus; });
+  if (!drives_here) return false;
+  if (frame.id == nmt_id || frame.id == fieldbus::sync_id) return true;
+  if (frame.id == fieldbus::heartbeat_id(fieldbus::DriveSettings{}.master_node)) return true;
+  return std::any_of(parts_.drives.begin(), parts_.drives.end(), [&](const DriveOnBus& axis) {
+    return axis.on_can != nullptr && axis.bus == bus &&
+           frame.id == fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, axis.on_can->node());
+  });
 }
 
 bool Cycle::everything_received() const noexcept {
@@ -153,7 +177,7 @@ void Cycle::judge_sensor() noexcept {
 void Cycle::judge_drives() noexcept {
   if (supervisor_.phase() == Phase::disabling || supervisor_.phase() == Phase::done) return;
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
-    const fieldbus::ServoDrive& drive = parts_.drives[i].drive;
+    const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
     const auto where = static_cast<std::int32_t>(i);
     if (drive.cycles_without_tpdo() > settings_.max_missed_feedback) {
       raise(Fault::drive_silent, where, drive.cycles_without_tpdo(), settings_.max_missed_feedback);
@@ -345,7 +369,7 @@ void Cycle::run_out() noexcept {
 void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
   fieldbus::CanFrame frame;
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
-    fieldbus::ServoDrive& drive = parts_.drives[i].drive;
+    fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
     drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
     if (drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame, static_cast<std::int32_t>(i));
   }
@@ -382,7 +406,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record_.proxy_W_m = triple(proxy_W_);
   record_.tool_W_m = triple(tool_W_);
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
-    const fieldbus::ServoDrive& drive = parts_.drives[i].drive;
+    const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
     record_.target_counts[i] = drive.target_counts();
     record_.actual_counts[i] = drive.actual_counts();
     if (!drive.fresh()) record_.set(RecordFlag::feedback_missing);

@@ -32,6 +32,7 @@
 #include "fieldbus/canopen_sync.hpp"
 #include "fieldbus/cia402_drive.hpp"
 #include "fieldbus/force_sensor.hpp"
+#include "fieldbus/modbus_line.hpp"
 #include "models/arm.hpp"
 #include "models/inverse_kinematics.hpp"
 
@@ -42,8 +43,12 @@ namespace proxarm::controller {
 inline constexpr double receive_window = 0.45;
 
 struct DriveOnBus {
-  fieldbus::ServoDrive drive;
-  std::size_t bus;  // index in the network
+  static constexpr std::size_t no_bus = static_cast<std::size_t>(-1);
+
+  std::unique_ptr<fieldbus::CyclicDrive> owned;
+  fieldbus::CyclicDrive& drive;  // *owned
+  fieldbus::ServoDrive* on_can;  // the same, or null: on a Modbus line
+  std::size_t bus;               // index in the network; no_bus: none
 };
 
 // A bus with drives: who gets SYNC and the controller's heartbeat.
@@ -58,6 +63,7 @@ struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
   std::vector<DriveBus> drive_buses;
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
   std::size_t sensor_bus;
   std::unique_ptr<models::Arm> arm;  // in one place for good: the inverse kinematics refers to it
@@ -98,6 +104,8 @@ class Cycle {
 
   void begin_cycle(std::int64_t t_k_ns) noexcept;
   void receive_until(std::int64_t deadline_ns) noexcept;
+  void deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexcept;
+  [[nodiscard]] bool is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) const noexcept;
   bool everything_received() const noexcept;
   void measure() noexcept;
   void judge(std::int64_t t_k_ns) noexcept;

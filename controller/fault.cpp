@@ -64,6 +64,8 @@ constexpr std::array texts{
               "another program floods the bus, or the machine is too slow"},
     FaultText{Fault::overrun, "overrun", "cycles in a row ended too late", "cycles",
               "use a longer --timestep, or a faster or less loaded machine"},
+    FaultText{Fault::second_master, "second_master", "another master commands this bus", nullptr,
+              "end the other controller or configuration tool, or unplug it, before the next start"},
 };
 
 const FaultText& text_of(Fault fault) noexcept {

@@ -33,6 +33,7 @@ enum class Fault : std::uint8_t {
   send_failed,          // a setpoint couldn't be queued (ENOBUFS, interface down): controlled stop
   receive_overflow,     // the kernel dropped frames: controlled stop
   overrun,              // more than max_overruns cycles in a row were late: controlled stop
+  second_master,  // somebody else sends SYNC, NMT commands, setpoints or the controller's heartbeat: controlled stop
 };
 
 // A fault, where it was seen, and when.

@@ -22,6 +22,7 @@
 #include "fieldbus/canopen_sequence.hpp"
 #include "fieldbus/cia402_state.hpp"
 #include "fieldbus/cia402_units.hpp"
+#include "fieldbus/cyclic_drive.hpp"
 #include "models/description/cell.hpp"
 
 namespace proxarm::fieldbus {
@@ -46,20 +47,7 @@ struct DriveSettings {
   void validate() const;  // throws SetupError
 };
 
-enum class DriveFault : std::uint8_t {
-  none,
-  state_fault,          // statusword says fault or fault reaction active, while operation was wanted
-  left_operation,       // the drive left operation enabled by itself (quick stop, disabled, ...)
-  emergency,            // an EMCY with a code other than 0
-  heartbeat_lost,       // no heartbeat for drive_heartbeat_timeout_ms
-  restarted,            // boot-up message: the drive was reset, and has lost its configuration
-  not_operational,      // someone else's NMT command took it out of operational
-  pdo_short,            // a TPDO shorter than its mapping
-  not_remote,           // statusword bit 9 is 0 in operation: the drive is under local control
-  target_out_of_range,  // a target that isn't finite or doesn't fit 32 bits; the one before is kept
-};
-
-class ServoDrive {
+class ServoDrive final : public CyclicDrive {
  public:
   // Throws SetupError where the description or the settings can't be what a drive is given.
   ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings);
@@ -73,7 +61,7 @@ class ServoDrive {
   // All identifiers that the drive and the master use between them: those, RPDO1 and SDO requests.
   [[nodiscard]] std::array<std::uint32_t, 6> used_ids() const noexcept;
   [[nodiscard]] std::uint8_t node() const noexcept { return description_.node; }
-  [[nodiscard]] const description::DriveDescription& description() const noexcept { return description_; }
+  [[nodiscard]] const description::DriveDescription& description() const noexcept override { return description_; }
   [[nodiscard]] const DriveSettings& settings() const noexcept { return settings_; }
   [[nodiscard]] const CountScale& scale() const noexcept { return scale_; }
   // Watching for faults of the wire starts here, once the drive is in operational.
@@ -82,29 +70,29 @@ class ServoDrive {
   // ---- cycle ----
   // A fault that the drive is found in when operation is first wanted (its last controller died, say) is reset on the
   // way; any later one is raised as a fault, and only fault_reset leaves it.
-  void request(DriveGoal goal) noexcept { goal_ = goal; }
+  void request(DriveGoal goal) noexcept override { goal_ = goal; }
   // A SYNC is going out: what was received before it is no longer fresh. Also notices a lost heartbeat.
-  void on_sync(std::int64_t now_ns) noexcept;
-  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept;  // true when it was this drive's
+  void on_sync(std::int64_t now_ns) noexcept override;
+  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true when it was this drive's
   // Takes a new target; false where none is taken: not following() yet, or fault target_out_of_range.
-  bool set_target_rad(double angle_rad) noexcept;
+  bool set_target_rad(double angle_rad) noexcept override;
   // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
-  bool encode_rpdo(CanFrame& frame) noexcept;
+  bool encode_rpdo(CanFrame& frame) noexcept override;
 
   // ---- what is known of the drive ----
-  [[nodiscard]] bool fresh() const noexcept { return fresh_; }  // a TPDO came since the last SYNC
-  [[nodiscard]] bool heard() const noexcept { return heard_; }  // a TPDO came ever
+  [[nodiscard]] bool fresh() const noexcept override { return fresh_; }  // a TPDO came since the last SYNC
+  [[nodiscard]] bool heard() const noexcept { return heard_; }           // a TPDO came ever
   [[nodiscard]] std::int64_t tpdo_time_ns() const noexcept { return tpdo_time_ns_; }
-  [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept { return cycles_without_tpdo_; }
-  [[nodiscard]] DriveState state() const noexcept { return state_; }
+  [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept override { return cycles_without_tpdo_; }
+  [[nodiscard]] DriveState state() const noexcept override { return state_; }
   [[nodiscard]] DriveGoal goal() const noexcept { return goal_; }
-  [[nodiscard]] bool following() const noexcept { return following_; }  // takes targets
+  [[nodiscard]] bool following() const noexcept override { return following_; }  // takes targets
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   [[nodiscard]] std::uint16_t last_controlword() const noexcept { return controlword_; }
-  [[nodiscard]] std::int32_t actual_counts() const noexcept { return actual_counts_; }
-  [[nodiscard]] double actual_rad() const noexcept { return scale_.angle_rad(actual_counts_); }
-  [[nodiscard]] std::int32_t target_counts() const noexcept { return target_counts_; }
-  [[nodiscard]] double target_rad() const noexcept { return scale_.angle_rad(target_counts_); }
+  [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
+  [[nodiscard]] double actual_rad() const noexcept override { return scale_.angle_rad(actual_counts_); }
+  [[nodiscard]] std::int32_t target_counts() const noexcept override { return target_counts_; }
+  [[nodiscard]] double target_rad() const noexcept override { return scale_.angle_rad(target_counts_); }
   [[nodiscard]] bool follows_command() const noexcept { return (statusword_ & statusword::follows_command) != 0; }
   [[nodiscard]] bool following_error() const noexcept { return (statusword_ & statusword::following_error) != 0; }
   [[nodiscard]] bool internal_limit() const noexcept { return (statusword_ & statusword::internal_limit_active) != 0; }
@@ -112,14 +100,16 @@ class ServoDrive {
   [[nodiscard]] NmtState nmt_state() const noexcept { return heartbeat_.state(); }
   [[nodiscard]] std::uint64_t boot_ups() const noexcept { return heartbeat_.boot_ups(); }
 
-  [[nodiscard]] DriveFault fault() const noexcept { return fault_; }  // the first one, kept until clear_fault()
+  [[nodiscard]] DriveFault fault() const noexcept override {
+    return fault_;
+  }  // the first one, kept until clear_fault()
   [[nodiscard]] std::int64_t fault_time_ns() const noexcept { return fault_time_ns_; }
   void clear_fault() noexcept { fault_ = DriveFault::none; }
   [[nodiscard]] const Emergency& latest_emergency() const noexcept { return emergency_; }
   [[nodiscard]] std::uint64_t emergencies() const noexcept { return emergencies_; }
   [[nodiscard]] std::uint64_t repeated_tpdos() const noexcept { return repeated_tpdos_; }
   // State, fault and latest EMCY in words; not for the cycle.
-  [[nodiscard]] std::string describe() const;
+  [[nodiscard]] std::string describe() const override;
 
  private:
   bool decode_tpdo(const CanFrame& frame, std::int64_t time_ns) noexcept;
@@ -152,7 +142,5 @@ class ServoDrive {
   std::uint64_t emergencies_ = 0;
   std::uint64_t repeated_tpdos_ = 0;
 };
-
-[[nodiscard]] const char* to_string(DriveFault fault) noexcept;
 
 }  // namespace proxarm::fieldbus

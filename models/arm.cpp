@@ -44,13 +44,15 @@ std::string meant(const std::string& word, const std::vector<std::string>& names
   return near.empty() ? "" : "did you mean " + in_quotes(near) + "?";
 }
 
-bool turns(const UrdfJoint& joint) { return joint.type == "revolute" || joint.type == "continuous"; }
+bool is_axis(const UrdfJoint& joint) {
+  return joint.type == "revolute" || joint.type == "continuous" || joint.type == "prismatic";
+}
 
 // Each drive has its joint, each joint that moves has its drive.
 void check_joints(const Cell& cell, const Urdf& urdf) {
   std::vector<std::string> names;
   for (const UrdfJoint& joint : urdf.joints) {
-    if (turns(joint)) names.push_back(joint.name);
+    if (is_axis(joint)) names.push_back(joint.name);
   }
   for (std::size_t i = 0; i < cell.drives.size(); ++i) {
     const std::string& name = cell.drives[i].joint;
@@ -61,9 +63,9 @@ void check_joints(const Cell& cell, const Urdf& urdf) {
                     "a joint of " + urdf.file.filename().string() + ": " + description::one_of(names),
                     meant(name, names));
     }
-    if (!turns(*joint)) {
+    if (!is_axis(*joint)) {
       throw in_cell(cell, "drives", i, "joint", in_quotes(name) + ", a " + joint->type + " joint",
-                    "a revolute or continuous joint: " + description::one_of(names));
+                    "a revolute, continuous or prismatic joint: " + description::one_of(names));
     }
   }
   for (const UrdfJoint& joint : urdf.joints) {
@@ -188,6 +190,7 @@ void Arm::read_chain(const Cell& cell) {
       const Pose A = turn_z_to(Vec3(m.jnt_axis[3 * joint], m.jnt_axis[3 * joint + 1], m.jnt_axis[3 * joint + 2]));
       Link& link = links_[static_cast<std::size_t>(count++)];
       link.drive = static_cast<int>(drive);
+      link.slides = m.jnt_type[joint] == mjJNT_SLIDE;
       link.fixed = X_before * A;
       X_before = A.inverse();
     }
@@ -244,7 +247,8 @@ void Arm::forward(const JointVector& q, Frames& frames) const noexcept {
   for (int i = 0; i < axes_; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Link& link = links_[k];
-    const double c = std::cos(q[link.drive]), s = std::sin(q[link.drive]);
+    const double angle = link.slides ? 0.0 : q[link.drive];
+    const double c = std::cos(angle), s = std::sin(angle);
     Mat3 R;
     Vec3 p;
     if (i == 0) {
@@ -259,6 +263,7 @@ void Arm::forward(const JointVector& q, Frames& frames) const noexcept {
     turned.col(0) = c * R.col(0) + s * R.col(1);
     turned.col(1) = c * R.col(1) - s * R.col(0);
     turned.col(2) = R.col(2);
+    if (link.slides) p += q[link.drive] * R.col(2);
     frames.p_W[k] = p;
   }
 }
@@ -280,7 +285,11 @@ void Arm::kinematics(const JointVector& q, ToolKinematics& out) const noexcept {
   for (int i = 0; i < axes_; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Vec3 z = frames.R_W[k].col(2);
-    out.J_W.col(links_[k].drive) << z.cross(p_T - frames.p_W[k]), z;
+    if (links_[k].slides) {
+      out.J_W.col(links_[k].drive) << z, Vec3::Zero();
+    } else {
+      out.J_W.col(links_[k].drive) << z.cross(p_T - frames.p_W[k]), z;
+    }
   }
 }
 
@@ -299,7 +308,8 @@ Pose Arm::sensor_pose(const JointVector& q) const noexcept {
 // ---- statics --------------------------------------------------------------------------------------------------------
 
 JointVector Arm::gravity_torque(const Frames& frames) const noexcept {
-  // With m_i, c_i mass and centre of mass of everything from link i outwards: τ_i = −z_i · (c_i − p_i) × m_i g.
+  // With m_i, c_i mass and centre of mass of everything from link i outwards: τ_i = −z_i · (c_i − p_i) × m_i g; of an
+  // axis that slides, −z_i · m_i g.
   JointVector torque(axes_);
   double mass = 0.0;
   Vec3 moment = Vec3::Zero();  // m_i c_i
@@ -308,7 +318,9 @@ JointVector Arm::gravity_torque(const Frames& frames) const noexcept {
     const Link& link = links_[k];
     mass += link.mass_kg;
     moment += link.mass_kg * (frames.p_W[k] + frames.R_W[k] * link.centre_of_mass);
-    torque[link.drive] = -frames.R_W[k].col(2).dot((moment - mass * frames.p_W[k]).cross(gravity_W_));
+    const Vec3 lever = moment - mass * frames.p_W[k];
+    const Vec3 load = link.slides ? Vec3(mass * gravity_W_) : Vec3(lever.cross(gravity_W_));
+    torque[link.drive] = -frames.R_W[k].col(2).dot(load);
   }
   return torque;
 }
@@ -375,6 +387,7 @@ JointMatrix Arm::link_mass_matrix(const JointVector& q) const noexcept {
   // Composite bodies: everything from link j outwards has mass m, centre c and inertia I about c. Turning it about z_j
   // at 1 rad/s² takes the force F = m z_j × (c − p_j) at c and the torque I z_j, and axis i ≤ j must supply
   //   M_ij = z_i · (I z_j + (c − p_i) × F).
+  // An axis j that slides takes F = m z_j and no torque; an axis i that slides must supply z_i · F.
   Frames frames;
   forward(q, frames);
   JointMatrix M(axes_, axes_);
@@ -394,10 +407,12 @@ JointMatrix Arm::link_mass_matrix(const JointVector& q) const noexcept {
       centre = new_centre;
     }
     const Vec3 z = frames.R_W[k].col(2);
-    const Vec3 F = mass * z.cross(centre - frames.p_W[k]), torque = inertia * z;
+    const Vec3 F = mass * (link.slides ? z : Vec3(z.cross(centre - frames.p_W[k])));
+    const Vec3 torque = link.slides ? Vec3(Vec3::Zero()) : Vec3(inertia * z);
     for (int i = 0; i <= j; ++i) {
       const auto h = static_cast<std::size_t>(i);
-      const double value = frames.R_W[h].col(2).dot(torque + (centre - frames.p_W[h]).cross(F));
+      const Vec3 load = links_[h].slides ? F : Vec3(torque + (centre - frames.p_W[h]).cross(F));
+      const double value = frames.R_W[h].col(2).dot(load);
       M(links_[h].drive, link.drive) = M(link.drive, links_[h].drive) = value;
     }
   }

@@ -1,8 +1,8 @@
 // The arm: where its tool is, how it moves, what it weighs and how it gives, for given joint angles.
 //
-// Built from a cell: the URDF between its root and the sensor's link must be a chain of revolute joints, one per drive
-// of the cell. All joint vectors are in the order of the cell's drives, in rad, Nm and kg m² at the joint (after the
-// gear).
+// Built from a cell: the URDF between its root and the sensor's link must be a chain of revolute or prismatic joints,
+// one per drive of the cell. All joint vectors are in the order of the cell's drives, in rad, Nm and kg m² at the joint
+// (after the gear).
 //   W ─X_WB─ B ─ joints ─ L (link that carries the sensor) ─X_LS─ S ─X_ST─ T
 // MuJoCo reads the URDF; the recursions below are our own, since a fixed serial chain needs no more.
 //
@@ -42,7 +42,7 @@ struct TipMass {
 
 class Arm {
  public:
-  // Throws description::SetupError: unreadable URDF, a drive's joint that isn't there or isn't revolute or isn't
+  // Throws description::SetupError: unreadable URDF, a drive's joint that isn't there or can't be driven or isn't
   // between root and sensor, a joint without a drive, a link without inertia.
   explicit Arm(const description::Cell& cell);
 
@@ -92,6 +92,7 @@ class Arm {
     Vec3 centre_of_mass = Vec3::Zero();  // in the link
     Mat3 inertia = Mat3::Zero();         // about the centre of mass, axes of the link
     int drive = 0;                       // index in the cell's drives
+    bool slides = false;                 // along z, by q in m; else it turns about z
   };
   struct Frames {
     std::array<Mat3, max_axes> R_W;

@@ -68,11 +68,11 @@ ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, dou
     const auto& drive = cell.drives[i];
     const std::string key = "drives[" + std::to_string(i) + "]";
     const int joint = mj_name2id(&m, mjOBJ_JOINT, drive.joint.c_str());
-    if (joint < 0 || m.jnt_type[joint] != mjJNT_HINGE) {
+    if (joint < 0 || (m.jnt_type[joint] != mjJNT_HINGE && m.jnt_type[joint] != mjJNT_SLIDE)) {
       throw SetupError({.file = cell.file.string(),
                         .key = key + ".joint",
                         .found = drive.joint,
-                        .expected = "a revolute joint of " + cell.urdf.string()});
+                        .expected = "a revolute or prismatic joint of " + cell.urdf.string()});
     }
     if (!(drive.rotor_inertia_kg_m2 > 0.0)) {
       throw SetupError({.file = cell.file.string(),
@@ -261,22 +261,25 @@ double ArmDynamics::joint_speed_rad_per_s(std::size_t axis) const noexcept {
   return links_->data->qvel[axes_[axis].dof];
 }
 
-// −∂/∂φ of the work of gravity: Σ over bodies behind the joint of (axis × lever) · (−m g).
+// −∂/∂φ of the work of gravity: Σ over bodies behind the joint of (axis × lever) · (−m g); of a joint that slides,
+// axis · (−m g).
 double ArmDynamics::static_torque_Nm(std::size_t axis) const noexcept {
   const mjModel* m = links_->model.get();
   const mjData* d = links_->data.get();
   const int dof = axes_[axis].dof, joint = m->dof_jntid[dof];
   const Vec3 axis_B(d->xaxis + 3 * joint), anchor_B(d->xanchor + 3 * joint), gravity_B(m->opt.gravity);
+  const bool slides = m->jnt_type[joint] == mjJNT_SLIDE;
+  const auto moved = [&](const Vec3& lever) { return slides ? axis_B : Vec3(axis_B.cross(lever)); };
   double torque = 0.0;
   for (int body = 1; body < m->nbody; ++body) {
     int ancestor = body;
     while (ancestor != 0 && ancestor != m->jnt_bodyid[joint]) ancestor = m->body_parentid[ancestor];
     if (ancestor == 0) continue;
     const Vec3 lever = Vec3(d->xipos + 3 * body) - anchor_B;
-    torque -= axis_B.cross(lever).dot(m->body_mass[body] * gravity_B);
+    torque -= moved(lever).dot(m->body_mass[body] * gravity_B);
   }
   const Vec3 lever_T = links_->p_BL + links_->arm_B - anchor_B;
-  return torque + axis_B.cross(lever_T).dot(hand_mass_kg_ * gravity_B);
+  return torque + moved(lever_T).dot(hand_mass_kg_ * gravity_B);
 }
 
 Energy ArmDynamics::energy() const {

@@ -25,6 +25,11 @@ enum class DeviceFaultKind : std::uint8_t {
   sdo_silent,      // "sdo": SDO requests stay unanswered
   power_loss,      // "power": off, and on again at the end
   jammed,          // "jammed": the motor can't turn
+  // Drives on a Modbus line, which know "silent", "power" and "jammed" as well
+  modbus_exception,   // "exception": each request is answered by exception 04
+  modbus_closed,      // "closed": the connection is closed
+  modbus_wrong_unit,  // "wrong_unit": its answers bear the next unit's number
+  modbus_half,        // "half_answer": its answers end in the middle
   // Sensor
   sensor_silent,    // "silent": answers nothing
   samples_missing,  // "samples": answers everything but polls

@@ -38,6 +38,7 @@ void check_nodes(const description::Cell& cell, const std::vector<std::size_t>& 
     return std::numeric_limits<std::size_t>::max();
   };
   for (std::size_t i = 0; i < cell.drives.size(); ++i) {
+    if (!cell.drives[i].on_can()) continue;
     const bool with_sensor = interface_of(cell.drives[i].bus) == interface_of(cell.sensor.bus);
     for (std::uint32_t operation = 0; with_sensor && operation < 16; ++operation) {
       const std::uint32_t id = cell.sensor.base_id << 4 | operation;
@@ -52,7 +53,8 @@ void check_nodes(const description::Cell& cell, const std::vector<std::size_t>& 
                                    "interface, that of the drive of " + cell.drives[i].joint});
     }
     for (std::size_t j = 0; j < i; ++j) {
-      const bool same_wire = interface_of(cell.drives[i].bus) == interface_of(cell.drives[j].bus);
+      const bool same_wire =
+          cell.drives[j].on_can() && interface_of(cell.drives[i].bus) == interface_of(cell.drives[j].bus);
       if (!same_wire || cell.drives[i].node != cell.drives[j].node) continue;
       throw SetupError({.file = cell.file.string(),
                         .bus = cell.drives[i].bus,

@@ -92,6 +92,29 @@ class SimulatedCell::PlantGauges final : public GaugeSource {
   const Plant& plant_;
 };
 
+class SimulatedCell::WirelessModbus final : public fieldbus::ModbusClient {
+ public:
+  explicit WirelessModbus(std::vector<ModbusDevice*> devices) : devices_(std::move(devices)) {}
+
+ private:
+  fieldbus::ModbusResult transact(const fieldbus::ModbusMessage& request,
+                                  fieldbus::ModbusMessage& answer) noexcept override {
+    for (ModbusDevice* device : devices_) {
+      if (device->unit() != request.bytes[0]) continue;
+      if (device->fault() == ModbusFault::closed) return fieldbus::ModbusResult::closed;
+      const std::vector<std::uint8_t> bytes = device->serve(request.span());
+      // The master waits in vain for the rest of half an answer.
+      if (bytes.empty() || device->fault() == ModbusFault::half) return fieldbus::ModbusResult::timeout;
+      std::copy(bytes.begin(), bytes.end(), answer.bytes.begin());
+      answer.size = bytes.size();
+      return fieldbus::ModbusResult::ok;
+    }
+    return fieldbus::ModbusResult::timeout;
+  }
+
+  std::vector<ModbusDevice*> devices_;
+};
+
 // ---- Set-up
 
 SimulatedCell::SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
@@ -102,7 +125,17 @@ SimulatedCell::SimulatedCell(const description::Cell& cell, const description::S
       tick_ns_(config.tick_ns),
       faults_(config.faults),
       plant_(cell, sensor, hand, events.now_ns(), config.plant) {
-  for (std::size_t axis = 0; axis < cell_.drives.size(); ++axis) add_drive(axis, config);
+  for (std::size_t axis = 0; axis < cell_.drives.size(); ++axis) {
+    axes_.push_back(std::make_unique<PlantAxis>(plant_.servo(axis), cell_.drives[axis]));
+    drives_.emplace_back();
+    modbus_drives_.emplace_back();
+    node_of_axis_.push_back(nodes_.size());
+    if (cell_.drives[axis].on_can()) {
+      add_drive(axis, config);
+    } else {
+      add_modbus_drive(axis);
+    }
+  }
   add_sensor(sensor);
   check_faults();
 }
@@ -120,9 +153,27 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
   }
   Clockwork& clockwork = *this;
   nodes_.push_back(std::make_unique<DeviceNode>(drive.joint, bus, events_, clockwork));
-  axes_.push_back(std::make_unique<PlantAxis>(plant_.servo(axis), drive));
-  drives_.push_back(std::make_unique<DriveDevice>(device, *axes_.back(), *nodes_.back()));
-  nodes_.back()->set_device(*drives_.back());
+  drives_[axis] = std::make_unique<DriveDevice>(device, *axes_[axis], *nodes_.back());
+  nodes_.back()->set_device(*drives_[axis]);
+}
+
+void SimulatedCell::add_modbus_drive(std::size_t axis) {
+  const description::DriveDescription& drive = cell_.drives[axis];
+  modbus_drives_[axis] =
+      std::make_unique<ModbusDevice>(description::load_modbus_drive(drive.description), drive.node,
+                                     drive.max_acceleration_rad_per_s2 * counts_per_rad(drive), *axes_[axis]);
+}
+
+std::vector<ModbusDevice*> SimulatedCell::modbus_devices(const std::string& line) {
+  std::vector<ModbusDevice*> devices;
+  for (std::size_t axis = 0; axis < cell_.drives.size(); ++axis) {
+    if (modbus_drives_[axis] && cell_.drives[axis].bus == line) devices.push_back(modbus_drives_[axis].get());
+  }
+  return devices;
+}
+
+std::unique_ptr<fieldbus::ModbusClient> SimulatedCell::modbus_client(const std::string& line) {
+  return std::make_unique<WirelessModbus>(modbus_devices(line));
 }
 
 void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
@@ -185,6 +236,9 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   events_.schedule(time_ns + tick_ns_, [this](std::int64_t next_ns) { tick(next_ns); });
   advance_to(time_ns);
   for (const auto& node : nodes_) node->on_time(time_ns);
+  for (const auto& drive : modbus_drives_) {
+    if (drive) drive->on_time(time_ns);
+  }
 }
 
 void SimulatedCell::advance_to(std::int64_t time_ns) noexcept {
@@ -242,7 +296,9 @@ void SimulatedCell::set_fault(std::size_t index, bool on, std::int64_t time_ns) 
   const DeviceFault& fault = faults_[index];
   advance_to(time_ns);
   const std::size_t axis = axis_of(fault.device);
-  if (axis < drives_.size()) {
+  if (axis < drives_.size() && modbus_drives_[axis]) {
+    set_modbus_fault(axis, fault, on);
+  } else if (axis < drives_.size()) {
     set_drive_fault(axis, fault, on, time_ns);
   } else {
     set_sensor_fault(fault, on);
@@ -253,7 +309,7 @@ void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, 
                                     std::int64_t time_ns) noexcept {
   switch (fault.kind) {
     case DeviceFaultKind::drive_silent:
-      return nodes_[axis]->cut(on);
+      return nodes_[node_of_axis_[axis]]->cut(on);
     case DeviceFaultKind::drive_fault:
       if (on) drives_[axis]->inject_fault(static_cast<std::uint16_t>(fault.value), time_ns);
       return;
@@ -263,12 +319,42 @@ void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, 
       return drives_[axis]->canopen().mute_sdo(on);
     case DeviceFaultKind::power_loss:
       if (on) plant_.servo(axis).disable();
-      return nodes_[axis]->set_power(!on, time_ns);
+      return nodes_[node_of_axis_[axis]]->set_power(!on, time_ns);
     case DeviceFaultKind::jammed:
       return plant_.arm().jam(axis, on);
     default:
       return;
   }
+}
+
+void SimulatedCell::set_modbus_fault(std::size_t axis, const DeviceFault& fault, bool on) noexcept {
+  ModbusFault kind = ModbusFault::none;
+  switch (fault.kind) {
+    case DeviceFaultKind::drive_silent:
+      kind = ModbusFault::silent;
+      break;
+    case DeviceFaultKind::power_loss:
+      if (on) plant_.servo(axis).disable();
+      kind = ModbusFault::silent;
+      break;
+    case DeviceFaultKind::modbus_exception:
+      kind = ModbusFault::exception;
+      break;
+    case DeviceFaultKind::modbus_closed:
+      kind = ModbusFault::closed;
+      break;
+    case DeviceFaultKind::modbus_wrong_unit:
+      kind = ModbusFault::wrong_unit;
+      break;
+    case DeviceFaultKind::modbus_half:
+      kind = ModbusFault::half;
+      break;
+    case DeviceFaultKind::jammed:
+      return plant_.arm().jam(axis, on);
+    default:
+      return;
+  }
+  modbus_drives_[axis]->set_fault(on ? kind : ModbusFault::none);
 }
 
 void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept {

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "fieldbus/modbus_client.hpp"
 #include "fieldbus/simulated_can_network.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
@@ -21,6 +22,7 @@
 #include "sim/device_fault.hpp"
 #include "sim/device_node.hpp"
 #include "sim/drive_device.hpp"
+#include "sim/modbus_device.hpp"
 #include "sim/plant.hpp"
 
 namespace proxarm::sim {
@@ -55,9 +57,15 @@ class SimulatedCell final : private Clockwork {
   SimulatedCell& operator=(const SimulatedCell&) = delete;
   ~SimulatedCell() override;
 
-  // Nodes, one per drive in the cell's order and then the sensor: to be connected to their buses before power_on().
+  // Nodes, one per drive on CAN in the cell's order and then the sensor: to be connected to their buses before
+  // power_on().
   [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
   [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
+
+  // What is on the cell's Modbus lines: for a server on a real line, or as a master's end of a line without any wire,
+  // whose requests are answered at once. The cell must outlive both.
+  [[nodiscard]] std::vector<ModbusDevice*> modbus_devices(const std::string& line);
+  [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
 
   // Connects all nodes to the buses of these names.
   void attach_to(fieldbus::SimulatedCanNetwork& network);
@@ -71,22 +79,26 @@ class SimulatedCell final : private Clockwork {
   void set_observer(std::function<void(const Truth&)> observer) { observer_ = std::move(observer); }
 
   [[nodiscard]] Plant& plant() noexcept { return plant_; }
-  [[nodiscard]] DriveDevice& drive(std::size_t axis) noexcept { return *drives_[axis]; }
+  [[nodiscard]] DriveDevice& drive(std::size_t axis) noexcept { return *drives_[axis]; }                 // on CAN
+  [[nodiscard]] ModbusDevice& modbus_drive(std::size_t axis) noexcept { return *modbus_drives_[axis]; }  // on Modbus
   [[nodiscard]] AtiDevice& sensor() noexcept { return *sensor_; }
   [[nodiscard]] const description::Cell& cell() const noexcept { return cell_; }
 
  private:
   class PlantAxis;
   class PlantGauges;
+  class WirelessModbus;
 
   void advance_to(std::int64_t time_ns) noexcept override;
   [[nodiscard]] Truth present_truth() const noexcept;
   void add_drive(std::size_t axis, const SimulatedCellConfig& config);
+  void add_modbus_drive(std::size_t axis);
   void add_sensor(const description::SensorDescription& sensor);
   void check_faults() const;
   void schedule_faults();
   void set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept;
   void set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
+  void set_modbus_fault(std::size_t axis, const DeviceFault& fault, bool on) noexcept;
   void set_sensor_fault(const DeviceFault& fault, bool on) noexcept;
   void tick(std::int64_t time_ns) noexcept;
   [[nodiscard]] std::size_t bus_index(const std::string& name, const std::string& key) const;
@@ -100,7 +112,9 @@ class SimulatedCell final : private Clockwork {
   std::vector<std::unique_ptr<DeviceNode>> nodes_;
   std::vector<std::unique_ptr<PlantAxis>> axes_;
   std::unique_ptr<PlantGauges> gauges_;
-  std::vector<std::unique_ptr<DriveDevice>> drives_;
+  std::vector<std::unique_ptr<DriveDevice>> drives_;          // per axis; null: on Modbus
+  std::vector<std::unique_ptr<ModbusDevice>> modbus_drives_;  // per axis; null: on CAN
+  std::vector<std::size_t> node_of_axis_;
   std::unique_ptr<AtiDevice> sensor_;
   std::function<void(const Truth&)> observer_;
 };

@@ -9,6 +9,7 @@
 
 #include "controller/bring_up.hpp"
 #include "controller/command_line/bus_plan.hpp"
+#include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/realtime.hpp"
 #include "controller/command_line/session_output.hpp"
 #include "controller/command_line/signal_watch.hpp"
@@ -167,6 +168,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
   set_filters(network, parts);
   SessionOutput output(session, options, false);
   bring_up_devices(parts);
+  report_modbus_rates(session, parts);
   output.introduce(parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);

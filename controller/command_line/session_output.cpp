@@ -41,9 +41,14 @@ std::string place_of(const controller::FaultReport& report, const controller::Cy
   if (report.fault == Fault::bus_off || report.fault == Fault::receive_overflow) {
     return "bus " + parts.network.bus(where).name();
   }
-  const fieldbus::ServoDrive& drive = parts.drives[where].drive;
+  if (report.fault == Fault::second_master) {
+    char id[8];
+    std::snprintf(id, sizeof id, "%03Xh", static_cast<unsigned>(report.value));
+    return "bus " + parts.network.bus(where).name() + ", identifier " + id;
+  }
+  const fieldbus::CyclicDrive& drive = parts.drives[where].drive;
   std::string place = "drive of " + drive.description().joint + ", bus " + drive.description().bus + ", node " +
-                      std::to_string(drive.node());
+                      std::to_string(drive.description().node);
   if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled) place += ": " + drive.describe();
   return place;
 }

@@ -1,5 +1,6 @@
 #include <atomic>
 #include <cstdio>
+#include <memory>
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/prepared_session.hpp"
@@ -8,6 +9,7 @@
 #include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/far_end_process.hpp"
+#include "sim/modbus_server.hpp"
 
 namespace proxarm::command_line {
 
@@ -31,6 +33,10 @@ int sim_command(const RunOptions& options) {
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
   sim::FarEndProcess process(session.cell, session.sensor, session.hand, network, interface_of_bus, config);
+  std::vector<std::unique_ptr<sim::ModbusServer>> servers;
+  for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
+    servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
+  }
   SignalWatch signals([&](int) { stop.store(true); });
   std::fprintf(stderr, "proxarm sim: %s on the wire; Ctrl-C ends it\n", session.cell.name.c_str());
   process.run(stop);

@@ -1,8 +1,11 @@
 #include "controller/command_line/simulated_run.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <numeric>
 
+#include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/signal_watch.hpp"
 #include "controller/session.hpp"
 
@@ -15,6 +18,7 @@ using SteadyClock = std::chrono::steady_clock;
 
 // For the last frames to get onto the wire and to the drives: the longest queue of a cycle is through in a millisecond.
 constexpr std::int64_t last_words_ns = 5'000'000;
+constexpr double tcp_exchange_s = 1e-3;      // of a Modbus drive with a network of its own
 constexpr std::size_t record_capacity = 64;  // drained after every cycle
 
 std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
@@ -48,18 +52,31 @@ SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& opt
 int SimulatedRun::run() {
   controller::BusIndices indices(session_.cell.buses.size());
   std::iota(indices.begin(), indices.end(), std::size_t{0});
+  const controller::ModbusOpener open_line = [this](const description::ModbusLineDescription& line, double) {
+    return far_end_.modbus_client(line.name);
+  };
   controller::CycleParts parts =
-      controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_, indices);
+      controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_, indices, open_line);
   if (!options_.record_dir.empty()) {
     network_.set_observer(
         [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
   }
   far_end_.attach_to(network_);
   far_end_.power_on();
-  controller::bring_up(parts);
+  controller::bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(line, network_.now_ns()); });
+  report_modbus_rates(session_, parts);
   output_.introduce(parts);
   if (options_.pace == Pace::realtime) network_.follow_real_time();
   return run_cycles(std::move(parts));
+}
+
+// A line's worker on the virtual clock: an exchange takes as long as it does on the wire.
+void SimulatedRun::pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
+  const double takes_s = line.description().serial()
+                             ? fieldbus::modbus_rtu_exchange_s(line.drives().front()->registers(), line.description())
+                             : tcp_exchange_s;
+  const std::int64_t next_ns = std::max(line.step(time_ns), time_ns + std::llround(1e9 * takes_s));
+  network_.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
 }
 
 int SimulatedRun::run_cycles(controller::CycleParts parts) {

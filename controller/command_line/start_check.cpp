@@ -86,6 +86,7 @@ void require_nodes_apart(const PreparedSession& session, const std::vector<std::
   const auto& drives = session.cell.drives;
   for (std::size_t second = 0; second < drives.size(); ++second) {
     for (std::size_t first = 0; first < second; ++first) {
+      if (!drives[first].on_can() || !drives[second].on_can()) continue;
       if (drives[first].node != drives[second].node) continue;
       if (interface_of(drives[first]) != interface_of(drives[second])) continue;
       throw SetupError({.bus = interface_of(drives[second]),

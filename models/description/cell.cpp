@@ -88,6 +88,24 @@ BusDescription read_bus(const YamlNode& node) {
   return bus;
 }
 
+ModbusLineDescription read_modbus_line(const YamlNode& node) {
+  ModbusLineDescription line;
+  line.name = read_name(node, "name");
+  if (node.has("host") == node.has("device")) {
+    throw node.error_at("host", "either host (and port) of a TCP connection, or device (and baud) of a serial line");
+  }
+  if (node.has("host")) {
+    line.host = node.string("host");
+    line.port = static_cast<int>(node.integer_or("port", line.port, 1, 65535));
+    return line;
+  }
+  line.device = node.string("device");
+  line.baud = static_cast<int>(node.integer_or("baud", line.baud, 1200, 4'000'000));
+  line.parity = node.choice_or("parity", line.parity, {"none", "even", "odd"});
+  line.stop_bits = static_cast<int>(node.integer_or("stop_bits", line.stop_bits, 1, 2));
+  return line;
+}
+
 SimulatedDrive read_simulation(const YamlNode& node) {
   SimulatedDrive s;
   s.coulomb_friction_Nm = node.number_or("coulomb_friction_Nm", s.coulomb_friction_Nm, 0.0, 1e5);
@@ -122,8 +140,9 @@ DriveDescription read_drive(const YamlNode& node) {
   DriveDescription d;
   d.joint = node.string("joint");
   d.bus = node.string("bus");
-  d.node = static_cast<std::uint8_t>(node.integer("node", 1, 127));
-  d.profile = node.choice_or("profile", d.profile, {"cia402"});
+  d.profile = node.choice_or("profile", d.profile, {"cia402", "modbus"});
+  d.node = static_cast<std::uint8_t>(node.integer("node", 1, d.on_can() ? 127 : 247));
+  if (!d.on_can()) d.description = node.existing_file("description").string();
   d.mode = node.choice_or("mode", d.mode, {"csp"});
   d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
   d.counts_per_motor_revolution =
@@ -194,10 +213,35 @@ void read_buses(const YamlNode& root, Cell& cell) {
   }
 }
 
+void read_modbus_lines(const YamlNode& root, Cell& cell) {
+  if (!root.has("modbus_lines")) return;
+  for (const YamlNode& node : root.list("modbus_lines", 0, 16)) {
+    const ModbusLineDescription line = read_modbus_line(node);
+    const auto has_name = [&](const auto& other) { return other.name == line.name; };
+    if (std::any_of(cell.buses.begin(), cell.buses.end(), has_name) ||
+        std::any_of(cell.modbus_lines.begin(), cell.modbus_lines.end(), has_name)) {
+      throw node.error_at("name", "a name that no other bus or line of this cell has");
+    }
+    cell.modbus_lines.push_back(line);
+  }
+}
+
+void check_line(const YamlNode& node, const std::string& line, const std::vector<ModbusLineDescription>& lines) {
+  std::vector<std::string> names;
+  for (const ModbusLineDescription& l : lines) names.push_back(l.name);
+  if (std::find(names.begin(), names.end(), line) != names.end()) return;
+  throw node.error_at("bus", names.empty() ? "a line of this cell: it has no modbus_lines"
+                                           : "one of this cell's modbus_lines: " + one_of(names));
+}
+
 void read_drives(const YamlNode& root, Cell& cell) {
   for (const YamlNode& node : root.list("drives", 1, 32)) {
     const DriveDescription drive = read_drive(node);
-    check_bus(node, drive.bus, cell.buses);
+    if (drive.on_can()) {
+      check_bus(node, drive.bus, cell.buses);
+    } else {
+      check_line(node, drive.bus, cell.modbus_lines);
+    }
     for (const DriveDescription& other : cell.drives) {
       if (other.joint == drive.joint) throw node.error_at("joint", "a joint that no other drive of this cell moves");
       if (other.bus == drive.bus && other.node == drive.node) {
@@ -241,6 +285,7 @@ Cell read_cell(const YamlNode& root) {
   cell.gravity_W_m_per_s2 = root.vec3_or("gravity_W_m_per_s2", cell.gravity_W_m_per_s2, between(-30.0, 30.0));
   cell.tool = read_tool(root.map("tool"));
   read_buses(root, cell);
+  read_modbus_lines(root, cell);
   read_drives(root, cell);
   read_start(root, cell);
   cell.sensor = read_sensor(root.map("sensor"));

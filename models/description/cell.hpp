@@ -28,6 +28,20 @@ struct BusDescription {
   std::int64_t data_bitrate = 0;     // bit/s, CAN FD data phase; 0 for a classic bus
 };
 
+// A line with Modbus drives: a TCP connection to each of them, or one serial line for all. A CAN bus it is not: SYNC,
+// `--bus` and the bus budget know nothing of it.
+struct ModbusLineDescription {
+  std::string name;
+  std::string host;    // TCP: numeric address; empty for a serial line
+  int port = 502;      // TCP
+  std::string device;  // RTU: such as /dev/ttyUSB0
+  int baud = 115200;
+  std::string parity = "even";  // none, even, odd
+  int stop_bits = 1;
+
+  [[nodiscard]] bool serial() const noexcept { return host.empty(); }
+};
+
 // How the drive of a joint behaves that only a simulation must know.
 struct SimulatedDrive {
   double coulomb_friction_Nm = 0.0;  // at the joint, motor side of the gear
@@ -44,10 +58,11 @@ struct SimulatedDrive {
 };
 
 struct DriveDescription {
-  std::string joint;  // name in the URDF
-  std::string bus;
-  std::uint8_t node = 0;  // 1..127
-  std::string profile = "cia402";
+  std::string joint;      // name in the URDF; of a linear one, read m for rad, N for Nm and kg for kg m² all along
+  std::string bus;        // CAN bus or Modbus line
+  std::uint8_t node = 0;  // 1..127; of a Modbus drive its unit, 1..247
+  std::string profile = "cia402";  // or "modbus"
+  std::string description;         // modbus: path of the register map, absolute (in the file: relative to its folder)
   std::string mode = "csp";
   std::uint32_t device_type = 0x00020192;  // expected in 1000h: CiA 402 servo drive
   double counts_per_motor_revolution = 1048576.0;
@@ -64,6 +79,7 @@ struct DriveDescription {
   SimulatedDrive simulation;
 
   [[nodiscard]] double counts_per_rad() const noexcept;  // signed by `direction`
+  [[nodiscard]] bool on_can() const noexcept { return profile != "modbus"; }
 };
 
 struct ToolDescription {
@@ -103,6 +119,7 @@ struct Cell {
   std::vector<double> start_rad;  // joint angles at the start, in the order of `drives`
   ToolDescription tool;
   std::vector<BusDescription> buses;
+  std::vector<ModbusLineDescription> modbus_lines;
   std::vector<DriveDescription> drives;
   SensorPlacement sensor;
   CellLimits limits;

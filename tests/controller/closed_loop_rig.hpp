@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numeric>
@@ -31,6 +32,7 @@ struct RigOptions {
   std::vector<std::string> device_faults{};  // as on the command line
   fieldbus::FaultScript script{};
   double duration_s = 2.5;
+  std::string cell = "models/cells/default.yaml";
   std::string scene = "scenes/wall.yaml";
   std::string hand = "sim/hands/touch.yaml";
   SessionSettings settings{};
@@ -42,12 +44,12 @@ class ClosedLoopRig {
  public:
   explicit ClosedLoopRig(const RigOptions& rig)
       : options(rig),
-        cell(description::load_cell(source_file("models/cells/default.yaml"))),
+        cell(description::load_cell(source_file(rig.cell))),
         sensor(biased(description::load_sensor(source_file("models/sensors/ati_net_can_oem.yaml")), rig)),
         hand(description::load_hand(source_file(rig.hand))),
         scene(scenes::load_scene(source_file(rig.scene))),
         compiled(scenes::compile(scene)),
-        network({{.name = "axes_1_3"}, {.name = "axes_4_6"}, {.name = "sensor"}}),
+        network({{.name = cell.buses[0].name}, {.name = cell.buses[1].name}, {.name = cell.buses[2].name}}),
         far_end(cell, sensor, hand, network.events(), with_faults(rig)) {
     far_end.attach_to(network);
     network.apply(rig.script);
@@ -71,8 +73,9 @@ class ClosedLoopRig {
   CycleParts prepared_parts(fieldbus::CanNetwork& through) {
     description::Cell believed = cell;
     for (std::size_t i = 0; i < 6; ++i) believed.start_rad[i] += options.start_error_rad[i];
-    CycleParts parts = build_parts(believed, sensor, compiled, options.settings, through, {0, 1, 2});
-    bring_up(parts);
+    CycleParts parts = build_parts(believed, sensor, compiled, options.settings, through, {0, 1, 2},
+                                   [this](const auto& line, double) { return far_end.modbus_client(line.name); });
+    bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(line, network.now_ns()); });
     return parts;
   }
 
@@ -97,6 +100,11 @@ class ClosedLoopRig {
   std::int64_t first_cycle_ns = 0;
 
  private:
+  // A Modbus line's worker on the virtual clock, as fast as it wants to be.
+  void pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
+    const std::int64_t next_ns = std::max(line.step(time_ns), time_ns + 1'000'000);
+    network.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
+  }
   static description::SensorDescription biased(description::SensorDescription sensor, const RigOptions& rig) {
     for (std::size_t i = 0; i < 6; ++i) sensor.simulation.bias_counts[i] += rig.sensor_bias_counts[i];
     return sensor;

@@ -379,10 +379,11 @@ TEST(ArmMistakes, AMissingJointIsNamedWithThoseThatExist) {
   EXPECT_THAT(text, HasSubstr("did you mean \"axis_3\"?"));
 }
 
-TEST(ArmMistakes, AJointThatSlidesIsRefused) {
+TEST(ArmMistakes, AJointThatFloatsIsRefused) {
   EXPECT_THAT(
-      message(with_urdf("name=\"axis_4\" type=\"revolute\"", "name=\"axis_4\" type=\"prismatic\"")),
-      HasSubstr("drives[3].joint: found \"axis_4\", a prismatic joint, expected a revolute or continuous joint"));
+      message(with_urdf("name=\"axis_4\" type=\"revolute\"", "name=\"axis_4\" type=\"planar\"")),
+      HasSubstr("drives[3].joint: found \"axis_4\", a planar joint, expected a revolute, continuous or prismatic "
+                "joint"));
 }
 
 TEST(ArmMistakes, AJointWithoutADriveIsRefused) {

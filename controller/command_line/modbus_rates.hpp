@@ -1,0 +1,13 @@
+// What Modbus lines achieve, shown before the motion, and whether a hand can be coupled through an axis that slow.
+#pragma once
+
+#include "controller/command_line/prepared_session.hpp"
+#include "controller/cycle.hpp"
+
+namespace proxarm::command_line {
+
+// On standard error, a line per drive on Modbus with its measured rate, and a warning with the arithmetic where the
+// loop with the hand, judged as if all of the motion went through that axis, has no margin at the mass that is wanted.
+void report_modbus_rates(const PreparedSession& session, const controller::CycleParts& parts);
+
+}  // namespace proxarm::command_line

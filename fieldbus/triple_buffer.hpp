@@ -1,0 +1,34 @@
+// The latest value from one thread to another: neither ever waits, and the reader may miss values but never sees half
+// of one. One writer, one reader.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+namespace proxarm::fieldbus {
+
+template <class T>
+class TripleBuffer {
+ public:
+  void write(const T& value) noexcept {
+    slots_[back_] = value;
+    back_ = middle_.exchange(static_cast<std::uint8_t>(back_ | fresh), std::memory_order_acq_rel) & place;
+  }
+  // False, and `out` as it was, where nothing has been written since the last read.
+  bool read(T& out) noexcept {
+    if ((middle_.load(std::memory_order_relaxed) & fresh) == 0) return false;
+    front_ = middle_.exchange(front_, std::memory_order_acq_rel) & place;
+    out = slots_[front_];
+    return true;
+  }
+
+ private:
+  static constexpr std::uint8_t fresh = 4, place = 3;
+  std::array<T, 3> slots_{};
+  std::atomic<std::uint8_t> middle_{1};
+  std::uint8_t back_ = 0;   // the writer's
+  std::uint8_t front_ = 2;  // the reader's
+};
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,92 @@
+// A cell whose first axis is a rail on Modbus under an arm on CAN, against its simulated far end: it runs, and whatever
+// happens to the line stops all axes in a controlled way.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/controller/closed_loop_rig.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using testing::ClosedLoopRig;
+using testing::RigOptions;
+
+RigOptions rail(std::vector<std::string> faults = {}) {
+  RigOptions options;
+  options.device_faults = std::move(faults);
+  options.cell = "models/cells/rail.yaml";
+  options.settings.mass_kg = 8.0;
+  return options;
+}
+
+double rail_m(const CycleRecord& record, const ClosedLoopRig& rig) {
+  return record.actual_counts[0] / rig.cell.drives[0].counts_per_rad();
+}
+
+TEST(ModbusAxis, RunsUnderAnArmOnCan) {
+  ClosedLoopRig rig(rail());
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), rig.cycle->parts().drives[0].drive.describe());
+  EXPECT_EQ(rig.cycle->rendered_cycles(), 2500u);
+  EXPECT_NEAR(rig.cycle->parts().modbus_lines[0]->drives()[0]->achieved_rate_Hz(), 200.0, 1.0);
+  EXPECT_EQ(rig.far_end.modbus_drive(0).register_at(16) & 2, 0) << "switched off in the end";
+}
+
+// The rail carries the motion along y, the others the rest. Sliding sideways along the wall takes the hand's wish of
+// 0.18 m in y; here a hand that wishes nothing else.
+TEST(ModbusAxis, FollowsASidewaysMotion) {
+  ClosedLoopRig rig(rail());
+  rig.run();
+  ASSERT_FALSE(rig.records.empty());
+  double worst_m = 0.0;
+  for (std::size_t k = 0; k < rig.records.size(); ++k) {
+    if (rig.records[k].phase != Phase::rendering) continue;
+    const double target_m = rig.records[k].target_counts[0] / rig.cell.drives[0].counts_per_rad();
+    worst_m = std::max(worst_m, std::abs(target_m - rail_m(rig.records[k], rig)));
+  }
+  // Slower than 0.1 m/s, 20 ms late at the most.
+  EXPECT_LT(worst_m, 0.002);
+}
+
+struct LineFault {
+  const char* script;
+  fieldbus::DriveFault fault;
+  std::size_t most_cycles;  // from the failure to the stop: one exchange of 5 ms, or the 60 ms of stale_after_s
+  const char* message;
+};
+
+class ModbusLineFaults : public ::testing::TestWithParam<LineFault> {};
+
+TEST_P(ModbusLineFaults, StopAllAxes) {
+  ClosedLoopRig rig(rail({std::string("rail:") + GetParam().script + "@1.9s"}));
+  rig.run();
+  ASSERT_EQ(rig.fault().fault, Fault::drive_fault) << fault_name(rig.fault().fault);
+  EXPECT_EQ(rig.fault().where, 0);
+  const fieldbus::CyclicDrive& drive = rig.cycle->parts().drives[0].drive;
+  EXPECT_EQ(drive.fault(), GetParam().fault) << drive.describe();
+  EXPECT_THAT(drive.describe(), ::testing::HasSubstr(GetParam().message));
+  EXPECT_LE(rig.fault().cycle, rig.cycle_at(1.9) + GetParam().most_cycles);
+  EXPECT_EQ(rig.cycle->supervisor().phase(), Phase::done);
+  // The arm on CAN ran out and is switched off; the rail's drive has stopped by its own communication timeout or its
+  // control word. Nothing moves.
+  for (std::size_t axis = 1; axis < 6; ++axis) {
+    EXPECT_NE(rig.far_end.drive(axis).state(), sim::DriveState::operation_enabled);
+  }
+  const auto first = static_cast<std::size_t>(rig.fault().cycle);
+  const sim::Truth last = rig.far_end.truth();
+  EXPECT_LT((last.X_WT.translation() - rig.truths[first].X_WT.translation()).norm(), 0.02);
+  EXPECT_LT(last.velocity_W.norm(), 2e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, ModbusLineFaults,
+    ::testing::Values(
+        LineFault{"exception", fieldbus::DriveFault::modbus_exception, 8, "server device failure"},
+        LineFault{"closed", fieldbus::DriveFault::modbus_closed, 8, "connection was closed"},
+        LineFault{"wrong_unit", fieldbus::DriveFault::modbus_wrong_unit, 8, "another unit"},
+        LineFault{"silent", fieldbus::DriveFault::modbus_timeout, 70, "no complete Modbus answer in time"},
+        LineFault{"half_answer", fieldbus::DriveFault::modbus_timeout, 70, "no complete Modbus answer in time"}),
+    [](const auto& fault) { return std::string(fault.param.script); });
+
+}  // namespace
+}  // namespace proxarm::controller
