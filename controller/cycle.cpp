@@ -203,6 +203,7 @@ void Cycle::judge_buses() noexcept {
     const fieldbus::BusStatus& status = parts_.network.bus(bus).status();
     const auto where = static_cast<std::int32_t>(bus);
     if (status.state == fieldbus::BusState::bus_off) raise(Fault::bus_off, where);
+    if (status.state == fieldbus::BusState::error_passive) raise(Fault::error_passive, where);
     if (status.receive_overflows > 0) {
       raise(Fault::receive_overflow, where, static_cast<double>(status.receive_overflows));
     }

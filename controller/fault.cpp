@@ -66,6 +66,8 @@ constexpr std::array texts{
               "use a longer --timestep, or a faster or less loaded machine"},
     FaultText{Fault::second_master, "second_master", "another master commands this bus", nullptr,
               "end the other controller or configuration tool, or unplug it, before the next start"},
+    FaultText{Fault::error_passive, "error_passive", "the CAN controller is error passive: 128 errors or more", nullptr,
+              "check termination, bitrate and cable of this bus before it goes off altogether"},
 };
 
 const FaultText& text_of(Fault fault) noexcept {

@@ -34,6 +34,7 @@ enum class Fault : std::uint8_t {
   receive_overflow,     // the kernel dropped frames: controlled stop
   overrun,              // more than max_overruns cycles in a row were late: controlled stop
   second_master,  // somebody else sends SYNC, NMT commands, setpoints or the controller's heartbeat: controlled stop
+  error_passive,  // a CAN controller counts so many errors that it may only listen for them: controlled stop
 };
 
 // A fault, where it was seen, and when.

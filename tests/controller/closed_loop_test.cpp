@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <string>
 
+#include "models/description/setup_error.hpp"
 #include "tests/controller/closed_loop_rig.hpp"
 
 namespace proxarm::controller {
@@ -183,6 +185,86 @@ TEST(ClosedLoop, StopsTheOtherBusAtOnceWhenAnInterfaceGoesDown) {
   EXPECT_LE(rig.fault().cycle, rig.cycle_at(failure_s) + 1);
   expect_targets_run_out(rig);
   expect_arm_at_rest(rig, 0.01);
+}
+
+// The bus still works, but the next errors would end it.
+TEST(ClosedLoop, StopsAtOnceWhenABusIsErrorPassive) {
+  ClosedLoopRig rig(
+      {.script = {{{.action = fieldbus::FaultAction::error_passive, .bus = "axes_1_3", .from_ns = failure_ns}}}});
+  rig.run();
+  expect_controlled_stop(rig, Fault::error_passive, 0, 1);
+}
+
+// TPDO1 of node 2 with 4 bytes instead of 6: statusword and half a position.
+TEST(ClosedLoop, StopsWhenATpdoIsShort) {
+  ClosedLoopRig rig({.script = {{{.action = fieldbus::FaultAction::resize,
+                                  .bus = "axes_1_3",
+                                  .id = 0x182,
+                                  .mask = 0x7FF,
+                                  .from_ns = failure_ns,
+                                  .receiver = "controller",
+                                  .length = 4}}}});
+  rig.run();
+  expect_controlled_stop(rig, Fault::drive_fault, 1, 2);
+  EXPECT_EQ(rig.cycle->parts().drives[1].drive.fault(), fieldbus::DriveFault::pdo_short);
+}
+
+// One TPDO later than its cycle counts as missed, and three in a row are tolerated.
+TEST(ClosedLoop, RidesThroughThreeLateTpdos) {
+  ClosedLoopRig rig({.script = {{{.action = fieldbus::FaultAction::delay,
+                                  .bus = "axes_4_6",
+                                  .id = 0x185,
+                                  .mask = 0x7FF,
+                                  .from_ns = failure_ns,
+                                  .count = 3,
+                                  .receiver = "controller",
+                                  .delay_ns = 700'000}}}});
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+}
+
+// A node that never yields: nothing of ours gets through, ten frames wait, and the eleventh is refused (ENOBUFS).
+TEST(ClosedLoop, StopsTheOtherBusWhenTheQueueIsFull) {
+  fieldbus::CanFrame urgent;
+  urgent.id = 0x010;
+  urgent.length = 8;
+  ClosedLoopRig rig({.script = {{{.action = fieldbus::FaultAction::babble,
+                                  .bus = "axes_4_6",
+                                  .from_ns = failure_ns,
+                                  .to_ns = failure_ns + 300'000'000,
+                                  .frame = urgent,
+                                  .period_ns = 100'000}}}});
+  rig.run();
+  EXPECT_TRUE(rig.fault().fault == Fault::send_failed || rig.fault().fault == Fault::drive_silent)
+      << fault_name(rig.fault().fault);
+  EXPECT_LE(rig.fault().cycle, rig.cycle_at(failure_s) + 4);
+  expect_arm_at_rest(rig, 0.01);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_NE(rig.far_end.drive(axis).state(), sim::DriveState::operation_enabled) << "the bus that still works";
+  }
+}
+
+// Set-up ends with the node and the object that went unanswered; nothing has moved.
+TEST(ClosedLoop, IsRefusedWhenADriveDoesNotAnswerItsSdo) {
+  ClosedLoopRig rig({.device_faults = {"axis_2:sdo"}});
+  try {
+    rig.run();
+    FAIL();
+  } catch (const description::SetupError& error) {
+    EXPECT_NE(std::string(error.what()).find("no answer"), std::string::npos) << error.what();
+    EXPECT_EQ(error.problem().node, 2);
+  }
+}
+
+TEST(ClosedLoop, IsRefusedWhenAnotherDeviceHasADrivesNode) {
+  ClosedLoopRig rig({.device_faults = {"axis_5:device_type=0x00030191"}});
+  try {
+    rig.run();
+    FAIL();
+  } catch (const description::SetupError& error) {
+    EXPECT_NE(std::string(error.what()).find("device type"), std::string::npos) << error.what();
+    EXPECT_EQ(error.problem().node, 5);
+  }
 }
 
 // Somebody's EMCY in the name of node 5, which itself feels fine: 4210h, excess temperature.

@@ -7,6 +7,7 @@
 
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
+#include "models/description/modbus_drive.hpp"
 #include "models/description/quantity.hpp"
 #include "models/description/sensor.hpp"
 #include "models/description/yaml_file.hpp"
@@ -18,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(data) + 1, size - 1);
   const auto parse = [&] { return description::YamlNode::parse(text, "fuzz.yaml"); };
   try {
-    switch (data[0] % 4) {
+    switch (data[0] % 8 == 4 ? 4 : data[0] % 4) {
       case 0:
         (void)description::read_cell(parse());
         break;
@@ -27,6 +28,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         break;
       case 2:
         (void)description::read_hand(parse());
+        break;
+      case 4:
+        (void)description::read_modbus_drive(parse());
         break;
       default:
         (void)description::parse_duration(text);
