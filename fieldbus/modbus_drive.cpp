@@ -256,7 +256,7 @@ void ModbusDrive::judge() noexcept {
 
 bool ModbusDrive::set_target_rad(double angle_rad) noexcept {
   Setpoint setpoint{.time_ns = now_ns_, .counts = static_cast<double>(feedback_.position_counts)};
-  setpoint.drive_it = goal_ == DriveGoal::operation_enabled && fault_ == DriveFault::none;
+  setpoint.drive_it = goal_ == DriveGoal::operation_enabled;
   const auto counts = scale_.counts(angle_rad);
   if (following_ && !counts) raise(DriveFault::target_out_of_range);
   const bool taken = following_ && counts.has_value();

@@ -171,7 +171,6 @@ void ModbusDevice::obey(std::int64_t time_ns) noexcept {
   if (timed_out_) return;
   if (!enabled_) axis_.enable(time_ns);
   enabled_ = true;
-  last_command_ns_ = time_ns;
   const double way = std::abs(static_cast<double>(position) - axis_.demand_counts());
   constexpr double shortest_ns = 1e6, longest_ns = 1e9;
   const double takes_ns = speed > 0 ? 1e9 * way / static_cast<double>(speed) : longest_ns;

@@ -64,7 +64,6 @@ class ModbusDevice {
   ModbusFault fault_ = ModbusFault::none;
   bool commanded_ = false, requested_ = false, enabled_ = false, timed_out_ = false;
   std::int64_t last_request_ns_ = 0;
-  std::int64_t last_command_ns_ = 0;
 };
 
 }  // namespace proxarm::sim

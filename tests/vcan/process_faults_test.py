@@ -82,6 +82,29 @@ class ProcessFaults(two.VcanTestCase):
             self.assertLess(abs(rest - at_kill), 5e-3 * COUNTS_PER_RAD)
         self.assert_drives_off(seen)
 
+    def test_drives_of_a_stopped_controller_stop_by_themselves(self):
+        """SIGSTOP: the process is there, its sockets too, and nothing comes any more. When it goes on, it finds that it
+        was late and another master's SYNCs on the bus, and ends."""
+        with two.simulated_arm(two.THREE), two.candump(*two.INTERFACES) as witness, \
+                two.controller(two.THREE, "60s") as run:
+            time.sleep(MID_MOTION_S)
+            run.send(signal.SIGSTOP)
+            stopped_us = time.time_ns() // 1000
+            send_syncs()
+            run.send(signal.SIGCONT)
+            status = run.wait()
+            seen = two.frames_of(witness)
+        self.assertEqual(status, 1)
+        for node in two.NODES:
+            emergencies = [(f.time_us - stopped_us, f.data[:2]) for f in two.of_node(seen, two.EMCY, node)]
+            self.assertEqual([code for _, code in emergencies][:2], [bytes([0x50, 0x82]), bytes([0x30, 0x81])])
+            self.assertTrue(3_000 <= emergencies[0][0] <= 7_000, emergencies)
+            told = [(time_us, position) for time_us, _, position in feedback(seen, node)]
+            at_stop = [position for time_us, position in told if time_us <= stopped_us][-1]
+            still = [p for time_us, p in told if stopped_us + 30_000 < time_us < stopped_us + 300_000]
+            self.assertLess(max(abs(position - at_stop) for position in still), 5e-3 * COUNTS_PER_RAD)
+            self.assertLessEqual(max(still) - min(still), 20)
+
     def test_a_killed_arm_is_told_of_and_the_record_is_whole(self):
         record = self.folder / "record"
         with two.simulated_arm(two.THREE) as arm, two.controller(two.THREE, "60s", record) as run:
