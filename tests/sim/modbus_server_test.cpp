@@ -3,7 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <thread>
+
 #include "fieldbus/modbus_client.hpp"
+#include "fieldbus/modbus_line.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/modbus_server.hpp"
 
@@ -145,6 +151,47 @@ TEST(ModbusConnection, ToNobodyIsRefused) {
   } catch (const description::SetupError& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("the Modbus line can't be opened"));
   }
+}
+
+// The whole of a real line: worker thread, TCP, server thread; here the cycle and the physics share this thread.
+TEST(ModbusThread, MovesADriveWhileTheCycleNeverWaits) {
+  StillAxis axis;
+  const auto registers =
+      description::load_modbus_drive(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/drives/generic_absolute.yaml");
+  ModbusDevice device{registers, 1, 1e6, axis};
+  axis.position = 500;
+  device.on_time(0);
+  ModbusServer server(loopback(0), {&device});
+  description::DriveDescription joint;
+  joint.node = 1;
+  joint.profile = "modbus";
+  joint.counts_per_motor_revolution = 2.0 * M_PI * 1000.0;
+  joint.gear_ratio = 1.0;
+  joint.range_rad = {-10.0, 10.0};
+  description::ModbusDriveDescription patient = registers;
+  patient.stale_after_s = 2.0;  // a loaded machine
+  fieldbus::ModbusDrive drive(joint, patient, 1'000'000);
+  fieldbus::ModbusLine line(loopback(server.port()), fieldbus::open_modbus(loopback(server.port()), patience_s),
+                            {&drive});
+  const auto now_ns = [] {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  };
+  line.start_up(now_ns());
+  line.start();
+  drive.request(fieldbus::DriveGoal::operation_enabled);
+  double target = 0.5;
+  for (int cycle = 0; cycle < 20'000 && axis.target != 600; ++cycle) {
+    drive.on_sync(now_ns());
+    if (drive.set_target_rad(target)) target = std::min(0.6, target + 1e-4);
+    device.on_time(now_ns());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(drive.following()) << drive.describe();
+  EXPECT_EQ(axis.target, 600);
+  EXPECT_EQ(drive.fault(), fieldbus::DriveFault::none) << drive.describe();
+  EXPECT_GT(drive.achieved_rate_Hz(), 0.0);
+  line.stop();
 }
 
 TEST(ModbusDrive, StopsByItselfWithoutRequests) {
