@@ -139,6 +139,22 @@ bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // beyond it, and it wouldn't have let the proxy around
 }
 
+// From where the straight way enters, along the face to its edge.
+Vec3 BoxObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
+  const Crossing c = cross(q, p);
+  if (!c.any() || c.face < 0 || step(1.0, p, q).touches) return q;
+  const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(c.face)];
+  const Vec3 from = entered.projection(q + std::max(c.enter, 0.0) * (p - q));
+  const Vec3 d = step_on_face(entered, mu_, p, q).r - from, from_l = local(from), d_l = axes_.transpose() * d;
+  double share = 1.0;
+  for (int k = 0; k < 3; ++k) {
+    if (k == c.face / 2 || !(std::abs(from_l[k] + d_l[k]) > half_[k])) continue;
+    const double at = (std::copysign(half_[k], d_l[k]) - from_l[k]) / d_l[k];
+    share = std::clamp(at, 0.0, share);
+  }
+  return from + share * d;
+}
+
 Obstacle::Tangent BoxObstacle::tangent(const Vec3& /*r*/, std::int32_t feature) const noexcept {
   return {faces_[static_cast<std::size_t>(feature)], mu_};
 }

@@ -128,6 +128,23 @@ bool CylinderObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;
 }
 
+// From where the straight way enters, along the side or the end to the rim.
+Vec3 CylinderObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
+  const Crossing c = cross(q, p);
+  if (!c.any() || c.feature < 0 || step(1.0, p, q).touches) return q;
+  const Vec3 from = q + std::max(c.enter, 0.0) * (p - q);
+  const Vec3 d = (c.feature == side ? side_.step(1.0, p, q) : end_[c.feature - 1].step(1.0, p, q)).r - from;
+  if (c.feature == side) {
+    const double z = along(from), rise = e_.dot(d), share = (std::copysign(half_, rise) - z) / rise;
+    const Vec3 on_rim = from + (rise != 0.0 ? std::clamp(share, 0.0, 1.0) : 0.0) * d, u = radial(on_rim);
+    return on_rim + (R_ / u.norm() - 1.0) * u;
+  }
+  // ‖u + t v‖ = R on the end.
+  const Vec3 u = radial(from), v = radial(d);
+  const double a = v.squaredNorm(), b = u.dot(v), inside = std::max(0.0, R_ * R_ - u.squaredNorm());
+  return a > 0.0 ? Vec3(from + std::min(1.0, (std::sqrt(b * b + a * inside) - b) / a) * d) : from;
+}
+
 Obstacle::Tangent CylinderObstacle::tangent(const Vec3& r, std::int32_t feature) const noexcept {
   return feature == side ? side_.tangent(r, 0) : end_[feature - 1].tangent(r, 0);
 }

@@ -13,7 +13,9 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr int kPieces = 512;  // straight pieces of one step: more are given up, and the proxy stays where they led
+// What one step may cost, in about 15 ns: what needs more is given up, and the proxy stays where it got to. Deciding on
+// a way takes `kLook`, or `kFarLook` beyond the faces that are remembered; solving for two or three faces `kSolve`.
+constexpr int kBudget = 24'000, kLook = 20, kFarLook = 100, kSolve = 20;
 
 // In lifts. A face holds the proxy until it is `kPast` past its side. There it is in front of the next face as well if
 // that turns away by an angle φ of less than 165° (its height there: cos φ + kPast sin φ > 0). On an edge's own line
@@ -35,7 +37,8 @@ MeshSurface::Walk::Walk(MeshSurface& surface, const Vec3& to, const Vec3& from) 
       q(from),
       c(from),
       p_at(to),
-      came_from(kNone) {
+      came_from(kNone),
+      budget(kBudget) {
   const double far = (p - q).lpNorm<1>();
   if (far > 1e12) p_at = q + (p - q) * (1e12 / far);  // beyond any mesh, and within what predicates are exact for
   for (double& x : c) {
@@ -55,7 +58,8 @@ Vec3 MeshSurface::Walk::run() noexcept {
   }
   Went went = leave_planes() ? Went::on : Went::nowhere;
   Vec3 start = c;
-  for (int piece = 0; piece < kPieces && went == Went::on; ++piece) {
+  while (went == Went::on && budget > 0) {
+    budget -= kLook;
     went = try_free();
     if (went == Went::nowhere) went = try_singles();
     if (went == Went::nowhere) went = try_pairs();
@@ -71,6 +75,12 @@ bool MeshSurface::Walk::touches(std::uint32_t index) const noexcept {
     if (touched[i].face == index) return true;
   }
   return false;
+}
+
+TriangleMesh::Hit MeshSurface::Walk::look(const Vec3& x, const Vec3& y) noexcept {
+  const TriangleMesh::Hit hit = s.first_hit(x, y);
+  budget -= s.has_near(x) && s.has_near(y) ? kLook : kFarLook;
+  return hit;
 }
 
 // By index, so that nothing depends on the order in which faces are found.
@@ -177,7 +187,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::run_into(const TriangleMesh::Hit& hit
   const double there = side * TriangleMesh::height(face, towards) - lift;
   if (over > 0.0 && there < over) {
     const Vec3 x = c + (over / (over - there)) * (towards - c);
-    if (x.allFinite() && !s.first_hit(c, x).any()) {
+    if (x.allFinite() && !look(c, x).any()) {
       c = x;
       touch();
     }
@@ -192,7 +202,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::go(const Target& target) noexcept {
   const Vec3 x = whole ? target.r : Vec3(c + target.share * (target.r - c));
   if (!x.allFinite()) return Went::nowhere;
   if (x != c) {
-    const TriangleMesh::Hit hit = s.first_hit(c, x);
+    const TriangleMesh::Hit hit = look(c, x);
     if (hit.any()) return run_into(hit, x);
   }
   if (whole) report(target.count, target.of, target.slips);
@@ -210,7 +220,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_free() noexcept {
     mesh.test(touched[i].face, mesh.face(touched[i].face), c, p_at, size_c, size_p, hit);
   }
   if (hit.any()) return Went::nowhere;
-  hit = s.first_hit(c, p_at);
+  hit = look(c, p_at);
   if (hit.any()) return run_into(hit, p_at);
   c = p;
   return Went::arrived;
@@ -231,7 +241,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_singles() noexcept {
     // on the other: the nearer to p is taken, which is the choice that depends least on K.
     distance2[found++] = (step.r - p).squaredNorm() * (share < 1.0 ? 1e100 : 1.0);
   }
-  for (std::size_t tried = 0; tried < found; ++tried) {
+  for (std::size_t tried = 0; tried < found && budget > 0; ++tried) {
     const auto best = std::min_element(distance2.begin(), distance2.begin() + static_cast<std::ptrdiff_t>(found));
     const Went went = go(targets[static_cast<std::size_t>(best - distance2.begin())]);
     if (went != Went::nowhere) return went;
@@ -242,7 +252,8 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_singles() noexcept {
 
 MeshSurface::Walk::Went MeshSurface::Walk::try_pairs() noexcept {
   for (std::size_t j = 1; j < count; ++j) {
-    for (std::size_t i = 0; i < j; ++i) {
+    for (std::size_t i = 0; i < j && budget > 0; ++i) {
+      --budget;
       const Went went = try_pair(i, j);
       if (went != Went::nowhere) return went;
     }
@@ -258,6 +269,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_pair(std::size_t i, std::size_t j
   const bool edge = shares - shared.begin() == 2;
   if (!edge && count > kAll) return Went::nowhere;
 
+  budget -= kSolve;
   const FlatSurface<3> f = touched[i].surface(), g = touched[j].surface();
   GrooveLine line(f, g);
   if (!line.exists || 1.0 + line.cos < kSharpest) return Went::nowhere;
@@ -305,7 +317,8 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_triples() noexcept {
   if (count > kAll) return Went::nowhere;
   for (std::size_t k = 2; k < count; ++k) {
     for (std::size_t j = 1; j < k; ++j) {
-      for (std::size_t i = 0; i < j; ++i) {
+      for (std::size_t i = 0; i < j && budget > 0; ++i) {
+        budget -= kSolve;
         const std::size_t of[3] = {i, j, k};
         const FlatSurface<3> surface[3] = {touched[i].surface(), touched[j].surface(), touched[k].surface()};
         const FlatSurface<3>* const surfaces[3] = {&surface[0], &surface[1], &surface[2]};

@@ -32,6 +32,7 @@ struct MeshSurface::Walk {
   Walk(MeshSurface& surface, const Vec3& to, const Vec3& from) noexcept;
   Vec3 run() noexcept;
 
+  [[nodiscard]] TriangleMesh::Hit look(const Vec3& x, const Vec3& y) noexcept;
   void touch() noexcept;
   void touch(std::uint32_t index, const TriangleMesh::Face& face) noexcept;
   void add(std::uint32_t index, const TriangleMesh::Face& face, int side) noexcept;
@@ -60,6 +61,7 @@ struct MeshSurface::Walk {
   Vec3 c;                   // where it is
   Vec3 p_at;                // p, or where the way there ends for tests if it is out of all proportion
   std::uint32_t came_from;  // the face whose side was passed in the last move
+  int budget;               // what the step may still cost
   std::size_t count = 0;
   std::array<Side, kMost> touched;
 };

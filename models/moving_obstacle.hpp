@@ -69,6 +69,11 @@ class MovingObstacle final : public Obstacle {
     const Pose inverse = now_.inverse(Eigen::Isometry);
     return still_->excludes(inverse * q, inverse * r);
   }
+  [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override {
+    const Pose inverse = now_.inverse(Eigen::Isometry);
+    const Vec3 q_O = before_.inverse(Eigen::Isometry) * q, w = still_->detour(inverse * p, q_O);
+    return w == q_O ? q : Vec3(now_ * w);
+  }
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override {
     const Tangent t = still_->tangent(now_.inverse(Eigen::Isometry) * r, feature);
     return {FlatSurface<3>::of_unit(now_ * t.surface.point(), now_.linear() * t.surface.normal()), t.mu};

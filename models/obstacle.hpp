@@ -49,6 +49,10 @@ class Obstacle {
   // True if r can't be where a proxy from q ends: inside by more than rounding, or on the far side of a thin object.
   [[nodiscard]] virtual bool excludes(const Vec3& q, const Vec3& r) const noexcept = 0;
 
+  // Where a proxy that gets around the object on its way from q to p (step() doesn't touch, though the straight way
+  // passes the inside) leaves the surface it slid on; q itself if there is no such point.
+  [[nodiscard]] virtual Vec3 detour(const Vec3& /*p*/, const Vec3& q) const noexcept { return q; }
+
   // The tangent plane at the point of the surface next to r; `feature` is the one that step() found.
   [[nodiscard]] virtual Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept = 0;
 

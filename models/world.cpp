@@ -32,6 +32,7 @@ struct World::Candidates {
   std::array<Obstacle::Step, most> alone{};
   std::size_t count = 0;
   bool grew = false;
+  bool around = false;  // points beyond an object count as reached where it lets the proxy go around, see gets_around()
 
   [[nodiscard]] bool has(std::size_t i) const noexcept {
     return std::find(index.begin(), index.begin() + static_cast<std::ptrdiff_t>(count), i) !=
@@ -116,6 +117,17 @@ void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& c
   }
 }
 
+// Not straight, but over the edge where the obstacle lets go of the proxy on its way to p; all others have to let it
+// pass there, too.
+bool World::gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept {
+  const Vec3 edge = obstacle.detour(p, q);
+  if (edge == q || obstacle.excludes(edge, r)) return false;
+  return std::all_of(near_.begin(), near_.end(), [&](std::size_t i) {
+    const Obstacle& other = *entries_[i].obstacle;
+    return &other == &obstacle || (!other.excludes(other.carry(q), edge) && !other.excludes(edge, r));
+  });
+}
+
 bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
                  const Vec3& p) const noexcept {
   bool all = true;
@@ -123,6 +135,7 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
     if (std::find(contacts.begin(), contacts.end(), i) != contacts.end()) continue;
     const Obstacle& obstacle = *entries_[i].obstacle;
     if (!obstacle.excludes(obstacle.carry(q), r)) continue;
+    if (candidates.around && gets_around(obstacle, p, q, r)) continue;
     all = false;
     if (!candidates.has(i)) {
       // It isn't in the way of p, but of the trial: what it would do to that tells its feature.
@@ -312,7 +325,12 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
     return p;
   }
   Choice choice;
-  if (!search(K, p, q, candidates, choice)) {
+  bool found = search(K, p, q, candidates, choice);
+  if (!found) {
+    candidates.around = true;
+    found = search(K, p, q, candidates, choice);
+  }
+  if (!found) {
     // A tool so deep that tangent planes lead nowhere (beyond the radius of a curved surface): as far as a shorter step
     // leads, or where it was.
     ++unresolved_;

@@ -48,6 +48,7 @@ class World final : public GeometricAlgorithm<3> {
   void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept;
   bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
             const Vec3& p) const noexcept;
+  [[nodiscard]] bool gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept;
   void try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   void try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   void try_triples(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;

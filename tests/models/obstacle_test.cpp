@@ -100,6 +100,24 @@ TEST(Contract, BodiesTogether) {
                      edges);
 }
 
+// The box lets the proxy slide over its edge, the plane holds it beyond; each alone was refused because the straight
+// way there passes the box. No set was complete, and what a shorter step touched was reported with a force that it
+// couldn't bear.
+TEST(World, GetsOverABoxesEdgeOntoThePlaneBeyond) {
+  World g = world(entry<BoxObstacle>(0, Pose::Identity(), Vec3(0.4, 0.4, 0.4), 0.3),
+                  entry<PlaneObstacle>(1, Vec3(0, 0, 0), Vec3(0, 0.1, 1), 0.2));
+  const Vec3 q(0.2, 0.19901911828087324, -0.017404749897911184);
+  const Vec3 p(0.18926960744093457, 0.2020816112095713, -0.022821072597969165);
+  const double K = 22349.497;
+  const Vec3 r = g(K, p, q);
+  EXPECT_EQ(g.unresolved_steps(), 0u);
+  ASSERT_EQ(g.contacts().size(), 1u);
+  EXPECT_EQ(g.contacts()[0].object, 1);
+  EXPECT_TRUE(obeys_17<3>(g.contacts(), small_steps({0.3, 0.2}), K, p, q, r)) << r.transpose();
+  EXPECT_GT(r.y(), 0.2);
+  EXPECT_LE(std::abs(r.z() + 0.1 * r.y()), 1e-15);
+}
+
 // On a sphere friction has a closed form: the force makes the angle β = atan μ with the normal, so the line of the
 // force passes the centre at R sin β, and the proxy stops where it does. All in the plane of p, q and the centre.
 TEST(Sphere, SlidesToTheFrictionCircle) {
