@@ -5,6 +5,7 @@
 
 #include "fieldbus/ati_net_can_oem.hpp"
 #include "fieldbus/canopen_pdo.hpp"
+#include "fieldbus/described_sensor.hpp"
 #include "fieldbus/identifier_check.hpp"
 #include "models/description/setup_error.hpp"
 
@@ -50,8 +51,10 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
     settings.base_id = cell.sensor.base_id;
     return std::make_unique<fieldbus::AtiNetCanOem>(settings);
   }
-  throw SetupError(
-      {.file = sensor.file.string(), .key = "protocol", .found = sensor.protocol, .expected = "ati_net_can_oem"});
+  fieldbus::DescribedSensorSettings settings;
+  settings.bus_name = cell.sensor.bus;
+  settings.base_id = cell.sensor.base_id;
+  return std::make_unique<fieldbus::DescribedSensor>(sensor, settings);
 }
 
 DriveOnBus make_drive(const description::Cell& cell, const description::DriveDescription& drive,
@@ -140,7 +143,7 @@ void refuse_shared_identifiers(CycleParts& parts) {
       used.push_back({axis.bus, id, "drive of " + axis.drive.description().joint});
     }
   }
-  for (const std::uint32_t id : parts.sensor->wanted_ids()) used.push_back({parts.sensor_bus, id, "force sensor"});
+  for (const std::uint32_t id : parts.sensor->used_ids()) used.push_back({parts.sensor_bus, id, "force sensor"});
   fieldbus::refuse_shared_identifiers(used, names);
 }
 

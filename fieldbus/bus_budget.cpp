@@ -78,6 +78,7 @@ void check_pairs(const PlannedBus& bus) {
       if (one.name == two.name) refuse(bus, two, "two frames have this name");
       if (one.id != two.id || one.shape.extended != two.shape.extended) continue;
       if (two.after == one.name || one.after == two.name) continue;  // an answer on the question's own identifier
+      if (!two.sender.empty() && two.sender == one.sender && !two.after.empty()) continue;  // one after the other
       refuse(bus, two, "has the same identifier as \"" + one.name + "\"; give one of them another");
     }
   }

@@ -33,6 +33,9 @@ struct ForceSample {
   std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
 };
 
+// Marks a 29-bit identifier in lists of identifiers, as CAN_EFF_FLAG does.
+inline constexpr std::uint32_t extended_id_flag = 0x80000000U;
+
 class ForceSensor {
  public:
   ForceSensor() = default;
@@ -42,6 +45,8 @@ class ForceSensor {
 
   // ---- before the cycle ----
   [[nodiscard]] virtual std::vector<std::uint32_t> wanted_ids() const = 0;  // for the kernel's filters
+  // All that it sends and is sent, for the check that nobody else does.
+  [[nodiscard]] virtual std::vector<std::uint32_t> used_ids() const { return wanted_ids(); }
   // Reads and checks what the sensor says of itself, and starts it; throws SetupError. Frames of others go to `other`.
   virtual void start(CanNetwork& network, std::size_t bus, const FrameHandler& other = {}) = 0;
   // What was learned at start: make, serial number, calibration; one line for the log.

@@ -77,6 +77,7 @@ void AtiDevice::answer(std::uint8_t operation, std::span<const std::uint8_t> byt
 
 void AtiDevice::send_sample_frame(std::uint8_t operation, std::span<const std::uint8_t> bytes,
                                   std::int64_t time_ns) noexcept {
+  if (faults_.lost_one_in > 0 && ++frames_ % faults_.lost_one_in == 0) return;
   if (faults_.short_frames) bytes = bytes.first(bytes.size() - 1);
   answer(operation, bytes, time_ns);
   if (faults_.duplicated) answer(operation, bytes, time_ns);
@@ -85,6 +86,7 @@ void AtiDevice::send_sample_frame(std::uint8_t operation, std::span<const std::u
 void AtiDevice::send_sample(std::int64_t time_ns) noexcept {
   if (faults_.silent_samples) return;
   if (!faults_.frozen) last_ = gauges_.gauges(time_ns);
+  if (faults_.saturated) last_[0] = 32767;
   std::array<std::uint8_t, 8> first{};
   std::array<std::uint8_t, 6> second{};
   put_u16(first, 0, static_cast<std::uint16_t>(faults_.status_bits == 0 ? 0 : faults_.status_bits | any_error));

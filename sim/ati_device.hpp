@@ -21,6 +21,7 @@
 #include <string>
 
 #include "sim/device_port.hpp"
+#include "sim/sensor_faults.hpp"
 
 namespace proxarm::sim {
 
@@ -46,19 +47,6 @@ struct AtiDeviceConfig {
   std::int64_t start_time_ns = 10'000'000;  // from power or reset to the first answer
 };
 
-// What can be wrong with a sensor. All off: a good one.
-struct AtiFaults {
-  bool silent = false;            // answers nothing
-  bool silent_samples = false;    // answers everything but operation 0
-  bool frozen = false;            // repeats the sample that was the last when the fault began
-  bool half_sample = false;       // the second frame of each sample is missing
-  bool swapped = false;           // the second frame of each sample comes first
-  bool duplicated = false;        // each frame of a sample comes twice
-  bool short_frames = false;      // each frame of a sample lacks its last byte
-  std::uint16_t status_bits = 0;  // set in the status word
-  std::int64_t delay_ns = 0;      // on top of the answer time
-};
-
 class AtiDevice final : public BusDevice {
  public:
   AtiDevice(const AtiDeviceConfig& config, GaugeSource& gauges, DevicePort& port);
@@ -67,7 +55,7 @@ class AtiDevice final : public BusDevice {
   void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
   void on_time(std::int64_t) noexcept override {}
 
-  [[nodiscard]] AtiFaults& faults() noexcept { return faults_; }
+  [[nodiscard]] SensorFaults& faults() noexcept { return faults_; }
 
  private:
   void send_sample(std::int64_t time_ns) noexcept;
@@ -78,9 +66,10 @@ class AtiDevice final : public BusDevice {
   AtiDeviceConfig config_;
   GaugeSource& gauges_;
   DevicePort& port_;
-  AtiFaults faults_;
+  SensorFaults faults_;
   std::array<std::int16_t, 6> last_{};
   std::uint8_t calibration_ = 0;
+  std::uint64_t frames_ = 0;
   std::int64_t ready_ns_ = INT64_MAX;
 };
 

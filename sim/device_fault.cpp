@@ -40,6 +40,9 @@ constexpr KindName kinds[] = {
     {"swapped", true, DeviceFaultKind::swapped, Value::none},
     {"duplicated", true, DeviceFaultKind::duplicated, Value::none},
     {"short", true, DeviceFaultKind::short_frames, Value::none},
+    {"checksum", true, DeviceFaultKind::bad_checksum, Value::none},
+    {"saturated", true, DeviceFaultKind::saturated, Value::none},
+    {"lost", true, DeviceFaultKind::lost, Value::needed},
     {"status", true, DeviceFaultKind::status, Value::needed},
     {"delay", true, DeviceFaultKind::delay, Value::needed},
 };

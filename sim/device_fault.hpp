@@ -38,6 +38,9 @@ enum class DeviceFaultKind : std::uint8_t {
   swapped,          // "swapped": the second frame comes first
   duplicated,       // "duplicated": each frame comes twice
   short_frames,     // "short": each frame lacks a byte
+  bad_checksum,     // "checksum": each sample's checksum is wrong
+  saturated,        // "saturated": the first channel is at its rail
+  lost,             // "lost": every VALUE-th frame of samples is lost
   status,           // "status": bits VALUE in the status word
   delay,            // "delay": answers VALUE microseconds later
 };

@@ -23,8 +23,17 @@ bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
   return number == node && base != 0x000 && base != 0x100 && base != 0x680 && base != 0x780;
 }
 
+std::vector<std::uint32_t> sensor_ids(const description::Cell& cell, const description::SensorDescription& sensor) {
+  std::vector<std::uint32_t> ids;
+  if (sensor.described && !sensor.described->extended) return sensor.described->wire_ids(cell.sensor.base_id);
+  if (sensor.described) return ids;  // 29 bits: no drive's
+  for (std::uint32_t operation = 0; operation < 16; ++operation) ids.push_back(cell.sensor.base_id << 4 | operation);
+  return ids;
+}
+
 // Two drives with one node number on one interface would answer each other's requests.
-void check_nodes(const description::Cell& cell, const std::vector<std::size_t>& interface_of_bus) {
+void check_nodes(const description::Cell& cell, const description::SensorDescription& sensor,
+                 const std::vector<std::size_t>& interface_of_bus) {
   if (interface_of_bus.size() != cell.buses.size()) {
     throw SetupError({.file = cell.file.string(),
                       .key = "buses",
@@ -40,9 +49,8 @@ void check_nodes(const description::Cell& cell, const std::vector<std::size_t>& 
   for (std::size_t i = 0; i < cell.drives.size(); ++i) {
     if (!cell.drives[i].on_can()) continue;
     const bool with_sensor = interface_of(cell.drives[i].bus) == interface_of(cell.sensor.bus);
-    for (std::uint32_t operation = 0; with_sensor && operation < 16; ++operation) {
-      const std::uint32_t id = cell.sensor.base_id << 4 | operation;
-      if (!is_used_by(cell.drives[i].node, id)) continue;
+    for (const std::uint32_t id : sensor_ids(cell, sensor)) {
+      if (!with_sensor || !is_used_by(cell.drives[i].node, id)) continue;
       char text[8];
       std::snprintf(text, sizeof text, "0x%03X", id);
       throw SetupError({.file = cell.file.string(),
@@ -81,7 +89,7 @@ FarEndProcess::FarEndProcess(const description::Cell& cell, const description::S
                              const description::HandDescription& hand, fieldbus::CanNetwork& network,
                              const std::vector<std::size_t>& interface_of_bus, const SimulatedCellConfig& config)
     : network_(network), events_(network.now_ns()), interface_of_bus_(interface_of_bus), tick_ns_(config.tick_ns) {
-  check_nodes(cell, interface_of_bus);
+  check_nodes(cell, sensor, interface_of_bus);
   cell_ = std::make_unique<SimulatedCell>(cell, sensor, hand, events_, config);
   for (std::size_t i = 0; i < cell_->node_count(); ++i) {
     DeviceNode& node = cell_->node(i);

@@ -94,19 +94,36 @@ Vec6 ForceSensorModel::filtered(const Piece& piece, std::int64_t time_ns) const 
   return piece.input + decay(std::max<std::int64_t>(0, time_ns - piece.start_ns)) * (piece.start - piece.input);
 }
 
-GaugeSample ForceSensorModel::sample(std::int64_t time_ns) const noexcept {
-  GaugeSample result;
+ForceSensorModel::Instant ForceSensorModel::latest_instant(std::int64_t time_ns) const noexcept {
   const auto instant = [&](std::int64_t number) {
     return static_cast<std::int64_t>(1e9 * (static_cast<double>(number) / rate_Hz_));
   };
-  result.number = static_cast<std::int64_t>(1e-9 * static_cast<double>(time_ns) * rate_Hz_);
-  if (instant(result.number) > time_ns) --result.number;
-  if (instant(result.number + 1) <= time_ns) ++result.number;
-  result.time_ns = instant(result.number);
+  Instant latest;
+  latest.number = static_cast<std::int64_t>(1e-9 * static_cast<double>(time_ns) * rate_Hz_);
+  if (instant(latest.number) > time_ns) --latest.number;
+  if (instant(latest.number + 1) <= time_ns) ++latest.number;
+  latest.time_ns = instant(latest.number);
+  return latest;
+}
 
-  Vec6 wrench = filtered(result.time_ns >= now_.start_ns ? now_ : before_, result.time_ns);
-  const std::uint64_t key = seed_ + 32 * static_cast<std::uint64_t>(result.number);
+Vec6 ForceSensorModel::noisy_wrench(const Instant& instant) const noexcept {
+  Vec6 wrench = filtered(instant.time_ns >= now_.start_ns ? now_ : before_, instant.time_ns);
+  const std::uint64_t key = seed_ + 32 * static_cast<std::uint64_t>(instant.number);
   for (int i = 0; i < 6; ++i) wrench[i] += noise_deviation_[i] * normal(key + 4 * static_cast<std::uint64_t>(i));
+  return wrench;
+}
+
+std::array<double, 6> ForceSensorModel::wrench(std::int64_t time_ns) const noexcept {
+  const Vec6 w = noisy_wrench(latest_instant(time_ns));
+  return {w[0], w[1], w[2], w[3], w[4], w[5]};
+}
+
+GaugeSample ForceSensorModel::sample(std::int64_t time_ns) const noexcept {
+  GaugeSample result;
+  const Instant instant = latest_instant(time_ns);
+  result.number = instant.number;
+  result.time_ns = instant.time_ns;
+  const Vec6 wrench = noisy_wrench(instant);
   const Vec6 counts = gauges_per_unit_ * wrench + bias_counts_;
   for (int i = 0; i < 6; ++i) {
     const double limited = std::clamp(std::nearbyint(counts[i]), -32768.0, 32767.0);

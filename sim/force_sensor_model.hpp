@@ -34,6 +34,8 @@ class ForceSensorModel {
   void set_wrench(std::int64_t time_ns, const models::Wrench& wrench_S) noexcept;
   // The latest sample at this time: not before the last but one set_wrench().
   [[nodiscard]] GaugeSample sample(std::int64_t time_ns) const noexcept;
+  // What went into that sample, noise included, before any gauge: fx fy fz (N), tx ty tz (Nm).
+  [[nodiscard]] std::array<double, 6> wrench(std::int64_t time_ns) const noexcept;
 
  private:
   using Vec6 = models::Vec<6>;
@@ -42,6 +44,11 @@ class ForceSensorModel {
     Vec6 start = Vec6::Zero(), input = Vec6::Zero();
   };
   [[nodiscard]] double decay(std::int64_t elapsed_ns) const noexcept;
+  struct Instant {
+    std::int64_t number = 0, time_ns = 0;
+  };
+  [[nodiscard]] Instant latest_instant(std::int64_t time_ns) const noexcept;
+  [[nodiscard]] Vec6 noisy_wrench(const Instant& instant) const noexcept;
   [[nodiscard]] Vec6 filtered(const Piece& piece, std::int64_t time_ns) const noexcept;
 
   Eigen::Matrix<double, 6, 6> gauges_per_unit_;  // matrix⁻¹ · counts per unit

@@ -115,6 +115,17 @@ class SimulatedCell::WirelessModbus final : public fieldbus::ModbusClient {
   std::vector<ModbusDevice*> devices_;
 };
 
+class SimulatedCell::PlantWrench final : public WrenchSource {
+ public:
+  explicit PlantWrench(const Plant& plant) : plant_(plant) {}
+  [[nodiscard]] std::array<double, 6> wrench(std::int64_t time_ns) noexcept override {
+    return plant_.force_sensor().wrench(time_ns);
+  }
+
+ private:
+  const Plant& plant_;
+};
+
 // ---- Set-up
 
 SimulatedCell::SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
@@ -177,11 +188,14 @@ std::unique_ptr<fieldbus::ModbusClient> SimulatedCell::modbus_client(const std::
 }
 
 void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
-  if (sensor.protocol != "ati_net_can_oem") {
-    throw SetupError({.file = sensor.file.string(),
-                      .key = "protocol",
-                      .found = description::in_quotes(sensor.protocol),
-                      .expected = "ati_net_can_oem, which is what can be simulated"});
+  Clockwork& clockwork = *this;
+  const std::size_t bus = bus_index(cell_.sensor.bus, "sensor.bus");
+  nodes_.push_back(std::make_unique<DeviceNode>("sensor", bus, events_, clockwork));
+  if (sensor.described) {
+    wrench_ = std::make_unique<PlantWrench>(plant_);
+    described_sensor_ = std::make_unique<DescribedDevice>(
+        sensor, DescribedDeviceConfig{.base_id = cell_.sensor.base_id}, *wrench_, *nodes_.back());
+    return nodes_.back()->set_device(*described_sensor_);
   }
   AtiDeviceConfig config;
   config.base_id = cell_.sensor.base_id;
@@ -192,9 +206,6 @@ void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
   }
   config.counts_per_force = sensor.simulation.counts_per_N;
   config.counts_per_torque = sensor.simulation.counts_per_Nm;
-  Clockwork& clockwork = *this;
-  const std::size_t bus = bus_index(cell_.sensor.bus, "sensor.bus");
-  nodes_.push_back(std::make_unique<DeviceNode>("sensor", bus, events_, clockwork));
   gauges_ = std::make_unique<PlantGauges>(plant_);
   sensor_ = std::make_unique<AtiDevice>(config, *gauges_, *nodes_.back());
   nodes_.back()->set_device(*sensor_);
@@ -229,6 +240,9 @@ void SimulatedCell::power_on() {
   advance_to(now_ns);
   for (const auto& node : nodes_) node->set_power(true, now_ns);
   schedule_faults();
+  if (described_sensor_ && described_sensor_->period_ns() > 0) {
+    events_.schedule(now_ns + described_sensor_->period_ns(), [this](std::int64_t time_ns) { convert(time_ns); });
+  }
   events_.schedule(now_ns + tick_ns_, [this](std::int64_t time_ns) { tick(time_ns); });
 }
 
@@ -239,6 +253,13 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   for (const auto& drive : modbus_drives_) {
     if (drive) drive->on_time(time_ns);
   }
+}
+
+// A streaming sensor's own clock: nothing on the bus sets it.
+void SimulatedCell::convert(std::int64_t time_ns) noexcept {
+  advance_to(time_ns);
+  described_sensor_->on_converter(time_ns);
+  events_.schedule(time_ns + described_sensor_->period_ns(), [this](std::int64_t next_ns) { convert(next_ns); });
 }
 
 void SimulatedCell::advance_to(std::int64_t time_ns) noexcept {
@@ -357,8 +378,12 @@ void SimulatedCell::set_modbus_fault(std::size_t axis, const DeviceFault& fault,
   modbus_drives_[axis]->set_fault(on ? kind : ModbusFault::none);
 }
 
+SensorFaults& SimulatedCell::sensor_faults() noexcept {
+  return described_sensor_ ? described_sensor_->faults() : sensor_->faults();
+}
+
 void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept {
-  AtiFaults& faults = sensor_->faults();
+  SensorFaults& faults = sensor_faults();
   switch (fault.kind) {
     case DeviceFaultKind::sensor_silent:
       faults.silent = on;
@@ -382,7 +407,16 @@ void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept
       faults.short_frames = on;
       return;
     case DeviceFaultKind::status:
-      faults.status_bits = on ? static_cast<std::uint16_t>(fault.value) : std::uint16_t{0};
+      faults.status_bits = on ? fault.value : 0;
+      return;
+    case DeviceFaultKind::bad_checksum:
+      faults.bad_checksum = on;
+      return;
+    case DeviceFaultKind::saturated:
+      faults.saturated = on;
+      return;
+    case DeviceFaultKind::lost:
+      faults.lost_one_in = on ? fault.value : 0;
       return;
     case DeviceFaultKind::delay:
       faults.delay_ns = on ? std::int64_t{fault.value} * 1'000 : 0;

@@ -19,6 +19,7 @@
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
 #include "sim/ati_device.hpp"
+#include "sim/described_device.hpp"
 #include "sim/device_fault.hpp"
 #include "sim/device_node.hpp"
 #include "sim/drive_device.hpp"
@@ -81,19 +82,21 @@ class SimulatedCell final : private Clockwork {
   [[nodiscard]] Plant& plant() noexcept { return plant_; }
   [[nodiscard]] DriveDevice& drive(std::size_t axis) noexcept { return *drives_[axis]; }                 // on CAN
   [[nodiscard]] ModbusDevice& modbus_drive(std::size_t axis) noexcept { return *modbus_drives_[axis]; }  // on Modbus
-  [[nodiscard]] AtiDevice& sensor() noexcept { return *sensor_; }
+  [[nodiscard]] SensorFaults& sensor_faults() noexcept;
   [[nodiscard]] const description::Cell& cell() const noexcept { return cell_; }
 
  private:
   class PlantAxis;
   class PlantGauges;
   class WirelessModbus;
+  class PlantWrench;
 
   void advance_to(std::int64_t time_ns) noexcept override;
   [[nodiscard]] Truth present_truth() const noexcept;
   void add_drive(std::size_t axis, const SimulatedCellConfig& config);
   void add_modbus_drive(std::size_t axis);
   void add_sensor(const description::SensorDescription& sensor);
+  void convert(std::int64_t time_ns) noexcept;
   void check_faults() const;
   void schedule_faults();
   void set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept;
@@ -115,7 +118,9 @@ class SimulatedCell final : private Clockwork {
   std::vector<std::unique_ptr<DriveDevice>> drives_;          // per axis; null: on Modbus
   std::vector<std::unique_ptr<ModbusDevice>> modbus_drives_;  // per axis; null: on CAN
   std::vector<std::size_t> node_of_axis_;
-  std::unique_ptr<AtiDevice> sensor_;
+  std::unique_ptr<PlantWrench> wrench_;
+  std::unique_ptr<AtiDevice> sensor_;  // one of these two
+  std::unique_ptr<DescribedDevice> described_sensor_;
   std::function<void(const Truth&)> observer_;
 };
 

@@ -70,6 +70,46 @@ void add_sensor(PlannedBus& bus, const PreparedSession& session) {
   for (const PlannedFrame& frame : {poll, first, second}) bus.frames.push_back(frame);
 }
 
+PlannedFrame described_frame(const description::SensorProtocol& protocol, std::uint32_t id, std::size_t bytes) {
+  PlannedFrame frame{.name = "", .id = id};
+  frame.shape.bytes = static_cast<int>(bytes);
+  frame.shape.extended = protocol.extended;
+  frame.shape.fd = protocol.fd;
+  frame.shape.bit_rate_switch = protocol.bit_rate_switch;
+  frame.sender = "sensor";
+  return frame;
+}
+
+// A polled sensor answers within the receive window. One that streams isn't in step with the cycle; where it sends
+// several samples per cycle they follow each other.
+void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
+  const description::SensorProtocol& protocol = *session.sensor.described;
+  const std::uint32_t base_id = session.cell.sensor.base_id;
+  const double cycles = protocol.streams() ? 1.0 / (session.settings.period_s * protocol.rate_Hz) : 1.0;
+  const int samples = protocol.streams() ? static_cast<int>(std::ceil(1.0 / std::min(cycles, 1.0) - 1e-9)) : 1;
+  std::string before;
+  if (protocol.poll) {
+    PlannedFrame poll =
+        described_frame(protocol, protocol.wire_id(protocol.poll->id, base_id), protocol.poll->data.size());
+    poll.name = before = "sensor poll";
+    poll.sender = "controller";
+    bus.frames.push_back(poll);
+  }
+  for (int sample = 0; sample < samples; ++sample) {
+    for (std::size_t i = 0; i < protocol.frames.size(); ++i) {
+      PlannedFrame frame =
+          described_frame(protocol, protocol.wire_id(protocol.frames[i].id, base_id), protocol.frames[i].bytes);
+      frame.name = "sensor frame " + std::to_string(i + 1) + (samples > 1 ? " of " + std::to_string(sample + 1) : "");
+      frame.any_time = protocol.streams() && before.empty();
+      frame.after = before;
+      if (protocol.streams()) frame.every_cycles = std::max(1, static_cast<int>(cycles));
+      if (protocol.poll) frame.deadline = controller::receive_window;
+      before = frame.name;
+      bus.frames.push_back(frame);
+    }
+  }
+}
+
 PlannedBus planned(const PreparedSession& session, const controller::BusIndices& indices, std::size_t index) {
   PlannedBus bus;
   bus.bitrate = 0;
@@ -87,7 +127,12 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     for (const description::DriveDescription& drive : session.cell.drives) {
       if (on_it(drive)) add_drive(bus, drive);
     }
-    if (session.cell.sensor.bus == own.name) add_sensor(bus, session);
+    if (session.cell.sensor.bus != own.name) continue;
+    if (session.sensor.described) {
+      add_described_sensor(bus, session);
+    } else {
+      add_sensor(bus, session);
+    }
   }
   return bus;
 }

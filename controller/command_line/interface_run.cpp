@@ -58,7 +58,11 @@ controller::BusIndices indices_in(const SocketCanNetwork& network, std::size_t b
 void set_filters(SocketCanNetwork& network, const controller::CycleParts& parts) {
   for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
     std::vector<fieldbus::CanFilter> filters;
-    for (const std::uint32_t id : controller::wanted_ids(parts, bus)) filters.push_back({.id = id, .mask = 0x7FF});
+    for (const std::uint32_t id : controller::wanted_ids(parts, bus)) {
+      const bool extended = (id & fieldbus::extended_id_flag) != 0;
+      const std::uint32_t mask = extended ? 0x1FFFFFFF : 0x7FF;
+      filters.push_back({.id = id & mask, .mask = mask, .extended = extended});
+    }
     network.set_filters(bus, filters);
   }
 }

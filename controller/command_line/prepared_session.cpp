@@ -56,6 +56,19 @@ std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, const 
   return settings.max_repeated_samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
 }
 
+// A sensor that sends less often than the cycle runs is missed only when several of its samples are.
+std::uint32_t missed_samples_allowed(const description::SensorDescription& sensor,
+                                     const controller::SessionSettings& settings) {
+  if (!sensor.described || !sensor.described->streams()) return settings.max_missed_samples;
+  const double cycles = 1.0 / (settings.period_s * sensor.described->rate_Hz);
+  return settings.max_missed_samples * static_cast<std::uint32_t>(std::ceil(std::clamp(cycles, 1.0, 1000.0)));
+}
+
+// What a stream adds: nothing puts it in step with the cycle.
+double stream_delay_s(const description::SensorDescription& sensor) {
+  return sensor.described && sensor.described->streams() ? 0.5 / sensor.described->rate_Hz : 0.0;
+}
+
 // Below, no machine's cycle can be; above, no hand would call it touch. What a drive can hold exactly is in between.
 constexpr double shortest_period_s = 50e-6, longest_period_s = 0.1;
 
@@ -91,13 +104,14 @@ PreparedSession prepare(const RunOptions& options) {
   session.settings.period_s = options.period_s.value_or(session.cell.default_period_s);
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
   session.settings.max_repeated_samples = repeats_allowed(session.cell.sensor, session.settings);
+  session.settings.max_missed_samples = missed_samples_allowed(session.sensor, session.settings);
   session.duration_s = options.duration_s;
   require_period(session, options);
 
   // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
   session.loop.period_s = session.settings.period_s;
-  session.loop.delay_s =
-      session.settings.period_s + sensor_delay_s(session.cell.sensor) + setpoint_filter_delay_s(session.cell);
+  session.loop.delay_s = session.settings.period_s + sensor_delay_s(session.cell.sensor) +
+                         stream_delay_s(session.sensor) + setpoint_filter_delay_s(session.cell);
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
   session.loop.handle_mass_kg = session.cell.tool.mass_kg;
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;

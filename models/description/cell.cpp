@@ -172,7 +172,7 @@ SensorPlacement read_sensor(const YamlNode& node) {
   SensorPlacement s;
   s.description = node.existing_file("description").string();
   s.bus = node.string("bus");
-  s.base_id = static_cast<std::uint32_t>(node.integer("base_id", 0, 0x1fffffff));
+  s.base_id = static_cast<std::uint32_t>(node.integer_or("base_id", 0, 0, 0x1fffffff));
   s.link = node.string("link");
   s.pose_link = pose_or_identity(node, "pose_link");
   s.noise_N = node.number_or("noise_N", 0.0, 0.0, 1e3);

@@ -92,7 +92,7 @@ struct ToolDescription {
 struct SensorPlacement {
   std::string description;  // path of the sensor's file, absolute (in the cell's file: relative to its folder)
   std::string bus;
-  std::uint32_t base_id = 0;  // meaning is the sensor's own
+  std::uint32_t base_id = 0;  // meaning is the sensor's own; some have none
   std::string link;           // link of the URDF that carries it (the flange)
   PoseDescription pose_link;  // X_LS
   // Simulated sensor only:

@@ -77,10 +77,15 @@ SensorDescription read_sensor(const YamlNode& root) {
   SensorDescription sensor;
   sensor.file = std::filesystem::absolute(file).lexically_normal();
   sensor.name = root.string("name");
-  sensor.protocol = root.choice("protocol", {"ati_net_can_oem"});
+  sensor.protocol = root.choice("protocol", {"ati_net_can_oem", "described"});
   sensor.force_range_N = root.vec3("force_range_N", above(0.0, 1e6));
   sensor.torque_range_Nm = root.vec3("torque_range_Nm", above(0.0, 1e6));
-  sensor.simulation = read_simulation(root.map("simulation"));
+  if (sensor.protocol == "described") {
+    sensor.described = read_sensor_protocol(root);
+    for (std::size_t i = 0; i < 6; ++i) sensor.simulation.matrix[i][i] = 1.0;
+  } else {
+    sensor.simulation = read_simulation(root.map("simulation"));
+  }
   root.finish();
   return sensor;
 }

@@ -1,13 +1,17 @@
 // A force sensor's description: which protocol it speaks, its range, and what only a simulated one must know.
 //
 // A file under models/sensors. What a real ATI Net CAN OEM needs beyond that (matrix, counts) is read over CAN at
-// start; the simulation's values stand in the file, so that the simulated sensor can answer those requests.
+// start; the simulation's values stand in the file, so that the simulated sensor can answer those requests. What any
+// other CAN sensor needs is all in its file (sensor_protocol.hpp).
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+
+#include "models/description/sensor_protocol.hpp"
 
 namespace proxarm::description {
 
@@ -26,10 +30,11 @@ struct SensorSimulation {
 struct SensorDescription {
   std::filesystem::path file;
   std::string name;
-  std::string protocol;                   // "ati_net_can_oem"
+  std::string protocol;                   // "ati_net_can_oem" or "described"
   std::array<double, 3> force_range_N{};  // ± per axis of S; beyond it a reading isn't to be trusted
   std::array<double, 3> torque_range_Nm{};
-  SensorSimulation simulation;
+  SensorSimulation simulation;              // ati_net_can_oem
+  std::optional<SensorProtocol> described;  // described
 };
 
 // Throws SetupError, with file, line and key.

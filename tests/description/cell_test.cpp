@@ -225,7 +225,7 @@ TEST(Sensor, MistakesAreTold) {
     return sensor.replace(from, to).told(load_sensor);
   };
   EXPECT_THAT(told("protocol: ati_net_can_oem", "protocol: ati"),
-              HasSubstr("protocol: found \"ati\", expected ati_net_can_oem"));
+              HasSubstr("protocol: found \"ati\", expected ati_net_can_oem or described"));
   EXPECT_THAT(told("force_range_N: [330, 330, 330]", "force_range_N: [330, 330, 0]"),
               HasSubstr("force_range_N[2]: found 0, expected a number above 0"));
   EXPECT_THAT(told("counts_per_N: 1000000", "counts_per_N: 0"), HasSubstr("simulation.counts_per_N: found 0"));

@@ -1,0 +1,291 @@
+#include "models/description/sensor_protocol.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/description/yaml_file.hpp"
+
+namespace proxarm::description {
+namespace {
+
+constexpr std::array<const char*, 6> components{"fx", "fy", "fz", "tx", "ty", "tz"};
+
+struct Reader {
+  const YamlNode& root;
+  SensorProtocol& protocol;
+  bool big_endian = true;
+
+  [[nodiscard]] bool read_order(const YamlNode& node, bool otherwise) const {
+    return node.choice_or("byte_order", otherwise ? "big_endian" : "little_endian", {"big_endian", "little_endian"}) ==
+           "big_endian";
+  }
+
+  // `within`: how many bytes there are.
+  [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
+    NumberField number;
+    number.byte = static_cast<std::size_t>(node.integer("byte", 0, static_cast<std::int64_t>(within) - 1));
+    number.bits = static_cast<int>(node.integer("bits", 1, 32));
+    number.shift = static_cast<int>(node.integer_or("shift", 0, 0, 7));
+    number.big_endian = read_order(node, big_endian);
+    const std::string type = node.choice_or("type", "unsigned", {"unsigned", "signed", "float"});
+    number.kind = type == "signed"  ? NumberKind::signed_integer
+                  : type == "float" ? NumberKind::real
+                                    : NumberKind::unsigned_integer;
+    if (number.kind == NumberKind::real && (number.bits != 32 || number.shift != 0)) {
+      throw node.error_at("bits", "32 for a float, with shift 0");
+    }
+    if (number.byte + number.bytes() > within) {
+      throw node.error_at("byte", "a number that ends within the " + std::to_string(within) + " bytes",
+                          "one that ends after byte " + std::to_string(number.byte + number.bytes() - 1));
+    }
+    return number;
+  }
+
+  [[nodiscard]] std::uint32_t read_id(const YamlNode& node) const {
+    return static_cast<std::uint32_t>(node.integer("id", 0, protocol.extended ? 0x1FFFFFFF : 0x7FF));
+  }
+
+  [[nodiscard]] static std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key,
+                                                            std::size_t most) {
+    std::vector<std::uint8_t> bytes;
+    for (const YamlNode& item : node.list(key, 0, most)) {
+      bytes.push_back(static_cast<std::uint8_t>(item.as_integer(0, 255)));
+    }
+    return bytes;
+  }
+
+  void read_format() {
+    if (const auto format = root.find_map("format")) {
+      protocol.extended = format->boolean_or("extended", false);
+      protocol.fd = format->boolean_or("fd", false);
+      protocol.bit_rate_switch = format->boolean_or("bit_rate_switch", false);
+      if (protocol.bit_rate_switch && !protocol.fd) throw format->error_at("bit_rate_switch", "fd: true along with it");
+    }
+    if (const auto base = root.find_map("base_id")) {
+      protocol.has_base_id = true;
+      protocol.base_id_min = static_cast<std::uint32_t>(base->integer("min", 0, 0x1FFFFFFF));
+      protocol.base_id_max = static_cast<std::uint32_t>(base->integer("max", protocol.base_id_min, 0x1FFFFFFF));
+      protocol.base_id_step = static_cast<std::uint32_t>(base->integer_or("step", 1, 1, 0x1000000));
+    }
+    big_endian = read_order(root, true);
+  }
+
+  [[nodiscard]] SampleFrame read_frame(const YamlNode& node) const {
+    SampleFrame frame;
+    frame.id = read_id(node);
+    const auto bytes = node.integer("bytes", 1, static_cast<std::int64_t>(protocol.frame_capacity()));
+    constexpr std::array<std::int64_t, 7> fd_lengths{12, 16, 20, 24, 32, 48, 64};
+    if (bytes > 8 && std::find(fd_lengths.begin(), fd_lengths.end(), bytes) == fd_lengths.end()) {
+      throw node.error_at("bytes", "a length of CAN FD: up to 8, 12, 16, 20, 24, 32, 48 or 64");
+    }
+    frame.bytes = static_cast<std::uint8_t>(bytes);
+    if (node.has("starts_with")) frame.starts_with = read_bytes(node, "starts_with", frame.bytes);
+    return frame;
+  }
+
+  [[nodiscard]] SensorSignal read_signal(const YamlNode& node) const {
+    SensorSignal signal;
+    signal.number = read_number(node, protocol.sample_bytes());
+    signal.scale = node.number_or("scale", 1.0, -1e9, 1e9);
+    if (signal.scale == 0.0) throw node.error_at("scale", "a number other than 0");
+    signal.offset = node.number_or("offset", 0.0, -1e9, 1e9);
+    signal.saturated_below = node.number_or("saturated_below", signal.number.lowest(), -1e12, 1e12);
+    signal.saturated_above = node.number_or("saturated_above", signal.number.highest(), -1e12, 1e12);
+    return signal;
+  }
+
+  void read_frames() {
+    for (const YamlNode& node : root.list("frames", 1, max_sample_frames)) protocol.frames.push_back(read_frame(node));
+    if (protocol.sample_bytes() > max_sample_bytes) throw root.error_at("frames", "up to 256 bytes in all");
+    // Else the second of two frames with one identifier could not be told from the first.
+    for (std::size_t i = 1; i < protocol.frames.size(); ++i) {
+      const SampleFrame &first = protocol.frames[0], &other = protocol.frames[i];
+      if (first.id == other.id && first.bytes == other.bytes && first.starts_with.empty()) {
+        throw root.error_at("frames", "a first frame that can be told from the others",
+                            "frame " + std::to_string(i + 1) + " looks like it",
+                            "give the first one `starts_with`, or another identifier");
+      }
+    }
+  }
+
+  void read_signals() {
+    if (!root.has("matrix")) {
+      const YamlNode signals = root.map("signals");
+      for (const char* name : components) protocol.signals.push_back(read_signal(signals.map(name)));
+      return;
+    }
+    for (const YamlNode& node : root.list("signals", 1, max_sensor_signals)) {
+      protocol.signals.push_back(read_signal(node));
+    }
+    const std::size_t columns = protocol.signals.size();
+    protocol.matrix_columns.resize(columns);
+    const auto rows = root.list("matrix", 6, 6);
+    for (std::size_t row = 0; row < 6; ++row) {
+      const auto entries = rows[row].as_numbers(columns, columns, between(-1e12, 1e12));
+      for (std::size_t column = 0; column < columns; ++column) protocol.matrix_columns[column][row] = entries[column];
+    }
+  }
+
+  void read_status() {
+    const auto node = root.find_map("status");
+    if (!node) return;
+    SensorStatus status;
+    status.number = read_number(*node, protocol.sample_bytes());
+    status.error_mask = static_cast<std::uint32_t>(node->integer_or("error_mask", 0xFFFFFFFF, 0, 0xFFFFFFFF));
+    status.overload_mask = static_cast<std::uint32_t>(node->integer_or("overload_mask", 0, 0, 0xFFFFFFFF));
+    if (const auto names = node->find_map("bits_named")) {
+      for (const std::string& key : names->keys()) {
+        if (key.size() > 2 || key.find_first_not_of("0123456789") != std::string::npos || std::stoi(key) > 31) {
+          throw names->error_at(key, "the number of a bit, 0 to 31, as the key", in_quotes(key));
+        }
+        status.bits_named.emplace_back(std::stoi(key), names->string(key));
+      }
+    }
+    protocol.status = std::move(status);
+  }
+
+  void read_checksum() {
+    const auto node = root.find_map("checksum");
+    if (!node) return;
+    SensorChecksum sum;
+    const std::string kind = node->choice("kind", {"sum8", "sum16", "xor8", "crc8", "crc16"});
+    sum.kind = kind == "sum8"    ? ChecksumKind::sum8
+               : kind == "sum16" ? ChecksumKind::sum16
+               : kind == "xor8"  ? ChecksumKind::xor8
+               : kind == "crc8"  ? ChecksumKind::crc8
+                                 : ChecksumKind::crc16;
+    const bool wide = sum.kind == ChecksumKind::sum16 || sum.kind == ChecksumKind::crc16;
+    const auto size = static_cast<std::int64_t>(protocol.sample_bytes());
+    const std::int64_t width = wide ? 2 : 1;
+    if (size <= width) throw node->error("a sample that is longer than its checksum");
+    sum.number.byte = static_cast<std::size_t>(node->integer("byte", 0, size - width));
+    sum.number.bits = wide ? 16 : 8;
+    sum.number.big_endian = read_order(*node, big_endian);
+    sum.from = static_cast<std::size_t>(node->integer("from", 0, size - 1));
+    sum.to = static_cast<std::size_t>(node->integer("to", static_cast<std::int64_t>(sum.from) + 1, size));
+    if (sum.number.byte < sum.to && sum.number.byte + sum.number.bytes() > sum.from) {
+      throw node->error_at("byte", "a checksum outside of the bytes that it is of");
+    }
+    if (kind == "crc8" || kind == "crc16") {
+      const std::int64_t most = wide ? 0xFFFF : 0xFF;
+      sum.polynomial = static_cast<std::uint32_t>(node->integer("polynomial", 1, most));
+      sum.initial = static_cast<std::uint32_t>(node->integer_or("initial", 0, 0, most));
+    }
+    protocol.checksum = sum;
+  }
+
+  [[nodiscard]] std::optional<SensorCommand> read_command(const YamlNode& from, std::string_view key) const {
+    const auto node = from.find_map(key);
+    if (!node) return std::nullopt;
+    SensorCommand command;
+    command.id = read_id(*node);
+    command.data = read_bytes(*node, "data", 64);
+    command.sum16 = node->boolean_or("sum16", false);
+    if (const auto value = node->find_map("value")) {
+      if (key != "rate") throw value->error("no value but in the command `rate`");
+      if (command.data.empty()) throw node->error_at("data", "bytes that hold the value");
+      command.value = read_number(*value, command.data.size());
+      command.divides_Hz = node->number("divides_Hz", above(0.0, 1e9));
+    }
+    return command;
+  }
+
+  void read_conversation() {
+    protocol.poll = read_command(root, "poll");
+    if (protocol.poll && protocol.poll->data.size() + (protocol.poll->sum16 ? 2U : 0U) > protocol.frame_capacity()) {
+      throw root.error_at("poll", "a poll of one frame");
+    }
+    if (!protocol.poll) protocol.rate_Hz = root.number("rate_Hz", above(0.0, 1e5));
+    const double half_period_s = protocol.poll ? 5e-3 : 0.5 / protocol.rate_Hz;
+    protocol.together_s = 1e-6 * root.number_or("together_us", 1e6 * half_period_s, above(0.0, 1e6));
+    const auto commands = root.find_map("commands");
+    if (!commands) return;
+    protocol.stop = read_command(*commands, "stop");
+    protocol.clear_bias = read_command(*commands, "clear_bias");
+    protocol.bias = read_command(*commands, "bias");
+    protocol.rate = read_command(*commands, "rate");
+    protocol.start = read_command(*commands, "start");
+    check_rate(*commands);
+  }
+
+  void check_rate(const YamlNode& commands) const {
+    if (!protocol.rate || !protocol.rate->value) return;
+    if (protocol.poll) throw commands.error_at("rate", "no rate for a sensor that is polled");
+    const double value = std::round(protocol.rate->divides_Hz / protocol.rate_Hz);
+    if (value < 1.0 || value > protocol.rate->value->highest()) {
+      throw root.error_at("rate_Hz", "a rate whose code, divides_Hz / rate_Hz, is from 1 to " +
+                                         number_text(protocol.rate->value->highest()));
+    }
+    // 1 % off is another sensor's crystal; more is a mistake.
+    if (std::abs(protocol.rate->divides_Hz / value - protocol.rate_Hz) > 0.01 * protocol.rate_Hz) {
+      throw root.error_at("rate_Hz", "a rate that the sensor has: " + number_text(protocol.rate->divides_Hz / value) +
+                                         " is the nearest");
+    }
+  }
+
+  void check_identifiers() const {
+    const std::uint64_t most = protocol.extended ? 0x1FFFFFFF : 0x7FF;
+    const std::uint64_t base = std::uint64_t{protocol.base_id_max} * protocol.base_id_step;
+    std::vector<std::uint32_t> ids;
+    for (const SampleFrame& frame : protocol.frames) ids.push_back(frame.id);
+    for (const auto* command :
+         {&protocol.poll, &protocol.stop, &protocol.clear_bias, &protocol.bias, &protocol.rate, &protocol.start}) {
+      if (*command) ids.push_back((*command)->id);
+    }
+    for (const std::uint32_t id : ids) {
+      if (id + base > most) throw root.map("base_id").error_at("max", "identifiers that stay within the format's bits");
+    }
+  }
+};
+
+}  // namespace
+
+double NumberField::lowest() const noexcept {
+  if (kind == NumberKind::real) return -static_cast<double>(std::numeric_limits<float>::max());
+  return kind == NumberKind::signed_integer ? -std::ldexp(1.0, bits - 1) : 0.0;
+}
+
+double NumberField::highest() const noexcept {
+  if (kind == NumberKind::real) return static_cast<double>(std::numeric_limits<float>::max());
+  return std::ldexp(1.0, kind == NumberKind::signed_integer ? bits - 1 : bits) - 1.0;
+}
+
+std::size_t SensorProtocol::sample_bytes() const noexcept {
+  std::size_t bytes = 0;
+  for (const SampleFrame& frame : frames) bytes += frame.bytes;
+  return bytes;
+}
+
+std::vector<std::uint32_t> SensorProtocol::wire_ids(std::uint32_t base_id) const {
+  std::vector<std::uint32_t> ids;
+  const auto add = [&](std::uint32_t id) {
+    if (std::find(ids.begin(), ids.end(), wire_id(id, base_id)) == ids.end()) ids.push_back(wire_id(id, base_id));
+  };
+  for (const SampleFrame& frame : frames) add(frame.id);
+  for (const auto* command : {&poll, &stop, &clear_bias, &bias, &rate, &start}) {
+    if (*command) add((*command)->id);
+  }
+  return ids;
+}
+
+SensorProtocol read_sensor_protocol(const YamlNode& root) {
+  SensorProtocol protocol;
+  Reader reader{root, protocol};
+  reader.read_format();
+  reader.read_frames();
+  reader.read_signals();
+  if (const auto node = root.find_map("counter")) {
+    protocol.counter = reader.read_number(*node, protocol.sample_bytes());
+    if (protocol.counter->kind != NumberKind::unsigned_integer || protocol.counter->bits < 2) {
+      throw node->error("a counter that is unsigned and has 2 bits or more");
+    }
+  }
+  reader.read_status();
+  reader.read_checksum();
+  reader.read_conversation();
+  reader.check_identifiers();
+  return protocol;
+}
+
+}  // namespace proxarm::description

@@ -1,0 +1,124 @@
+// What a force sensor says on CAN and wants to hear, as data: the part of a sensor's file that makes a new sensor a new
+// file and no code.
+//
+// A sample is a string of bytes: the data of its frames, one after the other, in the order in which they are sent.
+// Every number is somewhere in it, so a value may begin in one frame and end in the next.
+//
+//   protocol: described
+//   base_id: {min: 0x010, max: 0x7F0, step: 1}   # the cell's sensor.base_id · step is added to every identifier; left
+//                                                # out: the identifiers are as they stand
+//   format: {extended: true}                     # 29-bit identifiers; fd: CAN FD; bit_rate_switch
+//   byte_order: big_endian                       # of all numbers that don't state their own
+//   frames:                                      # of one sample
+//     - {id: 0x001, bytes: 8, starts_with: [0xAA, 0x07]}
+//     - {id: 0x002, bytes: 6}
+//   signals:                                     # value = scale · number + offset, in N and Nm
+//     fx: {byte: 0, bits: 16, type: signed, scale: 0.02, offset: 0}
+//   matrix: 6 rows                               # then `signals` is a list and wrench = matrix · values
+//   counter: {byte: 4, bits: 16}                 # goes up by one from sample to sample
+//   status: {byte: 6, bits: 16, error_mask: 0xFC00, overload_mask: 0x03F0, bits_named: {"10": text}}
+//   checksum: {kind: sum16, byte: 20, from: 0, to: 20}
+//   poll: {id: 0x010, data: []}                  # asks for one sample; left out: the sensor streams
+//   rate_Hz: 1000                                # of the stream
+//   commands:                                    # all optional; sent in this order when the sensor is started
+//     stop, clear_bias, rate, start: {id: 0x102, data: [0x03, 0x01]}   # and `bias`, which is never sent by itself
+// A number's bits: `byte` is its first byte in the sample, `shift` how many bits lie below it in its lowest byte.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace proxarm::description {
+
+class YamlNode;
+
+inline constexpr std::size_t max_sample_bytes = 256;
+inline constexpr std::size_t max_sample_frames = 16;
+inline constexpr std::size_t max_sensor_signals = 12;
+
+enum class NumberKind : std::uint8_t { unsigned_integer, signed_integer, real };  // real: IEEE 754, 32 bits
+
+struct NumberField {
+  std::size_t byte = 0;
+  int bits = 16;  // 1..32
+  int shift = 0;  // 0..7
+  bool big_endian = true;
+  NumberKind kind = NumberKind::unsigned_integer;
+  [[nodiscard]] std::size_t bytes() const noexcept { return static_cast<std::size_t>((shift + bits + 7) / 8); }
+  [[nodiscard]] double lowest() const noexcept;  // that the bits can hold
+  [[nodiscard]] double highest() const noexcept;
+};
+
+struct SensorSignal {
+  NumberField number;
+  double scale = 1.0;  // N or Nm (with a matrix: of its column) per count
+  double offset = 0.0;
+  double saturated_below = 0.0;  // a number at or beyond these is at its rail; by default the ends of its bits
+  double saturated_above = 0.0;
+};
+
+struct SampleFrame {
+  std::uint32_t id = 0;
+  std::uint8_t bytes = 8;
+  std::vector<std::uint8_t> starts_with;
+};
+
+enum class ChecksumKind : std::uint8_t { sum8, sum16, xor8, crc8, crc16 };
+
+// Over the sample's bytes from .. to − 1. CRCs: most significant bit first.
+struct SensorChecksum {
+  ChecksumKind kind = ChecksumKind::sum16;
+  NumberField number;
+  std::size_t from = 0, to = 0;
+  std::uint32_t polynomial = 0, initial = 0;
+};
+
+struct SensorStatus {
+  NumberField number;
+  std::uint32_t error_mask = 0xFFFFFFFF;
+  std::uint32_t overload_mask = 0;
+  std::vector<std::pair<int, std::string>> bits_named;
+};
+
+// Data that doesn't fit one frame goes on in the next.
+struct SensorCommand {
+  std::uint32_t id = 0;
+  std::vector<std::uint8_t> data;
+  bool sum16 = false;                // followed by the 16-bit sum of all data, high byte first
+  std::optional<NumberField> value;  // of `data`: round(divides_Hz / rate)
+  double divides_Hz = 0.0;
+};
+
+struct SensorProtocol {
+  bool extended = false, fd = false, bit_rate_switch = false;
+  bool has_base_id = false;
+  std::uint32_t base_id_min = 0, base_id_max = 0, base_id_step = 1;
+  std::vector<SampleFrame> frames;
+  std::vector<SensorSignal> signals;                  // fx fy fz tx ty tz, or as many as the matrix has columns
+  std::vector<std::array<double, 6>> matrix_columns;  // empty: none
+  std::optional<NumberField> counter;
+  std::optional<SensorStatus> status;
+  std::optional<SensorChecksum> checksum;
+  std::optional<SensorCommand> poll;
+  double rate_Hz = 0.0;     // of the stream; a polled sensor: 0
+  double together_s = 0.0;  // the longest from a sample's first frame to its last
+  std::optional<SensorCommand> stop, clear_bias, bias, rate, start;
+
+  [[nodiscard]] std::size_t sample_bytes() const noexcept;
+  [[nodiscard]] bool streams() const noexcept { return !poll; }
+  // The identifier on the wire.
+  [[nodiscard]] std::uint32_t wire_id(std::uint32_t id, std::uint32_t base_id) const noexcept {
+    return id + base_id * base_id_step;
+  }
+  // Of all frames and commands, without repetition; 29-bit ones as they are, without a flag.
+  [[nodiscard]] std::vector<std::uint32_t> wire_ids(std::uint32_t base_id) const;
+  [[nodiscard]] std::size_t frame_capacity() const noexcept { return fd ? 64 : 8; }
+};
+
+// Of a sensor's file whose protocol is "described". Throws SetupError.
+SensorProtocol read_sensor_protocol(const YamlNode& root);
+
+}  // namespace proxarm::description
