@@ -75,7 +75,7 @@ void SimulatedRun::pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
   const double takes_s = line.description().serial()
                              ? fieldbus::modbus_rtu_exchange_s(line.drives().front()->registers(), line.description())
                              : tcp_exchange_s;
-  const std::int64_t next_ns = std::max(line.step(time_ns), time_ns + std::llround(1e9 * takes_s));
+  const std::int64_t next_ns = std::max<std::int64_t>(line.step(time_ns), time_ns + std::llround(1e9 * takes_s));
   network_.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
 }
 
