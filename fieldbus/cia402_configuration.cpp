@@ -11,7 +11,25 @@ namespace {
 using description::number_text;
 using description::SetupError;
 
-constexpr std::uint8_t csp = 8;
+// How a mode (6060h) takes its targets, in every case counts in 32 bits.
+struct Mode {
+  std::uint8_t number;
+  ObjectAddress target;
+  const char* unsupported;
+  const char* not_taken;
+};
+
+constexpr Mode csp{8,
+                   {0x607A, 0},
+                   "the drive can't do cyclic synchronous position (mode 8)",
+                   "the drive took mode 8 (cyclic synchronous position) but didn't change to it"};
+constexpr Mode ip{7,
+                  {0x60C1, 1},
+                  "the drive can't do interpolated position (mode 7)",
+                  "the drive took mode 7 (interpolated position) but didn't change to it"};
+
+const Mode& mode_of(const description::DriveDescription& drive) noexcept { return drive.mode == "ip" ? ip : csp; }
+
 constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
 
 constexpr const char* period_advice =
@@ -53,13 +71,13 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
   steps.push_back(if_present(sdo_read({0x1018, 2}, 4, "product code")));
   steps.push_back(if_present(sdo_read({0x1018, 3}, 4, "revision number")));
   steps.push_back(if_present(sdo_read({0x1018, 4}, 4, "serial number")));
-  constexpr std::uint32_t csp_supported = 1U << (csp - 1);
-  steps.push_back(sdo_expect({0x6502, 0}, 4, csp_supported, "supported drive modes",
-                             "the drive can't do cyclic synchronous position (mode 8)", csp_supported));
+  const Mode& mode = mode_of(drive);
+  const std::uint32_t supported = 1U << (mode.number - 1);
+  steps.push_back(sdo_expect({0x6502, 0}, 4, supported, "supported drive modes", mode.unsupported, supported));
 }
 
 // Quiet first: nothing but what the cycle needs may be on the bus.
-void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, std::uint16_t timeout_ms) {
+void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, ObjectAddress target, std::uint16_t timeout_ms) {
   for (std::uint8_t number = 2; number <= 4; ++number) {
     steps.push_back(disable_pdo_step(PdoDirection::receive, number, node));
     steps.push_back(disable_pdo_step(PdoDirection::transmit, number, node));
@@ -69,7 +87,7 @@ void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, std::uint16_t t
                            .id = pdo_id(PdoDirection::receive, 1, node),
                            .transmission_type = every_sync,
                            .event_timer_ms = timeout_ms,
-                           .mapping = {{{0x6040, 0}, 16}, {{0x607A, 0}, 32}}}));
+                           .mapping = {{{0x6040, 0}, 16}, {target, 32}}}));
   append(steps, pdo_steps({.direction = PdoDirection::transmit,
                            .number = 1,
                            .id = pdo_id(PdoDirection::transmit, 1, node),
@@ -143,7 +161,9 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
     refuse(drive, "node", std::to_string(drive.node), "a number other than the controller's own");
   }
   if (drive.profile != "cia402") refuse(drive, "profile", description::in_quotes(drive.profile), "cia402");
-  if (drive.mode != "csp") refuse(drive, "mode", description::in_quotes(drive.mode), "csp");
+  if (drive.mode != "csp" && drive.mode != "ip") {
+    refuse(drive, "mode", description::in_quotes(drive.mode), "csp or ip");
+  }
   if (!scale_.size_counts(settings.following_error_window_rad)) {
     refuse(drive, "following_error_window_rad", number_text(settings.following_error_window_rad),
            "a window whose counts fit 32 bits");
@@ -154,7 +174,7 @@ std::vector<SdoStep> ServoDrive::configuration_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
-  append_pdos(steps, node(), rpdo_timeout_ms(settings_));
+  append_pdos(steps, node(), mode_of(description_).target, rpdo_timeout_ms(settings_));
   steps.push_back(sdo_write({0x60C2, 1}, 1, period.units, "interpolation time period value"));
   steps.push_back(sdo_write({0x60C2, 2}, 1, as_u8(period.exponent), "interpolation time index"));
   steps.push_back(
@@ -168,9 +188,9 @@ std::vector<SdoStep> ServoDrive::configuration_steps() const {
   steps.push_back(
       sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"));
   steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
-  steps.push_back(sdo_write({0x6060, 0}, 1, csp, "modes of operation"));
-  SdoStep display = sdo_expect({0x6061, 0}, 1, csp, "modes of operation display",
-                               "the drive took mode 8 (cyclic synchronous position) but didn't change to it");
+  const Mode& mode = mode_of(description_);
+  steps.push_back(sdo_write({0x6060, 0}, 1, mode.number, "modes of operation"));
+  SdoStep display = sdo_expect({0x6061, 0}, 1, mode.number, "modes of operation display", mode.not_taken);
   display.patience_ns = mode_patience_ns;
   steps.push_back(display);
   return steps;

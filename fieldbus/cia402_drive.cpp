@@ -128,7 +128,9 @@ bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   frame = CanFrame{};
   frame.id = pdo_id(PdoDirection::receive, 1, node());
   frame.length = pdo_bytes;
-  write_u16_le(&frame.data[0], controlword_);
+  // Interpolated position: bit 4 says that its targets are valid; cyclic synchronous position has no such bit.
+  const bool interpolates = description_.mode == "ip" && controlword_ == controlword::enable_operation;
+  write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (interpolates ? 0x0010U : 0U)));
   write_u32_le(&frame.data[2], static_cast<std::uint32_t>(target_counts_));
   return true;
 }

@@ -8,7 +8,8 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::int64_t cyclic_synchronous_position = 8;
+constexpr std::int64_t interpolated_position = 7, cyclic_synchronous_position = 8;
+constexpr std::uint16_t interpolation_active = 1U << 4;  // of the controlword, in mode 7
 
 bool is_moving_state(DriveState state) noexcept {
   return state == DriveState::operation_enabled || state == DriveState::quick_stop_active ||
@@ -62,7 +63,8 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   statusword_ = &od.add(0x6041, 0, unsigned16, read_only, 0, true);
   mode_ = &od.add(0x6060, 0, integer8, read_write, 0, true);
   mode_->before_write = [](std::int64_t mode) {
-    return mode == 0 || mode == cyclic_synchronous_position ? SdoAbort::none : SdoAbort::invalid_value;
+    const bool known = mode == 0 || mode == interpolated_position || mode == cyclic_synchronous_position;
+    return known ? SdoAbort::none : SdoAbort::invalid_value;
   };
   mode_display_ = &od.add(0x6061, 0, integer8, read_only, 0, true);
   demand_ = &od.add(0x6062, 0, integer32, read_only, 0, true);
@@ -72,7 +74,7 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   velocity_ = &od.add(0x606C, 0, integer32, read_only, 0, true);
   torque_ = &od.add(0x6077, 0, integer16, read_only, 0, true);
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
-  od.add(0x6502, 0, unsigned32, constant, 1 << (cyclic_synchronous_position - 1));
+  od.add(0x6502, 0, unsigned32, constant, 1 << (interpolated_position - 1) | 1 << (cyclic_synchronous_position - 1));
   refusal_ = &od.add(0x2001, 0, unsigned8, read_only, 0, true);
   od.add(0x2010, 0, unsigned8, constant, 1);
   od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
@@ -100,14 +102,16 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   using enum Access;
   ObjectDictionary& od = slave_.dictionary();
   target_ = &od.add(0x607A, 0, integer32, read_write, 0, true);
-  target_->after_write = [this] { target_fresh_ = true; };
+  target_->after_write = [this] { target_fresh_ = mode_->number() != interpolated_position; };
   od.add(0x607D, 0, unsigned8, constant, 2);
   od.add(0x607D, 1, integer32, read_write, config.position_min);
   od.add(0x607D, 2, integer32, read_write, config.position_max);
   od.add(0x6084, 0, unsigned32, read_write, config.profile_deceleration).minimum = 1;
   od.add(0x6085, 0, unsigned32, read_write, config.quick_stop_deceleration).minimum = 1;
   od.add(0x60C1, 0, unsigned8, constant, 1);
-  od.add(0x60C1, 1, integer32, read_write, 0, true);
+  od.add(0x60C1, 1, integer32, read_write, 0, true).after_write = [this] {
+    target_fresh_ = mode_->number() == interpolated_position;
+  };
   od.add(0x60C2, 0, unsigned8, constant, 2);
   const auto not_while_moving = [this](std::int64_t) {
     return state_ == DriveState::operation_enabled ? SdoAbort::not_in_present_device_state : SdoAbort::none;
@@ -136,14 +140,16 @@ void DriveDevice::on_sync(std::int64_t time_ns) {
 
 // Position limits (607Dh) cut the target; with 607Ah at its old value because no PDO came, the axis slows down instead.
 void DriveDevice::latch_target() {
-  const bool fresh = target_fresh_;
+  const bool interpolates = mode_->number() == interpolated_position;
+  const bool valid = !interpolates || (controlword_->number() & interpolation_active) != 0;
+  const bool fresh = target_fresh_ && valid;
   target_fresh_ = false;
   following_ = false;
   if (state_ != DriveState::operation_enabled || stopping_ || !brake_open()) return;
   if (!fresh) return axis_.stop(deceleration(0x6085), now_ns_);
   const ObjectDictionary& od = slave_.dictionary();
   const std::int64_t low = od.number(0x607D, 1), high = od.number(0x607D, 2);
-  std::int64_t target = target_->number();
+  std::int64_t target = interpolates ? od.number(0x60C1, 1) : target_->number();
   target_limited_ = low < high && (target < low || target > high);
   if (target_limited_) target = std::clamp(target, low, high);
   // The first target after the brake has opened must be where the axis is: nothing jumps.
@@ -278,14 +284,16 @@ void DriveDevice::finish_stop() { enter(after_stop_, after_stop_transition_); }
 
 RefusalReason DriveDevice::refusal() const noexcept {
   if (slave_.state() != NmtState::operational) return RefusalReason::not_operational;
-  if (mode_display_->number() != cyclic_synchronous_position) return RefusalReason::mode_not_displayed;
+  const std::int64_t mode = mode_display_->number();
+  if (mode != interpolated_position && mode != cyclic_synchronous_position) return RefusalReason::mode_not_displayed;
   if (period_ns_ <= 0) return RefusalReason::interpolation_period_not_set;
   if (interval_count_ < 3) return RefusalReason::no_sync;
   std::int64_t sum = 0;
   for (int i = 0; i < interval_count_; ++i) sum += intervals_ns_[i];
   const double ratio = static_cast<double>(sum) / interval_count_ / static_cast<double>(period_ns_);
   if (!(ratio > 0.8 && ratio < 1.2)) return RefusalReason::sync_period_mismatch;
-  const std::int64_t distance = std::llabs(target_->number() - axis_.position_counts());
+  const std::int64_t target = mode == interpolated_position ? slave_.dictionary().number(0x60C1, 1) : target_->number();
+  const std::int64_t distance = std::llabs(target - axis_.position_counts());
   if (distance > following_window_->number()) return RefusalReason::target_far_from_actual;
   return RefusalReason::none;
 }

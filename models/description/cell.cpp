@@ -143,7 +143,7 @@ DriveDescription read_drive(const YamlNode& node) {
   d.profile = node.choice_or("profile", d.profile, {"cia402", "modbus"});
   d.node = static_cast<std::uint8_t>(node.integer("node", 1, d.on_can() ? 127 : 247));
   if (!d.on_can()) d.description = node.existing_file("description").string();
-  d.mode = node.choice_or("mode", d.mode, {"csp"});
+  d.mode = node.choice_or("mode", d.mode, {"csp", "ip"});
   d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
   d.counts_per_motor_revolution =
       node.number_or("counts_per_motor_revolution", d.counts_per_motor_revolution, 1.0, 4294967296.0);

@@ -196,7 +196,7 @@ TEST_F(DriveDeviceTest, RefusesOperationUntilModePeriodAndSyncAgree) {
 }
 
 TEST_F(DriveDeviceTest, RefusesModesThatItDoesNotHave) {
-  EXPECT_THAT(ask("601#4002650000000000"), ElementsAre("581#4302650080000000"));  // bit 7: mode 8
+  EXPECT_THAT(ask("601#4002650000000000"), ElementsAre("581#43026500C0000000"));  // bits 6 and 7: modes 7 and 8
   EXPECT_THAT(ask("601#2F6060000A000000"), ElementsAre("581#8060600030000906"));
 }
 

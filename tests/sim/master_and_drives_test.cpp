@@ -77,6 +77,24 @@ struct MasterAndDrives : ::testing::Test {
   double step_rad = 0.0;
 };
 
+// Interpolated position (mode 7): targets in 60C1h:01, valid while controlword bit 4 is set.
+TEST_F(MasterAndDrives, MoveInInterpolatedPositionMode) {
+  for (auto& drive : cell.drives) drive.mode = "ip";
+  start();
+  ASSERT_EQ(failure(), "");
+  for (auto& drive : drives) drive.request(fieldbus::DriveGoal::operation_enabled);
+  for (int i = 0; i < 200; ++i) cycle();
+  EXPECT_EQ(far_end->drive(0).canopen().dictionary().number(0x6061), 7);
+  EXPECT_EQ(far_end->drive(0).canopen().dictionary().number(0x6040), 0x1F);
+  step_rad = 1e-4;
+  const double before = far_end->plant().arm().joint_angle_rad(0);
+  for (int i = 0; i < 500; ++i) cycle();
+  step_rad = 0.0;
+  for (int i = 0; i < 300; ++i) cycle();
+  EXPECT_NEAR(far_end->plant().arm().joint_angle_rad(0) - before, 0.05, 1e-3);
+  for (auto& drive : drives) EXPECT_EQ(drive.fault(), fieldbus::DriveFault::none) << drive.describe();
+}
+
 TEST_F(MasterAndDrives, ComeUpTogetherMoveAndSwitchOff) {
   start();
   ASSERT_EQ(failure(), "");
