@@ -22,8 +22,8 @@ std::size_t columns_of(std::FILE* stream) {
 
 }  // namespace
 
-Progress::Progress(double total_s, std::FILE* stream)
-    : total_s_(total_s), stream_(stream), enabled_(can_redraw(stream)) {}
+Progress::Progress(double total_s, std::FILE* stream, std::string unit)
+    : total_s_(total_s), stream_(stream), unit_(std::move(unit)), enabled_(can_redraw(stream)) {}
 
 void Progress::update(double done_s, std::string_view note) {
   if (!enabled_) return;
@@ -32,7 +32,7 @@ void Progress::update(double done_s, std::string_view note) {
   last_ = now;
   drawn_ = true;
   // The last column stays free: some terminals wrap when it is written.
-  const std::string line = "\r" + progress_line(done_s, total_s_, note, columns_of(stream_) - 1) + "\x1b[K";
+  const std::string line = "\r" + progress_line(done_s, total_s_, note, columns_of(stream_) - 1, unit_) + "\x1b[K";
   std::fwrite(line.data(), 1, line.size(), stream_);
   std::fflush(stream_);
 }
@@ -44,7 +44,8 @@ void Progress::clear() {
   drawn_ = false;
 }
 
-std::string progress_line(double done_s, double total_s, std::string_view note, std::size_t columns) {
+std::string progress_line(double done_s, double total_s, std::string_view note, std::size_t columns,
+                          std::string_view unit) {
   const double ratio = done_s / total_s;
   const double fraction = std::isfinite(ratio) ? std::clamp(ratio, 0.0, 1.0) : 0.0;
   constexpr std::size_t width = 24;
@@ -53,8 +54,9 @@ std::string progress_line(double done_s, double total_s, std::string_view note, 
   std::snprintf(text, sizeof text, "%4.0f %% [", std::floor(100.0 * fraction));
   std::string line = text;
   for (std::size_t i = 0; i < width; ++i) line += i < filled ? '=' : i == filled ? '>' : ' ';
-  std::snprintf(text, sizeof text, "] %.1f of %.4g s", done_s, total_s);
+  std::snprintf(text, sizeof text, unit == "s" ? "] %.1f of %.4g " : "] %.0f of %.0f ", done_s, total_s);
   line += text;
+  line += unit;
   if (!note.empty()) line += ", ";
   line += note;
   if (line.size() <= columns) return line;

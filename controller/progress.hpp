@@ -14,8 +14,8 @@ namespace proxarm::controller {
 
 class Progress {
  public:
-  // `total_s` of what the run simulates or takes. `stream` is there for tests.
-  explicit Progress(double total_s, std::FILE* stream = stderr);
+  // `total_s` of what the run simulates or takes, or a count of things named by `unit`. `stream` is there for tests.
+  explicit Progress(double total_s, std::FILE* stream = stderr, std::string unit = "s");
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
   ~Progress() { clear(); }
@@ -30,11 +30,13 @@ class Progress {
  private:
   double total_s_;
   std::FILE* stream_;
+  std::string unit_;
   bool enabled_ = false, drawn_ = false;
   std::chrono::steady_clock::time_point last_{};
 };
 
 // The line itself, at most `columns` wide.
-std::string progress_line(double done_s, double total_s, std::string_view note, std::size_t columns);
+std::string progress_line(double done_s, double total_s, std::string_view note, std::size_t columns,
+                          std::string_view unit = "s");
 
 }  // namespace proxarm::controller

@@ -1,7 +1,10 @@
 // The subcommands of proxarm; each returns the exit status and throws SetupError.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "controller/command_line/run_options.hpp"
@@ -12,10 +15,24 @@ struct FileOptions {
   std::vector<std::filesystem::path> files;
 };
 
+struct StudyOptions {
+  std::vector<std::string> words;  // a study's name; or "merge" and the folders of its parts
+  std::filesystem::path out;
+  bool quick = false;
+  std::uint64_t seed = 1;
+  std::string shard = "1/1";
+  std::optional<double> runs;
+  unsigned threads = 0;
+  std::optional<std::uint64_t> replay;
+  std::string command_line;  // for the record
+};
+
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
+int tune_command(const RunOptions& options);
+int study_command(const StudyOptions& options);
 
 }  // namespace proxarm::command_line

@@ -129,6 +129,41 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                "simulation only: run with a mass that is predicted unstable");
 }
 
+// A whole number in decimal digits.
+CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store) {
+  return [option = std::move(option), store = std::move(store)](const CLI::results_t& words) {
+    const std::string& word = words.back();
+    if (word.empty() || word.size() > 16 || word.find_first_not_of("0123456789") != std::string::npos) {
+      throw description::SetupError(
+          {.key = option, .found = description::in_quotes(word), .expected = "a whole number of at most 16 digits"});
+    }
+    store(std::stoull(word));
+    return true;
+  };
+}
+
+void add_study_options(CLI::App& app, command_line::StudyOptions& options) {
+  app.add_option("study", options.words, "name of a study; or merge and the folders of its parts")
+      ->type_name("NAME")
+      ->required();
+  app.add_option("--out", options.out, "folder for CSV, JSON and plots")->type_name("DIR");
+  app.add_flag("--quick", options.quick, "fewer and coarser runs");
+  app.add_option("--seed", whole_number("--seed", [&](std::uint64_t n) { options.seed = n; }),
+                 "of all that is random (default 1)")
+      ->type_name("N");
+  app.add_option("--runs", whole_number("--runs", [&](std::uint64_t n) { options.runs = static_cast<double>(n); }),
+                 "how many, in studies of random runs")
+      ->type_name("N");
+  app.add_option("--shard", options.shard, "do the I-th of N parts")->type_name("I/N");
+  app.add_option("--threads",
+                 whole_number("--threads", [&](std::uint64_t n) { options.threads = static_cast<unsigned>(n); }),
+                 "how many (default: one per core)")
+      ->type_name("N");
+  app.add_option("--replay", whole_number("--replay", [&](std::uint64_t n) { options.replay = n; }),
+                 "stress only: one run again, by the seed that was printed for it")
+      ->type_name("SEED");
+}
+
 // CLI11's message in one line, with the nearest word that is known.
 int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
   std::vector<std::string> commands;
@@ -167,7 +202,7 @@ int run(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "help of all commands");
 
   std::function<int()> command;
-  RunOptions run_options, sim_options, plan_options;
+  RunOptions run_options, sim_options, plan_options, tune_options;
   command_line::FileOptions check_options, explain_options;
 
   CLI::App* run_app = app.add_subcommand("run", "render a scene on a simulated or real arm");
@@ -190,6 +225,16 @@ int run(int argc, char** argv) {
   CLI::App* explain_app = app.add_subcommand("explain", "what a scene compiles to, what is skipped and why");
   explain_app->add_option("scene", explain_options.files, "scene file")->required();
   explain_app->callback([&] { command = [&] { return command_line::explain_command(explain_options); }; });
+
+  CLI::App* tune_app = app.add_subcommand("tune", "advice on mass, damping and timestep for a cell and a hand");
+  add_session_options(*tune_app, tune_options);
+  tune_app->callback([&] { command = [&] { return command_line::tune_command(tune_options); }; });
+
+  command_line::StudyOptions study_options;
+  for (int i = 1; i < argc; ++i) study_options.command_line += (i > 1 ? " " : "proxarm ") + std::string(argv[i]);
+  CLI::App* study_app = app.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
+  add_study_options(*study_app, study_options);
+  study_app->callback([&] { command = [&] { return command_line::study_command(study_options); }; });
 
   try {
     app.parse(argc, argv);

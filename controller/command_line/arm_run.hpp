@@ -1,0 +1,11 @@
+// Sessions of the default cell for the studies: in-process, in virtual time, nothing printed and nothing drawn.
+#pragma once
+
+#include "controller/studies/fidelity.hpp"
+
+namespace proxarm::command_line {
+
+// Throws SetupError. Several threads may call it.
+std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,165 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/prepared_session.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using controller::HandModel;
+using controller::LoopModel;
+
+// What the advice allows for: a hand that holds on harder and is heavier, and a loop that is slower, than described.
+constexpr double hand_margin = 1.5, delay_margin = 1.2;
+
+// Felt mass, handle included, at which the loop is just stable.
+std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop) {
+  const auto mass = controller::smallest_stable_mass(hand, loop);
+  return mass ? std::optional<double>(*mass + loop.handle_mass_kg) : std::nullopt;
+}
+
+// The same with the margins: the worst of the hand as described and of one that is stiffer and heavier.
+std::optional<double> with_margin(const HandModel& hand, LoopModel loop) {
+  loop.delay_s *= delay_margin;
+  double worst = 0.0;
+  for (const double stiffer : {1.0, hand_margin}) {
+    for (const double heavier : {1.0, hand_margin}) {
+      HandModel other = hand;
+      other.stiffness_N_per_m *= stiffer;
+      other.mass_kg *= heavier;
+      const auto mass = smallest_felt(other, loop);
+      if (!mass) return std::nullopt;
+      worst = std::max(worst, *mass);
+    }
+  }
+  return worst;
+}
+
+double round_up(double value) {
+  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
+  return std::ceil(value / unit * (1.0 - 1e-9)) * unit;
+}
+
+std::string mass_text(const std::optional<double>& mass) {
+  if (!mass) return "none up to 1000 kg";
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.2g kg", round_up(*mass));
+  return text.data();
+}
+
+// The least damping with which some mass is stable with the margins, of a few.
+std::optional<double> damping_needed(const HandModel& hand, LoopModel loop) {
+  for (const double damping : {0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
+    if (damping < loop.damping_Ns_per_m) continue;
+    loop.damping_Ns_per_m = damping;
+    if (with_margin(hand, loop)) return damping;
+  }
+  return std::nullopt;
+}
+
+// What would be, were one thing ideal.
+struct Limit {
+  const char* what;
+  std::optional<double> mass_without;
+};
+
+std::vector<Limit> limits(const PreparedSession& session, const HandModel& hand) {
+  const LoopModel& loop = session.loop;
+  const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
+  const double sensor_s = std::max(0.0, loop.delay_s - T - filter_s);
+  std::vector<Limit> list;
+  const auto add = [&](const char* what, auto change) {
+    LoopModel other = loop;
+    HandModel other_hand = hand;
+    change(other, other_hand);
+    list.push_back({what, smallest_felt(other_hand, other)});
+  };
+  add("the timestep (a tenth of it)", [&](LoopModel& l, HandModel&) {
+    l.period_s = 0.1 * T;
+    l.delay_s -= 0.9 * T;
+  });
+  add("the delay of the setpoints' filter (limits.setpoint_bandwidth_Hz)",
+      [&](LoopModel& l, HandModel&) { l.delay_s = std::max(0.0, l.delay_s - filter_s); });
+  add("the sensor's delay", [&](LoopModel& l, HandModel&) { l.delay_s -= sensor_s; });
+  add("the drives' lag", [](LoopModel& l, HandModel&) { l.drive_time_constant_s = 0.0; });
+  add("the mass after the sensor (handle and hand)", [](LoopModel& l, HandModel& h) {
+    l.handle_mass_kg = 0.0;
+    h.mass_kg = 0.0;
+  });
+  // Most is gained by the first.
+  std::stable_sort(list.begin(), list.end(), [](const Limit& a, const Limit& b) {
+    return a.mass_without.value_or(1e9) < b.mass_without.value_or(1e9);
+  });
+  return list;
+}
+
+// The largest timestep of those that drives hold exactly at which the wanted mass has its margins.
+std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const LoopModel& loop) {
+  for (const double ms : {20.0, 10.0, 8.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5, 0.25, 0.2, 0.1}) {
+    LoopModel other = loop;
+    other.period_s = 1e-3 * ms;
+    other.delay_s += other.period_s - loop.period_s;
+    const auto smallest = with_margin(hand, other);
+    if (smallest && *smallest <= mass_kg) return other.period_s;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+int tune_command(const RunOptions& options) {
+  const PreparedSession session = prepare(options);
+  const HandModel hand{session.hand.stiffness_N_per_m, session.hand.damping_Ns_per_m, session.hand.mass_kg};
+  const LoopModel& loop = session.loop;
+  const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
+  std::printf("%s, held by %s: %.4g N/m, %.4g Ns/m, %.3g kg; T = %.4g ms\n", session.cell.name.c_str(),
+              session.hand.name.c_str(), hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, 1e3 * T);
+  std::printf(
+      "from a push to the arm being there: %.3g ms (sampling %.3g, reaching the target %.3g, setpoint filter %.3g, "
+      "sensor %.3g, drives %.3g)\n",
+      1e3 * total_delay_s(session), 1e3 * T, 1e3 * T, 1e3 * filter_s, 1e3 * std::max(0.0, loop.delay_s - T - filter_s),
+      1e3 * loop.drive_time_constant_s);
+  const auto smallest = smallest_felt(hand, loop), safe = with_margin(hand, loop);
+  std::printf("smallest stable mass: %s felt, handle's %.3g kg included\n", mass_text(smallest).c_str(),
+              loop.handle_mass_kg);
+  std::printf(
+      "advice: --mass %s, which is stable with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
+      mass_text(safe).c_str(), hand_margin, 100.0 * (delay_margin - 1.0));
+  const auto damping = damping_needed(hand, loop);
+  if (!damping) {
+    std::printf("damping: not even 500 Ns/m makes this loop stable: shorten its delay\n");
+  } else if (*damping > loop.damping_Ns_per_m) {
+    LoopModel damped = loop;
+    damped.damping_Ns_per_m = *damping;
+    std::printf("damping: --damping %.3g Ns/m makes it stable, from %s on\n", *damping,
+                mass_text(with_margin(hand, damped)).c_str());
+  } else {
+    std::printf(
+        "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
+        "R: %.2g Ns/m at 20 N and 0.1 m\n",
+        T * 20.0 / 0.1);
+  }
+  const auto sorted = limits(session, hand);
+  std::printf("what limits it: %s; without it the smallest stable mass would be %s\n", sorted.front().what,
+              mass_text(sorted.front().mass_without).c_str());
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    std::printf("  without %s: %s\n", sorted[i].what, mass_text(sorted[i].mass_without).c_str());
+  }
+  const double wanted = session.settings.mass_kg;
+  const auto timestep = timestep_for(wanted, hand, loop);
+  if (timestep) {
+    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms\n", wanted, 1e3 * *timestep);
+  } else {
+    std::printf("for %.3g kg with these margins: no timestep is short enough, %s is in the way\n", wanted,
+                sorted.front().what);
+  }
+  return smallest ? 0 : 1;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,60 @@
+// What a hand feels at the handle of the simulated arm, by frequency: the impedance F/v in free motion and against a
+// wall, from 0.1 to 30 Hz.
+//
+// The hand's intention is a sum of sines; force of the hand on the handle and the tool's true position are sampled once
+// a cycle, over whole periods of all sines, so that one Fourier coefficient per sine is exact. In free motion
+//   F/a = M_apparent(f) complex: its real part is the mass that is felt, its imaginary part −B/ω;
+// apparent_mass_error is |F/a − M|/M. Against a wall F/x is the stiffness that is felt; together they span what is
+// rendered at this frequency (a Z-width).
+//
+// The arm is whoever runs it: the studies know no bus and no drive.
+#pragma once
+
+#include <functional>
+#include <utility>
+
+#include "controller/studies/study.hpp"
+#include "models/geometry.hpp"
+
+namespace proxarm::studies {
+
+struct ArmSine {
+  double frequency_Hz = 1.0, amplitude_m = 0.0;
+};
+
+// A session of the default cell, as the fidelity study wants it.
+struct ArmSetup {
+  double mass_kg = 4.0;
+  double period_s = 1e-3;
+  double drive_factor = 1.0;     // on the drives' position bandwidth
+  bool wall = false;             // 0.2 m in front, and the hand leans on it
+  double settling_s = 2.0;       // before what is returned
+  double duration_s = 10.0;      // of what is returned
+  std::vector<ArmSine> sines{};  // of the hand's intention, along x
+};
+
+struct ArmSample {
+  models::Vec3 hand_force_N = models::Vec3::Zero(), tool_m = models::Vec3::Zero();
+};
+
+// One sample per cycle; fewer than asked for if a fault ended the session.
+using ArmRun = std::function<std::vector<ArmSample>(const ArmSetup&)>;
+
+class Fidelity final : public Study {
+ public:
+  explicit Fidelity(ArmRun arm) : arm_(std::move(arm)) {}
+
+  std::string name() const override { return "fidelity"; }
+  std::vector<Column> columns() const override;
+  std::size_t jobs(const Options& options) const override;
+  std::vector<Row> run(std::size_t job, const Options& options) const override;
+  nlohmann::json headline(const Table& table, const Options& options) const override;
+  std::vector<std::string> plot(const Table& table, const Options& options,
+                                const std::filesystem::path& out) const override;
+  std::string text(const nlohmann::json& headline) const override;
+
+ private:
+  ArmRun arm_;
+};
+
+}  // namespace proxarm::studies

@@ -1,0 +1,308 @@
+#include "controller/studies/skip.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <sstream>
+
+#include "controller/studies/chart.hpp"
+#include "scenes/compile.hpp"
+#include "scenes/obstacles.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using models::Vec3;
+using nlohmann::json;
+using scenes::Scene;
+using Clock = std::chrono::steady_clock;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+constexpr double K = 1e6;  // 1 kg at 1 ms
+
+double elapsed_ns(Clock::time_point begun) {
+  return std::chrono::duration<double, std::nano>(Clock::now() - begun).count();
+}
+
+// A step, repeated along a small circle around `at`, each pushed by `push`; best of seven rounds.
+double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& push, int steps) {
+  double best = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 7; ++round) {
+    Vec3 q = g(K, at, at);
+    const auto begun = Clock::now();
+    for (int k = 0; k < steps; ++k) {
+      const double angle = 0.01 * k;
+      const Vec3 ahead(2e-6 * std::cos(angle), 2e-6 * std::sin(angle), 0.0);
+      g.set_time({1e-3 * k, 1e-3});
+      q = g(K, q + ahead + push, q);
+    }
+    best = std::min(best, elapsed_ns(begun) / steps);
+    if (!q.allFinite()) return nan_value;
+  }
+  return best;
+}
+
+// `count` spheres of radius 0.4 of their distance, on a grid of 1 m around the origin; the first one at the origin.
+Scene spheres(std::size_t count) {
+  Scene scene;
+  const auto side = static_cast<int>(std::ceil(std::cbrt(static_cast<double>(count))));
+  const double distance = 1.0 / side;
+  for (int i = 0; i < side * side * side && scene.objects.size() < count; ++i) {
+    scenes::Object object;
+    object.name = "sphere " + std::to_string(i);
+    object.friction = 0.3;
+    object.shape =
+        scenes::SphereShape{distance * Vec3(i % side, i / side % side, i / (side * side)), 0.4 * distance, false};
+    scene.objects.push_back(object);
+  }
+  return scene;
+}
+
+// A sphere of 0.2 m as a mesh of about `count` triangles; its poles, vertices of many, lie along x.
+Scene globe(std::size_t count) {
+  models::TriangleSoup soup;
+  const auto rings = static_cast<std::uint32_t>(std::max(2.0, std::sqrt(static_cast<double>(count) / 4.0)));
+  const std::uint32_t sectors = 2 * rings;
+  const auto at = [&](std::uint32_t ring, std::uint32_t sector) { return 1 + (ring - 1) * sectors + sector % sectors; };
+  const auto add = [&](double theta, double phi) {
+    soup.vertices.emplace_back(0.2 * std::cos(theta), 0.2 * std::sin(theta) * std::cos(phi),
+                               0.2 * std::sin(theta) * std::sin(phi));
+  };
+  constexpr double pi = std::numbers::pi;
+  add(0.0, 0.0);
+  for (std::uint32_t i = 1; i < rings; ++i) {
+    for (std::uint32_t j = 0; j < sectors; ++j) add(pi * i / rings, 2.0 * pi * j / sectors);
+  }
+  add(pi, 0.0);
+  const auto last = static_cast<std::uint32_t>(soup.vertices.size() - 1);
+  for (std::uint32_t j = 0; j < sectors; ++j) {
+    soup.triangles.push_back({0, at(1, j), at(1, j + 1)});
+    for (std::uint32_t i = 1; i + 1 < rings; ++i) {
+      soup.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      soup.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+    soup.triangles.push_back({last, at(rings - 1, j + 1), at(rings - 1, j)});
+  }
+  scenes::MeshShape shape;
+  shape.mesh = std::make_shared<const models::TriangleMesh>(std::move(soup));
+  Scene scene;
+  scenes::Object object;
+  object.name = "globe";
+  object.friction = 0.3;
+  object.shape = shape;
+  scene.objects.push_back(object);
+  return scene;
+}
+
+// Every object asked for its distance: what a step costs at least where nothing is skipped.
+double all_ns(const Scene& scene, const Vec3& at) {
+  double best = std::numeric_limits<double>::infinity();
+  if (const auto* mesh = std::get_if<scenes::MeshShape>(&scene.objects.front().shape)) {
+    for (int round = 0; round < 5; ++round) {
+      const auto begun = Clock::now();
+      double least = 1e300;
+      for (std::uint32_t face = 0; face < mesh->mesh->size(); ++face) {
+        least = std::min(least, std::abs(models::TriangleMesh::height(mesh->mesh->face(face), at)));
+      }
+      if (least >= 0.0) best = std::min(best, elapsed_ns(begun));
+    }
+    return best;
+  }
+  for (int round = 0; round < 5; ++round) {
+    const auto begun = Clock::now();
+    if (scenes::clearance_m(scene, at) > -1e300) best = std::min(best, elapsed_ns(begun));
+  }
+  return best;
+}
+
+struct OptionScene {
+  const char* name;
+  Scene scene;
+};
+
+// A wall, and the same wall with one thing more each.
+std::vector<OptionScene> option_scenes() {
+  const auto wall = [](double friction) {
+    Scene scene;
+    scenes::Object object;
+    object.name = "wall";
+    object.shape = scenes::PlaneShape{Vec3::Zero(), Vec3::UnitZ()};
+    object.friction = friction;
+    scene.objects.push_back(object);
+    return scene;
+  };
+  std::vector<OptionScene> list;
+  list.push_back({"nothing", {}});
+  list.push_back({"wall", wall(0.0)});
+  list.push_back({"friction", wall(0.3)});
+  list.push_back({"layer", wall(0.3)});
+  list.back().scene.objects[0].layer = scenes::ElasticLayer{1e-3, 1e4};
+  list.push_back({"motion", wall(0.3)});
+  list.back().scene.objects[0].motion = scenes::Motion{.amplitude_m = Vec3(0.0, 0.0, 1e-6), .frequency_Hz = 1.0};
+  list.push_back({"viscous medium", wall(0.3)});
+  list.back().scene.media.push_back({.damping_Ns_per_m = 5.0, .within = {}});
+  list.push_back({"Coulomb field", wall(0.3)});
+  list.back().scene.coulomb_force_N = 0.5;
+  list.push_back({"two walls", wall(0.3)});
+  list.back().scene.objects.push_back(list.back().scene.objects[0]);
+  list.back().scene.objects[1].name = "other";
+  list.back().scene.objects[1].shape = scenes::PlaneShape{Vec3(-1.0, 0.0, 0.0), Vec3::UnitX()};
+  return list;
+}
+
+std::vector<std::size_t> counts(bool quick) {
+  if (quick) return {1, 10, 100, 1000};
+  return {1, 3, 10, 30, 100, 300, 1000, 3000, 10000};
+}
+std::vector<std::size_t> triangle_counts(bool quick) {
+  if (quick) return {100, 1000, 10'000};
+  return {100, 1000, 10'000, 100'000};
+}
+
+}  // namespace
+
+std::vector<Column> Skip::columns() const {
+  return {{"kind", true}, {"name", true}, {"count"},  {"far_ns"},
+          {"near_ns"},    {"contact_ns"}, {"all_ns"}, {"start_up_us"}};
+}
+
+std::size_t Skip::jobs(const Options& options) const {
+  return counts(options.quick).size() + triangle_counts(options.quick).size() + option_scenes().size();
+}
+
+std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
+  const std::vector<std::size_t> objects = counts(options.quick), triangles = triangle_counts(options.quick);
+  const int steps = options.quick ? 5'000 : 20'000;
+  std::string kind = "option", name;
+  Scene scene;
+  double count = 0.0;
+  Vec3 surface = Vec3::Zero();  // a point on something, seen from above
+  if (job < objects.size()) {
+    kind = name = "objects";
+    scene = spheres(objects[job]);
+    count = static_cast<double>(objects[job]);
+    surface.z() = std::get<scenes::SphereShape>(scene.objects[0].shape).radius_m;
+  } else if (job - objects.size() < triangles.size()) {
+    kind = name = "triangles";
+    scene = globe(triangles[job - objects.size()]);
+    count = static_cast<double>(std::get<scenes::MeshShape>(scene.objects[0].shape).mesh->size());
+    surface = {0.0, 0.0, 0.2};
+  } else {
+    OptionScene option = option_scenes()[job - objects.size() - triangles.size()];
+    name = option.name;
+    scene = std::move(option.scene);
+    count = static_cast<double>(scene.objects.size());
+  }
+  const auto begun = Clock::now();
+  const scenes::CompiledScene compiled = scenes::compile(scene);
+  const double start_up_us = 1e-3 * elapsed_ns(begun);
+  models::GeometricAlgorithm<3>& g = compiled.algorithm<3>();
+  const Vec3 none = Vec3::Zero(), into(0.0, 0.0, -5.0 / K);
+  const bool empty = scene.objects.empty();
+  const double gap = count > 1.0 && kind == "objects" ? 0.05 * surface.z() : 1e-3;
+  const double far = step_ns(g, Vec3(0.3, 0.2, 20.0), none, steps);
+  const double near = step_ns(g, surface + Vec3(0.0, 0.0, gap), none, steps);
+  const double contact = empty ? nan_value : step_ns(g, surface, into, steps);
+  const double all = kind == "option" ? nan_value : all_ns(scene, surface);
+  return {{kind, name, count, far, near, contact, all, start_up_us}};
+}
+
+json Skip::headline(const Table& table, const Options& /*options*/) const {
+  json free, near, contact, all, start_up, triangles, option;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
+    const std::string kind = table.text(row, table.column("kind"));
+    const std::string count = std::to_string(static_cast<long>(value("count")));
+    if (kind == "option") {
+      json& one = option[table.text(row, table.column("name"))];
+      one["free_ns"] = value("far_ns");
+      if (std::isfinite(value("contact_ns"))) one["contact_ns"] = value("contact_ns");
+    } else if (kind == "objects") {
+      free[count] = value("far_ns");
+      near[count] = value("near_ns");
+      contact[count] = value("contact_ns");
+      all[count] = value("all_ns");
+      start_up[count] = value("start_up_us");
+    } else {
+      triangles[count] = {{"free_ns", value("far_ns")},
+                          {"near_ns", value("near_ns")},
+                          {"contact_ns", value("contact_ns")},
+                          {"all_ns", value("all_ns")},
+                          {"start_up_us", value("start_up_us")}};
+    }
+  }
+  return {{"free_ns", free},
+          {"near_ns", near},
+          {"contact_ns", contact},
+          {"all_ns", all},
+          {"start_up_us", start_up},
+          {"triangles", triangles},
+          {"options", option},
+          {"keys",
+           {{"free_ns", "by number of spheres: a step far from all of them"},
+            {"near_ns", "a step that touches nothing, a twentieth of a radius above one of them"},
+            {"contact_ns", "a step that slides on one of them, with friction"},
+            {"all_ns", "asking every object (every face) for its distance, once"},
+            {"start_up_us", "compiling the scene"},
+            {"triangles", "the same by number of triangles of a mesh"},
+            {"options",
+             "a wall, and what one option more costs; a scene without it has another algorithm and pays nothing"}}}};
+}
+
+std::vector<std::string> Skip::plot(const Table& table, const Options& /*options*/,
+                                    const std::filesystem::path& out) const {
+  Chart chart{.title = "Cost of a step against the size of the world",
+              .columns = 2,
+              .panel_width = 700,
+              .panel_height = 430,
+              .common_key = true};
+  for (const char* kind : {"objects", "triangles"}) {
+    Panel panel{.title = std::string(kind) == "objects" ? "spheres" : "a mesh",
+                .x_label = std::string("number of ") + kind,
+                .y_label = "time of a step (ns)",
+                .log_x = true,
+                .log_y = true,
+                .y_low = 1.0,
+                .y_high = 1e6};
+    const std::array<const char*, 4> columns{"far_ns", "near_ns", "contact_ns", "all_ns"};
+    const std::array<const char*, 4> names{"far", "near", "in contact, sliding", "evaluating everything"};
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      Curve curve{.name = names[i], .style = static_cast<int>(i), .marks = true};
+      for (std::size_t row = 0; row < table.rows(); ++row) {
+        if (table.text(row, table.column("kind")) != kind) continue;
+        curve.x.push_back(table.number(row, table.column("count")));
+        curve.y.push_back(table.number(row, table.column(columns[i])));
+      }
+      panel.curves.push_back(curve);
+    }
+    chart.panels.push_back(panel);
+  }
+  const std::string warning = draw(chart, out / "skip.svg");
+  return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
+}
+
+std::string Skip::text(const json& headline) const {
+  std::ostringstream text;
+  char line[200];
+  for (const auto& item : headline.at("options").items()) {
+    const json& contact = item.value().value("contact_ns", json());
+    std::snprintf(line, sizeof line, "%-16s free %6.1f ns, in contact %6.1f ns\n", item.key().c_str(),
+                  item.value().at("free_ns").get<double>(), contact.is_number() ? contact.get<double>() : 0.0);
+    text << line;
+  }
+  for (const auto& item : headline.at("contact_ns").items()) {
+    std::snprintf(line, sizeof line, "%6s spheres: far %.1f, near %.1f, in contact %.1f ns; all of them %.0f ns\n",
+                  item.key().c_str(), headline.at("free_ns").at(item.key()).get<double>(),
+                  headline.at("near_ns").at(item.key()).get<double>(), item.value().get<double>(),
+                  headline.at("all_ns").at(item.key()).get<double>());
+    text << line;
+  }
+  return text.str();
+}
+
+}  // namespace proxarm::studies

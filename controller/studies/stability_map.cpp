@@ -1,0 +1,402 @@
+#include "controller/studies/stability_map.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "controller/admittance_proxy.hpp"
+#include "controller/studies/chart.hpp"
+#include "models/free_space.hpp"
+#include "models/plane.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using controller::AdmittanceProxy;
+using controller::HandModel;
+using controller::LoopModel;
+using models::Vec;
+using nlohmann::json;
+using Vec1 = Vec<1>;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+// Drive, delay and hand of controller/stability.hpp as a simulation: the force that the sensor will read at the next
+// step, of the proxy's position.
+class LinearPlant {
+ public:
+  LinearPlant(const HandModel& hand, const LoopModel& loop, double intention_m, double start_m)
+      : K_(hand.stiffness_N_per_m),
+        D_(hand.damping_Ns_per_m / loop.period_s),
+        m_((hand.mass_kg + loop.handle_mass_kg) / (loop.period_s * loop.period_s)),
+        beta_(loop.drive_time_constant_s > 0.0 ? std::exp(-loop.period_s / loop.drive_time_constant_s) : 0.0),
+        intention_(intention_m),
+        p_(start_m),
+        p1_(start_m),
+        p2_(start_m) {
+    const double periods = loop.delay_s / loop.period_s, whole = std::floor(periods + 1e-9);
+    rest_ = std::max(0.0, periods - whole);
+    grip_.assign(static_cast<std::size_t>(whole) + 2, K_ * (start_m - intention_m));
+  }
+
+  // The proxy is at q(k); returns h(k + 1).
+  double operator()(double q) noexcept {
+    p2_ = p1_;
+    p1_ = p_;
+    p_ = (1.0 - beta_) * q + beta_ * p_;
+    const double grip = K_ * (p_ - intention_) + D_ * (p_ - p1_) + m_ * (p_ - 2.0 * p1_ + p2_);
+    grip_[next_] = grip;
+    // The oldest and the one after it.
+    const std::size_t oldest = next_ + 1 == grip_.size() ? 0 : next_ + 1;
+    const std::size_t younger = oldest + 1 == grip_.size() ? 0 : oldest + 1;
+    next_ = oldest;
+    return -((1.0 - rest_) * grip_[younger] + rest_ * grip_[oldest]);
+  }
+  [[nodiscard]] double first_force() const noexcept { return -grip_[0]; }
+
+ private:
+  double K_, D_, m_, beta_, intention_, p_, p1_, p2_, rest_ = 0.0;
+  std::vector<double> grip_;
+  std::size_t next_ = 0;
+};
+
+controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
+  controller::AdmittanceConfig config;
+  config.mass_kg = mass_kg;
+  config.damping_Ns_per_m = loop.damping_Ns_per_m;
+  config.spring_N_per_m = loop.spring_N_per_m;
+  config.period_s = loop.period_s;
+  config.order = loop.order;
+  config.matched_labels = loop.matched_labels;
+  return config;
+}
+
+// ln of the growth from one stretch of half-waves to the next; positive: unstable.
+double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
+  constexpr double start = 1e-3;
+  constexpr int settling = 30, stretch = 40, most_steps = 200'000;
+  models::FreeSpace<1> nothing;
+  AdmittanceProxy<1> proxy(config(loop, mass_kg), nothing);
+  // Held at rest away from where the hand wants it, then released; the hand wants 0.
+  proxy.start({.q = Vec1(start)});
+  static_cast<void>(proxy.set_reference(Vec1::Zero()));
+  LinearPlant plant(hand, loop, 0.0, start);
+  double h = plant.first_force(), before = start, first = 0.0, second = 0.0;
+  int crossings = 0;
+  for (int k = 0; k < most_steps; ++k) {
+    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) return 10.0;
+    const double q = proxy.q()[0];
+    h = plant(q);
+    crossings += (q < 0.0) != (before < 0.0) ? 1 : 0;
+    before = q;
+    const double size = std::abs(q);
+    if (size > 1e12 * start) return 10.0;
+    if (crossings >= settling + 2 * stretch) break;
+    if (crossings >= settling + stretch) {
+      second = std::max(second, size);
+    } else if (crossings >= settling) {
+      first = std::max(first, size);
+    }
+    if (k % 1024 == 1023 && size < 1e-12 * start && std::abs(h) < 1e-9 * start * hand.stiffness_N_per_m) return -10.0;
+  }
+  return second > 0.0 && first > 0.0 ? std::log(second / first) : -10.0;
+}
+
+struct Contact {
+  double bounces = 0.0;      // touches in the last third
+  double amplitude_m = 0.0;  // of the proxy in it, peak to peak
+};
+
+// The hand means to be 20 mm behind a wall that is 10 mm away.
+Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double mass_kg) {
+  constexpr double start = 0.01, intention = -0.02;
+  models::Plane<1> wall(Vec1(0.0), Vec1(1.0));
+  AdmittanceProxy<1> proxy(config(loop, mass_kg), wall);
+  proxy.start({.q = Vec1(start)});
+  LinearPlant plant(hand, loop, intention, start);
+  double h = 0.0;
+  const int steps = static_cast<int>(std::min(20'000.0, 3.0 / loop.period_s));
+  Contact contact;
+  double low = start, high = -start;
+  bool touched = false;
+  for (int k = 0; k < steps; ++k) {
+    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) break;
+    h = plant(proxy.q()[0]);
+    const bool touches = proxy.f()[0] > 0.0;
+    if (3 * k > 2 * steps) {
+      contact.bounces += touches && !touched ? 1.0 : 0.0;
+      low = std::min(low, proxy.q()[0]);
+      high = std::max(high, proxy.q()[0]);
+    }
+    touched = touches;
+  }
+  contact.amplitude_m = std::max(0.0, high - low);
+  return contact;
+}
+
+std::vector<double> decades(double low, double high, int count) {
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) values.push_back(low * std::pow(high / low, i / (count - 1.0)));
+  return values;
+}
+
+struct Grip {
+  double damping_Ns_per_m, mass_kg;
+};
+
+struct Grid {
+  std::vector<double> T, K, L, tau;
+  std::vector<Grip> grips;
+  std::vector<int> orders{1, 2};
+
+  explicit Grid(bool quick)
+      : T(decades(0.25e-3, 8e-3, quick ? 4 : 10)),
+        K(decades(100.0, 5000.0, quick ? 4 : 10)),
+        L(quick ? std::vector<double>{0.0, 4e-3, 16e-3} : std::vector<double>{0.0, 1e-3, 4e-3, 8e-3, 16e-3}),
+        tau(quick ? std::vector<double>{1.6e-3} : std::vector<double>{0.0, 1.6e-3}),
+        grips(quick ? std::vector<Grip>{{10.0, 0.0}, {20.0, 1.0}, {40.0, 2.0}}
+                    : std::vector<Grip>{{10.0, 0.0}, {20.0, 0.0}, {10.0, 0.5}, {20.0, 1.0}, {40.0, 2.0}}) {}
+  [[nodiscard]] std::size_t size() const {
+    return T.size() * K.size() * L.size() * tau.size() * grips.size() * orders.size();
+  }
+};
+
+// A coarse look at tables that were worked out elsewhere: the smallest stable mass, by eigenvalues.
+double d1_error() {
+  double worst = 0.0;
+  for (const double T : decades(1e-4, 1e-2, 9)) {
+    for (const double K : decades(50.0, 5000.0, 9)) {
+      for (const double D : {1.0, 10.0, 40.0}) {
+        LoopModel loop;
+        loop.period_s = T;
+        const double exact = K * T * T / 4.0 + D * T / 2.0;
+        const double found = controller::smallest_stable_mass({K, D, 0.0}, loop).value_or(0.0);
+        worst = std::max(worst, std::abs(found / exact - 1.0));
+      }
+    }
+  }
+  return worst;
+}
+
+}  // namespace
+
+double measured_boundary_kg(const HandModel& hand, const LoopModel& loop, double guess_kg) {
+  // A bracket: unstable below, stable above.
+  double low = guess_kg / 1.03, high = guess_kg * 1.03;
+  double at_low = growth(hand, loop, low), at_high = growth(hand, loop, high);
+  for (int i = 0; i < 24 && !(at_low > 0.0); ++i) {
+    high = low;
+    at_high = at_low;
+    low /= 1.06;
+    at_low = growth(hand, loop, low);
+  }
+  for (int i = 0; i < 24 && !(at_high < 0.0); ++i) {
+    low = high;
+    at_low = at_high;
+    high *= 1.06;
+    at_high = growth(hand, loop, high);
+  }
+  if (!(at_low > 0.0 && at_high < 0.0)) return nan_value;
+  for (int i = 0; i < 4 && high / low > 1.0005; ++i) {
+    // Runs that blew up or died say only the sign.
+    const bool both = std::abs(at_low) < 9.0 && std::abs(at_high) < 9.0;
+    const double part = both ? std::clamp(at_low / (at_low - at_high), 0.1, 0.9) : 0.5;
+    const double middle = low * std::pow(high / low, part), at = growth(hand, loop, middle);
+    (at > 0.0 ? low : high) = middle;
+    (at > 0.0 ? at_low : at_high) = at;
+  }
+  const bool both = std::abs(at_low) < 9.0 && std::abs(at_high) < 9.0;
+  return low * std::pow(high / low, both ? at_low / (at_low - at_high) : 0.5);
+}
+
+std::vector<Column> StabilityMap::columns() const {
+  return {{"period_s"},     {"stiffness_N_per_m"}, {"damping_Ns_per_m"},
+          {"hand_mass_kg"}, {"delay_s"},           {"drive_time_constant_s"},
+          {"order"},        {"predicted_kg"},      {"measured_kg"},
+          {"sensitivity"},  {"contact_bounces"},   {"contact_amplitude_m"}};
+}
+
+// A job: all stiffnesses of one line, so that jobs aren't too small.
+std::size_t StabilityMap::jobs(const Options& options) const {
+  const Grid grid(options.quick);
+  return grid.size() / grid.K.size();
+}
+
+std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) const {
+  const Grid grid(options.quick);
+  std::size_t rest = job;
+  const auto take = [&rest](const auto& list) {
+    const auto value = list[rest % list.size()];
+    rest /= list.size();
+    return value;
+  };
+  LoopModel loop;
+  loop.period_s = take(grid.T);
+  loop.delay_s = take(grid.L);
+  const Grip grip = take(grid.grips);
+  loop.drive_time_constant_s = take(grid.tau);
+  loop.order = take(grid.orders);
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < grid.K.size(); ++i) {
+    const HandModel hand{grid.K[i], grip.damping_Ns_per_m, grip.mass_kg};
+    const auto predicted = controller::smallest_stable_mass(hand, loop);
+    double measured = nan_value, sensitivity = nan_value;
+    Contact contact{nan_value, nan_value};
+    if (predicted) {
+      HandModel stiffer = hand;
+      stiffer.stiffness_N_per_m *= 1.01;
+      const auto other = controller::smallest_stable_mass(stiffer, loop);
+      sensitivity = other ? std::abs(std::log(*other / *predicted)) / std::log(1.01) : 1e3;
+      measured = measured_boundary_kg(hand, loop, *predicted);
+      if ((job + i) % 10 == 0) contact = push_against_wall(hand, loop, 1.5 * *predicted);
+    } else {
+      // At a mass whose oscillation takes some hundred steps, do both say the same?
+      const double mass = std::clamp(hand.stiffness_N_per_m * std::pow(40.0 * loop.period_s, 2), 1e-2, 1000.0);
+      const bool grows = growth(hand, loop, mass) > 0.0;
+      measured = grows == (controller::spectral_radius(hand, loop, mass) > 1.0) ? -1.0 : 0.0;
+    }
+    rows.push_back({loop.period_s, hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, loop.delay_s,
+                    loop.drive_time_constant_s, static_cast<double>(loop.order), predicted.value_or(-1.0), measured,
+                    sensitivity, contact.bounces, contact.amplitude_m});
+  }
+  return rows;
+}
+
+json StabilityMap::headline(const Table& table, const Options& /*options*/) const {
+  const std::size_t predicted = table.column("predicted_kg"), measured = table.column("measured_kg"),
+                    sensitivity = table.column("sensitivity"), bounces = table.column("contact_bounces");
+  std::int64_t ill = 0, none = 0, none_disagree = 0, not_found = 0, contact = 0, contact_cycles = 0, compared = 0;
+  double worst = 0.0, sum2 = 0.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double p = table.number(row, predicted), m = table.number(row, measured);
+    if (std::isfinite(table.number(row, bounces))) {
+      ++contact;
+      contact_cycles += table.number(row, bounces) > 1.0 ? 1 : 0;
+    }
+    if (p < 0.0) {
+      ++none;
+      none_disagree += m < 0.0 ? 0 : 1;
+    } else if (!(table.number(row, sensitivity) < 3.0)) {
+      ++ill;
+    } else if (!std::isfinite(m)) {
+      ++not_found;
+    } else {
+      const double error = std::abs(m / p - 1.0);
+      worst = std::max(worst, error);
+      sum2 += error * error;
+      ++compared;
+    }
+  }
+  return {
+      {"points", table.rows()},
+      {"boundary_error_max", worst},
+      {"boundary_error_rms", std::sqrt(sum2 / static_cast<double>(std::max<std::int64_t>(1, compared)))},
+      {"compared", compared},
+      {"ill_conditioned", ill},
+      {"no_stable_mass", none},
+      {"no_stable_mass_disagree", none_disagree},
+      {"not_found", not_found},
+      {"contact_points", contact},
+      {"contact_cycles", contact_cycles},
+      {"d1_error_max", d1_error()},
+      {"keys",
+       {{"points", "combinations of timestep, hand, delay, drive and order"},
+        {"boundary_error_max",
+         "the largest |measured/predicted - 1| of the smallest stable mass, ill-conditioned apart"},
+        {"compared", "points of boundary_error_max"},
+        {"ill_conditioned", "points where 1 % of the hand's stiffness moves the boundary by 3 % or more"},
+        {"no_stable_mass",
+         "points where no mass up to 1000 kg is stable; _disagree: simulation and eigenvalues differ at a mass that "
+         "oscillates fast enough to be followed"},
+        {"not_found", "points where the simulation showed no boundary near the predicted one"},
+        {"contact_points", "points that were also simulated against a wall, at 1.5 times the smallest stable mass"},
+        {"contact_cycles", "of those, how many went on making and breaking contact"},
+        {"d1_error_max", "ideal drive, no delay beyond one period: error of the prediction against K T^2/4 + D T/2"}}}};
+}
+
+std::vector<std::string> StabilityMap::plot(const Table& table, const Options& options,
+                                            const std::filesystem::path& out) const {
+  const Grid grid(options.quick);
+  const auto value = [&table](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
+  MapChart chart{.title = "Smallest stable mass in kg, measured (order 1, drives of 100 Hz)",
+                 .columns = 3,
+                 .z_low = 1e-3,
+                 .z_high = 100.0,
+                 .note = "white: no mass up to 1000 kg is stable"};
+  const std::vector<double> delays = options.quick ? grid.L : std::vector<double>{0.0, 4e-3, 16e-3};
+  for (const Grip& grip : {Grip{10.0, 0.0}, Grip{20.0, 1.0}}) {
+    for (const double delay : delays) {
+      char title[120];
+      std::snprintf(title, sizeof title, "hand %.0f kg, %.0f Ns/m; delay T + %.0f ms", grip.mass_kg,
+                    grip.damping_Ns_per_m, 1e3 * delay);
+      Map map{.title = title,
+              .x_label = "timestep (ms)",
+              .y_label = "hand's stiffness (N/m)",
+              .log_x = true,
+              .log_y = true,
+              .log_z = true};
+      for (const double T : grid.T) map.x.push_back(1e3 * T);
+      map.y = grid.K;
+      map.z.assign(map.x.size() * map.y.size(), nan_value);
+      for (std::size_t row = 0; row < table.rows(); ++row) {
+        if (value(row, "order") != 1.0 || value(row, "drive_time_constant_s") != 1.6e-3 ||
+            value(row, "delay_s") != delay || value(row, "hand_mass_kg") != grip.mass_kg ||
+            value(row, "damping_Ns_per_m") != grip.damping_Ns_per_m || !(value(row, "predicted_kg") > 0.0)) {
+          continue;
+        }
+        const auto x = std::find(grid.T.begin(), grid.T.end(), value(row, "period_s")) - grid.T.begin();
+        const auto y = std::find(grid.K.begin(), grid.K.end(), value(row, "stiffness_N_per_m")) - grid.K.begin();
+        const auto place = static_cast<std::size_t>(y) * map.x.size() + static_cast<std::size_t>(x);
+        if (place < map.z.size()) map.z[place] = value(row, "measured_kg");
+      }
+      chart.maps.push_back(map);
+    }
+  }
+  Chart agreement{.title = "Measured against predicted boundary", .panel_height = 480};
+  Panel panel{.x_label = "sensitivity of the boundary to the hand's stiffness, |∂ln M/∂ln K|",
+              .y_label = "|measured/predicted − 1|",
+              .log_x = true,
+              .log_y = true,
+              .y_low = 1e-7,
+              .y_high = 1.0};
+  Curve good{.name = "compared", .style = 0, .marks = true, .line = false},
+      bad{.name = "ill-conditioned", .style = 2, .marks = true, .line = false};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double p = value(row, "predicted_kg"), m = value(row, "measured_kg"), s = value(row, "sensitivity");
+    if (!(p > 0.0) || !std::isfinite(m) || row % (table.rows() / 2500 + 1) != 0) continue;
+    Curve& curve = s < 3.0 ? good : bad;
+    curve.x.push_back(std::max(s, 1e-4));
+    curve.y.push_back(std::max(std::abs(m / p - 1.0), 2e-7));
+  }
+  panel.curves = {good, bad, {.name = "2 %", .x = {1e-4, 1e3}, .y = {0.02, 0.02}, .style = 1}};
+  agreement.panels.push_back(panel);
+  std::vector<std::string> warnings;
+  for (const std::string& warning :
+       {draw(chart, out / "stability.svg"), draw(agreement, out / "stability_agreement.svg")}) {
+    if (!warning.empty()) warnings.push_back(warning);
+  }
+  return warnings;
+}
+
+std::string StabilityMap::text(const json& headline) const {
+  std::ostringstream text;
+  char line[300];
+  std::snprintf(
+      line, sizeof line,
+      "%lld points: measured and predicted boundary differ by %.3g %% at most, %.2g %% rms (%lld compared, %lld "
+      "ill-conditioned, %lld without a stable mass)\n",
+      headline.at("points").get<long long>(), 100.0 * headline.at("boundary_error_max").get<double>(),
+      100.0 * headline.at("boundary_error_rms").get<double>(), headline.at("compared").get<long long>(),
+      headline.at("ill_conditioned").get<long long>(), headline.at("no_stable_mass").get<long long>());
+  text << line << "not found " << headline.at("not_found") << ", disagreeing where no mass is stable "
+       << headline.at("no_stable_mass_disagree") << "; K T²/4 + D T/2 to " << headline.at("d1_error_max").get<double>()
+       << "\nagainst a wall: " << headline.at("contact_points") << " points, " << headline.at("contact_cycles")
+       << " that don't settle\n";
+  return text.str();
+}
+
+}  // namespace proxarm::studies

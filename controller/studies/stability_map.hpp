@@ -1,0 +1,33 @@
+// The smallest stable mass over timestep, hand, delay and drive: predicted from eigenvalues (controller/stability.hpp),
+// and measured by running the controller's own proxy against the same linear plant until the motion has grown or
+// shrunk.
+//
+// Measured: the growth of the oscillation is followed over some tens of its half-waves, in free motion; the mass at
+// which it neither grows nor shrinks is found by bracketing and the secant rule. A point is ill-conditioned where a per
+// cent of the hand's stiffness moves the boundary by more than three (|∂ln M/∂ln K_h| ≥ 3).
+//
+// At every tenth point the proxy also meets a wall at 1.5 times the smallest stable mass, with the hand pushing on:
+// does it settle, or make and break contact for good?
+#pragma once
+
+#include "controller/stability.hpp"
+#include "controller/studies/study.hpp"
+
+namespace proxarm::studies {
+
+class StabilityMap final : public Study {
+ public:
+  std::string name() const override { return "stability"; }
+  std::vector<Column> columns() const override;
+  std::size_t jobs(const Options& options) const override;
+  std::vector<Row> run(std::size_t job, const Options& options) const override;
+  nlohmann::json headline(const Table& table, const Options& options) const override;
+  std::vector<std::string> plot(const Table& table, const Options& options,
+                                const std::filesystem::path& out) const override;
+  std::string text(const nlohmann::json& headline) const override;
+};
+
+// The boundary next to `guess_kg`, measured; not finite where no growth changed sign within a factor of four.
+double measured_boundary_kg(const controller::HandModel& hand, const controller::LoopModel& loop, double guess_kg);
+
+}  // namespace proxarm::studies

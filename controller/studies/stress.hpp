@@ -1,0 +1,45 @@
+// Random worlds under random forces, and what must hold at every step whatever they are.
+//
+// A run: a world composed at random, a proxy of 1 g to 1 t with a timestep of 10 µs to 50 ms, order 1 or 2, forces up
+// to 1e6 N (steady, noise, jumps, sines, random walks, towards an object), 1000 steps. After each step, with q the
+// previous proxy as 𝒢 was given it, r the new one and f = κ(r − p̂):
+//   finite          r and f are
+//   inside          r is nowhere inside of an object (by more than rounding)
+//   law             f lies in the sum of the friction cones of the contacts that are reported, against the slip (17):
+//                   nothing pulls, nothing leaves its cone
+//   stiffness       𝒢(κ', r − f/κ', q) = r for another κ' (Assumption 1)
+//   work            fᵀ(r − q) ≤ f_n ‖r − q‖²/(2R) on one convex surface of radius R, and ≤ 0 on flat and concave ones
+// Counted apart, with their numbers, and not among the violations:
+//   unresolved      steps in which 𝒢 itself says that no set of contacts was complete (a squeeze, a jam)
+//   several         another κ' gave another point that obeys (17) as well: Coulomb's law has several solutions there
+//   edge            work on the edges of boxes, cylinders and meshes, where R is zero
+//   not judged      work with several contacts of which one is convex, with objects that move (they do work), with
+//   layers
+//                   (they give back what they took), and at order 2, whose q is no place where the proxy was
+#pragma once
+
+#include <cstdint>
+
+#include "controller/studies/study.hpp"
+
+namespace proxarm::studies {
+
+class Stress final : public Study {
+ public:
+  static constexpr int steps_per_run = 1000;
+
+  std::string name() const override { return "stress"; }
+  std::vector<Column> columns() const override;
+  std::size_t jobs(const Options& options) const override;
+  std::vector<Row> run(std::size_t job, const Options& options) const override;
+  nlohmann::json headline(const Table& table, const Options& options) const override;
+  std::vector<std::string> plot(const Table& table, const Options& options,
+                                const std::filesystem::path& out) const override;
+  std::string text(const nlohmann::json& headline) const override;
+  bool failed(const nlohmann::json& headline) const override;
+
+  // One run alone, by its own seed: what it was made of, and each violation with its state. True if there was one.
+  static bool replay(std::uint64_t run_seed, std::string& text);
+};
+
+}  // namespace proxarm::studies

@@ -1,0 +1,38 @@
+#include "controller/studies/studies.hpp"
+
+#include "controller/studies/error.hpp"
+#include "controller/studies/figure5.hpp"
+#include "controller/studies/skip.hpp"
+#include "controller/studies/stability_map.hpp"
+#include "controller/studies/stress.hpp"
+#include "models/description/setup_error.hpp"
+#include "models/description/text.hpp"
+
+namespace proxarm::studies {
+
+StudyList all_studies(const ArmRun& arm) {
+  StudyList list;
+  list.push_back(std::make_unique<Figure5>());
+  list.push_back(std::make_unique<Stress>());
+  list.push_back(std::make_unique<ErrorStudy>());
+  list.push_back(std::make_unique<StabilityMap>());
+  list.push_back(std::make_unique<Fidelity>(arm));
+  list.push_back(std::make_unique<Skip>());
+  return list;
+}
+
+const Study& study_named(const StudyList& list, const std::string& name) {
+  std::vector<std::string> known;
+  for (const auto& study : list) {
+    if (study->name() == name) return *study;
+    known.push_back(study->name());
+  }
+  const std::string near = description::nearest(name, known);
+  known.emplace_back("merge");
+  throw description::SetupError({.key = "study",
+                                 .found = description::in_quotes(name),
+                                 .expected = description::one_of(known),
+                                 .advice = near.empty() ? "" : "did you mean " + near + "?"});
+}
+
+}  // namespace proxarm::studies

@@ -1,0 +1,21 @@
+// The studies by their names.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "controller/studies/fidelity.hpp"
+#include "controller/studies/study.hpp"
+
+namespace proxarm::studies {
+
+using StudyList = std::vector<std::unique_ptr<Study>>;
+
+// `arm` runs the simulated arm for the studies that want it.
+StudyList all_studies(const ArmRun& arm);
+
+// Throws description::SetupError that names what there is.
+const Study& study_named(const StudyList& list, const std::string& name);
+
+}  // namespace proxarm::studies

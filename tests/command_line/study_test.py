@@ -1,0 +1,64 @@
+"""The studies and the advice of `tune`, as the program prints and writes them."""
+import json
+import unittest
+
+from harness import ProgramTest
+
+
+class Study(ProgramTest):
+    def figures(self, name, folder):
+        return json.loads((self.folder / folder / f"{name}.json").read_text())
+
+    def test_parts_that_are_merged_are_the_whole(self):
+        runs = ("study", "stress", "--runs", "12", "--seed", "3")
+        whole = self.call(*runs, "--out", "whole")
+        self.assertIn(whole.status, (0, 1), whole.err)
+        for part in (1, 2, 3):
+            self.assertEqual(self.call(*runs, "--shard", f"{part}/3", "--out", f"part{part}").status, 0)
+        merged = self.call("study", "merge", "part1", "part2", "part3", "--out", "merged")
+        self.assertEqual(merged.status, whole.status, merged.err)
+        self.assertEqual((self.folder / "whole/stress.csv").read_bytes(), (self.folder / "merged/stress.csv").read_bytes())
+        one, other = self.figures("stress", "whole"), self.figures("stress", "merged")
+        for key in ("runs", "steps", "violations", "seed", "by_kind"):
+            self.assertEqual(one[key], other[key])
+        self.assertTrue((self.folder / "merged/stress.svg").exists())
+        missing = self.call("study", "merge", "part1", "part3", "--out", "merged")
+        self.assertEqual(missing.status, 2)
+        self.assertIn("12 jobs: all parts", missing.err)
+
+    def test_figure5_writes_its_files(self):
+        self.assertEqual(self.call("study", "figure5", "--out", "out").status, 0)
+        figures = self.figures("figure5", "out")
+        self.assertEqual(figures["pull_force_N"]["23"], 0)
+        self.assertLessEqual(figures["kick_N"]["23"], 1e-12)
+        for key in ("pull_force_N", "kick_N", "oscillation_N"):
+            self.assertIn(key, figures["keys"])
+        self.assertIn("<svg", (self.folder / "out/figure5.svg").read_text()[:1000])
+
+    def test_mistakes_are_named(self):
+        for arguments, words in ((("figur5", "--out", "x"), ("'figur5'", "figure5")),
+                                 (("figure5",), ("--out",)),
+                                 (("figure5", "--out", "x", "--shard", "3/2"), ("--shard", "3/2")),
+                                 (("figure5", "--out", "x", "--seed", "-1"), ("--seed",)),
+                                 (("error", "--out", "x", "--replay", "4"), ("--replay",))):
+            outcome = self.call("study", *arguments)
+            self.assertEqual(outcome.status, 2, arguments)
+            self.assertEqual(outcome.err.count("\n"), 1, outcome.err)
+            for word in words:
+                self.assertIn(word.strip("'"), outcome.err)
+
+
+class Tune(ProgramTest):
+    def test_advice_says_what_limits(self):
+        outcome = self.call("tune")
+        self.assertEqual(outcome.status, 0, outcome.err)
+        for word in ("smallest stable mass", "advice: --mass", "what limits it", "timestep of at most", "handle"):
+            self.assertIn(word, outcome.out)
+
+    def test_a_hopeless_loop_is_told_so(self):
+        outcome = self.call("tune", "--timestep", "50ms")
+        self.assertIn("damping", outcome.out)
+
+
+if __name__ == "__main__":
+    unittest.main()

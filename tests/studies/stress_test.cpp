@@ -1,0 +1,39 @@
+#include "controller/studies/stress.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/models/random_states.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+// The seed and the counts have been seen clean; a failure names the run's own seed.
+void expect_no_violation(std::size_t first, double runs) {
+  const Stress study;
+  const Options options{.seed = 1};
+  Table table(study.columns());
+  const auto count = static_cast<std::size_t>(tests::scaled(runs));
+  for (std::size_t job = first; job < first + count; ++job) {
+    for (const Row& row : study.run(job, options)) table.add(job, row);
+  }
+  const nlohmann::json headline = study.headline(table, options);
+  EXPECT_FALSE(study.failed(headline)) << study.text(headline);
+  EXPECT_GT(headline.at("contact_steps").get<double>(), 0.05 * headline.at("steps").get<double>());
+}
+
+TEST(Stress, HoldsInTheFirstWorlds) { expect_no_violation(0, 2500); }
+
+TEST(Stress, ARunIsTheSameAgainByItsSeed) {
+  const Stress study;
+  const Options options{.seed = 5};
+  EXPECT_EQ(study.run(3, options), study.run(3, options));
+  std::string one, two;
+  EXPECT_FALSE(Stress::replay(job_seed(1, 0), one));
+  EXPECT_FALSE(Stress::replay(job_seed(1, 0), two));
+  EXPECT_EQ(one, two);
+}
+
+}  // namespace
+}  // namespace proxarm::studies

@@ -1,0 +1,107 @@
+#include "controller/studies/study.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "models/description/setup_error.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Rows that no decimal of few digits holds.
+class Thirds final : public Study {
+ public:
+  std::string name() const override { return "thirds"; }
+  std::vector<Column> columns() const override { return {{"kind", true}, {"third"}}; }
+  std::size_t jobs(const Options& options) const override { return options.quick ? 5 : 23; }
+  std::vector<Row> run(std::size_t job, const Options& options) const override {
+    std::vector<Row> rows;
+    for (std::size_t i = 0; i <= job % 3; ++i) {
+      rows.push_back(
+          {std::string(i == 0 ? "first" : "next"), static_cast<double>(job_seed(options.seed, job) + i) / 3.0});
+    }
+    return rows;
+  }
+  nlohmann::json headline(const Table& table, const Options& /*options*/) const override {
+    double sum = 0.0;
+    for (std::size_t row = 0; row < table.rows(); ++row) sum += table.number(row, table.column("third"));
+    return {{"sum", sum}};
+  }
+  std::vector<std::string> plot(const Table& /*table*/, const Options& /*options*/,
+                                const fs::path& /*out*/) const override {
+    return {};
+  }
+  std::string text(const nlohmann::json& headline) const override { return headline.at("sum").dump(); }
+};
+
+class StudyFiles : public testing::Test {
+ protected:
+  StudyFiles() { fs::create_directories(folder_); }
+  ~StudyFiles() override {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  static std::string content(const fs::path& file) {
+    std::ifstream in(file);
+    std::ostringstream text;
+    text << in.rdbuf();
+    return text.str();
+  }
+  Outcome merge(const std::vector<fs::path>& parts, const fs::path& out) const {
+    return merge_study([this](const std::string&) -> const Study& { return study_; }, parts, out);
+  }
+
+  Thirds study_;
+  fs::path folder_ = fs::temp_directory_path() / ("proxarm_study_" + std::to_string(::getpid()));
+};
+
+TEST_F(StudyFiles, PartsThatAreMergedGiveTheFilesOfOneRun) {
+  const Options options{.seed = 7};
+  run_study(study_, options, {}, folder_ / "one", "one", 1);
+  std::vector<fs::path> parts;
+  for (std::size_t i = 1; i <= 4; ++i) {
+    parts.push_back(folder_ / std::to_string(i));
+    run_study(study_, options, {i, 4}, parts.back(), "part", 2);
+  }
+  merge({parts[2], parts[0], parts[3], parts[1]}, folder_ / "merged");
+  EXPECT_EQ(content(folder_ / "one/thirds.csv"), content(folder_ / "merged/thirds.csv"));
+  const auto one = nlohmann::json::parse(content(folder_ / "one/thirds.json"));
+  const auto merged = nlohmann::json::parse(content(folder_ / "merged/thirds.json"));
+  EXPECT_EQ(one.at("sum"), merged.at("sum"));
+  EXPECT_FALSE(merged.contains("shard"));
+}
+
+TEST_F(StudyFiles, PartsThatDontMakeAWholeAreRefused) {
+  const fs::path a = folder_ / "a", b = folder_ / "b", c = folder_ / "c";
+  run_study(study_, {.seed = 7}, {1, 2}, a, "part", 1);
+  run_study(study_, {.seed = 8}, {2, 2}, b, "part", 1);
+  run_study(study_, {.seed = 7}, {2, 2}, c, "part", 1);
+  EXPECT_THROW(merge({a}, folder_ / "out"), description::SetupError);        // half of it
+  EXPECT_THROW(merge({a, a, c}, folder_ / "out"), description::SetupError);  // one twice
+  EXPECT_THROW(merge({a, b}, folder_ / "out"), description::SetupError);     // another seed
+  EXPECT_THROW(merge({a, folder_}, folder_ / "out"), description::SetupError);
+  std::ofstream(c / "thirds.csv", std::ios::app) << "3,first,abc\n";
+  EXPECT_THROW(merge({a, c}, folder_ / "out"), description::SetupError);  // not a number
+}
+
+TEST_F(StudyFiles, ManyThreadsMakeTheFilesOfOne) {
+  run_study(study_, {}, {}, folder_ / "one", "x", 1);
+  run_study(study_, {}, {}, folder_ / "four", "x", 4);
+  EXPECT_EQ(content(folder_ / "one/thirds.csv"), content(folder_ / "four/thirds.csv"));
+}
+
+TEST(Shard, IsAPartOfAWhole) {
+  EXPECT_EQ(Shard::parse("2/8").index, 2u);
+  for (const char* bad : {"0/8", "9/8", "1", "a/b", "1/", "/2", "-1/2", "1/2/3", "1/99999999"}) {
+    EXPECT_THROW(Shard::parse(bad), description::SetupError) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace proxarm::studies
