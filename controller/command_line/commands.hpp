@@ -27,9 +27,15 @@ struct StudyOptions {
   std::string command_line;  // for the record
 };
 
+struct ScanOptions {
+  std::string interface;
+  std::optional<std::uint32_t> sensor_base_id;
+};
+
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
+int scan_command(const ScanOptions& options);  // 1: nothing answers
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);

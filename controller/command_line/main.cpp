@@ -204,6 +204,7 @@ int run(int argc, char** argv) {
   std::function<int()> command;
   RunOptions run_options, sim_options, plan_options, tune_options;
   command_line::FileOptions check_options, explain_options;
+  command_line::ScanOptions scan_options;
 
   CLI::App* run_app = app.add_subcommand("run", "render a scene on a simulated or real arm");
   add_run_options(*run_app, run_options);
@@ -217,6 +218,20 @@ int run(int argc, char** argv) {
   CLI::App* plan_app = app.add_subcommand("plan", "bus budget of a cell; status 1 if it can't be carried");
   add_session_options(*plan_app, plan_options);
   plan_app->callback([&] { command = [&] { return command_line::plan_command(plan_options); }; });
+
+  CLI::App* scan_app = app.add_subcommand("scan", "what is on a CAN interface: listens, then asks; changes nothing");
+  scan_app->add_option("--bus", scan_options.interface, "CAN interface, such as can0")->required()->type_name("IFACE");
+  scan_app
+      ->add_option_function<std::string>(
+          "--poll-sensor",
+          [&](const std::string& text) {
+            const auto id = description::strict_integer(text);
+            if (!id || *id < 0 || *id > 0x7F) throw CLI::ValidationError("--poll-sensor", "expected 0x09 to 0x7F");
+            scan_options.sensor_base_id = static_cast<std::uint32_t>(*id);
+          },
+          "poll an ATI Net CAN OEM at this base id, such as 0x68; never guessed")
+      ->type_name("BASE_ID");
+  scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
 
   CLI::App* check_app = app.add_subcommand("check", "validate cell, scene, hand and sensor files");
   check_app->add_option("files", check_options.files, "files to check")->required();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "models/description/dbc_file.hpp"
 #include "models/description/yaml_file.hpp"
 
 namespace proxarm::description {
@@ -15,6 +16,36 @@ struct Reader {
   const YamlNode& root;
   SensorProtocol& protocol;
   bool big_endian = true;
+  std::optional<DbcFile> dbc{};
+  std::vector<const DbcMessage*> messages{};  // of the frames; null where a frame states its own
+
+  // Position and scale by the signal's name in the DBC file.
+  [[nodiscard]] const DbcSignal* find_signal(const YamlNode& node, std::size_t& at) const {
+    const std::string name = node.string("signal");
+    at = 0;
+    for (std::size_t i = 0; i < messages.size(); ++i) {
+      const DbcSignal* signal = messages[i] != nullptr ? messages[i]->find(name) : nullptr;
+      if (signal != nullptr && (signal->multiplexed || signal->length > 32)) {
+        throw node.error_at("signal", "one of up to 32 bits that is always in its message");
+      }
+      if (signal != nullptr) return signal;
+      at += protocol.frames[i].bytes;
+    }
+    throw node.error_at("signal", "a signal of the messages that `frames` names");
+  }
+
+  void read_message(const YamlNode& node, SampleFrame& frame) {
+    if (!dbc) throw node.error_at("message", "the key `dbc` with a file beside it, at the top");
+    const DbcMessage* message = dbc->find(node.string("message"));
+    if (message == nullptr) throw node.error_at("message", "a message of " + dbc->file.filename().string());
+    if (message->extended != protocol.extended) {
+      throw node.error_at("message",
+                          protocol.extended ? "one of 29 bits" : "one of 11 bits, or format: {extended: true}");
+    }
+    frame.id = message->id;
+    frame.bytes = message->bytes;
+    messages.push_back(message);
+  }
 
   [[nodiscard]] bool read_order(const YamlNode& node, bool otherwise) const {
     return node.choice_or("byte_order", otherwise ? "big_endian" : "little_endian", {"big_endian", "little_endian"}) ==
@@ -24,6 +55,12 @@ struct Reader {
   // `within`: how many bytes there are.
   [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
     NumberField number;
+    if (node.has("signal")) {
+      std::size_t at = 0;
+      number = find_signal(node, at)->number;
+      number.byte += at;
+      return number;
+    }
     number.byte = static_cast<std::size_t>(node.integer("byte", 0, static_cast<std::int64_t>(within) - 1));
     number.bits = static_cast<int>(node.integer("bits", 1, 32));
     number.shift = static_cast<int>(node.integer_or("shift", 0, 0, 7));
@@ -69,15 +106,26 @@ struct Reader {
       protocol.base_id_step = static_cast<std::uint32_t>(base->integer_or("step", 1, 1, 0x1000000));
     }
     big_endian = read_order(root, true);
+    if (root.has("dbc")) dbc = load_dbc(root.existing_file("dbc"));
   }
 
-  [[nodiscard]] SampleFrame read_frame(const YamlNode& node) const {
+  [[nodiscard]] SampleFrame read_frame(const YamlNode& node) {
     SampleFrame frame;
-    frame.id = read_id(node);
-    const auto bytes = node.integer("bytes", 1, static_cast<std::int64_t>(protocol.frame_capacity()));
+    const bool named = node.has("message");
+    if (named) {
+      read_message(node, frame);
+    } else {
+      messages.push_back(nullptr);
+      frame.id = read_id(node);
+    }
+    const auto capacity = static_cast<std::int64_t>(protocol.frame_capacity());
+    const auto bytes = named ? std::int64_t{frame.bytes} : node.integer("bytes", 1, capacity);
+    if (named && (bytes < 1 || bytes > capacity)) {
+      throw node.error_at("message", "one of 1 to " + std::to_string(capacity) + " bytes");
+    }
     constexpr std::array<std::int64_t, 7> fd_lengths{12, 16, 20, 24, 32, 48, 64};
     if (bytes > 8 && std::find(fd_lengths.begin(), fd_lengths.end(), bytes) == fd_lengths.end()) {
-      throw node.error_at("bytes", "a length of CAN FD: up to 8, 12, 16, 20, 24, 32, 48 or 64");
+      throw node.error_at(named ? "message" : "bytes", "a length of CAN FD: up to 8, 12, 16, 20, 24, 32, 48 or 64");
     }
     frame.bytes = static_cast<std::uint8_t>(bytes);
     if (node.has("starts_with")) frame.starts_with = read_bytes(node, "starts_with", frame.bytes);
@@ -87,9 +135,20 @@ struct Reader {
   [[nodiscard]] SensorSignal read_signal(const YamlNode& node) const {
     SensorSignal signal;
     signal.number = read_number(node, protocol.sample_bytes());
-    signal.scale = node.number_or("scale", 1.0, -1e9, 1e9);
+    double scale = 1.0, offset = 0.0;
+    if (node.has("signal")) {
+      std::size_t at = 0;
+      const DbcSignal* named = find_signal(node, at);
+      scale = named->factor;
+      offset = named->offset;
+      if (!named->unit.empty() && named->unit != "N" && named->unit != "Nm" && !node.has("scale")) {
+        throw node.error_at("signal", "a signal in N or Nm, or a `scale` and `offset` of your own that make it so",
+                            "one in " + in_quotes(named->unit));
+      }
+    }
+    signal.scale = node.number_or("scale", scale, -1e9, 1e9);
     if (signal.scale == 0.0) throw node.error_at("scale", "a number other than 0");
-    signal.offset = node.number_or("offset", 0.0, -1e9, 1e9);
+    signal.offset = node.number_or("offset", offset, -1e9, 1e9);
     signal.saturated_below = node.number_or("saturated_below", signal.number.lowest(), -1e12, 1e12);
     signal.saturated_above = node.number_or("saturated_above", signal.number.highest(), -1e12, 1e12);
     return signal;

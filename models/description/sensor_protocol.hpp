@@ -22,6 +22,10 @@
 //   rate_Hz: 1000                                # of the stream
 //   commands:                                    # all optional; sent in this order when the sensor is started
 //     stop, clear_bias, rate, start: {id: 0x102, data: [0x03, 0x01]}   # and `bias`, which is never sent by itself
+// Places and scales can come from a DBC file instead (dbc_file.hpp):
+//   dbc: my_sensor.dbc
+//   frames: [{message: FORCE}, {message: TORQUE}]
+//   signals: {fx: {signal: Fx}, ...}             # also for counter, status and checksum
 // A number's bits: `byte` is its first byte in the sample, `shift` how many bits lie below it in its lowest byte.
 #pragma once
 

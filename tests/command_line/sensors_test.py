@@ -52,6 +52,13 @@ class OtherSensors(ProgramTest):
         self.assertEqual(outcome.status, 2)
         self.assertRegex(outcome.err, r"onrobot_hex\.yaml:\d+: signals\.tz\.byte: found")
 
+    def test_a_scan_names_its_interface_and_refuses_a_guess(self):
+        self.assertEqual(self.call("scan").status, 2)
+        outcome = self.call("scan", "--bus", "nosuch0")
+        self.assertEqual(outcome.status, 2)
+        self.assertEqual(len(outcome.err.strip().splitlines()), 1, outcome.err)
+        self.assertEqual(self.call("scan", "--bus", "nosuch0", "--poll-sensor", "0x80").status, 2)
+
 
 if __name__ == "__main__":
     unittest.main()

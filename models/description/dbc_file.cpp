@@ -1,0 +1,291 @@
+#include "models/description/dbc_file.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <optional>
+
+#include "models/description/setup_error.hpp"
+#include "models/description/text.hpp"
+
+namespace proxarm::description {
+namespace {
+
+constexpr std::size_t max_bytes = 4U << 20, max_messages = 4096, max_signals = 512;
+constexpr std::uint32_t extended_bit = 0x80000000U, unassigned_id = 0xC0000000U;
+
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+struct Token {
+  enum class Kind { end, word, number, string, sign };
+  Kind kind = Kind::end;
+  std::string_view text;  // without the quotes
+  int line = 1;
+};
+
+class Reader {
+ public:
+  Reader(std::string_view text, const std::filesystem::path& file) : rest_(text), file_(file) { advance(); }
+
+  DbcFile read() {
+    DbcFile dbc;
+    dbc.file = file_;
+    while (token_.kind != Token::Kind::end) read_section(dbc);
+    return dbc;
+  }
+
+ private:
+  [[nodiscard]] SetupError error(std::string expected) const {
+    return SetupError({.file = file_.string(),
+                       .line = token_.line,
+                       .message = "not DBC",
+                       .found = token_.kind == Token::Kind::end ? "the end of the file" : in_quotes(token_.text),
+                       .expected = std::move(expected)});
+  }
+
+  // ---- Words
+
+  void take(Token::Kind kind, std::size_t length) {
+    token_ = {kind, rest_.substr(0, length), line_};
+    rest_.remove_prefix(length);
+  }
+
+  void advance() {
+    while (!rest_.empty() && (rest_[0] == ' ' || rest_[0] == '\t' || rest_[0] == '\r' || rest_[0] == '\n')) {
+      line_ += rest_[0] == '\n' ? 1 : 0;
+      rest_.remove_prefix(1);
+    }
+    if (rest_.empty()) return take(Token::Kind::end, 0);
+    if (rest_[0] == '"') return advance_string();
+    const auto length_of = [&](auto belongs) {
+      return static_cast<std::size_t>(std::find_if_not(rest_.begin(), rest_.end(), belongs) - rest_.begin());
+    };
+    if (is_letter(rest_[0])) {
+      return take(Token::Kind::word, length_of([](char c) { return is_letter(c) || is_digit(c); }));
+    }
+    const bool signed_number = (rest_[0] == '-' || rest_[0] == '+') && rest_.size() > 1 && is_digit(rest_[1]);
+    if (!is_digit(rest_[0]) && !signed_number) return take(Token::Kind::sign, 1);
+    std::size_t length = 1;
+    while (length < rest_.size() && (is_digit(rest_[length]) || rest_[length] == '.' || exponent_at(length))) ++length;
+    take(Token::Kind::number, length);
+  }
+
+  [[nodiscard]] bool exponent_at(std::size_t at) const {
+    const char c = rest_[at], before = rest_[at - 1];
+    if (c == 'e' || c == 'E') return is_digit(before);
+    return (c == '-' || c == '+') && (before == 'e' || before == 'E');
+  }
+
+  void advance_string() {
+    const int line = line_;
+    const std::size_t end = rest_.find('"', 1);
+    if (end == std::string_view::npos) {
+      take(Token::Kind::sign, 1);
+      throw error("a string that ends");
+    }
+    token_ = {Token::Kind::string, rest_.substr(1, end - 1), line};
+    line_ += static_cast<int>(std::count(token_.text.begin(), token_.text.end(), '\n'));
+    rest_.remove_prefix(end + 1);
+  }
+
+  std::string word(const char* what) {
+    if (token_.kind != Token::Kind::word || token_.text.size() > 128) throw error(what);
+    std::string text(token_.text);
+    advance();
+    return text;
+  }
+
+  std::string_view string(const char* what) {
+    if (token_.kind != Token::Kind::string) throw error(what);
+    const std::string_view text = token_.text;
+    advance();
+    return text;
+  }
+
+  void sign(char expected) {
+    if (!at_sign(expected)) throw error(std::string("'") + expected + "'");
+    advance();
+  }
+
+  [[nodiscard]] bool at_sign(char c) const { return token_.kind == Token::Kind::sign && token_.text[0] == c; }
+
+  std::int64_t integer(const char* what, std::int64_t min, std::int64_t max) {
+    const auto value = token_.kind == Token::Kind::number ? strict_integer(token_.text) : std::nullopt;
+    if (!value || *value < min || *value > max) {
+      throw error(std::string(what) + " from " + std::to_string(min) + " to " + std::to_string(max));
+    }
+    advance();
+    return *value;
+  }
+
+  double number(const char* what) {
+    const auto value = token_.kind == Token::Kind::number ? strict_number(token_.text) : std::nullopt;
+    if (!value) throw error(what);
+    advance();
+    return *value;
+  }
+
+  // ---- Sections
+
+  void read_section(DbcFile& dbc) {
+    const int line = token_.line;
+    const std::string name = word("a section such as BO_");
+    if (name == "BO_") return read_message(dbc, line);
+    if (name == "SG_") return read_signal(dbc);
+    if (name == "SIG_VALTYPE_") return read_type(dbc);
+    if (name == "VERSION") return void(string("the version, in quotes"));
+    if (name == "NS_") return skip_new_symbols();
+    if (name == "BS_" || name == "BU_") return skip_line(line);
+    while (token_.kind != Token::Kind::end && !at_sign(';')) advance();
+    sign(';');
+  }
+
+  // A list of words that are sections elsewhere; BS_ with its colon ends it.
+  void skip_new_symbols() {
+    sign(':');
+    while (token_.kind == Token::Kind::word) {
+      std::string_view after = rest_;
+      after.remove_prefix(std::min(after.find_first_not_of(" \t\r\n"), after.size()));
+      if (token_.text == "BS_" && after.starts_with(':')) return;
+      advance();
+    }
+  }
+
+  void skip_line(int line) {
+    while (token_.kind != Token::Kind::end && token_.line == line) advance();
+  }
+
+  // BO_ 256 FORCE: 8 SENSOR
+  void read_message(DbcFile& dbc, int line) {
+    DbcMessage message;
+    message.line = line;
+    const auto id = static_cast<std::uint32_t>(integer("an identifier", 0, 0xFFFFFFFF));
+    message.extended = (id & extended_bit) != 0;
+    message.id = id & ~extended_bit;
+    if (id != unassigned_id && message.id > (message.extended ? 0x1FFFFFFFU : 0x7FFU)) {
+      throw error("an identifier of 11 bits, or of 29 with bit 31 set");
+    }
+    message.name = word("the message's name");
+    sign(':');
+    message.bytes = static_cast<std::uint8_t>(integer("a length", 0, 64));
+    (void)word("the sender's name");
+    if (dbc.find(message.name) != nullptr) throw error("a message that isn't there yet: " + message.name);
+    if (dbc.messages.size() >= max_messages) throw error("no more than 4096 messages");
+    dbc.messages.push_back(std::move(message));
+  }
+
+  // SG_ Fx m0 : 7|16@0- (0.01,0) [-300|300] "N" A,B
+  void read_signal(DbcFile& dbc) {
+    if (dbc.messages.empty()) throw error("a message (BO_) before its signals");
+    DbcMessage& message = dbc.messages.back();
+    DbcSignal signal;
+    signal.name = word("the signal's name");
+    if (token_.kind == Token::Kind::word) {
+      signal.multiplexed = token_.text != "M";
+      advance();
+    }
+    sign(':');
+    const auto start = integer("the start bit", 0, 511);
+    sign('|');
+    signal.length = static_cast<int>(integer("the length in bits", 1, 64));
+    sign('@');
+    const bool big_endian = integer("the byte order, 0 (Motorola) or 1 (Intel),", 0, 1) == 0;
+    const bool is_signed = at_sign('-');
+    if (!is_signed && !at_sign('+')) throw error("'+' (unsigned) or '-' (signed)");
+    advance();
+    place(message, signal, static_cast<int>(start), big_endian);
+    signal.number.kind = is_signed ? NumberKind::signed_integer : NumberKind::unsigned_integer;
+    sign('(');
+    signal.factor = number("the factor");
+    sign(',');
+    signal.offset = number("the offset");
+    sign(')');
+    sign('[');
+    (void)number("the lowest value");
+    sign('|');
+    (void)number("the highest value");
+    sign(']');
+    signal.unit = std::string(string("the unit, in quotes"));
+    (void)word("a receiver's name");
+    while (at_sign(',')) {
+      advance();
+      (void)word("a receiver's name");
+    }
+    if (message.find(signal.name) != nullptr) throw error("a signal that isn't there yet: " + signal.name);
+    if (message.signals.size() >= max_signals) throw error("no more than 512 signals in a message");
+    message.signals.push_back(std::move(signal));
+  }
+
+  // Intel: `start` is the lowest bit. Motorola: the highest, numbered as bit 7 .. 0 of byte 0, then bit 15 .. 8 of byte
+  // 1, and so on; the number goes on towards lower bits and then into the next byte.
+  void place(const DbcMessage& message, DbcSignal& signal, int start, bool big_endian) const {
+    NumberField& number = signal.number;
+    number.big_endian = big_endian;
+    number.byte = static_cast<std::size_t>(start / 8);
+    const int above = big_endian ? 7 - start % 8 : 0;  // bits of the first byte above the number
+    const int used = big_endian ? above + signal.length : start % 8 + signal.length;
+    const int bytes = (used + 7) / 8;
+    number.shift = big_endian ? 8 * bytes - used : start % 8;
+    number.bits = std::min(signal.length, 32);
+    if (number.byte + static_cast<std::size_t>(bytes) > message.bytes) {
+      throw error("a signal that ends within the " + std::to_string(message.bytes) + " bytes of " + message.name);
+    }
+  }
+
+  // SIG_VALTYPE_ 256 Fx : 1;
+  void read_type(DbcFile& dbc) {
+    const auto id = static_cast<std::uint32_t>(integer("an identifier", 0, 0xFFFFFFFF));
+    const std::string name = word("a signal's name");
+    if (at_sign(':')) advance();
+    const auto type = integer("0 (integer), 1 (float) or 2 (double)", 0, 2);
+    sign(';');
+    for (DbcMessage& message : dbc.messages) {
+      if (message.id != (id & ~extended_bit) || message.extended != ((id & extended_bit) != 0)) continue;
+      for (DbcSignal& signal : message.signals) {
+        if (signal.name != name || type == 0) continue;
+        if (type == 1 && signal.length != 32) throw error("a float of 32 bits");
+        // Doubles and shifted floats can be read past, not used.
+        if (type == 1) signal.number.kind = NumberKind::real;
+        if (type == 2) signal.length = 64;
+      }
+    }
+  }
+
+  std::string_view rest_;
+  const std::filesystem::path& file_;
+  Token token_;
+  int line_ = 1;
+};
+
+}  // namespace
+
+const DbcSignal* DbcMessage::find(std::string_view signal) const noexcept {
+  const auto found = std::find_if(signals.begin(), signals.end(), [&](const DbcSignal& s) { return s.name == signal; });
+  return found == signals.end() ? nullptr : &*found;
+}
+
+const DbcMessage* DbcFile::find(std::string_view message) const noexcept {
+  const auto found =
+      std::find_if(messages.begin(), messages.end(), [&](const DbcMessage& m) { return m.name == message; });
+  return found == messages.end() ? nullptr : &*found;
+}
+
+DbcFile parse_dbc(std::string_view text, const std::filesystem::path& file) {
+  if (text.size() > max_bytes) {
+    throw SetupError({.file = file.string(), .message = "is larger than 4 MiB", .advice = "is it the right file?"});
+  }
+  return Reader(text, file).read();
+}
+
+DbcFile load_dbc(const std::filesystem::path& file) {
+  std::error_code trouble;
+  const auto size = std::filesystem::file_size(file, trouble);
+  std::ifstream in(file, std::ios::binary);
+  if (trouble || !in) throw SetupError({.file = file.string(), .message = "can't be read"});
+  if (size > max_bytes) return parse_dbc(std::string(max_bytes + 1, ' '), file);
+  const std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  return parse_dbc(text, file);
+}
+
+}  // namespace proxarm::description
