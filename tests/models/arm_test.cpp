@@ -369,6 +369,42 @@ Cell with_urdf(const std::string& from, const std::string& to) {
   return cell;
 }
 
+// The rail of models/cells/rail.yaml slides along y of W. Differences of ±1e-6 leave 1e-12 of curvature and, of figures
+// of 1e3, 1e-7 of rounding.
+TEST(ArmThatSlides, HasItsDerivatives) {
+  const Cell cell = description::load_cell(source_dir / "models/cells/rail.yaml");
+  const Arm arm(cell);
+  JointVector q = arm.start_rad();
+  q[0] = 0.3;
+  ToolKinematics at_q;
+  arm.kinematics(q, at_q);
+  EXPECT_TRUE(at_q.J_W.col(0).isApprox((Vec<6>() << 0, 1, 0, 0, 0, 0).finished(), 1e-12));
+  const JointVector torque = arm.gravity_torque(q);
+  for (int i = 0; i < arm.axes(); ++i) {
+    constexpr double h = 1e-6;
+    JointVector before = q, after = q;
+    before[i] -= h;
+    after[i] += h;
+    const Vec3 motion = (arm.tool_pose(after).translation() - arm.tool_pose(before).translation()) / (2.0 * h);
+    EXPECT_LT((motion - at_q.J_W.col(i).head<3>()).norm(), 1e-9) << i;
+    EXPECT_NEAR((arm.potential_energy(after) - arm.potential_energy(before)) / (2.0 * h), torque[i], 1e-5) << i;
+  }
+}
+
+// Momentum along y is the rail's row of the mass matrix, and in a gravity of 1 m/s² along −y it is the holding force.
+TEST(ArmThatSlides, CarriesAllThatHangsOnIt) {
+  Cell cell = description::load_cell(source_dir / "models/cells/rail.yaml");
+  cell.gravity_W_m_per_s2 = {0.0, -1.0, 0.0};
+  const Arm arm(cell);
+  JointVector q = arm.start_rad();
+  q[0] = -0.2;
+  const JointMatrix M = arm.link_mass_matrix(q);
+  const JointVector force = arm.gravity_torque(q);
+  EXPECT_TRUE(M.row(0).transpose().isApprox(force, 1e-12)) << M.row(0) << "\n" << force.transpose();
+  EXPECT_TRUE(M.isApprox(M.transpose(), 1e-14));
+  EXPECT_GT(M(0, 0), 100.0) << "kg";
+}
+
 TEST(ArmMistakes, AMissingJointIsNamedWithThoseThatExist) {
   Cell cell = fixed_cell();
   cell.drives[2].joint = "axis3";
