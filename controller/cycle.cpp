@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "fieldbus/canopen_nmt.hpp"
 #include "fieldbus/canopen_pdo.hpp"
@@ -17,8 +18,17 @@ constexpr double seconds_per_ns = 1e-9;
 
 constexpr std::uint32_t nmt_id = 0x000;
 
+// To what the limits as sets are solved, and more.
+constexpr double leash_tolerance_m = 1e-6;
+
 // How long the drives may take to switch off before the run ends without them.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
+
+std::vector<description::DriveDescription> descriptions(const CycleParts& parts) {
+  std::vector<description::DriveDescription> all;
+  for (const DriveOnBus& axis : parts.drives) all.push_back(axis.drive.description());
+  return all;
+}
 
 // By its last word, which a drive that has gone silent can't take back.
 bool is_off(const DriveOnBus& axis) noexcept {
@@ -37,10 +47,12 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
       link_rad_(parts_.arm->start_rad()),
       target_rad_(parts_.arm->start_rad()),
-      target_k1_rad_(parts_.arm->start_rad()),
-      target_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
       run_out_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
       measured_link_rad_(parts_.arm->start_rad()),
+      actual_rad_(parts_.arm->start_rad()),
+      actual_k1_rad_(parts_.arm->start_rad()),
+      limiter_(descriptions(parts_), limits, settings.period_s),
+      guard_(descriptions(parts_), settings.period_s),
       records_(record_capacity) {
   solution_.q = link_rad_;
 }
@@ -72,6 +84,7 @@ void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
     supervisor_.handle(Event::begin);
   }
   record_ = {};
+  active_ = {};
   sample_is_new_ = false;
   fieldbus::CanFrame frame;
   for (DriveBus& bus : parts_.drive_buses) {
@@ -127,6 +140,8 @@ bool Cycle::everything_received() const noexcept {
 void Cycle::measure() noexcept {
   JointVector motor_rad(parts_.arm->axes());
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) motor_rad[i] = parts_.drives[i].drive.actual_rad();
+  actual_k1_rad_ = actual_rad_;
+  actual_rad_ = motor_rad;
   // Gravity twists the gears; the twist of the last cycle is right to within a cycle's change of it.
   measured_link_rad_ = motor_rad - (parts_.arm->motor_from_link(measured_link_rad_) - measured_link_rad_);
   tool_W_ = parts_.arm->tool_pose(measured_link_rad_).translation();
@@ -148,9 +163,6 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
   judge_sensor();
   if (overruns_in_a_row_ > settings_.max_overruns) {
     raise(Fault::overrun, -1, overruns_in_a_row_, settings_.max_overruns);
-  }
-  if (supervisor_.phase() == Phase::rendering && !((tool_W_ - proxy_W_).norm() <= limits_.leash_m)) {
-    raise(Fault::leash_exceeded, -1, (tool_W_ - proxy_W_).norm(), limits_.leash_m);
   }
   enter(supervisor_.phase(), t_k_ns);
 }
@@ -226,9 +238,10 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
     double stop_s = settings_.period_s;
     for (Eigen::Index i = 0; i < target_rad_.size(); ++i) {
       const double deceleration = parts_.drives[i].drive.description().max_acceleration_rad_per_s2;
-      stop_s = std::max(stop_s, std::abs(target_rad_per_s_[i]) / deceleration);
+      stop_s = std::max(stop_s, std::abs(guard_.speed_rad_per_s()[i]) / deceleration);
     }
-    run_out_rad_per_s_ = target_rad_per_s_;
+    guard_.follow_from_here();
+    run_out_rad_per_s_ = guard_.speed_rad_per_s();
     run_out_scale_ = 1.0;
     run_out_per_cycle_ = settings_.period_s / stop_s;
   }
@@ -236,13 +249,11 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
 
 // A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one.
 void Cycle::choose_targets(std::int64_t t_k_ns) noexcept {
-  target_k1_rad_ = target_rad_;
   act(t_k_ns);
   if (supervisor_.phase() != entered_phase_) {
     enter(supervisor_.phase(), t_k_ns);
     act(t_k_ns);
   }
-  target_rad_per_s_ = (target_rad_ - target_k1_rad_) / settings_.period_s;
 }
 
 void Cycle::act(std::int64_t t_k_ns) noexcept {
@@ -310,15 +321,20 @@ void Cycle::start_rendering() noexcept {
   link_rad_ = parts_.arm->link_from_motor(target_rad_);
   const models::Pose X_WT = parts_.arm->tool_pose(link_rad_);
   parts_.elastic.start(link_rad_);
-  proxy_W_ = X_WT.translation();
+  proxy_W_ = proxy_k1_W_ = X_WT.translation();
+  parts_.arm->kinematics(link_rad_, solution_.kinematics);
+  guard_.start(target_rad_);
   parts_.world->start(proxy_W_);
   parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
 }
 
 void Cycle::render() noexcept {
-  const WorldStep step = parts_.world->step(hand_W_.force);
+  make_limits();
+  const WorldStep step = parts_.world->step(hand_W_.force, step_limits_);
   const ProxyFault turned = parts_.orientation.step(hand_W_.torque);
-  if (step.fault != ProxyFault::none || turned != ProxyFault::none) raise(Fault::proxy_not_finite, -1);
+  if (step.fault != ProxyFault::none || turned != ProxyFault::none) return raise(Fault::proxy_not_finite, -1);
+  active_.add(step.limits);
+  proxy_k1_W_ = proxy_W_;
   proxy_W_ = step.q_W;
   record_.p_hat_W_m = triple(step.p_hat_W);
   record_.contact_force_W_N = triple(step.f_W);
@@ -328,43 +344,94 @@ void Cycle::render() noexcept {
   record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
   record_.set(RecordFlag::limit_orientation, parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy();
+  const double distance_m = (tool_W_ - proxy_W_).norm();
+  if (!(distance_m <= limits_.leash_m + leash_tolerance_m)) {
+    raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
+  }
   ++rendered_cycles_;
 }
 
-// Joint targets for the proxy's pose. A step that the joints can't take isn't sent: the last target stands, and the
-// stop that follows runs out from there.
+// The sets of this step, around the proxy and what is commanded behind the filter of the setpoints.
+void Cycle::make_limits() noexcept {
+  parts_.arm->kinematics(parts_.elastic.link_rad(), filtered_);
+  const StepStart start{.q_k1_W = proxy_W_,
+                        .q_k2_W = proxy_k1_W_,
+                        .filtered_W = filtered_.X_WT.translation(),
+                        .filtered_velocity_W = filtered_.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
+                        .measured_W = tool_W_,
+                        .force_N = hand_W_.force.norm()};
+  limiter_.make(start, link_rad_, target_rad_ - parts_.elastic.link_rad(), solution_.kinematics.J_W, step_limits_);
+}
+
+// Joint targets for the proxy's pose. Where the arm can't go all the way (a singularity, the end of its reach), the
+// proxy stays where the arm is.
 void Cycle::follow_proxy() noexcept {
   models::Pose X_WT = models::Pose::Identity();
   X_WT.translation() = proxy_W_;
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
+  const models::Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
   parts_.inverse.solve(link_rad_, X_WT, solution_);
-  if (solution_.status != models::InverseKinematicsResult::Status::converged) return raise(Fault::singular, -1);
-  const JointVector motor_rad = parts_.elastic.step(solution_.q);
-  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
-    const description::DriveDescription& drive = parts_.drives[i].drive.description();
-    const auto where = static_cast<std::int32_t>(i);
-    if (!(motor_rad[i] >= drive.range_rad[0] && motor_rad[i] <= drive.range_rad[1])) {
-      return raise(Fault::target_out_of_range, where, motor_rad[i],
-                   motor_rad[i] < drive.range_rad[0] ? drive.range_rad[0] : drive.range_rad[1]);
-    }
-    const double speed = std::abs(motor_rad[i] - target_rad_[i]) / settings_.period_s;
-    if (!(speed <= drive.max_speed_rad_per_s)) {
-      return raise(Fault::target_too_fast, where, speed, drive.max_speed_rad_per_s);
-    }
-  }
+  if (solution_.status == models::InverseKinematicsResult::Status::invalid) return raise(Fault::singular, -1);
   link_rad_ = solution_.q;
-  target_rad_ = motor_rad;
+  if (solution_.status != models::InverseKinematicsResult::Status::converged) {
+    active_.set(Limit::singularity);
+    const models::Vec3& reached_W = solution_.kinematics.X_WT.translation();
+    proxy_k1_W_ = proxy_W_ = parts_.world->resume(reached_W, (reached_W - reached_k1_W) / settings_.period_s);
+  }
+  command(parts_.elastic.step(link_rad_));
+}
+
+void Cycle::command(const JointVector& motor_rad) noexcept {
+  JointVector wanted_rad = motor_rad;
+  const bool follow = drives_follow(motor_rad, wanted_rad);
+  active_.add(guard_.step(wanted_rad));
+  target_rad_ = guard_.target_rad();
+  if (!follow || guard_.lag_rad() > limits_.following_error_rad) wind_back();
+}
+
+// A drive that is blocked is told to go a little further than it is, not more, and all the others wait with it: so
+// little is wound up that nothing snaps when it comes free. What a drive that follows is behind, after its setpoint's
+// way to it and back, grows with its speed.
+bool Cycle::drives_follow(const JointVector& motor_rad, JointVector& wanted_rad) noexcept {
+  std::uint8_t blocked = 0;
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    const DriveOnBus& axis = parts_.drives[static_cast<std::size_t>(i)];
+    if (!axis.drive.fresh()) continue;
+    const double lag_s =
+        5.0 * settings_.period_s + 1.0 / (2.0 * std::numbers::pi * axis.drive.description().position_bandwidth_Hz);
+    const double room_rad =
+        limits_.following_error_rad + lag_s / settings_.period_s * std::abs(actual_rad_[i] - actual_k1_rad_[i]);
+    if (std::abs(motor_rad[i] - actual_rad_[i]) <= room_rad) continue;
+    blocked = static_cast<std::uint8_t>(blocked | 1u << i);
+    wanted_rad[i] = std::clamp(motor_rad[i], actual_rad_[i] - room_rad, actual_rad_[i] + room_rad);
+  }
+  if (blocked == 0) return true;
+  active_.set(Limit::following_error, blocked);
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    if ((blocked & 1u << i) == 0) wanted_rad[i] = target_rad_[i];
+  }
+  return false;
+}
+
+// Filter and proxy go on from what was commanded: nothing of what couldn't be followed is caught up later.
+void Cycle::wind_back() noexcept {
+  const JointVector& speed = guard_.speed_rad_per_s();
+  guard_.follow_from_here();
+  parts_.elastic.resume(target_rad_, speed);
+  link_rad_ = parts_.elastic.link_rad() + parts_.elastic.lead_s() * speed;
+  parts_.arm->kinematics(link_rad_, solution_.kinematics);
+  const models::Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
+  proxy_W_ = parts_.world->resume(solution_.kinematics.X_WT.translation(), velocity_W);
+  proxy_k1_W_ = proxy_W_ - settings_.period_s * velocity_W;
+  parts_.orientation.start(Eigen::Quaterniond(solution_.kinematics.X_WT.linear()).normalized());
 }
 
 // Every joint keeps its share of the last motion while that shrinks to nothing, within each joint's deceleration.
 void Cycle::run_out() noexcept {
   run_out_scale_ = std::max(0.0, run_out_scale_ - run_out_per_cycle_);
-  for (Eigen::Index i = 0; i < target_rad_.size(); ++i) {
-    const description::DriveDescription& drive = parts_.drives[i].drive.description();
-    target_rad_[i] = std::clamp(target_rad_[i] + run_out_scale_ * run_out_rad_per_s_[i] * settings_.period_s,
-                                drive.range_rad[0], drive.range_rad[1]);
-  }
-  if (run_out_scale_ <= 0.0) supervisor_.handle(Event::at_rest);
+  active_.add(guard_.step(target_rad_ + run_out_scale_ * settings_.period_s * run_out_rad_per_s_));
+  target_rad_ = guard_.target_rad();
+  if (run_out_scale_ <= 0.0 && guard_.at_rest()) supervisor_.handle(Event::at_rest);
 }
 
 void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
@@ -400,6 +467,8 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record_.axes = static_cast<std::uint8_t>(parts_.drives.size());
   record_.set(RecordFlag::sample_held, !sample_is_new_);
   record_.set(RecordFlag::overrun, overruns_in_a_row_ > 0);
+  for (const LimitFlag& flag : limit_flags) record_.set(flag.flag, active_.has(flag.limit));
+  record_.limited_axes = active_.axes;
   record_.force_S_N = triple(reading_S_.force);
   record_.torque_S_Nm = triple(reading_S_.torque);
   record_.force_W_N = triple(hand_W_.force);

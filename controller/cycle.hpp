@@ -21,10 +21,12 @@
 
 #include "controller/cycle_record.hpp"
 #include "controller/elastic_setpoint.hpp"
+#include "controller/joint_guard.hpp"
 #include "controller/orientation_proxy.hpp"
 #include "controller/rendered_world.hpp"
 #include "controller/session_settings.hpp"
 #include "controller/spsc_ring.hpp"
+#include "controller/step_limits.hpp"
 #include "controller/supervisor.hpp"
 #include "controller/wrench_compensation.hpp"
 #include "fieldbus/can_network.hpp"
@@ -119,7 +121,11 @@ class Cycle {
   void tare(std::int64_t t_k_ns) noexcept;
   void start_rendering() noexcept;
   void render() noexcept;
+  void make_limits() noexcept;
   void follow_proxy() noexcept;
+  void command(const JointVector& motor_rad) noexcept;
+  bool drives_follow(const JointVector& motor_rad, JointVector& wanted_rad) noexcept;
+  void wind_back() noexcept;
   void run_out() noexcept;
   void send_targets(std::int64_t t_k_ns) noexcept;
   void send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept;
@@ -151,10 +157,15 @@ class Cycle {
   models::Vec3 proxy_W_ = models::Vec3::Zero();
   JointVector link_rad_;    // angles of the links at the target: what inverse kinematics starts from
   JointVector target_rad_;  // motor side, what the drives are sent
-  JointVector target_k1_rad_;
-  JointVector target_rad_per_s_;  // of the last cycle: what a stop runs out
   JointVector run_out_rad_per_s_;
   JointVector measured_link_rad_;
+  JointVector actual_rad_, actual_k1_rad_;  // by the encoders, in this cycle and the one before
+  models::Vec3 proxy_k1_W_ = models::Vec3::Zero();
+  StepLimiter limiter_;
+  StepLimits step_limits_;
+  JointGuard guard_;
+  ActiveLimits active_;
+  models::ToolKinematics filtered_;  // of the links as they are commanded, behind the filter
   models::InverseKinematicsResult solution_;
   double run_out_scale_ = 1.0;
   double run_out_per_cycle_ = 1.0;

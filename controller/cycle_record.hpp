@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "controller/step_limits.hpp"
 #include "controller/supervisor.hpp"
 #include "models/geometry.hpp"
 
@@ -29,7 +30,30 @@ enum class RecordFlag : std::uint32_t {
   contact_multivalued = 1u << 8,  // the contact problem had more than one solution
   truth = 1u << 9,                // the fields of the simulation's truth are filled in
   overrun = 1u << 10,             // the cycle was late; wall-clock, so it goes to timing.json and not to signals.csv
+  limit_power = 1u << 11,
+  limit_keep_out = 1u << 12,
+  limit_joint_speed = 1u << 13,
+  limit_joint_acceleration = 1u << 14,
+  limit_singularity = 1u << 15,      // inverse kinematics stopped short: end of reach, or nearly singular
+  limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
 };
+
+// The flag of a limit, and the parameter that holds it ("limits.leash_m").
+struct LimitFlag {
+  RecordFlag flag;
+  Limit limit;
+};
+inline constexpr std::array limit_flags{LimitFlag{RecordFlag::limit_speed, Limit::speed},
+                                        LimitFlag{RecordFlag::limit_acceleration, Limit::acceleration},
+                                        LimitFlag{RecordFlag::limit_power, Limit::power},
+                                        LimitFlag{RecordFlag::limit_workspace, Limit::workspace},
+                                        LimitFlag{RecordFlag::limit_keep_out, Limit::keep_out},
+                                        LimitFlag{RecordFlag::limit_joint, Limit::joint_range},
+                                        LimitFlag{RecordFlag::limit_joint_speed, Limit::joint_speed},
+                                        LimitFlag{RecordFlag::limit_joint_acceleration, Limit::joint_acceleration},
+                                        LimitFlag{RecordFlag::limit_leash, Limit::leash},
+                                        LimitFlag{RecordFlag::limit_singularity, Limit::singularity},
+                                        LimitFlag{RecordFlag::limit_following_error, Limit::following_error}};
 
 // Three numbers that stay trivially copyable (Eigen's types aren't).
 using Triple = std::array<double, 3>;
@@ -46,7 +70,8 @@ struct CycleRecord {
   ContactPhase contact = ContactPhase::free;
   std::uint8_t contact_count = 0;  // how many things press at once
   std::uint8_t axes = 0;
-  std::uint32_t flags = 0;  // RecordFlag
+  std::uint8_t limited_axes = 0;  // joints whose own limits were active, as bits
+  std::uint32_t flags = 0;        // RecordFlag
 
   Triple force_S_N{}, torque_S_Nm{};  // the sensor's wrench, as decoded
   Triple force_W_N{}, torque_W_Nm{};  // bias and tool weight taken off, turned to W, about the rendered point: h(k)

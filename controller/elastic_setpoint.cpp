@@ -23,6 +23,11 @@ void ElasticSetpoint::start(const JointVector& link_rad) noexcept {
   speed_rad_per_s_.setZero();
 }
 
+void ElasticSetpoint::resume(const JointVector& motor_rad, const JointVector& motor_rad_per_s) noexcept {
+  angle_rad_ = arm_->link_from_motor(motor_rad);
+  speed_rad_per_s_ = motor_rad_per_s;
+}
+
 JointVector ElasticSetpoint::step(const JointVector& link_rad) noexcept {
   if (omega_rad_per_s_ <= 0.0) {
     angle_rad_ = link_rad;

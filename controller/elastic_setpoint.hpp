@@ -28,11 +28,17 @@ class ElasticSetpoint {
 
   // At rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
+  // Goes on from where the motors are and how fast: what wound up in the filter is gone. Of the speed, the gears' part
+  // is left out.
+  void resume(const models::JointVector& motor_rad, const models::JointVector& motor_rad_per_s) noexcept;
   // One period towards these angles; returns the motors'.
   models::JointVector step(const models::JointVector& link_rad) noexcept;
 
-  // Where the links are meant to be now.
+  // Where the links are meant to be now, and how fast.
   [[nodiscard]] const models::JointVector& link_rad() const noexcept { return angle_rad_; }
+  [[nodiscard]] const models::JointVector& link_rad_per_s() const noexcept { return speed_rad_per_s_; }
+  // By how much the filter's input is ahead of it at a constant speed: 2/ω, in seconds; 0 without a filter.
+  [[nodiscard]] double lead_s() const noexcept { return omega_rad_per_s_ > 0.0 ? 2.0 / omega_rad_per_s_ : 0.0; }
 
  private:
   const models::Arm* arm_;

@@ -1,5 +1,7 @@
 #include "controller/rendered_world.hpp"
 
+#include "controller/limited_algorithm.hpp"
+
 namespace proxarm::controller {
 
 using models::Vec;
@@ -11,7 +13,10 @@ template <int N>
 class WorldOfDimension final : public RenderedWorld {
  public:
   WorldOfDimension(scenes::CompiledScene& scene, const AdmittanceConfig& config)
-      : scene_(&scene), basis_(scene.space.axes.leftCols<N>()), proxy_(config, scene.algorithm<N>()) {}
+      : scene_(&scene),
+        basis_(scene.space.axes.leftCols<N>()),
+        limited_(scene.algorithm<N>()),
+        proxy_(config, limited_) {}
 
   void start(const Vec3& q_W) noexcept override {
     ProxyStart<N> start;
@@ -24,7 +29,23 @@ class WorldOfDimension final : public RenderedWorld {
     last_.q_W = last_.p_hat_W = q_W;
   }
 
-  WorldStep step(const Vec3& h_W) noexcept override {
+  Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
+    // As far as the scene lets it: a step of 𝒢, whose κ doesn't matter.
+    const Vec<N> wanted = to_coordinates(q_W), v = basis_.transpose() * v_W;
+    if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
+    const double lead_s = proxy_.config().order == 2 ? proxy_.config().period_s : 0.0;
+    ProxyStart<N> start;
+    start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, proxy_.q());
+    start.v = v;
+    start.time_s = proxy_.time_s() + lead_s;
+    proxy_.start(start);
+    proxy_.set_reference(start_);
+    last_.q_W = to_W(start.q);
+    return last_.q_W;
+  }
+
+  WorldStep step(const Vec3& h_W, const StepLimits& limits) noexcept override {
+    limited_.set_limits(limits, basis_, proxy_.q());
     const ProxyFault fault = proxy_.step(basis_.transpose() * h_W);
     if (fault != ProxyFault::none) {
       last_.fault = fault;
@@ -33,7 +54,11 @@ class WorldOfDimension final : public RenderedWorld {
     last_ = {};
     last_.q_W = to_W(proxy_.q());
     last_.p_hat_W = to_W(proxy_.p_hat());
+    last_.limit_force_W = basis_ * (proxy_.kappa_N_per_m() * limited_.limit_shift());
     last_.f_W = basis_ * proxy_.f();
+    last_.limits = limited_.active();
+    if (last_.limits.kinds != 0) last_.f_W -= last_.limit_force_W;
+    last_.soft_limits_met = limited_.soft_limits_met();
     last_.v_W = basis_ * proxy_.velocity();
     for (const models::Contact<N>& contact : scene_->algorithm<N>().contacts()) {
       if (last_.contacts++ == 0) {
@@ -55,8 +80,17 @@ class WorldOfDimension final : public RenderedWorld {
     }
   }
 
+  Vec<N> to_coordinates(const Vec3& q_W) const noexcept {
+    if constexpr (N == 3) {
+      return scene_->from_W<N>(q_W);
+    } else {
+      return start_ + basis_.transpose() * (q_W - start_W_);
+    }
+  }
+
   scenes::CompiledScene* scene_;
   Eigen::Matrix<double, 3, N> basis_;
+  LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
   Vec3 start_W_ = Vec3::Zero();
   Vec<N> start_ = Vec<N>::Zero();

@@ -12,6 +12,7 @@
 
 #include "controller/admittance_proxy.hpp"
 #include "controller/session_settings.hpp"
+#include "controller/step_limits.hpp"
 #include "models/geometry.hpp"
 #include "scenes/compile.hpp"
 
@@ -27,6 +28,9 @@ struct WorldStep {
   std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
   int contacts = 0;
   bool slips = false;
+  ActiveLimits limits;                                // that held the proxy back
+  bool soft_limits_met = true;                        // leash and power
+  models::Vec3 limit_force_W = models::Vec3::Zero();  // of the limits on the proxy; f_W is without it
   ProxyFault fault = ProxyFault::none;
 };
 
@@ -39,8 +43,12 @@ class RenderedWorld {
 
   // Sets the proxy to rest at q_W; the spring, where there is one, pulls to it.
   virtual void start(const models::Vec3& q_W) noexcept = 0;
-  // One period under the hand's force; q_W of the result is finite, and the one before where there was a fault.
-  virtual WorldStep step(const models::Vec3& h_W) noexcept = 0;
+  // One period under the hand's force, within these limits; q_W of the result is finite, and the one before where there
+  // was a fault.
+  virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
+  // Goes on from near q_W, as near as the scene's objects let it, with this velocity: where the arm couldn't follow.
+  // Returns where.
+  virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
 };
 
 // `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the

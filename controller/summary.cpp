@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <string_view>
 
 #include "controller/apparent_mass.hpp"
 #include "controller/setpoint_hash.hpp"
@@ -65,10 +66,18 @@ struct Slide {
   double tangential = 0.0, limit = 0.0, length_s = 0.0, travel_m = 0.0;
 };
 
-constexpr std::uint32_t limit_flags =
-    static_cast<std::uint32_t>(RecordFlag::limit_speed) | static_cast<std::uint32_t>(RecordFlag::limit_acceleration) |
-    static_cast<std::uint32_t>(RecordFlag::limit_workspace) | static_cast<std::uint32_t>(RecordFlag::limit_joint) |
-    static_cast<std::uint32_t>(RecordFlag::limit_leash) | static_cast<std::uint32_t>(RecordFlag::limit_orientation);
+// "limits.leash_m"; joints' own limits with the joints' names: "axis_2, axis_3: max_speed_rad_per_s".
+std::string parameter_name(Limit limit, std::uint8_t axes, const std::vector<std::string>& names) {
+  const std::string parameter = limit_parameter(limit);
+  constexpr std::string_view of_joints = "drives[].";
+  if (parameter.compare(0, of_joints.size(), of_joints) != 0) return parameter;
+  std::string joints;
+  for (std::size_t i = 0; i < 8; ++i) {
+    if ((axes & (1u << i)) == 0) continue;
+    joints += (joints.empty() ? "" : ", ") + (i < names.size() ? names[i] : "axis " + std::to_string(i + 1));
+  }
+  return joints + ": " + parameter.substr(of_joints.size());
+}
 
 }  // namespace
 
@@ -129,7 +138,14 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (record.has(RecordFlag::overrun)) ++summary.overruns;
   if (record.phase != Phase::rendering) return;
   if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
-  if ((record.flags & limit_flags) != 0) ++summary.limited_cycles;
+  bool limited = record.has(RecordFlag::limit_orientation);
+  if (limited) ++summary.active_limits["orientation"];
+  for (const LimitFlag& flag : limit_flags) {
+    if (!record.has(flag.flag)) continue;
+    limited = true;
+    ++summary.active_limits[parameter_name(flag.limit, record.limited_axes, config.axis_names)];
+  }
+  if (limited) ++summary.limited_cycles;
   if (record.has(RecordFlag::truth)) summary.from_truth = true;
 }
 

@@ -47,8 +47,9 @@ struct SummaryConfig {
   double damping_Ns_per_m = 0.0;  // B
   double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
   int setpoint_delay_cycles = 2;
-  double touch_s = 0.1;   // how long a contact counts as a touch
-  double settle_s = 0.5;  // how long the arm may ring from it
+  double touch_s = 0.1;                 // how long a contact counts as a touch
+  double settle_s = 0.5;                // how long the arm may ring from it
+  std::vector<std::string> axis_names;  // for limits of single joints
 };
 
 struct FaultSummary {
@@ -79,10 +80,11 @@ struct Summary {
   std::optional<double> friction_ratio_error;
   double pulling_force_max_N = 0.0;
   double contact_time_s = 0.0, sliding_time_s = 0.0;
-  std::uint64_t contacts = 0;        // how often the proxy came to touch
-  std::uint64_t limited_cycles = 0;  // some limit was active
-  std::uint64_t held_samples = 0;    // cycles without a new sample of the sensor
-  std::vector<FaultSummary> faults;  // set by the caller
+  std::uint64_t contacts = 0;                          // how often the proxy came to touch
+  std::uint64_t limited_cycles = 0;                    // some limit was active
+  std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
+  std::uint64_t held_samples = 0;                      // cycles without a new sample of the sensor
+  std::vector<FaultSummary> faults;                    // set by the caller
   bool from_truth = false;
   std::string setpoint_sha256;
   double felt_mass_kg = 0.0;  // as configured, for comparison

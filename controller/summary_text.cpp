@@ -47,6 +47,8 @@ void add_repeatable(Json& json, const Summary& s) {
   json["sliding_time_s"] = s.sliding_time_s;
   json["contacts"] = s.contacts;
   json["limited_cycles"] = s.limited_cycles;
+  json["active_limits"] = Json::object();
+  for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
   json["held_samples"] = s.held_samples;
   json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
   json["faults"] = faults(s);
@@ -133,6 +135,8 @@ std::string summary_text(const Summary& s) {
   line("friction ratio error", s.friction_ratio_error ? format("%+.2f %%", 100 * *s.friction_ratio_error) : "none");
   line("pulling force", format("%.3g N", s.pulling_force_max_N));
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
+  for (const auto& [parameter, cycles] : s.active_limits)
+    line("", parameter + ": " + std::to_string(cycles) + " cycles");
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
   line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
   line("setpoints (SHA-256)", s.setpoint_sha256);

@@ -18,6 +18,12 @@ using controller::Summary;
 constexpr int fault_ended_the_run = 1;
 constexpr const char* default_plot = "proxarm-run.svg";
 
+std::vector<std::string> joint_names(const description::Cell& cell) {
+  std::vector<std::string> names;
+  for (const description::DriveDescription& drive : cell.drives) names.push_back(drive.joint);
+  return names;
+}
+
 controller::SummaryConfig summary_config(const PreparedSession& session) {
   controller::SummaryConfig config;
   config.period_s = session.settings.period_s;
@@ -26,13 +32,8 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
   config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
+  config.axis_names = joint_names(session.cell);
   return config;
-}
-
-std::vector<std::string> joint_names(const description::Cell& cell) {
-  std::vector<std::string> names;
-  for (const description::DriveDescription& drive : cell.drives) names.push_back(drive.joint);
-  return names;
 }
 
 std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts) {

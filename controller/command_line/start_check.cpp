@@ -69,12 +69,34 @@ void require_outside(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move or turn the object, or change start_rad in the cell file"});
 }
 
+// Within the workspace, and in no zone to be kept out of.
+void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
+  const description::CellLimits& limits = session.cell.limits;
+  const auto inside = [&](const std::array<double, 3>& min_m, const std::array<double, 3>& max_m) {
+    const models::Vec3 min(min_m.data()), max(max_m.data());
+    return (start_W.array() >= min.array()).all() && (start_W.array() <= max.array()).all();
+  };
+  const auto refuse = [&](const char* key, const char* expected) {
+    throw SetupError({.file = session.cell.file.string(),
+                      .key = key,
+                      .found = "the start of the tool at " + point_text(start_W),
+                      .expected = expected,
+                      .advice = "change the box, or start_rad"});
+  };
+  if (!inside(limits.workspace_min_m, limits.workspace_max_m)) refuse("limits.workspace_m", "a start inside of it");
+  for (const description::BoxDescription& zone : limits.keep_out) {
+    if (inside(zone.min_m, zone.max_m)) refuse("limits.keep_out_m", "a start outside of all of them");
+  }
+}
+
 }  // namespace
 
 void require_usable_start(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   require_regular(session, arm);
-  require_outside(session, arm.tool_pose(arm.start_rad()).translation());
+  const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
+  require_outside(session, start_W);
+  require_allowed(session, start_W);
 }
 
 void require_nodes_apart(const PreparedSession& session, const std::vector<std::string>& interfaces) {

@@ -182,6 +182,15 @@ SensorPlacement read_sensor(const YamlNode& node) {
   return s;
 }
 
+BoxDescription read_box(const YamlNode& node) {
+  BoxDescription box{node.vec3("min"), node.vec3("max")};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (box.min_m[i] < box.max_m[i]) continue;
+    (void)node.at("max").as_vec3(above(box.min_m[i], 1e6));  // says what is wrong, and where
+  }
+  return box;
+}
+
 CellLimits read_limits(const YamlNode& node) {
   CellLimits limits;
   limits.max_tool_speed_m_per_s =
@@ -189,6 +198,16 @@ CellLimits read_limits(const YamlNode& node) {
   limits.max_tool_acceleration_m_per_s2 =
       node.number_or("max_tool_acceleration_m_per_s2", limits.max_tool_acceleration_m_per_s2, above(0.0, 1000.0));
   limits.max_force_N = node.number_or("max_force_N", limits.max_force_N, above(0.0, 1e5));
+  limits.max_power_W = node.number_or("max_power_W", limits.max_power_W, 0.0, 1e5);
+  limits.following_error_rad = node.number_or("following_error_rad", limits.following_error_rad, above(0.0, 1.0));
+  if (const auto box = node.find_map("workspace_m")) {
+    const BoxDescription workspace = read_box(*box);
+    limits.workspace_min_m = workspace.min_m;
+    limits.workspace_max_m = workspace.max_m;
+  }
+  if (node.has("keep_out_m")) {
+    for (const YamlNode& zone : node.list("keep_out_m", 1, 16)) limits.keep_out.push_back(read_box(zone));
+  }
   limits.leash_m = node.number_or("leash_m", limits.leash_m, above(0.0, 1.0));
   limits.setpoint_bandwidth_Hz = node.number_or("setpoint_bandwidth_Hz", limits.setpoint_bandwidth_Hz, 0.0, 500.0);
   return limits;

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -102,12 +103,27 @@ struct SensorPlacement {
   double bandwidth_Hz = 0.0;    // its own low-pass; 0: none
 };
 
+// A box with its faces along the axes of W.
+struct BoxDescription {
+  std::array<double, 3> min_m{};
+  std::array<double, 3> max_m{};
+};
+
 struct CellLimits {
   double max_tool_speed_m_per_s = 0.5;
   double max_tool_acceleration_m_per_s2 = 20.0;
-  double max_force_N = 200.0;  // above it the sensor's reading is taken as a fault
-  double leash_m = 0.02;
-  double setpoint_bandwidth_Hz = 25.0;  // of the filter that keeps elastic gears from ringing; 0: none
+  double max_force_N = 200.0;         // above it the sensor's reading is taken as a fault
+  double max_power_W = 80.0;          // that the arm gives to the hand or takes from it; 0: no limit
+  double leash_m = 0.02;              // from the tool, as measured, to the proxy
+  double following_error_rad = 1e-3;  // of a drive that stands still: beyond it, setpoints wait for it
+  std::array<double, 3> workspace_min_m{-std::numeric_limits<double>::infinity(),
+                                        -std::numeric_limits<double>::infinity(),
+                                        -std::numeric_limits<double>::infinity()};  // of the rendered point, in W
+  std::array<double, 3> workspace_max_m{std::numeric_limits<double>::infinity(),
+                                        std::numeric_limits<double>::infinity(),
+                                        std::numeric_limits<double>::infinity()};
+  std::vector<BoxDescription> keep_out;  // where the rendered point may not go
+  double setpoint_bandwidth_Hz = 25.0;   // of the filter that keeps elastic gears from ringing; 0: none
 };
 
 struct Cell {

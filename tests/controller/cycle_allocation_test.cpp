@@ -17,7 +17,8 @@ using testing::RigOptions;
 static_assert(noexcept(std::declval<Cycle&>().run_cycle(0)), "no exception leaves the cycle");
 static_assert(noexcept(std::declval<Cycle&>().request_stop()));
 static_assert(noexcept(std::declval<Cycle&>().shut_down()));
-static_assert(noexcept(std::declval<RenderedWorld&>().step(std::declval<const models::Vec3&>())));
+static_assert(noexcept(std::declval<RenderedWorld&>().step(std::declval<const models::Vec3&>(),
+                                                           std::declval<const StepLimits&>())));
 static_assert(noexcept(std::declval<fieldbus::ServoDrive&>().encode_rpdo(std::declval<fieldbus::CanFrame&>())));
 
 struct Played {
