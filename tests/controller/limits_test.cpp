@@ -49,11 +49,11 @@ double bad_wish(Random& random, double wish, const description::DriveDescription
   return wish + random.uniform(-2.0, 2.0) * drive.max_speed_rad_per_s * T;
 }
 
-// 10⁷ joint setpoints at PROXARM_TEST_SCALE=10.
+// 10⁷ joint setpoints at PROXARM_TEST_SCALE=21.
 TEST(JointGuard, LetsNothingBeyondRangeSpeedOrAccelerationThrough) {
   Random random(11);
   constexpr int axes = 6, cycles = 2000;
-  const std::int64_t runs = tests::scaled(84);
+  const std::int64_t runs = tests::scaled(40);
   for (std::int64_t run = 0; run < runs; ++run) {
     const double T = random.log_uniform(2.5e-4, 4e-3);
     const auto drives = random_drives(random, axes);
@@ -165,7 +165,7 @@ double beyond(const StepLimits& limits, const Vec3& x) {
 
 TEST(Limits, AreMetTogetherWithAWallByTheNearestPointOfBoth) {
   Random random(12);
-  const std::int64_t count = tests::scaled(20000);
+  const std::int64_t count = tests::scaled(10000);
   std::int64_t limited = 0, both = 0, slow = 0;
   for (std::int64_t i = 0; i < count; ++i) {
     const RandomStep step = random_step(random, 0.0);
