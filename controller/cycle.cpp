@@ -396,7 +396,8 @@ bool Cycle::drives_follow(const JointVector& motor_rad, JointVector& wanted_rad)
   std::uint8_t blocked = 0;
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const DriveOnBus& axis = parts_.drives[static_cast<std::size_t>(i)];
-    if (!axis.drive.fresh()) continue;
+    // A Modbus drive answers more seldom than every cycle: how far it is behind says little.
+    if (axis.on_can == nullptr || !axis.drive.fresh()) continue;
     const double lag_s =
         5.0 * settings_.period_s + 1.0 / (2.0 * std::numbers::pi * axis.drive.description().position_bandwidth_Hz);
     const double room_rad =
