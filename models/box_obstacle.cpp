@@ -4,8 +4,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "models/friction_plane.hpp"
-
 namespace proxarm::models {
 
 std::array<FlatSurface<3>, 6> BoxObstacle::faces(const Pose& X, const Vec3& size_m) {
@@ -16,8 +14,13 @@ std::array<FlatSurface<3>, 6> BoxObstacle::faces(const Pose& X, const Vec3& size
   return {face(0, 1.0), face(0, -1.0), face(1, 1.0), face(1, -1.0), face(2, 1.0), face(2, -1.0)};
 }
 
-BoxObstacle::BoxObstacle(const Pose& X, const Vec3& size_m, double friction)
-    : centre_(X.translation()), axes_(X.linear()), half_(0.5 * size_m), mu_(friction), faces_(faces(X, size_m)) {
+BoxObstacle::BoxObstacle(const Pose& X, const Vec3& size_m, double friction, const Layer& layer)
+    : centre_(X.translation()),
+      axes_(X.linear()),
+      half_(0.5 * size_m),
+      mu_(friction),
+      layer_(layer),
+      faces_(faces(X, size_m)) {
   if (!size_m.allFinite() || !(size_m.minCoeff() > 0.0))
     throw std::invalid_argument("a box needs finite, positive sizes");
   if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -73,7 +76,7 @@ BoxObstacle::Crossing BoxObstacle::cross(const Vec3& q, const Vec3& p) const noe
   return c;
 }
 
-Obstacle::Step BoxObstacle::step(double /*K*/, const Vec3& p, const Vec3& q) const noexcept {
+Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const noexcept {
   Crossing c = cross(q, p);
   if (!c.any()) return {p, Vec3::UnitZ(), 0, false, false};
   const Vec3 p_l = local(p);
@@ -107,7 +110,7 @@ Obstacle::Step BoxObstacle::step(double /*K*/, const Vec3& p, const Vec3& q) con
   for (int face = 0; face < 6; ++face) {
     const double t = c.enters[static_cast<std::size_t>(face)];
     if (t < 0.0) continue;
-    const FaceStep<3> s = step_on_face(faces_[static_cast<std::size_t>(face)], mu_, p, q);
+    const FaceStep<3> s = step_on_layer(faces_[static_cast<std::size_t>(face)], mu_, layer_, K, p, q);
     if (!s.touches || !on_face(face, s.r)) continue;
     const double distance = s.slips ? (s.r - p).norm() : 0.0;  // one that sticks is preferred
     if (t > best_t || (t == best_t && distance < best_distance)) {
@@ -120,7 +123,7 @@ Obstacle::Step BoxObstacle::step(double /*K*/, const Vec3& p, const Vec3& q) con
 
   // Off the entered face. Past the edge on p's side nothing holds it.
   const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(c.face)];
-  const FaceStep<3> s = step_on_face(entered, mu_, p, q);
+  const FaceStep<3> s = step_on_layer(entered, mu_, layer_, K, p, q);
   if (!s.touches) return {p, entered.normal(), 0, false, false};
   const Vec3 r_l = local(s.r);
   Vec3 held = s.r;
@@ -134,7 +137,7 @@ Obstacle::Step BoxObstacle::step(double /*K*/, const Vec3& p, const Vec3& q) con
 
 bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   const Vec3 r_l = local(r);
-  if ((half_ - r_l.cwiseAbs()).minCoeff() > 2.0 * rounding(r)) return true;
+  if ((half_ - r_l.cwiseAbs()).minCoeff() > 2.0 * rounding(r) + layer_.thickness_m) return true;
   const Crossing c = cross(q, r);
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // beyond it, and it wouldn't have let the proxy around
 }
@@ -145,7 +148,8 @@ Vec3 BoxObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
   if (!c.any() || c.face < 0 || step(1.0, p, q).touches) return q;
   const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(c.face)];
   const Vec3 from = entered.projection(q + std::max(c.enter, 0.0) * (p - q));
-  const Vec3 d = step_on_face(entered, mu_, p, q).r - from, from_l = local(from), d_l = axes_.transpose() * d;
+  const Vec3 d = step_on_layer(entered, mu_, layer_, 1.0, p, q).r - from, from_l = local(from),
+             d_l = axes_.transpose() * d;
   double share = 1.0;
   for (int k = 0; k < 3; ++k) {
     if (k == c.face / 2 || !(std::abs(from_l[k] + d_l[k]) > half_[k])) continue;

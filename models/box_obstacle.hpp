@@ -7,6 +7,7 @@
 
 #include <array>
 
+#include "models/layer.hpp"
 #include "models/obstacle.hpp"
 
 namespace proxarm::models {
@@ -15,7 +16,7 @@ class BoxObstacle final : public Obstacle {
  public:
   // size_m: full edge lengths, finite and positive (10 µm will do for a plate). X: of the box in W.
   // Throws std::invalid_argument otherwise, and for a friction that isn't finite and ≥ 0.
-  BoxObstacle(const Pose& X, const Vec3& size_m, double friction);
+  BoxObstacle(const Pose& X, const Vec3& size_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
@@ -37,6 +38,7 @@ class BoxObstacle final : public Obstacle {
   Mat3 axes_;
   Vec3 half_;
   double mu_;
+  Layer layer_;
   std::array<FlatSurface<3>, 6> faces_;
 };
 

@@ -5,13 +5,15 @@
 
 namespace proxarm::models {
 
-CylinderObstacle::CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction)
+CylinderObstacle::CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction,
+                                   const Layer& layer)
     : middle_(0.5 * (from_m + to_m)),
       e_(unit<3>(to_m - from_m)),
       half_(0.5 * (to_m - from_m).norm()),
       R_(radius_m),
-      side_({middle_, e_}, radius_m, friction, false),
-      end_{{to_m, e_, friction}, {from_m, -e_, friction}} {}
+      depth_(layer.thickness_m),
+      side_({middle_, e_}, radius_m, friction, false, layer),
+      end_{{to_m, e_, friction, layer}, {from_m, -e_, friction, layer}} {}
 
 double CylinderObstacle::rounding(const Vec3& x) const noexcept {
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
@@ -123,7 +125,7 @@ Obstacle::Step CylinderObstacle::step(double K, const Vec3& p, const Vec3& q) co
 }
 
 bool CylinderObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
-  if (std::min(half_ - std::abs(along(r)), R_ - radial(r).norm()) > 2.0 * rounding(r)) return true;
+  if (std::min(half_ - std::abs(along(r)), R_ - radial(r).norm()) > 2.0 * rounding(r) + depth_) return true;
   const Crossing c = cross(q, r);
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;
 }

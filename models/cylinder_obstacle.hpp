@@ -13,7 +13,7 @@ class CylinderObstacle final : public Obstacle {
  public:
   // From the middle of one end to that of the other. Throws std::invalid_argument for ends that coincide, and for a
   // radius or a friction that isn't finite or negative.
-  CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction);
+  CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
@@ -35,6 +35,7 @@ class CylinderObstacle final : public Obstacle {
   Vec3 e_;
   double half_;
   double R_;
+  double depth_;  // of the layer
   RoundBar side_;
   PlaneObstacle end_[2];  // far, near
 };

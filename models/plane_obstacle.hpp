@@ -4,7 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "models/friction_plane.hpp"
+#include "models/layer.hpp"
+#include "models/obstacle.hpp"
 #include "models/round_obstacle.hpp"
 
 namespace proxarm::models {
@@ -20,20 +21,8 @@ class PlaneObstacle final : public Obstacle {
   }
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
-    const Vec3& n = surface_.normal();
-    if (!layer_.soft()) {
-      const FaceStep<3> s = step_on_face(surface_, mu_, p, q);
-      return {s.r, n, 0, s.touches, s.slips};
-    }
-    const double h_p = surface_.height(p);
-    if (h_p > 0.0) return {p, n, 0, false, false};
-    // K (h − h_p) = −k h along the normal, no deeper than the layer; then (4) along the tangent with f_n = K (h − h_p).
-    const double k = layer_.stiffness_N_per_m;
-    const double h = std::max(K * h_p / (K + k), -layer_.thickness_m);
-    const Vec3 p_t = p + n * (h - h_p), q_t = q + n * (h - surface_.height(q)), d = p_t - q_t;
-    const double distance = d.norm(), reach = mu_ * (h - h_p);
-    if (!(distance > reach)) return {(q_t - q).norm() <= surface_.rounding(q) ? q : q_t, n, 0, true, false};
-    return {p_t - (reach / distance) * d, n, 0, true, mu_ > 0.0};
+    const FaceStep<3> s = step_on_layer(surface_, mu_, layer_, K, p, q);
+    return {s.r, surface_.normal(), 0, s.touches, s.slips};
   }
 
   [[nodiscard]] bool excludes(const Vec3& /*q*/, const Vec3& r) const noexcept override {

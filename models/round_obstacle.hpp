@@ -14,6 +14,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "models/layer.hpp"
 #include "models/obstacle.hpp"
 
 namespace proxarm::models {
@@ -85,14 +86,6 @@ struct LineCore {
   [[nodiscard]] double size() const noexcept { return a.lpNorm<1>(); }
   [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
   [[nodiscard]] Bounds bounds() const noexcept { return {}; }
-};
-
-// An elastic layer: the surface gives way along its normal by f_n / stiffness until the rigid core is reached.
-struct Layer {
-  double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: none
-  double thickness_m = 0.0;
-
-  [[nodiscard]] bool soft() const noexcept { return thickness_m > 0.0; }
 };
 
 template <typename Core>

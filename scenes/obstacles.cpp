@@ -40,7 +40,7 @@ struct MakeParts {
         std::make_unique<models::Capsule>(models::SegmentCore(s.from_m, s.to_m), s.radius_m, mu, s.inside_out, layer));
   }
   std::vector<Part> operator()(const BoxShape& s) const {
-    if (!s.inside_out) return one(std::make_unique<models::BoxObstacle>(s.pose_W, s.size_m, mu));
+    if (!s.inside_out) return one(std::make_unique<models::BoxObstacle>(s.pose_W, s.size_m, mu, layer));
     std::vector<Part> parts;
     for (const auto& face : models::BoxObstacle::faces(s.pose_W, s.size_m)) {
       parts.push_back({std::make_unique<models::PlaneObstacle>(face.point(), Vec3(-face.normal()), mu),
@@ -49,7 +49,7 @@ struct MakeParts {
     return parts;
   }
   std::vector<Part> operator()(const CylinderShape& s) const {
-    if (!s.inside_out) return one(std::make_unique<models::CylinderObstacle>(s.from_m, s.to_m, s.radius_m, mu));
+    if (!s.inside_out) return one(std::make_unique<models::CylinderObstacle>(s.from_m, s.to_m, s.radius_m, mu, layer));
     std::vector<Part> parts;
     const Vec3 e = direction(s);
     parts.push_back({std::make_unique<models::RoundBar>(models::LineCore{s.from_m, e}, s.radius_m, mu, true), 0});
@@ -113,6 +113,20 @@ struct Size {
   double operator()(const MeshShape& s) const { return 0.5 * (s.mesh->bounds().high - s.mesh->bounds().low).norm(); }
 };
 
+// How thick the solid under a layer is; 0 where there can be none.
+struct Thickness {
+  static constexpr double kEndless = std::numeric_limits<double>::infinity();
+
+  double operator()(const PlaneShape&) const { return kEndless; }
+  double operator()(const SphereShape& s) const { return s.inside_out ? kEndless : 2.0 * s.radius_m; }
+  double operator()(const CapsuleShape& s) const { return s.inside_out ? kEndless : 2.0 * s.radius_m; }
+  double operator()(const BoxShape& s) const { return s.inside_out ? 0.0 : s.size_m.minCoeff(); }
+  double operator()(const CylinderShape& s) const {
+    return s.inside_out ? 0.0 : std::min(2.0 * s.radius_m, (s.to_m - s.from_m).norm());
+  }
+  double operator()(const MeshShape&) const { return 0.0; }
+};
+
 }  // namespace
 
 Vec3 middle_of(const Shape& shape) { return std::visit(Middle{}, shape); }
@@ -121,15 +135,16 @@ double size_of(const Shape& shape) { return std::visit(Size{}, shape); }
 std::vector<Part> parts_of(const Scene& scene, const Object& object) {
   Layer layer;
   if (object.layer) {
-    const bool smooth = std::holds_alternative<PlaneShape>(object.shape) ||
-                        std::holds_alternative<SphereShape>(object.shape) ||
-                        std::holds_alternative<CapsuleShape>(object.shape);
-    if (!smooth) {
-      throw description::SetupError({.file = scene.file.string(),
-                                     .line = object.line,
-                                     .key = "layer",
-                                     .found = "a layer on " + object.name,
-                                     .expected = "a plane, a sphere or a capsule under an elastic layer"});
+    // From inside, a box or a cylinder is several surfaces, and within a layer a mesh's faces have no exact sides.
+    const double thickness = std::visit(Thickness{}, object.shape);
+    if (!(object.layer->thickness_m < 0.5 * thickness)) {
+      throw description::SetupError(
+          {.file = scene.file.string(),
+           .line = object.line,
+           .key = "layer",
+           .found = "a layer of " + description::number_text(object.layer->thickness_m) + " m on " + object.name,
+           .expected = thickness > 0.0 ? "less than half of how thick the object is"
+                                       : "a layer on a plane, sphere or capsule, or on a solid box or cylinder"});
     }
     layer = {object.layer->stiffness_N_per_m, object.layer->thickness_m};
   }

@@ -16,7 +16,8 @@ struct Part {
   std::int32_t feature = -1;  // to be reported; −1: the obstacle's own
 };
 
-// The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on something with edges.
+// The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on a mesh, on a box or a
+// cylinder from inside, or as thick as what it is on.
 std::vector<Part> parts_of(const Scene& scene, const Object& object);
 
 // The same shape as a region: solid, without friction.

@@ -241,15 +241,21 @@ TEST(Layer, GivesWayByForceOverStiffness) {
   EXPECT_NEAR(plane.step(K, Vec3(0, 0, -0.01 - 20.0 / K), q).r.z(), -0.01, 1e-15);
   const Sphere sphere(PointCore{Vec3::Zero()}, 0.1, 0.3, false, layer);
   EXPECT_NEAR(sphere.step(K, Vec3(0, 0, 0.095 - 5.0 / K), Vec3(0, 0, 0.095)).r.z(), 0.095, 1e-15);
+  const BoxObstacle box(Pose::Identity(), Vec3(0.2, 0.2, 0.2), 0.3, layer);
+  EXPECT_NEAR(box.step(K, Vec3(0, 0, 0.095 - 5.0 / K), Vec3(0, 0, 0.095)).r.z(), 0.095, 1e-15);
+  EXPECT_NEAR(box.step(K, Vec3(0, 0, 0.09 - 20.0 / K), Vec3(0, 0, 0.095)).r.z(), 0.09, 1e-15);
 }
 
 TEST(Contract, Layers) {
   const Layer layer{2000.0, 0.01};
   ContractOptions<3> options = small_steps({0.3});
   options.soft = true;
+  options.several = 2e-3;  // at edges, as without layers
   expect_contract<3>(world(entry<PlaneObstacle>(0, Vec3(0.1, 0, 0), Vec3(1, 2, 3), 0.3, layer)), options);
   expect_contract<3>(world(entry<Sphere>(0, PointCore{Vec3(0.1, 0.2, 0.3)}, 0.3, 0.3, false, layer)), options);
   expect_contract<3>(world(entry<Sphere>(0, PointCore{Vec3(0.1, 0.2, 0.3)}, 0.3, 0.3, true, layer)), options);
+  expect_contract<3>(world(entry<BoxObstacle>(0, tilted({0.1, 0.2, 0.3}), Vec3(0.4, 0.5, 0.6), 0.3, layer)), options);
+  expect_contract<3>(world(entry<CylinderObstacle>(0, Vec3(0, 0, -0.2), Vec3(0.1, 0, 0.2), 0.25, 0.3, layer)), options);
 }
 
 TEST(World, IsAsCheapToAskForWhatIsFarAway) {
