@@ -104,7 +104,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
     } else if (chart.common_key || !panel.key) {
       gp << "unset key\n";
     } else {
-      gp << "set key outside right top vertical samplen 4 spacing 1.15\n";
+      gp << "set key outside right top vertical maxcols 1 samplen 3 spacing 1.1 font ',16'\n";
     }
     std::string plot = "plot ";
     for (const Curve& curve : panel.curves) {

@@ -37,7 +37,7 @@ std::vector<ArmSetup> setups(bool quick) {
                     .period_s = period,
                     .drive_factor = drive,
                     .wall = wall,
-                    .settling_s = 3.0,
+                    .settling_s = quick ? 3.0 : 12.0,
                     .duration_s = quick ? 10.0 : 30.0,
                     .sines = sines(wall)});
   };

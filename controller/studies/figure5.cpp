@@ -154,8 +154,13 @@ std::vector<std::string> Figure5::plot(const Table& table, const Options& /*opti
       Curve curve;
       for (std::size_t row = 0; row < table.rows(); ++row) {
         if (table.text(row, law) != each.name) continue;
-        curve.x.push_back(table.number(row, time));
-        curve.y.push_back(quantity.factor * table.number(row, column));
+        // What can't be seen at half the size isn't drawn.
+        const double t = table.number(row, time), value = quantity.factor * table.number(row, column);
+        const bool moved =
+            !curve.x.empty() && std::abs(value - curve.y.back()) > 0.004 * (quantity.high - quantity.low);
+        if (!curve.x.empty() && !moved && t - curve.x.back() < 0.05) continue;
+        curve.x.push_back(t);
+        curve.y.push_back(value);
       }
       chart.panels.push_back({.title = &quantity == &quantities[0] ? "(" + std::string(each.name) + ")" : "",
                               .x_label = &quantity == &quantities[3] ? "time (s)" : "",
