@@ -47,9 +47,9 @@ struct SummaryConfig {
   double damping_Ns_per_m = 0.0;  // B
   double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
   int setpoint_delay_cycles = 2;
-  double touch_s = 0.1;                 // how long a contact counts as a touch
-  double settle_s = 0.5;                // how long the arm may ring from it
-  std::vector<std::string> axis_names;  // for limits of single joints
+  double touch_s = 0.1;                      // how long a contact counts as a touch
+  double settle_s = 0.5;                     // how long the arm may ring from it
+  std::vector<std::string> axis_names = {};  // for limits of single joints
 };
 
 struct FaultSummary {
