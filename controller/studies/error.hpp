@@ -14,7 +14,7 @@
 //
 // Error: rms of the position error over 60 instants of the motion; a run's error counts as the largest of those with
 // its own and up to twofold finer timesteps, so that a crossing of zero is no precision. Run time: steps times the
-// time of a step, best of five.
+// time of a step, best of fifteen.
 #pragma once
 
 #include "controller/studies/study.hpp"
