@@ -20,8 +20,8 @@ constexpr double length_m = 0.5;
 constexpr double damping_m_per_rad = 1e-3;
 // Of the joints' own speed, what the tool's translation may use: the rest is for its rotation and for the gears' twist.
 constexpr double speed_share = 0.95;
-// Of the tool's speed, what is commanded: elastic gears add some 4 % where the hand pulls the arm along at the limit.
-constexpr double commanded_share = 0.93;
+// Of the tool's speed, what is commanded: elastic gears add some 7 % where the hand pulls the arm along at the limit.
+constexpr double commanded_share = 0.9;
 
 void add_plane(StepLimits& out, const LimitPlane<3>& plane) noexcept {
   if (out.plane_count < StepLimits::max_planes) out.planes[out.plane_count++] = plane;
