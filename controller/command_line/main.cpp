@@ -92,7 +92,7 @@ void add_session_options(CLI::App& app, RunOptions& options) {
   app.add_option("--duration",
                  quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
                           [&](double value) { options.duration_s = value; }),
-                 "how long to render, with its unit (default 10s)")
+                 "how long to render, with its unit (default 10s; at most a week)")
       ->type_name("TIME");
   app.add_option("--bus",
                  quantity([](const std::string& w) { return BusMapping::parse(w); },

@@ -94,6 +94,12 @@ void require_period(const PreparedSession& session, const RunOptions& options) {
 }  // namespace
 
 PreparedSession prepare(const RunOptions& options) {
+  constexpr double week_s = 604800.0;
+  if (!(options.duration_s <= week_s)) {
+    throw description::SetupError({.key = "--duration",
+                                   .found = description::number_text(options.duration_s) + " s",
+                                   .expected = "at most a week"});
+  }
   PreparedSession session;
   const fs::path cell_file = options.cell.empty() ? shipped_file(default_cell) : user_file(options.cell);
   session.cell = description::load_cell(cell_file);

@@ -69,6 +69,23 @@ void require_outside(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move or turn the object, or change start_rad in the cell file"});
 }
 
+// A guide that is not at the tool would draw the proxy onto it in one step.
+void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
+  if (!session.scene.guide) return;
+  const scenes::CompiledScene world = scenes::compile(session.scene);
+  if (world.dimensions() != 3) return;
+  const double away_m = (world.algorithm<3>()(1.0, start_W, start_W) - start_W).norm();
+  if (away_m <= start_tolerance_m) return;
+  char found[64];
+  std::snprintf(found, sizeof found, ") %.3g m away from it", away_m);
+  throw SetupError({.file = session.scene.file.string(),
+                    .line = session.scene.guide->line_number,
+                    .key = "guide",
+                    .found = "the start of the tool (" + point_text(start_W) + found,
+                    .expected = "a guide that begins where the tool is",
+                    .advice = "move the guide, or change start_rad in the cell file"});
+}
+
 // Within the workspace, and in no zone to be kept out of.
 void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
   const description::CellLimits& limits = session.cell.limits;
@@ -96,6 +113,7 @@ void require_usable_start(const PreparedSession& session) {
   require_regular(session, arm);
   const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
   require_outside(session, start_W);
+  require_on_guide(session, start_W);
   require_allowed(session, start_W);
 }
 

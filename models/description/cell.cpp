@@ -106,6 +106,18 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
   return line;
 }
 
+// 0 for none, or a filter whose delay a loop can bear, and its eigenvalues be found in no time.
+constexpr double least_bandwidth_Hz = 5.0;
+
+double bandwidth_or(const YamlNode& node, std::string_view key, double otherwise, double max_Hz) {
+  const double bandwidth_Hz = node.number_or(key, otherwise, 0.0, max_Hz);
+  if (bandwidth_Hz > 0.0 && bandwidth_Hz < least_bandwidth_Hz) {
+    throw node.error_at(key,
+                        "0 (no filter), or " + number_text(least_bandwidth_Hz) + " to " + number_text(max_Hz) + " Hz");
+  }
+  return bandwidth_Hz;
+}
+
 SimulatedDrive read_simulation(const YamlNode& node) {
   SimulatedDrive s;
   s.coulomb_friction_Nm = node.number_or("coulomb_friction_Nm", s.coulomb_friction_Nm, 0.0, 1e5);
@@ -178,7 +190,7 @@ SensorPlacement read_sensor(const YamlNode& node) {
   s.noise_N = node.number_or("noise_N", 0.0, 0.0, 1e3);
   s.noise_Nm = node.number_or("noise_Nm", 0.0, 0.0, 1e3);
   s.sample_rate_Hz = node.number("sample_rate_Hz", above(0.0, 1e6));
-  s.bandwidth_Hz = node.number_or("bandwidth_Hz", 0.0, 0.0, 1e6);
+  s.bandwidth_Hz = bandwidth_or(node, "bandwidth_Hz", 0.0, 1e6);
   return s;
 }
 
@@ -209,7 +221,7 @@ CellLimits read_limits(const YamlNode& node) {
     for (const YamlNode& zone : node.list("keep_out_m", 1, 16)) limits.keep_out.push_back(read_box(zone));
   }
   limits.leash_m = node.number_or("leash_m", limits.leash_m, above(0.0, 1.0));
-  limits.setpoint_bandwidth_Hz = node.number_or("setpoint_bandwidth_Hz", limits.setpoint_bandwidth_Hz, 0.0, 500.0);
+  limits.setpoint_bandwidth_Hz = bandwidth_or(node, "setpoint_bandwidth_Hz", limits.setpoint_bandwidth_Hz, 500.0);
   return limits;
 }
 

@@ -61,6 +61,10 @@ class CellFile(ProgramTest):
         self.assert_refused(self.call("run", cell), *fragments)
         cell.write_text(text.replace(new, old, 1))
 
+    def test_a_filter_slower_than_any_loop_can_bear(self):
+        self.refuse("setpoint_bandwidth_Hz: 25", "setpoint_bandwidth_Hz: 1e-3", "limits.setpoint_bandwidth_Hz: found 1e-3",
+                    "0 (no filter), or 5 to 500 Hz")
+
     def test_an_unknown_key_gets_the_nearest_one(self):
         self.refuse("gravity_W_m", "gravty_W_m", "default.yaml:8: gravty_W_m_per_s2: unknown key",
                     'did you mean "gravity_W_m_per_s2"')
@@ -152,6 +156,11 @@ class SceneFile(ProgramTest):
         self.refuse("objects:\n  - plane: {name: wall, point_m: [0.5, 0, 0.6], normal: [-1, 0, 0]}\n", ":2: wall",
                     "x 0.7000, y 0.0000, z 0.6000 m", "0.2 m inside", "free space", "start_rad")
 
+    def test_guides_begin_at_the_tool(self):
+        guide = "guide: {{line: {{point_m: [0.8, {y}, 0.6], direction: [1, 0, 0]}}}}\n"
+        self.summary("--scene", self.written("near.yaml", guide.format(y=0.00005)), "--duration", "0.2s")
+        self.refuse(guide.format(y=0.015), ":1: guide", "0.015 m away", "start_rad")
+
     def test_that_begins_at_the_start_is_fine_up_to_a_tenth_of_a_millimetre(self):
         wall = "objects:\n  - plane: {{point_m: [{x}, 0, 0], normal: [-1, 0, 0]}}\n"
         # The start is at 0.70000 to within 0.02 mm.
@@ -232,6 +241,9 @@ class Options(ProgramTest):
         self.assert_refused(self.call("run", "--record", SOURCE / "scenes"), "--record", "scenes")
         self.assert_refused(self.call("run", "--record", program()), "--record")
         self.assert_refused(self.call("run", "--record", "/proc/nowhere"), "--record", "/proc/nowhere")
+
+    def test_a_session_lasts_at_most_a_week(self):
+        self.assert_refused(self.call("run", "--duration", "1e30s"), "--duration", "at most a week")
 
     def test_a_plot_needs_a_folder_that_is_there(self):
         self.assert_refused(self.call("run", "--plot", "nowhere/plot.svg"), "--plot", "nowhere")
