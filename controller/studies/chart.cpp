@@ -69,7 +69,8 @@ void place(std::ostream& gp, std::size_t index, int columns, std::size_t count, 
   const double width = 1.0 / static_cast<double>(wide);
   const double height = (1.0 - top_margin - bottom_margin) / static_cast<double>(rows);
   const double left = static_cast<double>(index % wide) * width;
-  const double bottom = 1.0 - top_margin - height * static_cast<double>(index / wide + 1);
+  const std::size_t row = index / wide;
+  const double bottom = 1.0 - top_margin - height * static_cast<double>(row + 1);
   gp << "set origin " << left << "," << bottom << "\nset size " << width << "," << height << "\n";
 }
 

@@ -57,8 +57,8 @@ Scene spheres(std::size_t count) {
     scenes::Object object;
     object.name = "sphere " + std::to_string(i);
     object.friction = 0.3;
-    object.shape =
-        scenes::SphereShape{distance * Vec3(i % side, i / side % side, i / (side * side)), 0.4 * distance, false};
+    const int column = i % side, row = i / side % side, layer = i / (side * side);
+    object.shape = scenes::SphereShape{distance * Vec3(column, row, layer), 0.4 * distance, false};
     scene.objects.push_back(object);
   }
   return scene;
