@@ -62,6 +62,13 @@ class Media final : public GeometricAlgorithm<N> {
     const auto at = [&](double tau) { return (*rest_)(kappa / (1.0 - tau), Vec<N>(p + tau * d), q); };
     const auto excess = [&](double tau, const Vec<N>& r) { return kappa * tau / (1.0 - tau) * (r - q).norm() - F; };
     const double size = d.norm();
+    // (3), second case: where nothing else touches, however near the rest is.
+    const double share = (kappa * size - F) / (kappa * size);  // of the way to p; NaN where there is no way
+    if (share > 0.0) {
+      const Vec<N> aim = q - share * d;
+      const Vec<N> free = (*rest_)(kappa / share, aim, q);
+      if (free == aim) return free;
+    }
     // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R.
     const Vec<N> held = at(held_at_);
     const Vec<N> R = (held - q) / (1.0 - held_at_);

@@ -69,6 +69,16 @@ TEST(Media, CoulombOverAWallAddsToItsFriction) {
   }
 }
 
+// A soft coupling looks far behind a wall that the proxy, which all but rests before it, doesn't reach.
+TEST(Media, CoulombBeforeAWallIsEquation3AtEveryStiffness) {
+  auto g = media<3>(std::make_unique<FrictionPlane<3>>(Vec3(0.9, 0, 0), -Vec3::UnitX(), 0.3), 0.0, 1.0);
+  const Vec3 q(0.899943, -0.19446, 1.1062), direction = Vec3(6.1, 1.2, 7.1).normalized();
+  const Vec3 r = q + 3.8e-6 * direction;
+  for (double K = 1e-2; K < 1e9; K *= 7.0) {
+    ASSERT_LE((g(K, r + direction / K, q) - r).norm(), 1e-15 * (4.0 + 2.0 / K)) << K;
+  }
+}
+
 TEST(Contract, Media) {
   ContractOptions<3> options;
   options.forces_without_contact = true;

@@ -19,7 +19,7 @@ const std::filesystem::path scenes_folder = std::filesystem::path(PROXARM_SOURCE
 TEST(Check, PassesEveryShippedScene) {
   for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
     if (entry.path().extension() != ".yaml") continue;
-    for (const auto& report : check_scene(scenes::load_scene(entry.path()), {.states = 4000})) {
+    for (const auto& report : check_scene(scenes::load_scene(entry.path()), {})) {
       EXPECT_TRUE(report.passed()) << entry.path() << "\n" << report.text();
     }
   }
