@@ -126,6 +126,38 @@ class SimulatedCell::PlantWrench final : public WrenchSource {
   const Plant& plant_;
 };
 
+namespace {
+
+// A fault that the drive's bus doesn't know would do nothing, and a drill with it would seem to pass.
+void require_fault_of_drive(const DeviceFault& fault, bool on_modbus) {
+  bool only_can = false, only_modbus = false;
+  switch (fault.kind) {
+    case DeviceFaultKind::drive_fault:
+    case DeviceFaultKind::device_type:
+    case DeviceFaultKind::heartbeat_lost:
+    case DeviceFaultKind::sdo_silent:
+      only_can = true;
+      break;
+    case DeviceFaultKind::modbus_exception:
+    case DeviceFaultKind::modbus_closed:
+    case DeviceFaultKind::modbus_wrong_unit:
+    case DeviceFaultKind::modbus_half:
+      only_modbus = true;
+      break;
+    default:
+      break;
+  }
+  if (!(on_modbus ? only_can : only_modbus)) return;
+  const std::string expected = on_modbus ? "silent, power, jammed, exception, closed, wrong_unit or half_answer"
+                                         : "silent, power, jammed, fault, device_type, heartbeat or sdo";
+  throw SetupError({.key = "device fault",
+                    .found = "one of " + std::string(on_modbus ? "CAN" : "Modbus") + " for " + fault.device +
+                             ", a drive on " + (on_modbus ? "Modbus" : "CAN"),
+                    .expected = expected});
+}
+
+}  // namespace
+
 // ---- Set-up
 
 SimulatedCell::SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
@@ -291,7 +323,11 @@ Truth SimulatedCell::present_truth() const noexcept {
 
 void SimulatedCell::check_faults() const {
   for (const DeviceFault& fault : faults_) {
-    if (fault.device == "sensor" || axis_of(fault.device) < cell_.drives.size()) continue;
+    const std::size_t axis = axis_of(fault.device);
+    if (fault.device == "sensor" || axis < cell_.drives.size()) {
+      if (fault.device != "sensor") require_fault_of_drive(fault, modbus_drives_[axis] != nullptr);
+      continue;
+    }
     std::string names;
     for (const auto& drive : cell_.drives) names += drive.joint + ", ";
     throw SetupError({.key = "device fault",

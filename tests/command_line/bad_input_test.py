@@ -242,6 +242,11 @@ class Options(ProgramTest):
         self.assert_refused(self.call("run", "--record", program()), "--record")
         self.assert_refused(self.call("run", "--record", "/proc/nowhere"), "--record", "/proc/nowhere")
 
+    def test_a_fault_that_its_bus_does_not_know(self):
+        rail = SOURCE / "models/cells/rail.yaml"
+        self.assert_refused(self.call("run", rail, "--fault", "rail:sdo@1s"), "rail, a drive on Modbus", "half_answer")
+        self.assert_refused(self.call("run", "--fault", "axis_1:closed@1s"), "axis_1, a drive on CAN", "heartbeat")
+
     def test_a_session_lasts_at_most_a_week(self):
         self.assert_refused(self.call("run", "--duration", "1e30s"), "--duration", "at most a week")
 
