@@ -12,7 +12,6 @@
 namespace proxarm::sim {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::ms;
 
