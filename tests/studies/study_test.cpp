@@ -41,12 +41,14 @@ class Thirds final : public Study {
 };
 
 class StudyFiles : public testing::Test {
- protected:
-  StudyFiles() { fs::create_directories(folder_); }
+ public:
+  StudyFiles() { fs::create_directories(folder); }
   ~StudyFiles() override {
     std::error_code ignored;
-    fs::remove_all(folder_, ignored);
+    fs::remove_all(folder, ignored);
   }
+
+ protected:
   static std::string content(const fs::path& file) {
     std::ifstream in(file);
     std::ostringstream text;
@@ -54,46 +56,46 @@ class StudyFiles : public testing::Test {
     return text.str();
   }
   Outcome merge(const std::vector<fs::path>& parts, const fs::path& out) const {
-    return merge_study([this](const std::string&) -> const Study& { return study_; }, parts, out);
+    return merge_study([this](const std::string&) -> const Study& { return study; }, parts, out);
   }
 
-  Thirds study_;
-  fs::path folder_ = fs::temp_directory_path() / ("proxarm_study_" + std::to_string(::getpid()));
+  Thirds study;
+  fs::path folder = fs::temp_directory_path() / ("proxarm_study_" + std::to_string(::getpid()));
 };
 
 TEST_F(StudyFiles, PartsThatAreMergedGiveTheFilesOfOneRun) {
   const Options options{.seed = 7};
-  run_study(study_, options, {}, folder_ / "one", "one", 1);
+  run_study(study, options, {}, folder / "one", "one", 1);
   std::vector<fs::path> parts;
   for (std::size_t i = 1; i <= 4; ++i) {
-    parts.push_back(folder_ / std::to_string(i));
-    run_study(study_, options, {i, 4}, parts.back(), "part", 2);
+    parts.push_back(folder / std::to_string(i));
+    run_study(study, options, {i, 4}, parts.back(), "part", 2);
   }
-  merge({parts[2], parts[0], parts[3], parts[1]}, folder_ / "merged");
-  EXPECT_EQ(content(folder_ / "one/thirds.csv"), content(folder_ / "merged/thirds.csv"));
-  const auto one = nlohmann::json::parse(content(folder_ / "one/thirds.json"));
-  const auto merged = nlohmann::json::parse(content(folder_ / "merged/thirds.json"));
+  merge({parts[2], parts[0], parts[3], parts[1]}, folder / "merged");
+  EXPECT_EQ(content(folder / "one/thirds.csv"), content(folder / "merged/thirds.csv"));
+  const auto one = nlohmann::json::parse(content(folder / "one/thirds.json"));
+  const auto merged = nlohmann::json::parse(content(folder / "merged/thirds.json"));
   EXPECT_EQ(one.at("sum"), merged.at("sum"));
   EXPECT_FALSE(merged.contains("shard"));
 }
 
 TEST_F(StudyFiles, PartsThatDontMakeAWholeAreRefused) {
-  const fs::path a = folder_ / "a", b = folder_ / "b", c = folder_ / "c";
-  run_study(study_, {.seed = 7}, {1, 2}, a, "part", 1);
-  run_study(study_, {.seed = 8}, {2, 2}, b, "part", 1);
-  run_study(study_, {.seed = 7}, {2, 2}, c, "part", 1);
-  EXPECT_THROW(merge({a}, folder_ / "out"), description::SetupError);        // half of it
-  EXPECT_THROW(merge({a, a, c}, folder_ / "out"), description::SetupError);  // one twice
-  EXPECT_THROW(merge({a, b}, folder_ / "out"), description::SetupError);     // another seed
-  EXPECT_THROW(merge({a, folder_}, folder_ / "out"), description::SetupError);
+  const fs::path a = folder / "a", b = folder / "b", c = folder / "c";
+  run_study(study, {.seed = 7}, {1, 2}, a, "part", 1);
+  run_study(study, {.seed = 8}, {2, 2}, b, "part", 1);
+  run_study(study, {.seed = 7}, {2, 2}, c, "part", 1);
+  EXPECT_THROW(merge({a}, folder / "out"), description::SetupError);        // half of it
+  EXPECT_THROW(merge({a, a, c}, folder / "out"), description::SetupError);  // one twice
+  EXPECT_THROW(merge({a, b}, folder / "out"), description::SetupError);     // another seed
+  EXPECT_THROW(merge({a, folder}, folder / "out"), description::SetupError);
   std::ofstream(c / "thirds.csv", std::ios::app) << "3,first,abc\n";
-  EXPECT_THROW(merge({a, c}, folder_ / "out"), description::SetupError);  // not a number
+  EXPECT_THROW(merge({a, c}, folder / "out"), description::SetupError);  // not a number
 }
 
 TEST_F(StudyFiles, ManyThreadsMakeTheFilesOfOne) {
-  run_study(study_, {}, {}, folder_ / "one", "x", 1);
-  run_study(study_, {}, {}, folder_ / "four", "x", 4);
-  EXPECT_EQ(content(folder_ / "one/thirds.csv"), content(folder_ / "four/thirds.csv"));
+  run_study(study, {}, {}, folder / "one", "x", 1);
+  run_study(study, {}, {}, folder / "four", "x", 4);
+  EXPECT_EQ(content(folder / "one/thirds.csv"), content(folder / "four/thirds.csv"));
 }
 
 TEST(Shard, IsAPartOfAWhole) {
