@@ -3,6 +3,8 @@
 #include <array>
 #include <numbers>
 
+#include "controller/studies/globe_mesh.hpp"
+
 namespace proxarm::studies {
 namespace {
 
@@ -48,33 +50,11 @@ Shape some_edged(Random& random, const Vec3& at, bool inside_out) {
 
 // A convex globe of flat faces.
 Shape some_mesh(Random& random) {
-  models::TriangleSoup soup;
   const auto rings = static_cast<std::uint32_t>(2 + random.below(4)),
              sectors = static_cast<std::uint32_t>(3 + random.below(8));
   const Pose pose = some_pose(random, random.in_box(0.3));
   const Vec3 half = Vec3::Constant(0.25) + random.in_box(0.15);
-  const auto add = [&](double theta, double phi) {
-    const Vec3 x(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta));
-    soup.vertices.push_back(pose * Vec3(half.cwiseProduct(x)));
-  };
-  add(0.0, 0.0);
-  for (std::uint32_t i = 1; i < rings; ++i) {
-    for (std::uint32_t j = 0; j < sectors; ++j) add(pi * i / rings, 2.0 * pi * j / sectors);
-  }
-  add(pi, 0.0);
-  const auto at = [&](std::uint32_t ring, std::uint32_t sector) { return 1 + (ring - 1) * sectors + sector % sectors; };
-  const auto last = static_cast<std::uint32_t>(soup.vertices.size() - 1);
-  for (std::uint32_t j = 0; j < sectors; ++j) {
-    soup.triangles.push_back({0, at(1, j), at(1, j + 1)});
-    for (std::uint32_t i = 1; i + 1 < rings; ++i) {
-      soup.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      soup.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
-    soup.triangles.push_back({last, at(rings - 1, j + 1), at(rings - 1, j)});
-  }
-  scenes::MeshShape shape;
-  shape.mesh = std::make_shared<const models::TriangleMesh>(std::move(soup));
-  return shape;
+  return globe_mesh(rings, sectors, [&](const Vec3& x) { return Vec3(pose * Vec3(half.cwiseProduct(x))); });
 }
 
 scenes::Motion some_motion(Random& random) {

@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <sstream>
 
 #include "controller/studies/chart.hpp"
+#include "controller/studies/globe_mesh.hpp"
 #include "scenes/compile.hpp"
 #include "scenes/obstacles.hpp"
 
@@ -66,36 +66,13 @@ Scene spheres(std::size_t count) {
 
 // A sphere of 0.2 m as a mesh of about `count` triangles; its poles, vertices of many, lie along x.
 Scene globe(std::size_t count) {
-  models::TriangleSoup soup;
   const auto rings = static_cast<std::uint32_t>(std::max(2.0, std::sqrt(static_cast<double>(count) / 4.0)));
-  const std::uint32_t sectors = 2 * rings;
-  const auto at = [&](std::uint32_t ring, std::uint32_t sector) { return 1 + (ring - 1) * sectors + sector % sectors; };
-  const auto add = [&](double theta, double phi) {
-    soup.vertices.emplace_back(0.2 * std::cos(theta), 0.2 * std::sin(theta) * std::cos(phi),
-                               0.2 * std::sin(theta) * std::sin(phi));
-  };
-  constexpr double pi = std::numbers::pi;
-  add(0.0, 0.0);
-  for (std::uint32_t i = 1; i < rings; ++i) {
-    for (std::uint32_t j = 0; j < sectors; ++j) add(pi * i / rings, 2.0 * pi * j / sectors);
-  }
-  add(pi, 0.0);
-  const auto last = static_cast<std::uint32_t>(soup.vertices.size() - 1);
-  for (std::uint32_t j = 0; j < sectors; ++j) {
-    soup.triangles.push_back({0, at(1, j), at(1, j + 1)});
-    for (std::uint32_t i = 1; i + 1 < rings; ++i) {
-      soup.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
-      soup.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
-    }
-    soup.triangles.push_back({last, at(rings - 1, j + 1), at(rings - 1, j)});
-  }
-  scenes::MeshShape shape;
-  shape.mesh = std::make_shared<const models::TriangleMesh>(std::move(soup));
   Scene scene;
   scenes::Object object;
   object.name = "globe";
   object.friction = 0.3;
-  object.shape = shape;
+  object.shape =
+      globe_mesh(rings, 2 * rings, [](const Vec3& x) { return Vec3(0.2 * x.z(), 0.2 * x.x(), 0.2 * x.y()); });
   scene.objects.push_back(object);
   return scene;
 }
