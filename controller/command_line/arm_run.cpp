@@ -1,9 +1,9 @@
 #include "controller/command_line/arm_run.hpp"
 
 #include <numbers>
-#include <numeric>
 
 #include "controller/bring_up.hpp"
+#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/data_files.hpp"
 #include "controller/command_line/prepared_session.hpp"
 #include "controller/session.hpp"
@@ -45,21 +45,11 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
 
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
   const PreparedSession session = session_of(setup);
-  std::vector<fieldbus::SimulatedBusConfig> buses;
-  for (const description::BusDescription& bus : session.cell.buses) {
-    fieldbus::SimulatedBusConfig config;
-    config.name = bus.name;
-    config.bitrate = bus.bitrate;
-    config.data_bitrate = bus.data_bitrate;
-    buses.push_back(config);
-  }
-  fieldbus::SimulatedCanNetwork network(buses);
+  fieldbus::SimulatedCanNetwork network(simulated_buses(session.cell));
   sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::BusIndices indices(session.cell.buses.size());
-  std::iota(indices.begin(), indices.end(), std::size_t{0});
-  controller::CycleParts parts =
-      controller::build_parts(session.cell, session.sensor, scene, session.settings, network, indices);
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
+                                                         buses_in_order(session.cell));
   far_end.attach_to(network);
   far_end.power_on();
   controller::bring_up(parts);

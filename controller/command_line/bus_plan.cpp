@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 
+#include "controller/command_line/cell_buses.hpp"
 #include "fieldbus/canopen_pdo.hpp"
 #include "models/description/setup_error.hpp"
 
@@ -137,12 +137,6 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
   return bus;
 }
 
-controller::BusIndices apart(const PreparedSession& session) {
-  controller::BusIndices indices(session.cell.buses.size());
-  std::iota(indices.begin(), indices.end(), std::size_t{0});
-  return indices;
-}
-
 }  // namespace
 
 std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices) {
@@ -155,7 +149,7 @@ std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const 
 }
 
 void require_carried(const PreparedSession& session) {
-  const std::string refusal = fieldbus::refusal_text(plan_buses(session, apart(session)));
+  const std::string refusal = fieldbus::refusal_text(plan_buses(session, buses_in_order(session.cell)));
   if (refusal.empty()) return;
   throw description::SetupError({.key = "--timestep", .message = refusal, .advice = "`proxarm plan` shows each frame"});
 }

@@ -9,6 +9,7 @@
 
 #include "controller/bring_up.hpp"
 #include "controller/command_line/bus_plan.hpp"
+#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/realtime.hpp"
 #include "controller/command_line/session_output.hpp"
@@ -31,12 +32,6 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, should a disk take that long
 constexpr std::size_t frame_capacity = 262144;
 constexpr auto drain_interval = std::chrono::milliseconds(5);
-
-std::vector<std::string> bus_names(const description::Cell& cell) {
-  std::vector<std::string> names;
-  for (const description::BusDescription& bus : cell.buses) names.push_back(bus.name);
-  return names;
-}
 
 void refuse_real_interfaces(const std::vector<std::string>& interfaces) {
   for (const std::string& interface : interfaces) {

@@ -1,7 +1,8 @@
+#include <algorithm>
 #include <cstdio>
-#include <numeric>
 
 #include "controller/command_line/bus_plan.hpp"
+#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/commands.hpp"
 
 namespace proxarm::command_line {
@@ -25,8 +26,7 @@ controller::BusIndices indices_of(const std::vector<std::string>& interfaces) {
 
 int plan_command(const RunOptions& options) {
   const PreparedSession session = prepare(options);
-  std::vector<std::string> names;
-  for (const description::BusDescription& bus : session.cell.buses) names.push_back(bus.name);
+  const std::vector<std::string> names = bus_names(session.cell);
   const controller::BusIndices indices = indices_of(options.bus.simulated() ? names : options.bus.interfaces(names));
   bool all_fit = true;
   for (const fieldbus::BusPlan& plan : plan_buses(session, indices)) {

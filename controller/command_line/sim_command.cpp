@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <memory>
 
+#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/prepared_session.hpp"
 #include "controller/command_line/signal_watch.hpp"
@@ -22,10 +23,8 @@ int sim_command(const RunOptions& options) {
                                    .advice = "for both in one process: proxarm run"});
   }
   const PreparedSession session = prepare(options);
-  std::vector<std::string> names;
-  for (const description::BusDescription& bus : session.cell.buses) names.push_back(bus.name);
   std::atomic<bool> stop{false};
-  const std::vector<std::string> interfaces = options.bus.interfaces(names);
+  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
   fieldbus::SocketCanNetwork network(interfaces);
   std::vector<std::size_t> interface_of_bus;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 
+#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/signal_watch.hpp"
 #include "controller/session.hpp"
@@ -20,18 +20,6 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::int64_t last_words_ns = 5'000'000;
 constexpr double tcp_exchange_s = 1e-3;      // of a Modbus drive with a network of its own
 constexpr std::size_t record_capacity = 64;  // drained after every cycle
-
-std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
-  std::vector<fieldbus::SimulatedBusConfig> buses;
-  for (const description::BusDescription& bus : cell.buses) {
-    fieldbus::SimulatedBusConfig config;
-    config.name = bus.name;
-    config.bitrate = bus.bitrate;
-    config.data_bitrate = bus.data_bitrate;
-    buses.push_back(config);
-  }
-  return buses;
-}
 
 sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
   sim::SimulatedCellConfig config;
@@ -50,13 +38,11 @@ SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& opt
       output_(session, options, true) {}
 
 int SimulatedRun::run() {
-  controller::BusIndices indices(session_.cell.buses.size());
-  std::iota(indices.begin(), indices.end(), std::size_t{0});
   const controller::ModbusOpener open_line = [this](const description::ModbusLineDescription& line, double) {
     return far_end_.modbus_client(line.name);
   };
-  controller::CycleParts parts =
-      controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings, network_, indices, open_line);
+  controller::CycleParts parts = controller::build_parts(session_.cell, session_.sensor, scene_, session_.settings,
+                                                         network_, buses_in_order(session_.cell), open_line);
   if (!options_.record_dir.empty()) {
     network_.set_observer(
         [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
