@@ -79,6 +79,12 @@ std::string parameter_name(Limit limit, std::uint8_t axes, const std::vector<std
   return joints + ": " + parameter.substr(of_joints.size());
 }
 
+bool limited(const CycleRecord& record) {
+  return record.has(RecordFlag::limit_orientation) ||
+         std::any_of(limit_flags.begin(), limit_flags.end(),
+                     [&](const LimitFlag& flag) { return record.has(flag.flag); });
+}
+
 }  // namespace
 
 struct SummaryBuilder::State {
@@ -138,14 +144,13 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (record.has(RecordFlag::overrun)) ++summary.overruns;
   if (record.phase != Phase::rendering) return;
   if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
-  bool limited = record.has(RecordFlag::limit_orientation);
-  if (limited) ++summary.active_limits["orientation"];
+  if (limited(record)) ++summary.limited_cycles;
+  if (record.has(RecordFlag::limit_orientation)) ++summary.active_limits["orientation"];
   for (const LimitFlag& flag : limit_flags) {
-    if (!record.has(flag.flag)) continue;
-    limited = true;
-    ++summary.active_limits[parameter_name(flag.limit, record.limited_axes, config.axis_names)];
+    if (record.has(flag.flag)) {
+      ++summary.active_limits[parameter_name(flag.limit, record.limited_axes, config.axis_names)];
+    }
   }
-  if (limited) ++summary.limited_cycles;
   if (record.has(RecordFlag::truth)) summary.from_truth = true;
 }
 
@@ -190,8 +195,9 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
 
   const Vec3 spring = config.spring_N_per_m * (x - *start);
   if (now.contact == ContactPhase::free) {
-    // A world without contacts may act all the same: a field of friction, a soft layer.
-    if (vec3(now.contact_force_W_N).norm() < free_force_N) return apparent.add(hand - spring, x);
+    // A world without contacts may act all the same: a field of friction, a soft layer. And where a limit acts the mass
+    // isn't what moves.
+    if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now)) return apparent.add(hand - spring, x);
   }
   apparent.end_segment();
   if (now.contact == ContactPhase::free) return;

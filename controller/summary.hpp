@@ -15,8 +15,8 @@
 //                           that while the proxy slips
 //   tracking_rms_m, _max_m  ‖x(t_k) − q(k − delay)‖, delay = 2 cycles: a target sent in cycle k is latched at SYNC k+1
 //                           and, interpolated, reached at k+2
-//   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while the world's force on
-//                           the proxy is below 1 mN (apparent_mass.hpp);
+//   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while no limit acts and the world's
+//                           force on the proxy is below 1 mN (apparent_mass.hpp);
 //                           apparent_damping_Ns_per_m is its Im
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a

@@ -122,7 +122,8 @@ std::string summary_text(const Summary& s) {
   if (!loads.empty()) line("bus load", loads);
   line("felt mass",
        number(s.apparent_mass_kg, "%.3f kg") + format(", wanted %.3f kg", s.felt_mass_kg) +
-           (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : ""));
+           (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : "") +
+           (s.limited_cycles > 0 ? "; where no limit acts" : ""));
   line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m));
   line("contact", std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
                       format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s));

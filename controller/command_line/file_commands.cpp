@@ -4,6 +4,7 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/data_files.hpp"
+#include "controller/command_line/exit_status.hpp"
 #include "models/arm.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
@@ -18,8 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int not_valid = 2;
-
 // What a file is, by a key that only its kind has.
 enum class Kind { cell, scene, hand, sensor };
 
@@ -31,7 +30,7 @@ Kind kind_of(const fs::path& file) {
       if (root["protocol"]) return Kind::sensor;
       if (root["waypoints"] || root["multisine"] || root["stiffness_N_per_m"]) return Kind::hand;
     }
-  } catch (const YAML::Exception&) {  // the strict loader says what is wrong, and where
+  } catch (const std::exception&) {  // the strict loader says what is wrong, and where
   }
   return Kind::scene;
 }
@@ -78,11 +77,11 @@ int check_command(const FileOptions& options) {
       } else {
         std::fprintf(stderr, "proxarm: %s: its forces don't keep Assumption 1; the states are given above\n",
                      given.c_str());
-        status = not_valid;
+        status = set_up_mistake;
       }
     } catch (const description::SetupError& error) {
       std::fprintf(stderr, "proxarm: %s\n", error.what());
-      status = not_valid;
+      status = set_up_mistake;
     }
   }
   return status;

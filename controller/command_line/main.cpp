@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/exit_status.hpp"
 #include "models/description/quantity.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/description/text.hpp"
@@ -20,8 +21,6 @@ using namespace proxarm;
 using command_line::BusMapping;
 using command_line::Pace;
 using command_line::RunOptions;
-
-constexpr int set_up_mistake = 2;
 
 // A number with its unit, checked while the command line is parsed, so that CLI11 names the option in its message.
 template <typename Parse, typename Store>
@@ -192,7 +191,7 @@ int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseEr
     if (!near.empty()) message += "; did you mean " + near + "?";
   }
   std::fprintf(stderr, "proxarm: %s; %s\n", message.c_str(), advice.c_str());
-  return set_up_mistake;
+  return command_line::set_up_mistake;
 }
 
 int run(int argc, char** argv) {
@@ -270,5 +269,5 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     std::fprintf(stderr, "proxarm: %s\n", error.what());
   }
-  return set_up_mistake;
+  return command_line::set_up_mistake;
 }

@@ -1,9 +1,12 @@
 #include "controller/command_line/session_output.hpp"
 
+#include <unistd.h>
+
 #include <cmath>
 #include <cstdio>
 
 #include "controller/command_line/effective_config.hpp"
+#include "controller/command_line/exit_status.hpp"
 #include "models/description/setup_error.hpp"
 #include "scenes/compile.hpp"
 
@@ -15,7 +18,6 @@ using controller::CycleRecord;
 using controller::Fault;
 using controller::Summary;
 
-constexpr int fault_ended_the_run = 1;
 constexpr const char* default_plot = "proxarm-run.svg";
 
 std::vector<std::string> joint_names(const description::Cell& cell) {
@@ -74,14 +76,19 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   writer_->write_file("effective.yaml", effective_config(session));
 }
 
-// Better now than after the run that it was to show.
+// Better now than after the run that it was to show. By its name nothing but an earlier plot can be overwritten.
 void SessionOutput::refuse_lost_plot() const {
-  const fs::path folder = options_.plot_file.parent_path();
+  const fs::path& file = options_.plot_file;
+  if (file.empty()) return;
+  const auto refuse = [&](const char* expected) {
+    throw description::SetupError(
+        {.key = "--plot", .found = description::in_quotes(file.string()), .expected = expected});
+  };
+  if (file.extension() != ".svg") refuse("a file name that ends in .svg");
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
   std::error_code ignored;
-  if (folder.empty() || fs::is_directory(folder, ignored)) return;
-  throw description::SetupError({.key = "--plot",
-                                 .found = description::in_quotes(options_.plot_file.string()),
-                                 .expected = "a file in a folder that is there"});
+  if (!fs::is_directory(folder, ignored)) refuse("a file in a folder that is there");
+  if (access(folder.c_str(), W_OK) != 0 || fs::is_directory(file, ignored)) refuse("a file that can be written");
 }
 
 void SessionOutput::introduce(const controller::CycleParts& parts) const {
@@ -138,13 +145,14 @@ int SessionOutput::finish(const Summary& summary) {
     std::printf("%s", controller::summary_text(summary).c_str());
   }
   std::fflush(stdout);
-  draw_plot();
+  const bool drawn = draw_plot();
   if (writer_) writer_->finish(summary);
-  return summary.faults.empty() ? 0 : fault_ended_the_run;
+  if (!summary.faults.empty()) return fault_ended_the_run;
+  return drawn || options_.plot_file.empty() ? fine : set_up_mistake;
 }
 
-void SessionOutput::draw_plot() {
-  if (!plot_) return;
+bool SessionOutput::draw_plot() {
+  if (!plot_) return true;
   fs::path file = options_.plot_file;
   if (file.empty()) file = options_.record_dir.empty() ? fs::path(default_plot) : options_.record_dir / "plot.svg";
   const std::string warning = plot_->write(file);
@@ -153,6 +161,7 @@ void SessionOutput::draw_plot() {
   } else if (!options_.json) {
     std::printf("  plot:                     %s\n", file.c_str());
   }
+  return warning.empty();
 }
 
 }  // namespace proxarm::command_line

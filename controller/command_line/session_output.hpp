@@ -33,7 +33,7 @@ class SessionOutput {
 
  private:
   void refuse_lost_plot() const;
-  void draw_plot();
+  bool draw_plot();
 
   const PreparedSession& session_;
   const RunOptions& options_;

@@ -86,6 +86,23 @@ void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move the guide, or change start_rad in the cell file"});
 }
 
+// In a space of fewer dimensions the proxy moves beside the tool by as much as the tool starts beside the space: what
+// the file puts in its way would not be where it is felt.
+void require_in_space(const PreparedSession& session, const Vec3& start_W) {
+  const scenes::Space& space = session.scene.space;
+  const auto axes = space.axes.leftCols(space.dimensions);
+  const Vec3 from_origin = start_W - space.origin_m;
+  const double away_m = (from_origin - axes * (axes.transpose() * from_origin)).norm();
+  if (away_m <= start_tolerance_m) return;
+  char found[64];
+  std::snprintf(found, sizeof found, ") %.3g m beside it", away_m);
+  throw SetupError({.file = session.scene.file.string(),
+                    .key = "space",
+                    .found = "the start of the tool (" + point_text(start_W) + found,
+                    .expected = "a space that the tool starts in",
+                    .advice = "move space.origin_m, or change start_rad in the cell file"});
+}
+
 // Within the workspace, and in no zone to be kept out of.
 void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
   const description::CellLimits& limits = session.cell.limits;
@@ -112,6 +129,7 @@ void require_usable_start(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   require_regular(session, arm);
   const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
+  require_in_space(session, start_W);
   require_outside(session, start_W);
   require_on_guide(session, start_W);
   require_allowed(session, start_W);

@@ -253,6 +253,26 @@ class Options(ProgramTest):
     def test_a_plot_needs_a_folder_that_is_there(self):
         self.assert_refused(self.call("run", "--plot", "nowhere/plot.svg"), "--plot", "nowhere")
 
+    def test_a_plot_overwrites_nothing_but_a_plot(self):
+        scene = self.written("scene.yaml", "name: mine\n")
+        self.assert_refused(self.call("run", "--plot", scene), "--plot", "ends in .svg")
+        self.assertEqual(scene.read_text(), "name: mine\n")
+        (self.folder / "folder.svg").mkdir()
+        self.assert_refused(self.call("run", "--plot", self.folder / "folder.svg"), "--plot", "can be written")
+
+    def test_a_plot_that_cannot_be_drawn_is_no_success(self):
+        outcome = self.call("run", "--duration", "0.1s", "--plot", self.folder / "plot.svg", env={"PATH": "/nowhere"})
+        self.assertEqual(outcome.status, 2)
+        self.assertIn("gnuplot isn't installed", outcome.err)
+        self.assertFalse((self.folder / "plot.svg").exists())
+
+    def test_a_folder_is_no_file(self):
+        self.assert_refused(self.call("check", SOURCE / "scenes"), "scenes", "is a folder")
+
+    def test_a_plane_that_the_tool_is_not_in(self):
+        scene = self.changed("scenes/plane_2d.yaml", ("origin_m: [0.7, 0, 0.6]", "origin_m: [0.7, 0, 0.5]"))
+        self.assert_refused(self.call("run", "--scene", scene), "plane_2d.yaml", "space", "0.1 m beside it")
+
 
 class Buses(ProgramTest):
     def test_mappings(self):

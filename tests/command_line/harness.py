@@ -40,10 +40,10 @@ class ProgramTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def call(self, *arguments, timeout=600):
+    def call(self, *arguments, timeout=600, env=None):
         before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         done = subprocess.run([program(), *map(str, arguments)], cwd=self.folder, stdin=subprocess.DEVNULL,
-                              capture_output=True, text=True, timeout=timeout)
+                              capture_output=True, text=True, timeout=timeout, env=env)
         user_s = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
         return Outcome(done.returncode, done.stdout, done.stderr, user_s)
 

@@ -150,6 +150,24 @@ TEST(Summary, TakesNoMassInAFieldOfFriction) {
   EXPECT_FALSE(session.run(4000).apparent_mass_kg);
 }
 
+TEST(Summary, TakesNoMassWhereALimitActs) {
+  for (const RecordFlag flag : {RecordFlag::limit_speed, RecordFlag::limit_orientation}) {
+    const Session session;
+    SummaryBuilder builder({.period_s = T, .felt_mass_kg = session.mass_kg, .handle_mass_kg = session.handle_kg});
+    for (std::uint64_t k = 0; k < 4000; ++k) {
+      CycleRecord record = session.record(k);
+      record.set(flag, k >= 2000);
+      if (k >= 2000) record.hand_force_W_N[0] += 100.0 * Session::ax(static_cast<double>(k) * T);
+      builder.add(record);
+    }
+    const Summary s = builder.finish();
+    EXPECT_EQ(s.limited_cycles, 2000u);
+    ASSERT_TRUE(s.apparent_mass_kg);
+    EXPECT_NEAR(*s.apparent_mass_kg, 4.0, 4e-3);  // and not 104 kg
+    EXPECT_NE(summary_text(s).find("where no limit acts"), std::string::npos);
+  }
+}
+
 TEST(Summary, LeavesFrictionAndPullOutWhereTwoThingsPress) {
   SummaryBuilder builder({});
   Session session;

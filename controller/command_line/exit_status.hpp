@@ -1,0 +1,10 @@
+// How the program ends.
+#pragma once
+
+namespace proxarm::command_line {
+
+inline constexpr int fine = 0;
+inline constexpr int fault_ended_the_run = 1;
+inline constexpr int set_up_mistake = 2;
+
+}  // namespace proxarm::command_line
