@@ -47,6 +47,18 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
 
 }  // namespace
 
+std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
+  std::vector<fieldbus::SimulatedBusConfig> buses;
+  for (const description::BusDescription& bus : cell.buses) {
+    fieldbus::SimulatedBusConfig config;
+    config.name = bus.name;
+    config.bitrate = bus.bitrate;
+    config.data_bitrate = bus.data_bitrate;
+    buses.push_back(config);
+  }
+  return buses;
+}
+
 // ---- Where devices meet the physics
 
 class SimulatedCell::PlantAxis final : public ServoAxis {

@@ -48,6 +48,9 @@ struct Truth {
   std::int64_t hand_start_ns = 0;
 };
 
+// The cell's buses, for a network in this process.
+std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell);
+
 class SimulatedCell final : private Clockwork {
  public:
   // Throws SetupError: what Plant refuses, a bus that the cell doesn't have, a fault for a device that isn't there.

@@ -45,7 +45,7 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
 
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
   const PreparedSession session = session_of(setup);
-  fieldbus::SimulatedCanNetwork network(simulated_buses(session.cell));
+  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
   sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,

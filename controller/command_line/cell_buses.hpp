@@ -5,15 +5,11 @@
 #include <vector>
 
 #include "controller/bring_up.hpp"
-#include "fieldbus/simulated_can_network.hpp"
 #include "models/description/cell.hpp"
 
 namespace proxarm::command_line {
 
 std::vector<std::string> bus_names(const description::Cell& cell);
-
-// A network in this process, with a bus for each of the cell's.
-std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell);
 
 // For a network that has the cell's buses in the cell's order.
 controller::BusIndices buses_in_order(const description::Cell& cell);

@@ -32,7 +32,7 @@ sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
 SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& options)
     : session_(session),
       options_(options),
-      network_(simulated_buses(session.cell)),
+      network_(sim::simulated_buses(session.cell)),
       far_end_(session.cell, session.sensor, session.hand, network_.events(), far_end_config(options)),
       scene_(scenes::compile(session.scene)),
       output_(session, options, true) {}

@@ -1,42 +1,20 @@
 #include "controller/plot.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 
+#include "tests/scratch_folder.hpp"
+
 namespace proxarm::controller {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Folder {
- public:
-  Folder() {
-    char name[] = "/tmp/proxarm_plot_test_XXXXXX";
-    path_ = mkdtemp(name);
-  }
-  ~Folder() { fs::remove_all(path_); }
-  fs::path operator/(const std::string& name) const { return path_ / name; }
-  std::size_t count() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(path_), fs::directory_iterator{}));
-  }
-
- private:
-  fs::path path_;
-};
-
 bool have_gnuplot() { return std::system("command -v gnuplot > /dev/null 2>&1") == 0; }
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::stringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 // A made-up session: down to a wall, sticking, sliding, leaving.
 void fill(PlotBuilder& plot, int cycles, bool contact = true) {
@@ -70,11 +48,11 @@ void fill(PlotBuilder& plot, int cycles, bool contact = true) {
 
 TEST(Plot, DrawsASessionAtAWall) {
   if (!have_gnuplot()) GTEST_SKIP() << "gnuplot isn't installed";
-  Folder folder;
+  const tests::ScratchFolder folder;
   PlotBuilder plot("default scene, 4 kg, T = 1 ms");
   fill(plot, 10000);
   EXPECT_EQ(plot.write(folder / "plot.svg"), "");
-  const std::string svg = text_of(folder / "plot.svg");
+  const std::string svg = tests::text_of(folder / "plot.svg");
   for (const char* text : {"<svg", "</svg>", "from wall (mm)", "along wall (mm)", "force (N)", "time (s)", "stick",
                            "slip", "tool", "proxy", "default scene, 4 kg, T = 1 ms"}) {
     EXPECT_NE(svg.find(text), std::string::npos) << text;
@@ -86,39 +64,39 @@ TEST(Plot, DrawsASessionAtAWall) {
 
 TEST(Plot, DrawsCoordinatesWhereNothingWasTouched) {
   if (!have_gnuplot()) GTEST_SKIP() << "gnuplot isn't installed";
-  Folder folder;
+  const tests::ScratchFolder folder;
   PlotBuilder plot("free");
   fill(plot, 3000, false);
   EXPECT_EQ(plot.write(folder / "plot.svg"), "");
-  EXPECT_NE(text_of(folder / "plot.svg").find("z (mm)"), std::string::npos);
+  EXPECT_NE(tests::text_of(folder / "plot.svg").find("z (mm)"), std::string::npos);
 }
 
 TEST(Plot, IsTheSameTwice) {
   if (!have_gnuplot()) GTEST_SKIP() << "gnuplot isn't installed";
-  Folder folder;
+  const tests::ScratchFolder folder;
   for (const char* name : {"a", "b"}) {
     PlotBuilder plot("twice");
     fill(plot, 2000);
     EXPECT_EQ(plot.write(folder / name), "");
   }
-  EXPECT_EQ(text_of(folder / "a"), text_of(folder / "b"));
+  EXPECT_EQ(tests::text_of(folder / "a"), tests::text_of(folder / "b"));
 }
 
 // Names and titles that would be commands to a shell or to gnuplot.
 TEST(Plot, TakesNamesAsNames) {
   if (!have_gnuplot()) GTEST_SKIP() << "gnuplot isn't installed";
-  Folder folder;
+  const tests::ScratchFolder folder;
   PlotBuilder plot("it's `touch " + (folder / "pwned").string() + "`'; system 'false' #\n\"$x\"");
   fill(plot, 500);
   const fs::path odd = folder / "a b'; touch pwned; 'c.svg";
   EXPECT_EQ(plot.write(odd), "");
   EXPECT_TRUE(fs::exists(odd));
-  EXPECT_EQ(folder.count(), 1u);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator{}), 1);
 }
 
 TEST(Plot, ThinsOutALongSession) {
   if (!have_gnuplot()) GTEST_SKIP() << "gnuplot isn't installed";
-  Folder folder;
+  const tests::ScratchFolder folder;
   PlotBuilder plot("long");
   fill(plot, 200000);
   EXPECT_EQ(plot.write(folder / "plot.svg"), "");
@@ -126,7 +104,7 @@ TEST(Plot, ThinsOutALongSession) {
 }
 
 TEST(Plot, WarnsInsteadOfFailing) {
-  Folder folder;
+  const tests::ScratchFolder folder;
   PlotBuilder nothing("nothing");
   EXPECT_NE(nothing.write(folder / "plot.svg").find("nothing was rendered"), std::string::npos);
   PlotBuilder absent("absent", "no-such-gnuplot");

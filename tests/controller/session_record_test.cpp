@@ -1,7 +1,6 @@
 #include "controller/session_record.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -13,32 +12,12 @@
 #include <sstream>
 
 #include "models/description/setup_error.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace proxarm::controller {
 namespace {
 
 namespace fs = std::filesystem;
-
-class Folder {
- public:
-  Folder() {
-    char name[] = "/tmp/proxarm_record_XXXXXX";
-    path_ = mkdtemp(name);
-  }
-  ~Folder() { fs::remove_all(path_); }
-  fs::path operator/(const char* name) const { return path_ / name; }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::stringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
 
 std::vector<std::string> cells(const std::string& row) {
   std::vector<std::string> result;
@@ -110,7 +89,7 @@ TEST(SessionRecord, NumbersReadBackToTheSameBits) {
 // Written by hand in candump -L's format (can-utils, lib.c: "id#data", "id##flags data", "id#R", 8 digits when
 // extended).
 TEST(SessionRecord, FramesAreACandumpLog) {
-  Folder folder;
+  const tests::ScratchFolder folder;
   SessionWriter writer(folder / "s", six_axes, false);
   fieldbus::CanFrame frame{.id = 0x181, .length = 6, .data = {0x37, 0x12, 0x00, 0x10, 0x00, 0xAB}};
   writer.add_frame("axes_1_3", frame, 1'000'250'999);
@@ -119,7 +98,7 @@ TEST(SessionRecord, FramesAreACandumpLog) {
   writer.add_frame("sensor", {.id = 0x6A0, .remote = true}, 5000);
   writer.add_frame("sensor", {.id = 0x6A0, .fd = true, .bit_rate_switch = true, .length = 2, .data = {1, 2}}, 6000);
   writer.finish({});
-  EXPECT_EQ(text_of(folder / "s" / "frames.log"),
+  EXPECT_EQ(tests::text_of(folder / "s" / "frames.log"),
             "(0000000001.000250) axes_1_3 181#3712001000AB\n"
             "(0000000000.000000) axes_1_3 080#\n"
             "(0000012345.678901) sensor 00000123#FF\n"
@@ -130,7 +109,7 @@ TEST(SessionRecord, FramesAreACandumpLog) {
 // The witness: can-utils' own reader (which takes times within the first second for no time at all).
 TEST(SessionRecord, CanUtilsReadTheLog) {
   if (std::system("command -v log2asc > /dev/null 2>&1") != 0) GTEST_SKIP() << "can-utils' log2asc isn't installed";
-  Folder folder;
+  const tests::ScratchFolder folder;
   SessionWriter writer(folder / "s", six_axes, false);
   for (int k = 0; k < 100; ++k) {
     writer.add_frame("axes_1_3",
@@ -141,13 +120,13 @@ TEST(SessionRecord, CanUtilsReadTheLog) {
   const std::string command =
       "log2asc -I '" + (folder / "s" / "frames.log").string() + "' -O '" + (folder / "out.asc").string() + "' axes_1_3";
   ASSERT_EQ(std::system(command.c_str()), 0);
-  const std::string asc = text_of(folder / "out.asc");
+  const std::string asc = tests::text_of(folder / "out.asc");
   EXPECT_NE(asc.find("0.099000 1  201"), std::string::npos) << asc;
   EXPECT_NE(asc.find("d 6 0F 00 63 BE EF FF"), std::string::npos) << asc;
 }
 
 TEST(SessionRecord, HoldsAllFilesAndKeepsTheWallClockApart) {
-  Folder folder;
+  const tests::ScratchFolder folder;
   for (const char* name : {"a", "b"}) {
     SessionWriter writer(folder / name, six_axes, true);
     Summary summary;
@@ -163,18 +142,18 @@ TEST(SessionRecord, HoldsAllFilesAndKeepsTheWallClockApart) {
     writer.finish(summary);
   }
   for (const char* file : {"signals.csv", "frames.log", "effective.yaml", "summary.json"}) {
-    EXPECT_EQ(text_of(folder / "a" / file), text_of(folder / "b" / file)) << file;
+    EXPECT_EQ(tests::text_of(folder / "a" / file), tests::text_of(folder / "b" / file)) << file;
   }
-  EXPECT_NE(text_of(folder / "a" / "timing.json"), text_of(folder / "b" / "timing.json"));
-  EXPECT_EQ(text_of(folder / "a" / "effective.yaml"), "mass: 4 kg\n");
-  const std::string csv = text_of(folder / "a" / "signals.csv");
+  EXPECT_NE(tests::text_of(folder / "a" / "timing.json"), tests::text_of(folder / "b" / "timing.json"));
+  EXPECT_EQ(tests::text_of(folder / "a" / "effective.yaml"), "mass: 4 kg\n");
+  const std::string csv = tests::text_of(folder / "a" / "signals.csv");
   EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 2001);
-  EXPECT_TRUE(nlohmann::json::accept(text_of(folder / "a" / "summary.json")));
-  EXPECT_TRUE(nlohmann::json::accept(text_of(folder / "a" / "timing.json")));
+  EXPECT_TRUE(nlohmann::json::accept(tests::text_of(folder / "a" / "summary.json")));
+  EXPECT_TRUE(nlohmann::json::accept(tests::text_of(folder / "a" / "timing.json")));
 }
 
 TEST(SessionRecord, ReplacesAnEarlierSessionButNothingElse) {
-  Folder folder;
+  const tests::ScratchFolder folder;
   {
     SessionWriter writer(folder / "s", six_axes, false);
     writer.add(some_record(1));
@@ -184,7 +163,7 @@ TEST(SessionRecord, ReplacesAnEarlierSessionButNothingElse) {
     SessionWriter writer(folder / "s", six_axes, false);
     writer.finish({});
   }
-  EXPECT_EQ(text_of(folder / "s" / "signals.csv"), signals_header(six_axes, false) + "\n");
+  EXPECT_EQ(tests::text_of(folder / "s" / "signals.csv"), signals_header(six_axes, false) + "\n");
   std::ofstream(folder / "s" / "thesis.tex") << "\\documentclass";
   try {
     SessionWriter writer(folder / "s", six_axes, false);
@@ -193,11 +172,11 @@ TEST(SessionRecord, ReplacesAnEarlierSessionButNothingElse) {
     EXPECT_EQ(error.key(), "--record");
     EXPECT_NE(std::string(error.what()).find("thesis.tex"), std::string::npos) << error.what();
   }
-  EXPECT_EQ(text_of(folder / "s" / "thesis.tex"), "\\documentclass");
+  EXPECT_EQ(tests::text_of(folder / "s" / "thesis.tex"), "\\documentclass");
 }
 
 TEST(SessionRecord, NamesTheFolderThatCantBeWritten) {
-  Folder folder;
+  const tests::ScratchFolder folder;
   std::ofstream(folder / "file") << "x";
   EXPECT_THROW(SessionWriter(folder / "file", six_axes, false), description::SetupError);
   EXPECT_THROW(SessionWriter(fs::path("/proc/proxarm"), six_axes, false), description::SetupError);
@@ -206,7 +185,7 @@ TEST(SessionRecord, NamesTheFolderThatCantBeWritten) {
 // /dev/full takes every write and has room for none.
 TEST(SessionRecord, TellsOfAFullDisk) {
   if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  Folder folder;
+  const tests::ScratchFolder folder;
   SessionWriter writer(folder / "s", six_axes, false);
   fs::create_symlink("/dev/full", folder / "s" / "summary.json");
   try {

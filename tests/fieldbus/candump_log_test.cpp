@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -16,6 +15,7 @@
 #include "fieldbus/can_timing.hpp"
 #include "models/description/setup_error.hpp"
 #include "tests/allocation_count.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -206,7 +206,8 @@ TEST(CandumpLog, FormatsWithoutAllocation) {
 }
 
 TEST(CandumpLog, WritesFilesThatItReads) {
-  const auto path = std::filesystem::temp_directory_path() / ("proxarm_candump_" + std::to_string(::getpid()) + ".log");
+  const tests::ScratchFolder folder;
+  const auto path = folder / "run.log";
   CandumpLogWriter writer(path.string(), 1'700'000'000'000'000'000);
   for (int i = 0; i < 10'000; ++i) writer.write(i * std::int64_t{1'000'000}, "sensor", frame_of(0x680, {i & 0xff}));
   writer.finish();
@@ -227,8 +228,7 @@ TEST(CandumpLog, WritesFilesThatItReads) {
 // can-utils' own reader as the witness: log2asc reads the log and says the same in another format.
 TEST(CandumpLog, IsUnderstoodByCanUtils) {
   if (std::system("command -v log2asc >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs can-utils (log2asc)";
-  const auto folder = std::filesystem::temp_directory_path() / ("proxarm_log2asc_" + std::to_string(::getpid()));
-  std::filesystem::create_directories(folder);
+  const tests::ScratchFolder folder;
   {
     CandumpLogWriter writer((folder / "run.log").string());
     CanFrame extended = frame_of(0x1abcdef0, {0xca, 0xfe});
@@ -240,9 +240,7 @@ TEST(CandumpLog, IsUnderstoodByCanUtils) {
   const std::string command =
       "log2asc -I " + (folder / "run.log").string() + " -O " + (folder / "run.asc").string() + " vcan0 >/dev/null 2>&1";
   ASSERT_EQ(std::system(command.c_str()), 0);
-  std::ifstream file(folder / "run.asc");
-  const std::string asc((std::istreambuf_iterator<char>(file)), {});
-  std::filesystem::remove_all(folder);
+  const std::string asc = tests::text_of(folder / "run.asc");
   EXPECT_THAT(asc, HasSubstr("DE AD BE EF"));
   EXPECT_THAT(asc, HasSubstr("1ABCDEF0x"));
   EXPECT_THAT(asc, HasSubstr("0.2500"));

@@ -42,9 +42,7 @@ struct SimulatedDrives : ::testing::Test {
   bool poll_sensor = false;
 
   void build(std::vector<sim::DeviceFault> faults = {}) {
-    std::vector<SimulatedBusConfig> buses;
-    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .bitrate = bus.bitrate});
-    network = std::make_unique<SimulatedCanNetwork>(buses);
+    network = std::make_unique<SimulatedCanNetwork>(sim::simulated_buses(cell));
     const auto sensor_file = description::load_sensor(source_dir / "models/sensors/ati_net_can_oem.yaml");
     sim::SimulatedCellConfig config;
     config.faults = std::move(faults);

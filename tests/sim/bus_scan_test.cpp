@@ -25,9 +25,7 @@ struct Listener final : fieldbus::CanListener {
 
 struct BusScan : ::testing::Test {
   BusScan() {
-    std::vector<fieldbus::SimulatedBusConfig> buses;
-    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .bitrate = bus.bitrate});
-    network = std::make_unique<fieldbus::SimulatedCanNetwork>(buses);
+    network = std::make_unique<fieldbus::SimulatedCanNetwork>(simulated_buses(cell));
     const auto sensor = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml");
     far_end = std::make_unique<SimulatedCell>(cell, sensor, description::HandDescription{}, network->events());
     far_end->attach_to(*network);

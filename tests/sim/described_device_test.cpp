@@ -72,9 +72,7 @@ struct SensorInCell {
   explicit SensorInCell(const std::string& name, const std::vector<std::string>& faults = {}) {
     cell.sensor.base_id = name == "robotous_rft" ? 0x1F0 : name == "wacoh_dynpick" ? 7 : 0;
     cell.sensor.noise_N = cell.sensor.noise_Nm = 0.0;
-    std::vector<fieldbus::SimulatedBusConfig> buses;
-    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .bitrate = bus.bitrate});
-    network = std::make_unique<fieldbus::SimulatedCanNetwork>(buses);
+    network = std::make_unique<fieldbus::SimulatedCanNetwork>(simulated_buses(cell));
     SimulatedCellConfig config;
     for (const auto& text : faults) config.faults.push_back(parse_device_fault(text));
     far_end =

@@ -23,9 +23,7 @@ const std::filesystem::path source = PROXARM_SOURCE_DIR;
 
 struct MasterAndDrives : ::testing::Test {
   void start(const std::vector<std::string>& faults = {}) {
-    std::vector<fieldbus::SimulatedBusConfig> buses;
-    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .bitrate = bus.bitrate});
-    network = std::make_unique<fieldbus::SimulatedCanNetwork>(buses);
+    network = std::make_unique<fieldbus::SimulatedCanNetwork>(simulated_buses(cell));
     SimulatedCellConfig config;
     for (const auto& text : faults) config.faults.push_back(parse_device_fault(text));
     const auto sensor = description::load_sensor(source / "models/sensors/ati_net_can_oem.yaml");

@@ -1,13 +1,13 @@
 #include "controller/studies/study.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "models/description/setup_error.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -41,26 +41,13 @@ class Thirds final : public Study {
 };
 
 class StudyFiles : public testing::Test {
- public:
-  StudyFiles() { fs::create_directories(folder); }
-  ~StudyFiles() override {
-    std::error_code ignored;
-    fs::remove_all(folder, ignored);
-  }
-
  protected:
-  static std::string content(const fs::path& file) {
-    std::ifstream in(file);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-  }
   Outcome merge(const std::vector<fs::path>& parts, const fs::path& out) const {
     return merge_study([this](const std::string&) -> const Study& { return study; }, parts, out);
   }
 
   Thirds study;
-  fs::path folder = fs::temp_directory_path() / ("proxarm_study_" + std::to_string(::getpid()));
+  const tests::ScratchFolder folder;
 };
 
 TEST_F(StudyFiles, PartsThatAreMergedGiveTheFilesOfOneRun) {
@@ -72,9 +59,9 @@ TEST_F(StudyFiles, PartsThatAreMergedGiveTheFilesOfOneRun) {
     run_study(study, options, {i, 4}, parts.back(), "part", 2);
   }
   merge({parts[2], parts[0], parts[3], parts[1]}, folder / "merged");
-  EXPECT_EQ(content(folder / "one/thirds.csv"), content(folder / "merged/thirds.csv"));
-  const auto one = nlohmann::json::parse(content(folder / "one/thirds.json"));
-  const auto merged = nlohmann::json::parse(content(folder / "merged/thirds.json"));
+  EXPECT_EQ(tests::text_of(folder / "one/thirds.csv"), tests::text_of(folder / "merged/thirds.csv"));
+  const auto one = nlohmann::json::parse(tests::text_of(folder / "one/thirds.json"));
+  const auto merged = nlohmann::json::parse(tests::text_of(folder / "merged/thirds.json"));
   EXPECT_EQ(one.at("sum"), merged.at("sum"));
   EXPECT_FALSE(merged.contains("shard"));
 }
@@ -95,7 +82,7 @@ TEST_F(StudyFiles, PartsThatDontMakeAWholeAreRefused) {
 TEST_F(StudyFiles, ManyThreadsMakeTheFilesOfOne) {
   run_study(study, {}, {}, folder / "one", "x", 1);
   run_study(study, {}, {}, folder / "four", "x", 4);
-  EXPECT_EQ(content(folder / "one/thirds.csv"), content(folder / "four/thirds.csv"));
+  EXPECT_EQ(tests::text_of(folder / "one/thirds.csv"), tests::text_of(folder / "four/thirds.csv"));
 }
 
 TEST(Shard, IsAPartOfAWhole) {
