@@ -14,6 +14,12 @@ namespace {
 
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 constexpr std::uint32_t kLeaf = 4;  // faces per leaf
+constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
+
+float rounded_down(double x) noexcept {
+  const auto f = static_cast<float>(x);
+  return f > x ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
+}
 
 #ifdef __SIZEOF_FLOAT128__
 __extension__ using Wide = __float128;
@@ -43,6 +49,14 @@ Vec3 normal_of(const Vec3& a, const Vec3& b, const Vec3& c, double& thin) {
 
 }  // namespace
 
+TriangleMesh::Around::Around(const Vec3& point) noexcept {
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double at = point[static_cast<Eigen::Index>(k)];
+    const float up = -rounded_down(-at), down = -rounded_down(at);
+    x[k] = {up, up, down, down};
+  }
+}
+
 TriangleMesh::TriangleMesh(TriangleSoup soup) {
   if (soup.triangles.empty()) throw std::invalid_argument("a mesh needs at least one triangle");
   if (soup.vertices.size() >= std::numeric_limits<std::uint32_t>::max() / 8 || soup.triangles.size() >= (1u << 29)) {
@@ -67,9 +81,9 @@ TriangleMesh::TriangleMesh(TriangleSoup soup) {
   }
   weld(soup);
   if (triangles_.empty()) throw std::invalid_argument("none of the triangles has an area");
+  build();
   make_faces();
   check_closed();
-  build();
 }
 
 // Vertices with the same coordinates become one, triangles without area go; vertices that nothing uses stay behind.
@@ -86,8 +100,7 @@ void TriangleMesh::weld(TriangleSoup& soup) {
     const bool same = i > 0 && given[sorted[i]] == given[sorted[i - 1]];
     becomes[sorted[i]] = same ? becomes[sorted[i - 1]] : sorted[i];
   }
-  constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
-  std::fill(place.begin(), place.end(), unused);
+  std::fill(place.begin(), place.end(), kUnused);
   for (auto triangle : soup.triangles) {
     for (std::uint32_t& index : triangle) index = becomes[index];
     const Vec3 &a = given[triangle[0]], &b = given[triangle[1]], &c = given[triangle[2]];
@@ -96,7 +109,7 @@ void TriangleMesh::weld(TriangleSoup& soup) {
       continue;
     }
     for (std::uint32_t& index : triangle) {
-      if (place[index] == unused) {
+      if (place[index] == kUnused) {
         place[index] = static_cast<std::uint32_t>(vertices_.size());
         vertices_.push_back(given[index]);
       }
@@ -112,10 +125,11 @@ void TriangleMesh::make_faces() {
   for (const auto& triangle : triangles_) {
     const Vec3 &a = vertices_[triangle[0]], &b = vertices_[triangle[1]], &c = vertices_[triangle[2]];
     double thin = 0.0;
-    Face face{a, normal_of<long double>(a, b, c, thin), 1.0};
+    Face face{a, normal_of<long double>(a, b, c, thin), 1.0, 0.0};
     // The cross product is wrong by 2⁻⁶³ of the sides' product: more than u of its length in a thin triangle.
     if (!(thin > 1e-2)) face.normal = normal_of<Wide>(a, b, c, thin);
     if (!(thin > 1e-15)) face.trust = std::numeric_limits<double>::infinity();
+    face.offset = face.normal.dot(face.corner);
     faces_.push_back(face);
     largest = std::max({largest, a.lpNorm<1>(), b.lpNorm<1>(), c.lpNorm<1>()});
     edges += (b - a).norm() + (c - b).norm() + (a - c).norm();
@@ -139,67 +153,109 @@ void TriangleMesh::check_closed() {
   closed_ = forth == back;
 }
 
+// Halves the triangles by the middles of their boxes along the longest side of those middles' box, until few are left;
+// then puts triangles and vertices in that order.
 void TriangleMesh::build() {
   const auto count = static_cast<std::uint32_t>(size());
-  order_.resize(count);
-  std::iota(order_.begin(), order_.end(), 0u);
-  std::vector<Vec3> middle(count);
-  for (std::uint32_t f = 0; f < count; ++f) middle[f] = (corner(f, 0) + corner(f, 1) + corner(f, 2)) / 3.0;
-  nodes_.reserve(2 * (count / (kLeaf / 2) + 1));
-  nodes_.emplace_back();
-  struct Part {
-    std::uint32_t node, begin, end;
+  struct Item {
+    std::array<float, 3> low, high, middle;
+    std::uint32_t triangle;
   };
-  std::vector<Part> parts{{0, 0, count}};
+  std::vector<Item> items(count);
+  bounds_ = {corner(0, 0), corner(0, 0)};
+  for (std::uint32_t t = 0; t < count; ++t) {
+    const Vec3 low = corner(t, 0).cwiseMin(corner(t, 1)).cwiseMin(corner(t, 2));
+    const Vec3 high = corner(t, 0).cwiseMax(corner(t, 1)).cwiseMax(corner(t, 2));
+    bounds_ = {bounds_.low.cwiseMin(low), bounds_.high.cwiseMax(high)};
+    Item& item = items[t];
+    item.triangle = t;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      item.low[i] = rounded_down(low[k]);
+      item.high[i] = -rounded_down(-high[k]);
+      item.middle[i] = 0.5f * (item.low[i] + item.high[i]);
+    }
+  }
+  struct Part {
+    std::uint32_t begin, end, pair, of;  // `of`: which of the pair it is
+  };
+  nodes_.reserve(count / (kLeaf / 2) + 2);
+  nodes_.emplace_back();
+  // The root is alone in its pair; the other one is nowhere.
+  constexpr float nowhere = std::numeric_limits<float>::infinity();
+  for (auto& axis : nodes_[0].box) axis << 0.0f, nowhere, 0.0f, -nowhere;
+  std::vector<Part> parts{{0, count, 0, 0}};
   while (!parts.empty()) {
     const Part part = parts.back();
     parts.pop_back();
-    Node node;
-    node.low = node.high = corner(order_[part.begin], 0);
-    Vec3 low = middle[order_[part.begin]], high = low;
+    NodePair& pair = nodes_[part.pair];
+    std::array<float, 3> box_low = items[part.begin].low, box_high = items[part.begin].high;
+    std::array<float, 3> low = items[part.begin].middle, high = low;
     for (std::uint32_t i = part.begin; i < part.end; ++i) {
       for (std::size_t k = 0; k < 3; ++k) {
-        node.low = node.low.cwiseMin(corner(order_[i], k));
-        node.high = node.high.cwiseMax(corner(order_[i], k));
+        box_low[k] = std::min(box_low[k], items[i].low[k]);
+        box_high[k] = std::max(box_high[k], items[i].high[k]);
+        low[k] = std::min(low[k], items[i].middle[k]);
+        high[k] = std::max(high[k], items[i].middle[k]);
       }
-      low = low.cwiseMin(middle[order_[i]]);
-      high = high.cwiseMax(middle[order_[i]]);
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      pair.box[k][static_cast<Eigen::Index>(part.of)] = box_low[k];
+      pair.box[k][static_cast<Eigen::Index>(part.of) + 2] = -box_high[k];
     }
     if (part.end - part.begin <= kLeaf) {
-      node.first = part.begin;
-      node.count = part.end - part.begin;
+      pair.first[part.of] = part.begin;
+      pair.count[part.of] = part.end - part.begin;
     } else {
-      Eigen::Index axis = 0;
-      (high - low).maxCoeff(&axis);
+      std::size_t axis = 0;
+      for (std::size_t k = 1; k < 3; ++k) axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
       const std::uint32_t half = part.begin + (part.end - part.begin) / 2;
-      const auto at = [this](std::uint32_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
-      std::nth_element(at(part.begin), at(half), at(part.end), [&middle, axis](std::uint32_t a, std::uint32_t b) {
-        return middle[a][axis] < middle[b][axis] || (middle[a][axis] == middle[b][axis] && a < b);
+      const auto at = [&items](std::uint32_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
+      std::nth_element(at(part.begin), at(half), at(part.end), [axis](const Item& a, const Item& b) {
+        return a.middle[axis] < b.middle[axis] || (a.middle[axis] == b.middle[axis] && a.triangle < b.triangle);
       });
-      node.first = static_cast<std::uint32_t>(nodes_.size());
+      const auto within = static_cast<std::uint32_t>(nodes_.size());
+      pair.first[part.of] = within;
       nodes_.emplace_back();
-      nodes_.emplace_back();
-      parts.push_back({node.first + 1, half, part.end});
-      parts.push_back({node.first, part.begin, half});
+      parts.push_back({half, part.end, within, 1});
+      parts.push_back({part.begin, half, within, 0});
     }
-    nodes_[part.node] = node;
   }
+
+  std::vector<std::array<std::uint32_t, 3>> triangles(count);
+  for (std::uint32_t t = 0; t < count; ++t) triangles[t] = triangles_[items[t].triangle];
+  triangles_ = std::move(triangles);
+  std::vector<Vec3> vertices;
+  vertices.reserve(vertices_.size());
+  std::vector<std::uint32_t> place(vertices_.size(), kUnused);
+  for (auto& triangle : triangles_) {
+    for (std::uint32_t& index : triangle) {
+      if (place[index] == kUnused) {
+        place[index] = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(vertices_[index]);
+      }
+      index = place[index];
+    }
+  }
+  vertices_ = std::move(vertices);
+}
+
+int TriangleMesh::side_exactly(std::uint32_t f, const Vec3& x) const noexcept {
+  return orientation(corner(f, 0), corner(f, 1), corner(f, 2), x);
 }
 
 int TriangleMesh::side(std::uint32_t f, const Vec3& x) const noexcept {
   const double h = height(faces_[f], x), d = doubt(faces_[f], x.lpNorm<1>());
-  if (h > d) return 1;
-  if (h < -d) return -1;
-  return orientation(corner(f, 0), corner(f, 1), corner(f, 2), x);
+  return h > d ? 1 : h < -d ? -1 : side_exactly(f, x);
 }
 
 bool TriangleMesh::touched_by(std::uint32_t f, const Vec3& x, const Vec3& y) const noexcept {
   return segment_touches_triangle(x, y, corner(f, 0), corner(f, 1), corner(f, 2));
 }
 
-void TriangleMesh::test_exactly(std::uint32_t f, double h_x, double h_y, const Vec3& x, const Vec3& y,
-                                Hit& hit) const noexcept {
-  if (!touched_by(f, x, y)) return;
+void TriangleMesh::test_exactly(std::uint32_t f, int side_x, int side_y, double h_x, double h_y, const Vec3& x,
+                                const Vec3& y, Hit& hit) const noexcept {
+  if (!segment_touches_triangle(x, y, side_x, side_y, corner(f, 0), corner(f, 1), corner(f, 2))) return;
   const double fall = h_x - h_y;
   const double share = fall != 0.0 ? h_x / fall : 0.0;
   hit.consider(f, share > 0.0 ? std::min(share, 1.0) : 0.0);
@@ -213,18 +269,13 @@ void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit)
   const Vec3 d = y - x;
   const Vec3 one_over(1.0 / d.x(), 1.0 / d.y(), 1.0 / d.z());
   const double margin = 16.0 * u * (x.lpNorm<1>() + y.lpNorm<1>());
-  std::uint32_t stack[kDepth];
-  int top = 0;
-  stack[top++] = 0;
-  while (top > 0) {
-    const Node& node = nodes_[stack[--top]];
+  const auto passes = [&](const NodePair& pair, std::size_t of) {
     double enter = 0.0, leave = 1.0;
-    bool apart = false;
     for (Eigen::Index k = 0; k < 3; ++k) {
-      const double low = node.low[k] - margin - x[k], high = node.high[k] + margin - x[k];
+      const double low = pair.low(of, k) - margin - x[k], high = pair.high(of, k) + margin - x[k];
       if (std::abs(d[k]) <= margin) {
         // Along this axis it stays where it is, within the margin.
-        apart = apart || low > margin || high < -margin;
+        if (low > margin || high < -margin) return false;
         continue;
       }
       const double a = low * one_over[k], b = high * one_over[k];
@@ -232,12 +283,17 @@ void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit)
       leave = std::min(leave, std::max(a, b));
     }
     constexpr double slack = 1e-14;  // two roundings of shares of about one, many times over
-    if (apart || enter > leave + slack || enter > share() + slack) continue;
-    if (node.count > 0) {
-      for (std::uint32_t k = 0; k < node.count; ++k) visit(order_[node.first + k]);
-    } else {
-      stack[top++] = node.first;
-      stack[top++] = node.first + 1;
+    return !(enter > leave + slack || enter > share() + slack);
+  };
+  std::uint32_t stack[kDepth];
+  int top = 0;
+  stack[top++] = 0;
+  while (top > 0) {
+    const NodePair& pair = nodes_[stack[--top]];
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (!passes(pair, k)) continue;
+      if (pair.count[k] == 0) stack[top++] = pair.first[k];
+      for (std::uint32_t f = pair.first[k]; f < pair.first[k] + pair.count[k]; ++f) visit(f);
     }
   }
 }
@@ -288,38 +344,37 @@ double TriangleMesh::face_distance2(std::uint32_t f, const Vec3& x) const noexce
   return h * h;
 }
 
-double TriangleMesh::distance(const Vec3& x, double most, std::uint32_t& near) const noexcept {
-  double least = most * most;
-  const double first = face_distance2(near, x);
-  least = std::min(least, first);
+double TriangleMesh::distance_at_least(const Vec3& x, double most, std::uint32_t& near, double share) const noexcept {
+  const double share2 = share * share;
+  const Around around(x);
+  double least = std::min(most * most, face_distance2(near, x));
   struct Waiting {
-    std::uint32_t node;
+    std::uint32_t pair;
     double distance2;
   };
   Waiting stack[kDepth];
   int top = 0;
-  stack[top++] = {0, nodes_[0].distance2(x)};
+  stack[top++] = {0, 0.0};
   while (top > 0) {
     const Waiting waiting = stack[--top];
-    if (!(waiting.distance2 < least)) continue;
-    const Node& node = nodes_[waiting.node];
-    if (node.count > 0) {
-      for (std::uint32_t k = 0; k < node.count; ++k) {
-        const double d2 = face_distance2(order_[node.first + k], x);
-        if (d2 < least) {
-          least = d2;
-          near = order_[node.first + k];
+    if (!(waiting.distance2 < share2 * least)) continue;
+    const NodePair& pair = nodes_[waiting.pair];
+    const std::array<double, 2> d2 = pair.distance2(around);
+    const std::size_t nearer = d2[1] < d2[0] ? 1 : 0;
+    // The nearer of two inner nodes is looked at next; faces at once.
+    for (const std::size_t k : {1 - nearer, nearer}) {
+      if (!(d2[k] < share2 * least)) continue;
+      if (pair.count[k] == 0) stack[top++] = {pair.first[k], d2[k]};
+      for (std::uint32_t f = pair.first[k]; f < pair.first[k] + pair.count[k]; ++f) {
+        const double face2 = face_distance2(f, x);
+        if (face2 < least) {
+          least = face2;
+          near = f;
         }
       }
-      continue;
     }
-    const Waiting a{node.first, nodes_[node.first].distance2(x)};
-    const Waiting b{node.first + 1, nodes_[node.first + 1].distance2(x)};
-    const bool a_first = a.distance2 < b.distance2;
-    if ((a_first ? b : a).distance2 < least) stack[top++] = a_first ? b : a;
-    if ((a_first ? a : b).distance2 < least) stack[top++] = a_first ? a : b;
   }
-  return std::sqrt(least);
+  return share * std::sqrt(least);
 }
 
 double TriangleMesh::winding(const Vec3& x) const noexcept {

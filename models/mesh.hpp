@@ -5,6 +5,7 @@
 // a mesh may be open, closed or a soup; how faces are connected is not needed: who is where follows from coordinates.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -23,16 +24,18 @@ struct TriangleSoup {
 
 class TriangleMesh {
  public:
-  // What is known of a face without looking at its vertices.
-  struct Face {
+  // What is known of a face without looking at its vertices. A cache line.
+  struct alignas(64) Face {
     Vec3 corner;         // its first vertex
     Vec3 normal;         // unit within 2u, out of its front
     double trust = 1.0;  // 1; infinite for a triangle so thin that its normal can't be computed to that
+    double offset;       // normalᵀ corner, rounded; for first looks
   };
 
   // Vertices with the same coordinates become one; triangles without an area are left out (as sets of points they are
-  // part of their neighbours' sides). Throws std::invalid_argument: no triangle (left), an index out of range, a
-  // coordinate that isn't finite or beyond 1e9 m.
+  // part of their neighbours' sides). The others are put in the order of a tree of boxes, so that what is near in space
+  // is near in memory. Throws std::invalid_argument: no triangle (left), an index out of range, a coordinate that isn't
+  // finite or beyond 1e9 m.
   explicit TriangleMesh(TriangleSoup soup);
 
   [[nodiscard]] std::size_t size() const noexcept { return triangles_.size(); }
@@ -45,7 +48,7 @@ class TriangleMesh {
   }
   [[nodiscard]] const Face& face(std::uint32_t face) const noexcept { return faces_[face]; }
 
-  [[nodiscard]] Bounds bounds() const noexcept { return {nodes_[0].low, nodes_[0].high}; }
+  [[nodiscard]] Bounds bounds() const noexcept { return bounds_; }
   [[nodiscard]] double mean_edge_m() const noexcept { return mean_edge_; }
   [[nodiscard]] std::size_t dropped_triangles() const noexcept { return dropped_; }
   [[nodiscard]] bool closed() const noexcept { return closed_; }  // each edge has one face on either side
@@ -88,34 +91,40 @@ class TriangleMesh {
             Hit& hit) const noexcept {
     const double h_x = height(face, x), h_y = height(face, y);
     const double d_x = doubt(face, size_x), d_y = doubt(face, size_y);
-    if ((h_x > d_x && h_y > d_y) || (h_x < -d_x && h_y < -d_y)) return;
-    test_exactly(index, h_x, h_y, x, y, hit);
+    const int side_x = h_x > d_x ? 1 : h_x < -d_x ? -1 : side_exactly(index, x);
+    const int side_y = h_y > d_y ? 1 : h_y < -d_y ? -1 : side_exactly(index, y);
+    if (side_x * side_y <= 0) test_exactly(index, side_x, side_y, h_x, h_y, x, y, hit);
   }
 
-  // Calls visit(face) for each face whose box comes within `radius` of x; stops when it returns false.
+  // Calls visit(face) for each face whose box comes within `radius` (finite) of x; stops when it returns false.
   template <typename Visit>
   void within(const Vec3& x, double radius, Visit visit) const noexcept {
+    const double r2 = radius * radius;
+    const Around around(x);
     std::uint32_t stack[kDepth];
     int top = 0;
     stack[top++] = 0;
-    const double r2 = radius * radius;
     while (top > 0) {
-      const Node& node = nodes_[stack[--top]];
-      if (!(node.distance2(x) <= r2)) continue;
-      if (node.count > 0) {
-        for (std::uint32_t k = 0; k < node.count; ++k) {
-          if (!visit(order_[node.first + k])) return;
+      const NodePair& pair = nodes_[stack[--top]];
+      const std::array<double, 2> d2 = pair.distance2(around);
+      for (std::size_t k = 0; k < 2; ++k) {
+        if (!(d2[k] <= r2)) continue;
+        if (pair.count[k] == 0) stack[top++] = pair.first[k];
+        for (std::uint32_t f = pair.first[k]; f < pair.first[k] + pair.count[k]; ++f) {
+          if (!visit(f)) return;
         }
-      } else {
-        stack[top++] = node.first;
-        stack[top++] = node.first + 1;
       }
     }
   }
 
   // Distance from x to the nearest face, or `most` if none is nearer. `near` is where to look first (any face), and
   // becomes the nearest.
-  [[nodiscard]] double distance(const Vec3& x, double most, std::uint32_t& near) const noexcept;
+  [[nodiscard]] double distance(const Vec3& x, double most, std::uint32_t& near) const noexcept {
+    return distance_at_least(x, most, near, 1.0);
+  }
+  // No more than that distance and no less than `share` of it: found by looking at far fewer faces. `near` becomes one
+  // of those that are no farther than that.
+  [[nodiscard]] double distance_at_least(const Vec3& x, double most, std::uint32_t& near, double share) const noexcept;
 
   // Whether x is inside a closed mesh.
   [[nodiscard]] bool encloses(const Vec3& x) const noexcept;
@@ -125,12 +134,31 @@ class TriangleMesh {
   [[nodiscard]] double winding(const Vec3& x) const noexcept;
 
  private:
-  struct Node {
-    Vec3 low, high;
-    std::uint32_t first = 0;  // of its faces in order_, or the first of its two nodes
-    std::uint32_t count = 0;  // faces; 0: an inner node
-    [[nodiscard]] double distance2(const Vec3& x) const noexcept {
-      return (low - x).cwiseMax(x - high).cwiseMax(0.0).squaredNorm();
+  // A point between floats, so that distances from it are rounded down.
+  struct Around {
+    std::array<Eigen::Array4f, 3> x;  // {up, up, −down, −down}
+    explicit Around(const Vec3& point) noexcept;
+  };
+  // Two nodes of the tree of boxes, in a cache line. Boxes are rounded outwards.
+  struct alignas(64) NodePair {
+    std::array<Eigen::Array4f, 3> box;     // by axis: the lows of both, and −1 times their highs
+    std::array<std::uint32_t, 2> first{};  // face, or the pair of nodes within it
+    std::array<std::uint32_t, 2> count{};  // faces; 0: an inner node
+    [[nodiscard]] double low(std::size_t k, Eigen::Index axis) const noexcept {
+      return box[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(k)];
+    }
+    [[nodiscard]] double high(std::size_t k, Eigen::Index axis) const noexcept {
+      return -box[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(k + 2)];
+    }
+    // Of a point from both boxes, squared: no more than it is, and less by a millionth and rounding of x to float.
+    [[nodiscard, gnu::always_inline]] inline std::array<double, 2> distance2(const Around& point) const noexcept {
+      Eigen::Array4f sum = Eigen::Array4f::Zero();
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Eigen::Array4f out = (box[axis] - point.x[axis]).max(0.0f);
+        sum += out * out;  // at most one of low and high counts
+      }
+      sum *= 1.0f - 1e-6f;
+      return {sum[0] + sum[2], sum[1] + sum[3]};
     }
   };
   static constexpr int kDepth = 64;  // halving by number of faces: 33 levels at most, one node of each waits
@@ -138,17 +166,19 @@ class TriangleMesh {
   template <typename Share, typename Visit>
   void along(const Vec3& x, const Vec3& y, Share share, Visit visit) const noexcept;
   void weld(TriangleSoup& soup);
+  void build();
   void make_faces();
   void check_closed();
-  void build();
   [[nodiscard]] double face_distance2(std::uint32_t face, const Vec3& x) const noexcept;
-  void test_exactly(std::uint32_t index, double h_x, double h_y, const Vec3& x, const Vec3& y, Hit& hit) const noexcept;
+  [[nodiscard]] int side_exactly(std::uint32_t face, const Vec3& x) const noexcept;
+  void test_exactly(std::uint32_t index, int side_x, int side_y, double h_x, double h_y, const Vec3& x, const Vec3& y,
+                    Hit& hit) const noexcept;
 
   std::vector<Vec3> vertices_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   std::vector<Face> faces_;
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> order_;
+  std::vector<NodePair> nodes_;
+  Bounds bounds_;
   double mean_edge_ = 0.0, lift_ = 0.0;
   std::size_t dropped_ = 0;
   bool closed_ = false;

@@ -140,9 +140,13 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
 }
 
 bool segment_touches_triangle(const Vec3& x, const Vec3& y, const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
-  const int from = orientation(a, b, c, x), to = orientation(a, b, c, y);
-  if (from == 0 && to == 0) return touches_in_plane(x, y, {a, b, c});
-  if (from == to) return false;
+  return segment_touches_triangle(x, y, orientation(a, b, c, x), orientation(a, b, c, y), a, b, c);
+}
+
+bool segment_touches_triangle(const Vec3& x, const Vec3& y, int side_x, int side_y, const Vec3& a, const Vec3& b,
+                              const Vec3& c) noexcept {
+  if (side_x == 0 && side_y == 0) return touches_in_plane(x, y, {a, b, c});
+  if (side_x == side_y) return false;
   const int ab = orientation(x, y, a, b), bc = orientation(x, y, b, c);
   if (ab * bc < 0) return false;
   const int ca = orientation(x, y, c, a);

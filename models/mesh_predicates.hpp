@@ -21,5 +21,8 @@ bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
 
 // True if the closed segment from x to y has a point in common with the closed triangle (not a collinear one).
 bool segment_touches_triangle(const Vec3& x, const Vec3& y, const Vec3& a, const Vec3& b, const Vec3& c) noexcept;
+// The same where the sides of x and y, orientation(a, b, c, ·), are known.
+bool segment_touches_triangle(const Vec3& x, const Vec3& y, int side_x, int side_y, const Vec3& a, const Vec3& b,
+                              const Vec3& c) noexcept;
 
 }  // namespace proxarm::models

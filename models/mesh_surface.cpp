@@ -4,16 +4,16 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "models/friction_plane.hpp"
 #include "models/mesh_walk.hpp"
 
 namespace proxarm::models {
 
 MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction)
-    : mesh_(std::move(mesh)), mu_(friction) {
+    : mesh_(std::move(mesh)), mu_(friction), lift_(mesh_->lift_m()) {
   if (!std::isfinite(friction) || !(friction >= 0.0)) {
     throw std::invalid_argument("a friction coefficient must be finite and not negative");
   }
-  near_.reserve(kNear);
 }
 
 bool MeshSurface::is_clear(const Vec3& p, const Vec3& q) const noexcept {
@@ -23,32 +23,54 @@ bool MeshSurface::is_clear(const Vec3& p, const Vec3& q) const noexcept {
 
 void MeshSurface::find_clearance(const Vec3& q) noexcept {
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-  const double distance = mesh_->distance(q, std::numeric_limits<double>::infinity(), nearest_face_);
+  // Half of the way is clear at little cost; all of it takes a look at every face that is about as near.
+  const double distance = mesh_->distance_at_least(q, std::numeric_limits<double>::infinity(), nearest_face_, 0.5);
   // What rounding may add to a distance: a few u of the coordinates, which the lift (64 u S) exceeds on the mesh's
   // part; two lifts more, so that whoever is clear doesn't touch either.
   clearance_ = distance * (1.0 - 16.0 * u) - 3.0 * mesh_->lift_m() - 16.0 * u * q.lpNorm<1>();
   clear_at_ = q;
 }
 
+void MeshSurface::Near::add(std::uint32_t index, const TriangleMesh::Face& of) noexcept {
+  const auto i = static_cast<Eigen::Index>(count);
+  const double trusted = of.trust > 1.0 ? 0.0 : 1.0;
+  x[i] = trusted * of.normal.x();
+  y[i] = trusted * of.normal.y();
+  z[i] = trusted * of.normal.z();
+  offset[i] = trusted * of.offset;
+  face[count++] = index;
+}
+
+void MeshSurface::Near::finish() noexcept {
+  for (std::size_t i = count; i % kTogether != 0; ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    x[k] = y[k] = z[k] = 0.0;
+    offset[k] = 1e30;
+  }
+}
+
 bool MeshSurface::has_near(const Vec3& x) const noexcept {
   return near_radius_ > 0.0 && (x - near_centre_).squaredNorm() < near_radius_ * near_radius_;
 }
 
-// Gathers the faces around x, out to `reach` if they aren't too many. A little further than asked for, because a face
-// counts as touched, and a way as tested, within a few lifts.
-void MeshSurface::come_near(const Vec3& x, double reach) noexcept {
-  const double margin = 64.0 * mesh_->lift_m();
+// Gathers the faces around a way that begins at x and has gone, or will go, by `move`; farther ahead than behind, and
+// no fewer than that way needs, unless they are too many. A little further than asked for, because a face counts as
+// touched, and a way as tested, within a few lifts.
+void MeshSurface::come_near(const Vec3& x, const Vec3& move) noexcept {
+  const double margin = 64.0 * lift_, reach = 1.001 * move.norm();
   double radius = std::max(4.0 * reach, 0.5 * mesh_->mean_edge_m());
   for (int tries = 0; tries < 3 && radius >= reach; ++tries, radius *= 0.4) {
-    near_.clear();
+    const Vec3 centre = reach > 0.0 ? Vec3(x + (0.5 * radius / reach) * move) : x;
+    near_.count = 0;
     bool full = false;
-    mesh_->within(x, radius + margin, [&](std::uint32_t f) {
-      full = near_.size() == kNear;
-      if (!full) near_.push_back({f, mesh_->face(f)});
+    mesh_->within(centre, radius + margin, [&](std::uint32_t f) {
+      full = near_.count == kNear;
+      if (!full) near_.add(f, mesh_->face(f));
       return !full;
     });
     if (full) continue;
-    near_centre_ = x;
+    near_.finish();
+    near_centre_ = centre;
     near_radius_ = radius;
     return;
   }
@@ -57,22 +79,71 @@ void MeshSurface::come_near(const Vec3& x, double reach) noexcept {
 
 TriangleMesh::Hit MeshSurface::first_hit(const Vec3& x, const Vec3& y) noexcept {
   if (!has_near(x) || !has_near(y)) {
-    const double reach = (y - x).norm();
-    if (!(reach < 4.0 * mesh_->mean_edge_m())) return mesh_->first_hit(x, y);
-    come_near(x, reach * 1.001);
+    const Vec3 move = y - x;
+    if (!(move.norm() < 4.0 * mesh_->mean_edge_m())) return mesh_->first_hit(x, y);
+    come_near(x, move);
     if (!has_near(x) || !has_near(y)) return mesh_->first_hit(x, y);
   }
   TriangleMesh::Hit hit;
   const double size_x = x.lpNorm<1>(), size_y = y.lpNorm<1>();
-  for (const Near& near : near_) mesh_->test(near.index, near.face, x, y, size_x, size_y, hit);
+  maybe_between(x, y, 0.0, [&](std::uint32_t f) { mesh_->test(f, mesh_->face(f), x, y, size_x, size_y, hit); });
   return hit;
+}
+
+void MeshSurface::keep_side(const Contact<3>& contact) noexcept {
+  const auto index = static_cast<std::uint32_t>(contact.feature);
+  const TriangleMesh::Face& face = mesh_->face(index);
+  const int side = contact.normal == face.normal ? 1 : -1;
+  if (index == held_.face && side == held_.side) return;
+  held_.face = index;
+  held_.side = side;
+  held_.surface = FlatSurface<3>::of_unit(face.corner + lift_ * contact.normal, contact.normal);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& a = mesh_->corner(index, k);
+    held_.out[k] = (mesh_->corner(index, (k + 1) % 3) - a).cross(face.normal).normalized();
+    held_.rim[k] = held_.out[k].dot(a);
+  }
+}
+
+// The usual step: the face that holds the proxy goes on to do so alone. True only where the walk is certain to find the
+// same, bit for bit: the way to p is blocked by that face, the step on it stays within its sides, and no other face is
+// touched or crossed; each by more than rounding, else the walk decides.
+bool MeshSurface::glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept {
+  if (held_.side == 0 || !has_near(q)) return false;
+  const TriangleMesh::Face& face = mesh_->face(held_.face);
+  const FaceStep<3> step = step_on_face(held_.surface, mu_, p, q);
+  if (!step.touches || !has_near(step.r)) return false;
+  const double from = held_.side * TriangleMesh::height(face, q), to = held_.side * TriangleMesh::height(face, p);
+  const double end = held_.side * TriangleMesh::height(face, step.r);
+  if (!(from > 0.5 * lift_ && from < 2.0 * lift_ && end > 0.5 * lift_ && to < -lift_)) return false;
+  // The way to p passes the face's plane before `through` of it.
+  const double through = 2.0 * from / (from - to);
+  const double inside = -lift_ - 1e-15 * (q.lpNorm<1>() + step.r.lpNorm<1>() + through * p.lpNorm<1>());
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& out = held_.out[k];
+    const double past_q = out.dot(q) - held_.rim[k], past_p = out.dot(p) - held_.rim[k];
+    const double past_r = out.dot(step.r) - held_.rim[k];
+    if (!(past_q < inside && past_r < inside && past_q + through * (past_p - past_q) < inside)) return false;
+  }
+  bool alone = true;
+  maybe_between(q, step.r, 6.0 * lift_, [&](std::uint32_t f) { alone = alone && f == held_.face; });
+  if (!alone) return false;
+  count_ = 1;
+  contacts_[0] = {0, static_cast<std::int32_t>(held_.face), step.slips, held_.surface.normal()};
+  last_move_ = step.r - q;
+  r = step.r;
+  return true;
 }
 
 Vec3 MeshSurface::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept {
   count_ = 0;
   if (is_clear(p, q)) return p;
+  Vec3 r;
+  if (glides(p, q, r)) return r;
   Walk walk(*this, p, q);
-  return walk.run();
+  r = walk.run();
+  if (count_ == 1) keep_side(contacts_[0]);
+  return r;
 }
 
 }  // namespace proxarm::models

@@ -53,8 +53,10 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   [[nodiscard]] bool is_clear(const Vec3& p, const Vec3& q) const noexcept;
   void find_clearance(const Vec3& q) noexcept;
   [[nodiscard]] bool has_near(const Vec3& x) const noexcept;
-  void come_near(const Vec3& x, double reach) noexcept;
+  void come_near(const Vec3& x, const Vec3& move) noexcept;
   [[nodiscard]] TriangleMesh::Hit first_hit(const Vec3& x, const Vec3& y) noexcept;
+  void keep_side(const Contact<3>& contact) noexcept;
+  [[nodiscard]] bool glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept;
 
   std::shared_ptr<const TriangleMesh> mesh_;
   double mu_;
@@ -63,16 +65,38 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
 
-  // All faces that come within near_radius_ of near_centre_: asked for again when a way leaves that ball.
+  // All faces that come within near_radius_ of near_centre_: asked for again when a way leaves that ball. By columns,
+  // because each step looks at all of them.
+  static constexpr std::size_t kNear = 96, kTogether = 4;
   struct Near {
-    std::uint32_t index;
-    TriangleMesh::Face face;
+    using Column = Eigen::Array<double, kNear, 1>;
+    Column x, y, z, offset;  // of normals; zeros where a normal can't be trusted
+    std::array<std::uint32_t, kNear> face;
+    std::size_t count = 0;
+
+    void add(std::uint32_t index, const TriangleMesh::Face& face) noexcept;
+    // Fills up to a multiple of kTogether with planes that nothing is close to.
+    void finish() noexcept;
   };
-  static constexpr std::size_t kNear = 96;
-  std::vector<Near> near_;
+  // Calls visit(face) for each near face whose plane is not proven to have both points on one side, farther away than
+  // `margin` and what rounding explains.
+  template <typename Visit>
+  void maybe_between(const Vec3& x, const Vec3& y, double margin, Visit visit) const noexcept;
+
+  Near near_;
   Vec3 near_centre_ = Vec3::Zero();
   double near_radius_ = -1.0;
-  double last_move_ = 0.0;
+  Vec3 last_move_ = Vec3::Zero();
+
+  // The face that held the proxy alone in the last step with contact, and from which side.
+  struct Held {
+    std::uint32_t face = 0;
+    int side = 0;  // 0: there is none
+    FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
+    std::array<Vec3, 3> out;    // of its sides: unit, in its plane
+    std::array<double, 3> rim;  // outᵀ corner
+  };
+  Held held_;
 
   // No face is closer than clearance_ to clear_at_.
   Vec3 clear_at_ = Vec3::Zero();

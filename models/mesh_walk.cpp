@@ -66,7 +66,7 @@ Vec3 MeshSurface::Walk::run() noexcept {
     if (went == Went::nowhere) went = try_triples();
   }
   if (went != Went::arrived) hold();
-  s.last_move_ = (c - start).norm();
+  s.last_move_ = c - start;
   return c;
 }
 
@@ -108,7 +108,7 @@ void MeshSurface::Walk::touch() noexcept {
   count = 0;
   if (!s.has_near(c) && !s.is_clear(c, c)) s.come_near(c, s.last_move_);
   if (s.has_near(c)) {
-    for (const Near& near : s.near_) touch(near.index, near.face);
+    s.maybe_between(c, c, (kAbove + 1.0) * lift, [this](std::uint32_t f) { touch(f, mesh.face(f)); });
   } else {
     mesh.within(c, 2.0 * kAround * lift, [this](std::uint32_t f) {
       touch(f, mesh.face(f));

@@ -1,7 +1,9 @@
 // One step of a MeshSurface on its way from q. Internal to models.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <limits>
 
 #include "models/mesh_surface.hpp"
 
@@ -65,5 +67,24 @@ struct MeshSurface::Walk {
   std::size_t count = 0;
   std::array<Side, kMost> touched;
 };
+
+// nᵀx − nᵀcorner is wrong by 9u of ‖x‖₁ and of ‖corner‖₁ (products and sums 4u each, the normal 2u, the offset 4u, less
+// than that in the norms' sense); 16u are taken, and the lift is 64u of the largest ‖corner‖₁.
+template <typename Visit>
+void MeshSurface::maybe_between(const Vec3& x, const Vec3& y, double margin, Visit visit) const noexcept {
+  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+  const double close = margin + 0.25 * lift_ + 16.0 * u * std::max(x.lpNorm<1>(), y.lpNorm<1>());
+  for (std::size_t i = 0; i < near_.count; i += kTogether) {
+    using Heights = Eigen::Array<double, kTogether, 1>;
+    const auto of = [i](const Near::Column& column) { return column.segment<kTogether>(static_cast<Eigen::Index>(i)); };
+    const Heights at_x = of(near_.x) * x.x() + of(near_.y) * x.y() + of(near_.z) * x.z() - of(near_.offset);
+    const Heights at_y = of(near_.x) * y.x() + of(near_.y) * y.y() + of(near_.z) * y.z() - of(near_.offset);
+    const Heights beside = at_x.min(at_y).max(-(at_x.max(at_y)));
+    if ((beside > close).all()) continue;
+    for (std::size_t k = 0; k < kTogether; ++k) {
+      if (!(beside[static_cast<Eigen::Index>(k)] > close)) visit(near_.face[i + k]);
+    }
+  }
+}
 
 }  // namespace proxarm::models
