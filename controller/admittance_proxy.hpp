@@ -28,11 +28,13 @@
 // for the cycle: they neither allocate, lock, throw nor print.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
+#include "fieldbus/state_archive.hpp"
 #include "models/geometric_algorithm.hpp"
 #include "models/geometry.hpp"
 
@@ -105,6 +107,12 @@ class AdmittanceProxy {
   // Order 2: how many steps were taken at first order (impacts, releases, stick and slip, restarts).
   [[nodiscard]] std::uint64_t first_order_steps() const noexcept { return first_order_steps_; }
 
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(config_.mass_kg, config_.damping_Ns_per_m, config_.spring_N_per_m, config_.period_s, q_k1_, q_k2_, v_k1_,
+          v_k2_, h_k1_, has_h_k1_, period_k1_s_, q_ref_, f_, p_hat_, kappa_, epoch_s_, steps_, contacts_,
+          euler_steps_left_, first_order_steps_);
+  }
+
  private:
   static constexpr std::size_t max_contacts = 8;
 
@@ -119,6 +127,12 @@ class AdmittanceProxy {
     bool overflow = false;  // more than fit: never equal to anything
     bool known = true;
     bool held = false;  // q = q(k−1) bit for bit although p̂ isn't: a 𝒢 that reports no contacts may stick all the same
+
+    void archive(fieldbus::StateArchive& state) noexcept {
+      for (Key& key : keys) state(key.object, key.feature, key.slips);
+      state(count, overflow, known, held);
+      count = std::min(count, max_contacts);
+    }
   };
 
   struct Trial {

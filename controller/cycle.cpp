@@ -58,6 +58,7 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
 }
 
 void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
+  begin_box(t_k_ns);
   begin_cycle(t_k_ns);
   receive_until(t_k_ns + receive_window_ns_);
   const SteadyTime begun = std::chrono::steady_clock::now();
@@ -67,6 +68,7 @@ void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
   send_targets(t_k_ns);
   compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
   write_record(t_k_ns);
+  finish_box();
   ++cycle_;
 }
 
@@ -107,6 +109,7 @@ void Cycle::receive_until(std::int64_t deadline_ns) noexcept {
 }
 
 void Cycle::deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexcept {
+  if (box_ != nullptr) box_->add({received.frame, received.time_ns, static_cast<std::uint8_t>(bus)});
   if (bus == parts_.sensor_bus && parts_.sensor->on_frame(received.frame, received.time_ns)) return;
   for (DriveOnBus& axis : parts_.drives) {
     if (axis.bus == bus && axis.drive.on_frame(received.frame, received.time_ns)) return;
@@ -157,7 +160,8 @@ void Cycle::measure() noexcept {
 }
 
 void Cycle::judge(std::int64_t t_k_ns) noexcept {
-  if (stop_requested_.load(std::memory_order_relaxed)) supervisor_.handle(Event::stop);
+  stop_seen_ = stop_requested_.load(std::memory_order_relaxed);
+  if (stop_seen_) supervisor_.handle(Event::stop);
   judge_buses();
   judge_drives();
   judge_sensor();
@@ -449,6 +453,7 @@ void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
 
 void Cycle::send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept {
   const fieldbus::SendResult result = parts_.network.bus(bus).send(frame);
+  if (box_ != nullptr) box_->add({frame, parts_.network.now_ns(), static_cast<std::uint8_t>(bus), true, result});
   if (result == fieldbus::SendResult::sent) return;
   if (result == fieldbus::SendResult::bus_off) {
     raise(Fault::bus_off, static_cast<std::int32_t>(bus));
@@ -484,6 +489,44 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   }
   record_.compute_ns = compute_ns_;
   records_.push(record_);
+}
+
+void Cycle::begin_box(std::int64_t t_k_ns) noexcept {
+  if (box_ == nullptr) return;
+  if (const std::span<std::byte> room = box_->state_room(); !room.empty()) {
+    fieldbus::StateArchive state = fieldbus::StateArchive::writer(room);
+    archive(state);
+    if (state.whole()) box_->finish_state(state.bytes());
+  }
+  boxed_ = &box_->begin(t_k_ns);
+}
+
+void Cycle::finish_box() noexcept {
+  if (box_ == nullptr) return;
+  boxed_->overruns_in_a_row = overruns_in_a_row_;
+  boxed_->stop_requested = stop_seen_;
+  for (std::size_t bus = 0; bus < std::min(max_buses, parts_.network.bus_count()); ++bus) {
+    const fieldbus::BusStatus& status = parts_.network.bus(bus).status();
+    boxed_->buses[bus] = {status.state, status.receive_overflows};
+  }
+  fieldbus::StateArchive inputs = fieldbus::StateArchive::writer(boxed_->inputs);
+  for (DriveOnBus& axis : parts_.drives) axis.drive.archive_input(inputs);
+  boxed_->input_bytes = static_cast<std::uint16_t>(inputs.bytes());
+  boxed_->rendered_cycles = rendered_cycles_;
+  boxed_->record = record_;
+  box_->finish();
+}
+
+void Cycle::archive(fieldbus::StateArchive& state) noexcept {
+  for (DriveOnBus& axis : parts_.drives) axis.drive.archive(state);
+  for (DriveBus& bus : parts_.drive_buses) state(bus.sync, bus.heartbeat);
+  parts_.sensor->archive(state);
+  parts_.world->archive(state);
+  state(parts_.elastic, parts_.orientation, parts_.compensation, supervisor_, entered_phase_, phase_since_ns_,
+        first_cycle_ns_, cycle_, rendered_cycles_, missed_samples_, reading_S_.force, reading_S_.torque, R_WS_,
+        hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, run_out_rad_per_s_,
+        measured_link_rad_, actual_rad_, actual_k1_rad_, guard_, run_out_scale_, run_out_per_cycle_);
+  if (state.reading()) parts_.arm->kinematics(link_rad_, solution_.kinematics);
 }
 
 }  // namespace proxarm::controller

@@ -19,6 +19,7 @@
 #include <memory>
 #include <vector>
 
+#include "controller/black_box.hpp"
 #include "controller/cycle_record.hpp"
 #include "controller/elastic_setpoint.hpp"
 #include "controller/joint_guard.hpp"
@@ -90,6 +91,11 @@ class Cycle {
   // The loop's owner: this many cycles in a row were late.
   void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
 
+  // Before the first cycle: what it is given and what it does is also written there.
+  void write_to(BlackBox& box) noexcept { box_ = &box; }
+  // All that a cycle leaves to the next one: with it and what the cycles are given, a replay gives the same setpoints.
+  void archive(fieldbus::StateArchive& state) noexcept;
+
   // After the last cycle: drives back to NMT pre-operational. Never fails.
   void shut_down() noexcept;
 
@@ -131,6 +137,8 @@ class Cycle {
   void send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept;
   void raise(Fault fault, std::int32_t where, double value = 0.0, double limit = 0.0) noexcept;
   void write_record(std::int64_t t_k_ns) noexcept;
+  void begin_box(std::int64_t t_k_ns) noexcept;
+  void finish_box() noexcept;
   void enter(Phase phase, std::int64_t t_k_ns) noexcept;
 
   CycleParts parts_;
@@ -148,6 +156,7 @@ class Cycle {
   std::uint32_t missed_samples_ = 0;
   std::uint32_t overruns_in_a_row_ = 0;
   std::atomic<bool> stop_requested_{false};
+  bool stop_seen_ = false;  // in this cycle
 
   bool sample_is_new_ = false;
   models::Wrench reading_S_;
@@ -172,6 +181,8 @@ class Cycle {
 
   std::int64_t compute_ns_ = 0;
   CycleRecord record_;
+  BlackBox* box_ = nullptr;
+  BoxCycle* boxed_ = nullptr;  // this cycle's entry
   SpscRing<CycleRecord> records_;
 };
 

@@ -17,6 +17,7 @@
 // Neither allocates, locks nor throws after construction.
 #pragma once
 
+#include "fieldbus/state_archive.hpp"
 #include "models/arm.hpp"
 
 namespace proxarm::controller {
@@ -39,6 +40,7 @@ class ElasticSetpoint {
   [[nodiscard]] const models::JointVector& link_rad_per_s() const noexcept { return speed_rad_per_s_; }
   // By how much the filter's input is ahead of it at a constant speed: 2/ω, in seconds; 0 without a filter.
   [[nodiscard]] double lead_s() const noexcept { return omega_rad_per_s_ > 0.0 ? 2.0 / omega_rad_per_s_ : 0.0; }
+  void archive(fieldbus::StateArchive& state) noexcept { state(angle_rad_, speed_rad_per_s_); }
 
  private:
   const models::Arm* arm_;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "controller/step_limits.hpp"
+#include "fieldbus/state_archive.hpp"
 #include "models/arm.hpp"
 #include "models/description/cell.hpp"
 
@@ -34,6 +35,7 @@ class JointGuard {
   // How far the setpoints are behind what was wanted: of the joint that is furthest.
   [[nodiscard]] double lag_rad() const noexcept { return (wanted_k1_rad_ - target_rad_).cwiseAbs().maxCoeff(); }
   [[nodiscard]] bool at_rest() const noexcept { return speed_rad_per_s_.cwiseAbs().maxCoeff() < 1e-9; }
+  void archive(fieldbus::StateArchive& state) noexcept { state(target_rad_, speed_rad_per_s_, wanted_k1_rad_); }
 
  private:
   struct Joint {

@@ -16,6 +16,7 @@
 #include <cstdint>
 
 #include "controller/admittance_proxy.hpp"
+#include "fieldbus/state_archive.hpp"
 #include "models/geometry.hpp"
 
 namespace proxarm::controller {
@@ -46,6 +47,7 @@ class OrientationProxy {
   [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }        // in the last step
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
   [[nodiscard]] const OrientationConfig& config() const noexcept { return config_; }
+  void archive(fieldbus::StateArchive& state) noexcept { state(R_WT_, R_start_, omega_W_); }
 
  private:
   OrientationConfig config_;

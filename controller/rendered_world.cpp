@@ -70,6 +70,8 @@ class WorldOfDimension final : public RenderedWorld {
     return last_;
   }
 
+  void archive(fieldbus::StateArchive& state) noexcept override { state(proxy_, start_W_, start_, last_.q_W); }
+
  private:
   // In three dimensions the coordinates are W's own where the scene keeps W's axes, and not even rounding comes in.
   Vec3 to_W(const Vec<N>& x) const noexcept {

@@ -13,6 +13,7 @@
 #include "controller/admittance_proxy.hpp"
 #include "controller/session_settings.hpp"
 #include "controller/step_limits.hpp"
+#include "fieldbus/state_archive.hpp"
 #include "models/geometry.hpp"
 #include "scenes/compile.hpp"
 
@@ -49,6 +50,7 @@ class RenderedWorld {
   // Goes on from near q_W, as near as the scene's objects let it, with this velocity: where the arm couldn't follow.
   // Returns where.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
+  virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 };
 
 // `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the

@@ -21,10 +21,22 @@ constexpr std::size_t buffer_bytes = 1 << 16;
 // All that a session's folder may hold: what a later session replaces.
 constexpr const char* file_names[] = {"signals.csv", "frames.log",  "effective.yaml", "effective.json", "summary.json",
                                       "timing.json", "plot.svg",    "plot.png",       "cell.yaml",      "scene.yaml",
-                                      "hand.yaml",   "sensor.yaml", "arm.urdf"};
+                                      "hand.yaml",   "sensor.yaml", "arm.urdf",       "reason.txt"};
 
 bool is_ours(std::string_view name) {
   return std::find(std::begin(file_names), std::end(file_names), name) != std::end(file_names);
+}
+
+// A session's replay, or its black box: folders with nothing else in them, and no links to such.
+bool is_our_folder(const fs::path& path) {
+  std::error_code error;
+  if (fs::symlink_status(path, error).type() != fs::file_type::directory) return false;
+  const bool replay = path.filename() == "replay";
+  if (!replay && path.filename() != "black-box") return false;
+  return std::all_of(fs::directory_iterator(path, error), {}, [&](const fs::directory_entry& entry) {
+    const fs::path name = entry.path().filename();
+    return replay ? name == "cycles.bin" || name == "files" : is_ours(name.string()) || is_our_folder(entry.path());
+  });
 }
 
 template <typename Number>
@@ -160,12 +172,13 @@ SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::stri
   if (error) fail("", error.message());
   for (fs::directory_iterator entry(folder_, error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (!is_ours(name)) {
+    if (!is_ours(name) && !is_our_folder(entry->path())) {
       fail("", "a folder that already holds " + description::in_quotes(name));
     }
   }
   if (error) fail("", error.message());
   for (const char* name : file_names) fs::remove(folder_ / name, error);
+  for (const char* name : {"replay", "black-box"}) fs::remove_all(folder_ / name, error);
   open(signals_, "signals.csv");
   open(frames_, "frames.log");
   signals_.buffer =

@@ -6,6 +6,7 @@
 //   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it
 //   effective.yaml   what the session ran with, every default filled in (and other configuration files by their names)
 //   summary.json     figures that are the same in two runs with the same input (repeatable_json())
+//   replay           what `proxarm replay` needs (replay_log.hpp)
 //   timing.json      those of the wall clock (timing_json()); overruns and compute time stand nowhere else
 //
 // Two runs with the same input give the same bytes in all but timing.json. Not for the cycle: it leaves records in a
@@ -37,7 +38,8 @@ class SessionWriter {
   // Time of the frame's last bit on the network's own clock (which is not the records' time: bring-up comes before the
   // first cycle), 0 or later.
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
-  // A file of configuration, as text: effective.yaml, or cell, scene, hand, sensor.yaml, arm.urdf as they were read.
+  // A file of configuration, as text: effective.yaml, or cell, scene, hand, sensor.yaml, arm.urdf as they were read;
+  // reason.txt: why there is a black box.
   void write_file(std::string_view name, std::string_view text);
   // summary.json and timing.json; closes all files. Throws description::SetupError where a file couldn't be written
   // whole (a full disk, say).

@@ -12,6 +12,7 @@
 #include <cstdint>
 
 #include "controller/fault.hpp"
+#include "fieldbus/state_archive.hpp"
 
 namespace proxarm::controller {
 
@@ -39,6 +40,9 @@ class Supervisor {
   void handle(Event event) noexcept;
   // Latches the first fault and handles Event::fault.
   void raise(const FaultReport& report) noexcept;
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(phase_, report_.fault, report_.where, report_.cycle, report_.value, report_.limit);
+  }
 
  private:
   Phase phase_ = Phase::idle;

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 
+#include "fieldbus/state_archive.hpp"
 #include "models/description/cell.hpp"
 #include "models/geometry.hpp"
 
@@ -33,6 +34,10 @@ class WrenchCompensation {
 
   // The hand's wrench about T's origin, in W.
   [[nodiscard]] models::Wrench hand_wrench_W(const models::Wrench& reading_S, const models::Mat3& R_WS) const noexcept;
+
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(bias_S_.force, bias_S_.torque, tare_sum_S_.force, tare_sum_S_.torque, tare_count_, tare_spread_N_);
+  }
 
  private:
   double mass_kg_;

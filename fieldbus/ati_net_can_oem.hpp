@@ -50,6 +50,10 @@ class AtiNetCanOem final : public ForceSensor {
   void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override;
   [[nodiscard]] bool taring() const noexcept override { return tare_wanted_ > 0; }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
+  void archive(StateArchive& state) noexcept override {
+    state(scaled_, bias_, known_wrench_S_, tare_wanted_, tare_taken_, tare_sum_, tare_known_S_, poll_ns_, polled_,
+          half_, half_status_, half_gauges_, gauges_, fresh_, latest_, incomplete_, dropped_, wrong_lengths_);
+  }
 
   // What was read at start, and what has been wrong since.
   [[nodiscard]] const std::array<std::array<double, 6>, 6>& matrix() const noexcept { return matrix_; }

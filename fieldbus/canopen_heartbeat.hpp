@@ -9,6 +9,7 @@
 
 #include "fieldbus/can_frame.hpp"
 #include "fieldbus/canopen_nmt.hpp"
+#include "fieldbus/state_archive.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -24,6 +25,7 @@ class HeartbeatProducer {
   [[nodiscard]] bool due(std::int64_t now_ns, std::uint64_t cycle, CanFrame& frame) noexcept;
   // The next due() is true again, for another try after a failed send.
   void resend() noexcept { ever_ = false; }
+  void archive(StateArchive& state) noexcept { state(next_ns_, last_cycle_, ever_); }
 
  private:
   std::uint8_t node_;
@@ -52,6 +54,7 @@ class HeartbeatConsumer {
     heard_ = true;
     last_ns_ = now_ns;
   }
+  void archive(StateArchive& state) noexcept { state(timeout_ns_, last_ns_, boot_ups_, state_, heard_); }
 
  private:
   std::uint8_t node_;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "fieldbus/can_frame.hpp"
+#include "fieldbus/state_archive.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -17,6 +18,7 @@ class SyncProducer {
   // `counter_overflow` as in 1019h: 0 means no counter, else 2..240.
   explicit SyncProducer(std::uint8_t counter_overflow = 0) noexcept : overflow_(counter_overflow) {}
   [[nodiscard]] CanFrame next() noexcept;
+  void archive(StateArchive& state) noexcept { state(counter_); }
 
  private:
   std::uint8_t overflow_;

@@ -111,6 +111,12 @@ class ServoDrive final : public CyclicDrive {
   // State, fault and latest EMCY in words; not for the cycle.
   [[nodiscard]] std::string describe() const override;
 
+  void archive(StateArchive& state) noexcept override {
+    state(heartbeat_, goal_, state_, fault_, statusword_, controlword_, actual_counts_, target_counts_, tpdo_time_ns_,
+          fault_time_ns_, boot_ups_at_start_, cycles_without_tpdo_, held_, held_pending_, cycling_, old_fault_, fresh_,
+          heard_, following_, emergency_, emergencies_, repeated_tpdos_);
+  }
+
  private:
   bool decode_tpdo(const CanFrame& frame, std::int64_t time_ns) noexcept;
   void judge_state(bool was_enabled, std::int64_t time_ns) noexcept;

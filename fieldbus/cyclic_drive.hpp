@@ -10,6 +10,7 @@
 
 #include "fieldbus/can_frame.hpp"
 #include "fieldbus/cia402_state.hpp"
+#include "fieldbus/state_archive.hpp"
 #include "models/description/cell.hpp"
 
 namespace proxarm::fieldbus {
@@ -57,6 +58,11 @@ class CyclicDrive {
   [[nodiscard]] virtual DriveFault fault() const noexcept = 0;  // the first one
   // State and fault in words; not for the cycle.
   [[nodiscard]] virtual std::string describe() const = 0;
+
+  // All that changes in a cycle.
+  virtual void archive(StateArchive& state) noexcept = 0;
+  // What came in at the last on_sync() by another way than a frame; read back, it comes in at the next one.
+  virtual void archive_input(StateArchive& /*state*/) noexcept {}
 
  protected:
   CyclicDrive() = default;

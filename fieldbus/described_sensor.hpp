@@ -53,6 +53,11 @@ class DescribedSensor final : public ForceSensor {
   void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override;
   [[nodiscard]] bool taring() const noexcept override { return tare_wanted_ > 0; }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
+  void archive(StateArchive& state) noexcept override {
+    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, values_, bias_,
+          latest_, known_wrench_S_, tare_known_S_, tare_wanted_, tare_taken_, tare_sum_, counts_);
+    if (next_ >= slots_.size()) next_ = 0;
+  }
 
   [[nodiscard]] const DescribedSensorCounts& counts() const noexcept { return counts_; }
 

@@ -18,6 +18,7 @@
 #include "fieldbus/can_frame.hpp"
 #include "fieldbus/can_network.hpp"
 #include "fieldbus/frame_pump.hpp"
+#include "fieldbus/state_archive.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -31,6 +32,8 @@ struct ForceSample {
   bool saturated = false;     // some channel is at its rail, so the wrench is not to be believed
   std::uint64_t number = 0;   // counts the samples, from 1
   std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
+
+  void archive(StateArchive& state) noexcept { state(wrench_S, time_ns, status, healthy, saturated, number, repeats); }
 };
 
 // Marks a 29-bit identifier in lists of identifiers, as CAN_EFF_FLAG does.
@@ -62,6 +65,8 @@ class ForceSensor {
   // Averages the raw readings of the coming samples; when `samples` are in, the sensor reads `known_wrench_S` there.
   virtual void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept = 0;
   [[nodiscard]] virtual bool taring() const noexcept = 0;
+  // What was read at start, and all that changes in a cycle.
+  virtual void archive(StateArchive& state) noexcept = 0;
 
   // ---- in words, not for the cycle ----
   [[nodiscard]] virtual std::string describe_status(std::uint32_t status) const = 0;

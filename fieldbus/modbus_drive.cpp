@@ -233,6 +233,12 @@ void ModbusDrive::on_sync(std::int64_t now_ns) noexcept {
   if (!following_) target_counts_ = feedback_.position_counts;
 }
 
+void ModbusDrive::archive_input(StateArchive& state) noexcept {
+  Feedback feedback = feedback_;
+  state(feedback);
+  if (state.reading()) feedbacks_.write(feedback);
+}
+
 void ModbusDrive::judge() noexcept {
   const std::uint32_t status = feedback_.status;
   const bool wanted = goal_ == DriveGoal::operation_enabled;

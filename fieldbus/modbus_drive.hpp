@@ -57,6 +57,10 @@ class ModbusDrive final : public CyclicDrive {
   [[nodiscard]] double target_rad() const noexcept override { return scale_.angle_rad(target_counts_); }
   [[nodiscard]] DriveFault fault() const noexcept override { return fault_; }
   [[nodiscard]] std::string describe() const override;
+  void archive(StateArchive& state) noexcept override {
+    state(feedback_, goal_, state_, fault_, now_ns_, target_counts_, previous_target_, fresh_, following_);
+  }
+  void archive_input(StateArchive& state) noexcept override;
   // Mean over the last exchanges that were answered, 1/s; 0: none yet.
   [[nodiscard]] double achieved_rate_Hz() const noexcept { return feedback_.rate_Hz; }
 

@@ -27,6 +27,11 @@ struct StudyOptions {
   std::string command_line;  // for the record
 };
 
+struct ReplayOptions {
+  std::filesystem::path folder;
+  bool json = false;
+};
+
 struct ScanOptions {
   std::string interface;
   std::optional<std::uint32_t> sensor_base_id;
@@ -35,7 +40,8 @@ struct ScanOptions {
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
-int scan_command(const ScanOptions& options);  // 1: nothing answers
+int scan_command(const ScanOptions& options);      // 1: nothing answers
+int replay_command(const ReplayOptions& options);  // 1: other setpoints
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);

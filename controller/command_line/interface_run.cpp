@@ -50,6 +50,12 @@ controller::BusIndices indices_in(const SocketCanNetwork& network, std::size_t b
   return indices;
 }
 
+std::vector<std::string> names_in(fieldbus::CanNetwork& network) {
+  std::vector<std::string> names;
+  for (std::size_t bus = 0; bus < network.bus_count(); ++bus) names.push_back(network.bus(bus).name());
+  return names;
+}
+
 void set_filters(SocketCanNetwork& network, const controller::CycleParts& parts) {
   for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
     std::vector<fieldbus::CanFilter> filters;
@@ -92,11 +98,13 @@ std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const c
 class Drain {
  public:
   Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
-        std::vector<fieldbus::BitRates> rates)
+        std::vector<fieldbus::BitRates> rates, BlackBoxKeeper& keeper, controller::ReplayRecorder* replay)
       : records_(records),
         tap_(tap),
         output_(output),
         rates_(std::move(rates)),
+        keeper_(keeper),
+        replay_(replay),
         busy_ns_(rates_.size()),
         begun_ns_(tap.now_ns()),
         thread_([this] { loop(); }) {}
@@ -130,6 +138,7 @@ class Drain {
   void drain() {
     CycleRecord record;
     while (records_.pop(record)) output_.add(record);
+    if (replay_ != nullptr) replay_->drain(keeper_.head());
     controller::TappedFrame tapped;
     while (tap_.frames().pop(tapped)) {
       output_.add_frame(tap_.bus(tapped.bus).name(), tapped.frame, tapped.time_ns);
@@ -143,6 +152,8 @@ class Drain {
   controller::FrameTap& tap_;
   SessionOutput& output_;
   std::vector<fieldbus::BitRates> rates_;
+  BlackBoxKeeper& keeper_;
+  controller::ReplayRecorder* replay_;
   std::vector<std::int64_t> busy_ns_;
   std::int64_t begun_ns_;
   std::int64_t last_ns_ = 0;
@@ -152,7 +163,7 @@ class Drain {
 
 }  // namespace
 
-int run_on_interfaces(const PreparedSession& session, const RunOptions& options) {
+int run_on_interfaces(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper) {
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
   SocketCanNetwork network(interfaces);
@@ -166,13 +177,19 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
       controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices);
   set_filters(network, parts);
   SessionOutput output(session, options, false);
+  std::unique_ptr<controller::ReplayRecorder> replay;
+  if (!options.record_dir.empty()) {
+    replay = std::make_unique<controller::ReplayRecorder>(keeper.box(), options.record_dir, replay_files(session));
+  }
+  keeper.set_head(replay_head(session, names_in(tap), indices));
   bring_up_devices(parts);
   report_modbus_rates(session, parts);
   output.introduce(parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
+  cycle.write_to(keeper.box());
   SignalWatch signals([&](int) { cycle.request_stop(); });
-  Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices));
+  Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, replay.get());
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::SessionTally tally;
   {
@@ -182,12 +199,13 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options)
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
   cycle.shut_down();
   drain.finish();
+  if (replay) replay->finish();
 
   controller::Summary summary = output.summary(cycle);
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
   summary.bus_load = drain.loads();
-  return output.finish(summary);
+  return output.finish(summary, keeper);
 }
 
 }  // namespace proxarm::command_line

@@ -120,6 +120,10 @@ void add_run_options(CLI::App& app, RunOptions& options) {
          "held (default) or free")
       ->type_name("held|free");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
+  app.add_option("--black-box", options.black_box_dir,
+                 "where the last ten seconds go after a fault or a crash (default: black-box in the record, or "
+                 "proxarm-black-box)")
+      ->type_name("DIR");
   app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
   app.add_flag_callback(
       "--no-plot", [&] { options.plot = false; }, "draw no plot");
@@ -231,6 +235,12 @@ int run(int argc, char** argv) {
           "poll an ATI Net CAN OEM at this base id, such as 0x68; never guessed")
       ->type_name("BASE_ID");
   scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
+
+  command_line::ReplayOptions replay_options;
+  CLI::App* replay_app = app.add_subcommand("replay", "a recorded session or black box again, by the controller alone");
+  replay_app->add_option("folder", replay_options.folder, "folder of --record, or of a black box")->required();
+  replay_app->add_flag("--json", replay_options.json, "print the result as one JSON object");
+  replay_app->callback([&] { command = [&] { return command_line::replay_command(replay_options); }; });
 
   CLI::App* check_app = app.add_subcommand("check", "validate cell, scene, hand and sensor files");
   check_app->add_option("files", check_options.files, "files to check")->required();

@@ -34,9 +34,10 @@ int run_command(const RunOptions& options) {
   require_stable(session, options);
   if (options.bus.simulated()) {
     require_carried(session);
-    return SimulatedRun(session, options).run();
   }
-  return run_on_interfaces(session, options);
+  BlackBoxKeeper keeper(session, options);
+  if (options.bus.simulated()) return SimulatedRun(session, options, keeper).run();
+  return run_on_interfaces(session, options, keeper);
 }
 
 }  // namespace proxarm::command_line

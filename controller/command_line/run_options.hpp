@@ -39,9 +39,10 @@ struct RunOptions {
   double duration_s = 10.0;
   controller::SessionSettings settings;  // all that isn't optional above
   BusMapping bus;
-  std::optional<Pace> pace;          // unset: virtual in-process, real time on an interface
-  std::filesystem::path record_dir;  // empty: no record
-  std::filesystem::path plot_file;   // empty: proxarm-run.svg, none with --json
+  std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
+  std::filesystem::path record_dir;     // empty: no record
+  std::filesystem::path black_box_dir;  // empty: in the record, or proxarm-black-box
+  std::filesystem::path plot_file;      // empty: proxarm-run.svg, none with --json
   bool plot = true;
   bool json = false;
   bool force_unstable = false;

@@ -20,6 +20,8 @@ using controller::Summary;
 
 constexpr const char* default_plot = "proxarm-run.svg";
 
+}  // namespace
+
 std::vector<std::string> joint_names(const description::Cell& cell) {
   std::vector<std::string> names;
   for (const description::DriveDescription& drive : cell.drives) names.push_back(drive.joint);
@@ -37,6 +39,18 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   config.axis_names = joint_names(session.cell);
   return config;
 }
+
+void complete(CycleRecord& record, const PreparedSession& session, std::uint64_t proxy_steps) {
+  const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+  const double scene_time_s = static_cast<double>(proxy_steps) * session.settings.period_s;
+  record.proxy_clearance_m = scenes::clearance_m(session.scene, controller::vec3(record.proxy_W_m), scene_time_s);
+  record.tool_clearance_m = scenes::clearance_m(session.scene, controller::vec3(tool), scene_time_s);
+  if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
+    record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
+  }
+}
+
+namespace {
 
 std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts) {
   if (report.where < 0) return "";
@@ -103,14 +117,8 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
 }
 
 void SessionOutput::add(CycleRecord record) {
-  const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
   if (record.phase == controller::Phase::rendering) ++proxy_steps_;
-  const double scene_time_s = static_cast<double>(proxy_steps_) * session_.settings.period_s;
-  record.proxy_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(record.proxy_W_m), scene_time_s);
-  record.tool_clearance_m = scenes::clearance_m(session_.scene, controller::vec3(tool), scene_time_s);
-  if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session_.scene.objects.size()) {
-    record.friction = session_.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
-  }
+  complete(record, session_, proxy_steps_);
   builder_.add(record);
   if (writer_) writer_->add(record);
   if (plot_) plot_->add(record);
@@ -137,7 +145,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle) {
   return summary;
 }
 
-int SessionOutput::finish(const Summary& summary) {
+int SessionOutput::finish(const Summary& summary, BlackBoxKeeper& keeper) {
   progress_.clear();
   if (options_.json) {
     std::printf("%s\n", controller::summary_json(summary).c_str());
@@ -147,7 +155,11 @@ int SessionOutput::finish(const Summary& summary) {
   std::fflush(stdout);
   const bool drawn = draw_plot();
   if (writer_) writer_->finish(summary);
-  if (!summary.faults.empty()) return fault_ended_the_run;
+  keeper.finish(summary.faults.empty() ? "" : summary.faults.front().text);
+  if (!summary.faults.empty()) {
+    if (!options_.json) std::printf("  black box:                %s\n", keeper.folder().c_str());
+    return fault_ended_the_run;
+  }
   return drawn || options_.plot_file.empty() ? fine : set_up_mistake;
 }
 

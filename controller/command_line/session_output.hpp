@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "controller/command_line/black_box_keeper.hpp"
 #include "controller/command_line/prepared_session.hpp"
 #include "controller/cycle.hpp"
 #include "controller/plot.hpp"
@@ -13,6 +14,11 @@
 #include "controller/summary.hpp"
 
 namespace proxarm::command_line {
+
+std::vector<std::string> joint_names(const description::Cell& cell);
+controller::SummaryConfig summary_config(const PreparedSession& session);
+// Fills in what only the scene knows, distances and friction, after so many steps of the proxy.
+void complete(controller::CycleRecord& record, const PreparedSession& session, std::uint64_t proxy_steps);
 
 class SessionOutput {
  public:
@@ -28,8 +34,9 @@ class SessionOutput {
 
   // Of all that was added and what the cycle found; the caller fills in what only it knows before finish().
   [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle);
-  // Writes files, draws the plot, prints the summary to standard output. Returns the exit status.
-  int finish(const controller::Summary& summary);
+  // Writes files, draws the plot, prints the summary to standard output, has the black box written after a fault.
+  // Returns the exit status.
+  int finish(const controller::Summary& summary, BlackBoxKeeper& keeper);
 
  private:
   void refuse_lost_plot() const;

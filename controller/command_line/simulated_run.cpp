@@ -29,15 +29,17 @@ sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
 
 }  // namespace
 
-SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& options)
+SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper)
     : session_(session),
       options_(options),
+      keeper_(keeper),
       network_(sim::simulated_buses(session.cell)),
       far_end_(session.cell, session.sensor, session.hand, network_.events(), far_end_config(options)),
       scene_(scenes::compile(session.scene)),
       output_(session, options, true) {}
 
 int SimulatedRun::run() {
+  keeper_.set_head(replay_head(session_, bus_names(session_.cell), buses_in_order(session_.cell)));
   const controller::ModbusOpener open_line = [this](const description::ModbusLineDescription& line, double) {
     return far_end_.modbus_client(line.name);
   };
@@ -46,6 +48,7 @@ int SimulatedRun::run() {
   if (!options_.record_dir.empty()) {
     network_.set_observer(
         [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
+    replay_ = std::make_unique<controller::ReplayRecorder>(keeper_.box(), options_.record_dir, replay_files(session_));
   }
   far_end_.attach_to(network_);
   far_end_.power_on();
@@ -67,6 +70,7 @@ void SimulatedRun::pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
 
 int SimulatedRun::run_cycles(controller::CycleParts parts) {
   Cycle cycle(std::move(parts), session_.settings, session_.cell.limits, record_capacity);
+  cycle.write_to(keeper_.box());
   SignalWatch signals([&](int) { cycle.request_stop(); });
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     network_.simulated_bus(i).statistics().reset(network_.now_ns());
@@ -85,7 +89,8 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   }
   cycle.shut_down();
   network_.sleep_until(network_.now_ns() + last_words_ns);
-  return output_.finish(summary);
+  if (replay_) replay_->finish();
+  return output_.finish(summary, keeper_);
 }
 
 void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
@@ -96,6 +101,7 @@ void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
     record.hand_force_W_N = controller::triple(truth_.hand_force_W);
     output_.add(record);
   }
+  if (replay_) replay_->drain(keeper_.head());
 }
 
 }  // namespace proxarm::command_line

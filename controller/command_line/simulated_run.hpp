@@ -12,7 +12,7 @@ namespace proxarm::command_line {
 class SimulatedRun {
  public:
   // Throws SetupError. `session` and `options` must outlive the run.
-  SimulatedRun(const PreparedSession& session, const RunOptions& options);
+  SimulatedRun(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper);
 
   // Returns the exit status; throws SetupError while nothing has moved.
   int run();
@@ -24,10 +24,12 @@ class SimulatedRun {
 
   const PreparedSession& session_;
   const RunOptions& options_;
+  BlackBoxKeeper& keeper_;
   fieldbus::SimulatedCanNetwork network_;
   sim::SimulatedCell far_end_;
   scenes::CompiledScene scene_;
   SessionOutput output_;
+  std::unique_ptr<controller::ReplayRecorder> replay_;
   sim::Truth truth_;  // at the present cycle's SYNC
 };
 

@@ -106,7 +106,7 @@ struct Reader {
       protocol.base_id_step = static_cast<std::uint32_t>(base->integer_or("step", 1, 1, 0x1000000));
     }
     big_endian = read_order(root, true);
-    if (root.has("dbc")) dbc = load_dbc(root.existing_file("dbc"));
+    if (root.has("dbc")) dbc = load_dbc(protocol.dbc = root.existing_file("dbc"));
   }
 
   [[nodiscard]] SampleFrame read_frame(const YamlNode& node) {

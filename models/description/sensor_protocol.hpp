@@ -31,6 +31,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -110,6 +111,7 @@ struct SensorProtocol {
   double rate_Hz = 0.0;     // of the stream; a polled sensor: 0
   double together_s = 0.0;  // the longest from a sample's first frame to its last
   std::optional<SensorCommand> stop, clear_bias, bias, rate, start;
+  std::filesystem::path dbc;  // that it was read from; empty: none
 
   [[nodiscard]] std::size_t sample_bytes() const noexcept;
   [[nodiscard]] bool streams() const noexcept { return !poll; }

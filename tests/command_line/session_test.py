@@ -106,8 +106,9 @@ class Record(ProgramTest):
         """Stands for the two runs that the tests of this class share."""
 
     def test_two_runs_are_the_same_to_the_byte(self):
-        names = sorted(file.name for file in self.first.iterdir())
-        self.assertEqual(names, sorted(file.name for file in self.second.iterdir()))
+        names, others = (sorted(str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file())
+                         for folder in (self.first, self.second))
+        self.assertEqual(names, others)
         self.assertLessEqual({"signals.csv", "frames.log", "effective.yaml", "summary.json", "timing.json"}, set(names))
         for name in names:
             if name != "timing.json":  # wall-clock figures, and nothing else

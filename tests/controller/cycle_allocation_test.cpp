@@ -38,6 +38,8 @@ Played play(const RigOptions& options, std::vector<CycleRecord>* recorded) {
   ClosedLoopRig parts_of(options);  // for its descriptions and its scene; its far end stays alone
   ReplayNetwork network(recorder.recording(), {"axes_1_3", "axes_4_6", "sensor"});
   Cycle cycle(parts_of.prepared_parts(network), options.settings, parts_of.cell.limits, 64);
+  BlackBox box(options.settings.period_s, 40);
+  cycle.write_to(box);
   Played played;
   played.records.reserve(rig.records.size() + 10);
   const auto wanted = static_cast<std::uint64_t>(std::ceil(options.duration_s / options.settings.period_s - 1e-9));

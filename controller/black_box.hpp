@@ -1,0 +1,108 @@
+// The last ten seconds of everything, always in memory: what came into the cycle, what left it, and what it made of it.
+//
+// The cycle writes here (noexcept, no lock, no allocation, no system call; every page is touched beforehand). The
+// memory is a shared mapping, so that a process that was forked off before still has it when this one has died
+// (command_line/black_box_keeper.hpp). Three rings, overwritten from their oldest end:
+//   cycles   one entry per cycle: what came in by other ways than frames, and the cycle's record
+//   frames   all that was received and sent, in order
+//   states   the controller's whole state at the begin of a cycle, once a second: where a replay can start
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "controller/cycle_record.hpp"
+#include "fieldbus/can_network.hpp"
+#include "fieldbus/state_archive.hpp"
+
+namespace proxarm::controller {
+
+inline constexpr std::size_t max_buses = 8;
+
+struct BoxFrame {
+  fieldbus::CanFrame frame;
+  std::int64_t time_ns = 0;  // received: when it was on the wire; sent: when it was handed to the interface
+  std::uint8_t bus = 0;
+  bool sent = false;
+  fieldbus::SendResult result = fieldbus::SendResult::sent;
+};
+
+struct BusInput {
+  fieldbus::BusState state = fieldbus::BusState::error_active;
+  std::uint64_t receive_overflows = 0;
+};
+
+// What one cycle was given, and its record.
+struct BoxCycle {
+  std::int64_t t_k_ns = 0;
+  std::uint64_t first_frame = 0;  // in the ring of frames, counted from the first cycle
+  std::uint32_t frames = 0;
+  std::uint32_t overruns_in_a_row = 0;
+  bool stop_requested = false;
+  std::array<BusInput, max_buses> buses{};
+  std::uint16_t input_bytes = 0;
+  std::array<std::byte, 512> inputs{};  // CyclicDrive::archive_input() of all drives
+  std::uint64_t rendered_cycles = 0;
+  CycleRecord record;
+};
+
+static_assert(std::is_trivially_copyable_v<BoxCycle> && std::is_trivially_copyable_v<BoxFrame>);
+
+class BlackBox {
+ public:
+  static constexpr double seconds = 10.0;
+  static constexpr std::size_t most_state_bytes = 8192;
+
+  // For cycles of this period; `frames_per_cycle`: as many as are expected at most.
+  BlackBox(double period_s, std::size_t frames_per_cycle);
+  BlackBox(const BlackBox&) = delete;
+  BlackBox& operator=(const BlackBox&) = delete;
+  ~BlackBox();
+
+  // ---- the cycle's ----
+  // The entry of the cycle that begins; all of it is for the caller to fill.
+  [[nodiscard]] BoxCycle& begin(std::int64_t t_k_ns) noexcept;
+  void add(const BoxFrame& frame) noexcept;
+  void finish() noexcept;
+  // Room for a state where one is due, before the first frame of the cycle; empty: none is.
+  [[nodiscard]] std::span<std::byte> state_room() noexcept;
+  void finish_state(std::size_t bytes) noexcept;
+
+  // ---- anybody's, from whole cycles only ----
+  [[nodiscard]] std::uint64_t cycles() const noexcept { return head_->cycles.load(std::memory_order_acquire); }
+  // False where it has been overwritten. Of one that is far behind, in another thread, call it again.
+  bool read(std::uint64_t cycle, BoxCycle& out, std::vector<BoxFrame>& frames) const;
+  [[nodiscard]] std::uint64_t oldest_cycle() const noexcept;
+  // The state at the begin of the oldest cycle that has one and is still there with all after it. False: none.
+  bool oldest_state(std::uint64_t& cycle, std::vector<std::byte>& state) const;
+  // Frames of a cycle that never ended.
+  [[nodiscard]] std::vector<BoxFrame> unfinished() const;
+
+ private:
+  struct State {
+    std::uint64_t cycle = 0;
+    std::size_t size = 0;
+    std::array<std::byte, most_state_bytes> bytes{};
+  };
+  static constexpr std::size_t state_count = 16;
+  struct Head {
+    std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0};
+  };
+  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+
+  std::size_t cycle_capacity_, frame_capacity_;
+  std::uint64_t cycles_per_state_;
+  std::size_t bytes_;
+  std::byte* memory_;
+  Head* head_;
+  BoxCycle* cycles_;
+  BoxFrame* frames_;
+  State* states_;
+};
+
+}  // namespace proxarm::controller
