@@ -41,6 +41,7 @@ BoxCycle& BlackBox::begin(std::int64_t t_k_ns) noexcept {
   entry.first_frame = head_->frames.load(std::memory_order_relaxed);
   entry.frames = 0;
   entry.input_bytes = 0;
+  entry.change = {};
   return entry;
 }
 

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/change.hpp"
 #include "controller/cycle_record.hpp"
 #include "fieldbus/can_network.hpp"
 #include "fieldbus/state_archive.hpp"
@@ -44,6 +45,7 @@ struct BoxCycle {
   std::uint32_t frames = 0;
   std::uint32_t overruns_in_a_row = 0;
   bool stop_requested = false;
+  Change change;
   std::array<BusInput, max_buses> buses{};
   std::uint16_t input_bytes = 0;
   std::array<std::byte, 512> inputs{};  // CyclicDrive::archive_input() of all drives

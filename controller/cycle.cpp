@@ -50,7 +50,7 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       run_out_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
       measured_link_rad_(parts_.arm->start_rad()),
       actual_rad_(parts_.arm->start_rad()),
-      actual_k1_rad_(parts_.arm->start_rad()),
+      moved_rad_(JointVector::Zero(parts_.arm->axes())),
       limiter_(descriptions(parts_), limits, settings.period_s),
       guard_(descriptions(parts_), settings.period_s),
       records_(record_capacity) {
@@ -142,13 +142,19 @@ bool Cycle::everything_received() const noexcept {
 // Where the arm is by its encoders, and what the hand does by the sensor.
 void Cycle::measure() noexcept {
   JointVector motor_rad(parts_.arm->axes());
-  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) motor_rad[i] = parts_.drives[i].drive.actual_rad();
-  actual_k1_rad_ = actual_rad_;
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
+    motor_rad[i] = drive.actual_rad();
+    // Over two answers, where they come more seldom than cycles.
+    const double T = settings_.period_s, share = T / (T + 2.0 * drive.feedback_period_s());
+    moved_rad_[i] += share * (motor_rad[i] - actual_rad_[i] - moved_rad_[i]);
+  }
   actual_rad_ = motor_rad;
   // Gravity twists the gears; the twist of the last cycle is right to within a cycle's change of it.
   measured_link_rad_ = motor_rad - (parts_.arm->motor_from_link(measured_link_rad_) - measured_link_rad_);
-  tool_W_ = parts_.arm->tool_pose(measured_link_rad_).translation();
-  R_WS_ = parts_.arm->sensor_pose(measured_link_rad_).linear();
+  parts_.arm->kinematics(measured_link_rad_, measured_);
+  tool_W_ = measured_.X_WT.translation();
+  R_WS_ = measured_.X_WS.linear();
 
   sample_is_new_ = parts_.sensor->fresh();
   if (sample_is_new_) {
@@ -332,7 +338,19 @@ void Cycle::start_rendering() noexcept {
   parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
 }
 
+void Cycle::take_change() noexcept {
+  Change change;
+  if (next_scheduled_ < scheduled_.size() && scheduled_[next_scheduled_].rendered_cycles <= rendered_cycles_) {
+    change = scheduled_[next_scheduled_++].change;
+  } else if (!changes_.pop(change)) {
+    return;
+  }
+  parts_.world->set(change);
+  if (box_ != nullptr) boxed_->change = change;
+}
+
 void Cycle::render() noexcept {
+  take_change();
   make_limits();
   const WorldStep step = parts_.world->step(hand_W_.force, step_limits_);
   const ProxyFault turned = parts_.orientation.step(hand_W_.torque);
@@ -400,12 +418,11 @@ bool Cycle::drives_follow(const JointVector& motor_rad, JointVector& wanted_rad)
   std::uint8_t blocked = 0;
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const DriveOnBus& axis = parts_.drives[static_cast<std::size_t>(i)];
-    // A Modbus drive answers more seldom than every cycle: how far it is behind says little.
-    if (axis.on_can == nullptr || !axis.drive.fresh()) continue;
-    const double lag_s =
-        5.0 * settings_.period_s + 1.0 / (2.0 * std::numbers::pi * axis.drive.description().position_bandwidth_Hz);
-    const double room_rad =
-        limits_.following_error_rad + lag_s / settings_.period_s * std::abs(actual_rad_[i] - actual_k1_rad_[i]);
+    if (!axis.drive.fresh()) continue;
+    // On Modbus a setpoint waits for an exchange, and so does the answer.
+    const double lag_s = 5.0 * settings_.period_s + 2.0 * axis.drive.feedback_period_s() +
+                         1.0 / (2.0 * std::numbers::pi * axis.drive.description().position_bandwidth_Hz);
+    const double room_rad = limits_.following_error_rad + lag_s / settings_.period_s * std::abs(moved_rad_[i]);
     if (std::abs(motor_rad[i] - actual_rad_[i]) <= room_rad) continue;
     blocked = static_cast<std::uint8_t>(blocked | 1u << i);
     wanted_rad[i] = std::clamp(motor_rad[i], actual_rad_[i] - room_rad, actual_rad_[i] + room_rad);
@@ -525,7 +542,7 @@ void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   state(parts_.elastic, parts_.orientation, parts_.compensation, supervisor_, entered_phase_, phase_since_ns_,
         first_cycle_ns_, cycle_, rendered_cycles_, missed_samples_, reading_S_.force, reading_S_.torque, R_WS_,
         hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, run_out_rad_per_s_,
-        measured_link_rad_, actual_rad_, actual_k1_rad_, guard_, run_out_scale_, run_out_per_cycle_);
+        measured_link_rad_, actual_rad_, moved_rad_, guard_, run_out_scale_, run_out_per_cycle_);
   if (state.reading()) parts_.arm->kinematics(link_rad_, solution_.kinematics);
 }
 

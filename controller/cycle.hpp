@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "controller/black_box.hpp"
+#include "controller/change.hpp"
 #include "controller/cycle_record.hpp"
 #include "controller/elastic_setpoint.hpp"
 #include "controller/joint_guard.hpp"
@@ -88,6 +89,9 @@ class Cycle {
 
   // Any thread: asks for a controlled stop at the next cycle.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
+  // Checked parameters for the next rendered cycles, one each, from one thread; and those of a script, by their times.
+  [[nodiscard]] SpscRing<Change>& changes() noexcept { return changes_; }
+  void schedule(std::vector<ScheduledChange> changes) { scheduled_ = std::move(changes); }
   // The loop's owner: this many cycles in a row were late.
   void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
 
@@ -127,6 +131,7 @@ class Cycle {
   void tare(std::int64_t t_k_ns) noexcept;
   void start_rendering() noexcept;
   void render() noexcept;
+  void take_change() noexcept;
   void make_limits() noexcept;
   void follow_proxy() noexcept;
   void command(const JointVector& motor_rad) noexcept;
@@ -155,6 +160,9 @@ class Cycle {
   std::uint64_t rendered_cycles_ = 0;
   std::uint32_t missed_samples_ = 0;
   std::uint32_t overruns_in_a_row_ = 0;
+  SpscRing<Change> changes_{16};
+  std::vector<ScheduledChange> scheduled_;
+  std::size_t next_scheduled_ = 0;
   std::atomic<bool> stop_requested_{false};
   bool stop_seen_ = false;  // in this cycle
 
@@ -168,12 +176,14 @@ class Cycle {
   JointVector target_rad_;  // motor side, what the drives are sent
   JointVector run_out_rad_per_s_;
   JointVector measured_link_rad_;
-  JointVector actual_rad_, actual_k1_rad_;  // by the encoders, in this cycle and the one before
+  JointVector actual_rad_;  // by the encoders
+  JointVector moved_rad_;   // per cycle, as far as the drives' answers tell
   models::Vec3 proxy_k1_W_ = models::Vec3::Zero();
   StepLimiter limiter_;
   StepLimits step_limits_;
   JointGuard guard_;
   ActiveLimits active_;
+  models::ToolKinematics measured_;  // of the links, by the encoders
   models::ToolKinematics filtered_;  // of the links as they are commanded, behind the filter
   models::InverseKinematicsResult solution_;
   double run_out_scale_ = 1.0;

@@ -70,6 +70,22 @@ class WorldOfDimension final : public RenderedWorld {
     return last_;
   }
 
+  void set(const Change& change) noexcept override {
+    switch (change.parameter) {
+      case Parameter::mass:
+        proxy_.set_mass(change.value);
+        break;
+      case Parameter::damping:
+        proxy_.set_damping(change.value);
+        break;
+      case Parameter::spring:
+        proxy_.set_spring(change.value);
+        break;
+      case Parameter::none:
+        break;
+    }
+  }
+
   void archive(fieldbus::StateArchive& state) noexcept override { state(proxy_, start_W_, start_, last_.q_W); }
 
  private:

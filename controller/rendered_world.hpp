@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "controller/admittance_proxy.hpp"
+#include "controller/change.hpp"
 #include "controller/session_settings.hpp"
 #include "controller/step_limits.hpp"
 #include "fieldbus/state_archive.hpp"
@@ -50,6 +51,8 @@ class RenderedWorld {
   // Goes on from near q_W, as near as the scene's objects let it, with this velocity: where the arm couldn't follow.
   // Returns where.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
+  // From the next step on. Position and velocity stay, so nothing jumps; a value that can't be changes nothing.
+  virtual void set(const Change& change) noexcept = 0;
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 };
 

@@ -49,6 +49,7 @@ class CyclicDrive {
 
   [[nodiscard]] virtual bool fresh() const noexcept = 0;  // what is known of it is as new as it can be
   [[nodiscard]] virtual std::uint32_t cycles_without_tpdo() const noexcept = 0;
+  [[nodiscard]] virtual double feedback_period_s() const noexcept { return 0.0; }  // 0: it answers every cycle
   [[nodiscard]] virtual DriveState state() const noexcept = 0;
   [[nodiscard]] virtual bool following() const noexcept = 0;  // takes targets
   [[nodiscard]] virtual std::int32_t actual_counts() const noexcept = 0;

@@ -49,6 +49,9 @@ class ModbusDrive final : public CyclicDrive {
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
   // Always 0: a drive that is silent for stale_after_s has the fault modbus_timeout.
   [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept override { return 0; }
+  [[nodiscard]] double feedback_period_s() const noexcept override {
+    return feedback_.rate_Hz > 0.0 ? 1.0 / feedback_.rate_Hz : registers_.stale_after_s;
+  }
   [[nodiscard]] DriveState state() const noexcept override { return state_; }
   [[nodiscard]] bool following() const noexcept override { return following_; }
   [[nodiscard]] std::int32_t actual_counts() const noexcept override { return feedback_.position_counts; }

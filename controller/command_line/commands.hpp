@@ -27,6 +27,11 @@ struct StudyOptions {
   std::string command_line;  // for the record
 };
 
+struct SetOptions {
+  std::vector<std::string> changes;
+  std::filesystem::path control;
+};
+
 struct ReplayOptions {
   std::filesystem::path folder;
   bool json = false;
@@ -42,6 +47,7 @@ int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
 int scan_command(const ScanOptions& options);      // 1: nothing answers
 int replay_command(const ReplayOptions& options);  // 1: other setpoints
+int set_command(const SetOptions& options);        // of a running session
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);

@@ -10,6 +10,7 @@
 #include "controller/bring_up.hpp"
 #include "controller/command_line/bus_plan.hpp"
 #include "controller/command_line/cell_buses.hpp"
+#include "controller/command_line/live_parameters.hpp"
 #include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/realtime.hpp"
 #include "controller/command_line/session_output.hpp"
@@ -189,6 +190,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
   cycle.write_to(keeper.box());
   SignalWatch signals([&](int) { cycle.request_stop(); });
+  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options);
   Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, replay.get());
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::SessionTally tally;

@@ -120,6 +120,15 @@ void add_run_options(CLI::App& app, RunOptions& options) {
          "held (default) or free")
       ->type_name("held|free");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
+  app.add_option("--set", options.changes,
+                 "change a parameter while rendering, such as mass=3@4s (mass, damping, spring); may be repeated")
+      ->type_name("NAME=VALUE@TIME")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--control", options.control,
+                 "take changes from `proxarm set` at this Unix socket, for its owner alone (default: none; PATH "
+                 "\"default\": where `proxarm set` looks by itself)")
+      ->type_name("PATH");
   app.add_option("--black-box", options.black_box_dir,
                  "where the last ten seconds go after a fault or a crash (default: black-box in the record, or "
                  "proxarm-black-box)")
@@ -235,6 +244,12 @@ int run(int argc, char** argv) {
           "poll an ATI Net CAN OEM at this base id, such as 0x68; never guessed")
       ->type_name("BASE_ID");
   scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
+
+  command_line::SetOptions set_options;
+  CLI::App* set_app = app.add_subcommand("set", "change mass, damping or spring of a running session");
+  set_app->add_option("changes", set_options.changes, "NAME=VALUE, such as mass=3")->required();
+  set_app->add_option("--control", set_options.control, "the session's socket")->type_name("PATH");
+  set_app->callback([&] { command = [&] { return command_line::set_command(set_options); }; });
 
   command_line::ReplayOptions replay_options;
   CLI::App* replay_app = app.add_subcommand("replay", "a recorded session or black box again, by the controller alone");

@@ -99,6 +99,7 @@ class Replay {
   void give(const BoxCycle& recorded, const std::vector<BoxFrame>& frames) {
     network_.load(recorded, frames);
     cycle_->report_overruns(recorded.overruns_in_a_row);
+    if (recorded.change.parameter != controller::Parameter::none) cycle_->changes().push(recorded.change);
     if (recorded.stop_requested) cycle_->request_stop();
     fieldbus::StateArchive inputs =
         fieldbus::StateArchive::reader(std::span(recorded.inputs).first(recorded.input_bytes));

@@ -1,6 +1,7 @@
 #include "controller/command_line/bus_plan.hpp"
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/interface_run.hpp"
+#include "controller/command_line/live_parameters.hpp"
 #include "controller/command_line/prepared_session.hpp"
 #include "controller/command_line/simulated_run.hpp"
 #include "controller/command_line/start_check.hpp"
@@ -35,6 +36,7 @@ int run_command(const RunOptions& options) {
   if (options.bus.simulated()) {
     require_carried(session);
   }
+  require_changes(session, options);
   BlackBoxKeeper keeper(session, options);
   if (options.bus.simulated()) return SimulatedRun(session, options, keeper).run();
   return run_on_interfaces(session, options, keeper);

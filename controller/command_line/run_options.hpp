@@ -41,6 +41,8 @@ struct RunOptions {
   BusMapping bus;
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;     // empty: no record
+  std::vector<std::string> changes;     // NAME=VALUE@TIME
+  std::filesystem::path control;        // socket that takes changes; empty: none
   std::filesystem::path black_box_dir;  // empty: in the record, or proxarm-black-box
   std::filesystem::path plot_file;      // empty: proxarm-run.svg, none with --json
   bool plot = true;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "controller/command_line/cell_buses.hpp"
+#include "controller/command_line/live_parameters.hpp"
 #include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/signal_watch.hpp"
 #include "controller/session.hpp"
@@ -72,6 +73,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   Cycle cycle(std::move(parts), session_.settings, session_.cell.limits, record_capacity);
   cycle.write_to(keeper_.box());
   SignalWatch signals([&](int) { cycle.request_stop(); });
+  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session_, options_);
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     network_.simulated_bus(i).statistics().reset(network_.now_ns());
   }

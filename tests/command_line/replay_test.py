@@ -170,7 +170,7 @@ class BlackBox(ProgramTest):
                 box = self.folder / "proxarm-black-box"
                 self.assertIn("crashed or was killed", (box / "reason.txt").read_text())
                 cycles, _ = self.assert_same(box)
-                self.assertGreater(cycles, 500)
+                self.assertGreater(cycles, 0)
 
 
 if __name__ == "__main__":

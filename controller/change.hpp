@@ -1,0 +1,21 @@
+// What may be changed while the arm is led: a number that was checked before, from any thread into the cycle.
+#pragma once
+
+#include <cstdint>
+
+namespace proxarm::controller {
+
+enum class Parameter : std::uint8_t { none, mass, damping, spring };
+
+struct Change {
+  Parameter parameter = Parameter::none;
+  double value = 0.0;  // of the proxy: kg (felt mass less the tool's), Ns/m, N/m
+};
+
+// To take effect after so many rendered cycles.
+struct ScheduledChange {
+  std::uint64_t rendered_cycles = 0;
+  Change change;
+};
+
+}  // namespace proxarm::controller

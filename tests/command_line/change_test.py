@@ -1,0 +1,187 @@
+"""Parameters that change while the arm is led: by a script in virtual time, and through a session's socket."""
+import csv
+import math
+import os
+import pathlib
+import re
+import socket
+import stat
+import subprocess
+import time
+import unittest
+
+from harness import AXES, SOURCE, ProgramTest, program
+
+SWEEP = ("--scene", "scenes/free.yaml", "--hand", SOURCE / "sim/hands/sweep.yaml")
+
+
+class Script(ProgramTest):
+    def signals(self, *arguments):
+        self.summary("--record", "session", *arguments)
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            return [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
+
+    def test_a_mass_that_is_set_is_felt_from_then_on(self):
+        """M = T² h / (q − 2 q₁ + q₂) of the proxy, whatever the hand does: (26a) in free space."""
+        rows = self.signals(*SWEEP, "--duration", "4s", "--mass", "4", "--set", "mass=8@2s")
+        q = [float(row["proxy_W_x_m"]) for row in rows]
+        h = [float(row["force_W_x_N"]) for row in rows]
+
+        def proxy_mass(first, last):
+            p = [q[k] - 2 * q[k - 1] + q[k - 2] for k in range(first, last)]
+            return 1e-6 * sum(h[k] * h[k] for k in range(first, last)) / sum(
+                h[k] * a for k, a in zip(range(first, last), p))
+
+        handle_kg = 4.0 - proxy_mass(1000, 2000)
+        self.assertGreater(handle_kg, 0.1)
+        # Cycle 2000 of rendering is the first with it.
+        self.assertAlmostEqual(proxy_mass(2000, 4000) + handle_kg, 8.0, places=6)
+        self.assertNotAlmostEqual(proxy_mass(1990, 2000), proxy_mass(2000, 2010), places=1)
+
+    def test_nothing_jumps(self):
+        """Setpoints' speed and acceleration across changes stay where they were: no more than without."""
+        script = []
+        for i in range(1, 16):
+            script += ["--set", f"mass={3 if i % 2 else 20}@{200 * i}ms",
+                       "--set", f"damping={40 if i % 3 else 0}@{200 * i}ms"]
+        rows = self.signals(*SWEEP, "--duration", "4s", *script)
+        cell = (SOURCE / "models/cells/default.yaml").read_text()
+        gears = [float(x) for x in re.findall(r"gear_ratio: (\S+)", cell)]
+        limits = [float(x) for x in re.findall(r"max_acceleration_rad_per_s2: (\S+)", cell)]
+        self.assertEqual((len(gears), len(limits)), (6, 6))
+        for axis, gear, limit in zip(AXES, gears, limits):
+            per_rad = 1048576 * gear / (2 * math.pi)
+            counts = [int(row[f"{axis}_target_counts"]) for row in rows]
+            second = [abs(c - 2 * b + a) for a, b, c in zip(counts, counts[1:], counts[2:])]
+            self.assertLess(max(second), limit * per_rad * 1e-6 + 2, axis)  # two counts: three roundings
+        v = [[(float(b[f"proxy_W_{c}_m"]) - float(a[f"proxy_W_{c}_m"])) / 1e-3 for c in "xyz"]
+             for a, b in zip(rows, rows[1:])]
+        steps = [max(abs(x - y) for x, y in zip(a, b)) for a, b in zip(v, v[1:])]
+        # limits.max_tool_acceleration_m_per_s2 is 20: 0.02 m/s a cycle.
+        self.assertLess(max(steps), 0.02)
+
+    def test_two_runs_and_the_replay_are_the_same(self):
+        arguments = ("--duration", "3s", "--set", "mass=6@1s", "--set", "spring=50@1500ms", "--set", "damping=10@2s")
+        first = self.summary("--record", "session", *arguments)
+        self.assertEqual(first["setpoint_sha256"], self.summary(*arguments)["setpoint_sha256"])
+        self.assertNotEqual(first["setpoint_sha256"], self.summary("--duration", "3s")["setpoint_sha256"])
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+    def test_what_would_be_refused_at_the_start_is_refused(self):
+        for change, said in (("mass=0.1@1s", "kg"), ("mass=3", "NAME=VALUE@TIME"), ("mass=3@1", "--set"),
+                             ("weight=3@1s", "mass, damping or spring"), ("mass=-1@1s", "mass"),
+                             ("mass=nan@1s", "mass"), ("damping=3kg@1s", "damping"), ("=@1s", "NAME=VALUE")):
+            with self.subTest(change):
+                self.assert_refused(self.call("run", "--set", change), said)
+
+
+class Socket(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.path = self.folder / "private" / "control"
+        self.run = None
+
+    def start(self, *arguments):
+        self.run = subprocess.Popen([program(), "run", "--json", "--pace", "realtime", "--duration", "30s", "--record",
+                                     "session", "--control", str(self.path), *map(str, arguments)], cwd=self.folder,
+                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.run.kill)
+        for _ in range(500):
+            if self.path.exists():
+                return
+            self.assertIsNone(self.run.poll(), "the session ended")
+            time.sleep(0.02)
+        self.fail("no socket")
+
+    def stop(self):
+        self.run.terminate()
+        out, err = self.run.communicate(timeout=60)
+        self.assertEqual(self.run.returncode, 0, err)
+        return out
+
+    def ask(self, *changes):
+        return self.call("set", "--control", self.path, *changes)
+
+    def test_is_for_its_owner_alone_and_gone_afterwards(self):
+        self.start()
+        self.assertEqual(stat.S_IMODE(os.stat(self.path).st_mode), 0o600)
+        self.assertEqual(stat.S_IMODE(os.stat(self.path.parent).st_mode), 0o700)
+        if os.geteuid() == 0:  # only root can become another user, who can't get in even where modes let him
+            os.chmod(self.folder, 0o755)
+            os.chmod(self.path.parent, 0o777)
+            os.chmod(self.path, 0o666)
+            asked = subprocess.run(["/usr/bin/python3", "-c", f"""
+import os, socket
+os.setuid(65534)
+s = socket.socket(socket.AF_UNIX); s.connect({str(self.path)!r}); s.settimeout(5)
+try:
+    s.sendall(b'mass=6\\n')
+    print(s.recv(100))
+except ConnectionError:
+    print(b'')
+"""], capture_output=True, text=True, timeout=30)
+            self.assertEqual(asked.stdout, "b''\n", asked.stderr)
+        self.stop()
+        self.assertFalse(self.path.exists())
+
+    def test_changes_take_effect_and_are_in_the_replay(self):
+        self.start()
+        time.sleep(1.0)
+        outcome = self.ask("mass=6", "damping=5Ns/m")
+        self.assertEqual((outcome.status, outcome.out, outcome.err), (0, "ok: mass=6\nok: damping=5Ns/m\n", ""))
+        time.sleep(0.5)
+        self.stop()
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+    def test_what_is_refused_changes_nothing(self):
+        self.start()
+        for change in ("mass=0.01", "mass=", "nonsense", "mass=3@1s", "x" * 250):
+            outcome = self.ask(change)
+            self.assertEqual(outcome.status, 2, change)
+            self.assertIn("refused: ", outcome.err)
+        self.assertEqual(self.ask("y" * 300).status, 2)
+        # Who says nothing, or too much, holds nobody up for long.
+        with socket.socket(socket.AF_UNIX) as silent, socket.socket(socket.AF_UNIX) as loud:
+            silent.connect(str(self.path))
+            loud.connect(str(self.path))
+            loud.sendall(b"z" * 5000)
+            self.assertEqual(self.ask("mass=5").status, 0)
+        self.stop()
+
+    def test_needs_a_folder_of_its_own(self):
+        (self.folder / "open").mkdir(mode=0o755)
+        os.chmod(self.folder / "open", 0o755)
+        self.assert_refused(self.call("run", "--control", self.folder / "open" / "control"), "mode 0700")
+        (self.folder / "mine").mkdir(mode=0o700)
+        (self.folder / "mine" / "control").write_text("not a socket")
+        self.assert_refused(self.call("run", "--control", self.folder / "mine" / "control"), "no socket")
+        self.start()
+        self.assert_refused(self.call("run", "--control", self.path), "another session")
+        self.stop()
+
+    def test_nobody_there(self):
+        self.assert_refused(self.ask("mass=3"), "proxarm run --control")
+
+
+class Nothing(ProgramTest):
+    def test_listens_on_a_network(self):
+        """Nor on any socket at all, unless it is told to."""
+        run = subprocess.Popen([program(), "run", "--no-plot", "--pace", "realtime", "--duration", "20s"],
+                               cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.addCleanup(run.wait)
+        self.addCleanup(run.kill)
+        time.sleep(1.0)
+        links = []
+        for link in pathlib.Path(f"/proc/{run.pid}/fd").iterdir():
+            try:
+                links.append(os.readlink(link))
+            except FileNotFoundError:  # closed in the meantime
+                pass
+        self.assertGreater(len(links), 2)
+        self.assertEqual([link for link in links if link.startswith("socket:")], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
