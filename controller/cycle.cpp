@@ -180,7 +180,9 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
 void Cycle::judge_sensor() noexcept {
   missed_samples_ = sample_is_new_ ? 0 : missed_samples_ + 1;
   if (missed_samples_ > settings_.max_missed_samples) {
-    raise(Fault::sensor_lost, -1, missed_samples_, settings_.max_missed_samples);
+    // A counter that stands still makes each sample an old one: it is there, and frozen.
+    const bool frozen = parts_.sensor->latest().repeats > settings_.max_missed_samples;
+    raise(frozen ? Fault::sensor_frozen : Fault::sensor_lost, -1, missed_samples_, settings_.max_missed_samples);
   }
   if (!sample_is_new_) return;
   const fieldbus::ForceSample& sample = parts_.sensor->latest();
@@ -211,6 +213,10 @@ void Cycle::judge_drives() noexcept {
         raise(Fault::drive_disabled, where);
         break;
       case fieldbus::DriveFault::target_out_of_range:
+      case fieldbus::DriveFault::modbus_timeout:
+      case fieldbus::DriveFault::modbus_closed:
+        raise(Fault::modbus_silent, where);
+        break;
         raise(Fault::target_out_of_range, where);
         break;
       default:

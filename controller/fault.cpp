@@ -23,7 +23,7 @@ constexpr const char* unconfirmed =
 constexpr std::array texts{
     FaultText{Fault::none, "none", "no fault", nullptr, ""},
     FaultText{Fault::sensor_lost, "sensor_lost", "no complete sample of the force sensor in time", "cycles",
-              "check the sensor's cable, power and base_id; `proxarm plan` tells whether its bus can carry it"},
+              "check the sensor's cable, power and identifiers; `proxarm plan` tells whether its bus can carry it"},
     FaultText{Fault::sensor_status, "sensor_status", "the force sensor's status word reports an error", nullptr,
               "power-cycle the sensor; look up the status bits in its manual"},
     FaultText{Fault::sensor_saturated, "sensor_saturated", "a gauge of the force sensor is at its rail", nullptr,
@@ -40,6 +40,8 @@ constexpr std::array texts{
               "check the drive's power, cable and node number"},
     FaultText{Fault::drive_fault, "drive_fault", "a drive reports a fault", nullptr,
               "read the drive's error code in the record, mend its cause, start again"},
+    FaultText{Fault::modbus_silent, "modbus_silent", "no complete answer on a Modbus line in time", nullptr,
+              "check the drive's power, the line's cable or network, and the unit's number"},
     FaultText{Fault::drive_disabled, "drive_disabled", "a drive left operation enabled by itself", nullptr,
               "check the drive's enable input, its supply and STO"},
     FaultText{Fault::drive_not_enabled, "drive_not_enabled", "a drive didn't reach operation enabled", "s",

@@ -21,6 +21,7 @@ enum class Fault : std::uint8_t {
   force_at_start,       // the handle was pushed while the sensor was tared: nothing is enabled
   drive_silent,         // no TPDO of a drive for more than max_missed_feedback cycles: controlled stop of the others
   drive_fault,          // a drive reports the state fault, or an EMCY: controlled stop of the others
+  modbus_silent,        // no answer of a drive on a Modbus line for stale_after_s, or the line is closed: likewise
   drive_disabled,       // a drive left operation enabled by itself: controlled stop of the others
   drive_not_enabled,    // a drive didn't reach operation enabled in time: nothing moves
   drive_not_disabled,   // a drive didn't confirm within a second that it is switched off

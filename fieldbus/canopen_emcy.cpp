@@ -118,7 +118,16 @@ std::string describe(const Emergency& emergency) {
     text += register_bits[bit];
     separator = ", ";
   }
-  return text + ")";
+  text += ")";
+  if (std::all_of(emergency.vendor.begin(), emergency.vendor.end(), [](std::uint8_t byte) { return byte == 0; })) {
+    return text;
+  }
+  text += ", maker's bytes";
+  for (const std::uint8_t byte : emergency.vendor) {
+    std::snprintf(head, sizeof head, " %02X", unsigned{byte});
+    text += head;
+  }
+  return text;
 }
 
 }  // namespace proxarm::fieldbus

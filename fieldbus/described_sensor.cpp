@@ -2,11 +2,39 @@
 
 #include <algorithm>
 #include <bit>
+#include <boost/crc.hpp>
 #include <cmath>
+#include <functional>
+#include <numeric>
+#include <span>
 
 namespace proxarm::fieldbus {
 
-using description::ChecksumKind;
+namespace {
+
+std::uint32_t checksum_of(const description::SensorChecksum& rule, std::span<const std::uint8_t> bytes) noexcept {
+  using description::ChecksumKind;
+  const auto crc = [&](auto remainder) {
+    remainder.process_bytes(bytes.data(), bytes.size());
+    return static_cast<std::uint32_t>(remainder.checksum());
+  };
+  switch (rule.kind) {
+    case ChecksumKind::crc8:
+      return crc(
+          boost::crc_basic<8>(static_cast<std::uint8_t>(rule.polynomial), static_cast<std::uint8_t>(rule.initial)));
+    case ChecksumKind::crc16:
+      return crc(
+          boost::crc_basic<16>(static_cast<std::uint16_t>(rule.polynomial), static_cast<std::uint16_t>(rule.initial)));
+    case ChecksumKind::xor8:
+      return std::accumulate(bytes.begin(), bytes.end(), 0U, std::bit_xor<std::uint32_t>());
+    case ChecksumKind::sum8:
+    case ChecksumKind::sum16:
+      break;
+  }
+  return std::accumulate(bytes.begin(), bytes.end(), 0U);
+}
+
+}  // namespace
 
 // ---- Numbers
 
@@ -134,28 +162,8 @@ void DescribedSensor::complete(std::int64_t time_ns) noexcept {
 bool DescribedSensor::checksum_is_right() const noexcept {
   if (!protocol_.checksum) return true;
   const description::SensorChecksum& rule = *protocol_.checksum;
-  std::uint32_t sum = rule.initial;
-  for (std::size_t i = rule.from; i < rule.to; ++i) {
-    const std::uint32_t byte = sample_[i];
-    switch (rule.kind) {
-      case ChecksumKind::sum8:
-      case ChecksumKind::sum16:
-        sum += byte;
-        break;
-      case ChecksumKind::xor8:
-        sum ^= byte;
-        break;
-      case ChecksumKind::crc8:
-        sum ^= byte;
-        for (int bit = 0; bit < 8; ++bit) sum = (sum & 0x80U) != 0 ? sum << 1 ^ rule.polynomial : sum << 1;
-        break;
-      case ChecksumKind::crc16:
-        sum ^= byte << 8;
-        for (int bit = 0; bit < 8; ++bit) sum = (sum & 0x8000U) != 0 ? sum << 1 ^ rule.polynomial : sum << 1;
-        break;
-    }
-  }
-  return (sum & checksum_.mask) == bits_of(checksum_);
+  const std::span<const std::uint8_t> bytes(sample_.data() + rule.from, rule.to - rule.from);
+  return (checksum_of(rule, bytes) & checksum_.mask) == bits_of(checksum_);
 }
 
 // A step of more than half the counter's range is one backwards: an older sample that comes late.
@@ -167,6 +175,7 @@ bool DescribedSensor::counter_moved() noexcept {
     // A sensor that has started anew counts from anywhere: its second older sample in a row is believed.
     counted_ = step == 0;
     ++counts_.repeated;
+    if (step == 0) ++latest_.repeats;
     return false;
   }
   if (counted_) counts_.lost += step - 1;

@@ -16,8 +16,8 @@ void refuse_shared_identifiers(std::span<const UsedIdentifier> used, std::span<c
            .found = used[a].owner + " and " + used[b].owner,
            .expected = "one owner of each identifier",
            .advice =
-               "set another node or base identifier at one of them, or give each of the cell's buses an interface of "
-               "its own"});
+               "give one of them other identifiers, where it lets you (a drive's node, a sensor's base_id), or each of "
+               "the cell's buses an interface of its own"});
     }
   }
 }

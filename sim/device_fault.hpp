@@ -53,6 +53,13 @@ struct DeviceFault {
   std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();
 };
 
+// What a device may be, as bits.
+enum class FaultyDevice : std::uint8_t { can_drive = 1, modbus_drive = 2, sensor = 4 };
+
+// Throws SetupError where a device of this kind doesn't know the fault: it would do nothing, and a drill with it would
+// seem to pass.
+void require_known_fault(const DeviceFault& fault, FaultyDevice device);
+
 // Throws SetupError: unknown kind, missing or superfluous value, bad time. Whether the device exists is known only to
 // the cell.
 [[nodiscard]] DeviceFault parse_device_fault(std::string_view text);

@@ -56,7 +56,7 @@ void check_nodes(const description::Cell& cell, const description::SensorDescrip
       throw SetupError({.file = cell.file.string(),
                         .bus = cell.sensor.bus,
                         .node = cell.drives[i].node,
-                        .key = "sensor.base_id",
+                        .key = sensor.described && !sensor.described->has_base_id ? "sensor.bus" : "sensor.base_id",
                         .message = std::string("identifier ") + text + " would be the sensor's and, on the same " +
                                    "interface, that of the drive of " + cell.drives[i].joint});
     }

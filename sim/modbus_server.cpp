@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <boost/crc.hpp>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -36,12 +37,9 @@ bool readable(int fd) noexcept {
 
 // CRC-16/MODBUS: x¹⁶ + x¹⁵ + x² + 1, reflected, from FFFFh; sent low byte first.
 std::uint16_t crc16(const Bytes& bytes) noexcept {
-  unsigned crc = 0xFFFF;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc & 1U) != 0 ? crc >> 1 ^ 0xA001U : crc >> 1;
-  }
-  return static_cast<std::uint16_t>(crc);
+  boost::crc_optimal<16, 0x8005, 0xFFFF, 0, true, true> crc;
+  crc.process_bytes(bytes.data(), bytes.size());
+  return crc.checksum();
 }
 
 // Bytes of a request on a serial line with its checksum, as far as it can be told yet; 0: not yet.

@@ -140,32 +140,23 @@ class SimulatedCell::PlantWrench final : public WrenchSource {
 
 namespace {
 
-// A fault that the drive's bus doesn't know would do nothing, and a drill with it would seem to pass.
-void require_fault_of_drive(const DeviceFault& fault, bool on_modbus) {
-  bool only_can = false, only_modbus = false;
-  switch (fault.kind) {
-    case DeviceFaultKind::drive_fault:
-    case DeviceFaultKind::device_type:
-    case DeviceFaultKind::heartbeat_lost:
-    case DeviceFaultKind::sdo_silent:
-      only_can = true;
-      break;
-    case DeviceFaultKind::modbus_exception:
-    case DeviceFaultKind::modbus_closed:
-    case DeviceFaultKind::modbus_wrong_unit:
-    case DeviceFaultKind::modbus_half:
-      only_modbus = true;
-      break;
-    default:
-      break;
+// A fault that this sensor can't have would do nothing.
+void require_fault_of_sensor(const DeviceFault& fault, const description::SensorDescription& sensor) {
+  require_known_fault(fault, FaultyDevice::sensor);
+  const bool described = sensor.described.has_value();
+  const auto refuse = [&](const char* found, const char* expected) {
+    throw SetupError({.file = sensor.file.string(), .key = "device fault", .found = found, .expected = expected});
+  };
+  if (fault.kind == DeviceFaultKind::bad_checksum && !(described && sensor.described->checksum)) {
+    refuse("sensor:checksum for a sensor whose samples have none", "another fault, or a sensor with a checksum");
   }
-  if (!(on_modbus ? only_can : only_modbus)) return;
-  const std::string expected = on_modbus ? "silent, power, jammed, exception, closed, wrong_unit or half_answer"
-                                         : "silent, power, jammed, fault, device_type, heartbeat or sdo";
-  throw SetupError({.key = "device fault",
-                    .found = "one of " + std::string(on_modbus ? "CAN" : "Modbus") + " for " + fault.device +
-                             ", a drive on " + (on_modbus ? "Modbus" : "CAN"),
-                    .expected = expected});
+  if (fault.kind == DeviceFaultKind::status && described && !sensor.described->status) {
+    refuse("sensor:status for a sensor whose samples have no status word", "another fault, or a sensor with one");
+  }
+  const bool of_order = fault.kind == DeviceFaultKind::half_sample || fault.kind == DeviceFaultKind::swapped;
+  if (of_order && described && sensor.described->frames.size() < 2) {
+    refuse("a fault of the frames' order for a sensor with one frame a sample", "another fault");
+  }
 }
 
 }  // namespace
@@ -192,7 +183,7 @@ SimulatedCell::SimulatedCell(const description::Cell& cell, const description::S
     }
   }
   add_sensor(sensor);
-  check_faults();
+  check_faults(sensor);
 }
 
 SimulatedCell::~SimulatedCell() = default;
@@ -333,11 +324,15 @@ Truth SimulatedCell::present_truth() const noexcept {
 
 // ---- Faults
 
-void SimulatedCell::check_faults() const {
+void SimulatedCell::check_faults(const description::SensorDescription& sensor) const {
   for (const DeviceFault& fault : faults_) {
     const std::size_t axis = axis_of(fault.device);
     if (fault.device == "sensor" || axis < cell_.drives.size()) {
-      if (fault.device != "sensor") require_fault_of_drive(fault, modbus_drives_[axis] != nullptr);
+      if (fault.device == "sensor") {
+        require_fault_of_sensor(fault, sensor);
+      } else {
+        require_known_fault(fault, modbus_drives_[axis] ? FaultyDevice::modbus_drive : FaultyDevice::can_drive);
+      }
       continue;
     }
     std::string names;

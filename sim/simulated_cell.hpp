@@ -100,7 +100,7 @@ class SimulatedCell final : private Clockwork {
   void add_modbus_drive(std::size_t axis);
   void add_sensor(const description::SensorDescription& sensor);
   void convert(std::int64_t time_ns) noexcept;
-  void check_faults() const;
+  void check_faults(const description::SensorDescription& sensor) const;
   void schedule_faults();
   void set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept;
   void set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;

@@ -67,7 +67,10 @@ std::string place_of(const controller::FaultReport& report, const controller::Cy
   const fieldbus::CyclicDrive& drive = parts.drives[where].drive;
   std::string place = "drive of " + drive.description().joint + ", bus " + drive.description().bus + ", node " +
                       std::to_string(drive.description().node);
-  if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled) place += ": " + drive.describe();
+  if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled ||
+      report.fault == Fault::modbus_silent) {
+    place += ": " + drive.describe();
+  }
   return place;
 }
 

@@ -1,6 +1,8 @@
 #include "models/description/modbus_drive.hpp"
 
+#include <algorithm>
 #include <limits>
+#include <tuple>
 
 #include "models/description/yaml_file.hpp"
 
@@ -33,7 +35,13 @@ ModbusValue read_command_value(const YamlNode& node) {
              : signal == "control" ? Signal::control
                                    : Signal::constant;
   if (v.signal == Signal::constant && !node.has("value")) throw node.error_at("value", "a number, or a signal");
+  const bool has_value = v.signal == Signal::constant || v.signal == Signal::speed;
+  if (node.has("value") && !has_value) throw node.error_at("value", "no value for signal: " + signal);
+  if (node.has("scale") && v.signal != Signal::position && v.signal != Signal::speed) {
+    throw node.error_at("scale", "a scale for signal: position or speed only");
+  }
   v.value = read_value(node, "value", 0, v.registers);
+  if (v.signal == Signal::speed && v.value < 0) throw node.error_at("value", "a lowest speed from 0 up");
   v.scale = node.number_or("scale", 1.0, above(0.0, 1e9));
   return v;
 }
@@ -49,14 +57,89 @@ std::uint32_t read_mask(const YamlNode& node, std::string_view key, std::uint32_
   return static_cast<std::uint32_t>(node.integer_or(key, otherwise, 0, 0xFFFFFFFF));
 }
 
-void read_command(const YamlNode& node, ModbusDriveDescription& drive) {
-  drive.command_register = read_register(node, "register");
-  int positions = 0;
-  for (const YamlNode& value : node.list("values", 1, most_written)) {
-    drive.command.push_back(read_command_value(value));
-    positions += drive.command.back().signal == ModbusValue::Signal::position ? 1 : 0;
+int count_of(const ModbusDriveDescription& drive, ModbusValue::Signal signal) {
+  return static_cast<int>(std::count_if(drive.command.begin(), drive.command.end(),
+                                        [&](const ModbusValue& value) { return value.signal == signal; }));
+}
+
+// What the drive is told in one register can't mean two things, nor can it be found where it was told.
+struct Registers {
+  int first, count;
+  std::string name;
+};
+
+void claim(const YamlNode& node, std::vector<Registers>& taken, const Registers& block) {
+  for (const Registers& other : taken) {
+    if (block.first + block.count <= other.first || other.first + other.count <= block.first) continue;
+    throw node.error_at("register", "registers of its own",
+                        block.name + " in " + std::to_string(block.first) + " to " +
+                            std::to_string(block.first + block.count - 1) + ", which overlap those of " + other.name +
+                            ", " + std::to_string(other.first) + " to " +
+                            std::to_string(other.first + other.count - 1));
   }
-  if (positions != 1) throw node.error_at("values", "exactly one value with signal: position");
+  taken.push_back(block);
+}
+
+void check_overlaps(const YamlNode& root, const ModbusDriveDescription& drive) {
+  const YamlNode feedback = root.map("feedback");
+  std::vector<Registers> taken;
+  claim(root.map("command"), taken, {drive.command_register, drive.command_count(), "the command"});
+  claim(feedback.map("position"), taken, {drive.position.at, drive.position.registers, "the position"});
+  claim(feedback.map("status"), taken, {drive.status.at, drive.status.registers, "the status"});
+  if (!root.has("settings")) return;
+  const auto nodes = root.list("settings", 0, 64);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const ModbusSetting& setting = drive.settings[i];
+    claim(nodes[i], taken, {setting.at, setting.registers, "setting " + in_quotes(setting.name)});
+  }
+}
+
+void read_control(const YamlNode& node, ModbusDriveDescription& drive) {
+  drive.control_on = read_value(node, "on", 0, 2);
+  drive.control_off = read_value(node, "off", 0, 2);
+  const auto word = std::find_if(drive.command.begin(), drive.command.end(),
+                                 [](const ModbusValue& value) { return value.signal == ModbusValue::Signal::control; });
+  if (word == drive.command.end()) {
+    if (drive.control_on != drive.control_off) {
+      throw node.error_at("on", "the same as `off`: no value of the command has signal: control");
+    }
+    return;
+  }
+  for (const char* key : {"on", "off"}) (void)read_value(node, key, 0, word->registers);
+  if (drive.control_on == drive.control_off) throw node.error_at("on", "a control word other than `off`");
+}
+
+// Bits that are looked for must be there, and a fault mustn't look like its absence.
+void check_status(const YamlNode& node, const ModbusDriveDescription& drive) {
+  const std::uint32_t bits = drive.status.registers == 1 ? 0xFFFF : 0xFFFFFFFF;
+  const std::tuple<const char*, std::uint32_t, std::uint32_t> masks[] = {
+      {"ready_mask", drive.ready_mask, bits},
+      {"ready_value", drive.ready_value, drive.ready_mask},
+      {"enabled_mask", drive.enabled_mask, bits},
+      {"enabled_value", drive.enabled_value, drive.enabled_mask},
+      {"fault_mask", drive.fault_mask, bits}};
+  for (const auto& [key, value, allowed] : masks) {
+    if ((value & ~allowed) == 0) continue;
+    throw node.error_at(key, allowed == bits
+                                 ? "bits of a status word of " + std::to_string(drive.status.registers) + " register(s)"
+                                 : "bits of its mask alone: this status would never be seen");
+  }
+  if (((drive.ready_value | drive.enabled_value) & drive.fault_mask) != 0) {
+    throw node.error_at("fault_mask", "bits that are clear while the drive is ready and driven");
+  }
+  if (drive.enabled_mask == 0 && count_of(drive, ModbusValue::Signal::control) > 0) {
+    throw node.error_at("enabled_mask", "the bits that say that the motor is driven: the control word switches it");
+  }
+}
+
+void read_command(const YamlNode& node, ModbusDriveDescription& drive) {
+  using Signal = ModbusValue::Signal;
+  drive.command_register = read_register(node, "register");
+  for (const YamlNode& value : node.list("values", 1, most_written)) drive.command.push_back(read_command_value(value));
+  if (count_of(drive, Signal::position) != 1) throw node.error_at("values", "exactly one value with signal: position");
+  if (count_of(drive, Signal::speed) > 1 || count_of(drive, Signal::control) > 1) {
+    throw node.error_at("values", "at most one value with signal: speed, and one with signal: control");
+  }
   if (drive.command_count() > most_written || drive.command_register + drive.command_count() > highest_register + 1) {
     throw node.error_at("values", "at most 121 registers, none above 65535", std::to_string(drive.command_count()));
   }
@@ -83,6 +166,7 @@ void read_feedback(const YamlNode& node, ModbusDriveDescription& drive) {
   drive.enabled_mask = read_mask(status, "enabled_mask", 0);
   drive.enabled_value = read_mask(status, "enabled_value", drive.enabled_mask);
   drive.fault_mask = read_mask(status, "fault_mask", 0);
+  check_status(status, drive);
 }
 
 }  // namespace
@@ -113,9 +197,7 @@ ModbusDriveDescription read_modbus_drive(const YamlNode& root) {
     throw root.error_at("stale_after_s", "at least two periods of rate_Hz, and at least response_timeout_s");
   }
   read_command(root.map("command"), drive);
-  const YamlNode control = root.map("control");
-  drive.control_on = read_value(control, "on", 0, 2);
-  drive.control_off = read_value(control, "off", 0, 2);
+  read_control(root.map("control"), drive);
   read_feedback(root.map("feedback"), drive);
   if (root.has("settings")) {
     for (const YamlNode& node : root.list("settings", 0, 64)) {
@@ -127,6 +209,7 @@ ModbusDriveDescription read_modbus_drive(const YamlNode& root) {
       drive.settings.push_back(setting);
     }
   }
+  check_overlaps(root, drive);
   root.finish();
   return drive;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "models/description/dbc_file.hpp"
 #include "models/description/yaml_file.hpp"
@@ -283,6 +284,42 @@ struct Reader {
     }
   }
 
+  // Bit j of a number lies `shift + j` bits above the lowest of its lowest byte.
+  [[nodiscard]] static std::size_t bit_of(const NumberField& number, int j) {
+    const auto above = static_cast<std::size_t>(number.shift + j);
+    return 8 * (number.big_endian ? number.byte + number.bytes() - 1 - above / 8 : number.byte + above / 8) + above % 8;
+  }
+
+  void claim(const YamlNode& node, const std::string& name, const NumberField& number,
+             std::map<std::size_t, std::string>& taken) const {
+    for (int j = 0; j < number.bits; ++j) {
+      const auto [place, free] = taken.emplace(bit_of(number, j), name);
+      if (free) continue;
+      throw node.error_at(node.has("signal") ? "signal" : "byte", "bits that nothing else has",
+                          "bit " + std::to_string(place->first % 8) + " of byte " + std::to_string(place->first / 8) +
+                              ", which is " + place->second + "'s");
+    }
+  }
+
+  void check_overlaps() const {
+    std::map<std::size_t, std::string> taken;
+    std::size_t at = 0;
+    for (const SampleFrame& frame : protocol.frames) {
+      for (std::size_t bit = 8 * at; bit < 8 * (at + frame.starts_with.size()); ++bit)
+        taken.emplace(bit, "starts_with");
+      at += frame.bytes;
+    }
+    const bool by_name = protocol.matrix_columns.empty();
+    const auto listed = by_name ? std::vector<YamlNode>{} : root.list("signals", 1, max_sensor_signals);
+    for (std::size_t i = 0; i < protocol.signals.size(); ++i) {
+      const YamlNode node = by_name ? root.map("signals").map(components[i]) : listed[i];
+      claim(node, by_name ? components[i] : "signal " + std::to_string(i + 1), protocol.signals[i].number, taken);
+    }
+    if (protocol.counter) claim(root.map("counter"), "counter", *protocol.counter, taken);
+    if (protocol.status) claim(root.map("status"), "status", protocol.status->number, taken);
+    if (protocol.checksum) claim(root.map("checksum"), "checksum", protocol.checksum->number, taken);
+  }
+
   void check_identifiers() const {
     const std::uint64_t most = protocol.extended ? 0x1FFFFFFF : 0x7FF;
     const std::uint64_t base = std::uint64_t{protocol.base_id_max} * protocol.base_id_step;
@@ -344,6 +381,7 @@ SensorProtocol read_sensor_protocol(const YamlNode& root) {
   reader.read_checksum();
   reader.read_conversation();
   reader.check_identifiers();
+  reader.check_overlaps();
   return protocol;
 }
 

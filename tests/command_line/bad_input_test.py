@@ -244,8 +244,10 @@ class Options(ProgramTest):
 
     def test_a_fault_that_its_bus_does_not_know(self):
         rail = SOURCE / "models/cells/rail.yaml"
-        self.assert_refused(self.call("run", rail, "--fault", "rail:sdo@1s"), "rail, a drive on Modbus", "half_answer")
-        self.assert_refused(self.call("run", "--fault", "axis_1:closed@1s"), "axis_1, a drive on CAN", "heartbeat")
+        self.assert_refused(self.call("run", rail, "--fault", "rail:sdo@1s"), "sdo for rail", "for a drive on Modbus", "half_answer")
+        self.assert_refused(self.call("run", "--fault", "axis_1:closed@1s"), "closed for axis_1", "a drive on CAN")
+        self.assert_refused(self.call("run", "--fault", "sensor:checksum@1s"), "sensor:checksum", "have none")
+        self.assert_refused(self.call("run", "--fault", "axis_1:fault=0x14210@1s"), "0 to 65535")
 
     def test_a_session_lasts_at_most_a_week(self):
         self.assert_refused(self.call("run", "--duration", "1e30s"), "--duration", "at most a week")

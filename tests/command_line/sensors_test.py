@@ -32,12 +32,19 @@ class OtherSensors(ProgramTest):
 
     def test_their_faults_end_the_run_with_a_name(self):
         for fault, name in (("half", "sensor_lost"), ("checksum", "sensor_lost"), ("saturated", "sensor_saturated"),
-                            ("status=0x0400", "sensor_status")):
+                            ("frozen", "sensor_frozen"), ("status=0x0400", "sensor_status")):
             with self.subTest(fault):
                 outcome = self.call("run", "--json", self.cell_with("onrobot_hex"), "--fault", f"sensor:{fault}@0.5s",
                                     "--duration", "1s")
                 self.assertEqual(outcome.status, 1, outcome.err)
                 self.assertIn(name, json.dumps(outcome.summary["faults"]))
+
+    def test_faults_that_a_sensor_cannot_have_are_refused(self):
+        for name, fault in (("aidin_aft200", "checksum"), ("aidin_aft200", "status=0x1"), ("wacoh_dynpick", "checksum")):
+            with self.subTest(name + fault):
+                outcome = self.call("run", self.cell_with(name), "--fault", f"sensor:{fault}@0.5s")
+                self.assertEqual(outcome.status, 2, outcome.err)
+                self.assertIn("sensor:" + fault[:6], outcome.err)
 
     def test_the_plan_names_their_frames_and_what_outranks_sync(self):
         outcome = self.call("plan", self.cell_with("aidin_aft200"))

@@ -92,6 +92,7 @@ TEST(ModbusAxis, WindsNothingUpBehindAJammedRail) {
 
 struct LineFault {
   const char* script;
+  Fault named;
   fieldbus::DriveFault fault;
   std::size_t most_cycles;  // from the failure to the stop: one exchange of 5 ms, or the 60 ms of stale_after_s
   const char* message;
@@ -102,7 +103,7 @@ class ModbusLineFaults : public ::testing::TestWithParam<LineFault> {};
 TEST_P(ModbusLineFaults, StopAllAxes) {
   ClosedLoopRig rig(rail({std::string("rail:") + GetParam().script + "@1.9s"}));
   rig.run();
-  ASSERT_EQ(rig.fault().fault, Fault::drive_fault) << fault_name(rig.fault().fault);
+  ASSERT_EQ(rig.fault().fault, GetParam().named) << fault_name(rig.fault().fault);
   EXPECT_EQ(rig.fault().where, 0);
   const fieldbus::CyclicDrive& drive = rig.cycle->parts().drives[0].drive;
   EXPECT_EQ(drive.fault(), GetParam().fault) << drive.describe();
@@ -123,11 +124,13 @@ TEST_P(ModbusLineFaults, StopAllAxes) {
 INSTANTIATE_TEST_SUITE_P(
     Faults, ModbusLineFaults,
     ::testing::Values(
-        LineFault{"exception", fieldbus::DriveFault::modbus_exception, 8, "server device failure"},
-        LineFault{"closed", fieldbus::DriveFault::modbus_closed, 8, "connection was closed"},
-        LineFault{"wrong_unit", fieldbus::DriveFault::modbus_wrong_unit, 8, "another unit"},
-        LineFault{"silent", fieldbus::DriveFault::modbus_timeout, 70, "no complete Modbus answer in time"},
-        LineFault{"half_answer", fieldbus::DriveFault::modbus_timeout, 70, "no complete Modbus answer in time"}),
+        LineFault{"exception", Fault::drive_fault, fieldbus::DriveFault::modbus_exception, 8, "server device failure"},
+        LineFault{"closed", Fault::modbus_silent, fieldbus::DriveFault::modbus_closed, 8, "connection was closed"},
+        LineFault{"wrong_unit", Fault::drive_fault, fieldbus::DriveFault::modbus_wrong_unit, 8, "another unit"},
+        LineFault{"silent", Fault::modbus_silent, fieldbus::DriveFault::modbus_timeout, 70,
+                  "no complete Modbus answer in time"},
+        LineFault{"half_answer", Fault::modbus_silent, fieldbus::DriveFault::modbus_timeout, 70,
+                  "no complete Modbus answer in time"}),
     [](const auto& fault) { return std::string(fault.param.script); });
 
 }  // namespace

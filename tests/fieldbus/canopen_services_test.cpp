@@ -81,7 +81,8 @@ TEST(Emcy, CarriesCodeRegisterAndTheMakersBytes) {
   EXPECT_EQ(emergency.vendor, (std::array<std::uint8_t, 5>{1, 2, 3, 4, 5}));
   EXPECT_EQ(emergency.time_ns, 7);
   EXPECT_EQ(describe(emergency),
-            "EMCY 8130: life guard error or heartbeat error (error register 11: generic, communication)");
+            "EMCY 8130: life guard error or heartbeat error (error register 11: generic, communication), maker's "
+            "bytes 01 02 03 04 05");
   EXPECT_FALSE(decode_emcy(frame_of("084#3081110102030405"), 7, 3, emergency));
   EXPECT_FALSE(decode_emcy(frame_of("080#"), 7, 0, emergency)) << "SYNC is no EMCY of node 0";
 }

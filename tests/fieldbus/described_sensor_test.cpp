@@ -509,6 +509,8 @@ TEST(DescribedSensor, FilesAreRefusedWithTheKey) {
   EXPECT_THAT(told("[0, 1, 0, 0, 0, 0]", "[0, 1, 0, 0, 0]"), HasSubstr("matrix[1]"));
   EXPECT_THAT(told("poll: {id: 0x300, data: [0x55]}", ""), HasSubstr("rate_Hz"));
   EXPECT_THAT(told("data: [0x55]", "data: [0x155]"), HasSubstr("poll.data[0]"));
+  // One bit can't be two things.
+  EXPECT_THAT(told("byte: 12, bits: 16", "byte: 11, bits: 16"), HasSubstr("bits that nothing else has"));
 }
 
 }  // namespace

@@ -335,7 +335,7 @@ TEST(ModbusRefuses, DescriptionsThatCannotBe) {
     return "";
   };
   const std::string good =
-      "name: x\nprotocol: modbus\ncommand: {register: 0, values: [{signal: position}]}\ncontrol: {on: 1, off: 0}\n"
+      "name: x\nprotocol: modbus\ncommand: {register: 0, values: [{signal: position}]}\ncontrol: {on: 0, off: 0}\n"
       "feedback: {register: 16, count: 3, position: {register: 17}, status: {register: 16, registers: 1}}\n";
   EXPECT_EQ(message(good), "");
   EXPECT_THAT(message(good + "stale_after_s: 0.001\n"), HasSubstr("at least two periods of rate_Hz"));
@@ -344,6 +344,58 @@ TEST(ModbusRefuses, DescriptionsThatCannotBe) {
   std::string outside = good;
   outside.replace(outside.find("register: 17"), 12, "register: 18");
   EXPECT_THAT(message(outside), HasSubstr("registers among those that are read, 16 to 18"));
+}
+
+// A map whose blocks overlapped was taken, and moved the arm when it was enabled: the speed went into the register of
+// the target. So was one whose status could never be seen.
+TEST(ModbusRefuses, RegisterMapsThatContradictThemselves) {
+  const std::string good = R"(name: x
+protocol: modbus
+command:
+  register: 0
+  values:
+    - {signal: control, registers: 1}
+    - {signal: position}
+    - {signal: speed, value: 1}
+control: {on: 1, off: 0}
+feedback:
+  register: 16
+  count: 3
+  position: {register: 17}
+  status: {register: 16, registers: 1, ready_mask: 0x1, enabled_mask: 0x2, fault_mask: 0x8}
+settings:
+  - {name: timeout, register: 32, registers: 1, value: 60}
+  - {name: ramp, register: 33, value: 1000}
+)";
+  const auto told = [&](const std::string& from, const std::string& to) -> std::string {
+    std::string text = good;
+    EXPECT_NE(text.find(from), std::string::npos) << from;
+    text.replace(text.find(from), from.size(), to);
+    try {
+      (void)description::read_modbus_drive(description::YamlNode::parse(text, "drive.yaml"));
+    } catch (const description::SetupError& error) {
+      return error.what();
+    }
+    return "taken";
+  };
+  EXPECT_EQ(told("name: x", "name: y"), "taken");
+  EXPECT_THAT(told("register: 33", "register: 32"),
+              HasSubstr("drive.yaml:17: settings[1].register: found setting \"ramp\" "
+                        "in 32 to 33, which overlap those of setting"));
+  EXPECT_THAT(told("register: 33", "register: 4"), HasSubstr("overlap those of the command, 0 to 4"));
+  EXPECT_THAT(told("register: 33", "register: 15"), HasSubstr("overlap those of the status"));
+  EXPECT_THAT(told("position: {register: 17}", "position: {register: 16}"), HasSubstr("overlap those of the position"));
+  EXPECT_THAT(told("  register: 0", "  register: 14"), HasSubstr("drive.yaml:13: feedback.position.register"));
+  EXPECT_THAT(told("enabled_mask: 0x2", "enabled_mask: 0x2, enabled_value: 0x4"), HasSubstr("never be seen"));
+  EXPECT_THAT(told("ready_mask: 0x1", "ready_mask: 0x10001"), HasSubstr("feedback.status.ready_mask"));
+  EXPECT_THAT(told("fault_mask: 0x8", "fault_mask: 0xA"), HasSubstr("clear while the drive is ready"));
+  EXPECT_THAT(told(", enabled_mask: 0x2", ""), HasSubstr("the motor is driven"));
+  EXPECT_THAT(told("on: 1", "on: 0"), HasSubstr("a control word other than `off`"));
+  EXPECT_THAT(told("on: 1", "on: 70000"), HasSubstr("control.on: found 70000"));
+  EXPECT_THAT(told("{signal: speed, value: 1}", "{signal: control}"), HasSubstr("at most one value with signal"));
+  EXPECT_THAT(told("{signal: speed, value: 1}", "{signal: speed, value: -1}"), HasSubstr("from 0 up"));
+  EXPECT_THAT(told("{signal: position}", "{signal: position, value: 3}"), HasSubstr("no value for signal: position"));
+  EXPECT_THAT(told("{signal: control, registers: 1}", "{value: 1, registers: 1}"), HasSubstr("the same as `off`"));
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ class ModbusAxis(two.VcanTestCase):
     def test_a_connection_that_is_closed_stops_the_arm(self):
         status, summary, errors = self.run_both("--fault", "rail:closed@1.5s")
         self.assertEqual(status, 1, errors)
-        self.assertEqual([fault["fault"] for fault in summary["faults"]], ["drive_fault"])
+        self.assertEqual([fault["fault"] for fault in summary["faults"]], ["modbus_silent"])
         self.assertIn("Modbus connection was closed", summary["faults"][0]["text"])
 
 
