@@ -43,20 +43,6 @@ std::vector<DriveBus> drive_buses(const std::vector<DriveOnBus>& drives) {
   return buses;
 }
 
-std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
-                                                   const description::SensorDescription& sensor) {
-  if (sensor.protocol == "ati_net_can_oem") {
-    fieldbus::AtiNetCanOemSettings settings;
-    settings.bus_name = cell.sensor.bus;
-    settings.base_id = cell.sensor.base_id;
-    return std::make_unique<fieldbus::AtiNetCanOem>(settings);
-  }
-  fieldbus::DescribedSensorSettings settings;
-  settings.bus_name = cell.sensor.bus;
-  settings.base_id = cell.sensor.base_id;
-  return std::make_unique<fieldbus::DescribedSensor>(sensor, settings);
-}
-
 DriveOnBus make_drive(const description::Cell& cell, const description::DriveDescription& drive,
                       const SessionSettings& settings, const BusIndices& bus_indices) {
   if (drive.on_can()) {
@@ -118,6 +104,12 @@ OrientationConfig orientation_config(const SessionSettings& settings) {
   return config;
 }
 
+ImpedanceConfig impedance_config(const SessionSettings& settings) {
+  return {.stiffness_N_per_m = settings.coupling_stiffness_N_per_m,
+          .damping_Ns_per_m = settings.coupling_damping_Ns_per_m,
+          .period_s = settings.period_s};
+}
+
 std::vector<fieldbus::DriveSlot> slots(CycleParts& parts) {
   std::vector<fieldbus::DriveSlot> slots;
   for (DriveOnBus& axis : parts.drives) {
@@ -149,16 +141,54 @@ void refuse_shared_identifiers(CycleParts& parts) {
 
 }  // namespace
 
+std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
+                                                   const description::SensorDescription& sensor) {
+  if (sensor.protocol == "ati_net_can_oem") {
+    fieldbus::AtiNetCanOemSettings settings;
+    settings.bus_name = cell.sensor.bus;
+    settings.base_id = cell.sensor.base_id;
+    return std::make_unique<fieldbus::AtiNetCanOem>(settings);
+  }
+  fieldbus::DescribedSensorSettings settings;
+  settings.bus_name = cell.sensor.bus;
+  settings.base_id = cell.sensor.base_id;
+  return std::make_unique<fieldbus::DescribedSensor>(sensor, settings);
+}
+
+// Torques for drives that take them, positions for those that don't.
+void require_scheme(const description::Cell& cell, const SessionSettings& settings) {
+  const bool torque = settings.scheme == Scheme::impedance;
+  for (const description::DriveDescription& drive : cell.drives) {
+    if ((drive.mode == "cst") == torque) continue;
+    throw SetupError(
+        {.file = cell.file.string(),
+         .key = "--scheme",
+         .found = torque ? "impedance" : "admittance",
+         .expected = torque ? "admittance: the drive of " + drive.joint + " takes positions (mode " + drive.mode + ")"
+                            : "impedance: the drive of " + drive.joint + " takes torques (mode cst)",
+         .advice = torque ? "the impedance type needs mode: cst for all drives" : ""});
+  }
+}
+
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
                        const BusIndices& bus_indices, const ModbusOpener& open_line) {
+  require_scheme(cell, settings);
   std::vector<DriveOnBus> drives;
   for (const description::DriveDescription& drive : cell.drives) {
     drives.push_back(make_drive(cell, drive, settings, bus_indices));
   }
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines = modbus_lines(cell, drives, open_line);
   auto arm = std::make_unique<models::Arm>(cell);
-  models::InverseKinematics inverse(*arm, inverse_config(cell, settings.period_s));
+  std::optional<models::InverseKinematics> inverse;
+  std::unique_ptr<RenderedWorld> world;
+  std::unique_ptr<TorqueRendering> torque;
+  if (settings.scheme == Scheme::impedance) {
+    torque = make_torque_rendering(scene, *arm, cell.drives, cell.limits, impedance_config(settings));
+  } else {
+    inverse.emplace(*arm, inverse_config(cell, settings.period_s));
+    world = make_rendered_world(scene, settings, proxy_mass(cell, settings));
+  }
   ElasticSetpoint elastic(*arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s);
   std::vector<DriveBus> buses = drive_buses(drives);
   return CycleParts{network,
@@ -170,7 +200,8 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
                     std::move(arm),
                     std::move(inverse),
                     std::move(elastic),
-                    make_rendered_world(scene, settings, proxy_mass(cell, settings)),
+                    std::move(world),
+                    std::move(torque),
                     OrientationProxy(orientation_config(settings)),
                     WrenchCompensation(cell)};
 }

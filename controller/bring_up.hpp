@@ -23,6 +23,13 @@ using BusIndices = std::vector<std::size_t>;
 using ModbusOpener = std::function<std::unique_ptr<fieldbus::ModbusClient>(const description::ModbusLineDescription&,
                                                                            double response_timeout_s)>;
 
+// Throws SetupError where the cell's base_id isn't one of the sensor's.
+std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
+                                                   const description::SensorDescription& sensor);
+
+// Throws SetupError where the drives' modes can't render that way. build_parts() asks, too.
+void require_scheme(const description::Cell& cell, const SessionSettings& settings);
+
 // `scene` must outlive the parts.
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,

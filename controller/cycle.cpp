@@ -47,6 +47,7 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
       link_rad_(parts_.arm->start_rad()),
       target_rad_(parts_.arm->start_rad()),
+      torque_Nm_(JointVector::Zero(parts_.arm->axes())),
       run_out_rad_per_s_(JointVector::Zero(parts_.arm->axes())),
       measured_link_rad_(parts_.arm->start_rad()),
       actual_rad_(parts_.arm->start_rad()),
@@ -212,11 +213,11 @@ void Cycle::judge_drives() noexcept {
       case fieldbus::DriveFault::left_operation:
         raise(Fault::drive_disabled, where);
         break;
-      case fieldbus::DriveFault::target_out_of_range:
       case fieldbus::DriveFault::modbus_timeout:
       case fieldbus::DriveFault::modbus_closed:
         raise(Fault::modbus_silent, where);
         break;
+      case fieldbus::DriveFault::target_out_of_range:
         raise(Fault::target_out_of_range, where);
         break;
       default:
@@ -298,6 +299,7 @@ void Cycle::act(std::int64_t t_k_ns) noexcept {
 // A drive that already follows while others don't yet stays where it was told to be when it was enabled.
 void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
   for (Eigen::Index i = 0; i < target_rad_.size(); ++i) target_rad_[i] = parts_.drives[i].drive.target_rad();
+  if (parts_.torque) hold();
   const auto not_following = std::find_if(parts_.drives.begin(), parts_.drives.end(),
                                           [](const DriveOnBus& a) { return !a.drive.following(); });
   if (not_following == parts_.drives.end()) {
@@ -321,6 +323,7 @@ void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
 bool Cycle::drives_off() const noexcept { return std::all_of(parts_.drives.begin(), parts_.drives.end(), is_off); }
 
 void Cycle::tare(std::int64_t t_k_ns) noexcept {
+  if (parts_.torque) hold();
   if (sample_is_new_) parts_.compensation.add_tare_sample(reading_S_, R_WS_);
   const double spread_N = parts_.compensation.tare_spread_N();
   if (spread_N > settings_.tare_spread_N) {
@@ -334,6 +337,7 @@ void Cycle::tare(std::int64_t t_k_ns) noexcept {
 
 // The proxy starts at rest where the targets stand, so the first setpoint equals the last one.
 void Cycle::start_rendering() noexcept {
+  if (parts_.torque) return parts_.torque->start(measured_link_rad_);
   link_rad_ = parts_.arm->link_from_motor(target_rad_);
   const models::Pose X_WT = parts_.arm->tool_pose(link_rad_);
   parts_.elastic.start(link_rad_);
@@ -356,6 +360,7 @@ void Cycle::take_change() noexcept {
 }
 
 void Cycle::render() noexcept {
+  if (parts_.torque) return render_torques();
   take_change();
   make_limits();
   const WorldStep step = parts_.world->step(hand_W_.force, step_limits_);
@@ -364,18 +369,46 @@ void Cycle::render() noexcept {
   active_.add(step.limits);
   proxy_k1_W_ = proxy_W_;
   proxy_W_ = step.q_W;
-  record_.p_hat_W_m = triple(step.p_hat_W);
-  record_.contact_force_W_N = triple(step.f_W);
-  record_.normal_W = triple(step.normal_W);
-  record_.contact_object = step.object;
-  record_.contact_count = static_cast<std::uint8_t>(step.contacts);
-  record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
+  record_world(step);
   record_.set(RecordFlag::limit_orientation, parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy();
   const double distance_m = (tool_W_ - proxy_W_).norm();
   if (!(distance_m <= limits_.leash_m + leash_tolerance_m)) {
     raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
   }
+  ++rendered_cycles_;
+}
+
+void Cycle::record_world(const WorldStep& step) noexcept {
+  record_.p_hat_W_m = triple(step.p_hat_W);
+  record_.contact_force_W_N = triple(step.f_W);
+  record_.normal_W = triple(step.normal_W);
+  record_.contact_object = step.object;
+  record_.contact_count = static_cast<std::uint8_t>(step.contacts);
+  record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
+}
+
+// Where the device stands when the first brake opens.
+void Cycle::hold() noexcept {
+  const bool any_live = std::any_of(parts_.drives.begin(), parts_.drives.end(),
+                                    [](const DriveOnBus& axis) { return axis.drive.following(); });
+  if (!any_live) parts_.torque->anchor(measured_link_rad_);
+  torque_Nm_ = parts_.torque->hold(measured_link_rad_).torque_Nm;
+}
+
+// A device that is driven back must not run away: it may be as fast as its joints may.
+void Cycle::render_torques() noexcept {
+  for (Eigen::Index i = 0; i < actual_rad_.size(); ++i) {
+    const double speed = std::abs(actual_rad_[i] - actual_k1_rad_[i]) / settings_.period_s;
+    const double limit = parts_.drives[static_cast<std::size_t>(i)].drive.description().max_speed_rad_per_s;
+    if (speed > limit) return raise(Fault::target_too_fast, static_cast<std::int32_t>(i), speed, limit);
+  }
+  const TorqueStep& step = parts_.torque->step(measured_link_rad_);
+  if (step.world.fault != ProxyFault::none) return raise(Fault::proxy_not_finite, -1);
+  active_.add(step.limits);
+  proxy_W_ = step.world.q_W;
+  torque_Nm_ = step.torque_Nm;
+  record_world(step.world);
   ++rendered_cycles_;
 }
 
@@ -398,7 +431,7 @@ void Cycle::follow_proxy() noexcept {
   X_WT.translation() = proxy_W_;
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
   const models::Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
-  parts_.inverse.solve(link_rad_, X_WT, solution_);
+  parts_.inverse->solve(link_rad_, X_WT, solution_);
   if (solution_.status == models::InverseKinematicsResult::Status::invalid) return raise(Fault::singular, -1);
   link_rad_ = solution_.q;
   if (solution_.status != models::InverseKinematicsResult::Status::converged) {
@@ -456,6 +489,7 @@ void Cycle::wind_back() noexcept {
 
 // Every joint keeps its share of the last motion while that shrinks to nothing, within each joint's deceleration.
 void Cycle::run_out() noexcept {
+  if (parts_.torque) return supervisor_.handle(Event::at_rest);
   run_out_scale_ = std::max(0.0, run_out_scale_ - run_out_per_cycle_);
   active_.add(guard_.step(target_rad_ + run_out_scale_ * settings_.period_s * run_out_rad_per_s_));
   target_rad_ = guard_.target_rad();
@@ -466,7 +500,11 @@ void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
   fieldbus::CanFrame frame;
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
-    drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
+    if (parts_.torque) {
+      parts_.drives[i].on_can->set_target_torque_Nm(torque_Nm_[static_cast<Eigen::Index>(i)]);
+    } else {
+      drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
+    }
     if (drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame, static_cast<std::int32_t>(i));
   }
   for (DriveBus& bus : parts_.drive_buses) {
@@ -506,7 +544,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record_.tool_W_m = triple(tool_W_);
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
-    record_.target_counts[i] = drive.target_counts();
+    record_.target_counts[i] = parts_.torque ? parts_.drives[i].on_can->target_torque() : drive.target_counts();
     record_.actual_counts[i] = drive.actual_counts();
     if (!drive.fresh()) record_.set(RecordFlag::feedback_missing);
   }

@@ -10,6 +10,9 @@
 // run_cycle() neither allocates, locks, throws nor prints; all that it touches was built before. One thread calls it.
 // The supervisor's phase says what the targets are: the actual positions (enabling), still (taring, disabling), the
 // proxy's (rendering), or the last ones run out at the joints' own deceleration (stopping).
+//
+// Impedance type (torque_rendering.hpp): the same cycle, with torques for where the tool is. Until rendering they hold
+// it where it stands; stopping is the drives' own, from whatever torque on their slow-down ramp (6084h).
 #pragma once
 
 #include <array>
@@ -17,6 +20,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "controller/black_box.hpp"
@@ -30,6 +34,7 @@
 #include "controller/spsc_ring.hpp"
 #include "controller/step_limits.hpp"
 #include "controller/supervisor.hpp"
+#include "controller/torque_rendering.hpp"
 #include "controller/wrench_compensation.hpp"
 #include "fieldbus/can_network.hpp"
 #include "fieldbus/canopen_heartbeat.hpp"
@@ -70,10 +75,11 @@ struct CycleParts {
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
   std::size_t sensor_bus;
-  std::unique_ptr<models::Arm> arm;  // in one place for good: the inverse kinematics refers to it
-  models::InverseKinematics inverse;
+  std::unique_ptr<models::Arm> arm;                  // in one place for good: the inverse kinematics refers to it
+  std::optional<models::InverseKinematics> inverse;  // admittance type
   ElasticSetpoint elastic;
-  std::unique_ptr<RenderedWorld> world;
+  std::unique_ptr<RenderedWorld> world;     // admittance type
+  std::unique_ptr<TorqueRendering> torque;  // impedance type
   OrientationProxy orientation;
   WrenchCompensation compensation;
 };
@@ -133,6 +139,9 @@ class Cycle {
   void render() noexcept;
   void take_change() noexcept;
   void make_limits() noexcept;
+  void hold() noexcept;
+  void render_torques() noexcept;
+  void record_world(const WorldStep& step) noexcept;
   void follow_proxy() noexcept;
   void command(const JointVector& motor_rad) noexcept;
   bool drives_follow(const JointVector& motor_rad, JointVector& wanted_rad) noexcept;
@@ -174,6 +183,7 @@ class Cycle {
   models::Vec3 proxy_W_ = models::Vec3::Zero();
   JointVector link_rad_;    // angles of the links at the target: what inverse kinematics starts from
   JointVector target_rad_;  // motor side, what the drives are sent
+  JointVector torque_Nm_;   // the same of the impedance type
   JointVector run_out_rad_per_s_;
   JointVector measured_link_rad_;
   JointVector actual_rad_;  // by the encoders

@@ -36,6 +36,7 @@ enum class RecordFlag : std::uint32_t {
   limit_joint_acceleration = 1u << 14,
   limit_singularity = 1u << 15,      // inverse kinematics stopped short: end of reach, or nearly singular
   limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
+  limit_joint_torque = 1u << 17,     // impedance type: the rendered torques were cut
 };
 
 // The flag of a limit, and the parameter that holds it ("limits.leash_m").
@@ -53,7 +54,8 @@ inline constexpr std::array limit_flags{LimitFlag{RecordFlag::limit_speed, Limit
                                         LimitFlag{RecordFlag::limit_joint_acceleration, Limit::joint_acceleration},
                                         LimitFlag{RecordFlag::limit_leash, Limit::leash},
                                         LimitFlag{RecordFlag::limit_singularity, Limit::singularity},
-                                        LimitFlag{RecordFlag::limit_following_error, Limit::following_error}};
+                                        LimitFlag{RecordFlag::limit_following_error, Limit::following_error},
+                                        LimitFlag{RecordFlag::limit_joint_torque, Limit::joint_torque}};
 
 // Three numbers that stay trivially copyable (Eigen's types aren't).
 using Triple = std::array<double, 3>;
@@ -84,7 +86,7 @@ struct CycleRecord {
   Triple tool_W_m{};                  // the rendered point by the encoders, at t_k
   double proxy_clearance_m = 0.0;     // signed distance of the proxy to the nearest surface; below 0: inside
   double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders
-  std::array<std::int32_t, max_axes> target_counts{};  // 607A, sent in this cycle
+  std::array<std::int32_t, max_axes> target_counts{};  // 607A sent in this cycle; in torque mode 6071
   std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
 
   // The simulation's truth at t_k (flag `truth`).

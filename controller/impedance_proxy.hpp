@@ -56,8 +56,8 @@ class ImpedanceProxy {
     if (!p.allFinite()) return ProxyFault::input_not_finite;
     const double K = config_.stiffness_N_per_m, B = config_.damping_Ns_per_m, T = config_.period_s;
     const bool implicit = config_.law == ImpedanceLaw::implicit;
+    const double kappa = kappa_N_per_m();
     const V p_hat = implicit ? V(p + B * (q_k1_ - p_k1_) / (K * T + B)) : p;  // (23a)
-    const double kappa = implicit ? K + B / T : K;
     if (!p_hat.allFinite()) return ProxyFault::result_not_finite;
     g_->set_time({epoch_s_ + static_cast<double>(steps_) * T, T});
     const V q = (*g_)(kappa, p_hat, q_k1_);                                                    // (1a), (23b)
@@ -76,6 +76,11 @@ class ImpedanceProxy {
   [[nodiscard]] const V& q() const noexcept { return q_k1_; }
   [[nodiscard]] const V& f() const noexcept { return f_; }
   [[nodiscard]] const V& p_hat() const noexcept { return p_hat_; }
+  // The stiffness that 𝒢 is asked with.
+  [[nodiscard]] double kappa_N_per_m() const noexcept {
+    const bool implicit = config_.law == ImpedanceLaw::implicit;
+    return config_.stiffness_N_per_m + (implicit ? config_.damping_Ns_per_m / config_.period_s : 0.0);
+  }
   [[nodiscard]] const ImpedanceConfig& config() const noexcept { return config_; }
 
  private:

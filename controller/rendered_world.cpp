@@ -1,6 +1,7 @@
 #include "controller/rendered_world.hpp"
 
 #include "controller/limited_algorithm.hpp"
+#include "controller/scene_space.hpp"
 
 namespace proxarm::controller {
 
@@ -13,25 +14,21 @@ template <int N>
 class WorldOfDimension final : public RenderedWorld {
  public:
   WorldOfDimension(scenes::CompiledScene& scene, const AdmittanceConfig& config)
-      : scene_(&scene),
-        basis_(scene.space.axes.leftCols<N>()),
-        limited_(scene.algorithm<N>()),
-        proxy_(config, limited_) {}
+      : scene_(&scene), space_(scene), limited_(scene.algorithm<N>()), proxy_(config, limited_) {}
 
   void start(const Vec3& q_W) noexcept override {
+    space_.start(q_W);
     ProxyStart<N> start;
-    start.q = scene_->from_W<N>(q_W);
+    start.q = space_.start();
     proxy_.start(start);
     proxy_.set_reference(start.q);
-    start_W_ = q_W;
-    start_ = start.q;
     last_ = {};
     last_.q_W = last_.p_hat_W = q_W;
   }
 
   Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
     // As far as the scene lets it: a step of 𝒢, whose κ doesn't matter.
-    const Vec<N> wanted = to_coordinates(q_W), v = basis_.transpose() * v_W;
+    const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     const double lead_s = proxy_.config().order == 2 ? proxy_.config().period_s : 0.0;
     ProxyStart<N> start;
@@ -39,34 +36,28 @@ class WorldOfDimension final : public RenderedWorld {
     start.v = v;
     start.time_s = proxy_.time_s() + lead_s;
     proxy_.start(start);
-    proxy_.set_reference(start_);
-    last_.q_W = to_W(start.q);
+    proxy_.set_reference(space_.start());
+    last_.q_W = space_.to_W(start.q);
     return last_.q_W;
   }
 
   WorldStep step(const Vec3& h_W, const StepLimits& limits) noexcept override {
-    limited_.set_limits(limits, basis_, proxy_.q());
-    const ProxyFault fault = proxy_.step(basis_.transpose() * h_W);
+    limited_.set_limits(limits, space_.basis(), proxy_.q());
+    const ProxyFault fault = proxy_.step(space_.basis().transpose() * h_W);
     if (fault != ProxyFault::none) {
       last_.fault = fault;
       return last_;
     }
     last_ = {};
-    last_.q_W = to_W(proxy_.q());
-    last_.p_hat_W = to_W(proxy_.p_hat());
-    last_.limit_force_W = basis_ * (proxy_.kappa_N_per_m() * limited_.limit_shift());
-    last_.f_W = basis_ * proxy_.f();
+    last_.q_W = space_.to_W(proxy_.q());
+    last_.p_hat_W = space_.to_W(proxy_.p_hat());
+    last_.limit_force_W = space_.basis() * (proxy_.kappa_N_per_m() * limited_.limit_shift());
+    last_.f_W = space_.basis() * proxy_.f();
     last_.limits = limited_.active();
     if (last_.limits.kinds != 0) last_.f_W -= last_.limit_force_W;
     last_.soft_limits_met = limited_.soft_limits_met();
-    last_.v_W = basis_ * proxy_.velocity();
-    for (const models::Contact<N>& contact : scene_->algorithm<N>().contacts()) {
-      if (last_.contacts++ == 0) {
-        last_.normal_W = basis_ * contact.normal;
-        last_.object = contact.object;
-      }
-      last_.slips = last_.slips || contact.slips;
-    }
+    last_.v_W = space_.basis() * proxy_.velocity();
+    add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
     return last_;
   }
 
@@ -89,29 +80,10 @@ class WorldOfDimension final : public RenderedWorld {
   void archive(fieldbus::StateArchive& state) noexcept override { state(proxy_, start_W_, start_, last_.q_W); }
 
  private:
-  // In three dimensions the coordinates are W's own where the scene keeps W's axes, and not even rounding comes in.
-  Vec3 to_W(const Vec<N>& x) const noexcept {
-    if constexpr (N == 3) {
-      return scene_->to_W<N>(x);
-    } else {
-      return start_W_ + basis_ * (x - start_);
-    }
-  }
-
-  Vec<N> to_coordinates(const Vec3& q_W) const noexcept {
-    if constexpr (N == 3) {
-      return scene_->from_W<N>(q_W);
-    } else {
-      return start_ + basis_.transpose() * (q_W - start_W_);
-    }
-  }
-
   scenes::CompiledScene* scene_;
-  Eigen::Matrix<double, 3, N> basis_;
+  SceneSpace<N> space_;
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
-  Vec3 start_W_ = Vec3::Zero();
-  Vec<N> start_ = Vec<N>::Zero();
   WorldStep last_;
 };
 

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 
 #include "controller/admittance_proxy.hpp"
 #include "controller/change.hpp"
@@ -35,6 +36,19 @@ struct WorldStep {
   models::Vec3 limit_force_W = models::Vec3::Zero();  // of the limits on the proxy; f_W is without it
   ProxyFault fault = ProxyFault::none;
 };
+
+// The contacts of a step, their normals turned to W by the scene's basis.
+template <int N>
+void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
+                  const Eigen::Matrix<double, 3, N>& basis) noexcept {
+  for (const models::Contact<N>& contact : contacts) {
+    if (step.contacts++ == 0) {
+      step.normal_W = basis * contact.normal;
+      step.object = contact.object;
+    }
+    step.slips = step.slips || contact.slips;
+  }
+}
 
 class RenderedWorld {
  public:

@@ -80,6 +80,7 @@ constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
                                    {RecordFlag::limit_joint_acceleration, "limit_joint_acceleration"},
                                    {RecordFlag::limit_singularity, "limit_singularity"},
                                    {RecordFlag::limit_following_error, "limit_following_error"},
+                                   {RecordFlag::limit_joint_torque, "limit_joint_torque"},
                                    {RecordFlag::limit_leash, "limit_leash"},
                                    {RecordFlag::limit_orientation, "limit_orientation"},
                                    {RecordFlag::contact_multivalued, "contact_multivalued"}};

@@ -10,7 +10,15 @@ enum class OrientationMode : std::uint8_t {
   free,  // the tool turns under the hand's torque with an inertia and a damping of its own
 };
 
+enum class Scheme : std::uint8_t {
+  admittance,  // (26): force in, positions out
+  impedance,   // (23): position in, torques out; for a light device that can be driven back
+};
+
 struct SessionSettings {
+  Scheme scheme = Scheme::admittance;
+  double coupling_stiffness_N_per_m = 750.0;  // impedance type: K and B of the virtual coupling
+  double coupling_damping_Ns_per_m = 8.0;
   double period_s = 1e-3;         // T, the timestep of the cycle
   double mass_kg = 4.0;           // what the hand feels, tool behind the sensor included
   double damping_Ns_per_m = 0.0;  // B of design point "virtual damping": to the world, in the medium

@@ -53,6 +53,8 @@ const char* limit_parameter(Limit limit) noexcept {
       return "singularity or end of reach";
     case Limit::following_error:
       return "limits.following_error_rad";
+    case Limit::joint_torque:
+      return "drives[].max_torque_Nm";
   }
   return "?";
 }
@@ -70,8 +72,15 @@ void StepLimiter::make(const StepStart& start, const JointVector& joint_rad, con
                        const models::Jacobian& J_W, StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
   add_balls(start, out);
-  add_borders(start.q_k1_W, out);
+  add_borders(start.q_k1_W, Borders::slow_down, out);
   add_joints(joint_rad, twist_rad, J_W, out);
+}
+
+void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, const models::Jacobian& J_W,
+                             StepLimits& out) const noexcept {
+  out.soft_count = out.plane_count = out.hard_count = 0;
+  add_borders(q_W, Borders::walls, out);
+  add_joint_walls(joint_rad, J_W, out);
 }
 
 void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexcept {
@@ -90,18 +99,19 @@ void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexc
   }
 }
 
-void StepLimiter::add_borders(const Vec3& q_W, StepLimits& out) const noexcept {
+void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out) const noexcept {
   const double T = period_s_;
   const double share = T / (T + limits_.max_tool_speed_m_per_s / limits_.max_tool_acceleration_m_per_s2);
+  // Whoever is outside already may not go further out.
+  const auto room = [&](double d) { return borders == Borders::walls ? d : std::max(0.0, share * d); };
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const double to_upper = limits_.workspace_max_m[k] - q_W[i], to_lower = q_W[i] - limits_.workspace_min_m[k];
-    // Whoever is outside already may not go further out.
     if (std::isfinite(to_upper)) {
-      add_plane(out, {Vec3::Unit(i), std::max(0.0, share * to_upper), Limit::workspace, 0});
+      add_plane(out, {Vec3::Unit(i), room(to_upper), Limit::workspace, 0});
     }
     if (std::isfinite(to_lower)) {
-      add_plane(out, {-Vec3::Unit(i), std::max(0.0, share * to_lower), Limit::workspace, 0});
+      add_plane(out, {-Vec3::Unit(i), room(to_lower), Limit::workspace, 0});
     }
   }
   for (const description::BoxDescription& zone : limits_.keep_out) {
@@ -112,7 +122,7 @@ void StepLimiter::add_borders(const Vec3& q_W, StepLimits& out) const noexcept {
       if (below > nearest.bound_m) nearest = {Vec3::Unit(i), below, Limit::keep_out, 0};
       if (above > nearest.bound_m) nearest = {-Vec3::Unit(i), above, Limit::keep_out, 0};
     }
-    nearest.bound_m = std::max(0.0, share * nearest.bound_m);
+    nearest.bound_m = room(nearest.bound_m);
     add_plane(out, nearest);
   }
 }
@@ -146,6 +156,24 @@ void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& tw
       add_plane(out, {sign / length * row, std::min(room, per_step) / length,
                       range ? Limit::joint_range : Limit::joint_speed, bit});
     }
+  }
+}
+
+// With the tool's translation alone, which is all that torques render: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
+void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
+                                  StepLimits& out) const noexcept {
+  models::Mat3 A;
+  A.noalias() = J_W.topRows<3>() * J_W.topRows<3>().transpose();
+  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
+  const Eigen::LLT<models::Mat3> factors(A);
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const Vec3 row = factors.solve(J_W.col(k).head<3>());
+    const double length = row.norm();
+    if (!(length > 1e-9)) continue;
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    add_plane(out, {row / length, (joints_[i].upper_rad - joint_rad[k]) / length, Limit::joint_range, bit});
+    add_plane(out, {-row / length, (joint_rad[k] - joints_[i].lower_rad) / length, Limit::joint_range, bit});
   }
 }
 

@@ -48,14 +48,15 @@ enum class Limit : std::uint16_t {
   joint_acceleration = 1u << 6,
   speed = 1u << 7,
   acceleration = 1u << 8,
-  singularity = 1u << 9,      // inverse kinematics stopped short
-  following_error = 1u << 10  // a drive doesn't follow: its setpoint waits for it
+  singularity = 1u << 9,       // inverse kinematics stopped short
+  following_error = 1u << 10,  // a drive doesn't follow: its setpoint waits for it
+  joint_torque = 1u << 11      // impedance type: what is rendered is cut
 };
 
 inline constexpr std::array all_limits{
     Limit::leash,        Limit::power,       Limit::workspace,          Limit::keep_out,
     Limit::joint_range,  Limit::joint_speed, Limit::joint_acceleration, Limit::speed,
-    Limit::acceleration, Limit::singularity, Limit::following_error};
+    Limit::acceleration, Limit::singularity, Limit::following_error,    Limit::joint_torque};
 
 // The parameter that holds a limit: "limits.leash_m", "drives[].range_rad".
 const char* limit_parameter(Limit limit) noexcept;
@@ -118,14 +119,21 @@ class StepLimiter {
   // link; `J_W`: of T at joint_rad. Neither allocates nor throws.
   void make(const StepStart& start, const models::JointVector& joint_rad, const models::JointVector& twist_rad,
             const models::Jacobian& J_W, StepLimits& out) const noexcept;
+  // For the impedance type: the borders alone, as walls for a proxy whose tool is at q_W. Nothing slows down ahead of
+  // them, and a tool that is pushed through one is pushed back.
+  void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,
+                  StepLimits& out) const noexcept;
 
  private:
+  enum class Borders : std::uint8_t { slow_down, walls };
   struct Joint {
     double lower_rad, upper_rad, speed_rad_per_s, acceleration_rad_per_s2;
   };
-  void add_borders(const models::Vec3& q_W, StepLimits& out) const noexcept;
+  void add_borders(const models::Vec3& q_W, Borders borders, StepLimits& out) const noexcept;
   void add_joints(const models::JointVector& joint_rad, const models::JointVector& twist_rad,
                   const models::Jacobian& J_W, StepLimits& out) const noexcept;
+  void add_joint_walls(const models::JointVector& joint_rad, const models::Jacobian& J_W,
+                       StepLimits& out) const noexcept;
   void add_balls(const StepStart& start, StepLimits& out) const noexcept;
 
   std::vector<Joint> joints_;

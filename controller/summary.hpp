@@ -21,6 +21,7 @@
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
 //                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
+//                           Impedance type: push = −n·F_h, so that it has the device's own friction and inertia, too
 //   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, t the direction of the slide:
 //                           over all cycles that slip on one thing, from settle_s after the contact began; at least
 //                           0.1 s and 1 mm of it
@@ -42,7 +43,7 @@ namespace proxarm::controller {
 
 struct SummaryConfig {
   double period_s = 1e-3;
-  double felt_mass_kg = 4.0;      // M: proxy and handle
+  double felt_mass_kg = 4.0;      // M: proxy and handle; impedance type: 0, and so is m
   double handle_mass_kg = 0.0;    // m: what moves after the sensor
   double damping_Ns_per_m = 0.0;  // B
   double spring_N_per_m = 0.0;    // K_v, to where the proxy starts

@@ -35,7 +35,7 @@ void add_repeatable(Json& json, const Summary& s) {
   json["tool_penetration_sliding_max_m"] = s.tool_penetration_sliding_max_m;
   json["tracking_rms_m"] = optional_number(s.tracking_rms_m);
   json["tracking_max_m"] = optional_number(s.tracking_max_m);
-  json["felt_mass_kg"] = s.felt_mass_kg;
+  json["felt_mass_kg"] = s.felt_mass_kg > 0.0 ? Json(s.felt_mass_kg) : Json(nullptr);
   json["apparent_mass_kg"] = optional_number(s.apparent_mass_kg);
   json["apparent_damping_Ns_per_m"] = optional_number(s.apparent_damping_Ns_per_m);
   json["contact_force_error_N"] = optional_number(s.contact_force_error_N);
@@ -121,7 +121,8 @@ std::string summary_text(const Summary& s) {
     loads += (loads.empty() ? "" : ", ") + bus + format(" %.1f %%", 100 * load);
   if (!loads.empty()) line("bus load", loads);
   line("felt mass",
-       number(s.apparent_mass_kg, "%.3f kg") + format(", wanted %.3f kg", s.felt_mass_kg) +
+       number(s.apparent_mass_kg, "%.3f kg") +
+           (s.felt_mass_kg > 0.0 ? format(", wanted %.3f kg", s.felt_mass_kg) : ", the device's own") +
            (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : "") +
            (s.limited_cycles > 0 ? "; where no limit acts" : ""));
   line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m));

@@ -1,34 +1,18 @@
 // What a CiA 402 drive is told before the cycle, and what is said of it in words.
+#include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "fieldbus/canopen_pdo.hpp"
 #include "fieldbus/canopen_sync.hpp"
 #include "fieldbus/cia402_drive.hpp"
+#include "fieldbus/eds_check.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
 
 using description::number_text;
 using description::SetupError;
-
-// How a mode (6060h) takes its targets, in every case counts in 32 bits.
-struct Mode {
-  std::uint8_t number;
-  ObjectAddress target;
-  const char* unsupported;
-  const char* not_taken;
-};
-
-constexpr Mode csp{8,
-                   {0x607A, 0},
-                   "the drive can't do cyclic synchronous position (mode 8)",
-                   "the drive took mode 8 (cyclic synchronous position) but didn't change to it"};
-constexpr Mode ip{7,
-                  {0x60C1, 1},
-                  "the drive can't do interpolated position (mode 7)",
-                  "the drive took mode 7 (interpolated position) but didn't change to it"};
-
-const Mode& mode_of(const description::DriveDescription& drive) noexcept { return drive.mode == "ip" ? ip : csp; }
 
 constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
 
@@ -51,7 +35,8 @@ std::string period_text(std::int64_t period_ns) { return number_text(static_cast
                     .expected = std::move(expected)});
 }
 
-std::uint16_t rpdo_timeout_ms(const DriveSettings& settings) noexcept {
+std::uint16_t rpdo_timeout_ms(const DriveSettings& settings, bool torque) noexcept {
+  if (torque) return static_cast<std::uint16_t>(settings.period_ns * settings.torque_timeout_periods / 1'000'000);
   const std::int64_t timeout_ns = settings.period_ns * settings.rpdo_timeout_periods;
   return static_cast<std::uint16_t>((timeout_ns + 999'999) / 1'000'000);
 }
@@ -71,13 +56,15 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
   steps.push_back(if_present(sdo_read({0x1018, 2}, 4, "product code")));
   steps.push_back(if_present(sdo_read({0x1018, 3}, 4, "revision number")));
   steps.push_back(if_present(sdo_read({0x1018, 4}, 4, "serial number")));
-  const Mode& mode = mode_of(drive);
+  const CyclicMode& mode = mode_of(drive);
   const std::uint32_t supported = 1U << (mode.number - 1);
-  steps.push_back(sdo_expect({0x6502, 0}, 4, supported, "supported drive modes", mode.unsupported, supported));
+  steps.push_back(sdo_expect(object_address(drive.objects.supported_modes), 4, supported, "supported drive modes",
+                             mode.unsupported, supported));
 }
 
 // Quiet first: nothing but what the cycle needs may be on the bus.
-void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, ObjectAddress target, std::uint16_t timeout_ms) {
+void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms) {
+  const std::uint8_t node = drive.node;
   for (std::uint8_t number = 2; number <= 4; ++number) {
     steps.push_back(disable_pdo_step(PdoDirection::receive, number, node));
     steps.push_back(disable_pdo_step(PdoDirection::transmit, number, node));
@@ -87,13 +74,25 @@ void append_pdos(std::vector<SdoStep>& steps, std::uint8_t node, ObjectAddress t
                            .id = pdo_id(PdoDirection::receive, 1, node),
                            .transmission_type = every_sync,
                            .event_timer_ms = timeout_ms,
-                           .mapping = {{{0x6040, 0}, 16}, {target, 32}}}));
+                           .mapping = rpdo_mapping(drive)}));
   append(steps, pdo_steps({.direction = PdoDirection::transmit,
                            .number = 1,
                            .id = pdo_id(PdoDirection::transmit, 1, node),
                            .transmission_type = every_sync,
                            .event_timer_ms = 0,
-                           .mapping = {{{0x6041, 0}, 16}, {{0x6064, 0}, 32}}}));
+                           .mapping = tpdo_mapping(drive)}));
+}
+
+// The drive itself keeps to the torque and the speed that the cell allows. 6076h is the motor's, before the gear, in
+// mNm.
+void append_torque(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
+  const auto rated_mNm = static_cast<std::uint32_t>(std::llround(1e3 * drive.rated_torque_Nm / drive.gear_ratio));
+  const auto most = static_cast<std::uint32_t>(std::llround(1e3 * drive.max_torque_Nm / drive.rated_torque_Nm));
+  const double rpm = 60.0 / (2.0 * std::numbers::pi) * drive.max_speed_rad_per_s * drive.gear_ratio;
+  steps.push_back(if_present(sdo_expect({0x6076, 0}, 4, rated_mNm, "motor rated torque (mNm)",
+                                        "is rated_torque_Nm in the cell's file this motor's, times its gear_ratio?")));
+  steps.push_back(sdo_write({0x6072, 0}, 2, most, "max torque"));
+  steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
 
 // What the drive does when we are gone or when it is told to stop. 1016h and 6007h are a must, since they are what
@@ -154,6 +153,9 @@ void DriveSettings::validate() const {
 ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings)
     : description_(drive),
       settings_(checked(settings)),
+      mode_(mode_of(drive)),
+      tpdo_bytes_(pdo_bytes(tpdo_mapping(drive))),
+      rpdo_bytes_(pdo_bytes(rpdo_mapping(drive))),
       scale_(drive),
       heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
   if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
@@ -161,22 +163,50 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
     refuse(drive, "node", std::to_string(drive.node), "a number other than the controller's own");
   }
   if (drive.profile != "cia402") refuse(drive, "profile", description::in_quotes(drive.profile), "cia402");
-  if (drive.mode != "csp" && drive.mode != "ip") {
-    refuse(drive, "mode", description::in_quotes(drive.mode), "csp or ip");
-  }
+  if (drive.mode != mode_.name) refuse(drive, "mode", description::in_quotes(drive.mode), "csp, ip or cst");
+  if (mode_.torque) set_up_torque();
   if (!scale_.size_counts(settings.following_error_window_rad)) {
     refuse(drive, "following_error_window_rad", number_text(settings.following_error_window_rad),
            "a window whose counts fit 32 bits");
   }
+  if (drive.eds.empty()) return;
+  eds_ = std::make_shared<description::EdsFile>(description::load_eds(drive.eds));
+  (void)configuration_steps();  // says what doesn't fit
+}
+
+// 6071h holds thousandths of the rated torque, in 16 bits.
+void ServoDrive::set_up_torque() {
+  if (!(description_.rated_torque_Nm > 0.0)) {
+    refuse(description_, "rated_torque_Nm", number_text(description_.rated_torque_Nm), "more than 0 Nm");
+  }
+  constexpr double most = 32.767;
+  if (!(description_.max_torque_Nm > 0.0 && description_.max_torque_Nm <= most * description_.rated_torque_Nm)) {
+    refuse(description_, "max_torque_Nm", number_text(description_.max_torque_Nm),
+           "more than 0 and at most 32.767 times rated_torque_Nm");
+  }
+  torque_per_Nm_ = description_.direction * 1e3 / description_.rated_torque_Nm;
+  if (rpdo_timeout_ms(settings_, true) < 1) {
+    throw SetupError({.key = "timestep",
+                      .found = period_text(settings_.period_ns),
+                      .expected =
+                          "at least 0.334 ms in torque mode: the drive must give up the last torque within three "
+                          "periods, and counts them in whole milliseconds (1400h:05)"});
+  }
 }
 
 std::vector<SdoStep> ServoDrive::configuration_steps() const {
+  return eds_ ? steps_by_eds(profile_steps(), *eds_, description_) : profile_steps();
+}
+
+std::vector<SdoStep> ServoDrive::profile_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
-  append_pdos(steps, node(), mode_of(description_).target, rpdo_timeout_ms(settings_));
-  steps.push_back(sdo_write({0x60C2, 1}, 1, period.units, "interpolation time period value"));
-  steps.push_back(sdo_write({0x60C2, 2}, 1, as_u8(period.exponent), "interpolation time index"));
+  append_pdos(steps, description_, rpdo_timeout_ms(settings_, mode_.torque));
+  steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
+                            "interpolation time period value"));
+  steps.push_back(sdo_write(object_address(description_.objects.interpolation_index), 1, as_u8(period.exponent),
+                            "interpolation time index"));
   steps.push_back(
       if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
   append_reactions(steps, settings_);
@@ -188,9 +218,10 @@ std::vector<SdoStep> ServoDrive::configuration_steps() const {
   steps.push_back(
       sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"));
   steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
-  const Mode& mode = mode_of(description_);
-  steps.push_back(sdo_write({0x6060, 0}, 1, mode.number, "modes of operation"));
-  SdoStep display = sdo_expect({0x6061, 0}, 1, mode.number, "modes of operation display", mode.not_taken);
+  if (mode_.torque) append_torque(steps, description_);
+  steps.push_back(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"));
+  SdoStep display = sdo_expect(object_address(description_.objects.mode_display), 1, mode_.number,
+                               "modes of operation display", mode_.not_taken);
   display.patience_ns = mode_patience_ns;
   steps.push_back(display);
   return steps;

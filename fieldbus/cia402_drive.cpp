@@ -1,12 +1,14 @@
 #include "fieldbus/cia402_drive.hpp"
 
+#include <cmath>
+#include <limits>
+
 #include "fieldbus/byte_order.hpp"
 #include "fieldbus/canopen_pdo.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
 
-constexpr std::uint8_t pdo_bytes = 6;   // 16 bits of word, 32 bits of position
 constexpr int syncs_before_enable = 3;  // that must have latched target = actual before 0F
 
 }  // namespace
@@ -71,13 +73,14 @@ bool ServoDrive::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept 
 }
 
 bool ServoDrive::decode_tpdo(const CanFrame& frame, std::int64_t time_ns) noexcept {
-  if (frame.length < pdo_bytes) {
+  if (frame.length < tpdo_bytes_) {
     raise(DriveFault::pdo_short, time_ns);
     return true;
   }
   if (fresh_) ++repeated_tpdos_;
   statusword_ = read_u16_le(&frame.data[0]);
   actual_counts_ = read_i32_le(&frame.data[2]);
+  if (mode_.torque) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
   tpdo_time_ns_ = time_ns;
   cycles_without_tpdo_ = 0;
   fresh_ = heard_ = true;
@@ -116,6 +119,17 @@ bool ServoDrive::set_target_rad(double angle_rad) noexcept {
   return true;
 }
 
+bool ServoDrive::set_target_torque_Nm(double torque_Nm) noexcept {
+  const double exact = std::round(torque_Nm * torque_per_Nm_);
+  constexpr double most = std::numeric_limits<std::int16_t>::max();
+  if (!(std::abs(exact) <= most)) {
+    raise(DriveFault::target_out_of_range, tpdo_time_ns_);
+    return false;
+  }
+  target_torque_ = static_cast<std::int16_t>(exact);
+  return true;
+}
+
 bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
   if (!heard_) return false;
   if (!following_) target_counts_ = actual_counts_;
@@ -127,11 +141,15 @@ bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
 
   frame = CanFrame{};
   frame.id = pdo_id(PdoDirection::receive, 1, node());
-  frame.length = pdo_bytes;
+  frame.length = rpdo_bytes_;
   // Interpolated position: bit 4 says that its targets are valid; cyclic synchronous position has no such bit.
   const bool interpolates = description_.mode == "ip" && controlword_ == controlword::enable_operation;
   write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (interpolates ? 0x0010U : 0U)));
-  write_u32_le(&frame.data[2], static_cast<std::uint32_t>(target_counts_));
+  if (mode_.torque) {
+    write_u16_le(&frame.data[2], static_cast<std::uint16_t>(target_torque_));
+  } else {
+    write_u32_le(&frame.data[2], static_cast<std::uint32_t>(target_counts_));
+  }
   return true;
 }
 

@@ -1,18 +1,18 @@
-// One CiA 402 servo drive in cyclic synchronous position mode (CSP, mode 8), as the master's cycle sees it.
+// One CiA 402 servo drive in a cyclic mode (positions or torques), as the master's cycle sees it.
 //
-// Wire, every SYNC (identifiers of the predefined connection set, numbers little-endian):
-//   TPDO1 180 + node, 6 bytes: statusword 6041h (u16), position actual value 6064h (i32)
-//   RPDO1 200 + node, 6 bytes: controlword 6040h (u16), target position 607Ah (i32)
-// plus EMCY 080 + node and heartbeat 700 + node, as they come.
+// Wire, every SYNC (identifiers of the predefined connection set): TPDO1 180 + node and RPDO1 200 + node, what they
+// carry by mode in cia402_mode.hpp; plus EMCY 080 + node and heartbeat 700 + node, as they come.
 //
 // A cycle: on_sync(); on_frame() for what comes in; set_target_rad() where following(); encode_rpdo(), send. All of
 // that is noexcept and allocates nothing. The target follows the actual position until the drive itself says that it
 // follows (operation enabled and statusword bit 12: the brake is open), and at least three SYNCs have latched such a
-// target before 0F (enable operation) is sent: otherwise the axis would jump.
+// target before 0F (enable operation) is sent: otherwise the axis would jump. A torque may be set at any time: the
+// drive applies it once its brake is open, and the axis falls where it isn't what holds it.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,10 +20,12 @@
 #include "fieldbus/canopen_emcy.hpp"
 #include "fieldbus/canopen_heartbeat.hpp"
 #include "fieldbus/canopen_sequence.hpp"
+#include "fieldbus/cia402_mode.hpp"
 #include "fieldbus/cia402_state.hpp"
 #include "fieldbus/cia402_units.hpp"
 #include "fieldbus/cyclic_drive.hpp"
 #include "models/description/cell.hpp"
+#include "models/description/eds_file.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -38,7 +40,9 @@ struct DriveSettings {
   // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which ends with NMT operational as well,
   // says the same a hundred times as often, and heartbeats that coincide would cost a full bus its setpoints' deadline.
   bool heartbeat_in_operation = true;
-  std::uint16_t rpdo_timeout_periods = 5;      // 1400h:05, rounded up to whole milliseconds
+  std::uint16_t rpdo_timeout_periods = 5;  // 1400h:05, rounded up to whole milliseconds
+  // The same in torque mode, rounded down: the last torque acts until then, and a third one missed must be the last.
+  std::uint16_t torque_timeout_periods = 3;
   double following_error_window_rad = 0.05;    // 6065h, at the joint
   std::uint16_t following_error_time_ms = 10;  // 6066h
   SdoSequenceConfig sdo{};
@@ -49,10 +53,11 @@ struct DriveSettings {
 
 class ServoDrive final : public CyclicDrive {
  public:
-  // Throws SetupError where the description or the settings can't be what a drive is given.
+  // Throws SetupError where the description or the settings can't be what a drive is given, by the profile or its EDS.
   ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings);
 
   // ---- set-up ----
+  // By the profile, and by the drive's EDS where it has one (eds_check.hpp).
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
   // What is left to write once it is in operational.
   [[nodiscard]] std::vector<SdoStep> operation_steps() const;
@@ -76,6 +81,8 @@ class ServoDrive final : public CyclicDrive {
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true when it was this drive's
   // Takes a new target; false where none is taken: not following() yet, or fault target_out_of_range.
   bool set_target_rad(double angle_rad) noexcept override;
+  // In torque mode, at the joint. False, and the torque stays as it was: fault target_out_of_range.
+  bool set_target_torque_Nm(double torque_Nm) noexcept;
   // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
   bool encode_rpdo(CanFrame& frame) noexcept override;
 
@@ -87,6 +94,11 @@ class ServoDrive final : public CyclicDrive {
   [[nodiscard]] DriveState state() const noexcept override { return state_; }
   [[nodiscard]] DriveGoal goal() const noexcept { return goal_; }
   [[nodiscard]] bool following() const noexcept override { return following_; }  // takes targets
+  [[nodiscard]] bool torque_mode() const noexcept { return mode_.torque; }
+  // 6071h and 6077h, thousandths of the rated torque; the latter as torque at the joint, too.
+  [[nodiscard]] std::int16_t target_torque() const noexcept { return target_torque_; }
+  [[nodiscard]] std::int16_t actual_torque() const noexcept { return actual_torque_; }
+  [[nodiscard]] double actual_torque_Nm() const noexcept { return actual_torque_ / torque_per_Nm_; }
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   [[nodiscard]] std::uint16_t last_controlword() const noexcept { return controlword_; }
   [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
@@ -118,13 +130,19 @@ class ServoDrive final : public CyclicDrive {
   }
 
  private:
+  void set_up_torque();
+  [[nodiscard]] std::vector<SdoStep> profile_steps() const;
   bool decode_tpdo(const CanFrame& frame, std::int64_t time_ns) noexcept;
   void judge_state(bool was_enabled, std::int64_t time_ns) noexcept;
   void raise(DriveFault fault, std::int64_t time_ns) noexcept;
 
   description::DriveDescription description_;
   DriveSettings settings_;
+  std::shared_ptr<const description::EdsFile> eds_;  // may be none
+  CyclicMode mode_;
+  std::uint8_t tpdo_bytes_, rpdo_bytes_;
   CountScale scale_;
+  double torque_per_Nm_ = 1.0;  // signed
   HeartbeatConsumer heartbeat_;
   DriveGoal goal_ = DriveGoal::none;
   DriveState state_ = DriveState::unknown;
@@ -133,6 +151,7 @@ class ServoDrive final : public CyclicDrive {
   std::uint16_t controlword_ = 0;
   std::int32_t actual_counts_ = 0;
   std::int32_t target_counts_ = 0;
+  std::int16_t target_torque_ = 0, actual_torque_ = 0;
   std::int64_t tpdo_time_ns_ = 0;
   std::int64_t fault_time_ns_ = 0;
   std::uint64_t boot_ups_at_start_ = 0;

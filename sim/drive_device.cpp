@@ -8,8 +8,13 @@ namespace proxarm::sim {
 
 namespace {
 
-constexpr std::int64_t interpolated_position = 7, cyclic_synchronous_position = 8;
+constexpr std::int64_t interpolated_position = 7, cyclic_synchronous_position = 8, cyclic_synchronous_torque = 10;
+constexpr std::int64_t modes[] = {interpolated_position, cyclic_synchronous_position, cyclic_synchronous_torque};
 constexpr std::uint16_t interpolation_active = 1U << 4;  // of the controlword, in mode 7
+
+bool is_cyclic(std::int64_t mode) noexcept {
+  return std::find(std::begin(modes), std::end(modes), mode) != std::end(modes);
+}
 
 bool is_moving_state(DriveState state) noexcept {
   return state == DriveState::operation_enabled || state == DriveState::quick_stop_active ||
@@ -63,8 +68,7 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   statusword_ = &od.add(0x6041, 0, unsigned16, read_only, 0, true);
   mode_ = &od.add(0x6060, 0, integer8, read_write, 0, true);
   mode_->before_write = [](std::int64_t mode) {
-    const bool known = mode == 0 || mode == interpolated_position || mode == cyclic_synchronous_position;
-    return known ? SdoAbort::none : SdoAbort::invalid_value;
+    return mode == 0 || is_cyclic(mode) ? SdoAbort::none : SdoAbort::invalid_value;
   };
   mode_display_ = &od.add(0x6061, 0, integer8, read_only, 0, true);
   demand_ = &od.add(0x6062, 0, integer32, read_only, 0, true);
@@ -72,9 +76,15 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   od.add(0x6065, 0, unsigned32, read_write, config.following_error_window_counts);
   od.add(0x6066, 0, unsigned16, read_write, config.following_error_time_ms);
   velocity_ = &od.add(0x606C, 0, integer32, read_only, 0, true);
+  target_torque_ = &od.add(0x6071, 0, integer16, read_write, 0, true);
+  target_torque_->after_write = [this] { target_fresh_ = mode_->number() == cyclic_synchronous_torque; };
+  max_torque_ = &od.add(0x6072, 0, unsigned16, read_write, 3000);
+  od.add(0x6076, 0, unsigned32, constant, config.rated_torque_mNm);
   torque_ = &od.add(0x6077, 0, integer16, read_only, 0, true);
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
-  od.add(0x6502, 0, unsigned32, constant, 1 << (interpolated_position - 1) | 1 << (cyclic_synchronous_position - 1));
+  std::int64_t supported = 0;
+  for (const std::int64_t mode : modes) supported |= std::int64_t{1} << (mode - 1);
+  od.add(0x6502, 0, unsigned32, constant, supported);
   refusal_ = &od.add(0x2001, 0, unsigned8, read_only, 0, true);
   od.add(0x2010, 0, unsigned8, constant, 1);
   od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
@@ -102,7 +112,7 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   using enum Access;
   ObjectDictionary& od = slave_.dictionary();
   target_ = &od.add(0x607A, 0, integer32, read_write, 0, true);
-  target_->after_write = [this] { target_fresh_ = mode_->number() != interpolated_position; };
+  target_->after_write = [this] { target_fresh_ = mode_->number() == cyclic_synchronous_position; };
   od.add(0x607D, 0, unsigned8, constant, 2);
   od.add(0x607D, 1, integer32, read_write, config.position_min);
   od.add(0x607D, 2, integer32, read_write, config.position_max);
@@ -138,8 +148,20 @@ void DriveDevice::on_sync(std::int64_t time_ns) {
   publish();
 }
 
+// Without a new one the last torque acts on: what ends it is the receive PDO's timer, or the lack of SYNC.
+void DriveDevice::latch_torque() {
+  following_ = false;
+  if (state_ != DriveState::operation_enabled || stopping_ || !brake_open()) return;
+  const std::int64_t most = max_torque_->number(), wanted = target_torque_->number();
+  const std::int64_t torque = std::clamp(wanted, -most, most);
+  target_limited_ = torque != wanted;
+  axis_.set_torque(1e-3 * static_cast<double>(torque));
+  following_ = true;
+}
+
 // Position limits (607Dh) cut the target; with 607Ah at its old value because no PDO came, the axis slows down instead.
 void DriveDevice::latch_target() {
+  if (mode_->number() == cyclic_synchronous_torque) return latch_torque();
   const bool interpolates = mode_->number() == interpolated_position;
   const bool valid = !interpolates || (controlword_->number() & interpolation_active) != 0;
   const bool fresh = target_fresh_ && valid;
@@ -171,7 +193,7 @@ void DriveDevice::publish() noexcept {
   const double speed = axis_.speed_counts_per_s();
   velocity_->set(
       static_cast<std::int64_t>(std::isfinite(speed) ? std::clamp(speed, -2147483648.0, 2147483647.0) : 0.0));
-  torque_->set(static_cast<std::int64_t>(std::lround(1000.0 * std::clamp(axis_.torque_ratio(), -1.0, 1.0))));
+  torque_->set(static_cast<std::int64_t>(std::lround(1000.0 * std::clamp(axis_.torque_ratio(), -32.767, 32.767))));
   statusword_->set(statusword());
 }
 
@@ -285,13 +307,14 @@ void DriveDevice::finish_stop() { enter(after_stop_, after_stop_transition_); }
 RefusalReason DriveDevice::refusal() const noexcept {
   if (slave_.state() != NmtState::operational) return RefusalReason::not_operational;
   const std::int64_t mode = mode_display_->number();
-  if (mode != interpolated_position && mode != cyclic_synchronous_position) return RefusalReason::mode_not_displayed;
+  if (!is_cyclic(mode)) return RefusalReason::mode_not_displayed;
   if (period_ns_ <= 0) return RefusalReason::interpolation_period_not_set;
   if (interval_count_ < 3) return RefusalReason::no_sync;
   std::int64_t sum = 0;
   for (int i = 0; i < interval_count_; ++i) sum += intervals_ns_[i];
   const double ratio = static_cast<double>(sum) / interval_count_ / static_cast<double>(period_ns_);
   if (!(ratio > 0.8 && ratio < 1.2)) return RefusalReason::sync_period_mismatch;
+  if (mode == cyclic_synchronous_torque) return RefusalReason::none;
   const std::int64_t target = mode == interpolated_position ? slave_.dictionary().number(0x60C1, 1) : target_->number();
   const std::int64_t distance = std::llabs(target - axis_.position_counts());
   if (distance > following_window_->number()) return RefusalReason::target_far_from_actual;

@@ -1,9 +1,11 @@
-// A simulated servo drive on CANopen with the CiA 402 profile, cyclic synchronous position mode (6060h = 8).
+// A simulated servo drive on CANopen with the CiA 402 profile: cyclic synchronous position (6060h = 8), interpolated
+// position (7), cyclic synchronous torque (10).
 //
 // At each SYNC it latches the target (607Ah) that came since the last one, samples position and statusword for its
 // transmit PDO, and moves to the target within the interpolation period (60C2h): there at the following SYNC. A SYNC
-// without a new target is answered by a bounded deceleration (6085h), never by a jump. When SYNC, the receive PDO or
-// the master's heartbeat fail, the drive stops by itself:
+// without a new target is answered by a bounded deceleration (6085h), never by a jump; a torque (6071h, cut at 6072h)
+// acts until the next one. When SYNC, the receive PDO or the master's heartbeat fail, the drive stops by itself, from
+// a torque too:
 //   SYNC          2010h:01 interpolation periods without one     EMCY 8700h, fault reaction 605Eh
 //   receive PDO   its event timer, 1400h:05                      EMCY 8250h, reaction 6007h
 //   heartbeat     1016h                                          EMCY 8130h, reaction 6007h, then 1029h
@@ -26,6 +28,7 @@ struct DriveDeviceConfig {
   std::uint16_t following_error_time_ms = 10;             // 6066h
   std::uint32_t quick_stop_deceleration = 1'000'000;      // 6085h, counts/s²
   std::uint32_t profile_deceleration = 500'000;           // 6084h, counts/s²: slow-down ramp
+  std::uint32_t rated_torque_mNm = 1000;                  // 6076h, of the motor
   std::int32_t position_min = 0, position_max = 0;        // 607Dh; equal: no limit
   std::int64_t brake_release_ns = 30'000'000;             // from enabling to where the target is followed
   std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: not supervised
@@ -86,6 +89,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void set_period();
   [[nodiscard]] double deceleration(std::uint16_t object) const noexcept;
   void latch_target();
+  void latch_torque();
   void supervise_sync();
   void supervise_following_error();
   void publish() noexcept;
@@ -100,7 +104,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
-              *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr;
+              *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr,
+              *target_torque_ = nullptr, *max_torque_ = nullptr;
 
   std::int64_t now_ns_ = 0;
   DriveState state_ = DriveState::not_ready_to_switch_on;
@@ -115,7 +120,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   bool target_taken_ = false;     // since power came on
   bool target_fresh_ = false;     // 607Ah was written since the last SYNC
   bool following_ = false;        // bit 12
-  bool target_limited_ = false;   // 607Dh
+  bool target_limited_ = false;   // by 607Dh or 6072h
   std::int64_t following_error_since_ns_ = never;
   std::int64_t last_sync_ns_ = never;
   std::int64_t intervals_ns_[intervals] = {};

@@ -21,13 +21,15 @@ class ServoAxis {
   virtual void set_interpolation_period_ns(std::int64_t period_ns) noexcept = 0;
   // Go to it, to be there one interpolation period later. Only while enabled.
   virtual void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept = 0;
+  // From now on this torque, and no control of the position, until the next target or stop(). Only while enabled.
+  virtual void set_torque(double ratio) noexcept = 0;  // of the rated torque, by the sense of the counts
   // Slow down to rest and hold, until the next target.
   virtual void stop(double deceleration_counts_per_s2, std::int64_t time_ns) noexcept = 0;
 
   [[nodiscard]] virtual std::int32_t position_counts() const noexcept = 0;
   [[nodiscard]] virtual std::int32_t demand_counts() const noexcept = 0;
   [[nodiscard]] virtual double speed_counts_per_s() const noexcept = 0;
-  [[nodiscard]] virtual double torque_ratio() const noexcept = 0;  // of the largest torque, −1..1
+  [[nodiscard]] virtual double torque_ratio() const noexcept = 0;  // of the rated torque
   [[nodiscard]] virtual bool limited() const noexcept = 0;         // torque or speed is at its limit
   [[nodiscard]] virtual bool at_rest() const noexcept = 0;         // the demand
 };

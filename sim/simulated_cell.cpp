@@ -42,6 +42,7 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.position_min = to_i32(std::min(first, second));
   c.position_max = to_i32(std::max(first, second));
   c.brake_release_ns = config.brake_release_ns;
+  if (drive.rated_torque_Nm > 0.0) c.rated_torque_mNm = to_u32(1e3 * drive.rated_torque_Nm / drive.gear_ratio);
   return c;
 }
 
@@ -64,7 +65,9 @@ std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cel
 class SimulatedCell::PlantAxis final : public ServoAxis {
  public:
   PlantAxis(ServoLoop& servo, const description::DriveDescription& drive)
-      : servo_(servo), counts_per_rad_(drive.counts_per_rad()), max_torque_Nm_(drive.simulation.max_torque_Nm) {}
+      : servo_(servo),
+        counts_per_rad_(drive.counts_per_rad()),
+        rated_torque_Nm_(drive.rated_torque_Nm > 0.0 ? drive.rated_torque_Nm : drive.simulation.max_torque_Nm) {}
 
   void enable(std::int64_t time_ns) noexcept override { servo_.enable(time_ns); }
   void disable() noexcept override { servo_.disable(); }
@@ -73,6 +76,9 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
   }
   void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept override {
     servo_.set_target(target_counts, time_ns);
+  }
+  void set_torque(double ratio) noexcept override {
+    servo_.set_torque_Nm(std::copysign(1.0, counts_per_rad_) * ratio * rated_torque_Nm_);
   }
   void stop(double deceleration_counts_per_s2, std::int64_t time_ns) noexcept override {
     servo_.stop(deceleration_counts_per_s2 / std::abs(counts_per_rad_), time_ns);
@@ -83,14 +89,14 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
     return servo_.speed_rad_per_s() * counts_per_rad_;
   }
   [[nodiscard]] double torque_ratio() const noexcept override {
-    return max_torque_Nm_ > 0.0 ? servo_.torque_Nm() / max_torque_Nm_ * (counts_per_rad_ > 0.0 ? 1.0 : -1.0) : 0.0;
+    return std::copysign(1.0, counts_per_rad_) * servo_.torque_Nm() / rated_torque_Nm_;
   }
   [[nodiscard]] bool limited() const noexcept override { return servo_.limited(); }
   [[nodiscard]] bool at_rest() const noexcept override { return servo_.at_rest(); }
 
  private:
   ServoLoop& servo_;
-  double counts_per_rad_, max_torque_Nm_;
+  double counts_per_rad_, rated_torque_Nm_;
 };
 
 class SimulatedCell::PlantGauges final : public GaugeSource {

@@ -41,11 +41,11 @@ void add_drive(PlannedBus& bus, const description::DriveDescription& drive) {
   const std::uint8_t node = drive.node;
   PlannedFrame feedback{.name = drive.joint + " TPDO1",
                         .id = fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 1, node)};
-  feedback.shape.bytes = 6;
+  feedback.shape.bytes = fieldbus::pdo_bytes(fieldbus::tpdo_mapping(drive));
   feedback.sender = drive.joint;
   feedback.after = "SYNC";
   PlannedFrame target{.name = drive.joint + " RPDO1", .id = fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, node)};
-  target.shape.bytes = 6;
+  target.shape.bytes = fieldbus::pdo_bytes(fieldbus::rpdo_mapping(drive));
   target.sender = "controller";
   target.release = controller::receive_window;
   for (const PlannedFrame& frame : {feedback, target}) bus.frames.push_back(frame);

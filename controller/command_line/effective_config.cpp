@@ -27,6 +27,11 @@ std::string effective_config(const PreparedSession& session) {
   out << YAML::Key << "hand" << YAML::Value << name_of(session.hand.file);
   number(out, "period_s", settings.period_s);
   number(out, "duration_s", session.duration_s);
+  if (session.impedance()) {
+    out << YAML::Key << "scheme" << YAML::Value << "impedance";
+    number(out, "coupling_stiffness_N_per_m", settings.coupling_stiffness_N_per_m);
+    number(out, "coupling_damping_Ns_per_m", settings.coupling_damping_Ns_per_m);
+  }
   number(out, "mass_kg", settings.mass_kg);
   number(out, "tool_mass_kg", session.cell.tool.mass_kg);
   number(out, "damping_Ns_per_m", settings.damping_Ns_per_m);

@@ -1,12 +1,17 @@
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <cstdio>
 
+#include "controller/bring_up.hpp"
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/data_files.hpp"
 #include "controller/command_line/exit_status.hpp"
 #include "models/arm.hpp"
 #include "models/description/cell.hpp"
+#include "models/description/eds_file.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
 #include "models/description/setup_error.hpp"
@@ -20,13 +25,18 @@ namespace {
 namespace fs = std::filesystem;
 
 // What a file is, by a key that only its kind has.
-enum class Kind { cell, scene, hand, sensor };
+enum class Kind { cell, scene, hand, sensor, registers, eds };
 
 Kind kind_of(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  if (extension == ".eds" || extension == ".dcf") return Kind::eds;
   try {
     const YAML::Node root = YAML::LoadFile(file.string());
     if (root.IsMap()) {
       if (root["drives"] || root["urdf"]) return Kind::cell;
+      if (root["protocol"] && root["command"]) return Kind::registers;
       if (root["protocol"]) return Kind::sensor;
       if (root["waypoints"] || root["multisine"] || root["stiffness_N_per_m"]) return Kind::hand;
     }
@@ -45,14 +55,32 @@ const char* check_laws(const scenes::Scene& scene) {
   return passed ? "scene" : nullptr;
 }
 
+// With the files that it names, and each device as the controller would make it.
+void check_cell(const fs::path& file) {
+  const description::Cell cell = description::load_cell(file);
+  const models::Arm arm(cell);
+  const std::int64_t period_ns = std::llround(1e9 * cell.default_period_s);
+  for (const description::DriveDescription& drive : cell.drives) {
+    if (drive.on_can()) {
+      const fieldbus::ServoDrive servo(drive, {.period_ns = period_ns});
+    } else {
+      const fieldbus::ModbusDrive modbus(drive, description::load_modbus_drive(drive.description), period_ns);
+    }
+  }
+  controller::make_sensor(cell, description::load_sensor(cell.sensor.description));
+}
+
 const char* check(const fs::path& file) {
   switch (kind_of(file)) {
-    case Kind::cell: {
-      const description::Cell cell = description::load_cell(file);
-      const models::Arm arm(cell);
-      description::load_sensor((cell.file.parent_path() / cell.sensor.description).lexically_normal());
+    case Kind::cell:
+      check_cell(file);
       return "cell";
-    }
+    case Kind::registers:
+      description::load_modbus_drive(file);
+      return "register map of a Modbus drive";
+    case Kind::eds:
+      description::load_eds(file);
+      return "description of a CANopen device";
     case Kind::sensor:
       description::load_sensor(file);
       return "sensor";

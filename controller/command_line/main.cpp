@@ -76,13 +76,26 @@ void add_session_options(CLI::App& app, RunOptions& options) {
   app.add_option("--damping",
                  quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
                           [&](double value) { options.settings.damping_Ns_per_m = value; }),
-                 "damping against the world, in Ns/m (default 0)")
+                 "damping against the world, in Ns/m (default 0); impedance: of the virtual coupling (default 8)")
       ->type_name("NS/M");
   app.add_option("--spring",
                  quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },
                           [&](double value) { options.settings.spring_N_per_m = value; }),
                  "spring to the start position, in N/m (default 0)")
       ->type_name("N/M");
+  app.add_option("--stiffness",
+                 quantity([](const std::string& w) { return description::parse_stiffness(w, "--stiffness"); },
+                          [&](double value) { options.stiffness_N_per_m = value; }),
+                 "impedance: stiffness of the virtual coupling, in N/m (default 750)")
+      ->type_name("N/M");
+  using controller::Scheme;
+  app.add_option(
+         "--scheme",
+         choice<Scheme>("--scheme", {{"admittance", Scheme::admittance}, {"impedance", Scheme::impedance}},
+                        [&](Scheme value) { options.scheme = value; }),
+         "admittance: force in, positions out (drives in csp, ip or on Modbus); impedance: position in, torques "
+         "out (drives in cst, a light device). Default: what the cell's drives take")
+      ->type_name("admittance|impedance");
   app.add_option("--timestep",
                  quantity([](const std::string& w) { return description::parse_duration(w, "--timestep"); },
                           [&](double value) { options.period_s = value; }),

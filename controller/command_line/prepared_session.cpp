@@ -6,8 +6,10 @@
 #include <cstdio>
 #include <numbers>
 
+#include "controller/bring_up.hpp"
 #include "controller/command_line/data_files.hpp"
 #include "fieldbus/cia402_units.hpp"
+#include "models/arm.hpp"
 #include "models/description/setup_error.hpp"
 #include "scenes/scene_file.hpp"
 
@@ -91,6 +93,59 @@ void require_period(const PreparedSession& session, const RunOptions& options) {
   }
 }
 
+// The impedance type renders at the point with the device's own mass: what only a proxy has can't be asked for.
+void choose_scheme(PreparedSession& session, const RunOptions& options) {
+  using controller::Scheme;
+  controller::SessionSettings& settings = session.settings;
+  const auto& drives = session.cell.drives;
+  const bool torques = std::any_of(drives.begin(), drives.end(),
+                                   [](const description::DriveDescription& drive) { return drive.mode == "cst"; });
+  settings.scheme = options.scheme.value_or(torques ? Scheme::impedance : Scheme::admittance);
+  controller::require_scheme(session.cell, settings);
+  const auto refuse = [](const char* key, const char* found, const char* expected) {
+    throw description::SetupError({.key = key, .found = found, .expected = expected});
+  };
+  if (settings.scheme == Scheme::admittance) {
+    if (options.stiffness_N_per_m) refuse("--stiffness", "the admittance type", "--scheme impedance");
+    return;
+  }
+  if (options.mass_kg) refuse("--mass", "the impedance type", "none: the hand feels the device's own mass");
+  if (settings.spring_N_per_m > 0.0) refuse("--spring", "the impedance type", "--scheme admittance");
+  if (settings.order != 1) refuse("--order", "2 with the impedance type", "1");
+  if (settings.orientation != controller::OrientationMode::held) {
+    refuse("--orientation", "free with the impedance type", "none: the tool's orientation isn't rendered");
+  }
+  settings.coupling_stiffness_N_per_m = options.stiffness_N_per_m.value_or(settings.coupling_stiffness_N_per_m);
+  if (settings.damping_Ns_per_m > 0.0) settings.coupling_damping_Ns_per_m = settings.damping_Ns_per_m;
+  settings.damping_Ns_per_m = 0.0;
+  settings.mass_kg = 0.0;
+}
+
+// A wall's K and B must be stable on the device alone, in its lightest and in its heaviest direction.
+void require_stable_coupling(const PreparedSession& session) {
+  const controller::SessionSettings& settings = session.settings;
+  const models::Arm arm(session.cell);
+  const models::TipMass tip = arm.effective_mass_range(arm.start_rad());
+  controller::ImpedanceConfig config{.stiffness_N_per_m = settings.coupling_stiffness_N_per_m,
+                                     .damping_Ns_per_m = settings.coupling_damping_Ns_per_m,
+                                     .period_s = settings.period_s};
+  config.validate();
+  for (const double mass_kg : {tip.min_kg, tip.max_kg}) {
+    if (controller::coupling_spectral_radius(config, mass_kg) < 1.0) continue;
+    std::array<char, 160> found{};
+    std::snprintf(found.data(), found.size(), "%.4g N/m and %.4g Ns/m, unstable at the %.3g kg of the device's tip",
+                  config.stiffness_N_per_m, config.damping_Ns_per_m, mass_kg);
+    const double least_damping = 1.5 * config.stiffness_N_per_m * config.period_s;
+    throw description::SetupError(
+        {.key = "--stiffness",
+         .found = found.data(),
+         .expected = "a coupling that is stable without a hand: damping above " +
+                     description::number_text(std::ceil(100.0 * least_damping) / 100.0) +
+                     " Ns/m for this stiffness (3KT/2, the loop's delay), and not much more than M/T",
+         .advice = "lower --stiffness, change --damping, or take a shorter --timestep"});
+  }
+}
+
 }  // namespace
 
 PreparedSession prepare(const RunOptions& options) {
@@ -113,9 +168,14 @@ PreparedSession prepare(const RunOptions& options) {
   session.settings.max_missed_samples = missed_samples_allowed(session.sensor, session.settings);
   session.duration_s = options.duration_s;
   require_period(session, options);
+  choose_scheme(session, options);
 
-  // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
   session.loop.period_s = session.settings.period_s;
+  if (session.impedance()) {
+    session.loop.delay_s = 0.5 * session.settings.period_s;  // a torque acts for a period
+    return session;
+  }
+  // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
   session.loop.delay_s = session.settings.period_s + sensor_delay_s(session.cell.sensor) +
                          stream_delay_s(session.sensor) + setpoint_filter_delay_s(session.cell);
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
@@ -127,6 +187,7 @@ PreparedSession prepare(const RunOptions& options) {
 }
 
 void require_stable(const PreparedSession& session, const RunOptions& options) {
+  if (session.impedance()) return require_stable_coupling(session);
   controller::HandModel hand;
   hand.stiffness_N_per_m = session.hand.stiffness_N_per_m;
   hand.damping_Ns_per_m = session.hand.damping_Ns_per_m;
@@ -148,6 +209,7 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
 }
 
 double motion_delay_s(const PreparedSession& session) {
+  if (session.impedance()) return 0.0;
   return 2.0 * session.settings.period_s + setpoint_filter_delay_s(session.cell);
 }
 

@@ -20,17 +20,19 @@ struct PreparedSession {
   controller::SessionSettings settings;
   double duration_s = 10.0;
   controller::LoopModel loop;  // how the controller expects the closed loop to behave
+
+  [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
 
 // Throws SetupError. Opens no bus and starts nothing.
 PreparedSession prepare(const RunOptions& options);
 
 // The mass and timestep, judged: throws SetupError where the handle alone is heavier, or where the loop with the hand
-// would be unstable (unless forced, which only a simulation may be).
+// would be unstable (unless forced, which only a simulation may be). Impedance type: the virtual coupling is judged.
 void require_stable(const PreparedSession& session, const RunOptions& options);
 
 // From the proxy's step to the links being where it went: latched at the next SYNC, reached a period later, and what
-// the filter of the setpoints takes.
+// the filter of the setpoints takes. Impedance type: 0, the proxy is where the tool may be.
 double motion_delay_s(const PreparedSession& session);
 
 // Total delay from a force on the handle to the arm being where the proxy went, in seconds.

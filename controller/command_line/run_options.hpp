@@ -37,7 +37,9 @@ struct RunOptions {
   std::optional<double> mass_kg;
   std::optional<double> period_s;
   double duration_s = 10.0;
-  controller::SessionSettings settings;  // all that isn't optional above
+  std::optional<controller::Scheme> scheme;  // unset: what the drives' modes say
+  std::optional<double> stiffness_N_per_m;   // impedance type
+  controller::SessionSettings settings;      // all that isn't optional above
   BusMapping bus;
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;     // empty: no record

@@ -32,7 +32,7 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   controller::SummaryConfig config;
   config.period_s = session.settings.period_s;
   config.felt_mass_kg = session.settings.mass_kg;
-  config.handle_mass_kg = session.cell.tool.mass_kg;
+  if (!session.impedance()) config.handle_mass_kg = session.cell.tool.mass_kg;
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
   config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
@@ -74,11 +74,22 @@ std::string place_of(const controller::FaultReport& report, const controller::Cy
   return place;
 }
 
+std::string rendered_text(const PreparedSession& session) {
+  const controller::SessionSettings& s = session.settings;
+  char text[96];
+  if (session.impedance()) {
+    std::snprintf(text, sizeof text, "impedance type, K = %.4g N/m, B = %.4g Ns/m", s.coupling_stiffness_N_per_m,
+                  s.coupling_damping_Ns_per_m);
+  } else {
+    std::snprintf(text, sizeof text, "%.4g kg felt", s.mass_kg);
+  }
+  return text;
+}
+
 std::string plot_title(const PreparedSession& session) {
-  char figures[96];
-  std::snprintf(figures, sizeof figures, ": %.4g kg felt, T = %.4g ms", session.settings.mass_kg,
-                1e3 * session.settings.period_s);
-  return session.scene.name + figures;
+  char period[32];
+  std::snprintf(period, sizeof period, ", T = %.4g ms", 1e3 * session.settings.period_s);
+  return session.scene.name + ": " + rendered_text(session) + period;
 }
 
 }  // namespace
@@ -111,11 +122,13 @@ void SessionOutput::refuse_lost_plot() const {
 void SessionOutput::introduce(const controller::CycleParts& parts) const {
   if (options_.json) return;  // nothing but the summary goes to standard output then
   const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad());
-  std::printf("%s, scene %s: %.4g kg felt, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
-              session_.scene.name.c_str(), session_.settings.mass_kg, 1e3 * session_.settings.period_s,
+  std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
+              session_.scene.name.c_str(), rendered_text(session_).c_str(), 1e3 * session_.settings.period_s,
               1e3 * total_delay_s(session_));
-  std::printf("the arm itself, without control: %.0f to %.0f kg at the tip, first mode %.1f Hz\n", tip.min_kg,
-              tip.max_kg, parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad()));
+  std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
+  const double mode_Hz = parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad());
+  if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
+  std::printf("\n");
   std::fflush(stdout);
 }
 

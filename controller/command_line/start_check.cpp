@@ -1,5 +1,8 @@
 #include "controller/command_line/start_check.hpp"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 
@@ -24,11 +27,23 @@ std::string point_text(const Vec3& point_W) {
   return text;
 }
 
-void require_regular(const PreparedSession& session, const models::Arm& arm) {
+// In m/rad. Torques render forces at the point alone; positions need the tool's orientation as well.
+double smallest_singular_value(const PreparedSession& session, const models::Arm& arm) {
+  if (session.impedance()) {
+    models::ToolKinematics tool;
+    arm.kinematics(arm.start_rad(), tool);
+    const models::Mat3 squares = tool.J_W.topRows<3>() * tool.J_W.topRows<3>().transpose();
+    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<models::Mat3>(squares).eigenvalues()[0]));
+  }
   const models::InverseKinematics inverse(arm);
   models::InverseKinematicsResult result;
   inverse.solve(arm.start_rad(), arm.tool_pose(arm.start_rad()), result);
-  const double smallest = result.smallest_singular_value_m_per_rad, limit = inverse.config().singular_m_per_rad;
+  return result.smallest_singular_value_m_per_rad;
+}
+
+void require_regular(const PreparedSession& session, const models::Arm& arm) {
+  const double limit = models::InverseKinematicsConfig{}.singular_m_per_rad;
+  const double smallest = smallest_singular_value(session, arm);
   if (smallest >= limit) return;
   char found[160];
   std::snprintf(found, sizeof found, "a singular pose (smallest singular value %.2g m/rad)", smallest);

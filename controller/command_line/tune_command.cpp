@@ -8,6 +8,7 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/prepared_session.hpp"
+#include "models/description/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -115,6 +116,12 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
 
 int tune_command(const RunOptions& options) {
   const PreparedSession session = prepare(options);
+  if (session.impedance()) {
+    throw description::SetupError({.file = session.cell.file.string(),
+                                   .key = "tune",
+                                   .found = "a cell of the impedance type",
+                                   .expected = "one whose drives take positions: `run` judges a coupling's K and B"});
+  }
   const HandModel hand{session.hand.stiffness_N_per_m, session.hand.damping_Ns_per_m, session.hand.mass_kg};
   const LoopModel& loop = session.loop;
   const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;

@@ -148,6 +148,37 @@ void check_counts(const YamlNode& node, const DriveDescription& drive) {
   }
 }
 
+// "0x60C1:02", or with sub-index 0 "0x607A".
+std::uint32_t read_object(const YamlNode& node, const std::string& key) {
+  const std::string text = node.string(key);
+  const std::size_t colon = text.find(':');
+  const auto index = strict_integer(text.substr(0, colon));
+  const auto sub =
+      colon == std::string::npos ? std::optional<std::int64_t>(0) : strict_integer("0x" + text.substr(colon + 1));
+  if (!index || !sub || *index < 0x1000 || *index > 0xFFFF || *sub < 0 || *sub > 0xFF) {
+    throw node.error_at(key, "an object, index and sub-index in hexadecimal: \"0x607A\" or \"0x60C1:02\"");
+  }
+  return static_cast<std::uint32_t>(*index << 8 | *sub);
+}
+
+DriveObjects read_objects(const YamlNode& node) {
+  DriveObjects o;
+  const std::pair<const char*, std::uint32_t*> keys[] = {{"target", &o.target},
+                                                         {"controlword", &o.controlword},
+                                                         {"statusword", &o.statusword},
+                                                         {"position", &o.position},
+                                                         {"torque", &o.torque},
+                                                         {"mode", &o.mode},
+                                                         {"mode_display", &o.mode_display},
+                                                         {"supported_modes", &o.supported_modes},
+                                                         {"interpolation_value", &o.interpolation_value},
+                                                         {"interpolation_index", &o.interpolation_index}};
+  for (const auto& [key, object] : keys) {
+    if (node.has(key)) *object = read_object(node, key);
+  }
+  return o;
+}
+
 DriveDescription read_drive(const YamlNode& node) {
   DriveDescription d;
   d.joint = node.string("joint");
@@ -155,7 +186,16 @@ DriveDescription read_drive(const YamlNode& node) {
   d.profile = node.choice_or("profile", d.profile, {"cia402", "modbus"});
   d.node = static_cast<std::uint8_t>(node.integer("node", 1, d.on_can() ? 127 : 247));
   if (!d.on_can()) d.description = node.existing_file("description").string();
-  d.mode = node.choice_or("mode", d.mode, {"csp", "ip"});
+  d.mode = node.choice_or("mode", d.mode, {"csp", "ip", "cst"});
+  if (d.mode == "cst") {
+    if (!d.on_can()) throw node.error_at("mode", "csp: a drive on Modbus takes positions");
+    d.rated_torque_Nm = node.number("rated_torque_Nm", above(0.0, 1e5));
+    d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 10.0 * d.rated_torque_Nm));
+  }
+  if (d.on_can()) {
+    if (node.has("eds")) d.eds = node.existing_file("eds").string();
+    if (const auto objects = node.find_map("objects")) d.objects = read_objects(*objects);
+  }
   d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
   d.counts_per_motor_revolution =
       node.number_or("counts_per_motor_revolution", d.counts_per_motor_revolution, 1.0, 4294967296.0);

@@ -58,13 +58,23 @@ struct SimulatedDrive {
   double servo_rate_Hz = 4000.0;
 };
 
+// Where a CANopen drive has what the profile CiA 402 has elsewhere, as index << 8 | sub-index.
+struct DriveObjects {
+  std::uint32_t target = 0;  // 0: what the mode has, 607Ah, 60C1h:01 or 6071h
+  std::uint32_t controlword = 0x604000, statusword = 0x604100, position = 0x606400, torque = 0x607700;
+  std::uint32_t mode = 0x606000, mode_display = 0x606100, supported_modes = 0x650200;
+  std::uint32_t interpolation_value = 0x60C201, interpolation_index = 0x60C202;
+};
+
 struct DriveDescription {
   std::string joint;      // name in the URDF; of a linear one, read m for rad, N for Nm and kg for kg m² all along
   std::string bus;        // CAN bus or Modbus line
   std::uint8_t node = 0;  // 1..127; of a Modbus drive its unit, 1..247
   std::string profile = "cia402";  // or "modbus"
   std::string description;         // modbus: path of the register map, absolute (in the file: relative to its folder)
-  std::string mode = "csp";
+  std::string mode = "csp";        // "csp", "ip", "cst"
+  std::string eds;                 // cia402: path of the maker's EDS or DCF file, absolute; may be empty
+  DriveObjects objects;            // cia402
   std::uint32_t device_type = 0x00020192;  // expected in 1000h: CiA 402 servo drive
   double counts_per_motor_revolution = 1048576.0;
   double gear_ratio = 100.0;       // motor revolutions per joint revolution
@@ -73,6 +83,8 @@ struct DriveDescription {
   std::array<double, 2> range_rad{};
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
+  double rated_torque_Nm = 0.0;            // mode cst: 6076h times the gear ratio, what 1000 in 6071h is at the joint
+  double max_torque_Nm = 0.0;              // mode cst: what the joint may be asked for
   double rotor_inertia_kg_m2 = 0.0;        // reflected to the joint
   double position_bandwidth_Hz = 100.0;    // of the drive's position loop, as its maker or a test states it: the lag
                                            // that the stability check counts on

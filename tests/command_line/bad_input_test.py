@@ -244,10 +244,33 @@ class Options(ProgramTest):
 
     def test_a_fault_that_its_bus_does_not_know(self):
         rail = SOURCE / "models/cells/rail.yaml"
-        self.assert_refused(self.call("run", rail, "--fault", "rail:sdo@1s"), "sdo for rail", "for a drive on Modbus", "half_answer")
+        outcome = self.call("run", rail, "--fault", "rail:sdo@1s")
+        self.assert_refused(outcome, "sdo for rail", "for a drive on Modbus", "half_answer")
         self.assert_refused(self.call("run", "--fault", "axis_1:closed@1s"), "closed for axis_1", "a drive on CAN")
         self.assert_refused(self.call("run", "--fault", "sensor:checksum@1s"), "sensor:checksum", "have none")
         self.assert_refused(self.call("run", "--fault", "axis_1:fault=0x14210@1s"), "0 to 65535")
+
+    def test_a_scheme_that_the_drives_cannot_serve(self):
+        light = SOURCE / "models/cells/light.yaml"
+        self.assert_refused(self.call("run", "--scheme", "impedance"), "--scheme", "axis_1 takes positions")
+        self.assert_refused(self.call("run", light, "--scheme", "admittance"), "--scheme", "turn takes torques")
+        self.assert_refused(self.call("run", "--stiffness", "300"), "--stiffness", "--scheme impedance")
+        for option in (("--mass", "3"), ("--spring", "100"), ("--order", "2"), ("--orientation", "free")):
+            self.assert_refused(self.call("run", light, *option), option[0], "impedance type")
+        self.assert_refused(self.call("run", light, "--stiffness", "20000"), "damping above 30 Ns/m", "0.368 kg")
+        self.assert_refused(self.call("tune", light), "impedance type")
+
+    def test_check_opens_what_a_cell_names(self):
+        for shipped in ("drives/generic_absolute.yaml", "drives/simulated_drive.eds", "cells/light.yaml"):
+            self.assertEqual(self.call("check", SOURCE / "models" / shipped).status, 0)
+        registers = (SOURCE / "models/drives/generic_absolute.yaml").read_text()
+        (self.folder / "own.yaml").write_text(registers.replace("register: 32,", "register: 4,"))
+        rail = (SOURCE / "models/cells/rail.yaml").read_text()
+        for path in ("../arms", "../../scenes", "../../sim", "../sensors"):
+            rail = rail.replace(path + "/", str((SOURCE / "models/cells" / path).resolve()) + "/")
+        (self.folder / "cell.yaml").write_text(rail.replace("../drives/generic_absolute.yaml", "own.yaml"))
+        for file in ("own.yaml", "cell.yaml"):
+            self.assert_refused(self.call("check", file), "own.yaml:", "settings[0].register", "overlap")
 
     def test_a_session_lasts_at_most_a_week(self):
         self.assert_refused(self.call("run", "--duration", "1e30s"), "--duration", "at most a week")

@@ -49,7 +49,7 @@ class ClosedLoopRig {
         hand(description::load_hand(source_file(rig.hand))),
         scene(scenes::load_scene(source_file(rig.scene))),
         compiled(scenes::compile(scene)),
-        network({{.name = cell.buses[0].name}, {.name = cell.buses[1].name}, {.name = cell.buses[2].name}}),
+        network(buses_of(cell)),
         far_end(cell, sensor, hand, network.events(), with_faults(rig)) {
     far_end.attach_to(network);
     network.apply(rig.script);
@@ -72,8 +72,10 @@ class ClosedLoopRig {
 
   CycleParts prepared_parts(fieldbus::CanNetwork& through) {
     description::Cell believed = cell;
-    for (std::size_t i = 0; i < 6; ++i) believed.start_rad[i] += options.start_error_rad[i];
-    CycleParts parts = build_parts(believed, sensor, compiled, options.settings, through, {0, 1, 2},
+    for (std::size_t i = 0; i < cell.drives.size(); ++i) believed.start_rad[i] += options.start_error_rad[i];
+    BusIndices indices(cell.buses.size());
+    std::iota(indices.begin(), indices.end(), std::size_t{0});
+    CycleParts parts = build_parts(believed, sensor, compiled, options.settings, through, indices,
                                    [this](const auto& line, double) { return far_end.modbus_client(line.name); });
     bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(line, network.now_ns()); });
     return parts;
@@ -100,6 +102,11 @@ class ClosedLoopRig {
   std::int64_t first_cycle_ns = 0;
 
  private:
+  static std::vector<fieldbus::SimulatedBusConfig> buses_of(const description::Cell& cell) {
+    std::vector<fieldbus::SimulatedBusConfig> buses;
+    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name});
+    return buses;
+  }
   // A Modbus line's worker on the virtual clock, as fast as it wants to be.
   void pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
     const std::int64_t next_ns = std::max(line.step(time_ns), time_ns + 1'000'000);

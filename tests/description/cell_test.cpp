@@ -151,7 +151,10 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"start_rad: [0, ", "start_rad: [", "start_rad: found a list of 5, expected a list of 6 numbers in rad"},
         Mistake{"direction: -1", "direction: 0", "drives[1].direction: found 0, expected 1 or -1"},
         Mistake{"profile: cia402", "profile: cia401", "drives[0].profile: found \"cia401\", expected cia402"},
-        Mistake{"mode: csp", "mode: velocity", "drives[0].mode: found \"velocity\", expected csp or ip"},
+        Mistake{"mode: csp", "mode: cst", "drives[0].rated_torque_Nm"},
+        Mistake{"mode: csp", "objects: {target: 60C1h}\n    mode: csp", "drives[0].objects.target: found \"60C1h\""},
+        Mistake{"mode: csp", "eds: nowhere.eds\n    mode: csp", "drives[0].eds"},
+        Mistake{"mode: csp", "mode: velocity", "drives[0].mode: found \"velocity\", expected csp, ip or cst"},
         Mistake{"gear_ratio: 150", "gear_ratio: 0", "drives[0].gear_ratio: found 0, expected a number above 0"},
         Mistake{"max_torque_Nm: 2500", "max_torque_Nm: -1",
                 "drives[0].simulation.max_torque_Nm: found -1, expected a number above "

@@ -350,7 +350,8 @@ TEST(ServoDrive, RefusesDescriptionsThatItCannotServe) {
   };
   refused([](DriveDescription& d) { d.node = 0; }, "node: found 0");
   refused([](DriveDescription& d) { d.node = 127; }, "the controller's own");
-  refused([](DriveDescription& d) { d.mode = "cst"; }, "expected csp or ip");
+  refused([](DriveDescription& d) { d.mode = "pv"; }, "expected csp, ip or cst");
+  refused([](DriveDescription& d) { d.mode = "cst"; }, "rated_torque_Nm");
   refused([](DriveDescription& d) { d.profile = "modbus"; }, "expected cia402");
 }
 

@@ -76,6 +76,7 @@ class IdealAxis final : public ServoAxis {
     speed = 0.0;
   }
   void set_interpolation_period_ns(std::int64_t period) noexcept override { period_ns = period; }
+  void set_torque(double ratio) noexcept override { torques.push_back(ratio); }
   void set_target(std::int32_t counts, std::int64_t time_ns) noexcept override {
     targets.push_back(counts);
     from = position;
@@ -118,7 +119,7 @@ class IdealAxis final : public ServoAxis {
   double position = 0.0, from = 0.0, target = 0.0, speed = 0.0, deceleration = 0.0;
   std::int64_t period_ns = 0, start_ns = 0, last_ns = 0;
   std::vector<std::int32_t> targets;
-  std::vector<double> stops;
+  std::vector<double> stops, torques;
 };
 
 inline int scaled(int count) {

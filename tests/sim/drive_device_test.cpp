@@ -91,6 +91,72 @@ struct DriveDeviceTest : ::testing::Test {
   std::vector<std::string> others;
 };
 
+// Mode 10: {6040, 6071} in, {6041, 6064, 6077} out.
+struct TorqueDriveTest : DriveDeviceTest {
+  void SetUp() override {
+    for (const char* request :
+         {"601#2300140101020080", "601#2F00160000000000", "601#2300160110004060", "601#2300160210007160",
+          "601#2F00160002000000", "601#2F00140201000000", "601#2B00140503000000", "601#2300140101020000",
+          "601#2300180181010080", "601#2F001A0000000000", "601#23001A0110004160", "601#23001A0220006460",
+          "601#23001A0310007760", "601#2F001A0003000000", "601#2F00180201000000", "601#2300180181010000",
+          "601#2F6060000A000000", "601#2FC2600101000000", "601#2FC26002FD000000", "601#2B72600058020000",
+          "601#2B07600003000000"}) {
+      const auto answers = ask(request);
+      ASSERT_EQ(answers.size(), 1u);
+      ASSERT_EQ(answers[0].substr(0, 6), "581#60") << request << " answered " << answers[0];
+    }
+    ask("000#0101");
+    torque_cycles(4, 0x06, 0);
+    torque_cycles(2, 0x07, 0);
+    torque_cycles(8, 0x0F, 0);
+    ASSERT_EQ(last, "181#3712E80300000000");
+  }
+  void torque_cycles(int count, std::uint16_t controlword, std::int16_t torque) {
+    for (int i = 0; i < count; ++i) {
+      last = ask("080#").front();
+      char text[32];
+      const auto t = static_cast<std::uint16_t>(torque);
+      std::snprintf(text, sizeof text, "201#%02X%02X%02X%02X", controlword & 0xFFu, controlword >> 8u, t & 0xFFu,
+                    t >> 8u);
+      others = ask(text);
+      pass(1);
+    }
+  }
+};
+
+TEST_F(TorqueDriveTest, TakesThousandthsOfItsRatedTorqueAtTheNextSync) {
+  torque_cycles(1, 0x0F, 250);
+  EXPECT_DOUBLE_EQ(axis.torques.back(), 0.0);
+  torque_cycles(1, 0x0F, -250);
+  EXPECT_DOUBLE_EQ(axis.torques.back(), 0.25);
+  torque_cycles(1, 0x0F, -250);
+  EXPECT_DOUBLE_EQ(axis.torques.back(), -0.25);
+}
+
+TEST_F(TorqueDriveTest, CutsATorqueAtItsLargestAndSaysSo) {
+  torque_cycles(3, 0x0F, 900);  // 6072h is 600
+  EXPECT_DOUBLE_EQ(axis.torques.back(), 0.6);
+  EXPECT_EQ(last.substr(0, 8), "181#371A");  // bit 11
+}
+
+// SYNC goes on, the setpoints don't: the last torque acts until the receive PDO's timer of three milliseconds, and not
+// when a fourth setpoint would have been due. EMCY 8250h, quick stop by 6007h.
+TEST_F(TorqueDriveTest, GivesUpATorqueWithinThreeMissedSetpoints) {
+  torque_cycles(3, 0x0F, 250);
+  for (int missed = 0; missed < 3; ++missed) {
+    EXPECT_EQ(drive.state(), DriveState::operation_enabled);
+    ask("080#");
+    EXPECT_DOUBLE_EQ(axis.torques.back(), 0.25);
+    EXPECT_TRUE(axis.stops.empty());
+    others.clear();
+    pass(1);
+    for (const auto& frame : port.take()) others.push_back(frame);
+  }
+  EXPECT_THAT(others, Contains("081#5082110000000000"));
+  EXPECT_EQ(axis.stops.size(), 1u) << "from the torque on the drive's own ramp";
+  EXPECT_NE(drive.state(), DriveState::operation_enabled);
+}
+
 // Statuswords: bits of the state as CiA 402 has them, voltage (10h), remote (200h), and bit 12 once the target is
 // followed. The axis stands at 1000 = 3E8h.
 TEST_F(DriveDeviceTest, ComesToOperationEnabledByTheBook) {
@@ -196,8 +262,8 @@ TEST_F(DriveDeviceTest, RefusesOperationUntilModePeriodAndSyncAgree) {
 }
 
 TEST_F(DriveDeviceTest, RefusesModesThatItDoesNotHave) {
-  EXPECT_THAT(ask("601#4002650000000000"), ElementsAre("581#43026500C0000000"));  // bits 6 and 7: modes 7 and 8
-  EXPECT_THAT(ask("601#2F6060000A000000"), ElementsAre("581#8060600030000906"));
+  EXPECT_THAT(ask("601#4002650000000000"), ElementsAre("581#43026500C0020000"));  // bits 6, 7 and 9: modes 7, 8 and 10
+  EXPECT_THAT(ask("601#2F60600009000000"), ElementsAre("581#8060600030000906"));  // cyclic synchronous velocity
 }
 
 TEST_F(DriveDeviceTest, TripsOnATargetThatIsFarAwayWhenTheBrakeOpens) {

@@ -36,6 +36,7 @@ class StillAxis final : public ServoAxis {
   void disable() noexcept override { enabled = false; }
   void set_interpolation_period_ns(std::int64_t period_ns) noexcept override { takes_ns = period_ns; }
   void set_target(std::int32_t counts, std::int64_t) noexcept override { target = counts; }
+  void set_torque(double) noexcept override {}
   void stop(double, std::int64_t) noexcept override { stopped = true; }
   [[nodiscard]] std::int32_t position_counts() const noexcept override { return position; }
   [[nodiscard]] std::int32_t demand_counts() const noexcept override { return position; }

@@ -1,0 +1,48 @@
+// Between W and the n coordinates of a scene (scenes/compile.hpp): x = Uᵀ(q_W − o). What of the start position lies off
+// that space stays as it is.
+#pragma once
+
+#include "models/geometry.hpp"
+#include "scenes/compile.hpp"
+
+namespace proxarm::controller {
+
+template <int N>
+class SceneSpace {
+ public:
+  using V = models::Vec<N>;
+
+  explicit SceneSpace(const scenes::CompiledScene& scene) : scene_(&scene), basis_(scene.space.axes.leftCols<N>()) {}
+
+  void start(const models::Vec3& q_W) noexcept {
+    start_W_ = q_W;
+    start_ = scene_->from_W<N>(q_W);
+  }
+
+  // In three dimensions the coordinates are W's own where the scene keeps W's axes, and not even rounding comes in.
+  [[nodiscard]] models::Vec3 to_W(const V& x) const noexcept {
+    if constexpr (N == 3) {
+      return scene_->to_W<N>(x);
+    } else {
+      return start_W_ + basis_ * (x - start_);
+    }
+  }
+  [[nodiscard]] V from_W(const models::Vec3& q_W) const noexcept {
+    if constexpr (N == 3) {
+      return scene_->from_W<N>(q_W);
+    } else {
+      return start_ + basis_.transpose() * (q_W - start_W_);
+    }
+  }
+  [[nodiscard]] const Eigen::Matrix<double, 3, N>& basis() const noexcept { return basis_; }  // U
+  [[nodiscard]] const V& start() const noexcept { return start_; }
+  [[nodiscard]] const models::Vec3& start_W() const noexcept { return start_W_; }
+
+ private:
+  const scenes::CompiledScene* scene_;
+  Eigen::Matrix<double, 3, N> basis_;
+  models::Vec3 start_W_ = models::Vec3::Zero();
+  V start_ = V::Zero();
+};
+
+}  // namespace proxarm::controller
