@@ -3,9 +3,11 @@
 //
 // At r the normal runs along the line from the core through r. With friction −λ N Nᵀ (r − q), λ ≥ 0, the tangential
 // part of f = r − p (in units where K = 1) vanishes at the mix p' = (p + λ q)/(1 + λ) instead of p: r is the point of
-// the surface next to p'. So with τ = λ/(1 + λ) all that is left is one equation,
-//   r(τ) = next to p + τ (q − p),   ‖f_t(r(τ))‖ = μ f_n(r(τ)),   0 ≤ τ ≤ 1,
-// where τ = 0 is frictionless and τ = 1 is stick (r next to q). On a plane this is (4) and linear in τ.
+// the surface next to p'. So with s = 1/(1 + λ) all that is left is one equation,
+//   r(s) = next to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1,
+// where s = 1 is frictionless and s = 0 is stick (r next to q). On a plane this is (4) and linear in s. Where p is far
+// beyond the radius, r turns from q's side to p's while s is about σ = R/‖p − q‖: s is counted from q, so that it has
+// all its digits there, and what is halved is u = s/(σ + (1 − σ)s), half of whose range is that turn.
 //
 // A solid one is not convex to the proxy: if p is past it, the proxy sticks if it can and otherwise goes around.
 #pragma once
@@ -109,28 +111,33 @@ class RoundObstacle final : public Obstacle {
 
     const At at_q = at(q, p);
     const double q_rounding = rounding(q);
-    // τ = 1: sticks where it is, or below it.
+    // s = 0: sticks where it is, or below it.
     Trial trial = stick(K, p, q, at_q, q_rounding);
     if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
     if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid one
 
-    // τ = 0 leaves no tangential force, so the excess is −μ f_n there. Between them it is nearly linear (on a plane it
-    // is): secants, within what is known to hold the root.
+    // s = 1 leaves no tangential force, so the excess is −μ f_n there. Between them it is nearly linear in s (on a
+    // plane it is): secants, within what is known to hold the root.
     Trial slide = place(K, p, at_p);
     if (!(mu_ > 0.0)) return {slide.r, slide.normal, 0, true, false};
-    const double small = 0.25 * rounding(p);
-    double low = 0.0, high = 1.0, last = 1.0, last_excess = trial.excess, tau = 0.0, excess = -mu_ * slide.f_n;
+    const Vec3 way = p - q;
+    const double sigma = R_ > 0.0 ? std::min(1.0, R_ / way.norm()) : 1.0, small = 0.25 * rounding(p);
+    const auto middle = [sigma](double from, double to) {
+      const double u = 0.5 * (from / (sigma + (1.0 - sigma) * from) + to / (sigma + (1.0 - sigma) * to));
+      return sigma * u / (1.0 - (1.0 - sigma) * u);
+    };
+    double low = 0.0, high = 1.0, last = 0.0, last_excess = trial.excess, at_s = 1.0, excess = -mu_ * slide.f_n;
     for (int k = 0; k < 100; ++k) {
-      double next = tau - excess * (tau - last) / (excess - last_excess);
-      if (k % 8 == 7 || !(next > low && next < high)) next = 0.5 * (low + high);
+      double next = at_s - excess * (at_s - last) / (excess - last_excess);
+      if ((k > 4 && k % 2 == 1) || !(next > low && next < high)) next = middle(low, high);
       if (!(next > low && next < high)) break;
-      last = tau;
+      last = at_s;
       last_excess = excess;
-      tau = next;
-      slide = place(K, p, at(p + tau * (q - p), q));
+      at_s = next;
+      slide = place(K, p, at(q + at_s * way, q));
       excess = slide.excess;
       if (std::abs(excess) <= small) break;
-      (excess < 0.0 ? low : high) = tau;
+      (excess < 0.0 ? high : low) = at_s;
     }
     return {slide.r, slide.normal, 0, true, true};
   }
