@@ -31,9 +31,19 @@ class MeshObstacle final : public Obstacle {
     out.touches = true;
     out.slips = most->slips;
     out.normal = most->normal;
-    const bool front = mesh().face(static_cast<std::uint32_t>(most->feature)).normal.dot(most->normal) > 0.0;
-    out.feature = front ? most->feature : ~most->feature;
+    out.feature = feature_of(*most);
     return out;
+  }
+
+  [[nodiscard]] std::size_t contacts(double K, const Vec3& p, const Vec3& q, const Step& s,
+                                     std::array<Contact<3>, 3>& out) const noexcept override {
+    static_cast<void>(surface_(K, p, q));
+    if (surface_.contacts().empty()) return Obstacle::contacts(K, p, q, s, out);
+    std::size_t count = 0;
+    for (const Contact<3>& contact : surface_.contacts()) {
+      out[count++] = {0, feature_of(contact), contact.slips, contact.normal};
+    }
+    return count;
   }
 
   // A point that the mesh lets the proxy reach is one where it ends if it wants to get there, or one within the few
@@ -59,6 +69,11 @@ class MeshObstacle final : public Obstacle {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface_.mesh(); }
 
  private:
+  [[nodiscard]] std::int32_t feature_of(const Contact<3>& contact) const noexcept {
+    const bool front = mesh().face(static_cast<std::uint32_t>(contact.feature)).normal.dot(contact.normal) > 0.0;
+    return front ? contact.feature : ~contact.feature;
+  }
+
   mutable MeshSurface surface_;  // what it remembers changes how fast it answers, not what
   mutable std::uint32_t near_ = 0;
 };

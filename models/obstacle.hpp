@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "models/flat_surface.hpp"
+#include "models/geometric_algorithm.hpp"
 
 namespace proxarm::models {
 
@@ -45,6 +46,14 @@ class Obstacle {
   // 𝒢 of this object alone, for stiffness K; exact in the sense of (17): the force is K (r − p), friction acts against
   // N Nᵀ (r − q) at the normal of r. All these calls are noexcept, allocate nothing and lock nothing.
   [[nodiscard]] virtual Step step(double K, const Vec3& p, const Vec3& q) const noexcept = 0;
+
+  // The contacts of that step, `s` being what it has returned: one, but for objects of several surfaces. Returns how
+  // many; their `object` is the caller's to fill in.
+  [[nodiscard]] virtual std::size_t contacts(double /*K*/, const Vec3& /*p*/, const Vec3& /*q*/, const Step& s,
+                                             std::array<Contact<3>, 3>& out) const noexcept {
+    out[0] = {0, s.feature, s.slips, s.normal};
+    return 1;
+  }
 
   // True if r can't be where a proxy from q ends: inside by more than rounding, or on the far side of a thin object.
   [[nodiscard]] virtual bool excludes(const Vec3& q, const Vec3& r) const noexcept = 0;

@@ -51,6 +51,7 @@ struct World::Choice {
   Vec3 r = Vec3::Zero();
   std::array<Contact<3>, 3> contacts{};
   std::size_t count = 0;
+  bool free = false;  // nothing in the way of p
 
   [[nodiscard]] bool found() const noexcept { return distance2 < infinity; }
   // True if this one is better than what was there; then the caller fills in the contacts.
@@ -87,10 +88,10 @@ void World::set_time(const StepTime& time) noexcept {
 
 // All obstacles that the step can meet. What a step does stays within the ball whose diameter is the way from q to p
 // (the force on it never does work: (r − p)ᵀ(r − q) ≤ 0), which around convex bodies of radius R is exceeded by ‖r −
-// q‖²/2R at most; twice that ball covers it.
-void World::gather(const Vec3& p, const Vec3& q) noexcept {
+// q‖²/2R at most; twice that ball covers it. `reach`: the least radius about the middle of that way.
+double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   const Vec3 middle = 0.5 * (p + q);
-  const double radius = (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>());
+  const double radius = std::max(reach, (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>()));
   near_.resize(near_fixed_);
   if (!((middle - near_centre_).norm() + radius <= near_radius_)) {
     // A millimetre more than needed, so that a proxy in contact asks once in many steps.
@@ -108,6 +109,7 @@ void World::gather(const Vec3& p, const Vec3& q) noexcept {
     const Obstacle& obstacle = *entries_[i].obstacle;
     if (obstacle.distance(middle) <= radius + (obstacle.carry(q) - q).norm()) near_.push_back(i);
   }
+  return radius;
 }
 
 void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept {
@@ -153,7 +155,11 @@ void World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& cand
     const std::size_t i[1] = {candidates.index[c]};
     if (!s.touches || !fits(q, s.r, i, candidates, K, p) || !choice.better(p, s.r, 1)) continue;
     const Entry& entry = entries_[i[0]];
-    choice.contacts[0] = {entry.object, entry.feature < 0 ? s.feature : entry.feature, s.slips, s.normal};
+    choice.count = entry.obstacle->contacts(K, p, q, s, choice.contacts);
+    for (std::size_t j = 0; j < choice.count; ++j) {
+      choice.contacts[j].object = entry.object;
+      if (entry.feature >= 0) choice.contacts[j].feature = entry.feature;
+    }
   }
 }
 
@@ -304,47 +310,61 @@ double World::distance(const Vec3& x) const noexcept {
   return tree_.nearest(x, least, [&](std::size_t i) { return entries_[i].obstacle->distance(x); });
 }
 
+// False where no set of contacts was complete.
+bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) const noexcept {
+  Candidates candidates;
+  add_candidates(K, p, q, candidates);
+  choice.free = candidates.count == 0;
+  if (choice.free) {
+    choice.r = p;
+    return true;
+  }
+  if (search(K, p, q, candidates, choice)) return true;
+  candidates.around = true;
+  if (search(K, p, q, candidates, choice)) return true;
+  // A tool so deep that tangent planes lead nowhere (beyond the radius of a curved surface): as far as a shorter step
+  // leads, or where it was.
+  Vec3 nearer = p;
+  for (int k = 0; k < 6 && !choice.found(); ++k) {
+    nearer = 0.5 * (nearer + q);
+    Candidates fewer;
+    add_candidates(K, nearer, q, fewer);
+    if (fewer.count > 0) search(K, nearer, q, fewer, choice);
+  }
+  if (!choice.found()) hold(p, q, candidates, choice);
+  return false;
+}
+
 Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   count_ = 0;
   if ((p - clear_at_).squaredNorm() < clearance_ * clearance_ &&
       (q - clear_at_).squaredNorm() < clearance_ * clearance_ && clearance_ > 0.0) {
     return p;
   }
-  gather(p, q);
-  Candidates candidates;
-  add_candidates(K, p, q, candidates);
-  if (candidates.count == 0) {
-    // Nothing in the way. How much room is there? Only what stands still is remembered.
-    if (moving_.empty()) {
-      double room = infinity;
-      for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
-      clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });
-      clearance_ -= 1e-12 * (1.0 + p.lpNorm<1>());  // rounding of distances
-      clear_at_ = p;
-    }
-    return p;
-  }
+  double radius = gather(p, q, 0.0);
   Choice choice;
-  bool found = search(K, p, q, candidates, choice);
-  if (!found) {
-    candidates.around = true;
-    found = search(K, p, q, candidates, choice);
+  bool found = solve(K, p, q, choice);
+  // What moves may carry the proxy, or others have squeezed it into something that it comes out of: then it may end
+  // where nobody has looked yet.
+  for (std::size_t known = 0; known != near_.size() && !choice.free;) {
+    known = near_.size();
+    const double away = (choice.r - 0.5 * (p + q)).norm();
+    if (away <= radius) break;
+    radius = gather(p, q, 2.0 * away);
+    choice = {};
+    found = solve(K, p, q, choice);
   }
-  if (!found) {
-    // A tool so deep that tangent planes lead nowhere (beyond the radius of a curved surface): as far as a shorter step
-    // leads, or where it was.
-    ++unresolved_;
-    Vec3 nearer = p;
-    for (int k = 0; k < 6 && !choice.found(); ++k) {
-      nearer = 0.5 * (nearer + q);
-      Candidates fewer;
-      add_candidates(K, nearer, q, fewer);
-      if (fewer.count > 0) search(K, nearer, q, fewer, choice);
-    }
-    if (!choice.found()) hold(p, q, candidates, choice);
-  }
+  if (!found) ++unresolved_;
   contacts_ = choice.contacts;
   count_ = choice.count;
+  if (choice.free && moving_.empty()) {
+    // Nothing in the way. How much room is there? Only what stands still is remembered.
+    double room = infinity;
+    for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
+    clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });
+    clearance_ -= 1e-12 * (1.0 + p.lpNorm<1>());  // rounding of distances
+    clear_at_ = p;
+  }
   return choice.r;
 }
 

@@ -44,7 +44,7 @@ class World final : public GeometricAlgorithm<3> {
   struct Candidates;
   struct Choice;
 
-  void gather(const Vec3& p, const Vec3& q) noexcept;
+  double gather(const Vec3& p, const Vec3& q, double reach) noexcept;
   void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept;
   bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
             const Vec3& p) const noexcept;
@@ -54,6 +54,7 @@ class World final : public GeometricAlgorithm<3> {
   void try_triples(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
 
+  bool solve(double K, const Vec3& p, const Vec3& q, Choice& choice) const noexcept;
   void hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept;
 
   std::vector<Entry> entries_;
