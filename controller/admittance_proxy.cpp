@@ -120,7 +120,8 @@ ProxyFault AdmittanceProxy<N>::euler(const V& h, Trial& out) noexcept {
 //   κ = 9M/(4T²) + 3B/(2T) + K_v,   q̃ = (4q₁ − q₂)/3   (so that v = (q − q̃)/(2T/3): 𝒢's previous proxy, and its T)
 //   p̂ = [M(12q₁ − 3q₂ + 2T(4v₁ − v₂))/(4T²) + (3B/2T) q̃ + K_v q_ref + h]/κ,   q = 𝒢(κ, p̂, q̃)
 // below with q₁ taken out of the brackets. Before that, 𝒢 is asked from the true q₁: whether the way from there meets
-// something (q̃ may lie beyond a thin wall), and whether the contacts are still those of the step before.
+// something (q̃ may lie beyond a thin wall), and whether the contacts are still those of the step before. Where nothing
+// acts on it from there, that is the step. A step for which 𝒢 has no answer that keeps its laws is an event, too.
 template <int N>
 ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, bool& contacts_changed) noexcept {
   const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m, T = config_.period_s;
@@ -129,13 +130,16 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, bool& contacts_chang
   out.kappa = 9.0 * M / (4.0 * T * T) + 3.0 * B / (2.0 * T) + K_v;
   out.p_hat = q_k1_ + (inertial + 3.0 * B / (2.0 * T) * (q_tilde - q_k1_) + K_v * (q_ref_ - q_k1_) + h) / out.kappa;
   contacts_changed = false;
+  const std::uint64_t unresolved = g_->unresolved_steps();
   for (const bool from_q_tilde : {false, true}) {
     const ProxyFault fault = from_q_tilde ? solve(out, q_tilde, 2.0 * T / 3.0) : solve(out, q_k1_, T);
     if (fault != ProxyFault::none) return fault;
-    if (contacts_.known && !same(contacts_, contact_set(g_->contacts(), out.held))) {
+    if (g_->unresolved_steps() != unresolved ||
+        (contacts_.known && !same(contacts_, contact_set(g_->contacts(), out.held)))) {
       contacts_changed = true;
       return ProxyFault::none;
     }
+    if (out.q == out.p_hat && g_->contacts().empty()) break;
   }
   out.v = (3.0 * (out.q - q_k1_) - (q_k1_ - q_k2_)) / (2.0 * T);
   return ProxyFault::none;
