@@ -399,7 +399,7 @@ void Cycle::hold() noexcept {
 // A device that is driven back must not run away: it may be as fast as its joints may.
 void Cycle::render_torques() noexcept {
   for (Eigen::Index i = 0; i < actual_rad_.size(); ++i) {
-    const double speed = std::abs(actual_rad_[i] - actual_k1_rad_[i]) / settings_.period_s;
+    const double speed = std::abs(moved_rad_[i]) / settings_.period_s;
     const double limit = parts_.drives[static_cast<std::size_t>(i)].drive.description().max_speed_rad_per_s;
     if (speed > limit) return raise(Fault::target_too_fast, static_cast<std::int32_t>(i), speed, limit);
   }
@@ -582,11 +582,12 @@ void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   for (DriveOnBus& axis : parts_.drives) axis.drive.archive(state);
   for (DriveBus& bus : parts_.drive_buses) state(bus.sync, bus.heartbeat);
   parts_.sensor->archive(state);
-  parts_.world->archive(state);
+  if (parts_.torque) parts_.torque->archive(state);
+  if (parts_.world) parts_.world->archive(state);
   state(parts_.elastic, parts_.orientation, parts_.compensation, supervisor_, entered_phase_, phase_since_ns_,
         first_cycle_ns_, cycle_, rendered_cycles_, missed_samples_, reading_S_.force, reading_S_.torque, R_WS_,
-        hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, run_out_rad_per_s_,
-        measured_link_rad_, actual_rad_, moved_rad_, guard_, run_out_scale_, run_out_per_cycle_);
+        hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, torque_Nm_,
+        run_out_rad_per_s_, measured_link_rad_, actual_rad_, moved_rad_, guard_, run_out_scale_, run_out_per_cycle_);
   if (state.reading()) parts_.arm->kinematics(link_rad_, solution_.kinematics);
 }
 

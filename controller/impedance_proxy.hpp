@@ -15,6 +15,7 @@
 #include <cstdint>
 
 #include "controller/admittance_proxy.hpp"
+#include "fieldbus/state_archive.hpp"
 #include "models/geometric_algorithm.hpp"
 
 namespace proxarm::controller {
@@ -82,6 +83,8 @@ class ImpedanceProxy {
     return config_.stiffness_N_per_m + (implicit ? config_.damping_Ns_per_m / config_.period_s : 0.0);
   }
   [[nodiscard]] const ImpedanceConfig& config() const noexcept { return config_; }
+
+  void archive(fieldbus::StateArchive& state) noexcept { state(q_k1_, p_k1_, p_hat_, f_, epoch_s_, steps_); }
 
  private:
   ImpedanceConfig config_;

@@ -77,7 +77,7 @@ class WorldOfDimension final : public RenderedWorld {
     }
   }
 
-  void archive(fieldbus::StateArchive& state) noexcept override { state(proxy_, start_W_, start_, last_.q_W); }
+  void archive(fieldbus::StateArchive& state) noexcept override { state(proxy_, space_, last_.q_W); }
 
  private:
   scenes::CompiledScene* scene_;

@@ -2,6 +2,7 @@
 // that space stays as it is.
 #pragma once
 
+#include "fieldbus/state_archive.hpp"
 #include "models/geometry.hpp"
 #include "scenes/compile.hpp"
 
@@ -37,6 +38,8 @@ class SceneSpace {
   [[nodiscard]] const Eigen::Matrix<double, 3, N>& basis() const noexcept { return basis_; }  // U
   [[nodiscard]] const V& start() const noexcept { return start_; }
   [[nodiscard]] const models::Vec3& start_W() const noexcept { return start_W_; }
+
+  void archive(fieldbus::StateArchive& state) noexcept { state(start_W_, start_); }
 
  private:
   const scenes::CompiledScene* scene_;

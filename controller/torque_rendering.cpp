@@ -85,6 +85,8 @@ class TorquesOfDimension final : public TorqueRendering {
     return last_;
   }
 
+  void archive(fieldbus::StateArchive& state) noexcept override { state(space_, proxy_, anchor_W_, p_k1_W_); }
+
  private:
   [[nodiscard]] Vec3 spring_to(const Vec3& rest_W, const Vec3& p_W) const noexcept {
     const ImpedanceConfig& c = proxy_.config();

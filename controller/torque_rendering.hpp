@@ -46,6 +46,8 @@ class TorqueRendering {
   // From here on, at rest.
   virtual void start(const models::JointVector& link_rad) noexcept = 0;
   virtual const TorqueStep& step(const models::JointVector& link_rad) noexcept = 0;
+
+  virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 };
 
 // Scene and arm must outlive the result. Throws SetupError where the coupling's figures can't be.

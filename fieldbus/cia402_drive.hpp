@@ -126,7 +126,8 @@ class ServoDrive final : public CyclicDrive {
   void archive(StateArchive& state) noexcept override {
     state(heartbeat_, goal_, state_, fault_, statusword_, controlword_, actual_counts_, target_counts_, tpdo_time_ns_,
           fault_time_ns_, boot_ups_at_start_, cycles_without_tpdo_, held_, held_pending_, cycling_, old_fault_, fresh_,
-          heard_, following_, emergency_, emergencies_, repeated_tpdos_);
+          heard_, following_, emergency_, emergencies_, repeated_tpdos_, target_torque_, actual_torque_,
+          torque_per_Nm_);
   }
 
  private:

@@ -103,6 +103,11 @@ std::vector<controller::ScheduledChange> scheduled_changes(const std::vector<std
 }  // namespace
 
 void require_changes(const PreparedSession& session, const RunOptions& options) {
+  if (session.impedance() && (!options.changes.empty() || !options.control.empty())) {
+    throw SetupError({.key = options.changes.empty() ? "--control" : "--set",
+                      .found = "the impedance type",
+                      .expected = "--scheme admittance: mass, damping and spring are the proxy's"});
+  }
   (void)scheduled_changes(options.changes, session, options);
   if (!options.control.empty()) require_control_path(control_path(options));
 }
