@@ -34,6 +34,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "controller/cycle_record.hpp"
@@ -63,14 +64,21 @@ struct ComputeTime {
   double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns, below 1 ms
 };
 
+// Of a session in real time (latency.hpp), µs.
+struct LatencySummary {
+  double median = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
+  std::vector<std::pair<int, std::uint64_t>> histogram;  // µs and how many, of bins that aren't empty
+};
+
 struct Summary {
   double simulated_time_s = 0.0;  // all cycles, whatever the phase
   double rendered_time_s = 0.0;
   double wall_time_s = 0.0;  // set by the caller
   std::uint64_t cycles = 0;
-  std::uint64_t overruns = 0;              // all phases
-  ComputeTime compute_us;                  // all phases
-  std::map<std::string, double> bus_load;  // set by the caller
+  std::uint64_t overruns = 0;                        // all phases
+  ComputeTime compute_us;                            // all phases
+  std::map<std::string, LatencySummary> latency_us;  // by name; set by the caller; empty in virtual time
+  std::map<std::string, double> bus_load;            // set by the caller
   double penetration_max_m = 0.0;
   double tool_penetration_max_m = 0.0;
   double tool_penetration_touch_max_m = 0.0;

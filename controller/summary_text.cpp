@@ -1,4 +1,5 @@
 // The summary for programs and for people.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -24,6 +25,13 @@ void add_timing(Json& json, const Summary& s) {
   json["wall_time_s"] = s.wall_time_s;
   json["overruns"] = s.overruns;
   json["compute_us"] = {{"median", s.compute_us.median}, {"p99", s.compute_us.p99}, {"max", s.compute_us.max}};
+  for (const auto& [name, latency] : s.latency_us) {
+    json["latency_us"][name] = {{"median", latency.median},
+                                {"p99", latency.p99},
+                                {"p999", latency.p999},
+                                {"max", latency.max},
+                                {"histogram", latency.histogram}};
+  }
 }
 
 void add_repeatable(Json& json, const Summary& s) {
@@ -116,6 +124,12 @@ std::string summary_text(const Summary& s) {
                    format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s", s.wall_time_s));
   line("compute per cycle", format("median %.1f, ", s.compute_us.median) + format("p99 %.1f, ", s.compute_us.p99) +
                                 format("max %.1f µs; overruns ", s.compute_us.max) + std::to_string(s.overruns));
+  for (const auto& [name, latency] : s.latency_us) {
+    std::string words = name;
+    std::replace(words.begin(), words.end(), '_', ' ');
+    line(words.c_str(), format("median %.0f, ", latency.median) + format("p99 %.0f, ", latency.p99) +
+                            format("p99.9 %.0f, ", latency.p999) + format("max %.1f µs", latency.max));
+  }
   std::string loads;
   for (const auto& [bus, load] : s.bus_load)
     loads += (loads.empty() ? "" : ", ") + bus + format(" %.1f %%", 100 * load);

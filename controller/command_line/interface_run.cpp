@@ -17,6 +17,7 @@
 #include "controller/command_line/signal_watch.hpp"
 #include "controller/command_line/start_check.hpp"
 #include "controller/frame_tap.hpp"
+#include "controller/latency.hpp"
 #include "controller/session.hpp"
 #include "fieldbus/can_timing.hpp"
 #include "fieldbus/socket_can_network.hpp"
@@ -94,17 +95,28 @@ std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const c
   return rates;
 }
 
+controller::LatencySummary figures(const controller::LatencyHistogram& times) {
+  controller::LatencySummary figures{
+      times.quantile_us(0.5), times.quantile_us(0.99), times.quantile_us(0.999), times.max_us(), {}};
+  for (std::size_t us = 0; us < times.counts().size(); ++us) {
+    if (times.counts()[us] > 0) figures.histogram.emplace_back(static_cast<int>(us), times.counts()[us]);
+  }
+  return figures;
+}
+
 // Takes records and frames out of the cycle's rings and hands them on, in a thread of its own. Counts how long the
 // frames would occupy a bus of the cell's bitrates, since a virtual interface takes no time.
 class Drain {
  public:
   Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
-        std::vector<fieldbus::BitRates> rates, BlackBoxKeeper& keeper, controller::ReplayRecorder* replay)
+        std::vector<fieldbus::BitRates> rates, BlackBoxKeeper& keeper, controller::LatencyMeter& meter,
+        controller::ReplayRecorder* replay)
       : records_(records),
         tap_(tap),
         output_(output),
         rates_(std::move(rates)),
         keeper_(keeper),
+        meter_(meter),
         replay_(replay),
         busy_ns_(rates_.size()),
         begun_ns_(tap.now_ns()),
@@ -139,6 +151,7 @@ class Drain {
   void drain() {
     CycleRecord record;
     while (records_.pop(record)) output_.add(record);
+    meter_.drain();
     if (replay_ != nullptr) replay_->drain(keeper_.head());
     controller::TappedFrame tapped;
     while (tap_.frames().pop(tapped)) {
@@ -154,6 +167,7 @@ class Drain {
   SessionOutput& output_;
   std::vector<fieldbus::BitRates> rates_;
   BlackBoxKeeper& keeper_;
+  controller::LatencyMeter& meter_;
   controller::ReplayRecorder* replay_;
   std::vector<std::int64_t> busy_ns_;
   std::int64_t begun_ns_;
@@ -191,7 +205,8 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   cycle.write_to(keeper.box());
   SignalWatch signals([&](int) { cycle.request_stop(); });
   const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options);
-  Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, replay.get());
+  controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
+  Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get());
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::SessionTally tally;
   {
@@ -206,6 +221,9 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   controller::Summary summary = output.summary(cycle);
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
+  summary.latency_us = {{"wake_up", figures(meter.latencies().wake_up)},
+                        {"compute", figures(meter.latencies().compute)},
+                        {"sensor_to_setpoint", figures(meter.latencies().sensor_to_setpoint)}};
   summary.bus_load = drain.loads();
   return output.finish(summary, keeper);
 }

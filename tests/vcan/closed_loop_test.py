@@ -70,6 +70,21 @@ class ClosedLoop:
         offsets = [s.time_us - r.time_us for key in recorded for s, r in zip(seen[key], recorded[key])]
         self.assertLess(max(offsets) - min(offsets), 100)
 
+    def test_the_record_replays_to_the_same_setpoints(self):
+        """Although the frames came from a kernel, at times of their own."""
+        done = subprocess.run([two.PROGRAM, "replay", self.record.name], capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        self.assertIn(f"{self.session.summary['cycles']} cycles from 0 on", done.stdout)
+
+    def test_latencies_are_told(self):
+        latencies = self.session.summary["latency_us"]
+        self.assertEqual(set(latencies), {"wake_up", "compute", "sensor_to_setpoint"})
+        for name, latency in latencies.items():
+            with self.subTest(name):
+                self.assertLessEqual(latency["median"], latency["p99"])
+                self.assertLessEqual(latency["p99"], latency["max"] + 1)
+                self.assertEqual(sum(n for _, n in latency["histogram"]), self.session.summary["cycles"])
+
     def test_targets_on_the_wire_have_the_hash_of_the_summary(self):
         self.assertEqual(two.setpoints_sha256(self.session.seen), self.session.summary["setpoint_sha256"])
 
