@@ -5,9 +5,10 @@
 // part of f = r − p (in units where K = 1) vanishes at the mix p' = (p + λ q)/(1 + λ) instead of p: r is the point of
 // the surface next to p'. So with s = 1/(1 + λ) all that is left is one equation,
 //   r(s) = next to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1,
-// where s = 1 is frictionless and s = 0 is stick (r next to q). On a plane this is (4) and linear in s. Where p is far
-// beyond the radius, r turns from q's side to p's while s is about σ = R/‖p − q‖: s is counted from q, so that it has
-// all its digits there, and what is halved is u = s/(σ + (1 − σ)s), half of whose range is that turn.
+// where s = 1 is frictionless and s = 0 is stick (r next to q). On a plane this is (4) and linear in s. Where the way
+// from q to p passes the core closely, at o = q + s₀ (p − q), r turns around there while t = s − s₀ is about σ = ‖o −
+// core‖/‖p − q‖, however small that is: so coordinates are taken from o, t is looked for, and what is halved is asinh
+// t/σ. A way through the core itself lets r jump over to p's side, and there it sticks: N(r − q) = 0.
 //
 // A solid one is not convex to the proxy: if p is past it, the proxy sticks if it can and otherwise goes around.
 #pragma once
@@ -43,18 +44,19 @@ struct PointCore {
   [[nodiscard]] double size() const noexcept { return centre.lpNorm<1>(); }
   [[nodiscard]] Vec3 any_normal() const noexcept { return Vec3::UnitZ(); }
   [[nodiscard]] Bounds bounds() const noexcept { return {centre, centre}; }
+  [[nodiscard]] PointCore seen_from(const Vec3& origin) const noexcept { return {centre - origin}; }
 };
 
 struct SegmentCore {
   SegmentCore(const Vec3& from, const Vec3& to) noexcept
-      : a(from), length((to - from).norm()), e(length > 0.0 ? Vec3((to - from) / length) : Vec3(Vec3::UnitZ())) {}
+      : a(from), end((to - from).norm()), e(end > 0.0 ? Vec3((to - from) / end) : Vec3(Vec3::UnitZ())) {}
 
-  [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), 0.0, length) * e; }
+  [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), begin, end) * e; }
   // The distance from a segment is that from its line or from one of its ends; along the way each has one minimum.
   [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
     double best = 0.0, least = std::numeric_limits<double>::infinity();
     for (const double t :
-         {closest_to_line(q, d, a, e), closest_to_point(q, d, a), closest_to_point(q, d, a + length * e)}) {
+         {closest_to_line(q, d, a, e), closest_to_point(q, d, a + begin * e), closest_to_point(q, d, a + end * e)}) {
       const Vec3 x = q + t * d;
       const double distance = (x - nearest(x)).squaredNorm();
       if (distance < least) {
@@ -64,15 +66,24 @@ struct SegmentCore {
     }
     return best;
   }
-  [[nodiscard]] double size() const noexcept { return a.lpNorm<1>() + length; }
+  [[nodiscard]] double size() const noexcept { return a.lpNorm<1>() + end; }
   [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
   [[nodiscard]] Bounds bounds() const noexcept {
-    const Vec3 b = a + length * e;
+    const Vec3 b = a + end * e;
     return {a.cwiseMin(b), a.cwiseMax(b)};
+  }
+  // With a next to the origin, so that no rounding of a's way there is left in what is near.
+  [[nodiscard]] SegmentCore seen_from(const Vec3& origin) const noexcept {
+    SegmentCore core = *this;
+    const double ahead = e.dot(origin - a);
+    core.a = a - origin + ahead * e;
+    core.begin -= ahead;
+    core.end -= ahead;
+    return core;
   }
 
   Vec3 a;
-  double length;
+  double begin = 0.0, end;  // along e, from a
   Vec3 e;
 };
 
@@ -88,6 +99,9 @@ struct LineCore {
   [[nodiscard]] double size() const noexcept { return a.lpNorm<1>(); }
   [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
   [[nodiscard]] Bounds bounds() const noexcept { return {}; }
+  [[nodiscard]] LineCore seen_from(const Vec3& origin) const noexcept {
+    return {a - origin + e.dot(origin - a) * e, e};
+  }
 };
 
 template <typename Core>
@@ -106,54 +120,35 @@ class RoundObstacle final : public Obstacle {
   }
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
-    const At at_p = at(p, q);
+    const At at_p = at(core_, p, q);
     if (!(at_p.height < 0.0) && !(sign_ > 0.0 && passes(q, p))) return {p, at_p.normal, 0, false, false};
 
-    const At at_q = at(q, p);
+    const At at_q = at(core_, q, p);
     const double q_rounding = rounding(q);
     // s = 0: sticks where it is, or below it.
     Trial trial = stick(K, p, q, at_q, q_rounding);
     if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
     if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid one
 
-    // s = 1 leaves no tangential force, so the excess is −μ f_n there. Between them it is nearly linear in s (on a
-    // plane it is): secants, within what is known to hold the root.
-    Trial slide = place(K, p, at_p);
-    if (!(mu_ > 0.0)) return {slide.r, slide.normal, 0, true, false};
-    const Vec3 way = p - q;
-    const double sigma = R_ > 0.0 ? std::min(1.0, R_ / way.norm()) : 1.0, small = 0.25 * rounding(p);
-    const auto middle = [sigma](double from, double to) {
-      const double u = 0.5 * (from / (sigma + (1.0 - sigma) * from) + to / (sigma + (1.0 - sigma) * to));
-      return sigma * u / (1.0 - (1.0 - sigma) * u);
-    };
-    double low = 0.0, high = 1.0, last = 0.0, last_excess = trial.excess, at_s = 1.0, excess = -mu_ * slide.f_n;
-    for (int k = 0; k < 100; ++k) {
-      double next = at_s - excess * (at_s - last) / (excess - last_excess);
-      if ((k > 4 && k % 2 == 1) || !(next > low && next < high)) next = middle(low, high);
-      if (!(next > low && next < high)) break;
-      last = at_s;
-      last_excess = excess;
-      at_s = next;
-      slide = place(K, p, at(q + at_s * way, q));
-      excess = slide.excess;
-      if (std::abs(excess) <= small) break;
-      (excess < 0.0 ? high : low) = at_s;
+    if (!(mu_ > 0.0)) {
+      const Trial trial_p = place(K, p, at_p);
+      return {trial_p.r, trial_p.normal, 0, true, false};
     }
-    return {slide.r, slide.normal, 0, true, true};
+    return slide(K, p, q, trial.excess);
   }
 
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
-    const double hard = at(r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
+    const double hard = at(core_, r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
     if (hard < -4.0 * rounding(r)) return true;
     return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // beyond it, and it would have held the proxy
   }
 
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t /*feature*/) const noexcept override {
-    const At here = at(r, r);
+    const At here = at(core_, r, r);
     return {FlatSurface<3>::of_unit(here.foot + sign_ * R_ * here.normal, here.normal), mu_};
   }
 
-  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return at(x, x).height; }
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return at(core_, x, x).height; }
 
   [[nodiscard]] Bounds bounds() const noexcept override {
     if (sign_ < 0.0) return {};
@@ -179,16 +174,16 @@ class RoundObstacle final : public Obstacle {
   };
 
   // In the middle of the core every direction is normal: the one towards `other` is taken.
-  [[nodiscard]] At at(const Vec3& x, const Vec3& other) const noexcept {
-    const Vec3 foot = core_.nearest(x);
+  [[nodiscard]] At at(const Core& core, const Vec3& x, const Vec3& other) const noexcept {
+    const Vec3 foot = core.nearest(x);
     Vec3 d = x - foot;
     double distance = d.norm();
     const double measured = distance;
     if (!(distance > 0.0)) {
-      d = other - core_.nearest(other);
+      d = other - core.nearest(other);
       distance = d.norm();
       if (!(distance > 0.0)) {
-        d = core_.any_normal();
+        d = core.any_normal();
         distance = 1.0;
       }
     }
@@ -219,6 +214,42 @@ class RoundObstacle final : public Obstacle {
     Trial trial = place(K, p, at_q);
     if (layer_.soft() && (trial.r - q).norm() <= q_rounding) trial.r = q;
     return trial;
+  }
+
+  // s = 1 leaves no tangential force, so the excess is −μ f_n there; at s = 0 it is `excess_at_q`. Between them it is
+  // nearly linear in s (on a plane it is): secants, within what is known to hold the root.
+  [[nodiscard]] Step slide(double K, const Vec3& p, const Vec3& q, double excess_at_q) const noexcept {
+    const Vec3 way = p - q;
+    const double s_0 = core_.closest_on_way(q, way);
+    const Vec3 o = q + s_0 * way, q_o = q - o, p_o = p - o;
+    const Core core = core_.seen_from(o);
+    // Closer to a bar's axis than a sixteenth of a unit in the last place r turns to the one side as well as to the
+    // other.
+    const double length = way.norm(), closest = core.nearest(Vec3::Zero()).norm(), least = rounding(q) / 256.0;
+    const Vec3 across = way.cross(at(core, p_o, q_o).normal);
+    const Vec3 aside = closest < least && across.norm() > 0.0 ? Vec3(least * across.normalized()) : Vec3(Vec3::Zero());
+    const auto try_at = [&](double t) { return place(K, p_o, at(core, t * way + aside, q_o)); };
+    const double sigma = std::max(closest, least) / length, small = 0.25 * rounding(p);
+    double low = -s_0, high = 1.0 - s_0, last = low, last_excess = excess_at_q, t = high;
+    Trial trial = try_at(t);
+    for (int k = 0; k < 100; ++k) {
+      double next = t - trial.excess * (t - last) / (trial.excess - last_excess);
+      if ((k > 4 && k % 2 == 1) || !(next > low && next < high)) {
+        next = sigma * std::sinh(0.5 * (std::asinh(low / sigma) + std::asinh(high / sigma)));
+      }
+      if (!(next > low && next < high)) next = 0.5 * (low + high);
+      if (!(next > low && next < high)) break;
+      last = t;
+      last_excess = trial.excess;
+      t = next;
+      trial = try_at(t);
+      if (std::abs(trial.excess) <= small) break;
+      (trial.excess < 0.0 ? high : low) = t;
+    }
+    if (trial.excess > small) trial = try_at(high);
+    const Vec3 motion = trial.r - q_o;
+    const bool slips = (motion - trial.normal * trial.normal.dot(motion)).norm() > rounding(q);
+    return {o + trial.r, trial.normal, 0, true, slips};
   }
 
   [[nodiscard]] Trial judge(const Vec3& p, const Vec3& r, const Vec3& n) const noexcept {
