@@ -20,7 +20,9 @@ class MeshObstacle final : public Obstacle {
   // feature: the face's index, or its complement if its back is touched.
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
     Step out;
+    const std::uint64_t unresolved = surface_.unresolved_steps();
     out.r = surface_(K, p, q);
+    out.resolved = surface_.unresolved_steps() == unresolved;
     out.normal = Vec3::UnitZ();
     out.touches = out.r != p;
     const Contact<3>* most = nullptr;

@@ -30,6 +30,7 @@ class Obstacle {
     std::int32_t feature = 0;    // face, edge or region; an argument of tangent()
     bool touches = false;
     bool slips = false;
+    bool resolved = true;  // false: no set of the object's own contacts was complete
   };
 
   // The object's surface as the proxy at r sees it.

@@ -52,6 +52,7 @@ struct World::Choice {
   std::array<Contact<3>, 3> contacts{};
   std::size_t count = 0;
   bool free = false;  // nothing in the way of p
+  bool resolved = true;
 
   [[nodiscard]] bool found() const noexcept { return distance2 < infinity; }
   // True if this one is better than what was there; then the caller fills in the contacts.
@@ -155,6 +156,7 @@ void World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& cand
     const std::size_t i[1] = {candidates.index[c]};
     if (!s.touches || !fits(q, s.r, i, candidates, K, p) || !choice.better(p, s.r, 1)) continue;
     const Entry& entry = entries_[i[0]];
+    choice.resolved = s.resolved;
     choice.count = entry.obstacle->contacts(K, p, q, s, choice.contacts);
     for (std::size_t j = 0; j < choice.count; ++j) {
       choice.contacts[j].object = entry.object;
@@ -319,9 +321,9 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) const 
     choice.r = p;
     return true;
   }
-  if (search(K, p, q, candidates, choice)) return true;
+  if (search(K, p, q, candidates, choice)) return choice.resolved;
   candidates.around = true;
-  if (search(K, p, q, candidates, choice)) return true;
+  if (search(K, p, q, candidates, choice)) return choice.resolved;
   // A tool so deep that tangent planes lead nowhere (beyond the radius of a curved surface): as far as a shorter step
   // leads, or where it was.
   Vec3 nearer = p;

@@ -7,6 +7,8 @@
 
 #include "models/box_obstacle.hpp"
 #include "models/cylinder_obstacle.hpp"
+#include "models/mesh_obstacle.hpp"
+#include "models/moving_obstacle.hpp"
 #include "models/plane_composition.hpp"
 #include "models/world.hpp"
 #include "tests/models/contract.hpp"
@@ -118,6 +120,35 @@ TEST(World, GetsOverABoxesEdgeOntoThePlaneBeyond) {
   EXPECT_LE(std::abs(r.z() + 0.1 * r.y()), 1e-15);
 }
 
+// Two moving planes had squeezed the proxy out of a box. When the box caught it again, far from where it was, the plane
+// there hadn't been asked.
+TEST(World, LooksAgainWhereAStepEndsFarFromWhereItBegan) {
+  std::vector<World::Entry> entries;
+  entries.push_back({std::make_unique<models::MovingObstacle>(
+                         std::make_unique<PlaneObstacle>(Vec3::Zero(), Vec3::UnitX(), 0.1), models::ScriptedMotion{}),
+                     0, -1});
+  entries.push_back(entry<PlaneObstacle>(1, Vec3(0, 0, 0.1), Vec3(-0.1, 0, 1), 0.7));
+  World g(std::move(entries));
+  // A metre deep in the first; a step of a centimetre.
+  const Vec3 r = g(100.0, Vec3(-1.01, 0, 0.01), Vec3(-1, 0, 0));
+  EXPECT_EQ(g.unresolved_steps(), 0u);
+  EXPECT_GE(r.x(), 0.0);
+  EXPECT_GE(Vec3(-0.1, 0, 1).dot(r - Vec3(0, 0, 0.1)), -1e-15);
+}
+
+// It named only one of the faces that held the proxy in a mesh's valley.
+TEST(World, NamesAllFacesOfAMeshThatHold) {
+  const auto valley = std::make_shared<const models::TriangleMesh>(models::TriangleSoup{
+      {Vec3(-1, -1, 0.5), Vec3(1, -1, 0.5), Vec3(-1, 0, 0), Vec3(1, 0, 0), Vec3(-1, 1, 0.5), Vec3(1, 1, 0.5)},
+      {{0, 1, 3}, {0, 3, 2}, {2, 3, 5}, {2, 5, 4}}});
+  World g =
+      world(entry<models::MeshObstacle>(0, valley, 0.1), entry<PlaneObstacle>(1, Vec3(0, 0, -9), Vec3(0, 0, 1), 0));
+  const Vec3 q = g(1.0, Vec3(0.3, 0, -0.1), Vec3(0.3, 0, 1));
+  static_cast<void>(g(1.0, q + Vec3(0.01, 0, -0.1), q));
+  ASSERT_EQ(g.contacts().size(), 2u);
+  EXPECT_NE(g.contacts()[0].feature, g.contacts()[1].feature);
+}
+
 // On a sphere friction has a closed form: the force makes the angle β = atan μ with the normal, so the line of the
 // force passes the centre at R sin β, and the proxy stops where it does. All in the plane of p, q and the centre.
 TEST(Sphere, SlidesToTheFrictionCircle) {
@@ -140,6 +171,43 @@ TEST(Sphere, SlidesToTheFrictionCircle) {
     // asin loses half the digits where its argument nears one: not in these states (d ≥ 0.7 R, β ≤ 45°), but its
     // derivative reaches 10.
     ASSERT_LE((s.r - expected).norm(), 1e-14) << "inside " << inside << " μ " << mu << " R " << R << " φ " << phi;
+  }
+}
+
+// From far beyond a cavity, p and q lie on opposite sides of its middle and the way between them passes that closely:
+// there the proxy turns around within a tiny part of the way. Counted from p, or in coordinates of W, that part was
+// lost in rounding, and the force left its friction cone altogether.
+TEST(RoundBodies, SlideToTheFrictionConeFromFarBeyondACavity) {
+  Random random(606);
+  const auto slide = [&random](const auto& core, double R, double mu, const Vec3& p, const Vec3& q) {
+    const models::RoundObstacle cavity(core, R, mu, true);
+    const Obstacle::Step s = cavity.step(1.0, p, q);
+    ASSERT_EQ(s.touches, cavity.distance(p) < 0.0);  // along an endless bar it may be inside
+    if (!s.touches) return;
+    const Vec3 f = s.r - p, n = s.normal, f_t = f - n * n.dot(f), d = s.r - q, v = d - n * n.dot(d);
+    // Rounding of p, and of q beside the slip's length, with the 64 units that all laws are judged by.
+    const double small = 64.0 * std::numeric_limits<double>::epsilon();
+    const double size = f.norm() + 1.0, uncertain = small / (v.norm() + 1e-300);
+    ASSERT_LE(f_t.norm(), mu * n.dot(f) + small * size);
+    if (!s.slips) return;
+    ASSERT_NEAR(f_t.norm(), mu * n.dot(f), small * size);
+    ASSERT_LE((f_t.normalized() + v.normalized()).norm(), uncertain + small * size / f_t.norm());
+  };
+  for (std::int64_t i = 0; i < scaled(20'000); ++i) {
+    const double R = random.uniform(0.3, 1.0), mu = random.uniform(0.05, 1.2);
+    const Vec3 a = random.in_box<3>(0.3), b = random.in_box<3>(0.3);
+    const Vec3 middle = a + random.uniform(0.0, 1.0) * (b - a);
+    const Vec3 q = middle + random.uniform(0.1, 0.3) * random.direction<3>();
+    // Past the middle by what is above rounding of a way of some metres, to 0.1 m.
+    const Vec3 through = middle + random.log_uniform(1e-14, 0.1) * random.direction<3>();
+    const Vec3 p = through + random.log_uniform(3.0, 1e6) * (through - q).normalized();
+    const Vec3 axis = (b - a).normalized();
+    slide(PointCore{middle}, R, mu, p, q);
+    // On a way along the axis, rounding of what is along decides on the side.
+    if (axis.cross((p - q).normalized()).norm() < 0.3) continue;
+    slide(SegmentCore(a, b), R, mu, p, q);
+    slide(models::LineCore{a, axis}, R, mu, p, q);
+    if (HasFatalFailure()) FAIL() << "state " << i;
   }
 }
 
