@@ -54,13 +54,12 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
 
 template <int N>
 ProxyFault AdmittanceProxy<N>::step(const V& h) noexcept {
-  if (!h.allFinite()) return ProxyFault::input_not_finite;
   Trial trial;
   const ProxyFault fault = config_.order == 1 ? verlet(h, trial) : second_order(h, trial);
-  if (fault != ProxyFault::none) return fault;
+  if (fault != ProxyFault::none) return h.allFinite() ? fault : ProxyFault::input_not_finite;
   p_hat_ = trial.p_hat;
   kappa_ = trial.kappa;
-  f_ = trial.kappa * (trial.q - trial.p_hat);  // (25a)
+  f_ = trial.f;
   q_k2_ = q_k1_;
   q_k1_ = trial.q;
   v_k2_ = v_k1_;
@@ -72,15 +71,16 @@ ProxyFault AdmittanceProxy<N>::step(const V& h) noexcept {
   return ProxyFault::none;
 }
 
-// q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out.
+// q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out. The history is finite, so whatever else isn't
+// shows in p̂.
 template <int N>
 ProxyFault AdmittanceProxy<N>::solve(Trial& out, const V& q_previous, double law_period_s) noexcept {
-  if (!out.p_hat.allFinite() || !q_previous.allFinite()) return ProxyFault::result_not_finite;
+  if (!out.p_hat.allFinite()) return ProxyFault::result_not_finite;
   g_->set_time({epoch_s_ + static_cast<double>(steps_ + 1) * config_.period_s, law_period_s});
   out.q = (*g_)(out.kappa, out.p_hat, q_previous);
-  out.held = out.q == q_previous && out.p_hat != q_previous;
-  // f = κ(q − p̂) may overflow although both are finite.
-  return (out.kappa * (out.q - out.p_hat)).allFinite() ? ProxyFault::none : ProxyFault::result_not_finite;
+  out.held = config_.order == 2 && out.q == q_previous && out.p_hat != q_previous;
+  out.f = out.kappa * (out.q - out.p_hat);  // (25a); it may overflow although both are finite
+  return out.f.allFinite() ? ProxyFault::none : ProxyFault::result_not_finite;
 }
 
 template <int N>
@@ -151,7 +151,6 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, bool& contacts_chang
 template <int N>
 ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
   const V h = config_.matched_labels && has_h_k1_ ? V(2.0 * h_k - h_k1_) : h_k;
-  if (!h.allFinite()) return ProxyFault::result_not_finite;
   bool again = euler_steps_left_ > 0 || config_.period_s != period_k1_s_;
   bool changed = false;
   if (!again) {

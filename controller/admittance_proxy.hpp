@@ -137,7 +137,7 @@ class AdmittanceProxy {
 
   struct Trial {
     double kappa = 0.0;
-    V p_hat = V::Zero(), q = V::Zero(), v = V::Zero();
+    V p_hat = V::Zero(), q = V::Zero(), v = V::Zero(), f = V::Zero();
     bool held = false;
   };
 
