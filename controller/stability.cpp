@@ -68,10 +68,15 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   return {lag * (derivative * derivative), lag * (B * T * damper + Polynomial{loop.spring_N_per_m * T * T}) + force};
 }
 
+// By hand: the product of std::complex looks for NaN each time, which takes most of a sweep.
 Complex evaluate(const Polynomial& p, Complex w) {
-  Complex value = 0.0;
-  for (std::size_t i = p.size(); i-- > 0;) value = value * w + p[i];
-  return value;
+  double re = 0.0, im = 0.0;
+  for (std::size_t i = p.size(); i-- > 0;) {
+    const double next = re * w.real() - im * w.imag() + p[i];
+    im = re * w.imag() + im * w.real();
+    re = next;
+  }
+  return {re, im};
 }
 
 // Roots z = 1/w of C, as eigenvalues of the companion matrix of zⁿ C(1/z).

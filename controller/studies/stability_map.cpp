@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <sstream>
 
 #include "controller/admittance_proxy.hpp"
@@ -75,35 +76,73 @@ controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
   return config;
 }
 
-// ln of the growth from one stretch of half-waves to the next; positive: unstable.
+// Of runs that say no more than the sign.
+constexpr double blew_up = 1e3, died = -1e3;
+
+// ln r through what was recorded from `from` (a share of it) on: by least squares over half of ln(q² − q q).
+double slope(const std::vector<double>& q, double from) {
+  const auto begin = static_cast<std::size_t>(from * static_cast<double>(q.size()));
+  int crossings = 0;
+  for (std::size_t k = begin + 1; k < q.size(); ++k) crossings += (q[k] < 0.0) != (q[k - 1] < 0.0) ? 1 : 0;
+  const double theta = std::numbers::pi * crossings / static_cast<double>(q.size() - begin - 1);
+  // Next to half a turn a step it takes several to make a quarter of a turn; at half a turn, none do, and the size is
+  // that of q itself.
+  std::size_t s = 0;
+  const auto most = std::min<std::size_t>((q.size() - begin) / 4, 20'000);
+  for (std::size_t i = 1; i <= most && s == 0; ++i) {
+    if (std::abs(std::sin(static_cast<double>(i) * theta)) > 0.9) s = i;
+  }
+  const std::size_t stride = std::max<std::size_t>(1, (q.size() - begin) / 400);
+  double n = 0.0, sum_x = 0.0, sum_y = 0.0, sum_xx = 0.0, sum_xy = 0.0;
+  for (std::size_t k = begin + s; k + s < q.size(); k += stride) {
+    const double size2 = q[k] * q[k] - (s == 0 ? 0.0 : q[k + s] * q[k - s]);
+    if (!(size2 > 0.0)) continue;
+    const double x = static_cast<double>(k - begin), y = 0.5 * std::log(size2);
+    n += 1.0;
+    sum_x += x;
+    sum_y += y;
+    sum_xx += x * x;
+    sum_xy += x * y;
+  }
+  const double spread = n * sum_xx - sum_x * sum_x;
+  return spread > 0.0 ? (n * sum_xy - sum_x * sum_y) / spread : 0.0;
+}
+
+// The rate ln|z| per step at which the motion of the slowest mode grows (positive: unstable) or fades.
+//
+// Where one mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) whatever its phase: a straight line
+// ln r² over k. The simulation goes on, twice as long each time, until the last quarter of that line is as steep as
+// its second half, within `share`.
 double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
-  constexpr double start = 1e-3;
-  constexpr int settling = 30, stretch = 40, most_steps = 200'000;
+  constexpr double start = 1e-3, share = 0.005;
+  constexpr int most_steps = 400'000, most_half_waves = 1280;
   models::FreeSpace<1> nothing;
   AdmittanceProxy<1> proxy(config(loop, mass_kg), nothing);
   // Held at rest away from where the hand wants it, then released; the hand wants 0.
   proxy.start({.q = Vec1(start)});
   static_cast<void>(proxy.set_reference(Vec1::Zero()));
   LinearPlant plant(hand, loop, 0.0, start);
-  double h = plant.first_force(), before = start, first = 0.0, second = 0.0;
-  int crossings = 0;
-  for (int k = 0; k < most_steps; ++k) {
-    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) return 10.0;
-    const double q = proxy.q()[0];
-    h = plant(q);
-    crossings += (q < 0.0) != (before < 0.0) ? 1 : 0;
-    before = q;
-    const double size = std::abs(q);
-    if (size > 1e12 * start) return 10.0;
-    if (crossings >= settling + 2 * stretch) break;
-    if (crossings >= settling + stretch) {
-      second = std::max(second, size);
-    } else if (crossings >= settling) {
-      first = std::max(first, size);
+  double h = plant.first_force();
+  std::vector<double> q{start};
+  int crossings = 0, look_at = 40;
+  double rate = 0.0;
+  while (q.size() < most_steps && crossings < most_half_waves) {
+    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) return blew_up;
+    const double now = proxy.q()[0];
+    h = plant(now);
+    crossings += (now < 0.0) != (q.back() < 0.0) ? 1 : 0;
+    q.push_back(now);
+    if (std::abs(now) > 1e12 * start) return blew_up;
+    if (q.size() % 1024 == 0 && std::abs(now) < 1e-12 * start && std::abs(h) < 1e-9 * start * hand.stiffness_N_per_m) {
+      return died;
     }
-    if (k % 1024 == 1023 && size < 1e-12 * start && std::abs(h) < 1e-9 * start * hand.stiffness_N_per_m) return -10.0;
+    if (crossings < look_at) continue;
+    look_at *= 2;
+    const double last_quarter = slope(q, 0.75);
+    rate = slope(q, 0.5);
+    if (std::abs(rate - last_quarter) <= share * std::abs(rate)) break;
   }
-  return second > 0.0 && first > 0.0 ? std::log(second / first) : -10.0;
+  return crossings >= 40 ? rate : died;
 }
 
 struct Contact {
@@ -201,16 +240,12 @@ double measured_boundary_kg(const HandModel& hand, const LoopModel& loop, double
     at_high = growth(hand, loop, high);
   }
   if (!(at_low > 0.0 && at_high < 0.0)) return nan_value;
-  for (int i = 0; i < 4 && high / low > 1.0005; ++i) {
-    // Runs that blew up or died say only the sign.
-    const bool both = std::abs(at_low) < 9.0 && std::abs(at_high) < 9.0;
-    const double part = both ? std::clamp(at_low / (at_low - at_high), 0.1, 0.9) : 0.5;
-    const double middle = low * std::pow(high / low, part), at = growth(hand, loop, middle);
-    (at > 0.0 ? low : high) = middle;
-    (at > 0.0 ? at_low : at_high) = at;
+  // Halved, not along the line between both rates: where another mode takes over, that line has a bend.
+  for (int i = 0; i < 7; ++i) {
+    const double middle = std::sqrt(low * high);
+    (growth(hand, loop, middle) > 0.0 ? low : high) = middle;
   }
-  const bool both = std::abs(at_low) < 9.0 && std::abs(at_high) < 9.0;
-  return low * std::pow(high / low, both ? at_low / (at_low - at_high) : 0.5);
+  return std::sqrt(low * high);
 }
 
 std::vector<Column> StabilityMap::columns() const {

@@ -2,8 +2,8 @@
 // and measured by running the controller's own proxy against the same linear plant until the motion has grown or
 // shrunk.
 //
-// Measured: the growth of the oscillation is followed over some tens of its half-waves, in free motion; the mass at
-// which it neither grows nor shrinks is found by bracketing and the secant rule. A point is ill-conditioned where a per
+// Measured: in free motion, the rate at which the oscillation grows or fades once its slowest mode is left, after 40 to
+// 1280 half-waves; the mass at which it does neither is found by halving. A point is ill-conditioned where a per
 // cent of the hand's stiffness moves the boundary by more than three (|∂ln M/∂ln K_h| ≥ 3).
 //
 // At every tenth point the proxy also meets a wall at 1.5 times the smallest stable mass, with the hand pushing on:
