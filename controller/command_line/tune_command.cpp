@@ -25,18 +25,22 @@ std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop
   return mass ? std::optional<double>(*mass + loop.handle_mass_kg) : std::nullopt;
 }
 
-// The same with the margins: the worst of the hand as described and of one that is stiffer and heavier.
-std::optional<double> with_margin(const HandModel& hand, LoopModel loop) {
-  loop.delay_s *= delay_margin;
+// The same with the margins: the worst of the hand as described and of one that is stiffer and heavier, and of the
+// delay as it is and longer.
+std::optional<double> with_margin(const HandModel& hand, const LoopModel& loop) {
   double worst = 0.0;
   for (const double stiffer : {1.0, hand_margin}) {
     for (const double heavier : {1.0, hand_margin}) {
-      HandModel other = hand;
-      other.stiffness_N_per_m *= stiffer;
-      other.mass_kg *= heavier;
-      const auto mass = smallest_felt(other, loop);
-      if (!mass) return std::nullopt;
-      worst = std::max(worst, *mass);
+      for (const double later : {1.0, delay_margin}) {
+        HandModel other = hand;
+        other.stiffness_N_per_m *= stiffer;
+        other.mass_kg *= heavier;
+        LoopModel slower = loop;
+        slower.delay_s *= later;
+        const auto mass = smallest_felt(other, slower);
+        if (!mass) return std::nullopt;
+        worst = std::max(worst, *mass);
+      }
     }
   }
   return worst;
@@ -54,12 +58,11 @@ std::string mass_text(const std::optional<double>& mass) {
   return text.data();
 }
 
-// The least damping with which some mass is stable with the margins, of a few.
+// The least damping with which some mass is stable with the margins: what there is, or of a few.
 std::optional<double> damping_needed(const HandModel& hand, LoopModel loop) {
   for (const double damping : {0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
-    if (damping < loop.damping_Ns_per_m) continue;
-    loop.damping_Ns_per_m = damping;
-    if (with_margin(hand, loop)) return damping;
+    loop.damping_Ns_per_m = std::max(damping, loop.damping_Ns_per_m);
+    if (with_margin(hand, loop)) return loop.damping_Ns_per_m;
   }
   return std::nullopt;
 }
@@ -100,16 +103,18 @@ std::vector<Limit> limits(const PreparedSession& session, const HandModel& hand)
   return list;
 }
 
-// The largest timestep of those that drives hold exactly at which the wanted mass has its margins.
+// The largest timestep, of those that drives hold exactly, up to which the wanted mass has its margins.
 std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const LoopModel& loop) {
-  for (const double ms : {20.0, 10.0, 8.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5, 0.25, 0.2, 0.1}) {
+  std::optional<double> largest;
+  for (const double ms : {0.1, 0.2, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 10.0, 20.0}) {
     LoopModel other = loop;
     other.period_s = 1e-3 * ms;
     other.delay_s += other.period_s - loop.period_s;
     const auto smallest = with_margin(hand, other);
-    if (smallest && *smallest <= mass_kg) return other.period_s;
+    if (!smallest || *smallest > mass_kg) break;
+    largest = other.period_s;
   }
-  return std::nullopt;
+  return largest;
 }
 
 }  // namespace
@@ -135,16 +140,17 @@ int tune_command(const RunOptions& options) {
   const auto smallest = smallest_felt(hand, loop), safe = with_margin(hand, loop);
   std::printf("smallest stable mass: %s felt, handle's %.3g kg included\n", mass_text(smallest).c_str(),
               loop.handle_mass_kg);
-  std::printf(
-      "advice: --mass %s, which is stable with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
-      mass_text(safe).c_str(), hand_margin, 100.0 * (delay_margin - 1.0));
+  std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
+              safe ? ("--mass " + mass_text(safe)).c_str() : "no mass up to 1000 kg",
+              safe ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
   const auto damping = damping_needed(hand, loop);
   if (!damping) {
-    std::printf("damping: not even 500 Ns/m makes this loop stable: shorten its delay\n");
+    std::printf("damping: not even %.3g Ns/m gives it these margins: shorten the delay\n",
+                std::max(500.0, loop.damping_Ns_per_m));
   } else if (*damping > loop.damping_Ns_per_m) {
     LoopModel damped = loop;
     damped.damping_Ns_per_m = *damping;
-    std::printf("damping: --damping %.3g Ns/m makes it stable, from %s on\n", *damping,
+    std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", *damping,
                 mass_text(with_margin(hand, damped)).c_str());
   } else {
     std::printf(
@@ -153,8 +159,11 @@ int tune_command(const RunOptions& options) {
         T * 20.0 / 0.1);
   }
   const auto sorted = limits(session, hand);
-  std::printf("what limits it: %s; without it the smallest stable mass would be %s\n", sorted.front().what,
-              mass_text(sorted.front().mass_without).c_str());
+  constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
+  const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
+  const std::string limit = helps ? sorted.front().what : "none of these alone";
+  std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),
+              helps ? "it" : sorted.front().what, mass_text(sorted.front().mass_without).c_str());
   for (std::size_t i = 1; i < sorted.size(); ++i) {
     std::printf("  without %s: %s\n", sorted[i].what, mass_text(sorted[i].mass_without).c_str());
   }
@@ -163,8 +172,7 @@ int tune_command(const RunOptions& options) {
   if (timestep) {
     std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms\n", wanted, 1e3 * *timestep);
   } else {
-    std::printf("for %.3g kg with these margins: no timestep is short enough, %s is in the way\n", wanted,
-                sorted.front().what);
+    std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
   }
   return smallest ? 0 : 1;
 }

@@ -133,6 +133,10 @@ std::string machine() {
 
 Outcome run_study(const Study& study, const Options& options, const Shard& shard, const fs::path& out,
                   const std::string& command, unsigned threads) {
+  if (options.runs && !(*options.runs >= 1.0)) {
+    throw SetupError(
+        {.key = "--runs", .found = std::to_string(static_cast<long long>(*options.runs)), .expected = "1 or more"});
+  }
   make_folder(out);
   Table table(study.columns());
   const std::size_t jobs = study.jobs(options);
@@ -168,6 +172,10 @@ Outcome merge_study(const std::function<const Study&(const std::string&)>& study
   std::vector<fs::path> files;
   for (const fs::path& part : parts) {
     std::error_code ignored;
+    if (fs::equivalent(part, out, ignored)) {
+      throw SetupError(
+          {.key = "--out", .found = out.string() + ", which is one of the parts", .expected = "another folder"});
+    }
     std::vector<fs::path> found;
     for (const auto& entry : fs::directory_iterator(part, ignored)) {
       if (entry.path().extension() == ".json") found.push_back(entry.path());

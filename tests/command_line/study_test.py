@@ -40,6 +40,7 @@ class Study(ProgramTest):
                                  (("figure5",), ("--out",)),
                                  (("figure5", "--out", "x", "--shard", "3/2"), ("--shard", "3/2")),
                                  (("figure5", "--out", "x", "--seed", "-1"), ("--seed",)),
+                                 (("stress", "--out", "x", "--runs", "0"), ("--runs", "1 or more")),
                                  (("error", "--out", "x", "--replay", "4"), ("--replay",))):
             outcome = self.call("study", *arguments)
             self.assertEqual(outcome.status, 2, arguments)
@@ -58,6 +59,14 @@ class Tune(ProgramTest):
     def test_a_hopeless_loop_is_told_so(self):
         outcome = self.call("tune", "--timestep", "50ms")
         self.assertIn("damping", outcome.out)
+
+    # It said "advice: --mass none up to 1000 kg, which is stable", and that not even 500 Ns/m would do where 600 did.
+    def test_advice_does_not_contradict_itself(self):
+        hopeless = self.call("tune", "--timestep", "50ms").out
+        self.assertNotIn("--mass none", hopeless)
+        self.assertIn("no mass up to 1000 kg is stable", hopeless)
+        damped = self.call("tune", "--damping", "600").out
+        self.assertNotIn("not even", damped)
 
 
 if __name__ == "__main__":

@@ -75,8 +75,14 @@ TEST_F(StudyFiles, PartsThatDontMakeAWholeAreRefused) {
   EXPECT_THROW(merge({a, a, c}, folder / "out"), description::SetupError);  // one twice
   EXPECT_THROW(merge({a, b}, folder / "out"), description::SetupError);     // another seed
   EXPECT_THROW(merge({a, folder}, folder / "out"), description::SetupError);
+  EXPECT_THROW(merge({a, c}, folder / "b/../a"), description::SetupError);  // over one of its parts
   std::ofstream(c / "thirds.csv", std::ios::app) << "3,first,abc\n";
   EXPECT_THROW(merge({a, c}, folder / "out"), description::SetupError);  // not a number
+}
+
+TEST_F(StudyFiles, NoRunsAreRefused) {
+  EXPECT_THROW(run_study(study, {.runs = 0.0}, {}, folder / "out", "x", 1), description::SetupError);
+  EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
 TEST_F(StudyFiles, ManyThreadsMakeTheFilesOfOne) {
