@@ -37,10 +37,14 @@ struct Tuning {
   double stiffness_N_per_m = 0.0, damping_ratio = 0.0, friction_slope = 1.0;
 };
 
-// Steps per instant: timesteps of all sizes between, so that impacts fall anywhere within a step.
-std::vector<int> refinements(bool quick) {
-  if (quick) return {1, 2, 3, 4, 6, 8, 12, 16, 24, 32};
-  return {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256};
+// Steps of a motion: timesteps of all sizes between, so that impacts fall anywhere within a step. Up to `instants`,
+// each of them ends at an instant.
+std::vector<int> step_counts(bool quick) {
+  std::vector<int> counts{4, 5, 6, 10, 12, 15, 20, 30};
+  for (const int per_instant : {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256}) {
+    if (!quick || per_instant <= 32) counts.push_back(instants * per_instant);
+  }
+  return counts;
 }
 
 std::vector<Tuning> tunings(const ErrorCase& which, Method method, bool quick) {
@@ -203,8 +207,8 @@ struct Errors {
 };
 
 template <typename Stepper>
-Errors errors_of(const ErrorCase& which, Stepper& stepper, int per_instant) {
-  const int steps = instants * per_instant;
+Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps) {
+  const int per_instant = std::max(1, steps / instants), compared = steps / per_instant;
   const double T = which.duration_s / steps, M = which.mass_kg;
   Errors errors;
   double sum_q = 0.0, sum_v = 0.0, rest_s = -1.0, top_speed = 1e-300;
@@ -229,7 +233,7 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int per_instant) {
   }
   const double end = which.duration_s;
   const CaseState exact = which.exact(end);
-  errors.position_m = std::sqrt(sum_q / instants);
+  errors.position_m = std::sqrt(sum_q / compared);
   errors.velocity_m_per_s = std::sqrt(sum_v / std::max(1, counted_v));
   errors.force_N = (stepper.f() - exact.f).norm();
   errors.energy_J = 0.5 * M * std::abs(stepper.v().squaredNorm() - which.exact(stepper.v_label_s(end)).v.squaredNorm());
@@ -258,7 +262,7 @@ double step_time_ns(const ErrorCase& which, Make make, int steps) {
 struct Runs {
   std::string method;
   Tuning tuning;
-  std::vector<double> T, error, cost_ns;
+  std::vector<double> T, steps, error, cost_ns;
 
   // The largest error with this and up to twofold finer timesteps.
   [[nodiscard]] double envelope(std::size_t i) const {
@@ -282,8 +286,8 @@ RunsByCase collect(const Table& table) {
   RunsByCase all;
   const std::size_t name = table.column("case"), method = table.column("method"), k = table.column("stiffness_N_per_m"),
                     ratio = table.column("damping_ratio"), slope = table.column("friction_slope"),
-                    T = table.column("period_s"), error = table.column("position_error_m"),
-                    cost = table.column("run_time_ns");
+                    T = table.column("period_s"), steps = table.column("steps"),
+                    error = table.column("position_error_m"), cost = table.column("run_time_ns");
   for (std::size_t row = 0; row < table.rows(); ++row) {
     std::vector<Runs>& list = all[table.text(row, name)];
     const Tuning tuning{table.number(row, k), table.number(row, ratio), table.number(row, slope)};
@@ -291,8 +295,9 @@ RunsByCase collect(const Table& table) {
                       list.back().tuning.stiffness_N_per_m == tuning.stiffness_N_per_m &&
                       list.back().tuning.damping_ratio == tuning.damping_ratio &&
                       list.back().tuning.friction_slope == tuning.friction_slope;
-    if (!same) list.push_back({table.text(row, method), tuning, {}, {}, {}});
+    if (!same) list.push_back({table.text(row, method), tuning, {}, {}, {}, {}});
     list.back().T.push_back(table.number(row, T));
+    list.back().steps.push_back(table.number(row, steps));
     list.back().error.push_back(table.number(row, error));
     list.back().cost_ns.push_back(table.number(row, cost));
   }
@@ -396,7 +401,7 @@ Fit fit_order(const Runs& runs) {
   std::vector<double> x, y;
   for (std::size_t i = 0; i < runs.T.size(); ++i) {
     const double e = runs.envelope(i);
-    if (i < 3 || !(e > 1e-11) || !std::isfinite(e)) continue;
+    if (runs.steps[i] < 4 * instants || !(e > 1e-11) || !std::isfinite(e)) continue;
     x.push_back(std::log10(runs.T[i]));
     y.push_back(std::log10(e));
   }
@@ -468,11 +473,10 @@ std::vector<Row> ErrorStudy::run(std::size_t job, const Options& options) const 
   std::vector<Row> rows;
   const auto all_steps = [&](const Tuning& tuning, auto make) {
     const double ns = step_time_ns(which, make, options.quick ? 500 : 2000);
-    for (const int per_instant : refinements(options.quick)) {
-      const int steps = instants * per_instant;
+    for (const int steps : step_counts(options.quick)) {
       const double T = which.duration_s / steps;
       auto stepper = make(T);
-      const Errors e = errors_of(which, stepper, per_instant);
+      const Errors e = errors_of(which, stepper, steps);
       rows.push_back({which.name, std::string(method_names[method]), tuning.stiffness_N_per_m, tuning.damping_ratio,
                       tuning.friction_slope, T, static_cast<double>(steps), ns, ns * steps, e.position_m,
                       e.velocity_m_per_s, e.force_N, e.energy_J, e.stop_s});

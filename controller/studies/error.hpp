@@ -12,9 +12,9 @@
 // each at many stiffnesses, damping ratios and slopes of the friction law. They ask the same objects
 // (models/obstacle.hpp) for distance and normal that 𝒢 is made of.
 //
-// Error: rms of the position error over 60 instants of the motion; a run's error counts as the largest of those with
-// its own and up to twofold finer timesteps, so that a crossing of zero is no precision. Run time: steps times the
-// time of a step, best of fifteen.
+// Error: rms of the position error over 60 instants of the motion (over all steps where there are fewer); a run's error
+// counts as the largest of those with its own and up to twofold finer timesteps, so that a crossing of zero is no
+// precision. Run time: steps times the time of a step, best of fifteen.
 #pragma once
 
 #include "controller/studies/study.hpp"
