@@ -9,7 +9,8 @@
 namespace proxarm::studies {
 namespace {
 
-// Seeds and counts that have been seen clean; a failure names the run's own seed.
+// Always the same worlds, so that a change of the code is what a failure shows; it names the run's own seed.
+// `proxarm study stress --seed N` is for others.
 void expect_no_violation(std::uint64_t seed, double runs) {
   const Stress study;
   const Options options{.seed = seed};
@@ -23,7 +24,7 @@ void expect_no_violation(std::uint64_t seed, double runs) {
   EXPECT_GT(headline.at("contact_steps").get<double>(), 0.05 * headline.at("steps").get<double>());
 }
 
-TEST(Stress, HoldsInRandomWorlds) { expect_no_violation(2, 400); }
+TEST(Stress, HoldsInRandomWorlds) { expect_no_violation(2, 10'000); }
 
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
