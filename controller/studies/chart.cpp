@@ -149,6 +149,7 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
     range(gp, 'x', map.x.front(), map.x.back(), map.log_x);
     range(gp, 'y', map.y.front(), map.y.back(), map.log_y);
     gp << "set format x '%g'\nset format y '%g'\n";
+    if (map.log_x && map.x.back() < 100.0 * map.x.front()) gp << "set logscale x 2\n";  // else one label only
     gp << (map.log_z ? "set" : "unset") << " logscale cb\n";
     if (chart.z_low < chart.z_high) gp << "set cbrange [" << chart.z_low << ":" << chart.z_high << "]\n";
     gp << "set title " << plain(map.title) << "\nset xlabel " << plain(map.x_label) << "\nset ylabel "

@@ -32,12 +32,15 @@ std::vector<ArmSine> sines(bool wall) {
 
 std::vector<ArmSetup> setups(bool quick) {
   std::vector<ArmSetup> list;
+  // The start fades with 2M/D, D = 13 Ns/m (a hand's 20 less what the loop's lag takes away): 12 such times for every
+  // mass, since at 0.1 Hz a tenth of a newton counts.
+  const auto settling = [quick](double mass) { return std::max(quick ? 3.0 : 12.0, (quick ? 0.6 : 2.0) * mass); };
   const auto add = [&](double mass, double period, double drive, bool wall) {
     list.push_back({.mass_kg = mass,
                     .period_s = period,
                     .drive_factor = drive,
                     .wall = wall,
-                    .settling_s = quick ? 3.0 : 12.0,
+                    .settling_s = settling(mass),
                     .duration_s = quick ? 10.0 : 30.0,
                     .sines = sines(wall)});
   };
