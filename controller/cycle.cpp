@@ -88,7 +88,7 @@ void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
   }
   record_ = {};
   active_ = {};
-  sample_is_new_ = false;
+  sample_is_new_ = commanded_ = false;
   fieldbus::CanFrame frame;
   for (DriveBus& bus : parts_.drive_buses) {
     send(bus.bus, bus.sync.next(), -1);
@@ -264,12 +264,13 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
   }
 }
 
-// A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one.
+// A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one; unless
+// the setpoints are made already: a second step of the guard would be one of twice the speed.
 void Cycle::choose_targets(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (supervisor_.phase() != entered_phase_) {
     enter(supervisor_.phase(), t_k_ns);
-    act(t_k_ns);
+    if (!commanded_) act(t_k_ns);
   }
 }
 
@@ -446,6 +447,7 @@ void Cycle::command(const JointVector& motor_rad) noexcept {
   JointVector wanted_rad = motor_rad;
   const bool follow = drives_follow(motor_rad, wanted_rad);
   active_.add(guard_.step(wanted_rad));
+  commanded_ = true;
   target_rad_ = guard_.target_rad();
   if (!follow || guard_.lag_rad() > limits_.following_error_rad) wind_back();
 }

@@ -174,6 +174,7 @@ class Cycle {
   std::size_t next_scheduled_ = 0;
   std::atomic<bool> stop_requested_{false};
   bool stop_seen_ = false;  // in this cycle
+  bool commanded_ = false;  // the guard has made this cycle's setpoints
 
   bool sample_is_new_ = false;
   models::Wrench reading_S_;

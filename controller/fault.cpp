@@ -6,19 +6,22 @@
 namespace proxarm::controller {
 namespace {
 
+constexpr const char* stopped = "the arm made a controlled stop and the drives were switched off";
+constexpr const char* still = "the arm had not begun to move, and the drives were switched off";
+constexpr const char* unconfirmed =
+    "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
+    "off";
+
 // One row per fault: what was seen (with one %s for where, %.4g value, %.4g limit used as the row says), what to do.
+// Faults that only a start can have say that nothing has moved.
 struct FaultText {
   Fault fault;
   const char* name;
   const char* cause;
   const char* unit;  // of value and limit; nullptr: no figures
   const char* advice;
+  const char* did = stopped;
 };
-
-constexpr const char* stopped = "the arm made a controlled stop and the drives were switched off";
-constexpr const char* unconfirmed =
-    "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
-    "off";
 
 constexpr std::array texts{
     FaultText{Fault::none, "none", "no fault", nullptr, ""},
@@ -35,7 +38,7 @@ constexpr std::array texts{
     FaultText{Fault::force_excessive, "force_excessive", "force beyond limits.max_force_N", "N",
               "push less, or raise the limit in the cell file"},
     FaultText{Fault::force_at_start, "force_at_start", "the handle was touched while the sensor was tared", "N",
-              "take the hand off the handle until rendering starts"},
+              "take the hand off the handle until rendering starts", still},
     FaultText{Fault::drive_silent, "drive_silent", "no feedback from a drive", "cycles",
               "check the drive's power, cable and node number"},
     FaultText{Fault::drive_fault, "drive_fault", "a drive reports a fault", nullptr,
@@ -45,7 +48,7 @@ constexpr std::array texts{
     FaultText{Fault::drive_disabled, "drive_disabled", "a drive left operation enabled by itself", nullptr,
               "check the drive's enable input, its supply and STO"},
     FaultText{Fault::drive_not_enabled, "drive_not_enabled", "a drive didn't reach operation enabled", "s",
-              "check the drive's power stage, STO and enable input"},
+              "check the drive's power stage, STO and enable input", still},
     FaultText{Fault::drive_not_disabled, "drive_not_disabled", "a drive didn't confirm that it is switched off",
               nullptr, "switch the drives' power off; then check the drive's cable and supply"},
     FaultText{Fault::target_out_of_range, "target_out_of_range", "the motion would leave a joint's range", "rad",
@@ -95,7 +98,7 @@ std::string describe(const FaultReport& report, const std::string& where, bool d
     line += figures.data();
   }
   line +=
-      " at cycle " + std::to_string(report.cycle) + "; " + (drives_off ? stopped : unconfirmed) + "; " + text.advice;
+      " at cycle " + std::to_string(report.cycle) + "; " + (drives_off ? text.did : unconfirmed) + "; " + text.advice;
   return line;
 }
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <numeric>
 #include <string>
@@ -38,6 +39,8 @@ struct RigOptions {
   SessionSettings settings{};
   std::array<double, 6> start_error_rad{};     // by which the controller is wrong about where the arm stands
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
+  std::vector<ScheduledChange> changes{};
+  std::function<void(fieldbus::SimulatedCanNetwork&)> after_cycle{};  // such as to take a nap, and be late
 };
 
 class ClosedLoopRig {
@@ -63,7 +66,11 @@ class ClosedLoopRig {
                                if (records.empty()) first_cycle_ns = t_k_ns;
                                truths.push_back(far_end.truth());
                              },
-                             [this] { drain(); }};
+                             [this] {
+                               drain();
+                               if (options.after_cycle) options.after_cycle(network);
+                             }};
+    cycle->schedule(options.changes);
     tally = run_session(*cycle, through, options.settings.period_s, options.duration_s, hooks);
     cycle->shut_down();
     network.sleep_until(network.now_ns() + 1'500'000'000);  // the drives stop, and the gears ring out

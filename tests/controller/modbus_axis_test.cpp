@@ -65,8 +65,8 @@ TEST(ModbusAxis, FollowsASidewaysMotion) {
   EXPECT_LT(worst_m, 0.022 * fastest_m_per_s);
 }
 
-// The rail jams in the middle of that motion, is pushed on for a second and comes free: it snapped by 0.84 m/s when only
-// the leash held it.
+// The rail jams in the middle of that motion, is pushed on for a second and comes free: it snapped by 0.84 m/s when
+// only the leash held it.
 TEST(ModbusAxis, WindsNothingUpBehindAJammedRail) {
   RigOptions options = rail({"rail:jammed@1.3s..2.3s"});
   options.scene = "scenes/free.yaml";

@@ -75,6 +75,22 @@ TEST(FaultText, EveryFaultHasANameOfItsOwn) {
   }
 }
 
+TEST(FaultText, OfAFaultAtTheStartSaysThatNothingHasMoved) {
+  for (const Fault fault : {Fault::force_at_start, Fault::drive_not_enabled}) {
+    const std::string text = describe({fault, 0, 100, 6.0, 5.0}, "");
+    EXPECT_NE(text.find("had not begun to move"), std::string::npos) << text;
+    EXPECT_EQ(text.find("controlled stop"), std::string::npos) << text;
+  }
+}
+
+TEST(FaultText, EveryFaultSaysCauseReactionAndAdvice) {
+  for (int i = 1; i <= static_cast<int>(Fault::error_passive); ++i) {
+    const std::string text = describe({static_cast<Fault>(i), 0, 100, 6.0, 5.0}, "somewhere");
+    const std::size_t cause = text.find(": "), did = text.find("; "), advice = text.rfind("; ");
+    EXPECT_TRUE(cause < did && did < advice && advice + 10 < text.size()) << text;
+  }
+}
+
 TEST(FaultText, DoesNotClaimDrivesToBeOffThatHaveNotSaidSo) {
   const FaultReport report{Fault::drive_silent, 2, 100, 5.0, 4.0};
   const std::string confirmed = describe(report, "drive of axis_3"), not_confirmed = describe(report, "", false);
