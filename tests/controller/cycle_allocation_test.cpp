@@ -36,7 +36,9 @@ Played play(const RigOptions& options, std::vector<CycleRecord>* recorded) {
   if (recorded != nullptr) *recorded = rig.records;
 
   ClosedLoopRig parts_of(options);  // for its descriptions and its scene; its far end stays alone
-  ReplayNetwork network(recorder.recording(), {"axes_1_3", "axes_4_6", "sensor"});
+  std::vector<std::string> buses;
+  for (const auto& bus : rig.cell.buses) buses.push_back(bus.name);
+  ReplayNetwork network(recorder.recording(), buses);
   Cycle cycle(parts_of.prepared_parts(network), options.settings, parts_of.cell.limits, 64);
   BlackBox box(options.settings.period_s, 40);
   cycle.write_to(box);
@@ -102,6 +104,15 @@ TEST(CycleAllocation, IsNoneWithTheSecondOrderProxy) {
   options.settings.damping_Ns_per_m = 20.0;
   options.settings.spring_N_per_m = 50.0;
   expect_no_allocation(options, Fault::none);
+}
+
+TEST(CycleAllocation, IsNoneInTheImpedanceType) {
+  RigOptions options{.duration_s = 6.0, .cell = "models/cells/light.yaml"};
+  options.settings.scheme = Scheme::impedance;
+  Played played;
+  expect_no_allocation(options, Fault::none, &played);
+  if (IsSkipped()) return;
+  EXPECT_GT(played.slip_cycles, 100u);
 }
 
 TEST(CycleAllocation, IsNoneInAFaultAndTheStopAfterIt) {
