@@ -60,6 +60,8 @@ DriveOnBus make_drive(const description::Cell& cell, const description::DriveDes
 // behind a gateway share its.
 std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const description::Cell& cell,
                                                                 std::vector<DriveOnBus>& drives,
+                                                                fieldbus::ForceSensor& sensor,
+                                                                const std::string& sensor_bus,
                                                                 const ModbusOpener& open_line) {
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines;
   for (const description::ModbusLineDescription& line : cell.modbus_lines) {
@@ -68,10 +70,11 @@ std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const descriptio
       if (axis.on_can != nullptr || axis.drive.description().bus != line.name) continue;
       on_it.push_back(static_cast<fieldbus::ModbusDrive*>(&axis.drive));
     }
-    if (on_it.empty()) continue;
-    double timeout_s = 0.0;
+    auto* sensor_on_it = line.name == sensor_bus ? static_cast<fieldbus::ModbusSensor*>(&sensor) : nullptr;
+    if (on_it.empty() && sensor_on_it == nullptr) continue;
+    double timeout_s = sensor_on_it != nullptr ? sensor_on_it->response_timeout_s() : 0.0;
     for (const auto* drive : on_it) timeout_s = std::max(timeout_s, drive->registers().response_timeout_s);
-    lines.push_back(std::make_unique<fieldbus::ModbusLine>(line, open_line(line, timeout_s), on_it));
+    lines.push_back(std::make_unique<fieldbus::ModbusLine>(line, open_line(line, timeout_s), on_it, sensor_on_it));
   }
   return lines;
 }
@@ -143,6 +146,15 @@ void refuse_shared_identifiers(CycleParts& parts) {
 
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor) {
+  const bool on_line = index_of(cell, cell.sensor.bus) == cell.buses.size();
+  if (on_line != (sensor.described && sensor.described->registers)) {
+    throw SetupError({.file = cell.file.string(),
+                      .key = "sensor.bus",
+                      .found = description::in_quotes(cell.sensor.bus),
+                      .expected = on_line ? "a CAN bus: " + sensor.name + " sends frames"
+                                          : "a Modbus line: " + sensor.name + " has registers"});
+  }
+  if (on_line) return std::make_unique<fieldbus::ModbusSensor>(sensor, cell.sensor.base_id, cell.sensor.bus);
   if (sensor.protocol == "ati_net_can_oem") {
     fieldbus::AtiNetCanOemSettings settings;
     settings.bus_name = cell.sensor.bus;
@@ -178,7 +190,9 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
   for (const description::DriveDescription& drive : cell.drives) {
     drives.push_back(make_drive(cell, drive, settings, bus_indices));
   }
-  std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines = modbus_lines(cell, drives, open_line);
+  std::unique_ptr<fieldbus::ForceSensor> force_sensor = make_sensor(cell, sensor);
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines =
+      modbus_lines(cell, drives, *force_sensor, cell.sensor.bus, open_line);
   auto arm = std::make_unique<models::Arm>(cell);
   std::optional<models::InverseKinematics> inverse;
   std::unique_ptr<RenderedWorld> world;
@@ -191,12 +205,13 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
   }
   ElasticSetpoint elastic(*arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s);
   std::vector<DriveBus> buses = drive_buses(drives);
+  const std::size_t sensor_bus = index_of(cell, cell.sensor.bus);
   return CycleParts{network,
                     std::move(drives),
                     std::move(buses),
+                    std::move(force_sensor),
+                    sensor_bus < bus_indices.size() ? bus_indices[sensor_bus] : DriveOnBus::no_bus,
                     std::move(lines),
-                    make_sensor(cell, sensor),
-                    bus_indices[index_of(cell, cell.sensor.bus)],
                     std::move(arm),
                     std::move(inverse),
                     std::move(elastic),

@@ -72,9 +72,9 @@ struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
   std::vector<DriveBus> drive_buses;
-  std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
-  std::size_t sensor_bus;
+  std::size_t sensor_bus;                                           // DriveOnBus::no_bus: on a Modbus line
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;  // their workers end before drives and sensor do
   std::unique_ptr<models::Arm> arm;                  // in one place for good: the inverse kinematics refers to it
   std::optional<models::InverseKinematics> inverse;  // admittance type
   ElasticSetpoint elastic;

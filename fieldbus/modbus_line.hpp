@@ -13,6 +13,7 @@
 
 #include "fieldbus/modbus_client.hpp"
 #include "fieldbus/modbus_drive.hpp"
+#include "fieldbus/modbus_sensor.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -20,15 +21,17 @@ namespace proxarm::fieldbus {
 // with one stop bit), and after each the silence of 3.5 characters, at least 1.75 ms above 19,200 baud.
 [[nodiscard]] double modbus_rtu_exchange_s(const description::ModbusDriveDescription& drive,
                                            const description::ModbusLineDescription& line) noexcept;
+// The same of `registers` that are read by function 3.
+[[nodiscard]] double modbus_rtu_read_s(int registers, const description::ModbusLineDescription& line) noexcept;
 // Exchanges a second with each of `drives` units that can be expected: the drive's own wish, or what the line carries.
 [[nodiscard]] double modbus_expected_rate_Hz(const description::ModbusDriveDescription& drive,
                                              const description::ModbusLineDescription& line, int drives) noexcept;
 
 class ModbusLine {
  public:
-  // The drives must outlive the line. Line and client are opened already.
+  // Drives and sensor (null: none on this line) must outlive the line. Line and client are opened already.
   ModbusLine(const description::ModbusLineDescription& line, std::unique_ptr<ModbusClient> client,
-             std::vector<ModbusDrive*> drives);
+             std::vector<ModbusDrive*> drives, ModbusSensor* sensor = nullptr);
   ModbusLine(const ModbusLine&) = delete;
   ModbusLine& operator=(const ModbusLine&) = delete;
   ~ModbusLine() { stop(); }
@@ -38,7 +41,9 @@ class ModbusLine {
 
   // Settings written and read back, positions read. Throws SetupError.
   void start_up(std::int64_t now_ns);
-  // One exchange with the drive whose turn it is; returns when the next is due.
+  // What an exchange takes on the wire, at most.
+  [[nodiscard]] double exchange_s() const noexcept;
+  // One exchange with the drive or sensor whose turn it is; returns when the next is due.
   std::int64_t step(std::int64_t now_ns) noexcept;
   // The worker: step() on CLOCK_MONOTONIC until stop().
   void start();
@@ -50,6 +55,7 @@ class ModbusLine {
   description::ModbusLineDescription line_;
   std::unique_ptr<ModbusClient> client_;
   std::vector<ModbusDrive*> drives_;
+  ModbusSensor* sensor_;
   std::int64_t interval_ns_;  // between exchanges with one drive
   std::int64_t next_ns_ = 0;
   std::size_t turn_ = 0;

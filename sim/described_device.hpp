@@ -43,6 +43,7 @@ class DescribedDevice final : public BusDevice {
 
   // Its converter has finished a sample: to be called every period_ns().
   void on_converter(std::int64_t time_ns) noexcept;
+  [[nodiscard]] bool fd() const noexcept { return protocol_.fd; }
   [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
   [[nodiscard]] bool streaming() const noexcept { return streaming_; }
   [[nodiscard]] SensorFaults& faults() noexcept { return faults_; }

@@ -25,6 +25,7 @@ bool is_used_by(std::uint8_t node, std::uint32_t id) noexcept {
 
 std::vector<std::uint32_t> sensor_ids(const description::Cell& cell, const description::SensorDescription& sensor) {
   std::vector<std::uint32_t> ids;
+  if (sensor.described && sensor.described->registers) return ids;  // on Modbus
   if (sensor.described && !sensor.described->extended) return sensor.described->wire_ids(cell.sensor.base_id);
   if (sensor.described) return ids;  // 29 bits: no drive's
   for (std::uint32_t operation = 0; operation < 16; ++operation) ids.push_back(cell.sensor.base_id << 4 | operation);

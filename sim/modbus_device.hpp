@@ -29,18 +29,32 @@ enum class ModbusFault : std::uint8_t {
   half,        // the answer ends in its middle
 };
 
-class ModbusDevice {
+// What answers on a Modbus line.
+class ModbusUnit {
+ public:
+  ModbusUnit() = default;
+  ModbusUnit(const ModbusUnit&) = delete;
+  ModbusUnit& operator=(const ModbusUnit&) = delete;
+  virtual ~ModbusUnit() = default;
+
+  [[nodiscard]] virtual std::uint8_t unit() const noexcept = 0;
+  // Unit and PDU of a request to this unit; the answer's, empty where there is none.
+  [[nodiscard]] virtual std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) = 0;
+  [[nodiscard]] virtual ModbusFault fault() const noexcept = 0;
+};
+
+class ModbusDevice final : public ModbusUnit {
  public:
   ModbusDevice(const description::ModbusDriveDescription& registers, std::uint8_t unit,
                double deceleration_counts_per_s2, ServoAxis& axis);
 
-  [[nodiscard]] std::uint8_t unit() const noexcept { return unit_; }
-  // Unit and PDU of a request to this unit; the answer's. Functions 3, 16 and 23, else exception 01.
-  [[nodiscard]] std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request);
+  [[nodiscard]] std::uint8_t unit() const noexcept override { return unit_; }
+  // Functions 3, 16 and 23, else exception 01.
+  [[nodiscard]] std::vector<std::uint8_t> serve(std::span<const std::uint8_t> request) override;
   void on_time(std::int64_t time_ns) noexcept;
 
   void set_fault(ModbusFault fault) noexcept;
-  [[nodiscard]] ModbusFault fault() const noexcept;
+  [[nodiscard]] ModbusFault fault() const noexcept override;
   [[nodiscard]] std::uint16_t register_at(std::uint16_t at) const;
   [[nodiscard]] bool timed_out() const noexcept;
 

@@ -52,7 +52,7 @@ std::size_t rtu_request_size(const Bytes& bytes) noexcept {
 
 }  // namespace
 
-ModbusServer::ModbusServer(const ModbusLineDescription& line, std::vector<ModbusDevice*> devices)
+ModbusServer::ModbusServer(const ModbusLineDescription& line, std::vector<ModbusUnit*> devices)
     : devices_(std::move(devices)) {
   if (line.serial()) {
     open_terminal(line);
@@ -108,7 +108,7 @@ void ModbusServer::serve_tcp() noexcept {
 // One request; false when the connection is at its end.
 bool ModbusServer::serve_connection(int connection) noexcept {
   if (!readable(connection)) {
-    for (const ModbusDevice* device : devices_) {
+    for (const ModbusUnit* device : devices_) {
       if (device->fault() == ModbusFault::closed) return false;
     }
     return true;
@@ -119,7 +119,7 @@ bool ModbusServer::serve_connection(int connection) noexcept {
   if (request.size() < 2 || request.size() > 254) return false;
   if (recv(connection, request.data(), request.size(), MSG_WAITALL) != static_cast<ssize_t>(request.size()))
     return false;
-  for (ModbusDevice* device : devices_) {
+  for (ModbusUnit* device : devices_) {
     if (device->unit() != request[0]) continue;
     if (device->fault() == ModbusFault::closed) return false;
     const Bytes answer = device->serve(request);
@@ -180,7 +180,7 @@ void ModbusServer::serve_terminal() noexcept {
     received.clear();
     if (crc16(request) != 0) continue;  // over a message with its checksum
     request.resize(size - 2);
-    for (ModbusDevice* device : devices_) {
+    for (ModbusUnit* device : devices_) {
       if (device->unit() != request[0]) continue;
       Bytes answer = device->serve(request);
       if (answer.empty()) break;

@@ -17,7 +17,7 @@ class ModbusServer {
   // Opens the line and serves until it is destroyed. `line.host` must be a loopback address (port 0: any that is free);
   // for a serial line a pseudo-terminal is made and `line.device` becomes a symbolic link to it, if it isn't empty.
   // Throws SetupError. The devices must outlive the server.
-  ModbusServer(const description::ModbusLineDescription& line, std::vector<ModbusDevice*> devices);
+  ModbusServer(const description::ModbusLineDescription& line, std::vector<ModbusUnit*> devices);
   ModbusServer(const ModbusServer&) = delete;
   ModbusServer& operator=(const ModbusServer&) = delete;
   ~ModbusServer();
@@ -32,7 +32,7 @@ class ModbusServer {
   void serve_terminal() noexcept;
   [[nodiscard]] bool serve_connection(int socket) noexcept;
 
-  std::vector<ModbusDevice*> devices_;
+  std::vector<ModbusUnit*> devices_;
   int listener_ = -1, terminal_fd_ = -1, port_ = 0;
   std::string terminal_, link_;
   std::atomic<bool> stop_{false};

@@ -112,12 +112,12 @@ class SimulatedCell::PlantGauges final : public GaugeSource {
 
 class SimulatedCell::WirelessModbus final : public fieldbus::ModbusClient {
  public:
-  explicit WirelessModbus(std::vector<ModbusDevice*> devices) : devices_(std::move(devices)) {}
+  explicit WirelessModbus(std::vector<ModbusUnit*> devices) : devices_(std::move(devices)) {}
 
  private:
   fieldbus::ModbusResult transact(const fieldbus::ModbusMessage& request,
                                   fieldbus::ModbusMessage& answer) noexcept override {
-    for (ModbusDevice* device : devices_) {
+    for (ModbusUnit* device : devices_) {
       if (device->unit() != request.bytes[0]) continue;
       if (device->fault() == ModbusFault::closed) return fieldbus::ModbusResult::closed;
       const std::vector<std::uint8_t> bytes = device->serve(request.span());
@@ -130,7 +130,7 @@ class SimulatedCell::WirelessModbus final : public fieldbus::ModbusClient {
     return fieldbus::ModbusResult::timeout;
   }
 
-  std::vector<ModbusDevice*> devices_;
+  std::vector<ModbusUnit*> devices_;
 };
 
 class SimulatedCell::PlantWrench final : public WrenchSource {
@@ -158,6 +158,12 @@ void require_fault_of_sensor(const DeviceFault& fault, const description::Sensor
   }
   if (fault.kind == DeviceFaultKind::status && described && !sensor.described->status) {
     refuse("sensor:status for a sensor whose samples have no status word", "another fault, or a sensor with one");
+  }
+  constexpr DeviceFaultKind of_registers[] = {DeviceFaultKind::sensor_silent, DeviceFaultKind::frozen,
+                                              DeviceFaultKind::saturated, DeviceFaultKind::status};
+  const bool has_it = std::find(std::begin(of_registers), std::end(of_registers), fault.kind) != std::end(of_registers);
+  if (described && sensor.described->registers && !has_it) {
+    refuse("a fault of CAN frames for a sensor on Modbus", "silent, frozen, saturated, or status where it has one");
   }
   const bool of_order = fault.kind == DeviceFaultKind::half_sample || fault.kind == DeviceFaultKind::swapped;
   if (of_order && described && sensor.described->frames.size() < 2) {
@@ -216,11 +222,12 @@ void SimulatedCell::add_modbus_drive(std::size_t axis) {
                                      drive.max_acceleration_rad_per_s2 * counts_per_rad(drive), *axes_[axis]);
 }
 
-std::vector<ModbusDevice*> SimulatedCell::modbus_devices(const std::string& line) {
-  std::vector<ModbusDevice*> devices;
+std::vector<ModbusUnit*> SimulatedCell::modbus_devices(const std::string& line) {
+  std::vector<ModbusUnit*> devices;
   for (std::size_t axis = 0; axis < cell_.drives.size(); ++axis) {
     if (modbus_drives_[axis] && cell_.drives[axis].bus == line) devices.push_back(modbus_drives_[axis].get());
   }
+  if (sensor_registers_ && cell_.sensor.bus == line) devices.push_back(sensor_registers_.get());
   return devices;
 }
 
@@ -229,6 +236,14 @@ std::unique_ptr<fieldbus::ModbusClient> SimulatedCell::modbus_client(const std::
 }
 
 void SimulatedCell::add_sensor(const description::SensorDescription& sensor) {
+  if (sensor.described && sensor.described->registers) {
+    wrench_ = std::make_unique<PlantWrench>(plant_);
+    sensor_registers_ = std::make_unique<ModbusSensorDevice>(*sensor.described->registers,
+                                                             static_cast<std::uint8_t>(cell_.sensor.base_id));
+    described_sensor_ =
+        std::make_unique<DescribedDevice>(sensor, DescribedDeviceConfig{}, *wrench_, *sensor_registers_);
+    return;
+  }
   Clockwork& clockwork = *this;
   const std::size_t bus = bus_index(cell_.sensor.bus, "sensor.bus");
   nodes_.push_back(std::make_unique<DeviceNode>("sensor", bus, events_, clockwork));
@@ -269,8 +284,11 @@ std::size_t SimulatedCell::axis_of(const std::string& joint) const noexcept {
 }
 
 void SimulatedCell::attach_to(fieldbus::SimulatedCanNetwork& network) {
+  using fieldbus::NodeFormat;
+  const bool fd_sensor = described_sensor_ && !sensor_registers_ && described_sensor_->fd();
   for (const auto& node : nodes_) {
-    node->connect(network.simulated_bus(cell_.buses[node->bus()].name).attach(*node, node->name()));
+    const NodeFormat format = fd_sensor && node == nodes_.back() ? NodeFormat::fd : NodeFormat::classic;
+    node->connect(network.simulated_bus(cell_.buses[node->bus()].name).attach(*node, node->name(), format));
   }
 }
 
@@ -280,6 +298,7 @@ void SimulatedCell::power_on() {
   const std::int64_t now_ns = events_.now_ns();
   advance_to(now_ns);
   for (const auto& node : nodes_) node->set_power(true, now_ns);
+  if (sensor_registers_) described_sensor_->power_on(now_ns);
   schedule_faults();
   if (described_sensor_ && described_sensor_->period_ns() > 0) {
     events_.schedule(now_ns + described_sensor_->period_ns(), [this](std::int64_t time_ns) { convert(time_ns); });
@@ -436,6 +455,7 @@ void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept
   switch (fault.kind) {
     case DeviceFaultKind::sensor_silent:
       faults.silent = on;
+      if (sensor_registers_) sensor_registers_->set_silent(on);
       return;
     case DeviceFaultKind::samples_missing:
       faults.silent_samples = on;

@@ -24,6 +24,7 @@
 #include "sim/device_node.hpp"
 #include "sim/drive_device.hpp"
 #include "sim/modbus_device.hpp"
+#include "sim/modbus_sensor_device.hpp"
 #include "sim/plant.hpp"
 
 namespace proxarm::sim {
@@ -61,14 +62,14 @@ class SimulatedCell final : private Clockwork {
   SimulatedCell& operator=(const SimulatedCell&) = delete;
   ~SimulatedCell() override;
 
-  // Nodes, one per drive on CAN in the cell's order and then the sensor: to be connected to their buses before
-  // power_on().
+  // Nodes, one per drive on CAN in the cell's order and then the sensor, if it is on CAN: to be connected to their
+  // buses before power_on().
   [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
   [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
 
   // What is on the cell's Modbus lines: for a server on a real line, or as a master's end of a line without any wire,
   // whose requests are answered at once. The cell must outlive both.
-  [[nodiscard]] std::vector<ModbusDevice*> modbus_devices(const std::string& line);
+  [[nodiscard]] std::vector<ModbusUnit*> modbus_devices(const std::string& line);
   [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
 
   // Connects all nodes to the buses of these names.
@@ -122,7 +123,8 @@ class SimulatedCell final : private Clockwork {
   std::vector<std::unique_ptr<ModbusDevice>> modbus_drives_;  // per axis; null: on CAN
   std::vector<std::size_t> node_of_axis_;
   std::unique_ptr<PlantWrench> wrench_;
-  std::unique_ptr<AtiDevice> sensor_;  // one of these two
+  std::unique_ptr<AtiDevice> sensor_;                     // one of these two
+  std::unique_ptr<ModbusSensorDevice> sensor_registers_;  // of the latter, where it is on Modbus
   std::unique_ptr<DescribedDevice> described_sensor_;
   std::function<void(const Truth&)> observer_;
 };

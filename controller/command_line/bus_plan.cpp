@@ -117,6 +117,8 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     if (indices[i] != index) continue;
     const description::BusDescription& own = session.cell.buses[i];
     bus.name += (bus.name.empty() ? "" : "+") + own.name;
+    // What shares an interface has the slowest of its rates; a classic bus among them makes all of it classic.
+    bus.data_bitrate = bus.bitrate == 0 ? own.data_bitrate : std::min(bus.data_bitrate, own.data_bitrate);
     bus.bitrate = bus.bitrate == 0 ? own.bitrate : std::min(bus.bitrate, own.bitrate);
     const auto on_it = [&](const description::DriveDescription& d) { return d.bus == own.name; };
     const bool first_drives =

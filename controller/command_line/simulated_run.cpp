@@ -19,7 +19,6 @@ using SteadyClock = std::chrono::steady_clock;
 
 // For the last frames to get onto the wire and to the drives: the longest queue of a cycle is through in a millisecond.
 constexpr std::int64_t last_words_ns = 5'000'000;
-constexpr double tcp_exchange_s = 1e-3;      // of a Modbus drive with a network of its own
 constexpr std::size_t record_capacity = 64;  // drained after every cycle
 
 sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
@@ -62,10 +61,8 @@ int SimulatedRun::run() {
 
 // A line's worker on the virtual clock: an exchange takes as long as it does on the wire.
 void SimulatedRun::pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
-  const double takes_s = line.description().serial()
-                             ? fieldbus::modbus_rtu_exchange_s(line.drives().front()->registers(), line.description())
-                             : tcp_exchange_s;
-  const std::int64_t next_ns = std::max<std::int64_t>(line.step(time_ns), time_ns + std::llround(1e9 * takes_s));
+  const std::int64_t earliest_ns = time_ns + std::llround(1e9 * line.exchange_s());
+  const std::int64_t next_ns = std::max<std::int64_t>(line.step(time_ns), earliest_ns);
   network_.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
 }
 

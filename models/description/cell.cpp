@@ -360,7 +360,9 @@ Cell read_cell(const YamlNode& root) {
   read_drives(root, cell);
   read_start(root, cell);
   cell.sensor = read_sensor(root.map("sensor"));
-  check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
+  const bool on_line = std::any_of(cell.modbus_lines.begin(), cell.modbus_lines.end(),
+                                   [&](const ModbusLineDescription& line) { return line.name == cell.sensor.bus; });
+  if (!on_line) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));

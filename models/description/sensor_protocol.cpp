@@ -62,8 +62,15 @@ struct Reader {
       number.byte += at;
       return number;
     }
-    number.byte = static_cast<std::size_t>(node.integer("byte", 0, static_cast<std::int64_t>(within) - 1));
-    number.bits = static_cast<int>(node.integer("bits", 1, 32));
+    if (protocol.registers) {
+      const std::int64_t first = protocol.registers->at, last = first + protocol.registers->count - 1;
+      within = 2 * static_cast<std::size_t>(protocol.registers->count);  // the frame may be longer
+      number.byte = 2 * static_cast<std::size_t>(node.integer("register", first, last) - first);
+      number.bits = static_cast<int>(node.integer_or("bits", 16, 1, 32));
+    } else {
+      number.byte = static_cast<std::size_t>(node.integer("byte", 0, static_cast<std::int64_t>(within) - 1));
+      number.bits = static_cast<int>(node.integer("bits", 1, 32));
+    }
     number.shift = static_cast<int>(node.integer_or("shift", 0, 0, 7));
     number.big_endian = read_order(node, big_endian);
     const std::string type = node.choice_or("type", "unsigned", {"unsigned", "signed", "float"});
@@ -155,7 +162,25 @@ struct Reader {
     return signal;
   }
 
+  // As one frame that is long enough, of whose identifier nobody hears.
+  void read_registers() {
+    const YamlNode node = root.map("registers");
+    SensorRegisters registers;
+    registers.at = static_cast<std::uint16_t>(node.integer("at", 0, 0xFFFF));
+    registers.count = static_cast<int>(node.integer("count", 1, max_sensor_registers));
+    if (registers.at + registers.count > 0x10000) throw node.error_at("count", "no register above 65535");
+    registers.response_timeout_s = node.number_or("response_timeout_s", registers.response_timeout_s, 0.001, 1.0);
+    protocol.registers = registers;
+    protocol.fd = true;
+    constexpr int lengths[] = {2, 4, 6, 8, 12, 16, 20, 24, 32, 48, 64};
+    const int* length =
+        std::find_if(std::begin(lengths), std::end(lengths), [&](int bytes) { return bytes >= 2 * registers.count; });
+    protocol.frames.push_back({.id = 1, .bytes = static_cast<std::uint8_t>(*length), .starts_with = {}});
+    messages.push_back(nullptr);
+  }
+
   void read_frames() {
+    if (root.has("registers")) return read_registers();
     for (const YamlNode& node : root.list("frames", 1, max_sample_frames)) protocol.frames.push_back(read_frame(node));
     if (protocol.sample_bytes() > max_sample_bytes) throw root.error_at("frames", "up to 256 bytes in all");
     // Else the second of two frames with one identifier could not be told from the first.
@@ -295,7 +320,8 @@ struct Reader {
     for (int j = 0; j < number.bits; ++j) {
       const auto [place, free] = taken.emplace(bit_of(number, j), name);
       if (free) continue;
-      throw node.error_at(node.has("signal") ? "signal" : "byte", "bits that nothing else has",
+      const char* key = node.has("signal") ? "signal" : protocol.registers ? "register" : "byte";
+      throw node.error_at(key, "bits that nothing else has",
                           "bit " + std::to_string(place->first % 8) + " of byte " + std::to_string(place->first / 8) +
                               ", which is " + place->second + "'s");
     }

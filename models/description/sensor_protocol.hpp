@@ -26,6 +26,9 @@
 //   dbc: my_sensor.dbc
 //   frames: [{message: FORCE}, {message: TORQUE}]
 //   signals: {fx: {signal: Fx}, ...}             # also for counter, status and checksum
+// A sensor on Modbus has registers instead of frames, format, poll and commands; two bytes of the sample each:
+//   registers: {at: 180, count: 6, response_timeout_s: 0.05}   # holding registers, numbered from 0; read rate_Hz times
+//   signals: {fx: {register: 180, bits: 16, type: signed, scale: 0.01}, ...}   # bits: 16 (left out) or 32
 // A number's bits: `byte` is its first byte in the sample, `shift` how many bits lie below it in its lowest byte.
 #pragma once
 
@@ -43,6 +46,7 @@ class YamlNode;
 inline constexpr std::size_t max_sample_bytes = 256;
 inline constexpr std::size_t max_sample_frames = 16;
 inline constexpr std::size_t max_sensor_signals = 12;
+inline constexpr std::size_t max_sensor_registers = 32;
 
 enum class NumberKind : std::uint8_t { unsigned_integer, signed_integer, real };  // real: IEEE 754, 32 bits
 
@@ -97,8 +101,15 @@ struct SensorCommand {
   double divides_Hz = 0.0;
 };
 
+struct SensorRegisters {
+  std::uint16_t at = 0;
+  int count = 0;
+  double response_timeout_s = 0.05;
+};
+
 struct SensorProtocol {
   bool extended = false, fd = false, bit_rate_switch = false;
+  std::optional<SensorRegisters> registers;  // on Modbus; then `frames` is one, of their bytes
   bool has_base_id = false;
   std::uint32_t base_id_min = 0, base_id_max = 0, base_id_step = 1;
   std::vector<SampleFrame> frames;

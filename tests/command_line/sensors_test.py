@@ -39,6 +39,45 @@ class OtherSensors(ProgramTest):
                 self.assertEqual(outcome.status, 1, outcome.err)
                 self.assertIn(name, json.dumps(outcome.summary["faults"]))
 
+    def test_a_sensor_on_can_fd_needs_a_bus_of_its_own_with_a_data_rate(self):
+        """All six values in one frame of 12 bytes, at the data phase's rate."""
+        text = ("name: FD sensor\nprotocol: described\nforce_range_N: [300, 300, 300]\ntorque_range_Nm: [15, 15, 15]\n"
+                "format: {fd: true, bit_rate_switch: true}\nframes: [{id: 0x123, bytes: 12}]\nrate_Hz: 1000\nsignals:\n" +
+                "".join(f"  {name}: {{byte: {2 * i}, bits: 16, type: signed, scale: {scale}}}\n" for i, (name, scale) in
+                        enumerate((("fx", 0.01), ("fy", 0.01), ("fz", 0.01), ("tx", 0.001), ("ty", 0.001), ("tz", 0.001)))))
+        cell = self.cell_with("aidin_aft200", text)
+        classic = self.call("run", cell, "--duration", "1s")
+        self.assertEqual(classic.status, 2)
+        self.assertIn("CAN FD on a classic bus", classic.err)
+        fd = cell.read_text().replace("name: sensor, bitrate: 1000000", "name: sensor, bitrate: 1000000, data_bitrate: 5000000")
+        cell.write_text(fd)
+        self.assertEqual(self.summary(cell, "--duration", "1s")["faults"], [])
+        plan = self.call("plan", cell)
+        self.assertEqual(plan.status, 0, plan.out)
+        self.assertIn("5 Mbit/s", plan.out)
+        cell.write_text(fd.replace("name: axes_1_3, bitrate: 1000000", "name: axes_1_3, bitrate: 1000000, data_bitrate: 5000000"))
+        mixed = self.call("run", cell, "--duration", "1s")
+        self.assertEqual(mixed.status, 2)
+        self.assertIn("is classic CAN but the bus carries CAN FD", mixed.err)
+
+    def test_a_sensor_on_a_modbus_line_renders_the_default_scene(self):
+        cell = self.cell_with("aidin_aft200", (SOURCE / "models/sensors/robotiq_ft300.yaml").read_text())
+        on_can = self.call("check", cell)
+        self.assertEqual(on_can.status, 2)
+        self.assertIn('sensor.bus: found "sensor", expected a Modbus line', on_can.err)
+        text = cell.read_text().replace("  bus: sensor\n", "  bus: ft\n  base_id: 9\n")
+        cell.write_text(text.replace("\ndrives:", "\nmodbus_lines:\n"
+                                     "  - {name: ft, device: /dev/ttyUSB0, baud: 19200, parity: none}\ndrives:"))
+        summary = self.summary(cell, "--duration", "5s")
+        self.assertEqual(summary["faults"], [])
+        self.assertGreater(summary["contact_time_s"], 0.5)
+        for fault, name in (("silent", "sensor_lost"), ("frozen", "sensor_frozen")):
+            outcome = self.call("run", "--json", cell, "--fault", f"sensor:{fault}@1s", "--duration", "5s")
+            self.assertIn(name, json.dumps(outcome.summary["faults"]))
+        refused = self.call("run", cell, "--fault", "sensor:half@1s")
+        self.assertEqual(refused.status, 2)
+        self.assertIn("a fault of CAN frames for a sensor on Modbus", refused.err)
+
     def test_faults_that_a_sensor_cannot_have_are_refused(self):
         for name, fault in (("aidin_aft200", "checksum"), ("aidin_aft200", "status=0x1"), ("wacoh_dynpick", "checksum")):
             with self.subTest(name + fault):
