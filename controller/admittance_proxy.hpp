@@ -56,6 +56,7 @@ enum class ProxyFault : std::uint8_t {
   none,
   input_not_finite,   // the force (admittance), position (impedance) or torque was NaN or infinite
   result_not_finite,  // finite input, but p̂ left the range of double, or 𝒢 returned something that isn't finite
+  squeezed,           // objects that move left no room (RenderedWorld)
 };
 
 // Where a motion starts, at time t₀.

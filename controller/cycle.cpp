@@ -366,6 +366,7 @@ void Cycle::render() noexcept {
   make_limits();
   const WorldStep step = parts_.world->step(hand_W_.force, step_limits_);
   const ProxyFault turned = parts_.orientation.step(hand_W_.torque);
+  if (step.fault == ProxyFault::squeezed) return raise(Fault::proxy_squeezed, -1);
   if (step.fault != ProxyFault::none || turned != ProxyFault::none) return raise(Fault::proxy_not_finite, -1);
   active_.add(step.limits);
   proxy_k1_W_ = proxy_W_;

@@ -61,6 +61,8 @@ constexpr std::array texts{
               "look for an obstacle or a jammed joint; limits.leash_m holds the limit"},
     FaultText{Fault::proxy_not_finite, "proxy_not_finite", "the proxy's step isn't finite", nullptr,
               "check the scene with `proxarm check`"},
+    FaultText{Fault::proxy_squeezed, "proxy_squeezed", "objects of the scene close on the proxy from both sides",
+              nullptr, "change their motion so that they leave it room"},
     FaultText{Fault::bus_off, "bus_off", "the CAN controller went off the bus", nullptr,
               "check termination, bitrate and cable"},
     FaultText{Fault::send_failed, "send_failed", "a frame couldn't be sent", nullptr,

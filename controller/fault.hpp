@@ -30,6 +30,7 @@ enum class Fault : std::uint8_t {
   singular,             // inverse kinematics found no bounded step: controlled stop
   leash_exceeded,       // the tool doesn't follow the proxy: controlled stop
   proxy_not_finite,     // the integrator refused a step: controlled stop
+  proxy_squeezed,       // objects that move leave the proxy no room: controlled stop
   bus_off,              // a CAN controller is off the bus: nothing can be commanded, drives stop by themselves
   send_failed,          // a setpoint couldn't be queued (ENOBUFS, interface down): controlled stop
   receive_overflow,     // the kernel dropped frames: controlled stop

@@ -163,6 +163,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
 
   V operator()(double K, const V& p, const V& q) noexcept override {
     V r = (*inner_)(K, p, q);
+    squeezed_ = inner_->squeezed();
     active_ = {};
     soft_met_ = true;
     limit_shift_ = V::Zero();
@@ -176,6 +177,8 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
     return {contacts_.data(), count_};
   }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return inner_->unresolved_steps(); }
+  // By the contacts alone: what a limit leaves inside of an object has its flags.
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
   // Of the last call. The limits' force on the proxy is κ times this.
   [[nodiscard]] const V& limit_shift() const noexcept { return limit_shift_; }
@@ -242,6 +245,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   V limit_shift_ = V::Zero();
   ActiveLimits active_;
   bool soft_met_ = true;
+  bool squeezed_ = false;
   std::array<models::Contact<N>, 8> contacts_{};
   std::size_t count_ = 0;
 };

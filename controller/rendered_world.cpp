@@ -43,7 +43,8 @@ class WorldOfDimension final : public RenderedWorld {
 
   WorldStep step(const Vec3& h_W, const StepLimits& limits) noexcept override {
     limited_.set_limits(limits, space_.basis(), proxy_.q());
-    const ProxyFault fault = proxy_.step(space_.basis().transpose() * h_W);
+    ProxyFault fault = proxy_.step(space_.basis().transpose() * h_W);
+    if (fault == ProxyFault::none && limited_.squeezed()) fault = ProxyFault::squeezed;
     if (fault != ProxyFault::none) {
       last_.fault = fault;
       return last_;

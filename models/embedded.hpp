@@ -16,7 +16,7 @@ class Embedded final : public GeometricAlgorithm<N> {
   explicit Embedded(std::unique_ptr<GeometricAlgorithm<3>> space) : space_(std::move(space)) {}
 
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
-    const Vec<N> r = (*space_)(K, lift(p), lift(q)).template head<N>();
+    const Vec<N> r = (*space_)(K, lift<N>(p), lift<N>(q)).template head<N>();
     count_ = 0;
     for (const Contact<3>& contact : space_->contacts()) {
       if (count_ == contacts_.size()) break;
@@ -29,12 +29,7 @@ class Embedded final : public GeometricAlgorithm<N> {
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return space_->unresolved_steps(); }
-
-  static Vec3 lift(const Vec<N>& x) noexcept {
-    Vec3 x3 = Vec3::Zero();
-    x3.template head<N>() = x;
-    return x3;
-  }
+  [[nodiscard]] bool squeezed() const noexcept override { return space_->squeezed(); }
 
  private:
   std::unique_ptr<GeometricAlgorithm<3>> space_;

@@ -60,6 +60,9 @@ class GeometricAlgorithm {
   // Steps so far for which the world had no answer that keeps all its laws (a proxy squeezed between moving objects,
   // two faces that jam it) and a law was given up; worth a warning, and a fault if it goes on.
   [[nodiscard]] virtual std::uint64_t unresolved_steps() const noexcept { return 0; }
+
+  // Whether the last step left the proxy inside of something: things that move leave it no room. A fault.
+  [[nodiscard]] virtual bool squeezed() const noexcept { return false; }
 };
 
 }  // namespace proxarm::models

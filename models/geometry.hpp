@@ -23,6 +23,14 @@ using Vec3 = Vec<3>;
 using Mat3 = Eigen::Matrix3d;
 using Pose = Eigen::Isometry3d;
 
+// Coordinates of a space of N dimensions as a vector of three; the others are zero.
+template <int N>
+Vec3 lift(const Vec<N>& x) noexcept {
+  Vec3 x3 = Vec3::Zero();
+  x3.template head<N>() = x;
+  return x3;
+}
+
 // Force and torque about the origin of the frame they are expressed in; N and Nm.
 struct Wrench {
   Vec3 force = Vec3::Zero();

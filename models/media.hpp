@@ -34,7 +34,7 @@ class Media final : public GeometricAlgorithm<N> {
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
     double c = 0.0, F = 0.0;
     for (const Medium& medium : media_) {
-      if (medium.shape != nullptr && medium.shape->distance(lift(q)) > 0.0) continue;
+      if (medium.shape != nullptr && medium.shape->distance(lift<N>(q)) > 0.0) continue;
       c += medium.damping_Ns_per_m / T_;
       F += medium.force_N;
     }
@@ -49,14 +49,9 @@ class Media final : public GeometricAlgorithm<N> {
   }
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return rest_->contacts(); }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return rest_->unresolved_steps(); }
+  [[nodiscard]] bool squeezed() const noexcept override { return rest_->squeezed(); }
 
  private:
-  static Vec3 lift(const Vec<N>& x) noexcept {
-    Vec3 x3 = Vec3::Zero();
-    x3.template head<N>() = x;
-    return x3;
-  }
-
   Vec<N> coulomb(double kappa, double F, const Vec<N>& p, const Vec<N>& q) noexcept {
     const Vec<N> d = q - p;
     const auto at = [&](double tau) { return (*rest_)(kappa / (1.0 - tau), Vec<N>(p + tau * d), q); };

@@ -1,9 +1,9 @@
 #include "models/mesh.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -80,50 +80,96 @@ TriangleMesh::TriangleMesh(TriangleSoup soup) {
     }
   }
   weld(soup);
-  if (triangles_.empty()) throw std::invalid_argument("none of the triangles has an area");
+  if (structure_.triangles.empty()) throw std::invalid_argument("none of the triangles has an area");
   build();
+  bound();
   make_faces();
   check_closed();
+}
+
+TriangleMesh TriangleMesh::restored(Structure structure) {
+  TriangleMesh mesh;
+  mesh.structure_ = std::move(structure);
+  const auto require = [](bool fine) {
+    if (!fine) throw std::invalid_argument("the mesh's structure is damaged");
+  };
+  const auto& [vertices, triangles, nodes, dropped, closed] = mesh.structure_;
+  require(!triangles.empty() && !nodes.empty() && triangles.size() < (1u << 29) && vertices.size() < (1u << 30));
+  for (const auto& triangle : triangles) {
+    for (const std::uint32_t index : triangle) require(index < vertices.size());
+  }
+  for (const Vec3& x : vertices) require((x.array().abs() <= 1e9).all());
+  // Pairs come after the one that leads to them, and not too deep for a stack.
+  std::vector<int> depth(nodes.size(), 0);
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t k = 0; k < (i == 0 ? 1u : 2u); ++k) {
+      const std::size_t first = nodes[i].first[k], count = nodes[i].count[k];
+      if (count > 0) {
+        require(first < triangles.size() && count <= triangles.size() - first);
+      } else {
+        require(first > i && first < nodes.size() && depth[i] < kDepth - 2);
+        depth[first] = std::max(depth[first], depth[i] + 1);
+      }
+    }
+  }
+  mesh.empty_second_root();
+  mesh.bound();
+  mesh.make_faces();
+  return mesh;
 }
 
 // Vertices with the same coordinates become one, triangles without area go; vertices that nothing uses stay behind.
 void TriangleMesh::weld(TriangleSoup& soup) {
   const auto& given = soup.vertices;
-  const auto before = [&](std::uint32_t a, std::uint32_t b) {
-    return std::lexicographical_compare(given[a].data(), given[a].data() + 3, given[b].data(), given[b].data() + 3);
-  };
-  std::vector<std::uint32_t> sorted(given.size()), becomes(given.size()), place(given.size());
-  std::iota(sorted.begin(), sorted.end(), 0u);
-  std::sort(sorted.begin(), sorted.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return before(a, b) || (!before(b, a) && a < b); });
-  for (std::size_t i = 0; i < sorted.size(); ++i) {
-    const bool same = i > 0 && given[sorted[i]] == given[sorted[i - 1]];
-    becomes[sorted[i]] = same ? becomes[sorted[i - 1]] : sorted[i];
+  std::vector<std::uint32_t> becomes(given.size()), place(given.size());
+  std::vector<std::uint32_t> table(std::bit_ceil(2 * given.size() + 1), kUnused);
+  for (std::uint32_t i = 0; i < given.size(); ++i) {
+    std::uint64_t hash = 0;
+    for (const double x : given[i]) hash = (hash ^ std::bit_cast<std::uint64_t>(x)) * 0x9e3779b97f4a7c15u;
+    std::size_t at = (hash >> 20) & (table.size() - 1);
+    while (table[at] != kUnused && given[table[at]] != given[i]) at = (at + 1) & (table.size() - 1);
+    if (table[at] == kUnused) table[at] = i;
+    becomes[i] = table[at];
   }
   std::fill(place.begin(), place.end(), kUnused);
   for (auto triangle : soup.triangles) {
     for (std::uint32_t& index : triangle) index = becomes[index];
     const Vec3 &a = given[triangle[0]], &b = given[triangle[1]], &c = given[triangle[2]];
     if (collinear(a, b, c)) {
-      ++dropped_;
+      ++structure_.dropped;
       continue;
     }
     for (std::uint32_t& index : triangle) {
       if (place[index] == kUnused) {
-        place[index] = static_cast<std::uint32_t>(vertices_.size());
-        vertices_.push_back(given[index]);
+        place[index] = static_cast<std::uint32_t>(structure_.vertices.size());
+        structure_.vertices.push_back(given[index]);
       }
       index = place[index];
     }
-    triangles_.push_back(triangle);
+    structure_.triangles.push_back(triangle);
   }
 }
 
+// The root is alone in its pair; the other one is nowhere.
+void TriangleMesh::empty_second_root() {
+  constexpr float nowhere = std::numeric_limits<float>::infinity();
+  for (auto& axis : structure_.nodes[0].box) {
+    axis[1] = nowhere;
+    axis[3] = -nowhere;
+  }
+}
+
+void TriangleMesh::bound() {
+  bounds_ = {vertex(0), vertex(0)};
+  for (const Vec3& x : structure_.vertices) bounds_ = {bounds_.low.cwiseMin(x), bounds_.high.cwiseMax(x)};
+}
+
 void TriangleMesh::make_faces() {
-  faces_.reserve(triangles_.size());
+  faces_.reserve(structure_.triangles.size());
   double largest = 0.0, edges = 0.0;
-  for (const auto& triangle : triangles_) {
-    const Vec3 &a = vertices_[triangle[0]], &b = vertices_[triangle[1]], &c = vertices_[triangle[2]];
+  for (const auto& triangle : structure_.triangles) {
+    const Vec3 &a = structure_.vertices[triangle[0]], &b = structure_.vertices[triangle[1]],
+               &c = structure_.vertices[triangle[2]];
     double thin = 0.0;
     Face face{a, normal_of<long double>(a, b, c, thin), 1.0, 0.0};
     // The cross product is wrong by 2⁻⁶³ of the sides' product: more than u of its length in a thin triangle.
@@ -134,7 +180,7 @@ void TriangleMesh::make_faces() {
     largest = std::max({largest, a.lpNorm<1>(), b.lpNorm<1>(), c.lpNorm<1>()});
     edges += (b - a).norm() + (c - b).norm() + (a - c).norm();
   }
-  mean_edge_ = edges / (3.0 * static_cast<double>(triangles_.size()));
+  mean_edge_ = edges / (3.0 * static_cast<double>(structure_.triangles.size()));
   lift_ = 64.0 * u * largest;
 }
 
@@ -142,7 +188,7 @@ void TriangleMesh::check_closed() {
   std::vector<std::uint64_t> forth, back;
   forth.reserve(3 * size());
   back.reserve(3 * size());
-  for (const auto& t : triangles_) {
+  for (const auto& t : structure_.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint64_t a = t[k], b = t[(k + 1) % 3];
       (a < b ? forth : back).push_back(a < b ? (a << 32 | b) : (b << 32 | a));
@@ -150,7 +196,7 @@ void TriangleMesh::check_closed() {
   }
   std::sort(forth.begin(), forth.end());
   std::sort(back.begin(), back.end());
-  closed_ = forth == back;
+  structure_.closed = forth == back;
 }
 
 // Halves the triangles by the middles of their boxes along the longest side of those middles' box, until few are left;
@@ -162,11 +208,9 @@ void TriangleMesh::build() {
     std::uint32_t triangle;
   };
   std::vector<Item> items(count);
-  bounds_ = {corner(0, 0), corner(0, 0)};
   for (std::uint32_t t = 0; t < count; ++t) {
     const Vec3 low = corner(t, 0).cwiseMin(corner(t, 1)).cwiseMin(corner(t, 2));
     const Vec3 high = corner(t, 0).cwiseMax(corner(t, 1)).cwiseMax(corner(t, 2));
-    bounds_ = {bounds_.low.cwiseMin(low), bounds_.high.cwiseMax(high)};
     Item& item = items[t];
     item.triangle = t;
     for (Eigen::Index k = 0; k < 3; ++k) {
@@ -179,16 +223,14 @@ void TriangleMesh::build() {
   struct Part {
     std::uint32_t begin, end, pair, of;  // `of`: which of the pair it is
   };
-  nodes_.reserve(count / (kLeaf / 2) + 2);
-  nodes_.emplace_back();
-  // The root is alone in its pair; the other one is nowhere.
-  constexpr float nowhere = std::numeric_limits<float>::infinity();
-  for (auto& axis : nodes_[0].box) axis << 0.0f, nowhere, 0.0f, -nowhere;
+  structure_.nodes.reserve(count / (kLeaf / 2) + 2);
+  structure_.nodes.emplace_back();
+  empty_second_root();
   std::vector<Part> parts{{0, count, 0, 0}};
   while (!parts.empty()) {
     const Part part = parts.back();
     parts.pop_back();
-    NodePair& pair = nodes_[part.pair];
+    NodePair& pair = structure_.nodes[part.pair];
     std::array<float, 3> box_low = items[part.begin].low, box_high = items[part.begin].high;
     std::array<float, 3> low = items[part.begin].middle, high = low;
     for (std::uint32_t i = part.begin; i < part.end; ++i) {
@@ -214,30 +256,35 @@ void TriangleMesh::build() {
       std::nth_element(at(part.begin), at(half), at(part.end), [axis](const Item& a, const Item& b) {
         return a.middle[axis] < b.middle[axis] || (a.middle[axis] == b.middle[axis] && a.triangle < b.triangle);
       });
-      const auto within = static_cast<std::uint32_t>(nodes_.size());
+      const auto within = static_cast<std::uint32_t>(structure_.nodes.size());
       pair.first[part.of] = within;
-      nodes_.emplace_back();
+      structure_.nodes.emplace_back();
       parts.push_back({half, part.end, within, 1});
       parts.push_back({part.begin, half, within, 0});
     }
   }
 
   std::vector<std::array<std::uint32_t, 3>> triangles(count);
-  for (std::uint32_t t = 0; t < count; ++t) triangles[t] = triangles_[items[t].triangle];
-  triangles_ = std::move(triangles);
+  for (std::uint32_t t = 0; t < count; ++t) triangles[t] = structure_.triangles[items[t].triangle];
+  structure_.triangles = std::move(triangles);
   std::vector<Vec3> vertices;
-  vertices.reserve(vertices_.size());
-  std::vector<std::uint32_t> place(vertices_.size(), kUnused);
-  for (auto& triangle : triangles_) {
+  vertices.reserve(structure_.vertices.size());
+  std::vector<std::uint32_t> place(structure_.vertices.size(), kUnused);
+  for (auto& triangle : structure_.triangles) {
     for (std::uint32_t& index : triangle) {
       if (place[index] == kUnused) {
         place[index] = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(vertices_[index]);
+        vertices.push_back(structure_.vertices[index]);
       }
       index = place[index];
     }
   }
-  vertices_ = std::move(vertices);
+  structure_.vertices = std::move(vertices);
+}
+
+std::size_t TriangleMesh::bytes() const noexcept {
+  const auto of = [](const auto& items) { return items.capacity() * sizeof(items[0]); };
+  return of(structure_.vertices) + of(structure_.triangles) + of(structure_.nodes) + of(faces_);
 }
 
 int TriangleMesh::side_exactly(std::uint32_t f, const Vec3& x) const noexcept {
@@ -289,7 +336,7 @@ void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit)
   int top = 0;
   stack[top++] = 0;
   while (top > 0) {
-    const NodePair& pair = nodes_[stack[--top]];
+    const NodePair& pair = structure_.nodes[stack[--top]];
     for (std::size_t k = 0; k < 2; ++k) {
       if (!passes(pair, k)) continue;
       if (pair.count[k] == 0) stack[top++] = pair.first[k];
@@ -358,7 +405,7 @@ double TriangleMesh::distance_at_least(const Vec3& x, double most, std::uint32_t
   while (top > 0) {
     const Waiting waiting = stack[--top];
     if (!(waiting.distance2 < share2 * least)) continue;
-    const NodePair& pair = nodes_[waiting.pair];
+    const NodePair& pair = structure_.nodes[waiting.pair];
     const std::array<double, 2> d2 = pair.distance2(around);
     const std::size_t nearer = d2[1] < d2[0] ? 1 : 0;
     // The nearer of two inner nodes is looked at next; faces at once.

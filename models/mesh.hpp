@@ -32,26 +32,68 @@ class TriangleMesh {
     double offset;       // normalᵀ corner, rounded; for first looks
   };
 
+  // A point between floats, so that distances from it are rounded down.
+  struct Around {
+    std::array<Eigen::Array4f, 3> x;  // {up, up, −down, −down}
+    explicit Around(const Vec3& point) noexcept;
+  };
+  // Two nodes of the tree of boxes, in a cache line. Boxes are rounded outwards.
+  struct alignas(64) NodePair {
+    std::array<Eigen::Array4f, 3> box;     // by axis: the lows of both, and −1 times their highs
+    std::array<std::uint32_t, 2> first{};  // face, or the pair of nodes within it
+    std::array<std::uint32_t, 2> count{};  // faces; 0: an inner node
+    [[nodiscard]] double low(std::size_t k, Eigen::Index axis) const noexcept {
+      return box[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(k)];
+    }
+    [[nodiscard]] double high(std::size_t k, Eigen::Index axis) const noexcept {
+      return -box[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(k + 2)];
+    }
+    // Of a point from both boxes, squared: no more than it is, and less by a millionth and rounding of x to float.
+    [[nodiscard, gnu::always_inline]] inline std::array<double, 2> distance2(const Around& point) const noexcept {
+      Eigen::Array4f sum = Eigen::Array4f::Zero();
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Eigen::Array4f out = (box[axis] - point.x[axis]).max(0.0f);
+        sum += out * out;  // at most one of low and high counts
+      }
+      sum *= 1.0f - 1e-6f;
+      return {sum[0] + sum[2], sum[1] + sum[3]};
+    }
+  };
+  // What takes long to find out: a mesh made from it again is the same to the bit.
+  struct Structure {
+    std::vector<Vec3> vertices;                           // each used
+    std::vector<std::array<std::uint32_t, 3>> triangles;  // in the tree's order
+    std::vector<NodePair> nodes;                          // from the root on, which is alone in its pair
+    std::uint64_t dropped = 0;                            // triangles without an area
+    bool closed = false;
+  };
+
   // Vertices with the same coordinates become one; triangles without an area are left out (as sets of points they are
   // part of their neighbours' sides). The others are put in the order of a tree of boxes, so that what is near in space
   // is near in memory. Throws std::invalid_argument: no triangle (left), an index out of range, a coordinate that isn't
   // finite or beyond 1e9 m.
   explicit TriangleMesh(TriangleSoup soup);
 
-  [[nodiscard]] std::size_t size() const noexcept { return triangles_.size(); }
+  // From structure() of another mesh. Throws std::invalid_argument for what would lead out of bounds; that boxes hold
+  // their triangles is taken for granted.
+  static TriangleMesh restored(Structure structure);
+  [[nodiscard]] const Structure& structure() const noexcept { return structure_; }
+
+  [[nodiscard]] std::size_t size() const noexcept { return structure_.triangles.size(); }
   [[nodiscard]] const std::array<std::uint32_t, 3>& triangle(std::uint32_t face) const noexcept {
-    return triangles_[face];
+    return structure_.triangles[face];
   }
-  [[nodiscard]] const Vec3& vertex(std::uint32_t index) const noexcept { return vertices_[index]; }
+  [[nodiscard]] const Vec3& vertex(std::uint32_t index) const noexcept { return structure_.vertices[index]; }
   [[nodiscard]] const Vec3& corner(std::uint32_t face, std::size_t k) const noexcept {
-    return vertices_[triangles_[face][k]];
+    return structure_.vertices[structure_.triangles[face][k]];
   }
   [[nodiscard]] const Face& face(std::uint32_t face) const noexcept { return faces_[face]; }
 
   [[nodiscard]] Bounds bounds() const noexcept { return bounds_; }
   [[nodiscard]] double mean_edge_m() const noexcept { return mean_edge_; }
-  [[nodiscard]] std::size_t dropped_triangles() const noexcept { return dropped_; }
-  [[nodiscard]] bool closed() const noexcept { return closed_; }  // each edge has one face on either side
+  [[nodiscard]] std::size_t bytes() const noexcept;  // of memory
+  [[nodiscard]] std::size_t dropped_triangles() const noexcept { return structure_.dropped; }
+  [[nodiscard]] bool closed() const noexcept { return structure_.closed; }  // each edge has one face on either side
 
   // How far the surface that a proxy touches is in front of the one that it may not reach, metres: so that rounding
   // can't take a proxy in contact through the latter.
@@ -105,7 +147,7 @@ class TriangleMesh {
     int top = 0;
     stack[top++] = 0;
     while (top > 0) {
-      const NodePair& pair = nodes_[stack[--top]];
+      const NodePair& pair = structure_.nodes[stack[--top]];
       const std::array<double, 2> d2 = pair.distance2(around);
       for (std::size_t k = 0; k < 2; ++k) {
         if (!(d2[k] <= r2)) continue;
@@ -134,39 +176,15 @@ class TriangleMesh {
   [[nodiscard]] double winding(const Vec3& x) const noexcept;
 
  private:
-  // A point between floats, so that distances from it are rounded down.
-  struct Around {
-    std::array<Eigen::Array4f, 3> x;  // {up, up, −down, −down}
-    explicit Around(const Vec3& point) noexcept;
-  };
-  // Two nodes of the tree of boxes, in a cache line. Boxes are rounded outwards.
-  struct alignas(64) NodePair {
-    std::array<Eigen::Array4f, 3> box;     // by axis: the lows of both, and −1 times their highs
-    std::array<std::uint32_t, 2> first{};  // face, or the pair of nodes within it
-    std::array<std::uint32_t, 2> count{};  // faces; 0: an inner node
-    [[nodiscard]] double low(std::size_t k, Eigen::Index axis) const noexcept {
-      return box[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(k)];
-    }
-    [[nodiscard]] double high(std::size_t k, Eigen::Index axis) const noexcept {
-      return -box[static_cast<std::size_t>(axis)][static_cast<Eigen::Index>(k + 2)];
-    }
-    // Of a point from both boxes, squared: no more than it is, and less by a millionth and rounding of x to float.
-    [[nodiscard, gnu::always_inline]] inline std::array<double, 2> distance2(const Around& point) const noexcept {
-      Eigen::Array4f sum = Eigen::Array4f::Zero();
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Eigen::Array4f out = (box[axis] - point.x[axis]).max(0.0f);
-        sum += out * out;  // at most one of low and high counts
-      }
-      sum *= 1.0f - 1e-6f;
-      return {sum[0] + sum[2], sum[1] + sum[3]};
-    }
-  };
   static constexpr int kDepth = 64;  // halving by number of faces: 33 levels at most, one node of each waits
 
   template <typename Share, typename Visit>
   void along(const Vec3& x, const Vec3& y, Share share, Visit visit) const noexcept;
+  TriangleMesh() = default;
   void weld(TriangleSoup& soup);
   void build();
+  void empty_second_root();
+  void bound();
   void make_faces();
   void check_closed();
   [[nodiscard]] double face_distance2(std::uint32_t face, const Vec3& x) const noexcept;
@@ -174,14 +192,10 @@ class TriangleMesh {
   void test_exactly(std::uint32_t index, int side_x, int side_y, double h_x, double h_y, const Vec3& x, const Vec3& y,
                     Hit& hit) const noexcept;
 
-  std::vector<Vec3> vertices_;
-  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  Structure structure_;
   std::vector<Face> faces_;
-  std::vector<NodePair> nodes_;
   Bounds bounds_;
   double mean_edge_ = 0.0, lift_ = 0.0;
-  std::size_t dropped_ = 0;
-  bool closed_ = false;
 };
 
 }  // namespace proxarm::models

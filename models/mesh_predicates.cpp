@@ -135,6 +135,12 @@ int orientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& x) noex
 }
 
 bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) noexcept {
+  const Vec3 d = b - a, e = c - a;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3;
+    const double m = d[i] * e[j], n = d[j] * e[i];
+    if (std::abs(m - n) > 8.0 * u * (std::abs(m) + std::abs(n))) return false;  // wrong by 4u of them at most
+  }
   const ExactVector v(a, b), w(a, c);
   return minor_of(v, w, 0, 1).sign() == 0 && minor_of(v, w, 1, 2).sign() == 0 && minor_of(v, w, 2, 0).sign() == 0;
 }

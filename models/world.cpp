@@ -284,13 +284,17 @@ bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidate
   return false;
 }
 
+// Whether r can be where a proxy from q ends, for all that is near.
+bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
+  return std::none_of(near_.begin(), near_.end(), [&](std::size_t i) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    return obstacle.excludes(obstacle.carry(q), r);
+  });
+}
+
 // Nothing is complete: the proxy stays where it is if it may, else it is brought out of the nearest thing.
 void World::hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
-  bool allowed = true;
-  for (const std::size_t i : near_) {
-    const Obstacle& obstacle = *entries_[i].obstacle;
-    allowed = allowed && !obstacle.excludes(obstacle.carry(q), q);
-  }
+  const bool allowed = is_free(q, q);
   for (std::size_t c = 0; c < candidates.count; ++c) {
     const Obstacle::Step& s = candidates.alone[c];
     if (!s.touches) continue;
@@ -339,6 +343,7 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) const 
 
 Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   count_ = 0;
+  squeezed_ = false;
   if ((p - clear_at_).squaredNorm() < clearance_ * clearance_ &&
       (q - clear_at_).squaredNorm() < clearance_ * clearance_ && clearance_ > 0.0) {
     return p;
@@ -356,7 +361,10 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
     choice = {};
     found = solve(K, p, q, choice);
   }
-  if (!found) ++unresolved_;
+  if (!found) {
+    ++unresolved_;
+    squeezed_ = !moving_.empty() && !is_free(q, choice.r);
+  }
   contacts_ = choice.contacts;
   count_ = choice.count;
   if (choice.free && moving_.empty()) {

@@ -39,6 +39,7 @@ class World final : public GeometricAlgorithm<3> {
   // Steps so far for which no set of contacts was complete (a jam, or a tool deeper than a curved surface's radius):
   // the proxy then goes as far as a shorter step leads, or stays.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
  private:
   struct Candidates;
@@ -46,6 +47,7 @@ class World final : public GeometricAlgorithm<3> {
 
   double gather(const Vec3& p, const Vec3& q, double reach) noexcept;
   void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept;
+  [[nodiscard]] bool is_free(const Vec3& q, const Vec3& r) const noexcept;
   bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
             const Vec3& p) const noexcept;
   [[nodiscard]] bool gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept;
@@ -70,6 +72,7 @@ class World final : public GeometricAlgorithm<3> {
   std::array<Contact<3>, 3> contacts_{};
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
+  bool squeezed_ = false;
   // No obstacle is closer than clearance_ to clear_at_ (less what movers have come since).
   Vec3 clear_at_ = Vec3::Zero();
   double clearance_ = -1.0;

@@ -14,6 +14,7 @@
 namespace proxarm::scenes {
 namespace {
 
+using models::lift;
 using models::Vec;
 using models::Vec3;
 
@@ -44,13 +45,6 @@ class Random {
  private:
   std::mt19937_64 engine_;
 };
-
-template <int N>
-Vec3 lift(const Vec<N>& v) {
-  Vec3 v3 = Vec3::Zero();
-  v3.template head<N>() = v;
-  return v3;
-}
 
 // One state and what came of it.
 template <int N>

@@ -101,7 +101,7 @@ void cut_sphere(const Scene& scene, const Object& object, std::int32_t index, co
     out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
     return;
   }
-  cut.balls.push_back({&object, index, models::Embedded<N>::lift(near),
+  cut.balls.push_back({&object, index, models::lift<N>(near),
                        std::sqrt((sphere.radius_m - away) * (sphere.radius_m + away)), sphere.inside_out});
 }
 
@@ -169,9 +169,8 @@ Algorithm<N> several_planes(const Cut<N>& cut, CompiledScene& out) {
   for (const auto& plane : cut.planes) {
     const double mu = N > 1 ? plane.object->friction : 0.0;
     friction = friction || mu > 0.0;
-    faces.push_back(
-        {models::FlatSurface<3>(models::Embedded<N>::lift(plane.point), models::Embedded<N>::lift(plane.normal)), mu,
-         plane.index, plane.feature});
+    faces.push_back({models::FlatSurface<3>(models::lift<N>(plane.point), models::lift<N>(plane.normal)), mu,
+                     plane.index, plane.feature});
   }
   out.stages.push_back(
       {"composition of " + std::to_string(faces.size()) + " planes" + (friction ? " with friction" : ""),
@@ -198,9 +197,9 @@ Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   std::size_t moving = 0, layers = 0, rubbing = 0;
   for (const auto& plane : cut.planes) {
     const double mu = N > 1 ? plane.object->friction : 0.0;
-    entries.push_back({std::make_unique<models::PlaneObstacle>(models::Embedded<N>::lift(plane.point),
-                                                               models::Embedded<N>::lift(plane.normal), mu),
-                       plane.index, plane.feature});
+    entries.push_back(
+        {std::make_unique<models::PlaneObstacle>(models::lift<N>(plane.point), models::lift<N>(plane.normal), mu),
+         plane.index, plane.feature});
   }
   for (const Ball& ball : cut.balls) {
     const double mu = N > 1 ? ball.object->friction : 0.0;

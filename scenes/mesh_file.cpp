@@ -3,14 +3,18 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <assimp/BaseImporter.h>
 #include <algorithm>
+#include <array>
 #include <assimp/Importer.hpp>
 #include <cctype>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
 #include "models/description/setup_error.hpp"
+#include "scenes/mesh_cache.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -29,6 +33,39 @@ std::string extension_of(const std::filesystem::path& file) {
   return extension;
 }
 
+// What a file is, its name says: none of the readers of other formats gets to see it.
+void keep_reader_of(const std::string& extension, Assimp::Importer& importer) {
+  const std::size_t wanted = importer.GetImporterIndex(extension.c_str());
+  Assimp::BaseImporter* const keep = importer.GetImporter(wanted);
+  for (std::size_t i = importer.GetImporterCount(); i-- > 0;) {
+    if (Assimp::BaseImporter* const other = importer.GetImporter(i); other != keep) {
+      importer.UnregisterLoader(other);
+      delete other;
+    }
+  }
+}
+
+// Assimp ends the program where a mesh that is said to have polygons has none. False: faces without corners, or corners
+// that are no numbers.
+bool prepare_for_triangulation(const aiScene& scene) {
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    aiMesh& mesh = *scene.mMeshes[m];
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+      const aiVector3D& x = mesh.mVertices[v];
+      if (!std::isfinite(x.x) || !std::isfinite(x.y) || !std::isfinite(x.z)) return false;
+    }
+    constexpr std::array<unsigned, 5> type_of{aiPrimitiveType_POINT, aiPrimitiveType_POINT, aiPrimitiveType_LINE,
+                                              aiPrimitiveType_TRIANGLE, aiPrimitiveType_POLYGON};
+    if (mesh.mNumFaces == 0) return false;
+    mesh.mPrimitiveTypes = 0;
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      if (mesh.mFaces[f].mNumIndices == 0) return false;
+      mesh.mPrimitiveTypes |= type_of[std::min(mesh.mFaces[f].mNumIndices, 4u)];
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 TriangleSoup read_mesh_file(const std::filesystem::path& file) {
@@ -43,12 +80,17 @@ TriangleSoup read_mesh_file(const std::filesystem::path& file) {
     throw SetupError({.file = file.string(), .found = "no such file", .expected = kExpected});
   }
   Assimp::Importer importer;
+  keep_reader_of(extension, importer);
   // Only what a surface needs; node transforms are applied. Vertices are welded later, exactly.
   importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
                                                           aiComponent_COLORS | aiComponent_TEXCOORDS |
                                                           aiComponent_TEXTURES | aiComponent_MATERIALS);
-  const aiScene* const scene = importer.ReadFile(
-      file.string(), aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_PreTransformVertices);
+  const aiScene* scene = importer.ReadFile(file.string(), aiProcess_RemoveComponent);
+  if (scene != nullptr && prepare_for_triangulation(*scene)) {
+    scene = importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_PreTransformVertices);
+  } else {
+    scene = nullptr;
+  }
   if (scene == nullptr || scene->mNumMeshes == 0) {
     const std::string why = importer.GetErrorString();
     throw SetupError({.file = file.string(),
@@ -85,10 +127,16 @@ TriangleSoup read_mesh_file(const std::filesystem::path& file) {
 
 std::shared_ptr<const models::TriangleMesh> load_mesh(const std::filesystem::path& file, double scale,
                                                       const models::Pose& pose_W) {
-  TriangleSoup soup = read_mesh_file(file);
-  for (Vec3& x : soup.vertices) x = pose_W * Vec3(scale * x);
+  const MeshCache cache(file, scale, pose_W);
   try {
-    return std::make_shared<const models::TriangleMesh>(std::move(soup));
+    if (auto structure = cache.load()) {
+      return std::make_shared<const models::TriangleMesh>(models::TriangleMesh::restored(std::move(*structure)));
+    }
+    TriangleSoup soup = read_mesh_file(file);
+    for (Vec3& x : soup.vertices) x = pose_W * Vec3(scale * x);
+    auto mesh = std::make_shared<const models::TriangleMesh>(std::move(soup));
+    cache.store(mesh->structure());
+    return mesh;
   } catch (const std::invalid_argument& mistake) {
     throw SetupError({.file = file.string(), .message = mistake.what(), .advice = "check the mesh and its scale"});
   }

@@ -15,7 +15,8 @@ namespace proxarm::scenes {
 // Throws description::SetupError: no such file, not a mesh, damaged, no triangles.
 models::TriangleSoup read_mesh_file(const std::filesystem::path& file);
 
-// The same, scaled to metres and put to where the scene has it. Throws description::SetupError, too, for what
+// The same, scaled to metres and put to where the scene has it; large ones leave a cache beside the file
+// (scenes/mesh_cache.hpp). Throws description::SetupError, too, for what
 // TriangleMesh refuses.
 std::shared_ptr<const models::TriangleMesh> load_mesh(const std::filesystem::path& file, double scale,
                                                       const models::Pose& pose_W);

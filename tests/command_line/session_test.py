@@ -216,6 +216,16 @@ class Signals(ProgramTest):
 
 
 class Scenes(ProgramTest):
+    def test_a_press_that_closes_on_the_proxy_is_a_fault(self):
+        press = ("objects:\n"
+                 "  - plane: {name: anvil, point_m: [0.71, 0, 0.6], normal: [-1, 0, 0]}\n"
+                 "  - box: {name: hammer, centre_m: [0.64, 0, 0.6], size_m: [0.02, 1, 1],\n"
+                 "          motion: {velocity_m_per_s: [0.05, 0, 0]}}\n")
+        outcome = self.call("run", "--json", "--scene", self.written("press.yaml", press), "--duration", "3s")
+        self.assertEqual(outcome.status, 1, outcome.err)
+        [fault] = outcome.summary["faults"]
+        self.assertIn("proxy_squeezed", json.dumps(fault))
+
     def test_all_shipped_scenes_run_without_a_fault(self):
         scenes = sorted((SOURCE / "scenes").glob("*.yaml"))
         self.assertGreaterEqual(len(scenes), 5)

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <numbers>
+#include <string>
 #include <utility>
 
 #include "models/mesh.hpp"
@@ -126,6 +128,26 @@ models::TriangleSoup field(std::uint32_t n, double size, Height height) {
     }
   }
   return soup;
+}
+
+// Binary STL as its description has it: 80 bytes, a count, and 50 bytes a triangle, little-endian.
+inline std::string stl_of(const models::TriangleSoup& soup) {
+  std::string out(80, ' ');
+  out.reserve(84 + 50 * soup.triangles.size());
+  const auto put = [&out](const auto& value) {
+    char bytes[sizeof(value)];
+    std::memcpy(bytes, &value, sizeof(value));
+    out.append(bytes, sizeof(value));
+  };
+  put(static_cast<std::uint32_t>(soup.triangles.size()));
+  for (const auto& t : soup.triangles) {
+    for (int k = 0; k < 3; ++k) put(0.0f);
+    for (const auto v : t) {
+      for (const double x : soup.vertices[v]) put(static_cast<float>(x));
+    }
+    put(std::uint16_t{0});
+  }
+  return out;
 }
 
 // `other` joins `soup`.

@@ -122,6 +122,50 @@ TEST(TriangleMesh, WeldsVerticesAndDropsTrianglesWithoutArea) {
   EXPECT_FALSE(TriangleMesh(soup).closed());
 }
 
+// What a file says of it may be anything: refused, or of no consequence but wrong answers.
+TEST(TriangleMesh, RefusesADamagedStructure) {
+  const TriangleMesh mesh(ball(2, 0.5));
+  const auto refused = [](TriangleMesh::Structure structure) {
+    EXPECT_THROW((void)TriangleMesh::restored(std::move(structure)), std::invalid_argument);
+  };
+  auto s = mesh.structure();
+  refused({});
+  s.vertices.pop_back();
+  refused(s);
+  s = mesh.structure();
+  s.triangles.pop_back();
+  refused(s);
+  s = mesh.structure();
+  s.nodes[0].first[0] = 0;
+  refused(s);
+  s = mesh.structure();
+  s.nodes.pop_back();
+  refused(s);
+  s = mesh.structure();
+  s.vertices[7].y() = std::nan("");
+  refused(s);
+
+  Random random(704);
+  std::int64_t taken = 0;
+  for (std::int64_t i = 0; i < scaled(3000); ++i) {
+    s = mesh.structure();
+    auto& pair = s.nodes[static_cast<std::size_t>(random.below(static_cast<int>(s.nodes.size())))];
+    auto* const bytes = reinterpret_cast<unsigned char*>(&pair);
+    for (int k = 0; k < 3; ++k) bytes[random.below(sizeof(pair))] = static_cast<unsigned char>(random.below(256));
+    try {
+      const TriangleMesh same = TriangleMesh::restored(std::move(s));
+      ++taken;
+      std::uint32_t near = 0;
+      const Vec3 x = random.in_box<3>(1.0), y = random.in_box<3>(1.0);
+      EXPECT_GE(same.distance(x, 1e9, near), 0.0);
+      EXPECT_LT(near, same.size());
+      EXPECT_LT(same.first_hit(x, y).face, same.size());
+    } catch (const std::invalid_argument&) {
+    }
+  }
+  EXPECT_GT(taken, scaled(100) / 2);
+}
+
 TEST(TriangleMesh, FindsTheNearestFaceAndTheFirstHit) {
   Random random(702);
   TriangleSoup soup;

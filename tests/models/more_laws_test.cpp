@@ -143,6 +143,32 @@ TEST(MovingObstacle, CarriesWhatSticks) {
   }
 }
 
+// A groove that moves sideways at up to 1 m/s against a proxy that nothing else moves.
+TEST(MovingObstacle, GrooveSweepsOntoARestingProxy) {
+  for (const double speed : {1e-3, 0.1, 1.0}) {
+    for (const double mu : {0.0, 0.3, 1.2}) {
+      ScriptedMotion motion;
+      motion.velocity_m_per_s = Vec3(speed, 0, 0);
+      std::vector<World::Entry> entries;
+      for (const double side : {1.0, -1.0}) {
+        entries.push_back({std::make_unique<MovingObstacle>(
+                               std::make_unique<PlaneObstacle>(Vec3::Zero(), Vec3(side, 0.1 * side, 1), mu), motion),
+                           0, -1});
+      }
+      World g(std::move(entries));
+      const double T = 1e-3;
+      Vec3 q(0, 0, 2e-4);
+      for (int k = 1; k <= 500; ++k) {
+        g.set_time({.time_s = k * T, .period_s = T});
+        q = g(1e6, q, q);
+        ASSERT_GE(q.z(), std::abs(q.x() - speed * k * T + 0.1 * q.y()) - 1e-12) << speed << ", " << mu << ", " << k;
+      }
+      EXPECT_GT(q.x(), 0.0);
+      EXPECT_EQ(g.unresolved_steps(), 0u);
+    }
+  }
+}
+
 // A groove that moves sideways at up to 1 m/s holds the proxy in it.
 TEST(MovingObstacle, GrooveTakesTheProxyAlong) {
   for (const double speed : {0.1, 1.0}) {
@@ -190,11 +216,16 @@ TEST(MovingObstacle, SqueezesTheProxyWithoutLosingIt) {
         ASSERT_GE(q.z(), -1e-12);
         ASSERT_LE(q.z(), gap + 1e-12);
         ASSERT_EQ(g.unresolved_steps(), 0u);
+        ASSERT_FALSE(g.squeezed());
       } else {
         ASSERT_LE(std::abs(q.z()), 0.02);
       }
     }
     EXPECT_GT(g.unresolved_steps(), 0u);
+    EXPECT_TRUE(g.squeezed());
+    g.set_time({.time_s = 0.0, .period_s = T});
+    q = g(1e6, Vec3(0, 0, 0.02), Vec3(0, 0, 0.02));
+    EXPECT_FALSE(g.squeezed()) << "there is room again";
   }
 }
 
