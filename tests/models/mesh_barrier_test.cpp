@@ -48,19 +48,20 @@ struct Shape {
   const char* name;
   std::uint32_t rings, sectors;
   double squeeze;
-  double bumps;
+  double bumps;  // metres at the usual radius
+  double radius_m = 0.4;
 };
 
 void expect_sealed(const Shape& shape, double steps, std::uint64_t seed) {
   Random random(seed);
   const auto radius = [&](double scale) {
     return [&shape, scale](double theta, double phi) {
-      return scale * (0.4 + shape.bumps * std::sin(5.0 * theta) * std::sin(7.0 * phi + theta));
+      return scale * shape.radius_m * (1.0 + 2.5 * shape.bumps * std::sin(5.0 * theta) * std::sin(7.0 * phi + theta));
     };
   };
   // Two shells 10 µm apart.
   const TriangleSoup inner = globe(shape.rings, shape.sectors, radius(1.0), shape.squeeze);
-  const TriangleSoup outer = globe(shape.rings, shape.sectors, radius(1.0 + 2.5e-5), shape.squeeze);
+  const TriangleSoup outer = globe(shape.rings, shape.sectors, radius(1.0 + 1e-5 / shape.radius_m), shape.squeeze);
   TriangleSoup both = inner;
   join(both, outer);
   // Every triangle's vertices once more, triangles of zero area over its sides, and some triangles twice.
@@ -89,7 +90,7 @@ void expect_sealed(const Shape& shape, double steps, std::uint64_t seed) {
           const double mid = 0.5 * (lo + hi);
           (within_shell(in, mid * along) > 0 ? lo : hi) = mid;
         }
-        q = region == 1 ? Vec3((lo + 4e-6) * along) : Vec3(0.9 * along);
+        q = region == 1 ? Vec3((lo + 4e-6) * along) : Vec3(2.25 * shape.radius_m * along);
       }
       const int side_in = region == 0 ? 1 : -1, side_out = region == 2 ? -1 : 1;
       ASSERT_EQ(within_shell(in, q), side_in);
@@ -119,6 +120,9 @@ TEST(MeshBarrier, HoldsOnEvenTriangles) { expect_sealed({"even", 16, 24, 1.0, 0.
 TEST(MeshBarrier, HoldsOnFiftyFacesAroundAVertex) { expect_sealed({"fifty", 10, 50, 1.0, 0.05}, 60'000, 802); }
 TEST(MeshBarrier, HoldsOnSlivers) { expect_sealed({"slivers", 24, 12, 0.1, 0.02}, 60'000, 803); }
 TEST(MeshBarrier, HoldsOnTheThinnestSlivers) { expect_sealed({"thinnest", 24, 9, 0.03, 0.0}, 60'000, 804); }
+TEST(MeshBarrier, HoldsOnEdgesOfATenthOfAMillimetre) {
+  expect_sealed({"tenth of a millimetre", 24, 40, 1.0, 0.05, 8e-4}, 60'000, 808);
+}
 TEST(MeshBarrier, HoldsOnCoarseSharpBodies) { expect_sealed({"coarse", 4, 5, 1.0, 0.15}, 60'000, 805); }
 
 // An open sheet that sticks out of a block through its walls, both one mesh that no vertices join: what is above the
