@@ -9,6 +9,7 @@
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -31,6 +32,16 @@ std::string extension_of(const std::filesystem::path& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;
+}
+
+// Assimp looks for the end of a PLY header for ever.
+bool has_no_end_of_header(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::string line;
+  for (int k = 0; k < 10'000 && std::getline(in, line); ++k) {
+    if (line.starts_with("end_header")) return false;
+  }
+  return true;
 }
 
 // What a file is, its name says: none of the readers of other formats gets to see it.
@@ -78,6 +89,9 @@ TriangleSoup read_mesh_file(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(file, error)) {
     throw SetupError({.file = file.string(), .found = "no such file", .expected = kExpected});
+  }
+  if (extension == ".ply" && has_no_end_of_header(file)) {
+    throw SetupError({.file = file.string(), .found = "no end_header", .expected = kExpected});
   }
   Assimp::Importer importer;
   keep_reader_of(extension, importer);
