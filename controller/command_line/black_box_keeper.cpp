@@ -67,7 +67,10 @@ std::vector<fs::path> replay_files(const PreparedSession& session) {
   std::vector<fs::path> files{session.cell.file, session.cell.urdf, session.scene.file, session.sensor.file,
                               session.hand.file};
   if (session.sensor.described) files.push_back(session.sensor.described->dbc);
-  for (const description::DriveDescription& drive : session.cell.drives) files.emplace_back(drive.description);
+  for (const description::DriveDescription& drive : session.cell.drives) {
+    files.emplace_back(drive.description);
+    files.emplace_back(drive.eds);
+  }
   for (const scenes::Object& object : session.scene.objects) {
     if (const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape)) files.push_back(mesh->file);
   }
