@@ -417,6 +417,7 @@ Fit fit_order(const Runs& runs) {
     xy += (x[i] - mx) * (y[i] - my);
   }
   const double slope = xy / xx;
+  if (slope < 0.0) return {0.0, 0.0};  // what grows with the number of steps is rounding
   for (std::size_t i = 0; i < x.size(); ++i) rr += std::pow(y[i] - my - slope * (x[i] - mx), 2);
   return {slope, std::sqrt(rr / n)};
 }
