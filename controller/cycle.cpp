@@ -575,6 +575,7 @@ void Cycle::finish_box() noexcept {
   }
   fieldbus::StateArchive inputs = fieldbus::StateArchive::writer(boxed_->inputs);
   for (DriveOnBus& axis : parts_.drives) axis.drive.archive_input(inputs);
+  parts_.sensor->archive_input(inputs);
   boxed_->input_bytes = static_cast<std::uint16_t>(inputs.bytes());
   boxed_->rendered_cycles = rendered_cycles_;
   boxed_->record = record_;

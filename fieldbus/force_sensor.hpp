@@ -67,6 +67,8 @@ class ForceSensor {
   [[nodiscard]] virtual bool taring() const noexcept = 0;
   // What was read at start, and all that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;
+  // What this cycle took that came by no frame of a CAN bus; reading gives it back before the cycle.
+  virtual void archive_input(StateArchive& /*state*/) noexcept {}
 
   // ---- in words, not for the cycle ----
   [[nodiscard]] virtual std::string describe_status(std::uint32_t status) const = 0;

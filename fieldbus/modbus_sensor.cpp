@@ -65,8 +65,16 @@ std::string ModbusSensor::identity() const {
 
 bool ModbusSensor::poll(std::int64_t now_ns, CanFrame& frame) noexcept {
   decoder_.poll(now_ns, frame);
-  if (samples_.read(taken_)) decoder_.on_frame(taken_.frame, taken_.time_ns);
+  took_ = samples_.read(taken_);
+  if (took_) decoder_.on_frame(taken_.frame, taken_.time_ns);
   return false;
+}
+
+void ModbusSensor::archive_input(StateArchive& state) noexcept {
+  bool took = took_;
+  Sample sample = state.reading() ? read_ : taken_;  // each with the frame's outside
+  state(took, sample);
+  if (state.reading() && took) samples_.write(sample);
 }
 
 }  // namespace proxarm::fieldbus

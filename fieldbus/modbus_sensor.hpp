@@ -37,6 +37,8 @@ class ModbusSensor final : public ForceSensor {
     decoder_.begin_tare(samples, known_wrench_S);
   }
   [[nodiscard]] bool taring() const noexcept override { return decoder_.taring(); }
+  void archive(StateArchive& state) noexcept override { decoder_.archive(state); }
+  void archive_input(StateArchive& state) noexcept override;
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override {
     return decoder_.describe_status(status);
   }
@@ -45,6 +47,8 @@ class ModbusSensor final : public ForceSensor {
   struct Sample {
     CanFrame frame;
     std::int64_t time_ns = 0;
+
+    void archive(StateArchive& state) noexcept { state(frame.data, time_ns); }
   };
 
   description::SensorProtocol protocol_;
@@ -54,6 +58,7 @@ class ModbusSensor final : public ForceSensor {
   TripleBuffer<Sample> samples_;
   Sample read_;   // the worker's
   Sample taken_;  // the cycle's
+  bool took_ = false;
 };
 
 }  // namespace proxarm::fieldbus

@@ -104,6 +104,7 @@ class Replay {
     fieldbus::StateArchive inputs =
         fieldbus::StateArchive::reader(std::span(recorded.inputs).first(recorded.input_bytes));
     for (const controller::DriveOnBus& axis : cycle_->parts().drives) axis.drive.archive_input(inputs);
+    cycle_->parts().sensor->archive_input(inputs);
   }
 
   controller::ReplayReader log_;

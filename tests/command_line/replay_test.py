@@ -55,6 +55,10 @@ class Replay(ProgramTest):
         self.assertEqual((outcome.status, outcome.summary),
                          (0, {"same": True, "first_cycle": 0, "cycles": summary["cycles"]}))
 
+    def test_torques(self):
+        record, summary = self.recorded(SOURCE / "models/cells/light.yaml", "--duration", "4s")
+        self.assert_same(record, cycles=summary["cycles"])
+
     def test_whatever_was_rendered(self):
         mesh = self.written("box.obj", MESH)
         scene = self.written("mesh.yaml", f"name: box of triangles\nobjects:\n  - mesh: {{file: {mesh.name}, friction: 0.3}}\n")

@@ -74,7 +74,7 @@ TEST_F(StudyFiles, PartsThatDontMakeAWholeAreRefused) {
   EXPECT_THROW(merge({a}, folder / "out"), description::SetupError);        // half of it
   EXPECT_THROW(merge({a, a, c}, folder / "out"), description::SetupError);  // one twice
   EXPECT_THROW(merge({a, b}, folder / "out"), description::SetupError);     // another seed
-  EXPECT_THROW(merge({a, folder}, folder / "out"), description::SetupError);
+  EXPECT_THROW(merge({a, folder.path()}, folder / "out"), description::SetupError);
   EXPECT_THROW(merge({a, c}, folder / "b/../a"), description::SetupError);  // over one of its parts
   std::ofstream(c / "thirds.csv", std::ios::app) << "3,first,abc\n";
   EXPECT_THROW(merge({a, c}, folder / "out"), description::SetupError);  // not a number
