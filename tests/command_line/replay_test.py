@@ -6,7 +6,7 @@ import subprocess
 import time
 import unittest
 
-from harness import ProgramTest, program
+from harness import SOURCE, ProgramTest, program
 
 SAME = re.compile(r"(\d+) cycles from (\d+) on: every setpoint is the same to the bit\n")
 
