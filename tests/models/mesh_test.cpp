@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <memory>
 
 #include "models/mesh_predicates.hpp"
@@ -150,8 +152,12 @@ TEST(TriangleMesh, RefusesADamagedStructure) {
   for (std::int64_t i = 0; i < scaled(3000); ++i) {
     s = mesh.structure();
     auto& pair = s.nodes[static_cast<std::size_t>(random.below(static_cast<int>(s.nodes.size())))];
-    auto* const bytes = reinterpret_cast<unsigned char*>(&pair);
-    for (int k = 0; k < 3; ++k) bytes[random.below(sizeof(pair))] = static_cast<unsigned char>(random.below(256));
+    std::array<unsigned char, sizeof(pair)> bytes{};
+    std::memcpy(bytes.data(), static_cast<const void*>(&pair), sizeof(pair));
+    for (int k = 0; k < 3; ++k) {
+      bytes[static_cast<std::size_t>(random.below(sizeof(pair)))] = static_cast<unsigned char>(random.below(256));
+    }
+    std::memcpy(static_cast<void*>(&pair), bytes.data(), sizeof(pair));
     try {
       const TriangleMesh same = TriangleMesh::restored(std::move(s));
       ++taken;

@@ -179,7 +179,7 @@ TEST(Sphere, SlidesToTheFrictionCircle) {
 // lost in rounding, and the force left its friction cone altogether.
 TEST(RoundBodies, SlideToTheFrictionConeFromFarBeyondACavity) {
   Random random(606);
-  const auto slide = [&random](const auto& core, double R, double mu, const Vec3& p, const Vec3& q) {
+  const auto slide = [](const auto& core, double R, double mu, const Vec3& p, const Vec3& q) {
     const models::RoundObstacle cavity(core, R, mu, true);
     const Obstacle::Step s = cavity.step(1.0, p, q);
     ASSERT_EQ(s.touches, cavity.distance(p) < 0.0);  // along an endless bar it may be inside
