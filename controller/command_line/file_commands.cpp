@@ -32,6 +32,7 @@ Kind kind_of(const fs::path& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   if (extension == ".eds" || extension == ".dcf") return Kind::eds;
+  if (fs::is_directory(file)) return Kind::scene;  // yaml-cpp loses memory on one
   try {
     const YAML::Node root = YAML::LoadFile(file.string());
     if (root.IsMap()) {
@@ -40,7 +41,7 @@ Kind kind_of(const fs::path& file) {
       if (root["protocol"]) return Kind::sensor;
       if (root["waypoints"] || root["multisine"] || root["stiffness_N_per_m"]) return Kind::hand;
     }
-  } catch (const std::exception&) {  // the strict loader says what is wrong, and where
+  } catch (const YAML::Exception&) {  // the strict loader says what is wrong, and where
   }
   return Kind::scene;
 }

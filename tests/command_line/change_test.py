@@ -171,7 +171,7 @@ class Nothing(ProgramTest):
         run = subprocess.Popen([program(), "run", "--no-plot", "--pace", "realtime", "--duration", "20s"],
                                cwd=self.folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(run.wait)
-        self.addCleanup(run.kill)
+        self.addCleanup(run.terminate)
         time.sleep(1.0)
         links = []
         for link in pathlib.Path(f"/proc/{run.pid}/fd").iterdir():
