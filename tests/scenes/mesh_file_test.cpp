@@ -16,6 +16,7 @@
 #include "scenes/scene_file.hpp"
 #include "tests/models/mesh_shapes.hpp"
 #include "tests/models/random_states.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace proxarm::tests {
 namespace {
@@ -29,21 +30,15 @@ using scenes::Scene;
 
 class MeshFile : public testing::Test {
  protected:
-  void SetUp() override {
-    folder_ = std::filesystem::temp_directory_path() /
-              (std::string("proxarm_mesh_") + testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-    ::setenv("XDG_CACHE_HOME", (folder_ / "cache").c_str(), 1);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
+  void SetUp() override { ::setenv("XDG_CACHE_HOME", (folder / "cache").c_str(), 1); }
 
   std::filesystem::path write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / name, std::ios::binary) << text;
-    return folder_ / name;
+    std::ofstream(folder / name, std::ios::binary) << text;
+    return folder / name;
   }
-  Scene scene(const std::string& text) const { return scenes::parse_scene(text, folder_ / "scene.yaml"); }
+  Scene scene(const std::string& text) const { return scenes::parse_scene(text, folder / "scene.yaml"); }
 
-  std::filesystem::path folder_;
+  const ScratchFolder folder;
 };
 
 std::string obj_of(const TriangleSoup& soup) {
@@ -92,7 +87,7 @@ TEST_F(MeshFile, SaysWhatIsWrong) {
       EXPECT_EQ(error.file(), file.string());
     }
   };
-  expect(folder_ / "none.stl", "no such file");
+  expect(folder / "none.stl", "no such file");
   expect(write("a.txt", "solid"), ".stl, .obj or .ply");
   expect(write("empty.stl", ""), "a mesh");
   expect(write("text.obj", "this is no mesh\n"), "a mesh");
@@ -172,24 +167,24 @@ class MeshCache : public MeshFile {
  protected:
   void SetUp() override {
     MeshFile::SetUp();
-    file_ = write("ball.stl", stl_of(ball(5, 0.5)));
-    cache_ = file_.string() + ".proxarm";
-    fresh_ = load();
-    ASSERT_TRUE(std::filesystem::is_regular_file(cache_));
-    bytes_ = read(cache_);
+    file = write("ball.stl", stl_of(ball(5, 0.5)));
+    cache = file.string() + ".proxarm";
+    fresh = load();
+    ASSERT_TRUE(std::filesystem::is_regular_file(cache));
+    bytes = text_of(cache);
   }
   std::shared_ptr<const TriangleMesh> load(double scale = 1.0) const {
-    return scenes::load_mesh(file_, scale, models::Pose::Identity());
+    return scenes::load_mesh(file, scale, models::Pose::Identity());
   }
   // A cache that isn't used is written again.
   bool is_used(double scale = 1.0) const {
     const std::filesystem::file_time_type long_ago{};
-    std::filesystem::last_write_time(cache_, long_ago);
+    std::filesystem::last_write_time(cache, long_ago);
     expect_same(*load(scale), scale);
-    return std::filesystem::last_write_time(cache_) == long_ago;
+    return std::filesystem::last_write_time(cache) == long_ago;
   }
   void expect_same(const TriangleMesh& mesh, double scale) const {
-    const auto &a = mesh.structure(), &b = fresh_->structure();
+    const auto &a = mesh.structure(), &b = fresh->structure();
     ASSERT_EQ(a.triangles, b.triangles);
     ASSERT_EQ(a.nodes.size(), b.nodes.size());
     ASSERT_EQ(a.closed, b.closed);
@@ -197,17 +192,13 @@ class MeshCache : public MeshFile {
     for (std::size_t i = 0; i < a.vertices.size(); ++i) ASSERT_EQ(a.vertices[i], scale * b.vertices[i]);
     if (scale == 1.0) {
       EXPECT_EQ(std::memcmp(a.nodes.data(), b.nodes.data(), a.nodes.size() * sizeof(a.nodes[0])), 0);
-      EXPECT_EQ(mesh.bounds().high, fresh_->bounds().high);
+      EXPECT_EQ(mesh.bounds().high, fresh->bounds().high);
     }
   }
-  static std::string read(const std::filesystem::path& file) {
-    std::ifstream in(file, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
 
-  std::filesystem::path file_, cache_;
-  std::shared_ptr<const TriangleMesh> fresh_;
-  std::string bytes_;
+  std::filesystem::path file, cache;
+  std::shared_ptr<const TriangleMesh> fresh;
+  std::string bytes;
 };
 
 TEST_F(MeshCache, CountsForTheSameMeshOnly) {
@@ -215,7 +206,7 @@ TEST_F(MeshCache, CountsForTheSameMeshOnly) {
   EXPECT_FALSE(is_used(2.0)) << "another scale";
   EXPECT_TRUE(is_used(2.0));
   EXPECT_FALSE(is_used());
-  std::string changed = read(file_);
+  std::string changed = text_of(file);
   changed[90] ^= 1;  // of the first triangle's normal, which counts for nothing: the same mesh, but other bytes
   write("ball.stl", changed);
   EXPECT_FALSE(is_used());
@@ -230,26 +221,26 @@ TEST_F(MeshCache, IsIgnoredWhereItIsDamaged) {
   Random random(902);
   std::vector<std::string> damaged{"",
                                    "x",
-                                   bytes_.substr(0, 100),
-                                   bytes_.substr(0, bytes_.size() - 1),
-                                   bytes_ + "x",
-                                   std::string(bytes_.size(), '\xff'),
-                                   std::string(bytes_.size(), '\0')};
+                                   bytes.substr(0, 100),
+                                   bytes.substr(0, bytes.size() - 1),
+                                   bytes + "x",
+                                   std::string(bytes.size(), '\xff'),
+                                   std::string(bytes.size(), '\0')};
   for (int i = 0; i < 25; ++i) {
-    std::string some = bytes_;
-    const double reach = random.chance(0.5) ? 100.0 : static_cast<double>(bytes_.size());
+    std::string some = bytes;
+    const double reach = random.chance(0.5) ? 100.0 : static_cast<double>(bytes.size());
     some[static_cast<std::size_t>(random.uniform(0.0, reach))] ^= static_cast<char>(1 << random.below(8));
     damaged.push_back(some);
   }
   for (const std::string& some : damaged) {
     write("ball.stl.proxarm", some);
     ASSERT_FALSE(is_used());
-    ASSERT_EQ(read(cache_), bytes_) << "written again";
+    ASSERT_EQ(text_of(cache), bytes) << "written again";
   }
 }
 
 TEST_F(MeshCache, OfAStrangerIsIgnored) {
-  const auto key = folder_ / "cache/proxarm/mesh-key";
+  const auto key = folder / "cache/proxarm/mesh-key";
   const auto mode = std::filesystem::status(key).permissions();
   EXPECT_EQ(mode, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
   std::filesystem::remove(key);
@@ -257,25 +248,25 @@ TEST_F(MeshCache, OfAStrangerIsIgnored) {
   EXPECT_TRUE(is_used());
   // A secret that others can read is none.
   std::filesystem::permissions(key, std::filesystem::perms::group_read, std::filesystem::perm_options::add);
-  std::filesystem::remove(cache_);
+  std::filesystem::remove(cache);
   expect_same(*load(), 1.0);
-  EXPECT_FALSE(std::filesystem::exists(cache_));
+  EXPECT_FALSE(std::filesystem::exists(cache));
 }
 
 TEST_F(MeshCache, IsDoneWithoutWhereItCannotBeWritten) {
-  std::filesystem::remove(cache_);
-  std::filesystem::create_directory(cache_);
+  std::filesystem::remove(cache);
+  std::filesystem::create_directory(cache);
   write("ball.stl.proxarm/in_the_way", "");
   expect_same(*load(), 1.0);
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 3) << "nothing is left beside";
-  std::filesystem::remove_all(cache_);
-  ::setenv("XDG_CACHE_HOME", file_.c_str(), 1);  // no folder
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 3) << "nothing is left beside";
+  std::filesystem::remove_all(cache);
+  ::setenv("XDG_CACHE_HOME", file.c_str(), 1);  // no folder
   expect_same(*load(), 1.0);
-  EXPECT_FALSE(std::filesystem::exists(cache_));
+  EXPECT_FALSE(std::filesystem::exists(cache));
 }
 
 TEST_F(MeshCache, MakesTheNextLoadQuickTiming) {
-  file_ = write("large.stl", stl_of(ball(7, 0.5)));
+  file = write("large.stl", stl_of(ball(7, 0.5)));
   const auto seconds = [&] {
     const std::clock_t begun = std::clock();
     const auto mesh = load();
