@@ -2,19 +2,19 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/control_socket.hpp"
+#include "controller/command_line/exit_status.hpp"
 
 namespace proxarm::command_line {
 
 int set_command(const SetOptions& options) {
   const std::filesystem::path path = options.control.empty() ? default_control_path() : options.control;
-  bool refused = false;
   for (const std::string& change : options.changes) {
     const std::string answer = ask_control_socket(path, change);
-    refused = answer.rfind("ok: ", 0) != 0;
+    const bool refused = answer.rfind("ok: ", 0) != 0;
     std::fprintf(refused ? stderr : stdout, "%s%s\n", refused ? "proxarm: " : "", answer.c_str());
-    if (refused) return 2;
+    if (refused) return set_up_mistake;
   }
-  return 0;
+  return fine;
 }
 
 }  // namespace proxarm::command_line

@@ -1,6 +1,7 @@
 // A simulated CiA 402 drive, brought up and moved by a master typed by hand.
 #include "sim/drive_device.hpp"
 
+#include <initializer_list>
 #include <random>
 
 #include "tests/sim/device_harness.hpp"
@@ -40,18 +41,21 @@ struct DriveDeviceTest : ::testing::Test {
     drive.on_frame(testing::from_text(text), now_ns);
     return port.take();
   }
-  void configure() {
-    for (const char* request :
-         {"601#2300140101020080", "601#2F00160000000000", "601#2300160110004060", "601#2300160220007A60",
-          "601#2F00160002000000", "601#2F00140201000000", "601#2300140101020000", "601#2300180181010080",
-          "601#2F001A0000000000", "601#23001A0110004160", "601#23001A0220006460", "601#2F001A0002000000",
-          "601#2F00180201000000", "601#2300180181010000", "601#2F60600008000000", "601#2FC2600101000000",
-          "601#2FC26002FD000000"}) {
+  // Downloads that are all taken, then operational.
+  void configure(std::initializer_list<const char*> requests) {
+    for (const char* request : requests) {
       const auto answers = ask(request);
       ASSERT_EQ(answers.size(), 1u);
       ASSERT_EQ(answers[0].substr(0, 6), "581#60") << request << " answered " << answers[0];
     }
     ask("000#0101");
+  }
+  void configure() {
+    configure({"601#2300140101020080", "601#2F00160000000000", "601#2300160110004060", "601#2300160220007A60",
+               "601#2F00160002000000", "601#2F00140201000000", "601#2300140101020000", "601#2300180181010080",
+               "601#2F001A0000000000", "601#23001A0110004160", "601#23001A0220006460", "601#2F001A0002000000",
+               "601#2F00180201000000", "601#2300180181010000", "601#2F60600008000000", "601#2FC2600101000000",
+               "601#2FC26002FD000000"});
   }
   // One cycle of 1 ms: SYNC, then the receive PDO, as a master does. Gives the transmit PDO.
   std::string cycle(std::uint16_t controlword, std::int32_t target) {
@@ -94,18 +98,12 @@ struct DriveDeviceTest : ::testing::Test {
 // Mode 10: {6040, 6071} in, {6041, 6064, 6077} out.
 struct TorqueDriveTest : DriveDeviceTest {
   void SetUp() override {
-    for (const char* request :
-         {"601#2300140101020080", "601#2F00160000000000", "601#2300160110004060", "601#2300160210007160",
-          "601#2F00160002000000", "601#2F00140201000000", "601#2B00140503000000", "601#2300140101020000",
-          "601#2300180181010080", "601#2F001A0000000000", "601#23001A0110004160", "601#23001A0220006460",
-          "601#23001A0310007760", "601#2F001A0003000000", "601#2F00180201000000", "601#2300180181010000",
-          "601#2F6060000A000000", "601#2FC2600101000000", "601#2FC26002FD000000", "601#2B72600058020000",
-          "601#2B07600003000000"}) {
-      const auto answers = ask(request);
-      ASSERT_EQ(answers.size(), 1u);
-      ASSERT_EQ(answers[0].substr(0, 6), "581#60") << request << " answered " << answers[0];
-    }
-    ask("000#0101");
+    configure({"601#2300140101020080", "601#2F00160000000000", "601#2300160110004060", "601#2300160210007160",
+               "601#2F00160002000000", "601#2F00140201000000", "601#2B00140503000000", "601#2300140101020000",
+               "601#2300180181010080", "601#2F001A0000000000", "601#23001A0110004160", "601#23001A0220006460",
+               "601#23001A0310007760", "601#2F001A0003000000", "601#2F00180201000000", "601#2300180181010000",
+               "601#2F6060000A000000", "601#2FC2600101000000", "601#2FC26002FD000000", "601#2B72600058020000",
+               "601#2B07600003000000"});
     torque_cycles(4, 0x06, 0);
     torque_cycles(2, 0x07, 0);
     torque_cycles(8, 0x0F, 0);
