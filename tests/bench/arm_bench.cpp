@@ -2,6 +2,7 @@
 #include <benchmark/benchmark.h>
 
 #include "models/inverse_kinematics.hpp"
+#include "tests/source_file.hpp"
 
 namespace {
 
@@ -9,8 +10,7 @@ using namespace proxarm;
 using models::JointVector;
 
 const models::Arm& arm() {
-  static const models::Arm instance(
-      description::load_cell(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/cells/default.yaml"));
+  static const models::Arm instance(description::load_cell(source_file("models/cells/default.yaml")));
   return instance;
 }
 

@@ -22,12 +22,9 @@
 #include "scenes/compile.hpp"
 #include "scenes/scene_file.hpp"
 #include "sim/simulated_cell.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::controller::testing {
-
-inline std::filesystem::path source_file(const std::string& path) {
-  return std::filesystem::path(PROXARM_SOURCE_DIR) / path;
-}
 
 struct RigOptions {
   std::vector<std::string> device_faults{};  // as on the command line

@@ -13,13 +13,14 @@
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
 #include "models/description/setup_error.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::description {
 namespace {
 
 using testing::HasSubstr;
 
-const std::filesystem::path source_dir = PROXARM_SOURCE_DIR;
+const std::filesystem::path source_dir = source_file();
 
 std::string read(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "models/description/setup_error.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -122,7 +123,7 @@ TEST(EdsFile, SaysWhereItIsWrong) {
 }
 
 TEST(EdsFile, OfTheSimulatedDriveIsShipped) {
-  const EdsFile eds = load_eds(PROXARM_SOURCE_DIR "/models/drives/simulated_drive.eds");
+  const EdsFile eds = load_eds(source_file("models/drives/simulated_drive.eds"));
   EXPECT_EQ(eds.find(0x650200)->default_value, 0x2C0u);
   EXPECT_TRUE(eds.find(0x607100)->mappable);
   EXPECT_THROW((void)load_eds("/nowhere/drive.eds"), SetupError);

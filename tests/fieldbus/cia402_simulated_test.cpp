@@ -16,12 +16,13 @@
 #include "models/description/sensor.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/simulated_cell.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
-const std::filesystem::path source_dir = PROXARM_SOURCE_DIR;
+const std::filesystem::path source_dir = source_file();
 
 // The default cell with its simulated far end, and the master's side as the cycle uses it.
 struct SimulatedDrives : ::testing::Test {

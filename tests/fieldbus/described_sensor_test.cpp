@@ -16,6 +16,7 @@
 #include "models/description/yaml_file.hpp"
 #include "scripted_network.hpp"
 #include "tests/allocation_count.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -24,7 +25,7 @@ using description::SetupError;
 using ::testing::HasSubstr;
 
 constexpr std::int64_t us = 1'000, ms = 1'000'000;
-const std::filesystem::path source_dir = PROXARM_SOURCE_DIR;
+const std::filesystem::path source_dir = source_file();
 
 description::SensorDescription shipped(const std::string& name) {
   return description::load_sensor(source_dir / "models/sensors" / (name + ".yaml"));

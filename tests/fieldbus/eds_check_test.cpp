@@ -10,13 +10,14 @@
 
 #include "fieldbus/cia402_drive.hpp"
 #include "models/description/setup_error.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
 
 using ::testing::HasSubstr;
 
-constexpr const char* shipped = PROXARM_SOURCE_DIR "/models/drives/simulated_drive.eds";
+const std::filesystem::path shipped = source_file("models/drives/simulated_drive.eds");
 
 std::string shipped_text() {
   std::ifstream in(shipped);

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "fieldbus/modbus_client.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -27,7 +28,7 @@ class Peer {
       dup2(in[0], 0);
       dup2(out[1], 1);
       for (const int fd : {in[0], in[1], out[0], out[1]}) close(fd);
-      execl("/usr/bin/python3", "python3", PROXARM_SOURCE_DIR "/tests/fieldbus/modbus_peer.py", wire, nullptr);
+      execl("/usr/bin/python3", "python3", source_file("tests/fieldbus/modbus_peer.py").c_str(), wire, nullptr);
       _exit(127);
     }
     close(in[0]);

@@ -9,6 +9,7 @@
 #include "fieldbus/modbus_line.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/description/yaml_file.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -106,7 +107,7 @@ DriveDescription linear_axis() {
 }
 
 ModbusDriveDescription shipped(const std::string& name) {
-  return description::load_modbus_drive(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/drives" / name);
+  return description::load_modbus_drive(source_file("models/drives") / name);
 }
 
 constexpr std::int64_t ms = 1'000'000;

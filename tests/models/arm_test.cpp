@@ -15,6 +15,7 @@
 
 #include "models/description/setup_error.hpp"
 #include "tests/models/random_states.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -24,7 +25,7 @@ using description::SetupError;
 using testing::HasSubstr;
 using tests::Random;
 
-const std::filesystem::path source_dir = PROXARM_SOURCE_DIR;
+const std::filesystem::path source_dir = source_file();
 
 std::array<double, 3> three(const char* text) {
   std::array<double, 3> v{};

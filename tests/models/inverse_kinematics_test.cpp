@@ -8,6 +8,7 @@
 #include "models/description/setup_error.hpp"
 #include "tests/allocation_count.hpp"
 #include "tests/models/random_states.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -15,9 +16,7 @@ namespace {
 using Status = InverseKinematicsResult::Status;
 using tests::Random;
 
-description::Cell default_cell() {
-  return description::load_cell(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/cells/default.yaml");
-}
+description::Cell default_cell() { return description::load_cell(source_file("models/cells/default.yaml")); }
 
 class InverseKinematicsTest : public testing::Test {
  protected:
@@ -304,7 +303,7 @@ TEST_F(InverseKinematicsTest, FindsAStartPoseFromAnywhere) {
 TEST_F(InverseKinematicsTest, RefusesWhatItCantSolve) {
   description::Cell cell = default_cell();
   cell.drives.resize(1);
-  cell.urdf = std::filesystem::path(PROXARM_SOURCE_DIR) / "tests/models/data/pendulum.urdf";
+  cell.urdf = source_file("tests/models/data/pendulum.urdf");
   cell.drives[0].joint = "hinge";
   cell.sensor.link = "tip";
   const Arm pendulum(cell);

@@ -7,6 +7,7 @@
 #include "scenes/scene_file.hpp"
 #include "tests/allocation_count.hpp"
 #include "tests/models/random_states.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::tests {
 namespace {
@@ -15,7 +16,7 @@ using models::Vec3;
 
 TEST(Compile, MakesStepsThatAllocateNothing) {
   if (!allocations_are_counted()) GTEST_SKIP() << "a sanitizer's malloc can't be counted";
-  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes")) {
+  for (const auto& entry : std::filesystem::directory_iterator(source_file("scenes"))) {
     if (entry.path().extension() != ".yaml") continue;
     const scenes::CompiledScene scene = scenes::compile(scenes::load_scene(entry.path()));
     if (scene.dimensions() != 3) continue;

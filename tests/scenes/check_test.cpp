@@ -8,13 +8,14 @@
 #include "models/friction_plane.hpp"
 #include "scenes/explain.hpp"
 #include "scenes/scene_file.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::tests {
 namespace {
 
 using models::Vec3;
 
-const std::filesystem::path scenes_folder = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
+const std::filesystem::path scenes_folder = source_file("scenes");
 
 TEST(Check, PassesEveryShippedScene) {
   for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {

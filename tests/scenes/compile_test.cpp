@@ -11,6 +11,7 @@
 #include "models/friction_plane.hpp"
 #include "models/plane.hpp"
 #include "scenes/scene_file.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::tests {
 namespace {
@@ -21,7 +22,7 @@ using scenes::CompiledScene;
 using scenes::load_scene;
 using scenes::parse_scene;
 
-const std::filesystem::path scenes_folder = std::filesystem::path(PROXARM_SOURCE_DIR) / "scenes";
+const std::filesystem::path scenes_folder = source_file("scenes");
 
 template <typename Algorithm, int N>
 bool is(const CompiledScene& scene) {

@@ -8,6 +8,7 @@
 #include "models/description/setup_error.hpp"
 #include "sim/simulated_cell.hpp"
 #include "tests/sim/device_harness.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::ms;
 
-const std::filesystem::path source = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = source_file();
 
 // Writes down what the scan sends.
 struct Listener final : fieldbus::CanListener {

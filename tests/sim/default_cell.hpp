@@ -9,12 +9,9 @@
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
-
-inline std::filesystem::path source_file(const std::string& path) {
-  return std::filesystem::path(PROXARM_SOURCE_DIR) / path;
-}
 
 inline description::Cell default_cell() { return description::load_cell(source_file("models/cells/default.yaml")); }
 

@@ -11,6 +11,7 @@
 #include "models/description/setup_error.hpp"
 #include "sim/simulated_cell.hpp"
 #include "tests/sim/device_harness.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 using ::testing::ElementsAre;
 using testing::ms;
 
-const std::filesystem::path source = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = source_file();
 
 description::SensorDescription shipped(const std::string& name) {
   return description::load_sensor(source / "models/sensors" / (name + ".yaml"));

@@ -8,6 +8,7 @@
 #include "fieldbus/socket_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "tests/sim/device_harness.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -17,7 +18,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using testing::ms;
 
-const std::filesystem::path source = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = source_file();
 
 // A master that sends what it was told at given times and writes down what it hears.
 struct ScriptedMaster final : fieldbus::CanListener {

@@ -12,6 +12,7 @@
 #include "sim/simulated_cell.hpp"
 #include "tests/allocation_count.hpp"
 #include "tests/sim/device_harness.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -19,7 +20,7 @@ namespace {
 using ::testing::HasSubstr;
 using testing::ms;
 
-const std::filesystem::path source = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = source_file();
 
 struct MasterAndDrives : ::testing::Test {
   void start(const std::vector<std::string>& faults = {}) {

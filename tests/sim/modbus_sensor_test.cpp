@@ -7,6 +7,7 @@
 #include "models/description/setup_error.hpp"
 #include "sim/modbus_sensor_device.hpp"
 #include "sim/modbus_server.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -17,7 +18,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 description::SensorDescription ft300() {
-  return description::load_sensor(PROXARM_SOURCE_DIR "/models/sensors/robotiq_ft300.yaml");
+  return description::load_sensor(source_file("models/sensors/robotiq_ft300.yaml"));
 }
 
 // Says what it is told to.
@@ -86,7 +87,7 @@ TEST(ModbusSensorFile, IsRefusedWhereItsRegistersCantBe) {
   EXPECT_THROW(fieldbus::ModbusSensor(ft300(), 0, "ft"), description::SetupError);
   EXPECT_THROW(fieldbus::ModbusSensor(ft300(), 248, "ft"), description::SetupError);
   EXPECT_THROW(
-      fieldbus::ModbusSensor(description::load_sensor(PROXARM_SOURCE_DIR "/models/sensors/aidin_aft200.yaml"), 9, "ft"),
+      fieldbus::ModbusSensor(description::load_sensor(source_file("models/sensors/aidin_aft200.yaml")), 9, "ft"),
       description::SetupError);
 }
 

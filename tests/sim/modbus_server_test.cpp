@@ -12,6 +12,7 @@
 #include "fieldbus/modbus_line.hpp"
 #include "models/description/setup_error.hpp"
 #include "sim/modbus_server.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -68,9 +69,7 @@ class ModbusLines : public ::testing::TestWithParam<bool> {
   }
 
   StillAxis axis;
-  ModbusDevice device{
-      description::load_modbus_drive(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/drives/generic_absolute.yaml"),
-      1, 1e6, axis};
+  ModbusDevice device{description::load_modbus_drive(source_file("models/drives/generic_absolute.yaml")), 1, 1e6, axis};
   ModbusServer server{served(), {&device}};
 };
 
@@ -127,9 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Wires, ModbusLines, ::testing::Bool(),
 
 TEST(ModbusConnection, ThatIsClosedIsNoticed) {
   StillAxis axis;
-  ModbusDevice device{
-      description::load_modbus_drive(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/drives/generic_absolute.yaml"),
-      1, 1e6, axis};
+  ModbusDevice device{description::load_modbus_drive(source_file("models/drives/generic_absolute.yaml")), 1, 1e6, axis};
   device.on_time(0);
   ModbusServer server(loopback(0), {&device});
   const auto master = fieldbus::open_modbus(loopback(server.port()), patience_s);
@@ -157,8 +154,7 @@ TEST(ModbusConnection, ToNobodyIsRefused) {
 // The whole of a real line: worker thread, TCP, server thread; here the cycle and the physics share this thread.
 TEST(ModbusThread, MovesADriveWhileTheCycleNeverWaits) {
   StillAxis axis;
-  const auto registers =
-      description::load_modbus_drive(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/drives/generic_absolute.yaml");
+  const auto registers = description::load_modbus_drive(source_file("models/drives/generic_absolute.yaml"));
   ModbusDevice device{registers, 1, 1e6, axis};
   axis.position = 500;
   device.on_time(0);
@@ -197,9 +193,7 @@ TEST(ModbusThread, MovesADriveWhileTheCycleNeverWaits) {
 
 TEST(ModbusDrive, StopsByItselfWithoutRequests) {
   StillAxis axis;
-  ModbusDevice device{
-      description::load_modbus_drive(std::filesystem::path(PROXARM_SOURCE_DIR) / "models/drives/generic_absolute.yaml"),
-      1, 1e6, axis};
+  ModbusDevice device{description::load_modbus_drive(source_file("models/drives/generic_absolute.yaml")), 1, 1e6, axis};
   using Bytes = std::vector<std::uint8_t>;
   EXPECT_THAT(device.serve(Bytes{1, 16, 0, 32, 0, 1, 2, 0, 60}), ElementsAre(1, 16, 0, 32, 0, 1));
   EXPECT_THAT(device.serve(Bytes{1, 16, 0, 0, 0, 5, 10, 0, 1, 0, 0, 0, 5, 0, 0, 0, 1}), ElementsAre(1, 16, 0, 0, 0, 5));

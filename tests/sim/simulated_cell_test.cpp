@@ -8,6 +8,7 @@
 #include "fieldbus/simulated_can_network.hpp"
 #include "models/description/setup_error.hpp"
 #include "tests/sim/device_harness.hpp"
+#include "tests/source_file.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -17,7 +18,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::ms;
 
-const std::filesystem::path source = PROXARM_SOURCE_DIR;
+const std::filesystem::path source = source_file();
 
 // A hand that holds still, or one that pushes along x.
 description::HandDescription still_hand() {
