@@ -34,9 +34,9 @@ TEST(TorqueRendering, CouplingIsStableAboveThreeHalvesOfKT) {
 }
 
 struct TorqueRenderingTest : ::testing::Test {
-  description::Cell cell = description::load_cell(testing::source_file("models/cells/light.yaml"));
+  description::Cell cell = description::load_cell(source_file("models/cells/light.yaml"));
   models::Arm arm{cell};
-  scenes::Scene scene = scenes::load_scene(testing::source_file("scenes/wall.yaml"));
+  scenes::Scene scene = scenes::load_scene(source_file("scenes/wall.yaml"));
   scenes::CompiledScene compiled = scenes::compile(scene);
   ImpedanceConfig config{.stiffness_N_per_m = 750.0, .damping_Ns_per_m = 8.0, .period_s = 1e-3};
   std::unique_ptr<TorqueRendering> torques = make_torque_rendering(compiled, arm, cell.drives, cell.limits, config);
