@@ -19,6 +19,7 @@ template <int N>
 AdmittanceProxy<N>::AdmittanceProxy(const AdmittanceConfig& config, models::GeometricAlgorithm<N>& g)
     : config_(config), g_(&g) {
   config_.validate();
+  timed_ = g.wants_time();
   start({});
 }
 
@@ -49,6 +50,7 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
   contacts_.known = !start.contact_established;
   euler_steps_left_ = 0;
   first_order_steps_ = 0;
+  prepare();
   return true;
 }
 
@@ -71,34 +73,55 @@ ProxyFault AdmittanceProxy<N>::step(const V& h) noexcept {
   return ProxyFault::none;
 }
 
+// What of the equations below doesn't change from step to step.
+template <int N>
+void AdmittanceProxy<N>::prepare() noexcept {
+  const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m;
+  const double T = config_.period_s, T_o = period_k1_s_;
+  const auto rule = [K_v](double kappa) {
+    return Rule{.kappa = kappa, .compliance = 1.0 / kappa, .of_reference = K_v / kappa};
+  };
+  // (26a) with B and K_v, on two intervals that may differ; κq₁ = [2M/(T(T + T_o)) + B/T + K_v] q₁ is taken out.
+  const bool plain = T == T_o && B == 0.0 && K_v == 0.0;
+  const double inertia = plain ? M / (T * T) : 2.0 * M / (T * (T + T_o));
+  verlet_ = rule(inertia + B / T + K_v);
+  verlet_.of_move = inertia * (T / T_o) / verlet_.kappa;
+  if (plain) verlet_.compliance = T * T / M;
+  plain_ = plain;
+  euler_ = rule(M / (T * T) + B / T + K_v);
+  euler_.of_v1 = M / T / euler_.kappa;
+  bdf2_ = rule(9.0 * M / (4.0 * T * T) + 3.0 * B / (2.0 * T) + K_v);
+  bdf2_.of_move = (3.0 * M / (4.0 * T * T) + B / (2.0 * T)) / bdf2_.kappa;
+  bdf2_.of_v1 = 2.0 * M / T / bdf2_.kappa;
+  bdf2_.of_v2 = -0.25 * bdf2_.of_v1;
+  prepared_for_s_ = T_o;
+  rate_Hz_ = 1.0 / T;
+}
+
 // q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out. The history is finite, so whatever else isn't
 // shows in p̂.
 template <int N>
 ProxyFault AdmittanceProxy<N>::solve(Trial& out, const V& q_previous, double law_period_s) noexcept {
   if (!out.p_hat.allFinite()) return ProxyFault::result_not_finite;
-  g_->set_time({epoch_s_ + static_cast<double>(steps_ + 1) * config_.period_s, law_period_s});
+  if (timed_) g_->set_time({epoch_s_ + static_cast<double>(steps_ + 1) * config_.period_s, law_period_s});
   out.q = (*g_)(out.kappa, out.p_hat, q_previous);
-  out.held = config_.order == 2 && out.q == q_previous && out.p_hat != q_previous;
   out.f = out.kappa * (out.q - out.p_hat);  // (25a); it may overflow although both are finite
   return out.f.allFinite() ? ProxyFault::none : ProxyFault::result_not_finite;
 }
 
+// (26), with B and K_v; the header has the equations, also of two intervals that differ.
 template <int N>
 ProxyFault AdmittanceProxy<N>::verlet(const V& h, Trial& out) noexcept {
-  const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m;
-  const double T = config_.period_s, T_o = period_k1_s_;
-  if (T == T_o && B == 0.0 && K_v == 0.0) {
-    out.p_hat = 2.0 * q_k1_ - q_k2_ + T * T * h / M;  // (26a)
-    out.kappa = M / (T * T);
+  if (prepared_for_s_ != period_k1_s_) prepare();
+  out.kappa = verlet_.kappa;
+  if (plain_) {
+    out.p_hat = 2.0 * q_k1_ - q_k2_ + verlet_.compliance * h;  // (26a)
   } else {
-    // (26a) with B and K_v, on two intervals that may differ. The header's p̂, with q₁ taken out of the brackets so that
-    // equal positions cancel exactly: κq₁ = [2M/(T(T + T_o)) + B/T + K_v] q₁.
-    const double inertia = 2.0 * M / (T * (T + T_o));
-    out.kappa = inertia + B / T + K_v;
-    out.p_hat = q_k1_ + (inertia * (T / T_o) * (q_k1_ - q_k2_) + K_v * (q_ref_ - q_k1_) + h) / out.kappa;
+    out.p_hat =
+        q_k1_ + (verlet_.of_move * (q_k1_ - q_k2_) + verlet_.of_reference * (q_ref_ - q_k1_) + verlet_.compliance * h);
   }
-  const ProxyFault fault = solve(out, q_k1_, T);  // (26b)
-  out.v = (out.q - q_k1_) / T;
+  const ProxyFault fault = solve(out, q_k1_, config_.period_s);  // (26b)
+  out.v = rate_Hz_ * (out.q - q_k1_);
   return fault;
 }
 
@@ -108,11 +131,11 @@ ProxyFault AdmittanceProxy<N>::verlet(const V& h, Trial& out) noexcept {
 // It is (26) but for v₁, which stands for (q₁ − q₂)/T there: that would be wrong by aT/2 with order 2's labels.
 template <int N>
 ProxyFault AdmittanceProxy<N>::euler(const V& h, Trial& out) noexcept {
-  const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m, T = config_.period_s;
-  out.kappa = M / (T * T) + B / T + K_v;
-  out.p_hat = q_k1_ + (M / T * v_k1_ + K_v * (q_ref_ - q_k1_) + h) / out.kappa;
-  const ProxyFault fault = solve(out, q_k1_, T);
-  out.v = (out.q - q_k1_) / T;
+  out.kappa = euler_.kappa;
+  out.p_hat = q_k1_ + (euler_.of_v1 * v_k1_ + euler_.of_reference * (q_ref_ - q_k1_) + euler_.compliance * h);
+  const ProxyFault fault = solve(out, q_k1_, config_.period_s);
+  out.held = out.q == q_k1_ && out.p_hat != q_k1_;
+  out.v = rate_Hz_ * (out.q - q_k1_);
   return fault;
 }
 
@@ -122,26 +145,32 @@ ProxyFault AdmittanceProxy<N>::euler(const V& h, Trial& out) noexcept {
 // below with q₁ taken out of the brackets. Before that, 𝒢 is asked from the true q₁: whether the way from there meets
 // something (q̃ may lie beyond a thin wall), and whether the contacts are still those of the step before. Where nothing
 // acts on it from there, that is the step. A step for which 𝒢 has no answer that keeps its laws is an event, too.
+// `now`: the contacts that the step ends with.
 template <int N>
-ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, bool& contacts_changed) noexcept {
-  const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m, T = config_.period_s;
-  const V q_tilde = q_k1_ + (q_k1_ - q_k2_) / 3.0;
-  const V inertial = M / (4.0 * T * T) * (3.0 * (q_k1_ - q_k2_) + 2.0 * T * (4.0 * v_k1_ - v_k2_));
-  out.kappa = 9.0 * M / (4.0 * T * T) + 3.0 * B / (2.0 * T) + K_v;
-  out.p_hat = q_k1_ + (inertial + 3.0 * B / (2.0 * T) * (q_tilde - q_k1_) + K_v * (q_ref_ - q_k1_) + h) / out.kappa;
+ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, bool& contacts_changed) noexcept {
+  const double T = config_.period_s;
+  const V move = q_k1_ - q_k2_, q_tilde = q_k1_ + (1.0 / 3.0) * move;
+  out.kappa = bdf2_.kappa;
+  V ahead = bdf2_.of_move * move + bdf2_.of_v1 * v_k1_ + bdf2_.of_v2 * v_k2_ + bdf2_.compliance * h;
+  if (bdf2_.of_reference > 0.0) ahead += bdf2_.of_reference * (q_ref_ - q_k1_);
+  out.p_hat = q_k1_ + ahead;
   contacts_changed = false;
   const std::uint64_t unresolved = g_->unresolved_steps();
   for (const bool from_q_tilde : {false, true}) {
-    const ProxyFault fault = from_q_tilde ? solve(out, q_tilde, 2.0 * T / 3.0) : solve(out, q_k1_, T);
+    const V& from = from_q_tilde ? q_tilde : q_k1_;
+    const ProxyFault fault = solve(out, from, from_q_tilde ? 2.0 / 3.0 * T : T);
     if (fault != ProxyFault::none) return fault;
-    if (g_->unresolved_steps() != unresolved ||
-        (contacts_.known && !same(contacts_, contact_set(g_->contacts(), out.held)))) {
+    out.held = out.q == from && out.p_hat != from;
+    const auto contacts = g_->contacts();
+    const bool free = contacts.empty() && out.q == out.p_hat;
+    set_contacts(now, contacts, out.held);
+    if (g_->unresolved_steps() != unresolved || (contacts_.known && !same(contacts_, now))) {
       contacts_changed = true;
       return ProxyFault::none;
     }
-    if (out.q == out.p_hat && g_->contacts().empty()) break;
+    if (free) break;
   }
-  out.v = (3.0 * (out.q - q_k1_) - (q_k1_ - q_k2_)) / (2.0 * T);
+  out.v = (0.5 * rate_Hz_) * (3.0 * (out.q - q_k1_) - move);
   return ProxyFault::none;
 }
 
@@ -153,17 +182,16 @@ ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
   const V h = config_.matched_labels && has_h_k1_ ? V(2.0 * h_k - h_k1_) : h_k;
   bool again = euler_steps_left_ > 0 || config_.period_s != period_k1_s_;
   bool changed = false;
+  ContactSet now;
   if (!again) {
-    const ProxyFault fault = bdf2(h, out, changed);
+    const ProxyFault fault = bdf2(h, out, now, changed);
     if (fault != ProxyFault::none) return fault;
     again = changed;
   }
   if (again) {
     const ProxyFault fault = euler(h, out);
     if (fault != ProxyFault::none) return fault;
-  }
-  const ContactSet now = contact_set(g_->contacts(), out.held);
-  if (again) {
+    set_contacts(now, g_->contacts(), out.held);
     const bool event = changed || (contacts_.known && !same(contacts_, now));
     const int after_event = contacts_.known && gained(contacts_, now) ? 2 : 1;
     const int counted_down = euler_steps_left_ > 0 ? euler_steps_left_ - 1 : 1;
@@ -175,16 +203,15 @@ ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
 }
 
 template <int N>
-typename AdmittanceProxy<N>::ContactSet AdmittanceProxy<N>::contact_set(std::span<const models::Contact<N>> contacts,
-                                                                        bool held) noexcept {
-  ContactSet set;
+void AdmittanceProxy<N>::set_contacts(ContactSet& set, std::span<const models::Contact<N>> contacts,
+                                      bool held) noexcept {
   set.held = held;
+  set.known = true;
   set.overflow = contacts.size() > max_contacts;
-  for (const auto& contact : contacts) {
-    if (set.count == max_contacts) break;
-    set.keys[set.count++] = {contact.object, contact.feature, contact.slips};
+  set.count = std::min(contacts.size(), max_contacts);
+  for (std::size_t i = 0; i < set.count; ++i) {
+    set.keys[i] = {contacts[i].object, contacts[i].feature, contacts[i].slips};
   }
-  return set;
 }
 
 // Does `now` hold a contact that `before` doesn't?
@@ -218,6 +245,7 @@ template <int N>
 bool AdmittanceProxy<N>::set_mass(double mass_kg) noexcept {
   if (!is_positive(mass_kg)) return false;
   config_.mass_kg = mass_kg;
+  prepare();
   return true;
 }
 
@@ -225,6 +253,7 @@ template <int N>
 bool AdmittanceProxy<N>::set_damping(double damping_Ns_per_m) noexcept {
   if (!is_not_negative(damping_Ns_per_m)) return false;
   config_.damping_Ns_per_m = damping_Ns_per_m;
+  prepare();
   return true;
 }
 
@@ -232,6 +261,7 @@ template <int N>
 bool AdmittanceProxy<N>::set_spring(double spring_N_per_m) noexcept {
   if (!is_not_negative(spring_N_per_m)) return false;
   config_.spring_N_per_m = spring_N_per_m;
+  prepare();
   return true;
 }
 
@@ -248,6 +278,7 @@ bool AdmittanceProxy<N>::set_period(double period_s) noexcept {
   epoch_s_ = time_s();
   steps_ = 0;
   config_.period_s = period_s;
+  prepare();
   return true;
 }
 

@@ -112,6 +112,7 @@ class AdmittanceProxy {
     state(config_.mass_kg, config_.damping_Ns_per_m, config_.spring_N_per_m, config_.period_s, q_k1_, q_k2_, v_k1_,
           v_k2_, h_k1_, has_h_k1_, period_k1_s_, q_ref_, f_, p_hat_, kappa_, epoch_s_, steps_, contacts_,
           euler_steps_left_, first_order_steps_);
+    prepare();
   }
 
  private:
@@ -120,35 +121,43 @@ class AdmittanceProxy {
   // Which objects press, where, and whether they slip; what order 2 must notice a change of.
   struct ContactSet {
     struct Key {
-      std::int32_t object = 0, feature = 0;
-      bool slips = false;
+      std::int32_t object, feature;
+      bool slips;
     };
-    std::array<Key, max_contacts> keys{};
+    std::array<Key, max_contacts> keys;  // the first `count`
     std::size_t count = 0;
     bool overflow = false;  // more than fit: never equal to anything
     bool known = true;
     bool held = false;  // q = q(k−1) bit for bit although p̂ isn't: a 𝒢 that reports no contacts may stick all the same
 
     void archive(fieldbus::StateArchive& state) noexcept {
-      for (Key& key : keys) state(key.object, key.feature, key.slips);
       state(count, overflow, known, held);
       count = std::min(count, max_contacts);
+      for (Key& key : std::span(keys).first(count)) state(key.object, key.feature, key.slips);
     }
+  };
+
+  // What M, B, K_v and T make of
+  //   p̂ = q₁ + of_move (q₁ − q₂) + of_v1 v₁ + of_v2 v₂ + of_reference (q_ref − q₁) + h/κ
+  struct Rule {
+    double kappa = 0.0, compliance = 0.0;  // κ, 1/κ
+    double of_move = 0.0, of_v1 = 0.0, of_v2 = 0.0, of_reference = 0.0;
   };
 
   struct Trial {
     double kappa = 0.0;
-    V p_hat = V::Zero(), q = V::Zero(), v = V::Zero(), f = V::Zero();
+    V p_hat, q, v, f;
     bool held = false;
   };
 
-  static ContactSet contact_set(std::span<const models::Contact<N>> contacts, bool held) noexcept;
+  static void set_contacts(ContactSet& set, std::span<const models::Contact<N>> contacts, bool held) noexcept;
   static bool same(const ContactSet& a, const ContactSet& b) noexcept;
   static bool gained(const ContactSet& before, const ContactSet& now) noexcept;
 
+  void prepare() noexcept;
   ProxyFault verlet(const V& h, Trial& out) noexcept;
   ProxyFault euler(const V& h, Trial& out) noexcept;
-  ProxyFault bdf2(const V& h, Trial& out, bool& contacts_changed) noexcept;
+  ProxyFault bdf2(const V& h, Trial& out, ContactSet& now, bool& contacts_changed) noexcept;
   ProxyFault second_order(const V& h, Trial& out) noexcept;
   ProxyFault solve(Trial& out, const V& q_previous, double law_period_s) noexcept;
 
@@ -165,6 +174,12 @@ class AdmittanceProxy {
   double epoch_s_ = 0.0;  // time label of q() is epoch + steps · T
   std::uint64_t steps_ = 0;
   ContactSet contacts_;
+  // Made of config_ and period_k1_s_ when one of them has changed.
+  Rule verlet_, euler_, bdf2_;
+  bool plain_ = true;            // no B, no K_v, equal intervals: (26a) as it stands
+  double prepared_for_s_ = 0.0;  // the period_k1_s_ of verlet_
+  double rate_Hz_ = 0.0;         // 1/T
+  bool timed_ = true;            // 𝒢 wants set_time()
   int euler_steps_left_ = 0;
   std::uint64_t first_order_steps_ = 0;
 };

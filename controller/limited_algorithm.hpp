@@ -173,6 +173,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   }
 
   void set_time(const models::StepTime& time) noexcept override { inner_->set_time(time); }
+  [[nodiscard]] bool wants_time() const noexcept override { return inner_->wants_time(); }
   [[nodiscard]] std::span<const models::Contact<N>> contacts() const noexcept override {
     return {contacts_.data(), count_};
   }

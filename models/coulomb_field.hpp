@@ -31,6 +31,7 @@ class CoulombField final : public GeometricAlgorithm<N> {
     if (!(distance > reach)) return q;  // (3), first case: bit for bit
     return p - (reach / distance) * d;  // (3), second case
   }
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] double force_N() const noexcept { return F_; }
 

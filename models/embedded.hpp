@@ -26,6 +26,7 @@ class Embedded final : public GeometricAlgorithm<N> {
   }
 
   void set_time(const StepTime& time) noexcept override { space_->set_time(time); }
+  [[nodiscard]] bool wants_time() const noexcept override { return space_->wants_time(); }
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return space_->unresolved_steps(); }

@@ -11,6 +11,7 @@ template <int N>
 class FreeSpace final : public GeometricAlgorithm<N> {
  public:
   Vec<N> operator()(double /*K*/, const Vec<N>& p, const Vec<N>& /*q*/) noexcept override { return p; }
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 };
 
 }  // namespace proxarm::models

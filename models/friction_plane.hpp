@@ -69,6 +69,7 @@ class FrictionPlane final : public GeometricAlgorithm<N> {
     contact_.slips = step.slips;
     return step.r;
   }
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override {
     return {&contact_, touches_ ? std::size_t{1} : std::size_t{0}};

@@ -54,6 +54,9 @@ class GeometricAlgorithm {
   // Called before the step where a world moves or holds a time; most need nothing of it.
   virtual void set_time(const StepTime& /*time*/) noexcept {}
 
+  // False where set_time() does nothing, for good: then a proxy leaves the call out.
+  [[nodiscard]] virtual bool wants_time() const noexcept { return true; }
+
   // The contacts of the last step that press (empty: free). Valid until the next call.
   [[nodiscard]] virtual std::span<const Contact<N>> contacts() const noexcept { return {}; }
 

@@ -20,6 +20,7 @@ class PlaneGuide final : public GeometricAlgorithm<3> {
  public:
   PlaneGuide(const Vec3& point_m, const Vec3& normal, double friction);
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {&contact_, 1}; }
 
  private:
@@ -39,6 +40,7 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
   static PolylineGuide line(const Vec3& point_m, const Vec3& direction, double friction);
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {&contact_, 1}; }
 
  private:

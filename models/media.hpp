@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -68,12 +69,27 @@ class Media final : public GeometricAlgorithm<N> {
     const Vec<N> held = at(held_at_);
     const Vec<N> R = (held - q) / (1.0 - held_at_);
     const double pull = kappa * R.norm();
-    // (3), first case; unless something that moves has come onto the proxy.
-    if (!(pull > F) || (!(kappa * size > F) && !(R.norm() > 2.0 * size))) return q;
-    if (F >= held_at_ * pull) return q + (1.0 - F / pull) * R;
-
     double low = 0.0, high = held_at_, e_low = -F, e_high = excess(held_at_, held);
     double tau = std::min(F / pull, held_at_);
+    // (3), first case; unless something that moves has come onto the proxy.
+    const bool rests = !(pull > F) || (!(kappa * size > F) && !(R.norm() > 2.0 * size));
+    if (rests || F >= held_at_ * pull) {
+      const Vec<N> straight = rests ? q : Vec<N>(q + (1.0 - F / pull) * R);
+      if (is_place(kappa, straight, q)) {
+        at(held_at_);  // its contacts are this step's
+        return straight;
+      }
+      // q lies behind a surface, as the reference of order 2 may, or the surface is too curved to be flat that near:
+      // there r(τ) does not end in q, and what the medium does grows without bound.
+      while (e_high < 0.0 && 1.0 - high > 1e-15) {
+        low = high;
+        e_low = e_high;
+        high = 1.0 - 0.1 * (1.0 - high);
+        e_high = excess(high, at(high));
+      }
+      tau = 0.5 * (low + high);
+    }
+
     Vec<N> r = held;
     for (int k = 0, side = 0; k < 100; ++k) {
       if (!(tau > low && tau < high)) tau = 0.5 * (low + high);
@@ -95,6 +111,13 @@ class Media final : public GeometricAlgorithm<N> {
       tau = k % 8 == 7 ? 0.5 * (low + high) : (low * e_high - high * e_low) / (e_high - e_low);
     }
     return r;
+  }
+
+  // Whether the rest of the world leaves a proxy from q at r, within the rounding of r; held so stiffly there that no
+  // elastic layer moves it.
+  bool is_place(double kappa, const Vec<N>& r, const Vec<N>& q) noexcept {
+    constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+    return ((*rest_)(1e15 * kappa, r, q) - r).norm() <= 16.0 * u * (r.template lpNorm<1>() + q.template lpNorm<1>());
   }
 
   // Where rest is looked at from: a hundredth of the way to p, far above rounding.

@@ -37,6 +37,7 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction);
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   // Contact::feature is the face's index in the mesh; its normal is on the proxy's side.
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }

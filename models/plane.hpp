@@ -28,6 +28,7 @@ class Plane final : public GeometricAlgorithm<N> {
     // u ‖p‖, which matters where κ is tiny and p far away.
     return surface_.projection(surface_.projection(p));
   }
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override {
     return {&contact_, touches_ ? std::size_t{1} : std::size_t{0}};

@@ -27,6 +27,7 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
   explicit PlaneComposition(std::vector<Face> faces);
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 

@@ -123,17 +123,16 @@ class RoundObstacle final : public Obstacle {
     const At at_p = at(core_, p, q);
     if (!(at_p.height < 0.0) && !(sign_ > 0.0 && passes(q, p))) return {p, at_p.normal, 0, false, false};
 
+    if (!(mu_ > 0.0) && at_p.height < 0.0) {
+      const Trial trial = place(K, p, at_p);
+      return {trial.r, trial.normal, 0, true, false};
+    }
     const At at_q = at(core_, q, p);
     const double q_rounding = rounding(q);
     // s = 0: sticks where it is, or below it.
     Trial trial = stick(K, p, q, at_q, q_rounding);
     if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
     if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid one
-
-    if (!(mu_ > 0.0)) {
-      const Trial trial_p = place(K, p, at_p);
-      return {trial_p.r, trial_p.normal, 0, true, false};
-    }
     return slide(K, p, q, trial.excess);
   }
 

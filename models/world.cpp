@@ -25,27 +25,6 @@ bool has_settled(double move, double last_move, const Vec3& r) noexcept {
 
 }  // namespace
 
-// The obstacles that may be part of the solution, and what each would do alone.
-struct World::Candidates {
-  static constexpr std::size_t most = 12;
-  std::array<std::size_t, most> index{};
-  std::array<Obstacle::Step, most> alone{};
-  std::size_t count = 0;
-  bool grew = false;
-  bool around = false;  // points beyond an object count as reached where it lets the proxy go around, see gets_around()
-
-  [[nodiscard]] bool has(std::size_t i) const noexcept {
-    return std::find(index.begin(), index.begin() + static_cast<std::ptrdiff_t>(count), i) !=
-           index.begin() + static_cast<std::ptrdiff_t>(count);
-  }
-  void add(std::size_t i, const Obstacle::Step& step) noexcept {
-    if (count == most || has(i)) return;
-    index[count] = i;
-    alone[count++] = step;
-    grew = true;
-  }
-};
-
 struct World::Choice {
   double distance2 = infinity;  // ‖r − p‖²
   Vec3 r = Vec3::Zero();
@@ -65,6 +44,18 @@ struct World::Choice {
     return true;
   }
 };
+
+bool World::Candidates::has(std::size_t i) const noexcept {
+  const auto end = index.begin() + static_cast<std::ptrdiff_t>(count);
+  return std::find(index.begin(), end, i) != end;
+}
+
+void World::Candidates::add(std::size_t i, const Obstacle::Step& step) noexcept {
+  if (count == most || has(i)) return;
+  index[count] = i;
+  alone[count++] = step;
+  grew = true;
+}
 
 World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
   std::vector<BoundsTree::Leaf> leaves;
@@ -317,8 +308,9 @@ double World::distance(const Vec3& x) const noexcept {
 }
 
 // False where no set of contacts was complete.
-bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) const noexcept {
-  Candidates candidates;
+bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept {
+  Candidates& candidates = candidates_;
+  candidates.clear();
   add_candidates(K, p, q, candidates);
   choice.free = candidates.count == 0;
   if (choice.free) {

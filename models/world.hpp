@@ -31,6 +31,7 @@ class World final : public GeometricAlgorithm<3> {
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
   void set_time(const StepTime& time) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return !moving_.empty(); }
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
   // Signed distance to the nearest obstacle, metres; infinite if there is none.
@@ -42,7 +43,23 @@ class World final : public GeometricAlgorithm<3> {
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
  private:
-  struct Candidates;
+  // The obstacles that may be part of the solution, and what each would do alone.
+  struct Candidates {
+    static constexpr std::size_t most = 12;
+    std::array<std::size_t, most> index{};
+    std::array<Obstacle::Step, most> alone{};
+    std::size_t count = 0;
+    bool grew = false;
+    bool around =
+        false;  // points beyond an object count as reached where it lets the proxy go around, see gets_around()
+
+    void clear() noexcept {
+      count = 0;
+      grew = around = false;
+    }
+    [[nodiscard]] bool has(std::size_t i) const noexcept;
+    void add(std::size_t i, const Obstacle::Step& step) noexcept;
+  };
   struct Choice;
 
   double gather(const Vec3& p, const Vec3& q, double reach) noexcept;
@@ -56,7 +73,7 @@ class World final : public GeometricAlgorithm<3> {
   void try_triples(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
 
-  bool solve(double K, const Vec3& p, const Vec3& q, Choice& choice) const noexcept;
+  bool solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept;
   void hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept;
 
   std::vector<Entry> entries_;
@@ -69,6 +86,7 @@ class World final : public GeometricAlgorithm<3> {
   std::size_t near_fixed_ = 0;
   Vec3 near_centre_ = Vec3::Zero();
   double near_radius_ = -1.0;
+  Candidates candidates_;  // of this step; kept, so that a step sets up no more than it needs
   std::array<Contact<3>, 3> contacts_{};
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;

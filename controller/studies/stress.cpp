@@ -23,6 +23,7 @@ namespace {
 
 using controller::AdmittanceProxy;
 using models::Contact;
+using models::lift;
 using models::Vec;
 using models::Vec3;
 using nlohmann::json;
@@ -32,13 +33,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 enum Invariant { finite, inside, law, stiffness, work, invariant_count };
 constexpr std::array<const char*, invariant_count> invariant_names{"finite", "inside", "law", "stiffness", "work"};
-
-template <int N>
-Vec3 lift(const Vec<N>& x) {
-  Vec3 x3 = Vec3::Zero();
-  x3.template head<N>() = x;
-  return x3;
-}
 
 // One call of 𝒢, as the proxy made it.
 template <int N>

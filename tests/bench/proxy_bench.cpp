@@ -7,24 +7,58 @@
 #include "controller/spsc_ring.hpp"
 #include "controller/stability.hpp"
 #include "controller/summary.hpp"
+#include "models/free_space.hpp"
 #include "models/friction_plane.hpp"
+#include "models/round_obstacle.hpp"
+#include "models/world.hpp"
 
 namespace {
 
 using namespace proxarm;
 using models::Vec3;
 
-// A slide along the default scene's wall, pushed to and fro.
-void proxy_step(benchmark::State& state) {
-  models::FrictionPlane<3> wall(Vec3(0.9, 0.0, 0.6), Vec3(-1.0, 0.0, 0.0), 0.3);
-  controller::AdmittanceProxy<3> proxy({.mass_kg = 4.0, .order = static_cast<int>(state.range(0))}, wall);
+// Pushed to and fro; the force is as large as it is on the default scene's wall.
+Vec3 push(int k) { return {10.0, k % 200 < 100 ? 6.0 : -6.0, 0.0}; }
+
+void run(benchmark::State& state, models::GeometricAlgorithm<3>& world) {
+  controller::AdmittanceProxy<3> proxy({.mass_kg = 4.0, .order = static_cast<int>(state.range(0))}, world);
   proxy.start({.q = Vec3(0.9, 0.0, 0.6), .v = Vec3::Zero(), .a = Vec3::Zero()});
   int k = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(proxy.step(push(++k)));
+}
+
+// What there is to be had: (26a) alone, in a loop.
+void bare_step(benchmark::State& state) {
+  Vec3 q(0.9, 0.0, 0.6), v = Vec3::Zero();
+  const double T = 1e-3, M = 4.0;
+  int k = 0;
   for (auto _ : state) {
-    benchmark::DoNotOptimize(proxy.step(Vec3(10.0, ++k % 200 < 100 ? 6.0 : -6.0, 0.0)));
+    v += T / M * push(++k);
+    q += T * v;
+    benchmark::DoNotOptimize(q);
   }
 }
-BENCHMARK(proxy_step)->Arg(1)->Arg(2);
+BENCHMARK(bare_step);
+
+void proxy_step_free(benchmark::State& state) {
+  models::FreeSpace<3> world;
+  run(state, world);
+}
+BENCHMARK(proxy_step_free)->Arg(1)->Arg(2);
+
+void proxy_step_wall(benchmark::State& state) {
+  models::FrictionPlane<3> world(Vec3(0.9, 0.0, 0.6), Vec3(-1.0, 0.0, 0.0), 0.3);
+  run(state, world);
+}
+BENCHMARK(proxy_step_wall)->Arg(1)->Arg(2);
+
+void proxy_step_globe(benchmark::State& state) {
+  std::vector<models::World::Entry> entries;
+  entries.push_back({std::make_unique<models::Sphere>(models::PointCore{Vec3(0.8, 0.0, 0.6)}, 0.1, 0.0, true), 0, 0});
+  models::World world(std::move(entries));
+  run(state, world);
+}
+BENCHMARK(proxy_step_globe)->Arg(1)->Arg(2);
 
 void ring_push_and_pop(benchmark::State& state) {
   controller::SpscRing<controller::CycleRecord> ring(1024);

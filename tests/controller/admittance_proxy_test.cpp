@@ -70,7 +70,7 @@ void expect_papers_line(unsigned seed) {
     Vec<N> q_k1 = q0, q_k2 = q0;
     for (int k = 0; k < 100; ++k) {
       const Vec<N> h = random.vector<N>(20.0);
-      const Vec<N> p_hat = 2.0 * q_k1 - q_k2 + T * T * h / M;
+      const Vec<N> p_hat = 2.0 * q_k1 - q_k2 + T * T / M * h;
       const Vec<N> q = papers_wall(M / (T * T), p_hat, q_k1);
       step<N>(proxy, h);
       // EXPECT_EQ on vectors compares bits (but for the sign of zero).
