@@ -99,9 +99,10 @@ double root(const CrossSection& c, double lo, double hi) noexcept {
 
 GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurface<3>& b, double mu_b,
                             const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b,
-                            bool may_pull) noexcept {
+                            GrooveSearch search) noexcept {
   GrooveSolution out;
   if (!line.exists) return out;
+  const bool may_pull = search == GrooveSearch::may_pull;
   const Vec3 d_p = p - line.x0, d_1 = q_a - line.x0, d_2 = q_b - line.x0;
   const double rounding = a.rounding(q_a) + b.rounding(q_b) + a.rounding(p);
   const double s_p = line.e.dot(d_p), F_n = -a.normal().dot(d_p), F_t = -line.t1.dot(d_p);
@@ -165,19 +166,21 @@ GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurf
   }
   const double s = root(c, lo, hi);
   const CrossSection::Shares shares = c.at(s);
-  if (c.is_root(s, shares) || may_pull) {
-    accept(s, shares, true, true);
-  } else {
-    // Where p is far deeper than q was away, friction on arrival can outweigh the faces' own directions, and g jumps
-    // through infinity. Then the roots are between: look from where p pulls towards rest.
-    for (double at = 1.0, s_far = s_p; at > 1e-15; at *= 0.7) {
-      const double s_near = s_1 + 0.7 * at * (s_p - s_1);
-      const double from = std::min(s_near, s_far), to = std::max(s_near, s_far), g_from = c.at(from).g;
-      const double end = g_from < 0.0 && c.at(to).g >= 0.0 ? root(c, from, to) : s_near;
-      const CrossSection::Shares here = c.at(end);
-      if (c.is_root(end, here) && accept(end, here, true, true)) break;
-      s_far = s_near;
-    }
+  const bool is_root = c.is_root(s, shares);
+  if ((is_root || may_pull) && accept(s, shares, true, true)) return out;
+  if (is_root && search == GrooveSearch::first_root) return out;
+  // Where p is far deeper than q was away, friction on arrival can outweigh the faces' own directions: g has several
+  // roots, or jumps through infinity between them. Look from where p pulls towards rest; if the root above is one, but
+  // of a contact that pulls, then only where both parts of a slip matter: beyond, there is no other.
+  const double widest = std::max(std::abs(c.w[0]), std::abs(c.w[1])), way = std::abs(s_p - s_1);
+  double at = is_root ? std::min(1.0, 1e3 * widest / way) : 1.0;
+  for (double s_far = s_1 + at * (s_p - s_1); at > 1e-15 && at * way > 1e-3 * rounding; at *= 0.7) {
+    const double s_near = s_1 + 0.7 * at * (s_p - s_1);
+    const double from = std::min(s_near, s_far), to = std::max(s_near, s_far), g_from = c.at(from).g;
+    const double end = g_from < 0.0 && c.at(to).g >= 0.0 ? root(c, from, to) : s_near;
+    const CrossSection::Shares here = c.at(end);
+    if (c.is_root(end, here) && accept(end, here, true, true)) break;
+    s_far = s_near;
   }
   return out;
 }

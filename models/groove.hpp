@@ -69,11 +69,16 @@ struct GrooveSolution {
   Vec3 r = Vec3::Zero();
 };
 
+enum class GrooveSearch {
+  all_roots,   // a step that arrives in the groove from near it can have several solutions without pull: any of them
+  first_root,  // not found where the first one pulls
+  may_pull,    // found even then: for the tangent planes of curved surfaces on the way to where they settle
+};
+
 // The proxy held by both faces; not found if one of them would have to pull. q_a and q_b are the previous proxy as
 // each surface sees it: the same point unless the surfaces move.
-// may_pull: found even then, for the tangent planes of curved surfaces on the way to where they settle.
 GrooveSolution solve_groove(const FlatSurface<3>& a, double mu_a, const FlatSurface<3>& b, double mu_b,
                             const GrooveLine& line, const Vec3& p, const Vec3& q_a, const Vec3& q_b,
-                            bool may_pull = false) noexcept;
+                            GrooveSearch search = GrooveSearch::all_roots) noexcept;
 
 }  // namespace proxarm::models

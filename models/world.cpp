@@ -14,13 +14,67 @@ namespace {
 constexpr int most_settling = 60;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// No closer than rounding lets it: the next move, were it to shrink as the last one has, would be nothing, or the moves
-// are tiny and have stopped shrinking (a slip that is short against a deep p amplifies rounding, so a fixed threshold
-// would not do).
-bool has_settled(double move, double last_move, const Vec3& r) noexcept {
+// No closer than rounding lets it: the next move, shorter by `contraction`, would be nothing, or the moves are tiny and
+// have stopped shrinking (a slip that is short against a deep p amplifies rounding, so a fixed threshold would not do).
+bool has_settled(double move, double last_move, double contraction, const Vec3& r) noexcept {
   const double size = 1e-3 + r.lpNorm<1>(), nothing = 5e-17 * size;
-  return move <= nothing || (last_move < infinity && move * move <= nothing * last_move) ||
-         (move <= 1e-9 * size && move > 0.5 * last_move);
+  return move <= nothing || contraction * move <= nothing || (move <= 1e-9 * size && move > 0.5 * last_move);
+}
+
+// Two objects that hold the proxy between them, each by one of its features.
+struct PairOfSurfaces {
+  const Obstacle &a, &b;
+  std::int32_t feature_a, feature_b;
+};
+
+struct SettledPair {
+  bool settled = false;
+  GrooveSolution groove;  // found: settled, and both press
+  Vec3 r = Vec3::Zero();
+  Obstacle::Tangent t_a, t_b;
+};
+
+// r = solution(at), on the tangent planes at `at`; at = r is wanted, from `at` on.
+SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, Vec3 at, GrooveSearch search) noexcept {
+  const Vec3 q_a = pair.a.carry(q), q_b = pair.b.carry(q);
+  Vec3 last_at = at, last_r = at, last_f = Vec3::Zero();
+  SettledPair out{
+      .groove = {}, .r = at, .t_a = pair.a.tangent(at, pair.feature_a), .t_b = pair.b.tangent(at, pair.feature_b)};
+  double last_move = infinity;
+  for (int k = 0; k < most_settling; ++k) {
+    const GrooveLine line(out.t_a.surface, out.t_b.surface, at);
+    const auto solve_by = [&](GrooveSearch by) {
+      return solve_groove(out.t_a.surface, out.t_a.mu, out.t_b.surface, out.t_b.mu, line, p, q_a, q_b, by);
+    };
+    out.groove = solve_by(search);
+    const bool presses = out.groove.found;
+    if (!presses) out.groove = solve_by(GrooveSearch::may_pull);
+    out.r = out.groove.r;
+    if (!out.groove.found || !out.r.allFinite()) break;
+    out.groove.found = presses;
+    const Vec3 f = out.r - at;
+    const double move = f.norm();
+    // Of solution() itself: a move from a point that was looked ahead to may be shorter than the next one.
+    const double contraction = k == 0 ? infinity : (out.r - last_r).norm() / std::max((at - last_at).norm(), 1e-300);
+    out.settled = has_settled(move, last_move, contraction, out.r);
+    if (out.settled) return out;
+    // Where each step only takes a part of the error off, the steps of one and the next tell where they lead.
+    const Vec3 bend = f - last_f;
+    const double theta = k < 2 ? 0.0 : f.dot(bend) / std::max(bend.squaredNorm(), 1e-300);
+    const Vec3 ahead = out.r - theta * (out.r - last_r);
+    last_at = at;
+    last_r = out.r;
+    last_f = f;
+    last_move = move;
+    at = (ahead - out.r).norm() <= 10.0 * move ? ahead : out.r;
+    const Obstacle::Tangent n_a = pair.a.tangent(at, pair.feature_a), n_b = pair.b.tangent(at, pair.feature_b);
+    out.settled = n_a.surface.normal() == out.t_a.surface.normal() && n_b.surface.normal() == out.t_b.surface.normal();
+    if (out.settled) return out;  // flat
+    out.t_a = n_a;
+    out.t_b = n_b;
+  }
+  out.groove.found = false;
+  return out;
 }
 
 }  // namespace
@@ -161,48 +215,14 @@ void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candid
     for (std::size_t d = 0; d < c; ++d) {
       const std::size_t m[2] = {std::min(candidates.index[c], candidates.index[d]),
                                 std::max(candidates.index[c], candidates.index[d])};
-      const std::size_t first = m[0] == candidates.index[d] ? d : c, second = first == d ? c : d;
-      const Obstacle &a = *entries_[m[0]].obstacle, &b = *entries_[m[1]].obstacle;
-      const Vec3 q_a = a.carry(q), q_b = b.carry(q);
-      const std::int32_t feature_a = candidates.alone[first].feature, feature_b = candidates.alone[second].feature;
-      // r = solution(at), on the tangent planes at `at`; at = r is wanted.
-      Vec3 r = q, at = q, last_r = q, last_f = Vec3::Zero();
-      Obstacle::Tangent t_a = a.tangent(at, feature_a), t_b = b.tangent(at, feature_b);
-      GrooveSolution s;
-      double last_move = infinity;
-      for (int k = 0; k < most_settling; ++k) {
-        const GrooveLine line(t_a.surface, t_b.surface, at);
-        s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b);
-        const bool presses = s.found;
-        if (!presses) s = solve_groove(t_a.surface, t_a.mu, t_b.surface, t_b.mu, line, p, q_a, q_b, true);
-        if (!s.found || !s.r.allFinite()) {
-          s.found = false;
-          break;
-        }
-        r = s.r;
-        s.found = presses;
-        const Vec3 f = r - at;
-        const double move = f.norm();
-        if (has_settled(move, last_move, r)) break;
-        // Where each step only takes a part of the error off, the steps of one and the next tell where they lead.
-        const Vec3 bend = f - last_f;
-        const double theta = k < 2 ? 0.0 : f.dot(bend) / std::max(bend.squaredNorm(), 1e-300);
-        const Vec3 ahead = r - theta * (r - last_r);
-        last_r = r;
-        last_f = f;
-        last_move = move;
-        at = (ahead - r).norm() <= 10.0 * move ? ahead : r;
-        const Obstacle::Tangent n_a = a.tangent(at, feature_a), n_b = b.tangent(at, feature_b);
-        if (n_a.surface.normal() == t_a.surface.normal() && n_b.surface.normal() == t_b.surface.normal())
-          break;  // flat
-        s.found = false;
-        t_a = n_a;
-        t_b = n_b;
-      }
-      if (!s.found || !fits(q, r, m, candidates, K, p) || !choice.better(p, r, 2)) continue;
-      const bool slips[2] = {s.slips1, s.slips2};
-      const Obstacle::Tangent* const tangents[2] = {&t_a, &t_b};
-      const std::size_t own[2] = {first, second};
+      const std::size_t own[2] = {m[0] == candidates.index[d] ? d : c, m[0] == candidates.index[d] ? c : d};
+      const PairOfSurfaces pair{*entries_[m[0]].obstacle, *entries_[m[1]].obstacle, candidates.alone[own[0]].feature,
+                                candidates.alone[own[1]].feature};
+      SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);
+      if (s.settled && !s.groove.found) s = settle(pair, p, q, s.r, GrooveSearch::all_roots);
+      if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !choice.better(p, s.r, 2)) continue;
+      const bool slips[2] = {s.groove.slips1, s.groove.slips2};
+      const Obstacle::Tangent* const tangents[2] = {&s.t_a, &s.t_b};
       for (std::size_t j = 0; j < 2; ++j) {
         const Entry& entry = entries_[m[j]];
         choice.contacts[j] = {entry.object, entry.feature < 0 ? candidates.alone[own[j]].feature : entry.feature,
@@ -244,7 +264,7 @@ void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& cand
           const std::array<Obstacle::Tangent, 3> next{tangent(0), tangent(1), tangent(2)};
           bool flat = true;
           for (std::size_t j = 0; j < 3; ++j) flat = flat && next[j].surface.normal() == t[j].surface.normal();
-          if (flat || has_settled(move, last_move, r)) break;
+          if (flat || has_settled(move, last_move, move / last_move, r)) break;
           s.found = false;
           last_move = move;
           t = next;

@@ -81,6 +81,19 @@ TEST(MillionStates, Box) {
   X.linear() = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   expect_independent_of_K<3>(together(BoxObstacle(X, Vec3(0.4, 0.5, 0.6), 0.3)), options({0.3}, 2e-3));
 }
+TEST(MillionStates, TwoBallsOnAPlane) {
+  ContractOptions<3> states = options({0.3, 0.2, 0.1}, 6e-3);
+  states.unresolved = 1e-4;
+  expect_independent_of_K<3>(
+      together(Sphere(PointCore{Vec3(-0.25, 0, 0)}, 0.3, 0.3, false),
+               Sphere(PointCore{Vec3(0.25, 0, 0)}, 0.3, 0.2, false), PlaneObstacle(Vec3::Zero(), Vec3::UnitZ(), 0.1)),
+      states);
+}
+TEST(MillionStates, BoxOnATiltedPlane) {
+  expect_independent_of_K<3>(together(BoxObstacle(Pose::Identity(), Vec3::Constant(0.4), 0.3),
+                                      PlaneObstacle(Vec3::Zero(), Vec3(0.0, 0.1, 1.0), 0.2)),
+                             options({0.3, 0.2}, 6e-3));
+}
 TEST(MillionStates, MeshOfABall) {
   expect_independent_of_K<3>(MeshSurface(std::make_shared<const TriangleMesh>(ball(3, 0.5)), 0.3),
                              options({0.3}, 6e-3, 2.0));
