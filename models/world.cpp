@@ -14,11 +14,12 @@ namespace {
 constexpr int most_settling = 60;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// No closer than rounding lets it: the next move, shorter by `contraction`, would be nothing, or the moves are tiny and
-// have stopped shrinking (a slip that is short against a deep p amplifies rounding, so a fixed threshold would not do).
+// No closer than rounding lets it. Tiny moves (their squares, by which planes and curved surfaces differ, are nothing)
+// are the last where the next one, shorter by `contraction`, would be nothing, or where they have stopped shrinking (a
+// slip that is short against a deep p amplifies rounding, so a fixed threshold would not do).
 bool has_settled(double move, double last_move, double contraction, const Vec3& r) noexcept {
   const double size = 1e-3 + r.lpNorm<1>(), nothing = 5e-17 * size;
-  return move <= nothing || contraction * move <= nothing || (move <= 1e-9 * size && move > 0.5 * last_move);
+  return move <= nothing || (move <= 1e-9 * size && (contraction * move <= nothing || move > 0.5 * last_move));
 }
 
 // Two objects that hold the proxy between them, each by one of its features.
