@@ -45,6 +45,7 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       limits_(limits),
       period_ns_(std::llround(settings.period_s * 1e9)),
       receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
+      outboxes_(parts_.network.bus_count()),
       link_rad_(parts_.arm->start_rad()),
       target_rad_(parts_.arm->start_rad()),
       torque_Nm_(JointVector::Zero(parts_.arm->axes())),
@@ -76,8 +77,9 @@ void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
 void Cycle::shut_down() noexcept {
   for (const DriveOnBus& axis : parts_.drives) {
     if (axis.on_can == nullptr) continue;
-    send(axis.bus, fieldbus::nmt_frame(fieldbus::NmtCommand::enter_pre_operational, axis.on_can->node()), -1);
+    send(axis.bus, fieldbus::nmt_frame(fieldbus::NmtCommand::enter_pre_operational, axis.on_can->node()));
   }
+  hand_over();
 }
 
 void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
@@ -91,22 +93,27 @@ void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
   sample_is_new_ = commanded_ = false;
   fieldbus::CanFrame frame;
   for (DriveBus& bus : parts_.drive_buses) {
-    send(bus.bus, bus.sync.next(), -1);
+    send(bus.bus, bus.sync.next());
   }
+  if (parts_.sensor->poll(t_k_ns, frame)) send(parts_.sensor_bus, frame);
+  hand_over();
   for (DriveOnBus& axis : parts_.drives) axis.drive.on_sync(t_k_ns);
-  if (parts_.sensor->poll(t_k_ns, frame)) send(parts_.sensor_bus, frame, -1);
   compute_ns_ = std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
 }
 
+// What came before t_k is read with what comes.
 void Cycle::receive_until(std::int64_t deadline_ns) noexcept {
+  if (everything_received()) receive_all();
+  while (!everything_received() && parts_.network.wait_for_frame(deadline_ns)) receive_all();
+}
+
+void Cycle::receive_all() noexcept {
+  const SteadyTime begun = std::chrono::steady_clock::now();
   fieldbus::TimedFrame received;
-  do {
-    const SteadyTime begun = std::chrono::steady_clock::now();
-    for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
-      while (parts_.network.bus(bus).receive(received)) deliver(bus, received);
-    }
-    compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
-  } while (!everything_received() && parts_.network.wait_for_frame(deadline_ns));
+  for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
+    while (parts_.network.bus(bus).receive(received)) deliver(bus, received);
+  }
+  compute_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun).count();
 }
 
 void Cycle::deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexcept {
@@ -230,7 +237,9 @@ void Cycle::judge_drives() noexcept {
 void Cycle::judge_buses() noexcept {
   for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
     const fieldbus::BusStatus& status = parts_.network.bus(bus).status();
+    if (box_ != nullptr && bus < max_buses) boxed_->buses[bus] = {status.state, status.receive_overflows};
     const auto where = static_cast<std::int32_t>(bus);
+    if (status.state == fieldbus::BusState::down) raise(Fault::interface_down, where);
     if (status.state == fieldbus::BusState::bus_off) raise(Fault::bus_off, where);
     if (status.state == fieldbus::BusState::error_passive) raise(Fault::error_passive, where);
     if (status.receive_overflows > 0) {
@@ -508,22 +517,42 @@ void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
     } else {
       drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
     }
-    if (drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame, static_cast<std::int32_t>(i));
+    if (drive.encode_rpdo(frame)) send(parts_.drives[i].bus, frame);
   }
   for (DriveBus& bus : parts_.drive_buses) {
-    if (bus.heartbeat.due(t_k_ns, cycle_, frame)) send(bus.bus, frame, -1);
+    if (bus.heartbeat.due(t_k_ns, cycle_, frame)) send(bus.bus, frame);
+  }
+  hand_over();
+}
+
+// Leaves with the next hand_over(), in one call with the bus' others.
+void Cycle::send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept {
+  Outbox& outbox = outboxes_[bus];
+  if (outbox.count == outbox.frames.size()) hand_over(bus);
+  outbox.frames[outbox.count++] = frame;
+}
+
+void Cycle::hand_over() noexcept {
+  for (std::size_t bus = 0; bus < outboxes_.size(); ++bus) {
+    if (outboxes_[bus].count > 0) hand_over(bus);
   }
 }
 
-void Cycle::send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept {
-  const fieldbus::SendResult result = parts_.network.bus(bus).send(frame);
-  if (box_ != nullptr) box_->add({frame, parts_.network.now_ns(), static_cast<std::uint8_t>(bus), true, result});
-  if (result == fieldbus::SendResult::sent) return;
-  if (result == fieldbus::SendResult::bus_off) {
-    raise(Fault::bus_off, static_cast<std::int32_t>(bus));
-  } else {
-    raise(Fault::send_failed, drive);
+void Cycle::hand_over(std::size_t bus) noexcept {
+  Outbox& outbox = outboxes_[bus];
+  std::array<fieldbus::SendResult, std::tuple_size_v<decltype(Outbox::frames)>> results{};
+  parts_.network.bus(bus).send_all({outbox.frames.data(), outbox.count}, results.data());
+  const std::int64_t now_ns = box_ == nullptr ? 0 : parts_.network.now_ns();
+  for (std::size_t i = 0; i < outbox.count; ++i) {
+    if (box_ != nullptr) box_->add({outbox.frames[i], now_ns, static_cast<std::uint8_t>(bus), true, results[i]});
+    if (results[i] == fieldbus::SendResult::sent) continue;
+    const auto where = static_cast<std::int32_t>(bus);
+    raise(results[i] == fieldbus::SendResult::bus_off ? Fault::bus_off
+          : results[i] == fieldbus::SendResult::down  ? Fault::interface_down
+                                                      : Fault::send_failed,
+          where);
   }
+  outbox.count = 0;
 }
 
 void Cycle::raise(Fault fault, std::int32_t where, double value, double limit) noexcept {
@@ -569,10 +598,6 @@ void Cycle::finish_box() noexcept {
   if (box_ == nullptr) return;
   boxed_->overruns_in_a_row = overruns_in_a_row_;
   boxed_->stop_requested = stop_seen_;
-  for (std::size_t bus = 0; bus < std::min(max_buses, parts_.network.bus_count()); ++bus) {
-    const fieldbus::BusStatus& status = parts_.network.bus(bus).status();
-    boxed_->buses[bus] = {status.state, status.receive_overflows};
-  }
   fieldbus::StateArchive inputs = fieldbus::StateArchive::writer(boxed_->inputs);
   for (DriveOnBus& axis : parts_.drives) axis.drive.archive_input(inputs);
   parts_.sensor->archive_input(inputs);

@@ -120,8 +120,15 @@ class Cycle {
   using JointVector = models::JointVector;
   using SteadyTime = std::chrono::steady_clock::time_point;
 
+  // Frames for one bus that go to its interface together.
+  struct Outbox {
+    std::array<fieldbus::CanFrame, 16> frames{};
+    std::size_t count = 0;
+  };
+
   void begin_cycle(std::int64_t t_k_ns) noexcept;
   void receive_until(std::int64_t deadline_ns) noexcept;
+  void receive_all() noexcept;
   void deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexcept;
   [[nodiscard]] bool is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) const noexcept;
   bool everything_received() const noexcept;
@@ -148,7 +155,9 @@ class Cycle {
   void wind_back() noexcept;
   void run_out() noexcept;
   void send_targets(std::int64_t t_k_ns) noexcept;
-  void send(std::size_t bus, const fieldbus::CanFrame& frame, std::int32_t drive) noexcept;
+  void send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept;
+  void hand_over(std::size_t bus) noexcept;
+  void hand_over() noexcept;
   void raise(Fault fault, std::int32_t where, double value = 0.0, double limit = 0.0) noexcept;
   void write_record(std::int64_t t_k_ns) noexcept;
   void begin_box(std::int64_t t_k_ns) noexcept;
@@ -160,6 +169,7 @@ class Cycle {
   description::CellLimits limits_;
   std::int64_t period_ns_;
   std::int64_t receive_window_ns_;
+  std::vector<Outbox> outboxes_;  // by bus; empty between cycles
 
   Supervisor supervisor_;
   Phase entered_phase_ = Phase::idle;

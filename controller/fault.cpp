@@ -64,9 +64,10 @@ constexpr std::array texts{
     FaultText{Fault::proxy_squeezed, "proxy_squeezed", "objects of the scene close on the proxy from both sides",
               nullptr, "change their motion so that they leave it room"},
     FaultText{Fault::bus_off, "bus_off", "the CAN controller went off the bus", nullptr,
-              "check termination, bitrate and cable"},
-    FaultText{Fault::send_failed, "send_failed", "a frame couldn't be sent", nullptr,
-              "check the interface; a queue that stays full means that nobody acknowledges"},
+              "check termination, bitrate and cable; an interface without restart-ms comes back by `ip link set IFACE "
+              "type can restart`"},
+    FaultText{Fault::send_failed, "send_failed", "a frame couldn't be sent: the interface's queue is full", nullptr,
+              "check cable, termination and bitrate, for nobody acknowledges, or who else floods the bus"},
     FaultText{Fault::receive_overflow, "receive_overflow", "received frames were dropped by the kernel", "frames",
               "another program floods the bus, or the machine is too slow"},
     FaultText{Fault::overrun, "overrun", "cycles in a row ended too late", "cycles",
@@ -75,6 +76,8 @@ constexpr std::array texts{
               "end the other controller or configuration tool, or unplug it, before the next start"},
     FaultText{Fault::error_passive, "error_passive", "the CAN controller is error passive: 128 errors or more", nullptr,
               "check termination, bitrate and cable of this bus before it goes off altogether"},
+    FaultText{Fault::interface_down, "interface_down", "the CAN interface is down or was removed", nullptr,
+              "find out who took it down (`dmesg`, `ip link`) and check its plug, then set it up again"},
 };
 
 const FaultText& text_of(Fault fault) noexcept {

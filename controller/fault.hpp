@@ -32,11 +32,12 @@ enum class Fault : std::uint8_t {
   proxy_not_finite,     // the integrator refused a step: controlled stop
   proxy_squeezed,       // objects that move leave the proxy no room: controlled stop
   bus_off,              // a CAN controller is off the bus: nothing can be commanded, drives stop by themselves
-  send_failed,          // a setpoint couldn't be queued (ENOBUFS, interface down): controlled stop
+  send_failed,          // a frame couldn't be queued (ENOBUFS): controlled stop
   receive_overflow,     // the kernel dropped frames: controlled stop
   overrun,              // more than max_overruns cycles in a row were late: controlled stop
-  second_master,  // somebody else sends SYNC, NMT commands, setpoints or the controller's heartbeat: controlled stop
-  error_passive,  // a CAN controller counts so many errors that it may only listen for them: controlled stop
+  second_master,   // somebody else sends SYNC, NMT commands, setpoints or the controller's heartbeat: controlled stop
+  error_passive,   // a CAN controller counts so many errors that it may only listen for them: controlled stop
+  interface_down,  // a CAN interface is down or gone: controlled stop of the others, its own drives stop by themselves
 };
 
 // A fault, where it was seen, and when.

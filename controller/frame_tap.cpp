@@ -11,6 +11,13 @@ class FrameTap::TappedBus final : public fieldbus::CanBus {
     if (result == fieldbus::SendResult::sent) tap_.frames_.push({frame, tap_.network_.now_ns(), index_});
     return result;
   }
+  void send_all(std::span<const fieldbus::CanFrame> frames, fieldbus::SendResult* results) noexcept override {
+    bus_.send_all(frames, results);
+    const std::int64_t now_ns = tap_.network_.now_ns();
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (results[i] == fieldbus::SendResult::sent) tap_.frames_.push({frames[i], now_ns, index_});
+    }
+  }
   bool receive(fieldbus::TimedFrame& out) noexcept override {
     if (!bus_.receive(out)) return false;
     tap_.frames_.push({out.frame, out.time_ns, index_});

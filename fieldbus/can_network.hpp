@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "fieldbus/can_frame.hpp"
@@ -41,6 +42,11 @@ class CanBus {
   virtual ~CanBus() = default;
 
   virtual SendResult send(const CanFrame& frame) noexcept = 0;
+  // send() for each of these in their order, at the price of one call where the bus can do that; results[i] is that of
+  // frames[i], and one that fails doesn't keep the next from being tried.
+  virtual void send_all(std::span<const CanFrame> frames, SendResult* results) noexcept {
+    for (std::size_t i = 0; i < frames.size(); ++i) results[i] = send(frames[i]);
+  }
   // Takes the oldest received frame; false when there is none. Own frames don't come back.
   virtual bool receive(TimedFrame& out) noexcept = 0;
   [[nodiscard]] virtual const BusStatus& status() const noexcept = 0;

@@ -146,7 +146,9 @@ int CanSystem::set_option(int fd, int level, int option, const void* value, unsi
   return ::setsockopt(fd, level, option, value, size);
 }
 
-std::int64_t CanSystem::write(int fd, const void* data, std::size_t size) noexcept { return ::write(fd, data, size); }
+int CanSystem::send_many(int fd, mmsghdr* messages, unsigned count) noexcept {
+  return ::sendmmsg(fd, messages, count, MSG_DONTWAIT);
+}
 
 int CanSystem::receive_many(int fd, mmsghdr* messages, unsigned count) noexcept {
   return ::recvmmsg(fd, messages, count, MSG_DONTWAIT, nullptr);

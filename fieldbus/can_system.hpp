@@ -39,7 +39,7 @@ class CanSystem {
   virtual int bind_can(int fd, unsigned interface_index) noexcept;
   virtual int close(int fd) noexcept;
   virtual int set_option(int fd, int level, int option, const void* value, unsigned size) noexcept;
-  virtual std::int64_t write(int fd, const void* data, std::size_t size) noexcept;
+  virtual int send_many(int fd, mmsghdr* messages, unsigned count) noexcept;     // sendmmsg(MSG_DONTWAIT)
   virtual int receive_many(int fd, mmsghdr* messages, unsigned count) noexcept;  // recvmmsg(MSG_DONTWAIT)
   virtual int poll(pollfd* fds, std::size_t count, std::int64_t timeout_ns) noexcept;
   virtual std::int64_t clock_ns(clockid_t clock) noexcept;

@@ -110,8 +110,22 @@ bool SimulatedCanBus::has_port(std::string_view name) const noexcept {
 bool SimulatedCanBus::set_state(std::string_view port_name, BusState state) noexcept {
   Port* port = find_port(port_name);
   if (port == nullptr) return false;
-  change_state(*port, state);
+  force_state(*port, state);
   return true;
+}
+
+ErrorCounters SimulatedCanBus::error_counters(std::string_view name) const noexcept {
+  for (const auto& port : ports_) {
+    if (port->name() == name) return port->errors;
+  }
+  return {};
+}
+
+// A rule's state stays until a rule ends it.
+void SimulatedCanBus::force_state(Port& port, BusState state) noexcept {
+  port.follows_errors = state == BusState::error_active;
+  port.errors = {};
+  change_state(port, state);
 }
 
 void SimulatedCanBus::change_state(Port& port, BusState state) noexcept {
@@ -125,6 +139,37 @@ void SimulatedCanBus::change_state(Port& port, BusState state) noexcept {
     if (state == BusState::bus_off && status_.state != state) ++status_.error_frames;
     status_.state = state;
   }
+}
+
+void SimulatedCanBus::count_errors(const Port* sender, bool destroyed) noexcept {
+  if (!destroyed && !any_errors_) return;
+  any_errors_ = false;
+  for (const auto& port : ports_) {
+    if (!port->follows_errors || is_off(port->state())) continue;
+    ErrorCounters& errors = port->errors;
+    if (port.get() == sender) {
+      errors.transmit = std::max(0, errors.transmit + (destroyed ? 8 : -1));
+    } else {
+      errors.receive = destroyed ? std::min(errors.receive + 1, 255) : std::clamp(errors.receive - 1, 0, 127);
+    }
+    any_errors_ = any_errors_ || errors.transmit > 0 || errors.receive > 0;
+    follow_errors(*port);
+  }
+}
+
+void SimulatedCanBus::follow_errors(Port& port) noexcept {
+  const int most = std::max(port.errors.transmit, port.errors.receive);
+  const BusState state = port.errors.transmit > 255 ? BusState::bus_off
+                         : most >= 128              ? BusState::error_passive
+                         : most >= 96               ? BusState::error_warning
+                                                    : BusState::error_active;
+  if (state == port.state()) return;
+  change_state(port, state);
+  if (state != BusState::bus_off || config_.restart_ns <= 0) return;
+  const std::int64_t recessive_ns = wire_time_ns(WireBits{128 * 11, 0}, rates_);
+  events_.schedule_after(config_.restart_ns + recessive_ns, [this, &port] {
+    if (port.state() == BusState::bus_off && port.follows_errors) force_state(port, BusState::error_active);
+  });
 }
 
 // An event rather than a call: everything that happens at this same moment may still enter the arbitration.
@@ -161,7 +206,7 @@ void SimulatedCanBus::arbitrate() {
   if (!is_acknowledged(*winner)) {
     // A real controller repeats the frame for ever, error passive; here it waits in silence for someone to join.
     if (winner == ports_.front().get() && status_.state != BusState::error_passive) {
-      change_state(*winner, BusState::error_passive);
+      force_state(*winner, BusState::error_passive);
       ++status_.error_frames;
       alone_ = true;
     }
@@ -169,7 +214,7 @@ void SimulatedCanBus::arbitrate() {
   }
   if (alone_) {
     alone_ = false;
-    change_state(*ports_.front(), BusState::error_active);
+    force_state(*ports_.front(), BusState::error_active);
   }
   sender_ = winner;
   transmitting_ = true;
@@ -209,6 +254,7 @@ void SimulatedCanBus::complete() {
     repeating_ = false;
     if (!is_off(status_.state)) ++status_.error_frames;
   }
+  count_errors(sender, destroyed);
   transmitting_ = false;
   for (const auto& port : ports_) {
     if (port->key() != no_frame) {

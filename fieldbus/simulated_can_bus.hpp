@@ -8,6 +8,14 @@
 // A frame that nobody else is there to acknowledge isn't delivered: the controller turns error passive, its queue fills
 // up, and it goes on when a node is attached or comes back.
 //
+// A frame that noise destroys (FaultAction::destroy) ends in an error frame and is repeated at once; every node counts
+// its errors as ISO 11898-1 has it:
+//     error      sender's transmit counter +8, others' receive counters +1
+//     success    sender's −1, others' −1 (from above 127 down to 127)
+//     state      by the larger one: error warning from 96, error passive from 128; bus-off when transmit is above 255
+// Bus-off purges the queue. With restart_ns the node is back after that time and 128 times 11 recessive bits, without
+// it never. The pause of 8 bits that an error passive sender makes after its frames isn't modelled.
+//
 // Arbitration is bit by bit: the lower base identifier wins; then a data frame over a remote one, an 11-bit over a
 // 29-bit identifier, a classic over an FD frame.
 #pragma once
@@ -38,6 +46,12 @@ struct SimulatedBusConfig {
   std::size_t node_transmit_queue_length = 64;  // the same for attached nodes
   std::size_t receive_queue_length = 1024;      // frames; what comes on top is lost and counted
   std::int64_t load_window_ns = 1'000'000;      // for BusStatistics::peak_load()
+  std::int64_t restart_ns = 0;                  // after bus-off by errors (SocketCAN's restart-ms); 0: never
+};
+
+struct ErrorCounters {
+  int transmit = 0;
+  int receive = 0;
 };
 
 // One frame as it was on the wire, for logs. `frame` is valid during the call only.
@@ -72,6 +86,8 @@ class SimulatedCanBus final : public CanBus {
 
   // bus_off and down purge the port's queue and cut it off; the error_ states take it back. False: no such port.
   bool set_state(std::string_view port, BusState state) noexcept;
+  // A port's; zeros where there is no such port.
+  [[nodiscard]] ErrorCounters error_counters(std::string_view port) const noexcept;
   void set_observer(WireObserver observer) { observer_ = std::move(observer); }
 
   [[nodiscard]] const SimulatedBusConfig& config() const noexcept { return config_; }
@@ -99,6 +115,9 @@ class SimulatedCanBus final : public CanBus {
   SendResult queue_frame(Port& port, const CanFrame& frame) noexcept;
   [[nodiscard]] Port* find_port(std::string_view name) noexcept;
   void change_state(Port& port, BusState state) noexcept;
+  void force_state(Port& port, BusState state) noexcept;
+  void count_errors(const Port* sender, bool destroyed) noexcept;
+  void follow_errors(Port& port) noexcept;
   void request_arbitration();
   void arbitrate();
   [[nodiscard]] bool is_acknowledged(const Port& sender) const noexcept;
@@ -134,6 +153,7 @@ class SimulatedCanBus final : public CanBus {
   bool repeating_ = false;  // this is the second of a duplicated frame
   bool arbitration_requested_ = false;
   bool alone_ = false;        // the controller is error passive because nobody acknowledges
+  bool any_errors_ = false;   // some counter isn't zero
   std::int64_t idle_ns_ = 0;  // the next frame may start from here
 
   std::vector<ActiveFault> faults_;

@@ -101,9 +101,9 @@ void SimulatedCanBus::add_fault(const FaultRule& rule) {
   if (fails_a_port(rule.action)) {
     check_port(rule.port, "port");
     Port* port = find_port(rule.port);
-    events_.schedule(rule.from_ns, [this, port, state = failed_state(rule.action)] { change_state(*port, state); });
+    events_.schedule(rule.from_ns, [this, port, state = failed_state(rule.action)] { force_state(*port, state); });
     if (rule.to_ns != FaultRule::forever) {
-      events_.schedule(rule.to_ns, [this, port] { change_state(*port, BusState::error_active); });
+      events_.schedule(rule.to_ns, [this, port] { force_state(*port, BusState::error_active); });
     }
   } else if (rule.action == FaultAction::babble) {
     babble(rule);

@@ -58,6 +58,9 @@ class SimulatedCanBus::Port final : public CanPort {
   [[nodiscard]] BusState state() const noexcept { return state_; }
   void set_state(BusState state) noexcept { state_ = state; }
 
+  ErrorCounters errors;
+  bool follows_errors = true;  // false: its state is a rule's
+
  private:
   std::uint64_t key_ = no_frame;
   BusState state_ = BusState::error_active;

@@ -18,7 +18,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::size_t batch_size = 32;  // frames per recvmmsg
+constexpr std::size_t batch_size = 32;  // frames per recvmmsg or sendmmsg
 
 [[noreturn]] void refuse_kernel(const std::string& interface, int error) {
   if (error == EAFNOSUPPORT) {
@@ -72,19 +72,18 @@ SendResult send_result(int error) noexcept {
   }
 }
 
-struct KernelFrame {
-  canfd_frame frame;
-  std::size_t bytes;
-};
-
-KernelFrame encode(const CanFrame& frame) noexcept {
-  KernelFrame out{};
-  out.frame.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0u) | (frame.remote ? CAN_RTR_FLAG : 0u);
-  out.frame.len = frame.length;
-  out.frame.flags = frame.fd && frame.bit_rate_switch ? CANFD_BRS : 0;
-  out.bytes = frame.fd ? CANFD_MTU : CAN_MTU;
-  if (!frame.remote) std::memcpy(out.frame.data, frame.data.data(), frame.fd ? 64 : 8);
-  return out;
+// Returns how many bytes of `out` are for the kernel.
+std::size_t encode(const CanFrame& frame, canfd_frame& out) noexcept {
+  out.can_id = frame.id | (frame.extended ? CAN_EFF_FLAG : 0u) | (frame.remote ? CAN_RTR_FLAG : 0u);
+  out.len = frame.length;
+  out.flags = frame.fd && frame.bit_rate_switch ? CANFD_BRS : 0;
+  const std::size_t data_bytes = frame.fd ? 64 : 8;
+  if (frame.remote) {
+    std::memset(out.data, 0, data_bytes);
+  } else {
+    std::memcpy(out.data, frame.data.data(), data_bytes);
+  }
+  return frame.fd ? CANFD_MTU : CAN_MTU;
 }
 
 CanFrame decode(const canfd_frame& raw, bool fd) noexcept {
@@ -106,7 +105,12 @@ class SocketCanNetwork::Bus final : public CanBus {
   Bus(std::string name, const CanSystem::Interface& interface, const SocketCanOptions& options, CanSystem& system);
   ~Bus() override { system_.close(fd_); }
 
-  SendResult send(const CanFrame& frame) noexcept override;
+  SendResult send(const CanFrame& frame) noexcept override {
+    SendResult result = SendResult::refused;
+    send_all({&frame, 1}, &result);
+    return result;
+  }
+  void send_all(std::span<const CanFrame> frames, SendResult* results) noexcept override;
   bool receive(TimedFrame& out) noexcept override;
   [[nodiscard]] const BusStatus& status() const noexcept override { return status_; }
   [[nodiscard]] const std::string& name() const noexcept override { return name_; }
@@ -114,6 +118,8 @@ class SocketCanNetwork::Bus final : public CanBus {
   [[nodiscard]] int fd() const noexcept { return fd_; }
   [[nodiscard]] bool fd_capable() const noexcept { return fd_capable_; }
   [[nodiscard]] bool has_frame() const noexcept { return next_ < count_; }
+  // The kernel has just said that nothing is there.
+  void known_empty() noexcept { drained_ = !has_frame(); }
   // Reads a batch if none is left. False: nothing there, apart from error frames.
   bool fill() noexcept;
 
@@ -124,6 +130,8 @@ class SocketCanNetwork::Bus final : public CanBus {
   };
 
   void set_option(int level, int option, const void* value, unsigned size, const char* what);
+  [[nodiscard]] bool can_send(const CanFrame& frame) const noexcept;
+  void hand_over(std::size_t count, SendResult* results) noexcept;
   void prepare(std::size_t i) noexcept;
   [[nodiscard]] std::int64_t read_control(std::size_t i) noexcept;
   void read_error_frame(const canfd_frame& frame) noexcept;
@@ -133,6 +141,10 @@ class SocketCanNetwork::Bus final : public CanBus {
   int fd_;
   bool fd_capable_;
   BusStatus status_;
+  std::array<mmsghdr, batch_size> out_headers_{};
+  std::array<iovec, batch_size> out_vectors_{};
+  std::array<canfd_frame, batch_size> out_frames_{};
+  std::array<std::size_t, batch_size> out_places_{};  // in the caller's list
   std::array<mmsghdr, batch_size> headers_{};
   std::array<iovec, batch_size> vectors_{};
   std::array<Message, batch_size> messages_{};
@@ -166,6 +178,11 @@ SocketCanNetwork::Bus::Bus(std::string name, const CanSystem::Interface& interfa
     system_.close(fd_);
     throw;
   }
+  for (std::size_t i = 0; i < batch_size; ++i) {
+    out_vectors_[i].iov_base = &out_frames_[i];
+    out_headers_[i].msg_hdr.msg_iov = &out_vectors_[i];
+    out_headers_[i].msg_hdr.msg_iovlen = 1;
+  }
 }
 
 void SocketCanNetwork::Bus::set_option(int level, int option, const void* value, unsigned size, const char* what) {
@@ -173,25 +190,43 @@ void SocketCanNetwork::Bus::set_option(int level, int option, const void* value,
   throw SetupError({.bus = name_, .message = std::string("the kernel refuses ") + what + ": " + std::strerror(errno)});
 }
 
-SendResult SocketCanNetwork::Bus::send(const CanFrame& frame) noexcept {
-  const bool valid = !frame.error && frame.id <= (frame.extended ? CAN_EFF_MASK : CAN_SFF_MASK) &&
-                     is_valid_length(frame.length, frame.fd) && !(frame.fd && (frame.remote || !fd_capable_));
-  SendResult result = SendResult::refused;
-  if (status_.state == BusState::bus_off) {
-    result = SendResult::bus_off;
-  } else if (valid) {
-    const KernelFrame raw = encode(frame);
-    std::int64_t written = 0;
-    do {
-      written = system_.write(fd_, &raw.frame, raw.bytes);
-    } while (written < 0 && errno == EINTR);
-    result =
-        written == static_cast<std::int64_t>(raw.bytes) ? SendResult::sent : send_result(written < 0 ? errno : EINVAL);
+bool SocketCanNetwork::Bus::can_send(const CanFrame& frame) const noexcept {
+  return !frame.error && frame.id <= (frame.extended ? CAN_EFF_MASK : CAN_SFF_MASK) &&
+         is_valid_length(frame.length, frame.fd) && !(frame.fd && (frame.remote || !fd_capable_));
+}
+
+void SocketCanNetwork::Bus::send_all(std::span<const CanFrame> frames, SendResult* results) noexcept {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    results[i] = status_.state == BusState::bus_off ? SendResult::bus_off : SendResult::refused;
+    if (status_.state != BusState::bus_off && can_send(frames[i])) {
+      out_vectors_[count].iov_len = encode(frames[i], out_frames_[count]);
+      out_places_[count++] = i;
+    }
+    if (count == batch_size || i + 1 == frames.size()) {
+      hand_over(count, results);
+      count = 0;
+    }
   }
-  if (result == SendResult::down) status_.state = BusState::down;
-  if (result == SendResult::sent && status_.state == BusState::down) status_.state = BusState::error_active;
-  ++(result == SendResult::sent ? status_.frames_sent : status_.send_failures);
-  return result;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    ++(results[i] == SendResult::sent ? status_.frames_sent : status_.send_failures);
+  }
+}
+
+// sendmmsg() stops at the first frame that the kernel doesn't take and says why only if it was the first of the call:
+// so the rest goes with another call, until that one is the first, and then the rest after it.
+void SocketCanNetwork::Bus::hand_over(std::size_t count, SendResult* results) noexcept {
+  std::size_t done = 0;
+  while (done < count) {
+    const int sent = system_.send_many(fd_, &out_headers_[done], static_cast<unsigned>(count - done));
+    if (sent < 0 && errno == EINTR) continue;
+    for (int i = 0; i < sent; ++i) results[out_places_[done++]] = SendResult::sent;
+    if (sent > 0 && status_.state == BusState::down) status_.state = BusState::error_active;
+    if (sent > 0) continue;
+    const SendResult failed = send_result(sent < 0 ? errno : EINVAL);
+    if (failed == SendResult::down) status_.state = BusState::down;
+    results[out_places_[done++]] = failed;
+  }
 }
 
 bool SocketCanNetwork::Bus::receive(TimedFrame& out) noexcept {
@@ -321,7 +356,11 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
     bool any = false;
     if (ready > 0) {
       for (std::size_t i = 0; i < poll_.size(); ++i) {
-        if (poll_[i].revents != 0) any = buses_[i]->fill() || any;
+        if (poll_[i].revents != 0) {
+          any = buses_[i]->fill() || any;
+        } else {
+          buses_[i]->known_empty();
+        }
       }
       if (any) return true;
       // Error frames only, or an interface that went down (reported once): wait on.

@@ -4,9 +4,9 @@
 //   network.bus_of(1) == 0, network.bus_of(2) == 1
 //   network.set_filters(0, {{.id = 0x180, .mask = 0x780}, {.id = 0x080, .mask = 0x7ff}});
 //
-// One non-blocking socket per bus. Frames come in batches (recvmmsg); the kernel drops those that no filter wants, and
-// those it had no room for are counted (SO_RXQ_OVFL). Error frames never come out of receive(): they set
-// status().state. A time stamp is the kernel's at reception (SO_TIMESTAMPNS, CLOCK_REALTIME), taken over to
+// One non-blocking socket per bus. Frames come and go in batches (recvmmsg, sendmmsg); the kernel drops those that no
+// filter wants, and those it had no room for are counted (SO_RXQ_OVFL). Error frames never come out of receive(): they
+// set status().state. A time stamp is the kernel's at reception (SO_TIMESTAMPNS, CLOCK_REALTIME), taken over to
 // CLOCK_MONOTONIC by the difference of both clocks read right after the batch: exact to the two reads (about 0.1 µs)
 // unless CLOCK_REALTIME was set in between; never later than that reading, and never earlier than the frame before it.
 //

@@ -55,8 +55,8 @@ namespace {
 std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts) {
   if (report.where < 0) return "";
   const auto where = static_cast<std::size_t>(report.where);
-  if (report.fault == Fault::bus_off || report.fault == Fault::error_passive ||
-      report.fault == Fault::receive_overflow) {
+  if (report.fault == Fault::bus_off || report.fault == Fault::error_passive || report.fault == Fault::interface_down ||
+      report.fault == Fault::send_failed || report.fault == Fault::receive_overflow) {
     return "bus " + parts.network.bus(where).name();
   }
   if (report.fault == Fault::second_master) {

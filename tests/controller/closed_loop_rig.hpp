@@ -38,6 +38,8 @@ struct RigOptions {
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
   std::vector<ScheduledChange> changes{};
   std::function<void(fieldbus::SimulatedCanNetwork&)> after_cycle{};  // such as to take a nap, and be late
+  std::int64_t restart_ns = 0;                                        // of all buses, after bus-off by errors
+  BlackBox* box = nullptr;
 };
 
 class ClosedLoopRig {
@@ -49,7 +51,7 @@ class ClosedLoopRig {
         hand(description::load_hand(source_file(rig.hand))),
         scene(scenes::load_scene(source_file(rig.scene))),
         compiled(scenes::compile(scene)),
-        network(buses_of(cell)),
+        network(buses_of(cell, rig)),
         far_end(cell, sensor, hand, network.events(), with_faults(rig)) {
     far_end.attach_to(network);
     network.apply(rig.script);
@@ -68,6 +70,7 @@ class ClosedLoopRig {
                                if (options.after_cycle) options.after_cycle(network);
                              }};
     cycle->schedule(options.changes);
+    if (options.box != nullptr) cycle->write_to(*options.box);
     tally = run_session(*cycle, through, options.settings.period_s, options.duration_s, hooks);
     cycle->shut_down();
     network.sleep_until(network.now_ns() + 1'500'000'000);  // the drives stop, and the gears ring out
@@ -106,9 +109,9 @@ class ClosedLoopRig {
   std::int64_t first_cycle_ns = 0;
 
  private:
-  static std::vector<fieldbus::SimulatedBusConfig> buses_of(const description::Cell& cell) {
+  static std::vector<fieldbus::SimulatedBusConfig> buses_of(const description::Cell& cell, const RigOptions& rig) {
     std::vector<fieldbus::SimulatedBusConfig> buses;
-    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name});
+    for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .restart_ns = rig.restart_ns});
     return buses;
   }
   // A Modbus line's worker on the virtual clock, as fast as it wants to be.

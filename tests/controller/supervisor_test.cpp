@@ -70,7 +70,7 @@ TEST(Supervisor, AFaultBeforeAnythingMovesDisablesAtOnce) {
 }
 
 TEST(FaultText, EveryFaultHasANameOfItsOwn) {
-  for (int i = 1; i <= static_cast<int>(Fault::overrun); ++i) {
+  for (int i = 1; i <= static_cast<int>(Fault::interface_down); ++i) {
     EXPECT_STRNE(proxarm::controller::fault_name(static_cast<Fault>(i)), "none") << i;
   }
 }
@@ -84,7 +84,7 @@ TEST(FaultText, OfAFaultAtTheStartSaysThatNothingHasMoved) {
 }
 
 TEST(FaultText, EveryFaultSaysCauseReactionAndAdvice) {
-  for (int i = 1; i <= static_cast<int>(Fault::error_passive); ++i) {
+  for (int i = 1; i <= static_cast<int>(Fault::interface_down); ++i) {
     const std::string text = describe({static_cast<Fault>(i), 0, 100, 6.0, 5.0}, "somewhere");
     const std::size_t cause = text.find(": "), did = text.find("; "), advice = text.rfind("; ");
     EXPECT_TRUE(cause < did && did < advice && advice + 10 < text.size()) << text;

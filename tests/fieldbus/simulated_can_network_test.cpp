@@ -478,6 +478,68 @@ TEST_F(FaultScriptTest, SendsADestroyedFrameAgain) {
   EXPECT_EQ(bus.status().error_frames, 2u);
 }
 
+// ISO 11898-1: the sender's counter +8 at each error and -1 at each success; warning from 96, passive from 128, bus-off
+// above 255. So the 12th, the 16th and the 32nd error frame of one frame.
+TEST_F(FaultScriptTest, CountsErrorsAsTheStandardDoes) {
+  apply({.action = FaultAction::destroy, .from_ns = 0, .to_ns = 100'000'000, .count = 32});
+  bus.send(frame_of(0x100));
+  const auto run_until_errors = [&](std::uint64_t errors) {
+    while (bus.status().error_frames < errors) network.sleep_until(network.now_ns() + 10'000);
+  };
+  run_until_errors(11);
+  EXPECT_EQ(bus.status().state, BusState::error_active);
+  EXPECT_EQ(bus.error_counters("controller").transmit, 88);
+  EXPECT_EQ(bus.error_counters("node").receive, 11);
+  run_until_errors(12);
+  EXPECT_EQ(bus.status().state, BusState::error_warning);
+  run_until_errors(16);
+  EXPECT_EQ(bus.status().state, BusState::error_passive);
+  run_until_errors(31);
+  EXPECT_EQ(bus.status().state, BusState::error_passive);
+  EXPECT_EQ(bus.error_counters("controller").transmit, 248);
+  run_until_errors(32);
+  EXPECT_EQ(bus.status().state, BusState::bus_off);
+  EXPECT_EQ(bus.send(frame_of(0x100)), SendResult::bus_off);
+  network.sleep_until(1'000'000'000);
+  EXPECT_EQ(bus.status().state, BusState::bus_off) << "no restart-ms";
+  EXPECT_TRUE(node.seen.empty());
+}
+
+TEST_F(FaultScriptTest, HealsFrameByFrame) {
+  apply({.action = FaultAction::destroy, .count = 15});
+  bus.send(frame_of(0x100));
+  network.sleep_until(2'000'000);
+  EXPECT_EQ(bus.error_counters("controller").transmit, 15 * 8 - 1);
+  EXPECT_EQ(bus.status().state, BusState::error_warning);
+  for (int i = 0; i < 24; ++i) {
+    bus.send(frame_of(0x100));
+    network.sleep_until(network.now_ns() + 100'000);
+  }
+  EXPECT_EQ(bus.error_counters("controller").transmit, 95);
+  EXPECT_EQ(bus.status().state, BusState::error_active);
+  EXPECT_EQ(bus.error_counters("node").receive, 0);
+}
+
+// restart-ms, then 128 times 11 recessive bits. What was in the queue is gone.
+TEST(SimulatedCanBus, ComesBackFromBusOffAfterItsRestartTime) {
+  SimulatedCanNetwork network({{.name = "axes", .restart_ns = 10'000'000}});
+  SimulatedCanBus& bus = network.simulated_bus(0);
+  Node node;
+  bus.attach(node, "node");
+  network.apply({{{.action = FaultAction::destroy, .count = 32}}});
+  for (std::uint32_t i = 0; i < 3; ++i) bus.send(frame_of(0x100 + i));
+  while (bus.status().state != BusState::bus_off) network.sleep_until(network.now_ns() + 1'000);
+  const std::int64_t off_ns = network.now_ns();
+  network.sleep_until(off_ns + 10'000'000 + 128 * 11 * 1'000 - 2'000);
+  EXPECT_EQ(bus.status().state, BusState::bus_off);
+  network.sleep_until(network.now_ns() + 3'000);
+  EXPECT_EQ(bus.status().state, BusState::error_active);
+  EXPECT_EQ(bus.error_counters("controller").transmit, 0);
+  EXPECT_EQ(bus.send(frame_of(0x200)), SendResult::sent);
+  network.sleep_until(network.now_ns() + 1'000'000);
+  EXPECT_THAT(node.ids(), ElementsAre(0x200));
+}
+
 TEST_F(FaultScriptTest, PurgesTheQueueAtBusOffAndRepeatsNothingAfterIt) {
   apply({.action = FaultAction::bus_off, .from_ns = 60'000, .to_ns = 500'000});
   for (std::uint32_t i = 0; i < 4; ++i) bus.send(frame_of(0));

@@ -53,7 +53,8 @@ class FakeSystem : public CanSystem {
   std::vector<std::vector<std::uint8_t>> written;
   std::vector<can_filter> filters;
   std::map<int, int> options;
-  int receive_calls = 0;
+  int receive_calls = 0, send_calls = 0;
+  int room = -1;  // frames that the interface's queue still takes; -1: any number
 
   Interface interface(const std::string& name) override {
     const auto found = interfaces.find(name);
@@ -81,11 +82,17 @@ class FakeSystem : public CanSystem {
     }
     return 0;
   }
-  std::int64_t write(int, const void* data, std::size_t size) noexcept override {
+  // As sendmmsg(): how many it took, or why it didn't take the first.
+  int send_many(int, mmsghdr* messages, unsigned count) noexcept override {
+    ++send_calls;
     if (write_error != 0) return fail(write_error);
-    const auto* bytes = static_cast<const std::uint8_t*>(data);
-    written.emplace_back(bytes, bytes + size);
-    return static_cast<std::int64_t>(size);
+    unsigned taken = 0;
+    for (; taken < count && room != 0; ++taken, room -= room > 0 ? 1 : 0) {
+      const iovec& from = *messages[taken].msg_hdr.msg_iov;
+      const auto* bytes = static_cast<const std::uint8_t*>(from.iov_base);
+      written.emplace_back(bytes, bytes + from.iov_len);
+    }
+    return taken == 0 ? fail(ENOBUFS) : static_cast<int>(taken);
   }
   int receive_many(int fd, mmsghdr* messages, unsigned count) noexcept override {
     ++receive_calls;
@@ -298,6 +305,38 @@ TEST_F(SocketCanNetworkTest, TellsAFullQueueFromAnInterfaceThatIsDown) {
   system.write_error = 0;
   EXPECT_EQ(bus.send(frame), SendResult::sent) << "set up again";
   EXPECT_EQ(bus.status().state, BusState::error_active);
+}
+
+TEST_F(SocketCanNetworkTest, SendsACyclesFramesInOneCall) {
+  std::vector<CanFrame> frames(40);
+  for (std::uint32_t i = 0; i < 40; ++i) frames[i].id = i;
+  std::vector<SendResult> results(40, SendResult::down);
+  bus.send_all(frames, results.data());
+  EXPECT_EQ(system.send_calls, 2) << "32 in a batch";
+  EXPECT_THAT(results, testing::Each(SendResult::sent));
+  ASSERT_EQ(system.written.size(), 40u);
+  for (std::uint32_t i = 0; i < 40; ++i) EXPECT_EQ(system.written[i][0], i) << "in their order";
+  EXPECT_EQ(bus.status().frames_sent, 40u);
+}
+
+// sendmmsg() that takes two of five and then says ENOBUFS once asked for the third: each frame has its own result, and
+// one that no kernel would take doesn't cost the others theirs.
+TEST_F(SocketCanNetworkTest, TellsWhichOfACyclesFramesWentAndWhichDidNot) {
+  std::vector<CanFrame> frames(6);
+  for (std::uint32_t i = 0; i < 6; ++i) frames[i].id = 0x201 + i;
+  frames[1].id = 0x800;
+  system.room = 2;
+  std::vector<SendResult> results(6, SendResult::sent);
+  bus.send_all(frames, results.data());
+  const auto full = SendResult::queue_full;
+  EXPECT_THAT(results, ElementsAre(SendResult::sent, SendResult::refused, SendResult::sent, full, full, full));
+  ASSERT_EQ(system.written.size(), 2u);
+  EXPECT_EQ(system.written[1][0], 0x03);
+  EXPECT_EQ(bus.status().frames_sent, 2u);
+  EXPECT_EQ(bus.status().send_failures, 4u);
+  system.room = -1;
+  bus.send_all(frames, results.data());
+  EXPECT_EQ(system.written.size(), 7u) << "nothing is sent twice";
 }
 
 TEST_F(SocketCanNetworkTest, DecodesTheKernelsBytesAndTheirTime) {

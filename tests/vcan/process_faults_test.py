@@ -95,6 +95,29 @@ class ProcessFaults(two.VcanTestCase):
             status = run.wait()
             seen = two.frames_of(witness)
         self.assertEqual(status, 1)
+        self.assert_stopped_by_themselves(seen, stopped_us)
+
+    def test_drives_stop_by_themselves_when_the_cycles_thread_alone_hangs(self):
+        """The process lives, its other threads write the record: none of them may send a heartbeat on its behalf."""
+        with two.simulated_arm(two.THREE), two.candump(*two.INTERFACES) as witness, \
+                two.controller(two.THREE, "60s", self.folder / "record") as run:
+            time.sleep(MID_MOTION_S)
+            with two.hung(run):
+                hung_us = time.time_ns() // 1000
+                states = two.thread_states(run)
+                send_syncs()
+            status = run.wait()
+            seen = two.frames_of(witness)
+        self.assertEqual(states[0], "t")
+        self.assertGreater(len(states), 1)
+        self.assertNotIn("t", states[1:], "the others go on")
+        self.assertEqual(status, 1)
+        self.assert_stopped_by_themselves(seen, hung_us)
+        silent = [f.id for f in seen if hung_us + 1_000 < f.time_us < hung_us + 290_000]
+        for its_own in (two.MASTER_HEARTBEAT, *(two.RPDO + node for node in two.NODES)):
+            self.assertNotIn(its_own, silent)
+
+    def assert_stopped_by_themselves(self, seen, stopped_us):
         for node in two.NODES:
             emergencies = [(f.time_us - stopped_us, f.data[:2]) for f in two.of_node(seen, two.EMCY, node)]
             self.assertEqual([code for _, code in emergencies][:2], [bytes([0x50, 0x82]), bytes([0x30, 0x81])])

@@ -43,6 +43,21 @@ class Torques(two.VcanTestCase):
             run.wait()
             send_syncs()
             seen = two.frames_of(witness)
+        self.assert_safe_torque(seen)
+
+    def test_torques_end_within_three_setpoints_when_the_cycles_thread_alone_hangs(self):
+        with two.simulated_arm(BUSES, CELL), two.candump("vcan0") as witness, \
+                two.controller(BUSES, "60s", None, CELL) as run:
+            time.sleep(MID_MOTION_S)
+            with two.hung(run):
+                send_syncs()
+                ended_us = time.time_ns() // 1000
+            status = run.wait()
+            seen = two.frames_of(witness)
+        self.assertEqual(status, 1)
+        self.assert_safe_torque([f for f in seen if f.time_us < ended_us])
+
+    def assert_safe_torque(self, seen):
         for node in NODES:
             last_us = two.of_node(seen, two.RPDO, node)[-1].time_us
             emergencies = [(f.time_us - last_us, f.data[:2]) for f in two.of_node(seen, two.EMCY, node)]

@@ -3,6 +3,8 @@
 For tests that with-vcan runs. All times are those of the kernel's clock there.
 """
 import collections
+import contextlib
+import ctypes
 import hashlib
 import json
 import os
@@ -113,6 +115,32 @@ class Process:
     def _read(file):
         file.seek(0)
         return file.read()
+
+
+@contextlib.contextmanager
+def hung(process):
+    """The main thread, which runs the cycle, stands still as under a debugger; all others of the process go on."""
+    seize, interrupt, detach = 0x4206, 0x4207, 17  # linux/ptrace.h
+    libc = ctypes.CDLL(None, use_errno=True)
+
+    def ptrace(request):
+        if libc.ptrace(ctypes.c_long(request), ctypes.c_long(process.process.pid), ctypes.c_void_p(), ctypes.c_void_p()):
+            raise OSError(ctypes.get_errno(), "ptrace")
+
+    ptrace(seize)
+    ptrace(interrupt)
+    os.waitpid(process.process.pid, 0)
+    try:
+        yield
+    finally:
+        ptrace(detach)
+
+
+def thread_states(process):
+    """'t': stopped by a debugger; the main thread's first."""
+    tasks = Path(f"/proc/{process.process.pid}/task")
+    return [(task / "stat").read_text().rpartition(")")[2].split()[0]
+            for task in sorted(tasks.iterdir(), key=lambda task: int(task.name))]
 
 
 def simulated_arm(bus, *options):
