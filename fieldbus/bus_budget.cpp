@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <random>
 
 #include "fieldbus/response_time.hpp"
 #include "models/description/setup_error.hpp"
@@ -112,6 +113,32 @@ void add_up(const PlannedBus& bus, BusPlan& plan) {
   plan.worst_load = static_cast<double>(plan.worst_ns) / period_ns;
   plan.least_load = static_cast<double>(plan.least_ns) / period_ns;
   plan.mean_worst_load = mean_ns / period_ns;
+}
+
+// The mean time on the wire of a frame as it usually is.
+double typical_ns(const PlannedFrame& frame, const BitRates& rates, std::mt19937& random) {
+  std::vector<CanFrame> frames = frame.typical;
+  for (int i = 0; frame.typical.empty() && i < 64; ++i) {
+    CanFrame& made = frames.emplace_back();
+    made.id = frame.id;
+    made.extended = frame.shape.extended;
+    made.fd = frame.shape.fd;
+    made.bit_rate_switch = frame.shape.bit_rate_switch;
+    made.length = static_cast<std::uint8_t>(frame.shape.bytes);
+    std::generate_n(made.data.begin(), made.length, [&] { return static_cast<std::uint8_t>(random()); });
+  }
+  double sum_ns = 0.0;
+  for (const CanFrame& each : frames) sum_ns += static_cast<double>(wire_time_ns(each, rates));
+  return sum_ns / static_cast<double>(frames.size());
+}
+
+void add_up_typical(const PlannedBus& bus, BusPlan& plan) {
+  std::mt19937 random(1);
+  double sum_ns = 0.0;
+  for (const PlannedFrame& frame : bus.frames) {
+    sum_ns += typical_ns(frame, {bus.bitrate, bus.data_bitrate}, random) / frame.every_cycles;
+  }
+  plan.typical_load = sum_ns / static_cast<double>(plan.period_ns);
 }
 
 void order_by_sync(const PlannedBus& bus, BusPlan& plan) {
@@ -240,6 +267,7 @@ void find_alternatives(const PlannedBus& bus, BusPlan& plan) {
 BusPlan plan_bus(const PlannedBus& bus, std::int64_t period_ns) {
   check(bus, period_ns);
   BusPlan plan = analyse(bus, period_ns);
+  add_up_typical(bus, plan);
   if (!plan.fits) {
     give_reasons(plan);
     find_alternatives(bus, plan);
@@ -275,7 +303,7 @@ std::string plan_text(const BusPlan& plan) {
   text += "  load at worst " + number(100.0 * plan.worst_load, 1) + " % (" + std::to_string(plan.worst_bits) +
           " bits, " + microseconds(plan.worst_ns) + " of " + microseconds(plan.period_ns) + "), at least " +
           number(100.0 * plan.least_load, 1) + " %, over many cycles at most " +
-          number(100.0 * plan.mean_worst_load, 1) + " %\n";
+          number(100.0 * plan.mean_worst_load, 1) + " %, typically " + number(100.0 * plan.typical_load, 1) + " %\n";
   if (plan.sync_jitter_ns > 0) {
     text += "  SYNC can be held back by " + microseconds(plan.sync_jitter_ns) + " (the longest other frame)\n";
   }

@@ -52,6 +52,8 @@ struct PlannedFrame {
   double deadline =
       1.0;            // latest end, as a fraction of the period after the cycle's start (any_time: after its queuing)
   bool sync = false;  // it is the SYNC
+
+  std::vector<CanFrame> typical{};  // as it usually is, for the typical load; none: random data
 };
 
 struct PlannedBus {
@@ -86,7 +88,8 @@ struct BusPlan {
   double worst_load = 0.0;  // of that cycle, 1 = all of its time
   double least_load = 0.0;
   double mean_worst_load =
-      0.0;  // over many cycles: a frame of every n-th cycle counts 1/n; all frames at their longest
+      0.0;                    // over many cycles: a frame of every n-th cycle counts 1/n; all frames at their longest
+  double typical_load = 0.0;  // the same with frames as they usually are, stuff bits included
   std::int64_t sync_jitter_ns = 0;  // the SYNC can be held back by the longest other frame
   std::vector<FramePlan> frames;
   std::vector<std::string> outranking_sync;  // names of the frames that win over the SYNC

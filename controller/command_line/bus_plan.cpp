@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <random>
 
 #include "controller/command_line/cell_buses.hpp"
+#include "fieldbus/byte_order.hpp"
 #include "fieldbus/canopen_pdo.hpp"
+#include "fieldbus/cia402_units.hpp"
 #include "models/description/setup_error.hpp"
+#include "sim/described_device.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -21,13 +25,17 @@ int cycles_of(const PreparedSession& session, int ms) {
   return std::max(1, static_cast<int>(std::int64_t{ms} * 1'000'000 / period_ns(session)));
 }
 
-void add_controller_frames(PlannedBus& bus, const PreparedSession& session) {
-  const fieldbus::DriveSettings drive;
+void add_sync(PlannedBus& bus) {
   PlannedFrame sync{.name = "SYNC", .id = fieldbus::sync_id};
   sync.shape.bytes = 0;
   sync.sender = "controller";
   sync.sync = true;
   bus.frames.push_back(sync);
+}
+
+// Queued after all setpoints.
+void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
+  const fieldbus::DriveSettings drive;
   PlannedFrame heartbeat{.name = "controller's heartbeat", .id = fieldbus::heartbeat_id(drive.master_node)};
   heartbeat.shape.bytes = 1;
   heartbeat.sender = "controller";
@@ -37,18 +45,116 @@ void add_controller_frames(PlannedBus& bus, const PreparedSession& session) {
   bus.frames.push_back(heartbeat);
 }
 
-void add_drive(PlannedBus& bus, const description::DriveDescription& drive) {
+// What frames usually hold: drives enabled and within 0.2 rad of the start pose, a hand that pushes with 10 N and 1 Nm.
+constexpr int typical_samples = 256;
+constexpr double typical_motion_rad = 0.2, typical_force_N = 10.0, typical_torque_Nm = 1.0;
+// A polled sensor's, from the request to its answer; what the simulated ones take. Makers don't state it.
+constexpr std::int64_t answer_time_ns = sim::DescribedDeviceConfig{}.answer_time_ns;
+constexpr std::uint16_t typical_controlword = 0x000F, typical_statusword = 0x1237;
+
+class TypicalPdos {
+ public:
+  TypicalPdos(const description::DriveDescription& drive, double start_rad)
+      : drive_(drive), scale_(drive), start_rad_(start_rad) {}
+
+  std::vector<fieldbus::CanFrame> operator()(std::uint32_t id, const std::vector<fieldbus::MappedObject>& mapping) {
+    std::vector<fieldbus::CanFrame> frames(typical_samples);
+    for (fieldbus::CanFrame& frame : frames) {
+      frame.id = id;
+      for (const fieldbus::MappedObject& mapped : mapping) {
+        fieldbus::write_u32_le(&frame.data[frame.length], value_of(mapped));  // the next one overwrites what is above
+        frame.length = static_cast<std::uint8_t>(frame.length + mapped.bits / 8);
+      }
+      std::fill(frame.data.begin() + frame.length, frame.data.end(), std::uint8_t{0});
+    }
+    return frames;
+  }
+
+ private:
+  std::uint32_t value_of(const fieldbus::MappedObject& mapped) {
+    if (mapped.object == fieldbus::object_address(drive_.objects.controlword)) return typical_controlword;
+    if (mapped.object == fieldbus::object_address(drive_.objects.statusword)) return typical_statusword;
+    if (mapped.bits == 16) return static_cast<std::uint32_t>(std::lround(100.0 * around_(random_)));  // a torque
+    // Some joints move far, others hardly: all orders of magnitude down to a count.
+    const double reach_rad = typical_motion_rad * std::pow(10.0, -7.0 * std::abs(around_(random_)));
+    return static_cast<std::uint32_t>(scale_.counts(start_rad_ + reach_rad * around_(random_)).value_or(0));
+  }
+
+  const description::DriveDescription& drive_;
+  fieldbus::CountScale scale_;
+  double start_rad_;
+  std::mt19937 random_{1};
+  std::uniform_real_distribution<double> around_{-1.0, 1.0};
+};
+
+// The frames of its samples under a push.
+class TypicalSensor final : private sim::WrenchSource, private sim::DevicePort {
+ public:
+  std::vector<fieldbus::CanFrame> operator()(const description::SensorDescription& sensor, std::uint32_t base_id) {
+    sim::DescribedDevice device(sensor, {.base_id = base_id, .answer_time_ns = 0, .start_time_ns = 0}, *this, *this);
+    device.power_on(0);
+    const description::SensorProtocol& protocol = *sensor.described;
+    for (const auto* command : {&protocol.start, &protocol.poll}) {
+      if (!*command) continue;
+      fieldbus::CanFrame frame;
+      frame.id = (*command)->id + base_id * protocol.base_id_step;
+      frame.extended = protocol.extended;
+      frame.fd = protocol.fd;
+      frame.length = static_cast<std::uint8_t>(std::min<std::size_t>((*command)->data.size(), 8));
+      std::copy_n((*command)->data.begin(), frame.length, frame.data.begin());
+      for (int i = 0; i < (command == &protocol.poll ? typical_samples : 1); ++i) device.on_frame(frame, 1);
+    }
+    for (int i = 0; protocol.streams() && i < typical_samples; ++i) device.on_converter(1);
+    return frames_;
+  }
+
+ private:
+  std::array<double, 6> wrench(std::int64_t) noexcept override {
+    std::array<double, 6> load{};
+    for (std::size_t i = 0; i < 6; ++i) load[i] = (i < 3 ? typical_force_N : typical_torque_Nm) * around_(random_);
+    return load;
+  }
+  void send(const fieldbus::CanFrame& frame, std::int64_t) noexcept override { frames_.push_back(frame); }
+
+  std::vector<fieldbus::CanFrame> frames_;
+  std::mt19937 random_{1};
+  std::uniform_real_distribution<double> around_{-1.0, 1.0};
+};
+
+void add_drive(PlannedBus& bus, const description::DriveDescription& drive, double start_rad) {
   const std::uint8_t node = drive.node;
+  TypicalPdos typical(drive, start_rad);
   PlannedFrame feedback{.name = drive.joint + " TPDO1",
                         .id = fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 1, node)};
   feedback.shape.bytes = fieldbus::pdo_bytes(fieldbus::tpdo_mapping(drive));
+  feedback.typical = typical(feedback.id, fieldbus::tpdo_mapping(drive));
   feedback.sender = drive.joint;
   feedback.after = "SYNC";
   PlannedFrame target{.name = drive.joint + " RPDO1", .id = fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, node)};
   target.shape.bytes = fieldbus::pdo_bytes(fieldbus::rpdo_mapping(drive));
+  target.typical = typical(target.id, fieldbus::rpdo_mapping(drive));
   target.sender = "controller";
   target.release = controller::receive_window;
   for (const PlannedFrame& frame : {feedback, target}) bus.frames.push_back(frame);
+}
+
+// Gauges first, first + 2, first + 4 at `at` of the frame, with what a push and the converter's noise make of them.
+std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, PlannedFrame frame, std::size_t first) {
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> around(-500, 500);
+  std::vector<fieldbus::CanFrame> frames(typical_samples);
+  for (fieldbus::CanFrame& made : frames) {
+    made.id = frame.id;
+    made.length = static_cast<std::uint8_t>(frame.shape.bytes);
+    const std::size_t at = made.length - 6U;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double bias = session.sensor.simulation.bias_counts[first + 2 * i];
+      const auto gauge = static_cast<std::uint16_t>(std::lround(bias) + around(random));
+      made.data[at + 2 * i] = static_cast<std::uint8_t>(gauge >> 8);
+      made.data[at + 2 * i + 1] = static_cast<std::uint8_t>(gauge);
+    }
+  }
+  return frames;
 }
 
 // ATI Net CAN OEM: a poll, and two answers.
@@ -61,12 +167,16 @@ void add_sensor(PlannedBus& bus, const PreparedSession& session) {
   first.shape.bytes = 8;
   first.sender = "sensor";
   first.after = "sensor poll";
+  first.latest_delay_ns = answer_time_ns;
   first.deadline = controller::receive_window;
   PlannedFrame second{.name = "sensor gauges 1 3 5", .id = base | 1U};
   second.shape.bytes = 6;
   second.sender = "sensor";
   second.after = "sensor poll";
+  second.latest_delay_ns = answer_time_ns;
   second.deadline = controller::receive_window;
+  first.typical = typical_gauges(session, first, 0);
+  second.typical = typical_gauges(session, second, 1);
   for (const PlannedFrame& frame : {poll, first, second}) bus.frames.push_back(frame);
 }
 
@@ -88,6 +198,7 @@ void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
   const double cycles = protocol.streams() ? 1.0 / (session.settings.period_s * protocol.rate_Hz) : 1.0;
   const int samples = protocol.streams() ? static_cast<int>(std::ceil(1.0 / std::min(cycles, 1.0) - 1e-9)) : 1;
   std::string before;
+  const std::vector<fieldbus::CanFrame> typical = TypicalSensor{}(session.sensor, base_id);
   if (protocol.poll) {
     PlannedFrame poll =
         described_frame(protocol, protocol.wire_id(protocol.poll->id, base_id), protocol.poll->data.size());
@@ -102,8 +213,11 @@ void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
       frame.name = "sensor frame " + std::to_string(i + 1) + (samples > 1 ? " of " + std::to_string(sample + 1) : "");
       frame.any_time = protocol.streams() && before.empty();
       frame.after = before;
+      if (protocol.poll && i == 0) frame.latest_delay_ns = answer_time_ns;
       if (protocol.streams()) frame.every_cycles = std::max(1, static_cast<int>(cycles));
       if (protocol.poll) frame.deadline = controller::receive_window;
+      std::copy_if(typical.begin(), typical.end(), std::back_inserter(frame.typical),
+                   [&](const fieldbus::CanFrame& f) { return f.id == frame.id && f.length == frame.shape.bytes; });
       before = frame.name;
       bus.frames.push_back(frame);
     }
@@ -124,10 +238,10 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     const bool first_drives =
         std::none_of(bus.frames.begin(), bus.frames.end(), [](const PlannedFrame& f) { return f.sync; });
     if (first_drives && std::any_of(session.cell.drives.begin(), session.cell.drives.end(), on_it)) {
-      add_controller_frames(bus, session);
+      add_sync(bus);
     }
-    for (const description::DriveDescription& drive : session.cell.drives) {
-      if (on_it(drive)) add_drive(bus, drive);
+    for (std::size_t axis = 0; axis < session.cell.drives.size(); ++axis) {
+      if (on_it(session.cell.drives[axis])) add_drive(bus, session.cell.drives[axis], session.cell.start_rad[axis]);
     }
     if (session.cell.sensor.bus != own.name) continue;
     if (session.sensor.described) {
@@ -136,6 +250,8 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
       add_sensor(bus, session);
     }
   }
+  const bool drives = std::any_of(bus.frames.begin(), bus.frames.end(), [](const PlannedFrame& f) { return f.sync; });
+  if (drives) add_heartbeat(bus, session);
   return bus;
 }
 

@@ -1,0 +1,115 @@
+"""What `proxarm plan` promises of a bus, against the in-process bus's own log of a session on it.
+
+The lengths of frames are counted here once more, bit by bit from the standard's layout (ISO 11898-1: 11-bit and 29-bit
+data frames, CRC-15, a stuff bit after five equal bits, 13 bits that aren't stuffed).
+"""
+import collections
+import functools
+import re
+import unittest
+
+from harness import SOURCE, ProgramTest
+from sensors_test import MAKES, OtherSensors
+
+BUS = re.compile(r"^(\S+): 1 Mbit/s, timestep ([\d.]+) ms$")
+LOAD = re.compile(r"load at worst ([\d.]+) % .*, at least ([\d.]+) %, over many cycles at most ([\d.]+) %, "
+                  r"typically ([\d.]+) %")
+FRAME = re.compile(r"^  (\S.*?) +([0-9A-F]{3,8}) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+)  in time$")
+LOGGED = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)$")
+
+
+@functools.cache
+def bits_on_the_wire(identifier, extended, data):
+    def number(value, count):
+        return [value >> i & 1 for i in reversed(range(count))]
+
+    bits = [0]
+    bits += number(identifier >> 18, 11) + [1, 1] + number(identifier & 0x3FFFF, 18) + [0, 0, 0] if extended else \
+        number(identifier, 11) + [0, 0, 0]
+    bits += number(len(data), 4)
+    for byte in data:
+        bits += number(byte, 8)
+    crc = 0
+    for bit in bits:
+        crc = (crc << 1 ^ (0x4599 if bit != crc >> 14 else 0)) & 0x7FFF
+    bits += number(crc, 15)
+    stuffed, run, last = 0, 0, None
+    for bit in bits:
+        run = run + 1 if bit == last else 1
+        last = bit
+        if run == 5:
+            stuffed, run, last = stuffed + 1, 1, 1 - bit
+    return len(bits) + stuffed + 13
+
+
+class Plan(ProgramTest):
+    cell_with = OtherSensors.cell_with
+
+    def planned(self, *arguments):
+        """Bus -> its loads and, by identifier, the ends that the plan gives its frames (µs after a cycle's start)."""
+        outcome = self.call("plan", *arguments)
+        self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
+        plans = {}
+        for line in outcome.out.splitlines():
+            if match := BUS.match(line):
+                ends = collections.defaultdict(list)
+                plans[match[1]] = plan = {"period_us": 1000 * float(match[2]), "end_us": ends}
+            elif match := LOAD.search(line):
+                plan["load"] = [float(figure) / 100 for figure in match.groups()]
+            elif match := FRAME.match(line):
+                ends[match[2]].append(float(match[5]))
+        return plans
+
+    def logged(self, *arguments):
+        """Bus -> the frames of a session while it rendered: end (µs), identifier, bits."""
+        outcome = self.call("run", "--json", "--duration", "1s", "--record", "session", *arguments)
+        self.assertEqual(outcome.status, 0, outcome.err)
+        buses = collections.defaultdict(list)
+        for line in (self.folder / "session" / "frames.log").read_text().splitlines():
+            seconds, micros, bus, identifier, data = LOGGED.match(line).groups()
+            bits = bits_on_the_wire(int(identifier, 16), len(identifier) == 8, bytes.fromhex(data))
+            buses[bus].append((1_000_000 * int(seconds) + int(micros), identifier, bits))
+        # Rendering is from 0.45 s to 1.45 s.
+        return {bus: [f for f in frames if 500_000 <= f[0] < 1_300_000] for bus, frames in buses.items()}
+
+    def assert_agrees(self, arguments, streaming=False):
+        plans, sessions = self.planned(*arguments), self.logged(*arguments)
+        self.assertEqual(sorted(plans), sorted(sessions))
+        # Cycles begin at multiples of the period after the first, at the same time on all buses; a SYNC takes 47 bits
+        # and stuff bits, and is received at the end of its EOF, three bits before the next frame may start.
+        syncs = [end - (bits - 3) for frames in sessions.values() for end, name, bits in frames if name == "080"]
+        for bus, plan in plans.items():
+            with self.subTest(bus):
+                frames, period = sessions[bus], plan["period_us"]
+                phase = min(start % period for start in syncs)
+                self.assertLess(max(start % period - phase for start in syncs), 136, "a SYNC waits for one frame")
+                cycles = int((frames[-1][0] - frames[0][0]) / period)
+                begin = frames[0][0]
+                seen = sum(bits for end, _, bits in frames if begin < end <= begin + cycles * period)
+                load = seen / (cycles * period)
+                worst, least, mean_worst, typical = plan["load"]
+                self.assertLessEqual(load, mean_worst)
+                self.assertGreaterEqual(load, least * mean_worst / worst - 0.01)
+                self.assertLess(abs(load - typical), 0.01, f"{load:.4f} seen, {typical} predicted")
+                for end, identifier, _ in frames:
+                    self.assertIn(identifier, plan["end_us"], "a frame that isn't in the plan")
+                    if bus == "sensor" and streaming:
+                        continue  # at any time in the cycle
+                    # µs of the log are cut off, the figures of the plan are rounded.
+                    self.assertLessEqual((end - phase) % period, max(plan["end_us"][identifier]) + 1.1, identifier)
+
+    def test_agrees_with_the_log_of_every_shipped_cell(self):
+        for cell in sorted((SOURCE / "models/cells").glob("*.yaml")):
+            with self.subTest(cell.name):
+                self.assert_agrees([cell])
+        with self.subTest("twice the timestep"):
+            self.assert_agrees(["--timestep", "2ms"])
+
+    def test_agrees_with_the_log_of_every_sensor(self):
+        for name in MAKES:
+            with self.subTest(name):
+                self.assert_agrees([self.cell_with(name)], streaming=True)
+
+
+if __name__ == "__main__":
+    unittest.main()
