@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 
 #include "fieldbus/can_timing.hpp"
 #include "models/description/setup_error.hpp"
@@ -18,6 +19,8 @@ namespace {
 
 using description::SetupError;
 
+// CLOCK_REALTIME is slewed by 500 ppm at most: 5 µs in this time.
+constexpr std::int64_t difference_kept_ns = 10'000'000;
 constexpr std::size_t batch_size = 32;  // frames per recvmmsg or sendmmsg
 
 [[noreturn]] void refuse_kernel(const std::string& interface, int error) {
@@ -100,9 +103,33 @@ CanFrame decode(const canfd_frame& raw, bool fd) noexcept {
 
 }  // namespace
 
+// Takes the kernel's stamps over to CLOCK_MONOTONIC. A clock is a system call where the kernel has no vDSO: so one
+// reading for all buses, and the difference of the clocks is kept for a while.
+class SocketCanNetwork::Clocks {
+ public:
+  explicit Clocks(CanSystem& system) : system_(system) {}
+
+  // Right after a batch.
+  void read() noexcept {
+    now_ns_ = system_.clock_ns(CLOCK_MONOTONIC);
+    if (now_ns_ < read_again_ns_) return;
+    offset_ns_ = now_ns_ - system_.clock_ns(CLOCK_REALTIME);
+    read_again_ns_ = now_ns_ + difference_kept_ns;
+  }
+  // 0: no stamp.
+  [[nodiscard]] std::int64_t monotonic_ns(std::int64_t stamp_ns) const noexcept {
+    return stamp_ns > 0 ? std::min(stamp_ns + offset_ns_, now_ns_) : now_ns_;
+  }
+
+ private:
+  CanSystem& system_;
+  std::int64_t now_ns_ = 0, offset_ns_ = 0, read_again_ns_ = std::numeric_limits<std::int64_t>::min();
+};
+
 class SocketCanNetwork::Bus final : public CanBus {
  public:
-  Bus(std::string name, const CanSystem::Interface& interface, const SocketCanOptions& options, CanSystem& system);
+  Bus(std::string name, const CanSystem::Interface& interface, const SocketCanOptions& options, CanSystem& system,
+      Clocks& clocks);
   ~Bus() override { system_.close(fd_); }
 
   SendResult send(const CanFrame& frame) noexcept override {
@@ -120,8 +147,10 @@ class SocketCanNetwork::Bus final : public CanBus {
   [[nodiscard]] bool has_frame() const noexcept { return next_ < count_; }
   // The kernel has just said that nothing is there.
   void known_empty() noexcept { drained_ = !has_frame(); }
-  // Reads a batch if none is left. False: nothing there, apart from error frames.
+  // Reads a batch if none is left; their times are the kernel's until date() has been called. False: nothing there,
+  // apart from error frames.
   bool fill() noexcept;
+  void date() noexcept;
 
  private:
   struct Message {
@@ -138,6 +167,7 @@ class SocketCanNetwork::Bus final : public CanBus {
 
   std::string name_;
   CanSystem& system_;
+  Clocks& clocks_;
   int fd_;
   bool fd_capable_;
   BusStatus status_;
@@ -157,8 +187,12 @@ class SocketCanNetwork::Bus final : public CanBus {
 };
 
 SocketCanNetwork::Bus::Bus(std::string name, const CanSystem::Interface& interface, const SocketCanOptions& options,
-                           CanSystem& system)
-    : name_(std::move(name)), system_(system), fd_(system.open_raw_can()), fd_capable_(interface.mtu >= CANFD_MTU) {
+                           CanSystem& system, Clocks& clocks)
+    : name_(std::move(name)),
+      system_(system),
+      clocks_(clocks),
+      fd_(system.open_raw_can()),
+      fd_capable_(interface.mtu >= CANFD_MTU) {
   if (fd_ < 0) refuse_kernel(name_, errno);
   try {
     const int on = 1;
@@ -171,6 +205,7 @@ SocketCanNetwork::Bus::Bus(std::string name, const CanSystem::Interface& interfa
     if (system_.set_option(fd_, SOL_SOCKET, SO_RCVBUFFORCE, &bytes, sizeof bytes) != 0) {  // needs CAP_NET_ADMIN
       set_option(SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes, "SO_RCVBUF");
     }
+    if (options.closed) set_option(SOL_CAN_RAW, CAN_RAW_FILTER, nullptr, 0, "CAN_RAW_FILTER");
     if (system_.bind_can(fd_, interface.index) != 0) {
       throw SetupError({.bus = name_, .message = std::string("cannot bind to the interface: ") + std::strerror(errno)});
     }
@@ -182,6 +217,7 @@ SocketCanNetwork::Bus::Bus(std::string name, const CanSystem::Interface& interfa
     out_vectors_[i].iov_base = &out_frames_[i];
     out_headers_[i].msg_hdr.msg_iov = &out_vectors_[i];
     out_headers_[i].msg_hdr.msg_iovlen = 1;
+    prepare(i);
   }
 }
 
@@ -234,13 +270,15 @@ bool SocketCanNetwork::Bus::receive(TimedFrame& out) noexcept {
     const bool known_empty = drained_;
     drained_ = false;
     if (known_empty || !fill()) return false;
+    clocks_.read();
+    date();
   }
   out = frames_[next_++];
   ++status_.frames_received;
   return true;
 }
 
-// The kernel writes the lengths: they are set anew before each call.
+// The kernel writes the lengths: they are set anew for the next call.
 void SocketCanNetwork::Bus::prepare(std::size_t i) noexcept {
   vectors_[i] = {&messages_[i].frame, sizeof(canfd_frame)};
   headers_[i].msg_hdr = {};
@@ -252,27 +290,30 @@ void SocketCanNetwork::Bus::prepare(std::size_t i) noexcept {
 
 bool SocketCanNetwork::Bus::fill() noexcept {
   next_ = count_ = 0;
-  for (std::size_t i = 0; i < batch_size; ++i) prepare(i);
   const int got = system_.receive_many(fd_, headers_.data(), batch_size);
   if (got < 0 && (errno == ENETDOWN || errno == ENODEV || errno == ENXIO)) status_.state = BusState::down;
   if (got <= 0) return false;
-  const std::int64_t now_ns = system_.clock_ns(CLOCK_MONOTONIC);
-  const std::int64_t offset_ns = now_ns - system_.clock_ns(CLOCK_REALTIME);
   for (std::size_t i = 0; i < static_cast<std::size_t>(got); ++i) {
     const std::int64_t stamp_ns = read_control(i);
     const unsigned bytes = headers_[i].msg_len;
+    prepare(i);
     if (bytes != CAN_MTU && bytes != CANFD_MTU) continue;
     if ((messages_[i].frame.can_id & CAN_ERR_FLAG) != 0) {
       read_error_frame(messages_[i].frame);
       continue;
     }
-    const std::int64_t time_ns = stamp_ns > 0 ? std::min(stamp_ns + offset_ns, now_ns) : now_ns;
-    last_time_ns_ = std::max(last_time_ns_, time_ns);
-    frames_[count_++] = {decode(messages_[i].frame, bytes == CANFD_MTU), last_time_ns_};
+    frames_[count_++] = {decode(messages_[i].frame, bytes == CANFD_MTU), stamp_ns};
   }
   if (count_ > 0 && status_.state == BusState::down) status_.state = BusState::error_active;
   drained_ = count_ > 0 && static_cast<std::size_t>(got) < batch_size;
   return count_ > 0;
+}
+
+void SocketCanNetwork::Bus::date() noexcept {
+  for (std::size_t i = 0; i < count_; ++i) {
+    last_time_ns_ = std::max(last_time_ns_, clocks_.monotonic_ns(frames_[i].time_ns));
+    frames_[i].time_ns = last_time_ns_;
+  }
 }
 
 // Returns the time stamp (CLOCK_REALTIME), 0 if there is none.
@@ -310,7 +351,7 @@ void SocketCanNetwork::Bus::read_error_frame(const canfd_frame& frame) noexcept 
 
 SocketCanNetwork::SocketCanNetwork(const std::vector<std::string>& interfaces, const SocketCanOptions& options,
                                    CanSystem& system)
-    : system_(system) {
+    : system_(system), clocks_(std::make_unique<Clocks>(system)) {
   if (interfaces.empty()) throw SetupError({.key = "--bus", .message = "no CAN interface named"});
   // The kernel first: without CAN in it, no interface can exist, and that is what the user must know.
   const int probe = system_.open_raw_can();
@@ -320,8 +361,9 @@ SocketCanNetwork::SocketCanNetwork(const std::vector<std::string>& interfaces, c
     const auto known = std::find_if(buses_.begin(), buses_.end(), [&](const auto& bus) { return bus->name() == name; });
     bus_of_.push_back(static_cast<std::size_t>(known - buses_.begin()));
     if (known != buses_.end()) continue;
-    buses_.push_back(std::make_unique<Bus>(name, checked_interface(name, system_), options, system_));
+    buses_.push_back(std::make_unique<Bus>(name, checked_interface(name, system_), options, system_, *clocks_));
     poll_.push_back({buses_.back()->fd(), POLLIN, 0});
+    filled_.push_back(false);
   }
 }
 
@@ -357,12 +399,20 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
     if (ready > 0) {
       for (std::size_t i = 0; i < poll_.size(); ++i) {
         if (poll_[i].revents != 0) {
-          any = buses_[i]->fill() || any;
+          filled_[i] = buses_[i]->fill();
+          any = any || filled_[i];
         } else {
           buses_[i]->known_empty();
+          filled_[i] = false;
         }
       }
-      if (any) return true;
+      if (any) {
+        clocks_->read();
+        for (std::size_t i = 0; i < poll_.size(); ++i) {
+          if (filled_[i]) buses_[i]->date();
+        }
+        return true;
+      }
       // Error frames only, or an interface that went down (reported once): wait on.
     }
     if (rest_ns <= 0 || (ready == 0 && now_ns() >= deadline_ns)) return false;

@@ -7,8 +7,9 @@
 // One non-blocking socket per bus. Frames come and go in batches (recvmmsg, sendmmsg); the kernel drops those that no
 // filter wants, and those it had no room for are counted (SO_RXQ_OVFL). Error frames never come out of receive(): they
 // set status().state. A time stamp is the kernel's at reception (SO_TIMESTAMPNS, CLOCK_REALTIME), taken over to
-// CLOCK_MONOTONIC by the difference of both clocks read right after the batch: exact to the two reads (about 0.1 µs)
-// unless CLOCK_REALTIME was set in between; never later than that reading, and never earlier than the frame before it.
+// CLOCK_MONOTONIC by the difference of both clocks, which is read anew every 10 ms: exact to 5 µs, while a clock is
+// slewed as fast as can be, unless CLOCK_REALTIME was set in between; never later than now, and never earlier than the
+// frame before it.
 //
 // After bus-off, send() refuses until the interface reports its restart: the kernel has purged its queue, and what
 // comes next is the supervisor's decision. A removed interface stays `down`; one that was set down works again once it
@@ -35,7 +36,8 @@ struct CanFilter {
 
 struct SocketCanOptions {
   int receive_buffer_bytes =
-      4 << 20;  // the default of 208 kB holds 278 frames; limited by net.core.rmem_max unless root
+      4 << 20;          // the default of 208 kB holds 278 frames; limited by net.core.rmem_max unless root
+  bool closed = false;  // nothing passes until set_filters(): no flood that began earlier fills the buffer
 };
 
 class SocketCanNetwork final : public CanNetwork {
@@ -49,7 +51,7 @@ class SocketCanNetwork final : public CanNetwork {
   // Index of the bus on which the i-th name of the list is.
   [[nodiscard]] std::size_t bus_of(std::size_t listed) const noexcept { return bus_of_[listed]; }
   // The kernel passes only these from now on (frames already received stay); none at all if the list is empty. Until
-  // the first call everything passes. At most 512. Throws SetupError.
+  // the first call everything passes, unless the options say otherwise. At most 512. Throws SetupError.
   void set_filters(std::size_t bus, const std::vector<CanFilter>& filters);
   [[nodiscard]] bool carries_fd(std::size_t bus) const noexcept;
 
@@ -61,11 +63,14 @@ class SocketCanNetwork final : public CanNetwork {
 
  private:
   class Bus;
+  class Clocks;
 
   CanSystem& system_;
+  std::unique_ptr<Clocks> clocks_;
   std::vector<std::unique_ptr<Bus>> buses_;
   std::vector<std::size_t> bus_of_;
   std::vector<pollfd> poll_;
+  std::vector<bool> filled_;  // by the last wait
 };
 
 // True only for interfaces of kind vcan or vxcan, as the kernel says by rtnetlink (IFLA_INFO_KIND), whatever their

@@ -155,12 +155,39 @@ FarEndStatistics FarEndProcess::statistics() const {
   return total;
 }
 
+void set_acceptance_filters(fieldbus::SocketCanNetwork& network, const description::Cell& cell,
+                            const description::SensorDescription& sensor,
+                            const std::vector<std::size_t>& interface_of_bus) {
+  std::vector<std::vector<fieldbus::CanFilter>> filters(network.bus_count());
+  const auto filters_of = [&](const std::string& bus) -> std::vector<fieldbus::CanFilter>& {
+    std::size_t at = 0;
+    while (cell.buses[at].name != bus) ++at;
+    return filters[interface_of_bus[at]];
+  };
+  for (const description::DriveDescription& drive : cell.drives) {
+    if (!drive.on_can()) continue;
+    auto& own = filters_of(drive.bus);
+    own.push_back({.id = drive.node, .mask = 0x07F});
+    for (const std::uint32_t id : {0x000U, 0x080U}) own.push_back({.id = id, .mask = 0x7FF});
+    own.push_back({.id = 0x700, .mask = 0x780});
+  }
+  if (!sensor.described) {
+    filters_of(cell.sensor.bus).push_back({.id = cell.sensor.base_id << 4, .mask = 0x7F0});
+  } else if (!sensor.described->registers) {
+    for (const std::uint32_t id : sensor.described->wire_ids(cell.sensor.base_id)) {
+      filters_of(cell.sensor.bus).push_back({.id = id, .extended = sensor.described->extended});
+    }
+  }
+  for (std::size_t bus = 0; bus < filters.size(); ++bus) network.set_filters(bus, filters[bus]);
+}
+
 FarEndStatistics run_on_socketcan(const description::Cell& cell, const description::SensorDescription& sensor,
                                   const description::HandDescription& hand, const std::vector<std::string>& interfaces,
                                   const std::atomic<bool>& stop, const SimulatedCellConfig& config) {
-  fieldbus::SocketCanNetwork network(interfaces);
+  fieldbus::SocketCanNetwork network(interfaces, {.closed = true});
   std::vector<std::size_t> interface_of_bus;
   for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
+  set_acceptance_filters(network, cell, sensor, interface_of_bus);
   FarEndProcess process(cell, sensor, hand, network, interface_of_bus, config);
   process.run(stop);
   return process.statistics();

@@ -15,6 +15,10 @@
 #include "fieldbus/event_queue.hpp"
 #include "sim/simulated_cell.hpp"
 
+namespace proxarm::fieldbus {
+class SocketCanNetwork;
+}
+
 namespace proxarm::sim {
 
 struct FarEndStatistics {
@@ -61,6 +65,12 @@ class FarEndProcess {
   FarEndStatistics statistics_;
   bool powered_ = false;
 };
+
+// Lets only frames for the cell's devices through, as their own CAN controllers' filters would: NMT, SYNC, heartbeats,
+// what a drive's node number is in, and the sensor's identifiers.
+void set_acceptance_filters(fieldbus::SocketCanNetwork& network, const description::Cell& cell,
+                            const description::SensorDescription& sensor,
+                            const std::vector<std::size_t>& interface_of_bus);
 
 // All of it: opens the kernel's interfaces, one name per bus of the cell (the same name twice is one logical bus), and
 // runs until `stop`. Throws SetupError as FarEndProcess does, and for interfaces that can't be opened.

@@ -181,7 +181,7 @@ class Drain {
 int run_on_interfaces(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper) {
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
-  SocketCanNetwork network(interfaces);
+  SocketCanNetwork network(interfaces, {.closed = true});
   refuse_real_interfaces(interfaces);
   const controller::BusIndices indices = indices_in(network, interfaces.size());
   warn_if_not_carried(session, indices);

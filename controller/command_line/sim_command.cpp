@@ -26,9 +26,10 @@ int sim_command(const RunOptions& options) {
   std::atomic<bool> stop{false};
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
-  fieldbus::SocketCanNetwork network(interfaces);
+  fieldbus::SocketCanNetwork network(interfaces, {.closed = true});
   std::vector<std::size_t> interface_of_bus;
   for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
+  sim::set_acceptance_filters(network, session.cell, session.sensor, interface_of_bus);
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
   sim::FarEndProcess process(session.cell, session.sensor, session.hand, network, interface_of_bus, config);

@@ -230,6 +230,15 @@ TEST(SocketCanSetup, AsksForWhatACycleNeeds) {
   EXPECT_EQ(system.options[SO_RCVBUF], 123456) << "where SO_RCVBUFFORCE is not permitted";
 }
 
+TEST(SocketCanSetup, IsClosedFromTheStartWhereThatIsWanted) {
+  FakeSystem system;
+  system.filters.resize(1);
+  SocketCanNetwork open({"vcan0"}, {}, system);
+  EXPECT_EQ(system.filters.size(), 1u) << "the kernel's own, which pass everything";
+  SocketCanNetwork closed({"vcan0"}, {.closed = true}, system);
+  EXPECT_TRUE(system.filters.empty());
+}
+
 TEST(VirtualCan, GoesByTheKindThatTheKernelSaysNotByTheName) {
   FakeSystem system;
   EXPECT_TRUE(is_virtual_can("vcan0", system));
