@@ -57,6 +57,10 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       guard_(descriptions(parts_), settings.period_s),
       records_(record_capacity) {
   solution_.q = link_rad_;
+  if (settings.passivity != Passivity::off) {
+    passivity_ =
+        std::make_unique<PassivityObserver>(PassivityConfig{}, settings.period_s, settings.passivity == Passivity::on);
+  }
 }
 
 void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
@@ -355,6 +359,7 @@ void Cycle::start_rendering() noexcept {
   parts_.arm->kinematics(link_rad_, solution_.kinematics);
   guard_.start(target_rad_);
   parts_.world->start(proxy_W_);
+  if (passivity_) passivity_->start(tool_W_);
   parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
 }
 
@@ -373,6 +378,7 @@ void Cycle::render() noexcept {
   if (parts_.torque) return render_torques();
   take_change();
   make_limits();
+  if (passivity_) parts_.world->add_damping(passivity_->observe_hand(hand_W_.force, tool_W_));
   const WorldStep step = parts_.world->step(hand_W_.force, step_limits_);
   const ProxyFault turned = parts_.orientation.step(hand_W_.torque);
   if (step.fault == ProxyFault::squeezed) return raise(Fault::proxy_squeezed, -1);
@@ -381,6 +387,7 @@ void Cycle::render() noexcept {
   proxy_k1_W_ = proxy_W_;
   proxy_W_ = step.q_W;
   record_world(step);
+  if (passivity_) record_passivity(step);
   record_.set(RecordFlag::limit_orientation, parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy();
   const double distance_m = (tool_W_ - proxy_W_).norm();
@@ -397,6 +404,15 @@ void Cycle::record_world(const WorldStep& step) noexcept {
   record_.contact_object = step.object;
   record_.contact_count = static_cast<std::uint8_t>(step.contacts);
   record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
+}
+
+void Cycle::record_passivity(const WorldStep& step) noexcept {
+  passivity_->observe_proxy(step.v_W, step.f_W + step.limit_force_W, step.mass_kg, step.damping_Ns_per_m);
+  record_.energies_J = passivity_->energies_J();
+  record_.added_damping_Ns_per_m = passivity_->added_damping_Ns_per_m();
+  record_.oscillation_m_per_s = passivity_->oscillation_m_per_s();
+  record_.felt_damping_Ns_per_m = passivity_->felt_damping_Ns_per_m();
+  record_.set(RecordFlag::oscillation, passivity_->oscillates());
 }
 
 // Where the device stands when the first brake opens.
@@ -613,6 +629,7 @@ void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   parts_.sensor->archive(state);
   if (parts_.torque) parts_.torque->archive(state);
   if (parts_.world) parts_.world->archive(state);
+  if (passivity_) passivity_->archive(state);
   state(parts_.elastic, parts_.orientation, parts_.compensation, supervisor_, entered_phase_, phase_since_ns_,
         first_cycle_ns_, cycle_, rendered_cycles_, missed_samples_, reading_S_.force, reading_S_.torque, R_WS_,
         hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, torque_Nm_,

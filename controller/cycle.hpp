@@ -29,6 +29,7 @@
 #include "controller/elastic_setpoint.hpp"
 #include "controller/joint_guard.hpp"
 #include "controller/orientation_proxy.hpp"
+#include "controller/passivity.hpp"
 #include "controller/rendered_world.hpp"
 #include "controller/session_settings.hpp"
 #include "controller/spsc_ring.hpp"
@@ -149,6 +150,7 @@ class Cycle {
   void hold() noexcept;
   void render_torques() noexcept;
   void record_world(const WorldStep& step) noexcept;
+  void record_passivity(const WorldStep& step) noexcept;
   void follow_proxy() noexcept;
   void command(const JointVector& motor_rad) noexcept;
   bool drives_follow(const JointVector& motor_rad, JointVector& wanted_rad) noexcept;
@@ -200,6 +202,7 @@ class Cycle {
   JointVector actual_rad_;  // by the encoders
   JointVector moved_rad_;   // per cycle, as far as the drives' answers tell
   models::Vec3 proxy_k1_W_ = models::Vec3::Zero();
+  std::unique_ptr<PassivityObserver> passivity_;  // null: not wanted
   StepLimiter limiter_;
   StepLimits step_limits_;
   JointGuard guard_;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "controller/passivity.hpp"
 #include "controller/step_limits.hpp"
 #include "controller/supervisor.hpp"
 #include "models/geometry.hpp"
@@ -37,6 +38,7 @@ enum class RecordFlag : std::uint32_t {
   limit_singularity = 1u << 15,      // inverse kinematics stopped short: end of reach, or nearly singular
   limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
   limit_joint_torque = 1u << 17,     // impedance type: the rendered torques were cut
+  oscillation = 1u << 18,            // motion above the hand's band (passivity.hpp)
 };
 
 // The flag of a limit, and the parameter that holds it ("limits.leash_m").
@@ -88,6 +90,10 @@ struct CycleRecord {
   double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders
   std::array<std::int32_t, max_axes> target_counts{};  // 607A sent in this cycle; in torque mode 6071
   std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
+
+  // Of PassivityObserver, where it is wanted.
+  PortEnergies energies_J{};
+  double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
 
   // The simulation's truth at t_k (flag `truth`).
   Triple true_tool_W_m{};

@@ -14,7 +14,11 @@ template <int N>
 class WorldOfDimension final : public RenderedWorld {
  public:
   WorldOfDimension(scenes::CompiledScene& scene, const AdmittanceConfig& config)
-      : scene_(&scene), space_(scene), limited_(scene.algorithm<N>()), proxy_(config, limited_) {}
+      : scene_(&scene),
+        space_(scene),
+        limited_(scene.algorithm<N>()),
+        proxy_(config, limited_),
+        damping_Ns_per_m_(config.damping_Ns_per_m) {}
 
   void start(const Vec3& q_W) noexcept override {
     space_.start(q_W);
@@ -58,6 +62,8 @@ class WorldOfDimension final : public RenderedWorld {
     if (last_.limits.kinds != 0) last_.f_W -= last_.limit_force_W;
     last_.soft_limits_met = limited_.soft_limits_met();
     last_.v_W = space_.basis() * proxy_.velocity();
+    last_.mass_kg = proxy_.config().mass_kg;
+    last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
     add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
     return last_;
   }
@@ -68,7 +74,7 @@ class WorldOfDimension final : public RenderedWorld {
         proxy_.set_mass(change.value);
         break;
       case Parameter::damping:
-        proxy_.set_damping(change.value);
+        if (proxy_.set_damping(change.value + added_Ns_per_m_)) damping_Ns_per_m_ = change.value;
         break;
       case Parameter::spring:
         proxy_.set_spring(change.value);
@@ -78,7 +84,13 @@ class WorldOfDimension final : public RenderedWorld {
     }
   }
 
-  void archive(fieldbus::StateArchive& state) noexcept override { state(proxy_, space_, last_.q_W); }
+  void add_damping(double damping_Ns_per_m) noexcept override {
+    if (proxy_.set_damping(damping_Ns_per_m_ + damping_Ns_per_m)) added_Ns_per_m_ = damping_Ns_per_m;
+  }
+
+  void archive(fieldbus::StateArchive& state) noexcept override {
+    state(proxy_, space_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_);
+  }
 
  private:
   scenes::CompiledScene* scene_;
@@ -86,6 +98,7 @@ class WorldOfDimension final : public RenderedWorld {
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
   WorldStep last_;
+  double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
 };
 
 }  // namespace

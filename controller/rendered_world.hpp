@@ -34,6 +34,7 @@ struct WorldStep {
   ActiveLimits limits;                                // that held the proxy back
   bool soft_limits_met = true;                        // leash and power
   models::Vec3 limit_force_W = models::Vec3::Zero();  // of the limits on the proxy; f_W is without it
+  double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // with which it was made
   ProxyFault fault = ProxyFault::none;
 };
 
@@ -67,6 +68,8 @@ class RenderedWorld {
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
   // From the next step on. Position and velocity stay, so nothing jumps; a value that can't be changes nothing.
   virtual void set(const Change& change) noexcept = 0;
+  // From the next step on, beside what is set: damping that isn't the user's wish.
+  virtual void add_damping(double damping_Ns_per_m) noexcept = 0;
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 };
 

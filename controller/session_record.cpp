@@ -83,7 +83,8 @@ constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
                                    {RecordFlag::limit_joint_torque, "limit_joint_torque"},
                                    {RecordFlag::limit_leash, "limit_leash"},
                                    {RecordFlag::limit_orientation, "limit_orientation"},
-                                   {RecordFlag::contact_multivalued, "contact_multivalued"}};
+                                   {RecordFlag::contact_multivalued, "contact_multivalued"},
+                                   {RecordFlag::oscillation, "oscillation"}};
 
 void append_flags(std::string& row, const CycleRecord& record) {
   bool first = true;

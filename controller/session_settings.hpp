@@ -15,6 +15,12 @@ enum class Scheme : std::uint8_t {
   impedance,   // (23): position in, torques out; for a light device that can be driven back
 };
 
+enum class Passivity : std::uint8_t {
+  off,
+  observe,  // energies and oscillations are found (passivity.hpp)
+  on,       // and damping is added against them
+};
+
 struct SessionSettings {
   Scheme scheme = Scheme::admittance;
   double coupling_stiffness_N_per_m = 750.0;  // impedance type: K and B of the virtual coupling
@@ -25,6 +31,7 @@ struct SessionSettings {
   double spring_N_per_m = 0.0;    // K_v, to the start position
   int order = 1;                  // 1: (26); 2: its second-order sibling
   OrientationMode orientation = OrientationMode::held;
+  Passivity passivity = Passivity::off;
   double rotational_inertia_kg_m2 = 0.05;
   double rotational_damping_Nms_per_rad = 0.5;
 

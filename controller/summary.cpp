@@ -92,6 +92,7 @@ struct SummaryBuilder::State {
 
   void count(const CycleRecord& record);
   void track(const CycleRecord& record);
+  void observe(const CycleRecord& record);
   void penetrate(const CycleRecord& record);
   void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
   void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
@@ -128,6 +129,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   ++s.rendered;
   s.recent.push_back(record);
   s.penetrate(record);
+  if (s.config.passivity) s.observe(record);
   s.track(record);
   const std::size_t n = s.recent.size();
   if (n >= 3) s.middle(s.recent[n - 3], s.recent[n - 2], s.recent[n - 1]);
@@ -152,6 +154,19 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
     }
   }
   if (record.has(RecordFlag::truth)) summary.from_truth = true;
+}
+
+void SummaryBuilder::State::observe(const CycleRecord& record) {
+  constexpr double noticeable_Ns_per_m = 1.0;
+  if (!summary.passivity) summary.passivity.emplace();
+  PassivitySummary& p = *summary.passivity;
+  p.energies_J = record.energies_J;
+  p.oscillation_max_m_per_s = std::max(p.oscillation_max_m_per_s, record.oscillation_m_per_s);
+  p.added_damping_max_Ns_per_m = std::max(p.added_damping_max_Ns_per_m, record.added_damping_Ns_per_m);
+  if (record.added_damping_Ns_per_m >= noticeable_Ns_per_m) p.added_time_s += config.period_s;
+  if (!record.has(RecordFlag::oscillation)) return;
+  p.oscillating_time_s += config.period_s;
+  p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);
 }
 
 void SummaryBuilder::State::penetrate(const CycleRecord& record) {

@@ -51,6 +51,7 @@ struct SummaryConfig {
   int setpoint_delay_cycles = 2;
   double touch_s = 0.1;                      // how long a contact counts as a touch
   double settle_s = 0.5;                     // how long the arm may ring from it
+  bool passivity = false;                    // observed
   std::vector<std::string> axis_names = {};  // for limits of single joints
 };
 
@@ -68,6 +69,16 @@ struct ComputeTime {
 struct LatencySummary {
   double median = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
   std::vector<std::pair<int, std::uint64_t>> histogram;  // µs and how many, of bins that aren't empty
+};
+
+// Of a session with --passivity; passivity.hpp has the symbols. Work and energies at the end of the rendering.
+struct PassivitySummary {
+  PortEnergies energies_J;
+  double oscillating_time_s = 0.0;
+  double oscillation_max_m_per_s = 0.0;  // root mean square over 0.1 s
+  double added_time_s = 0.0;             // with at least 1 Ns/m
+  double added_damping_max_Ns_per_m = 0.0;
+  double felt_damping_min_Ns_per_m = 0.0;  // b̂ while it oscillated
 };
 
 struct Summary {
@@ -92,8 +103,9 @@ struct Summary {
   std::uint64_t contacts = 0;                          // how often the proxy came to touch
   std::uint64_t limited_cycles = 0;                    // some limit was active
   std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
-  std::uint64_t held_samples = 0;                      // cycles without a new sample of the sensor
-  std::vector<FaultSummary> faults;                    // set by the caller
+  std::optional<PassivitySummary> passivity;
+  std::uint64_t held_samples = 0;    // cycles without a new sample of the sensor
+  std::vector<FaultSummary> faults;  // set by the caller
   bool from_truth = false;
   std::string setpoint_sha256;
   double felt_mass_kg = 0.0;  // as configured, for comparison

@@ -34,6 +34,22 @@ void add_timing(Json& json, const Summary& s) {
   }
 }
 
+Json passivity(const std::optional<PassivitySummary>& summary) {
+  if (!summary) return nullptr;
+  const PortEnergies& e = summary->energies_J;
+  return {{"hand_J", e.hand},
+          {"proxy_J", e.proxy},
+          {"world_J", e.world},
+          {"kinetic_J", e.kinetic},
+          {"damping_J", e.damping},
+          {"added_damping_J", e.added},
+          {"oscillating_time_s", summary->oscillating_time_s},
+          {"oscillation_max_m_per_s", summary->oscillation_max_m_per_s},
+          {"added_time_s", summary->added_time_s},
+          {"added_damping_max_Ns_per_m", summary->added_damping_max_Ns_per_m},
+          {"felt_damping_min_Ns_per_m", summary->felt_damping_min_Ns_per_m}};
+}
+
 void add_repeatable(Json& json, const Summary& s) {
   json["bus_load"] = Json::object();
   for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
@@ -57,6 +73,7 @@ void add_repeatable(Json& json, const Summary& s) {
   json["limited_cycles"] = s.limited_cycles;
   json["active_limits"] = Json::object();
   for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
+  json["passivity"] = passivity(s.passivity);
   json["held_samples"] = s.held_samples;
   json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
   json["faults"] = faults(s);
@@ -153,6 +170,15 @@ std::string summary_text(const Summary& s) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
   for (const auto& [parameter, cycles] : s.active_limits)
     line("", parameter + ": " + std::to_string(cycles) + " cycles");
+  if (s.passivity) {
+    const PortEnergies& e = s.passivity->energies_J;
+    line("energy", format("hand to tool %.3g J, ", e.hand) + format("hand to proxy %.3g J, ", e.proxy) +
+                       format("world to proxy %.3g J, ", e.world) + format("damped %.3g J", e.damping));
+    line("oscillation", format("%.2f s, ", s.passivity->oscillating_time_s) +
+                            format("at most %.3g mm/s", 1e3 * s.passivity->oscillation_max_m_per_s));
+    line("damping added", format("%.2f s, ", s.passivity->added_time_s) +
+                              format("at most %.3g Ns/m", s.passivity->added_damping_max_Ns_per_m));
+  }
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
   line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
   line("setpoints (SHA-256)", s.setpoint_sha256);

@@ -1,5 +1,6 @@
 #include "sim/hand.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace proxarm::sim {
@@ -36,10 +37,22 @@ Intention Hand::intention(double time_s) const noexcept {
   return result;
 }
 
+description::Grip Hand::grip(double time_s) const noexcept {
+  description::Grip held{0.0, description_.stiffness_N_per_m, description_.damping_Ns_per_m};
+  for (const description::Grip& next : description_.grips) {
+    if (time_s < next.time_s) break;
+    const double share = std::min(1.0, (time_s - next.time_s) / description::grip_change_s);
+    held.stiffness_N_per_m += share * (next.stiffness_N_per_m - held.stiffness_N_per_m);
+    held.damping_Ns_per_m += share * (next.damping_Ns_per_m - held.damping_Ns_per_m);
+  }
+  return held;
+}
+
 Vec3 Hand::force_W(double time_s, const Vec3& position_W, const Vec3& velocity_W) const noexcept {
   const Intention want = intention(time_s);
-  return description_.stiffness_N_per_m * (want.position_W - position_W) +
-         description_.damping_Ns_per_m * (want.velocity_W - velocity_W);
+  const description::Grip held = grip(time_s);
+  return held.stiffness_N_per_m * (want.position_W - position_W) +
+         held.damping_Ns_per_m * (want.velocity_W - velocity_W);
 }
 
 }  // namespace proxarm::sim

@@ -29,6 +29,8 @@ class Hand {
   [[nodiscard]] const description::HandDescription& description() const noexcept { return description_; }
 
  private:
+  [[nodiscard]] description::Grip grip(double time_s) const noexcept;
+
   description::HandDescription description_;
   models::Vec3 start_W_;
 };

@@ -54,6 +54,8 @@ Plant::Plant(const Cell& cell, const description::SensorDescription& sensor, con
   }
   torque_Nm_.assign(servos_.size(), 0.0);
   force_sensor_.reset(time_ns_, arm_.sensor_wrench_S());
+  const auto steps = static_cast<std::size_t>(std::llround(1e9 * cell.sensor.delay_s / static_cast<double>(step_ns_)));
+  sensed_.assign(steps, arm_.sensor_wrench_S());
 }
 
 void Plant::start_hand(std::int64_t time_ns) noexcept {
@@ -82,7 +84,12 @@ void Plant::step() noexcept {
   const double hand_time_s = hand_started_ ? 1e-9 * static_cast<double>(time_ns_ - hand_start_ns_) : 0.0;
   const ToolState& tool = arm_.tool();
   arm_.apply(torque_Nm_, hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W));
-  force_sensor_.set_wrench(time_ns_, arm_.sensor_wrench_S());
+  models::Wrench wrench_S = arm_.sensor_wrench_S();
+  if (!sensed_.empty()) {
+    std::swap(wrench_S, sensed_[next_sensed_]);
+    next_sensed_ = (next_sensed_ + 1) % sensed_.size();
+  }
+  force_sensor_.set_wrench(time_ns_, wrench_S);
 }
 
 }  // namespace proxarm::sim

@@ -66,6 +66,8 @@ class Plant {
   std::vector<ServoLoop> servos_;
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<double> torque_Nm_;
+  std::vector<models::Wrench> sensed_;  // on their way through the sensor, a step each; the next one is the oldest
+  std::size_t next_sensed_ = 0;
   std::int64_t start_ns_, time_ns_;
   std::int64_t hand_start_ns_ = 0;
   bool hand_started_ = false;

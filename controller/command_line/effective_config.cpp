@@ -39,6 +39,9 @@ std::string effective_config(const PreparedSession& session) {
   out << YAML::Key << "order" << YAML::Value << settings.order;
   out << YAML::Key << "orientation" << YAML::Value
       << (settings.orientation == controller::OrientationMode::held ? "held" : "free");
+  constexpr const char* passivity[] = {"off", "observe", "on"};
+  out << YAML::Key << "passivity" << YAML::Value << passivity[static_cast<int>(settings.passivity)];
+  number(out, "sensor_delay_s", session.cell.sensor.delay_s);
   number(out, "rotational_inertia_kg_m2", settings.rotational_inertia_kg_m2);
   number(out, "rotational_damping_Nms_per_rad", settings.rotational_damping_Nms_per_rad);
   number(out, "tare_s", settings.tare_s);

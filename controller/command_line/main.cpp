@@ -101,6 +101,12 @@ void add_session_options(CLI::App& app, RunOptions& options) {
                           [&](double value) { options.period_s = value; }),
                  "timestep T with its unit: 1ms, 500us (default: the cell's)")
       ->type_name("TIME");
+  app.add_option("--extra-delay",
+                 quantity([](const std::string& w) { return description::parse_duration(w, "--extra-delay"); },
+                          [&](double value) { options.extra_delay_s = value; }),
+                 "readings of the force sensor are this much older than the cell says, such as 8ms: simulated, and "
+                 "counted where stability is judged")
+      ->type_name("TIME");
   app.add_option("--duration",
                  quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
                           [&](double value) { options.duration_s = value; }),
@@ -132,6 +138,14 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                                  [&](OrientationMode value) { options.settings.orientation = value; }),
          "held (default) or free")
       ->type_name("held|free");
+  using controller::Passivity;
+  app.add_option("--passivity",
+                 choice<Passivity>("--passivity",
+                                   {{"off", Passivity::off}, {"observe", Passivity::observe}, {"on", Passivity::on}},
+                                   [&](Passivity value) { options.passivity = value; }),
+                 "observe: energies at the hand's and the proxy's port, and oscillations; on: add damping against "
+                 "them (default: the cell's, or off)")
+      ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,
                  "change a parameter while rendering, such as mass=3@4s (mass, damping, spring); may be repeated")

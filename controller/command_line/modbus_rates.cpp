@@ -13,8 +13,9 @@ constexpr double exchanges_late = 1.5;
 
 void warn_if_unstable(const PreparedSession& session, const std::string& joint, double rate_Hz) {
   controller::HandModel hand;
-  hand.stiffness_N_per_m = session.hand.stiffness_N_per_m;
-  hand.damping_Ns_per_m = session.hand.damping_Ns_per_m;
+  const description::Grip grip = description::tightest_grip(session.hand);
+  hand.stiffness_N_per_m = grip.stiffness_N_per_m;
+  hand.damping_Ns_per_m = grip.damping_Ns_per_m;
   hand.mass_kg = session.hand.mass_kg;
   controller::LoopModel loop = session.loop;
   const double late_s = exchanges_late / rate_Hz;

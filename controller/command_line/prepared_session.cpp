@@ -31,7 +31,7 @@ fs::path chosen(const fs::path& given, const description::Cell& cell, const std:
 
 // Mean age of a sample: its converter holds it for half a period, its filter delays by its time constant.
 double sensor_delay_s(const description::SensorPlacement& sensor) {
-  double delay_s = 0.0;
+  double delay_s = sensor.delay_s;
   if (sensor.sample_rate_Hz > 0.0) delay_s += 0.5 / sensor.sample_rate_Hz;
   if (sensor.bandwidth_Hz > 0.0) delay_s += 1.0 / (2.0 * pi * sensor.bandwidth_Hz);
   return delay_s;
@@ -146,6 +146,27 @@ void require_stable_coupling(const PreparedSession& session) {
   }
 }
 
+void add_delay(description::SensorPlacement& sensor, double extra_delay_s) {
+  sensor.delay_s += extra_delay_s;
+  if (sensor.delay_s <= description::longest_sensor_delay_s) return;
+  throw description::SetupError(
+      {.key = "--extra-delay",
+       .found = description::number_text(sensor.delay_s) + " s, with the cell's",
+       .expected = "at most " + description::number_text(description::longest_sensor_delay_s) + " s"});
+}
+
+void choose_passivity(PreparedSession& session, const RunOptions& options) {
+  using controller::Passivity;
+  const std::string& cells = session.cell.passivity;
+  const Passivity otherwise = cells == "on" ? Passivity::on : cells == "observe" ? Passivity::observe : Passivity::off;
+  session.settings.passivity = options.passivity.value_or(otherwise);
+  if (!session.impedance() || session.settings.passivity == Passivity::off) return;
+  throw description::SetupError({.file = options.passivity ? "" : session.cell.file.string(),
+                                 .key = options.passivity ? "--passivity" : "passivity",
+                                 .found = "the impedance type",
+                                 .expected = "off: it has no proxy with a mass to be damped"});
+}
+
 }  // namespace
 
 PreparedSession prepare(const RunOptions& options) {
@@ -161,6 +182,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.sensor = description::load_sensor(beside(session.cell.file, session.cell.sensor.description));
   session.hand = description::load_hand(chosen(options.hand, session.cell, session.cell.default_hand));
   session.scene = scenes::load_scene(chosen(options.scene, session.cell, session.cell.default_scene));
+  add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;
   session.settings.period_s = options.period_s.value_or(session.cell.default_period_s);
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
@@ -169,6 +191,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.duration_s = options.duration_s;
   require_period(session, options);
   choose_scheme(session, options);
+  choose_passivity(session, options);
 
   session.loop.period_s = session.settings.period_s;
   if (session.impedance()) {
@@ -189,8 +212,9 @@ PreparedSession prepare(const RunOptions& options) {
 void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (session.impedance()) return require_stable_coupling(session);
   controller::HandModel hand;
-  hand.stiffness_N_per_m = session.hand.stiffness_N_per_m;
-  hand.damping_Ns_per_m = session.hand.damping_Ns_per_m;
+  const description::Grip grip = description::tightest_grip(session.hand);
+  hand.stiffness_N_per_m = grip.stiffness_N_per_m;
+  hand.damping_Ns_per_m = grip.damping_Ns_per_m;
   hand.mass_kg = session.hand.mass_kg;
   if (options.force_unstable && !options.bus.simulated()) {
     throw description::SetupError({.key = "--force-unstable",

@@ -36,10 +36,12 @@ struct RunOptions {
   std::filesystem::path hand;   // empty: the cell's
   std::optional<double> mass_kg;
   std::optional<double> period_s;
+  double extra_delay_s = 0.0;  // of the sensor's readings
   double duration_s = 10.0;
-  std::optional<controller::Scheme> scheme;  // unset: what the drives' modes say
-  std::optional<double> stiffness_N_per_m;   // impedance type
-  controller::SessionSettings settings;      // all that isn't optional above
+  std::optional<controller::Scheme> scheme;        // unset: what the drives' modes say
+  std::optional<controller::Passivity> passivity;  // unset: the cell's
+  std::optional<double> stiffness_N_per_m;         // impedance type
+  controller::SessionSettings settings;            // all that isn't optional above
   BusMapping bus;
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;     // empty: no record

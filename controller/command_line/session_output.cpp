@@ -36,6 +36,7 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
   config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
+  config.passivity = session.settings.passivity != controller::Passivity::off;
   config.axis_names = joint_names(session.cell);
   return config;
 }

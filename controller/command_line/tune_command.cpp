@@ -127,7 +127,8 @@ int tune_command(const RunOptions& options) {
                                    .found = "a cell of the impedance type",
                                    .expected = "one whose drives take positions: `run` judges a coupling's K and B"});
   }
-  const HandModel hand{session.hand.stiffness_N_per_m, session.hand.damping_Ns_per_m, session.hand.mass_kg};
+  const description::Grip grip = description::tightest_grip(session.hand);
+  const HandModel hand{grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
   const LoopModel& loop = session.loop;
   const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
   std::printf("%s, held by %s: %.4g N/m, %.4g Ns/m, %.3g kg; T = %.4g ms\n", session.cell.name.c_str(),

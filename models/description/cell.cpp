@@ -231,6 +231,7 @@ SensorPlacement read_sensor(const YamlNode& node) {
   s.noise_Nm = node.number_or("noise_Nm", 0.0, 0.0, 1e3);
   s.sample_rate_Hz = node.number("sample_rate_Hz", above(0.0, 1e6));
   s.bandwidth_Hz = bandwidth_or(node, "bandwidth_Hz", 0.0, 1e6);
+  s.delay_s = node.number_or("delay_s", 0.0, 0.0, longest_sensor_delay_s);
   return s;
 }
 
@@ -364,6 +365,7 @@ Cell read_cell(const YamlNode& root) {
                                    [&](const ModbusLineDescription& line) { return line.name == cell.sensor.bus; });
   if (!on_line) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
+  cell.passivity = root.choice_or("passivity", cell.passivity, {"off", "observe", "on"});
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
   cell.default_scene = absolute_path_or_empty(root, "default_scene");

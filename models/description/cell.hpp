@@ -113,7 +113,10 @@ struct SensorPlacement {
   double noise_Nm = 0.0;
   double sample_rate_Hz = 0.0;  // of its converter, not synchronised with anything
   double bandwidth_Hz = 0.0;    // its own low-pass; 0: none
+  double delay_s = 0.0;         // by which its readings are older than that
 };
+
+inline constexpr double longest_sensor_delay_s = 0.1;
 
 // A box with its faces along the axes of W.
 struct BoxDescription {
@@ -151,6 +154,7 @@ struct Cell {
   std::vector<DriveDescription> drives;
   SensorPlacement sensor;
   CellLimits limits;
+  std::string passivity = "off";  // "off", "observe", "on" (--passivity)
   double default_period_s = 1e-3;
   double default_mass_kg = 4.0;
   std::string default_scene;  // path, absolute (in the cell's file: relative to its folder); may be empty

@@ -8,6 +8,8 @@
 namespace proxarm::description {
 namespace {
 
+constexpr Range stiffness_range = between(0.0, 1e5), damping_range = between(0.0, 1e4);
+
 Waypoint read_waypoint(const YamlNode& node) {
   return {.time_s = node.number("time_s", 0.0, 1e6), .offset_m = node.vec3("offset_m", between(-10.0, 10.0))};
 }
@@ -26,6 +28,14 @@ Sine read_sine(const YamlNode& node) {
 
 }  // namespace
 
+Grip tightest_grip(const HandDescription& hand) noexcept {
+  Grip tightest{0.0, hand.stiffness_N_per_m, hand.damping_Ns_per_m};
+  for (const Grip& grip : hand.grips) {
+    if (grip.stiffness_N_per_m > tightest.stiffness_N_per_m) tightest = grip;
+  }
+  return tightest;
+}
+
 HandDescription load_hand(const std::filesystem::path& file) { return read_hand(YamlNode::load(file)); }
 
 HandDescription read_hand(const YamlNode& root) {
@@ -34,8 +44,19 @@ HandDescription read_hand(const YamlNode& root) {
   hand.file = std::filesystem::absolute(file).lexically_normal();
   hand.name = root.string_or("name", file.stem().string());
   hand.mass_kg = root.number_or("mass_kg", hand.mass_kg, 0.0, 100.0);
-  hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, 0.0, 1e5);
-  hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, 0.0, 1e4);
+  hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, stiffness_range);
+  hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, damping_range);
+  if (root.has("grips")) {
+    for (const YamlNode& node : root.list("grips", 1, 1000)) {
+      const Grip grip{node.number("time_s", 0.0, 1e6), node.number("stiffness_N_per_m", stiffness_range),
+                      node.number("damping_Ns_per_m", damping_range)};
+      if (!hand.grips.empty() && grip.time_s < hand.grips.back().time_s + grip_change_s) {
+        throw node.error_at("time_s", "a time at least " + number_text(grip_change_s) + " s after the grip before, " +
+                                          number_text(hand.grips.back().time_s) + " s");
+      }
+      hand.grips.push_back(grip);
+    }
+  }
   if (root.has("waypoints")) {
     for (const YamlNode& node : root.list("waypoints", 1, 100'000)) {
       const Waypoint waypoint = read_waypoint(node);

@@ -27,15 +27,27 @@ struct Sine {
   std::array<double, 3> direction{1.0, 0.0, 0.0};  // in W; scaled to length 1 by load_hand
 };
 
+// From this time on the hand holds the handle so; a grip changes evenly over grip_change_s.
+struct Grip {
+  double time_s = 0.0;  // strictly rising along the list
+  double stiffness_N_per_m = 0.0;
+  double damping_Ns_per_m = 0.0;
+};
+inline constexpr double grip_change_s = 0.1;
+
 struct HandDescription {
   std::filesystem::path file;
   std::string name;
   double mass_kg = 1.0;  // of the hand, beyond the handle; felt by the force sensor
   double stiffness_N_per_m = 500.0;
   double damping_Ns_per_m = 20.0;
+  std::vector<Grip> grips;  // after the one above
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
 };
+
+// The stiffest of all its grips.
+Grip tightest_grip(const HandDescription& hand) noexcept;
 
 // Throws SetupError, with file, line and key.
 HandDescription load_hand(const std::filesystem::path& file);

@@ -3,6 +3,7 @@
 
 #include "controller/admittance_proxy.hpp"
 #include "controller/cycle_record.hpp"
+#include "controller/passivity.hpp"
 #include "controller/session_record.hpp"
 #include "controller/spsc_ring.hpp"
 #include "controller/stability.hpp"
@@ -59,6 +60,21 @@ void proxy_step_globe(benchmark::State& state) {
   run(state, world);
 }
 BENCHMARK(proxy_step_globe)->Arg(1)->Arg(2);
+
+// What --passivity costs a cycle.
+void passivity_step(benchmark::State& state) {
+  controller::PassivityObserver observer({}, 1e-3, true);
+  observer.start(Vec3::Zero());
+  Vec3 tool_W = Vec3::Zero(), v_W(0.0, 0.1, 0.0);
+  int k = 0;
+  for (auto _ : state) {
+    if (++k % 100 == 0) v_W = -v_W;
+    tool_W += 1e-3 * v_W;
+    benchmark::DoNotOptimize(observer.observe_hand(Vec3(10.0, 6.0, 0.0), tool_W));
+    observer.observe_proxy(v_W, Vec3(-10.0, 0.0, 0.0), 4.0, 0.0);
+  }
+}
+BENCHMARK(passivity_step);
 
 void ring_push_and_pop(benchmark::State& state) {
   controller::SpscRing<controller::CycleRecord> ring(1024);

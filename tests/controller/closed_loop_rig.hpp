@@ -34,6 +34,7 @@ struct RigOptions {
   std::string scene = "scenes/wall.yaml";
   std::string hand = "sim/hands/touch.yaml";
   SessionSettings settings{};
+  double sensor_delay_s = 0.0;
   std::array<double, 6> start_error_rad{};     // by which the controller is wrong about where the arm stands
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
   std::vector<ScheduledChange> changes{};
@@ -46,7 +47,7 @@ class ClosedLoopRig {
  public:
   explicit ClosedLoopRig(const RigOptions& rig)
       : options(rig),
-        cell(description::load_cell(source_file(rig.cell))),
+        cell(delayed(description::load_cell(source_file(rig.cell)), rig.sensor_delay_s)),
         sensor(biased(description::load_sensor(source_file("models/sensors/ati_net_can_oem.yaml")), rig)),
         hand(description::load_hand(source_file(rig.hand))),
         scene(scenes::load_scene(source_file(rig.scene))),
@@ -118,6 +119,10 @@ class ClosedLoopRig {
   void pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
     const std::int64_t next_ns = std::max(line.step(time_ns), time_ns + 1'000'000);
     network.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
+  }
+  static description::Cell delayed(description::Cell cell, double sensor_delay_s) {
+    cell.sensor.delay_s += sensor_delay_s;
+    return cell;
   }
   static description::SensorDescription biased(description::SensorDescription sensor, const RigOptions& rig) {
     for (std::size_t i = 0; i < 6; ++i) sensor.simulation.bias_counts[i] += rig.sensor_bias_counts[i];

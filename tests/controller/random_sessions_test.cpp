@@ -63,6 +63,7 @@ RigOptions random_session(Random& random) {
   if (random.chance(0.9)) options.settings.tare_spread_N = 1e6;  // the hand is never still
   options.settings.order = random.chance(0.3) ? 2 : 1;
   options.settings.orientation = random.chance(0.3) ? OrientationMode::free : OrientationMode::held;
+  options.settings.passivity = random.chance(0.3) ? Passivity::on : Passivity::off;
   if (random.chance(0.5)) options.device_faults.push_back(random_device_fault(random));
   for (std::uint64_t cycle = 0; cycle < 2000; cycle += static_cast<std::uint64_t>(50 + random.below(500))) {
     const auto parameter = static_cast<Parameter>(1 + random.below(3));
