@@ -11,6 +11,7 @@
 #include "models/cylinder_obstacle.hpp"
 #include "models/free_space.hpp"
 #include "models/friction_plane.hpp"
+#include "models/mesh_obstacle.hpp"
 #include "models/plane.hpp"
 #include "models/plane_composition.hpp"
 #include "models/plane_obstacle.hpp"
@@ -143,7 +144,17 @@ void sphere_on_plane(benchmark::State& state) {
 }
 BENCHMARK(sphere_on_plane);
 
-// A crowd of small spheres in a cube of 10 m, and one in the middle.
+// An octahedron of 20 mm.
+std::shared_ptr<const TriangleMesh> small_mesh(const Vec3& at) {
+  constexpr double R = 0.02;
+  TriangleSoup soup;
+  soup.vertices = {{R, 0, 0}, {-R, 0, 0}, {0, R, 0}, {0, -R, 0}, {0, 0, R}, {0, 0, -R}};
+  soup.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  for (Vec3& vertex : soup.vertices) vertex += at;
+  return std::make_shared<const TriangleMesh>(std::move(soup));
+}
+
+// A crowd of small spheres in a cube of 10 m, every hundredth a mesh, and one in the middle.
 std::vector<World::Entry> crowd(int count) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> at(-5.0, 5.0);
@@ -152,7 +163,11 @@ std::vector<World::Entry> crowd(int count) {
   while (static_cast<int>(entries.size()) < count) {
     const Vec3 x(at(random), at(random), at(random));
     if (x.norm() < 1.0) continue;
-    entries.push_back({std::make_unique<Sphere>(PointCore{x}, 0.02, 0.2, false), 1, -1});
+    if (entries.size() % 100 == 99) {
+      entries.push_back({std::make_unique<MeshObstacle>(small_mesh(x), 0.2), 1, -1});
+    } else {
+      entries.push_back({std::make_unique<Sphere>(PointCore{x}, 0.02, 0.2, false), 1, -1});
+    }
   }
   return entries;
 }

@@ -404,5 +404,41 @@ TEST(MeshSurface, TakesNoNonsense) {
   }
 }
 
+// A surface that has just been made holds no face, so it walks. In steps of nanometres to centimetres, pushed into the
+// surface and along it, so that a proxy glides far, over edges and off the surface.
+TEST(MeshSurface, GlidesWhereTheWalkGoesBitForBit) {
+  constexpr std::uint64_t seed = 31;
+  Random random(seed);
+  std::int64_t in_contact = 0;
+  for (const auto& mesh : {mesh_of(ball(4, 0.5)), mesh_of(block({0.8, 0.9, 1.0}))}) {
+    for (const double mu : {0.0, 0.3}) {
+      MeshSurface g(mesh, mu);
+      Vec3 q = Vec3::Zero();
+      const std::int64_t steps = scaled(25'000);
+      for (std::int64_t i = 0; i < steps; ++i) {
+        if (i % 500 == 0) {  // from afar onto the surface
+          const Vec3 far = random.direction<3>();
+          q = g(1e6, 0.2 * far, far);
+        }
+        const double size = random.log_uniform(1e-9, 1e-2);
+        const Vec3 p = q + size * (random.direction<3>() - 0.5 * q.normalized());
+        const Vec3 r = g(1e6, p, q);
+        MeshSurface walks(mesh, mu);
+        const Vec3 walked = walks(1e6, p, q);
+        ASSERT_EQ(r, walked) << state_text<3>(1e6, p, q, r) << ", seed " << seed << ", state " << i;
+        ASSERT_EQ(g.contacts().size(), walks.contacts().size());
+        for (std::size_t c = 0; c < g.contacts().size(); ++c) {
+          ASSERT_EQ(g.contacts()[c].feature, walks.contacts()[c].feature);
+          ASSERT_EQ(g.contacts()[c].slips, walks.contacts()[c].slips);
+        }
+        in_contact += g.contacts().empty() ? 0 : 1;
+        q = r;
+      }
+    }
+  }
+  std::cout << "  " << in_contact << " steps in contact, seed " << seed << "\n";
+  EXPECT_GT(in_contact, scaled(30'000));
+}
+
 }  // namespace
 }  // namespace proxarm::tests
