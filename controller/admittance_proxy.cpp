@@ -48,7 +48,8 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
   steps_ = 0;
   contacts_ = {};
   contacts_.known = !start.contact_established;
-  euler_steps_left_ = 0;
+  restart_steps_left_ = 0;
+  after_impact_ = false;
   first_order_steps_ = 0;
   prepare();
   return true;
@@ -90,6 +91,7 @@ void AdmittanceProxy<N>::prepare() noexcept {
   plain_ = plain;
   euler_ = rule(M / (T * T) + B / T + K_v);
   euler_.of_v1 = M / T / euler_.kappa;
+  parabola_ = {.kappa = 2.0 * M / (T * T), .compliance = 0.5 * T * T / M, .of_v1 = T};
   bdf2_ = rule(9.0 * M / (4.0 * T * T) + 3.0 * B / (2.0 * T) + K_v);
   bdf2_.of_move = (3.0 * M / (4.0 * T * T) + B / (2.0 * T)) / bdf2_.kappa;
   bdf2_.of_v1 = 2.0 * M / T / bdf2_.kappa;
@@ -139,6 +141,23 @@ ProxyFault AdmittanceProxy<N>::euler(const V& h, Trial& out) noexcept {
   return fault;
 }
 
+// One step of constant acceleration, which needs no q(k−2) either, where nothing hits: friction sets in or lets go, a
+// contact ends.
+//   q = q₁ + T v₁ + T²(h + f)/(2M)   gives   κ = 2M/T²,   p̂ = q₁ + T v₁ + T²h/(2M),   and v = 2(q − q₁)/T − v₁
+// Stick loses a T²/8 at most of what is left of a slide, as in (26); with Euler it is a T²/2. Friction stops and
+// doesn't turn round. Not for B and K_v, which this would let ring where they are stiff.
+template <int N>
+ProxyFault AdmittanceProxy<N>::parabola(const V& h, Trial& out) noexcept {
+  out.kappa = parabola_.kappa;
+  out.p_hat = q_k1_ + (parabola_.of_v1 * v_k1_ + parabola_.compliance * h);
+  const ProxyFault fault = solve(out, q_k1_, config_.period_s);
+  out.held = out.q == q_k1_ && out.p_hat != q_k1_;
+  const V mean = rate_Hz_ * (out.q - q_k1_);
+  out.v = 2.0 * mean - v_k1_;
+  if (out.q != out.p_hat && !(out.v.dot(mean) > 0.0)) out.v.setZero();
+  return fault;
+}
+
 // BDF2: v = (3q − 4q₁ + q₂)/(2T), and a = (3v − 4v₁ + v₂)/(2T), in Ma + Bv + K_v(q − q_ref) = h + f:
 //   κ = 9M/(4T²) + 3B/(2T) + K_v,   q̃ = (4q₁ − q₂)/3   (so that v = (q − q̃)/(2T/3): 𝒢's previous proxy, and its T)
 //   p̂ = [M(12q₁ − 3q₂ + 2T(4v₁ − v₂))/(4T²) + (3B/2T) q̃ + K_v q_ref + h]/κ,   q = 𝒢(κ, p̂, q̃)
@@ -174,13 +193,13 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
   return ProxyFault::none;
 }
 
-// Across an impact BDF2 must not be used: it would rebound where (26) doesn't. A change of the contact set, of stick
-// and slip, and a release are done again by Euler. The velocity of that very step still holds part of the approach, so
-// after a new contact two more Euler steps give a clean history; after the others one does.
+// BDF2 must not look back across an event. An impact is stepped by Euler: BDF2 would rebound where (26) doesn't, and
+// the velocity of that very step still holds part of the approach, so that two more such steps give a clean history. A
+// change of stick and slip and a release are stepped along the parabola, and so is one more step after them.
 template <int N>
 ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
   const V h = config_.matched_labels && has_h_k1_ ? V(2.0 * h_k - h_k1_) : h_k;
-  bool again = euler_steps_left_ > 0 || config_.period_s != period_k1_s_;
+  bool again = restart_steps_left_ > 0 || config_.period_s != period_k1_s_;
   bool changed = false;
   ContactSet now;
   if (!again) {
@@ -189,16 +208,38 @@ ProxyFault AdmittanceProxy<N>::second_order(const V& h_k, Trial& out) noexcept {
     again = changed;
   }
   if (again) {
-    const ProxyFault fault = euler(h, out);
+    const ProxyFault fault = restart(h, out, now, changed);
     if (fault != ProxyFault::none) return fault;
-    set_contacts(now, g_->contacts(), out.held);
-    const bool event = changed || (contacts_.known && !same(contacts_, now));
-    const int after_event = contacts_.known && gained(contacts_, now) ? 2 : 1;
-    const int counted_down = euler_steps_left_ > 0 ? euler_steps_left_ - 1 : 1;
-    euler_steps_left_ = event && after_event > counted_down ? after_event : counted_down;
-    ++first_order_steps_;
   }
   contacts_ = now;
+  return ProxyFault::none;
+}
+
+template <int N>
+ProxyFault AdmittanceProxy<N>::restart(const V& h, Trial& out, ContactSet& now, bool changed) noexcept {
+  const auto step = [&](ProxyFault (AdmittanceProxy::*by)(const V&, Trial&)) {
+    const ProxyFault fault = (this->*by)(h, out);
+    if (fault == ProxyFault::none) set_contacts(now, g_->contacts(), out.held);
+    return fault;
+  };
+  const bool plain = config_.damping_Ns_per_m == 0.0 && config_.spring_N_per_m == 0.0;
+  bool hits = after_impact_ || !plain || !contacts_.known || (changed && gained(contacts_, now));
+  if (!hits) {
+    const std::uint64_t unresolved = g_->unresolved_steps();
+    const ProxyFault fault = step(&AdmittanceProxy::parabola);
+    if (fault != ProxyFault::none) return fault;
+    hits = gained(contacts_, now) || g_->unresolved_steps() != unresolved;
+  }
+  if (hits) {
+    const ProxyFault fault = step(&AdmittanceProxy::euler);
+    if (fault != ProxyFault::none) return fault;
+  }
+  const bool event = changed || (contacts_.known && !same(contacts_, now));
+  const bool impact = contacts_.known && gained(contacts_, now);
+  const int counted_down = restart_steps_left_ > 0 ? restart_steps_left_ - 1 : 1;
+  restart_steps_left_ = event ? std::max(impact ? 2 : 1, counted_down) : counted_down;
+  after_impact_ = impact || (after_impact_ && restart_steps_left_ > 0);
+  ++first_order_steps_;
   return ProxyFault::none;
 }
 

@@ -105,13 +105,13 @@ class AdmittanceProxy {
   bool set_period(double period_s) noexcept;
 
   [[nodiscard]] const AdmittanceConfig& config() const noexcept { return config_; }
-  // Order 2: how many steps were taken at first order (impacts, releases, stick and slip, restarts).
+  // Order 2: how many steps didn't look back at q(k−2) (impacts, releases, stick and slip, restarts).
   [[nodiscard]] std::uint64_t first_order_steps() const noexcept { return first_order_steps_; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(config_.mass_kg, config_.damping_Ns_per_m, config_.spring_N_per_m, config_.period_s, q_k1_, q_k2_, v_k1_,
           v_k2_, h_k1_, has_h_k1_, period_k1_s_, q_ref_, f_, p_hat_, kappa_, epoch_s_, steps_, contacts_,
-          euler_steps_left_, first_order_steps_);
+          restart_steps_left_, after_impact_, first_order_steps_);
     prepare();
   }
 
@@ -157,6 +157,8 @@ class AdmittanceProxy {
   void prepare() noexcept;
   ProxyFault verlet(const V& h, Trial& out) noexcept;
   ProxyFault euler(const V& h, Trial& out) noexcept;
+  ProxyFault parabola(const V& h, Trial& out) noexcept;
+  ProxyFault restart(const V& h, Trial& out, ContactSet& now, bool changed) noexcept;
   ProxyFault bdf2(const V& h, Trial& out, ContactSet& now, bool& contacts_changed) noexcept;
   ProxyFault second_order(const V& h, Trial& out) noexcept;
   ProxyFault solve(Trial& out, const V& q_previous, double law_period_s) noexcept;
@@ -175,12 +177,13 @@ class AdmittanceProxy {
   std::uint64_t steps_ = 0;
   ContactSet contacts_;
   // Made of config_ and period_k1_s_ when one of them has changed.
-  Rule verlet_, euler_, bdf2_;
+  Rule verlet_, euler_, parabola_, bdf2_;
   bool plain_ = true;            // no B, no K_v, equal intervals: (26a) as it stands
   double prepared_for_s_ = 0.0;  // the period_k1_s_ of verlet_
   double rate_Hz_ = 0.0;         // 1/T
   bool timed_ = true;            // 𝒢 wants set_time()
-  int euler_steps_left_ = 0;
+  int restart_steps_left_ = 0;   // order 2: before it may look back again
+  bool after_impact_ = false;    // those by Euler
   std::uint64_t first_order_steps_ = 0;
 };
 
