@@ -274,15 +274,28 @@ std::string Skip::text(const json& headline) const {
   char line[200];
   for (const auto& item : headline.at("options").items()) {
     const json& contact = item.value().value("contact_ns", json());
-    std::snprintf(line, sizeof line, "%-16s free %6.1f ns, in contact %6.1f ns\n", item.key().c_str(),
-                  item.value().at("free_ns").get<double>(), contact.is_number() ? contact.get<double>() : 0.0);
+    std::snprintf(line, sizeof line, "%-16s free %6.1f ns", item.key().c_str(),
+                  item.value().at("free_ns").get<double>());
     text << line;
+    if (contact.is_number()) {
+      std::snprintf(line, sizeof line, ", in contact %6.1f ns", contact.get<double>());
+      text << line;
+    }
+    text << '\n';
   }
   for (const auto& item : headline.at("contact_ns").items()) {
     std::snprintf(line, sizeof line, "%6s spheres: far %.1f, near %.1f, in contact %.1f ns; all of them %.0f ns\n",
                   item.key().c_str(), headline.at("free_ns").at(item.key()).get<double>(),
                   headline.at("near_ns").at(item.key()).get<double>(), item.value().get<double>(),
                   headline.at("all_ns").at(item.key()).get<double>());
+    text << line;
+  }
+  for (const auto& item : headline.at("triangles").items()) {
+    const auto ns = [&](const char* key) {
+      return item.value().at(key).is_number() ? item.value().at(key).get<double>() : nan_value;
+    };
+    std::snprintf(line, sizeof line, "%6s triangles: far %.1f, near %.1f, in contact %.1f ns; all of them %.0f ns\n",
+                  item.key().c_str(), ns("free_ns"), ns("near_ns"), ns("contact_ns"), ns("all_ns"));
     text << line;
   }
   return text.str();
