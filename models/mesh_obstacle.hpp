@@ -5,7 +5,10 @@
 // the mesh together with another object is solved only as far as that goes, and the World holds the proxy beyond.
 #pragma once
 
+#include <limits>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "models/mesh_surface.hpp"
 #include "models/obstacle.hpp"
@@ -15,7 +18,8 @@ namespace proxarm::models {
 class MeshObstacle final : public Obstacle {
  public:
   // Throws std::invalid_argument for a friction that isn't finite and ≥ 0.
-  MeshObstacle(std::shared_ptr<const TriangleMesh> mesh, double friction) : surface_(std::move(mesh), friction) {}
+  MeshObstacle(std::shared_ptr<const TriangleMesh> mesh, double friction, std::vector<double> of_face = {})
+      : surface_(std::move(mesh), friction, std::move(of_face)) {}
 
   // feature: the face's index, or its complement if its back is touched.
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
@@ -57,9 +61,10 @@ class MeshObstacle final : public Obstacle {
   }
 
   [[nodiscard]] Tangent tangent(const Vec3& /*r*/, std::int32_t feature) const noexcept override {
-    const TriangleMesh::Face& face = mesh().face(static_cast<std::uint32_t>(feature < 0 ? ~feature : feature));
+    const auto index = static_cast<std::uint32_t>(feature < 0 ? ~feature : feature);
+    const TriangleMesh::Face& face = mesh().face(index);
     const Vec3 n = feature < 0 ? Vec3(-face.normal) : face.normal;
-    return {FlatSurface<3>::of_unit(face.corner + mesh().lift_m() * n, n), surface_.friction()};
+    return {FlatSurface<3>::of_unit(face.corner + mesh().lift_m() * n, n), surface_.friction(index)};
   }
 
   // Not signed: both sides of a mesh hold.

@@ -9,10 +9,14 @@
 
 namespace proxarm::models {
 
-MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction)
-    : mesh_(std::move(mesh)), mu_(friction), lift_(mesh_->lift_m()) {
-  if (!std::isfinite(friction) || !(friction >= 0.0)) {
+MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction, std::vector<double> of_face)
+    : mesh_(std::move(mesh)), mu_(friction), friction_of_face_(std::move(of_face)), lift_(mesh_->lift_m()) {
+  const auto is_friction = [](double mu) { return std::isfinite(mu) && mu >= 0.0; };
+  if (!is_friction(friction) || !std::all_of(friction_of_face_.begin(), friction_of_face_.end(), is_friction)) {
     throw std::invalid_argument("a friction coefficient must be finite and not negative");
+  }
+  if (!friction_of_face_.empty() && friction_of_face_.size() != mesh_->size()) {
+    throw std::invalid_argument("friction by face needs one for each");
   }
 }
 
@@ -111,7 +115,7 @@ void MeshSurface::keep_side(const Contact<3>& contact) noexcept {
 bool MeshSurface::glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept {
   if (held_.side == 0 || !has_near(q)) return false;
   const TriangleMesh::Face& face = mesh_->face(held_.face);
-  const FaceStep<3> step = step_on_face(held_.surface, mu_, p, q);
+  const FaceStep<3> step = step_on_face(held_.surface, friction(held_.face), p, q);
   if (!step.touches || !has_near(step.r)) return false;
   const double from = held_.side * TriangleMesh::height(face, q), to = held_.side * TriangleMesh::height(face, p);
   const double end = held_.side * TriangleMesh::height(face, step.r);

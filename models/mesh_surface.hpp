@@ -33,8 +33,9 @@ namespace proxarm::models {
 
 class MeshSurface final : public GeometricAlgorithm<3> {
  public:
-  // A mesh may serve several surfaces. Throws std::invalid_argument for a friction that isn't finite and ≥ 0.
-  MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction);
+  // A mesh may serve several surfaces. `of_face`: friction by face, where it isn't the same everywhere; empty, or as
+  // many as the mesh has faces. Throws std::invalid_argument for a friction that isn't finite and ≥ 0.
+  MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double friction, std::vector<double> of_face = {});
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
   [[nodiscard]] bool wants_time() const noexcept override { return false; }
@@ -46,7 +47,9 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
-  [[nodiscard]] double friction() const noexcept { return mu_; }
+  [[nodiscard]] double friction(std::uint32_t face) const noexcept {
+    return friction_of_face_.empty() ? mu_ : friction_of_face_[face];
+  }
 
  private:
   struct Walk;  // one step on its way
@@ -61,6 +64,7 @@ class MeshSurface final : public GeometricAlgorithm<3> {
 
   std::shared_ptr<const TriangleMesh> mesh_;
   double mu_;
+  std::vector<double> friction_of_face_;
   double lift_;
   std::array<Contact<3>, 3> contacts_{};
   std::size_t count_ = 0;

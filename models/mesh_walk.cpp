@@ -231,7 +231,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_singles() noexcept {
   std::array<double, kMost> distance2;
   std::size_t found = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const FaceStep<3> step = step_on_face(touched[i].surface(), s.mu_, p, q);
+    const FaceStep<3> step = step_on_face(touched[i].surface(), s.friction(touched[i].face), p, q);
     if (!step.touches) continue;
     std::size_t exit = 3;
     const double share = share_on(touched[i].face, step.r, exit);
@@ -294,7 +294,8 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_pair(std::size_t i, std::size_t j
   // A q within a few lifts of both counts as in the line.
   const bool in_line = std::abs(f.height(q)) <= kAbove * lift && std::abs(g.height(q)) <= kAbove * lift;
   const Vec3 from = !in_line || (f.holds(q) && g.holds(q)) ? q : line.settle(f, g, line.settle(f, g, q));
-  const GrooveSolution solution = solve_groove(f, s.mu_, g, s.mu_, line, p, from, from);
+  const GrooveSolution solution =
+      solve_groove(f, s.friction(touched[i].face), g, s.friction(touched[j].face), line, p, from, from);
   if (!solution.found) return Went::nowhere;
   Target target{solution.r, 1.0, {i, j, 0}, {solution.slips1, solution.slips2, false}, 2};
   if (edge) {
@@ -322,7 +323,7 @@ MeshSurface::Walk::Went MeshSurface::Walk::try_triples() noexcept {
         const std::size_t of[3] = {i, j, k};
         const FlatSurface<3> surface[3] = {touched[i].surface(), touched[j].surface(), touched[k].surface()};
         const FlatSurface<3>* const surfaces[3] = {&surface[0], &surface[1], &surface[2]};
-        const double mu[3] = {s.mu_, s.mu_, s.mu_};
+        const double mu[3] = {s.friction(touched[i].face), s.friction(touched[j].face), s.friction(touched[k].face)};
         const Vec3* const qs[3] = {&q, &q, &q};
         const CornerSolution solution =
             solve_corner(surfaces, mu, CornerPoint(surface[0], surface[1], surface[2]), p, qs);
@@ -351,7 +352,7 @@ void MeshSurface::Walk::report(std::size_t contacts, const std::array<std::size_
 // Whether the force from p lies in the sum of these faces' friction cones, at rest.
 bool MeshSurface::Walk::can_hold(std::size_t contacts, const std::array<std::size_t, 3>& of) const noexcept {
   std::array<ForceCone, 3> cones;
-  for (std::size_t k = 0; k < contacts; ++k) cones[k] = {touched[of[k]].normal, s.mu_};
+  for (std::size_t k = 0; k < contacts; ++k) cones[k] = {touched[of[k]].normal, s.friction(touched[of[k]].face)};
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
   return in_sum_of_cones(c - p, {cones.data(), contacts}, lift + 8.0 * u * p.lpNorm<1>());
 }

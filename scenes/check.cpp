@@ -233,6 +233,9 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
     region.friction->push_back(object.friction);
     region.soft = region.soft || object.layer.has_value();
   }
+  // Contacts don't say which region of a mesh they are on.
+  const auto has_regions = [](const Object& object) { return !object.friction_regions.empty(); };
+  if (std::any_of(scene.objects.begin(), scene.objects.end(), has_regions)) region.friction.reset();
   region.acts_without_contact = !scene.media.empty() || scene.coulomb_force_N || scene.guide;
   region.bends = scene.guide && scene.guide->kind == GuideDescription::Kind::polyline;
   if (scene.guide) region.centre = compiled.from_W<N>(scene.guide->points_m.front());

@@ -29,6 +29,11 @@ using models::Vec3;
 template <int N>
 using Algorithm = CompiledScene::Algorithm<N>;
 
+bool has_friction(const Object& object) {
+  const auto rubs = [](const FrictionRegion& region) { return region.friction > 0.0; };
+  return object.friction > 0.0 || std::any_of(object.friction_regions.begin(), object.friction_regions.end(), rubs);
+}
+
 SetupError refusal(const Scene& scene, int line, std::string message, std::string advice) {
   return SetupError(
       {.file = scene.file.string(), .line = line, .message = std::move(message), .advice = std::move(advice)});
@@ -215,7 +220,7 @@ Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   }
   for (const Object& object : scene.objects) {
     moving += object.motion ? 1 : 0;
-    rubbing += object.friction > 0.0 ? 1 : 0;
+    rubbing += has_friction(object) ? 1 : 0;
   }
   if (layers > 0 && scene.objects.size() > 1) {
     throw refusal(scene, scene.objects.front().line, "found an elastic layer in a scene of several objects",
@@ -259,7 +264,7 @@ Algorithm<3> guide(const Scene& scene, const GuideDescription& guide, CompiledSc
 }
 
 // A mesh that is all there is, without a world around it.
-Algorithm<3> one_mesh(const Object& object, const MeshShape& shape, CompiledScene& out) {
+Algorithm<3> one_mesh(const Scene& scene, const Object& object, const MeshShape& shape, CompiledScene& out) {
   const models::TriangleMesh& mesh = *shape.mesh;
   out.stages.push_back({"clearance", "a step that can't reach anything is q = p, without a look"});
   out.stages.push_back(
@@ -270,10 +275,13 @@ Algorithm<3> one_mesh(const Object& object, const MeshShape& shape, CompiledScen
   if (mesh.dropped_triangles() > 0) {
     out.skipped.push_back({std::to_string(mesh.dropped_triangles()) + " triangles", "without an area"});
   }
+  if (!object.friction_regions.empty()) {
+    out.stages.push_back({"friction by triangle", std::to_string(object.friction_regions.size()) + " regions"});
+  }
   out.skipped.push_back({"composition", "a single object"});
-  if (!(object.friction > 0.0)) out.skipped.push_back({"friction", "μ = 0"});
+  if (!has_friction(object)) out.skipped.push_back({"friction", "μ = 0"});
   out.skipped.push_back({"motion", "nothing moves"});
-  return std::make_unique<models::MeshSurface>(shape.mesh, object.friction);
+  return std::make_unique<models::MeshSurface>(shape.mesh, object.friction, friction_by_face(scene, object));
 }
 
 template <int N>
@@ -301,7 +309,7 @@ Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
     if (cut.planes.empty() && cut.others.size() == 1 && cut.others.front().second == 0) {
       const Object& object = *cut.others.front().first;
       const auto* mesh = std::get_if<MeshShape>(&object.shape);
-      if (mesh != nullptr && !object.motion && !object.layer) return one_mesh(object, *mesh, out);
+      if (mesh != nullptr && !object.motion && !object.layer) return one_mesh(scene, object, *mesh, out);
     }
   }
   return world<N>(scene, cut, out);

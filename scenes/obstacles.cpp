@@ -28,6 +28,7 @@ std::vector<Part> one(std::unique_ptr<models::Obstacle> obstacle) {
 struct MakeParts {
   double mu;
   Layer layer;
+  std::vector<double> mu_of_face{};  // of a mesh
 
   std::vector<Part> operator()(const PlaneShape& s) const {
     return one(std::make_unique<models::PlaneObstacle>(s.point_m, s.normal, mu, layer));
@@ -58,7 +59,7 @@ struct MakeParts {
     return parts;
   }
   std::vector<Part> operator()(const MeshShape& s) const {
-    return one(std::make_unique<models::MeshObstacle>(s.mesh, mu));
+    return one(std::make_unique<models::MeshObstacle>(s.mesh, mu, mu_of_face));
   }
 };
 
@@ -156,7 +157,31 @@ std::vector<Part> parts_of(const Scene& scene, const Object& object) {
                                    .found = "motion of the mesh " + object.name,
                                    .expected = "a mesh that stands still"});
   }
-  return std::visit(MakeParts{object.friction, layer}, object.shape);
+  return std::visit(MakeParts{object.friction, layer, friction_by_face(scene, object)}, object.shape);
+}
+
+std::vector<double> friction_by_face(const Scene& scene, const Object& object) {
+  const auto* shape = std::get_if<MeshShape>(&object.shape);
+  if (shape == nullptr || object.friction_regions.empty()) return {};
+  const models::TriangleMesh& mesh = *shape->mesh;
+  std::vector<double> friction(mesh.size(), object.friction);
+  for (const FrictionRegion& region : object.friction_regions) {
+    const auto within = region_of(region.within);
+    bool any = false;
+    for (std::uint32_t face = 0; face < mesh.size(); ++face) {
+      const Vec3 middle = (mesh.corner(face, 0) + mesh.corner(face, 1) + mesh.corner(face, 2)) / 3.0;
+      if (within->distance(middle) > 0.0) continue;
+      friction[face] = region.friction;
+      any = true;
+    }
+    if (any) continue;
+    throw description::SetupError({.file = scene.file.string(),
+                                   .line = region.line,
+                                   .key = "friction_regions",
+                                   .found = "a region of " + object.name + " that holds the middle of no triangle",
+                                   .expected = "a shape, in W, that reaches the mesh"});
+  }
+  return friction;
 }
 
 std::unique_ptr<models::Obstacle> region_of(const Shape& shape) {
@@ -166,7 +191,7 @@ std::unique_ptr<models::Obstacle> region_of(const Shape& shape) {
         if constexpr (requires { s.inside_out; }) s.inside_out = false;
       },
       solid);
-  return std::move(std::visit(MakeParts{0.0, {}}, solid).front().obstacle);
+  return std::move(std::visit(MakeParts{0.0, {}, {}}, solid).front().obstacle);
 }
 
 models::ScriptedMotion script_of(const Motion& motion) {

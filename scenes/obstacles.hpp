@@ -20,6 +20,10 @@ struct Part {
 // cylinder from inside, or as thick as what it is on.
 std::vector<Part> parts_of(const Scene& scene, const Object& object);
 
+// Friction by face of a mesh with regions; empty for any other object. Throws SetupError for a region without a
+// triangle.
+std::vector<double> friction_by_face(const Scene& scene, const Object& object);
+
 // The same shape as a region: solid, without friction.
 std::unique_ptr<models::Obstacle> region_of(const Shape& shape);
 

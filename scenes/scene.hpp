@@ -90,10 +90,18 @@ struct Motion {
   bool driven = false;  // by CompiledScene::drive() instead
 };
 
+// The friction of those triangles of a mesh whose middles lie within a shape.
+struct FrictionRegion {
+  Shape within;
+  double friction = 0.0;
+  int line = 0;
+};
+
 struct Object {
   std::string name;  // unique in a scene; "plane 1" where the file gives none
   Shape shape;
-  double friction = 0.0;  // μ, no unit
+  double friction = 0.0;                         // μ, no unit
+  std::vector<FrictionRegion> friction_regions;  // of a mesh; the last one that holds a triangle counts
   std::optional<ElasticLayer> layer;
   std::optional<Motion> motion;
   int line = 0;  // in the scene's file, for messages; 0: unknown

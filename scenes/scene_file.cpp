@@ -135,6 +135,13 @@ Motion read_motion(const YamlNode& node) {
   return motion;
 }
 
+// A shape to be inside of.
+Shape read_region(const YamlNode& within) {
+  const auto [kind, shape] = shape_node(within);
+  if (kind == "mesh") throw within.error("a box, sphere, capsule, cylinder or plane as a region", "a mesh");
+  return read_shape(kind, shape);
+}
+
 Object read_object(const YamlNode& entry) {
   const auto [kind, node] = shape_node(entry);
   Object object;
@@ -142,6 +149,13 @@ Object read_object(const YamlNode& entry) {
   object.shape = read_shape(kind, node);
   object.name = node.string_or("name", "");
   object.friction = node.number_or("friction", 0.0, friction_range);
+  if (kind == "mesh" && node.has("friction_regions")) {
+    for (const YamlNode& region : node.list("friction_regions", 1, 1000)) {
+      object.friction_regions.push_back({.within = read_region(region.map("within")),
+                                         .friction = region.number("friction", friction_range),
+                                         .line = region.line()});
+    }
+  }
   if (const auto layer = node.find_map("layer")) {
     object.layer = ElasticLayer{.thickness_m = layer->number("thickness_m", length_range),
                                 .stiffness_N_per_m = layer->number("stiffness_N_per_m", above(0.0, 1e12))};
@@ -200,11 +214,7 @@ MediumDescription read_medium(const YamlNode& entry) {
     throw entry.error("a medium: viscous or coulomb", "an empty map");
   }
   medium.line = node->line();
-  if (const auto within = node->find_map("within")) {
-    const auto [kind, shape] = shape_node(*within);
-    if (kind == "mesh") throw within->error("a box, sphere, capsule, cylinder or plane as a region", "a mesh");
-    medium.within = read_shape(kind, shape);
-  }
+  if (const auto within = node->find_map("within")) medium.within = read_region(*within);
   return medium;
 }
 

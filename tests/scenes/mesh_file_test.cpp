@@ -1,6 +1,7 @@
 // Meshes from files, and scenes with them.
 #include "scenes/mesh_file.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -300,6 +301,61 @@ TEST_F(MeshFile, RefusesInScenesWhatAMeshCannot) {
   }
   EXPECT_NO_THROW(scenes::compile(scene("objects:\n  - mesh: {file: open.stl}\n")));
   EXPECT_NO_THROW(scenes::compile(scene("objects:\n  - mesh: {file: block.stl, inside_out: true}\n")));
+}
+
+// A flat sheet, smooth for x < 0 and rough beyond: pushed along at 45 degrees to it, the proxy slides over the smooth
+// half and sticks on the rough one. Alone, and in a world of several objects.
+TEST_F(MeshFile, HasFrictionByRegion) {
+  TriangleSoup sheet;
+  constexpr std::uint32_t side = 20;
+  for (std::uint32_t i = 0; i <= side; ++i) {
+    for (std::uint32_t j = 0; j <= side; ++j) sheet.vertices.emplace_back(-1.0 + 0.1 * i, -1.0 + 0.1 * j, 0.0);
+  }
+  for (std::uint32_t i = 0; i < side; ++i) {
+    for (std::uint32_t j = 0; j < side; ++j) {
+      const std::uint32_t a = i * (side + 1) + j, b = a + side + 1;
+      sheet.triangles.push_back({a, b, b + 1});
+      sheet.triangles.push_back({a, b + 1, a + 1});
+    }
+  }
+  write("sheet.obj", obj_of(sheet));
+  const std::string mesh =
+      "objects:\n"
+      "  - mesh:\n"
+      "      file: sheet.obj\n"
+      "      friction: 0.1\n"
+      "      friction_regions:\n"
+      "        - within: {box: {centre_m: [1, 0, 0], size_m: [2, 3, 1]}}\n"
+      "          friction: 2\n";
+  for (const std::string& other : {std::string(), std::string("  - sphere: {centre_m: [0, 0, 2], radius_m: 0.1}\n")}) {
+    const CompiledScene compiled = scenes::compile(scene(mesh + other));
+    auto& g = compiled.algorithm<3>();
+    Vec3 q(-0.505, 0.03, 0.0);
+    q = g(1e6, q - Vec3(0, 0, 1e-6), q + Vec3(0, 0, 1e-3));
+    for (int k = 0; k < 2000; ++k) q = g(1e6, q + 5e-4 * Vec3(1, 0, -1), q);
+    EXPECT_NEAR(q.x(), 0.0, 5e-4) << "stops where it gets rough";  // a step
+    EXPECT_NEAR(q.y(), 0.03, 1e-12);
+    const double on_smooth = g(1e6, Vec3(-0.5 + 1e-3, 0.03, -1e-3), Vec3(-0.5, 0.03, 0.0)).x() + 0.5;
+    EXPECT_NEAR(on_smooth, 0.9e-3, 1e-12);  // (4): what friction of 0.1 leaves
+  }
+}
+
+TEST_F(MeshFile, RefusesARegionThatHoldsNothing) {
+  write("ball.obj", obj_of(ball(2, 0.5)));
+  const auto refused = [&](const std::string& regions) {
+    try {
+      scenes::compile(scene("objects:\n  - mesh:\n      file: ball.obj\n      friction_regions: " + regions + "\n"));
+    } catch (const SetupError& error) {
+      return std::string(error.what());
+    }
+    return std::string("accepted");
+  };
+  EXPECT_THAT(refused("[{within: {sphere: {centre_m: [3, 0, 0], radius_m: 1}}, friction: 0.5}]"),
+              testing::HasSubstr("holds the middle of no triangle"));
+  EXPECT_THAT(refused("[{within: {sphere: {centre_m: [0, 0, 0], radius_m: 1}}, friction: -1}]"),
+              testing::HasSubstr("friction"));
+  EXPECT_THAT(refused("[{within: {mesh: {file: ball.obj}}, friction: 1}]"), testing::HasSubstr("a mesh"));
+  EXPECT_THAT(refused("[]"), testing::HasSubstr("friction_regions"));
 }
 
 }  // namespace
