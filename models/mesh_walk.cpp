@@ -117,7 +117,14 @@ void MeshSurface::Walk::touch() noexcept {
   }
 }
 
-// A q exactly in a triangle's plane counts as in front of it.
+// Whether the way from c meets one of the touched faces that c isn't in the plane of.
+bool MeshSurface::Walk::crosses(const Vec3& x) const noexcept {
+  return std::any_of(touched.begin(), touched.begin() + static_cast<std::ptrdiff_t>(count),
+                     [&](const Side& face) { return face.side != 0 && mesh.touched_by(face.face, c, x); });
+}
+
+// A q exactly in a triangle's plane counts as in front of it, unless other faces are in the way there: then it is
+// beside the triangle, next to a corner of it, and behind.
 bool MeshSurface::Walk::leave_planes() noexcept {
   for (int round = 0; round < 4; ++round) {
     Vec3 out = Vec3::Zero();
@@ -130,7 +137,12 @@ bool MeshSurface::Walk::leave_planes() noexcept {
     if (!inside) return true;
     const double size = out.norm();
     if (!(size > 0.1)) return false;
-    c += (lift / size) * out;
+    const Vec3 away = (lift / size) * out;
+    if (crosses(c + away) && !crosses(c - away)) {
+      c -= away;
+    } else {
+      c += away;
+    }
     touch();
   }
   return false;

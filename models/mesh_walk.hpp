@@ -40,6 +40,7 @@ struct MeshSurface::Walk {
   void add(std::uint32_t index, const TriangleMesh::Face& face, int side) noexcept;
   [[nodiscard]] bool touches(std::uint32_t index) const noexcept;
   bool leave_planes() noexcept;
+  [[nodiscard]] bool crosses(const Vec3& x) const noexcept;
 
   Went run_into(const TriangleMesh::Hit& hit, const Vec3& towards) noexcept;
   Went go(const Target& target) noexcept;

@@ -113,7 +113,7 @@ void expect_sealed(const Shape& shape, double steps, std::uint64_t seed) {
   }
   std::cout << "  " << shape.name << ": " << mesh->size() << " faces, " << contacts << " contacts, " << unresolved
             << " unresolved, seed " << seed << "\n";
-  EXPECT_LE(static_cast<double>(unresolved), 0.01 * steps);
+  EXPECT_LE(static_cast<double>(unresolved), 0.01 * static_cast<double>(scaled(steps)));
 }
 
 TEST(MeshBarrier, HoldsOnEvenTriangles) { expect_sealed({"even", 16, 24, 1.0, 0.05}, 60'000, 801); }
