@@ -29,7 +29,10 @@ void check(const PdoConfiguration& pdo) {
   for (const MappedObject& mapped : pdo.mapping) bits += mapped.bits;
   if (pdo.number < 1 || pdo.number > 4) throw std::invalid_argument("PDO number must be 1..4");
   if (pdo.id > 0x7FF || is_restricted_id(pdo.id)) throw std::invalid_argument("PDO identifier is restricted");
-  if (pdo.mapping.empty() || pdo.mapping.size() > 8 || bits > 64) throw std::invalid_argument("PDO mapping too long");
+  const unsigned most_bits = pdo.fd ? 512 : 64, most_objects = pdo.fd ? 64 : 8;
+  if (pdo.mapping.empty() || pdo.mapping.size() > most_objects || bits > most_bits) {
+    throw std::invalid_argument("PDO mapping too long");
+  }
 }
 
 }  // namespace

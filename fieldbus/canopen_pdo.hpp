@@ -34,6 +34,7 @@ struct PdoConfiguration {
   std::uint32_t id = 0;     // 11-bit identifier
   std::uint8_t transmission_type = every_sync;
   std::uint16_t event_timer_ms = 0;  // 0: left alone
+  bool fd = false;                   // CAN FD: up to 64 bytes (CiA 1301), else 8
   std::vector<MappedObject> mapping{};
 };
 
@@ -44,7 +45,7 @@ struct PdoConfiguration {
 [[nodiscard]] std::uint32_t mapping_entry(const MappedObject& mapped) noexcept;
 
 // Throws std::invalid_argument where the configuration breaks the rules above (a programmer's mistake): identifier,
-// number, empty mapping or more than 64 bits.
+// number, empty mapping or more than 64 bits (CAN FD: 64 bytes).
 [[nodiscard]] std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo);
 // For PDOs that aren't used: a drive's default ones would load the bus. Optional: the drive may not have it.
 [[nodiscard]] SdoStep disable_pdo_step(PdoDirection direction, std::uint8_t number, std::uint8_t node);

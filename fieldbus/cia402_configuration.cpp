@@ -74,12 +74,14 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .id = pdo_id(PdoDirection::receive, 1, node),
                            .transmission_type = every_sync,
                            .event_timer_ms = timeout_ms,
+                           .fd = drive.fd,
                            .mapping = rpdo_mapping(drive)}));
   append(steps, pdo_steps({.direction = PdoDirection::transmit,
                            .number = 1,
                            .id = pdo_id(PdoDirection::transmit, 1, node),
                            .transmission_type = every_sync,
                            .event_timer_ms = 0,
+                           .fd = drive.fd,
                            .mapping = tpdo_mapping(drive)}));
 }
 

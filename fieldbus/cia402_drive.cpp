@@ -141,7 +141,8 @@ bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
 
   frame = CanFrame{};
   frame.id = pdo_id(PdoDirection::receive, 1, node());
-  frame.length = rpdo_bytes_;
+  frame.fd = frame.bit_rate_switch = description_.fd;
+  frame.length = rpdo_bytes_;  // 4 or 6: a length that CAN FD has as well
   // Interpolated position: bit 4 says that its targets are valid; cyclic synchronous position has no such bit.
   const bool interpolates = description_.mode == "ip" && controlword_ == controlword::enable_operation;
   write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (interpolates ? 0x0010U : 0U)));

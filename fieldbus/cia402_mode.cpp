@@ -31,6 +31,9 @@ std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& driv
   std::vector<MappedObject> mapping{{object_address(drive.objects.statusword), 16},
                                     {object_address(drive.objects.position), 32}};
   if (mode_of(drive).torque) mapping.push_back({object_address(drive.objects.torque), 16});
+  for (const description::DriveFeedback& more : drive.feedback) {
+    mapping.push_back({object_address(more.object), more.bits});
+  }
   return mapping;
 }
 

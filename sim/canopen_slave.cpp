@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "fieldbus/can_timing.hpp"
+
 namespace proxarm::sim {
 
 namespace {
@@ -24,8 +26,8 @@ CanopenSlave::CanopenSlave(const CanopenSlaveConfig& config, CanopenApplication&
   errors_.reserve(16);
   add_communication_objects();
   for (int number = 1; number <= pdos; ++number) {
-    receive_.push_back(std::make_unique<Receive>(dictionary_, number, config.node));
-    transmit_.push_back(std::make_unique<Transmit>(dictionary_, number, config.node));
+    receive_.push_back(std::make_unique<Receive>(dictionary_, number, config.node, config.fd));
+    transmit_.push_back(std::make_unique<Transmit>(dictionary_, number, config.node, config.fd));
   }
 }
 
@@ -140,7 +142,8 @@ void CanopenSlave::send_state(NmtState state, std::int64_t time_ns) noexcept {
 // ---- Frames in
 
 void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
-  if (frame.extended || frame.remote || frame.error || frame.fd || frame.length > 8) return;
+  if (frame.extended || frame.remote || frame.error || frame.length > (frame.fd ? 64 : 8)) return;
+  if (frame.fd != (config_.fd && is_pdo(frame.id))) return;  // all services but PDOs stay with classic frames
   if (state_ == NmtState::initialising) return;
   if (frame.id == 0) return on_nmt_command(frame, time_ns);
   if (frame.id > 0x700 && frame.id <= 0x77F) {
@@ -152,6 +155,11 @@ void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_n
   for (auto& receive : receive_) {
     if (receive->pdo.valid() && receive->pdo.identifier() == frame.id) on_receive_pdo(*receive, frame, time_ns);
   }
+}
+
+bool CanopenSlave::is_pdo(std::uint32_t id) const noexcept {
+  return std::any_of(receive_.begin(), receive_.end(),
+                     [&](const auto& receive) { return receive->pdo.valid() && receive->pdo.identifier() == id; });
 }
 
 void CanopenSlave::on_sdo(const fieldbus::CanFrame& frame, std::int64_t time_ns) {
@@ -186,7 +194,8 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   if (frame.length < receive.pdo.length()) {
     return raise_error(emcy::pdo_too_short, error_register::communication, time_ns);
   }
-  if (frame.length > receive.pdo.length()) {
+  // A CAN FD frame is filled up to the next length that there is.
+  if (frame.length > fieldbus::padded_length(receive.pdo.length(), config_.fd)) {
     raise_error(emcy::pdo_too_long, error_register::communication, time_ns);
   } else {
     clear_error(emcy::pdo_too_long, time_ns);
@@ -198,7 +207,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   const std::int64_t window_ns = sync_window_->number() * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());
   if (window_ns > 0 && last_sync_ns_ != never && time_ns - last_sync_ns_ > window_ns) return;
-  std::copy_n(frame.data.begin(), 8, receive.data.begin());
+  receive.data = frame.data;
   receive.waiting = true;
 }
 
@@ -271,7 +280,7 @@ void CanopenSlave::error_behaviour(std::int64_t time_ns) {
 void CanopenSlave::transmit_on_sync(std::int64_t time_ns) noexcept {
   for (auto& pdo : transmit_) {
     if (!pdo->pdo.valid() || !pdo->pdo.synchronous()) continue;
-    std::array<std::uint8_t, 8> data{};
+    std::array<std::uint8_t, 64> data{};
     pdo->pdo.pack(data);
     const int every = pdo->pdo.transmission_type();
     const bool changed = pdo->last_ns == never || data != pdo->last;
@@ -284,7 +293,7 @@ void CanopenSlave::transmit_on_sync(std::int64_t time_ns) noexcept {
 void CanopenSlave::transmit_events(std::int64_t time_ns) noexcept {
   for (auto& pdo : transmit_) {
     if (!pdo->pdo.valid() || pdo->pdo.synchronous()) continue;
-    std::array<std::uint8_t, 8> data{};
+    std::array<std::uint8_t, 64> data{};
     pdo->pdo.pack(data);
     const bool first = pdo->last_ns == never;
     const std::int64_t since_ns = first ? 0 : time_ns - pdo->last_ns;
@@ -294,11 +303,14 @@ void CanopenSlave::transmit_events(std::int64_t time_ns) noexcept {
   }
 }
 
-void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 8>& data, std::int64_t time_ns) noexcept {
+void CanopenSlave::transmit(Transmit& pdo, const std::array<std::uint8_t, 64>& data, std::int64_t time_ns) noexcept {
   pdo.last = data;
   pdo.last_ns = time_ns;
   pdo.syncs = 0;
-  port_.send(make_frame(pdo.pdo.identifier(), {data.data(), pdo.pdo.length()}), time_ns);
+  const auto length = static_cast<std::size_t>(fieldbus::padded_length(pdo.pdo.length(), config_.fd));
+  fieldbus::CanFrame frame = make_frame(pdo.pdo.identifier(), {data.data(), length});
+  frame.fd = frame.bit_rate_switch = config_.fd;
+  port_.send(frame, time_ns);
 }
 
 // ---- Heartbeat consumer, 1016h: reserved u8 | node u8 | time in ms u16

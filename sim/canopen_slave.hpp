@@ -66,6 +66,7 @@ struct CanopenSlaveConfig {
   std::uint32_t device_type = 0;
   std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;  // 1018h
   std::string device_name;
+  bool fd = false;                            // its PDOs are CAN FD frames at the data bitrate
   std::int64_t boot_time_ns = 20'000'000;     // from power or reset to the boot-up frame
   std::int64_t sdo_answer_time_ns = 100'000;  // the firmware's time from a request to its answer
   std::int64_t pdo_answer_time_ns = 20'000;   // from SYNC to the transmit PDO at the controller
@@ -102,19 +103,19 @@ class CanopenSlave final : public BusDevice {
   static constexpr std::int64_t never = INT64_MIN;
 
   struct Receive {
-    Receive(ObjectDictionary& dictionary, int number, std::uint8_t node)
-        : pdo(dictionary, SlavePdo::Direction::receive, number, node, number == 1) {}
+    Receive(ObjectDictionary& dictionary, int number, std::uint8_t node, bool fd)
+        : pdo(dictionary, SlavePdo::Direction::receive, number, node, number == 1, fd) {}
     SlavePdo pdo;
-    std::array<std::uint8_t, 8> data{};  // waiting for SYNC
+    std::array<std::uint8_t, 64> data{};  // waiting for SYNC
     bool waiting = false;
     std::int64_t last_ns = never;  // supervised by the event timer once the first one has come
     bool overdue = false;
   };
   struct Transmit {
-    Transmit(ObjectDictionary& dictionary, int number, std::uint8_t node)
-        : pdo(dictionary, SlavePdo::Direction::transmit, number, node, number == 1) {}
+    Transmit(ObjectDictionary& dictionary, int number, std::uint8_t node, bool fd)
+        : pdo(dictionary, SlavePdo::Direction::transmit, number, node, number == 1, fd) {}
     SlavePdo pdo;
-    std::array<std::uint8_t, 8> last{};
+    std::array<std::uint8_t, 64> last{};
     std::int64_t last_ns = never;
     int syncs = 0;  // since the last one was sent
   };
@@ -135,13 +136,14 @@ class CanopenSlave final : public BusDevice {
   void on_nmt_command(const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_sdo(const fieldbus::CanFrame& frame, std::int64_t time_ns);
+  [[nodiscard]] bool is_pdo(std::uint32_t id) const noexcept;  // one that it receives
   void on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
   void check_heartbeats(std::int64_t time_ns);
   void check_receive_pdos(std::int64_t time_ns);
   void transmit_events(std::int64_t time_ns) noexcept;
   void transmit_on_sync(std::int64_t time_ns) noexcept;
-  void transmit(Transmit& transmit, const std::array<std::uint8_t, 8>& data, std::int64_t time_ns) noexcept;
+  void transmit(Transmit& transmit, const std::array<std::uint8_t, 64>& data, std::int64_t time_ns) noexcept;
   void configure_consumers() noexcept;
   [[nodiscard]] SdoAbort check_consumer(std::uint8_t subindex, std::int64_t value) const noexcept;
   void error_behaviour(std::int64_t time_ns);

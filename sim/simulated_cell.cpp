@@ -28,6 +28,7 @@ std::int32_t to_i32(double value) noexcept {
 DriveDeviceConfig drive_config(const description::DriveDescription& drive, const SimulatedCellConfig& config) {
   DriveDeviceConfig c;
   c.canopen.node = drive.node;
+  c.canopen.fd = drive.fd;
   c.canopen.device_type = drive.device_type;
   c.canopen.serial = drive.node;
   c.canopen.revision = 0x00010000;
@@ -287,7 +288,10 @@ void SimulatedCell::attach_to(fieldbus::SimulatedCanNetwork& network) {
   using fieldbus::NodeFormat;
   const bool fd_sensor = described_sensor_ && !sensor_registers_ && described_sensor_->fd();
   for (const auto& node : nodes_) {
-    const NodeFormat format = fd_sensor && node == nodes_.back() ? NodeFormat::fd : NodeFormat::classic;
+    const auto drive = std::find_if(cell_.drives.begin(), cell_.drives.end(),
+                                    [&](const description::DriveDescription& d) { return d.joint == node->name(); });
+    const bool fd = drive == cell_.drives.end() ? fd_sensor : drive->fd;
+    const NodeFormat format = fd ? NodeFormat::fd : NodeFormat::classic;
     node->connect(network.simulated_bus(cell_.buses[node->bus()].name).attach(*node, node->name(), format));
   }
 }

@@ -17,11 +17,13 @@ bool is_restricted(std::int64_t id) noexcept {
 
 }  // namespace
 
-SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number, std::uint8_t node, bool valid)
+SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number, std::uint8_t node, bool valid,
+                   bool fd)
     : dictionary_(dictionary),
       direction_(direction),
       parameters_(static_cast<std::uint16_t>((direction == Direction::receive ? 0x1400 : 0x1800) + number - 1)),
-      mapping_(static_cast<std::uint16_t>((direction == Direction::receive ? 0x1600 : 0x1A00) + number - 1)) {
+      mapping_(static_cast<std::uint16_t>((direction == Direction::receive ? 0x1600 : 0x1A00) + number - 1)),
+      most_(fd ? 64 : 8) {
   const std::int64_t id = (direction == Direction::receive ? 0x200 : 0x180) + 0x100 * (number - 1) + node;
   const auto reconfigure = [this] { configure(); };
   dictionary.add(parameters_, 0, DataType::unsigned8, Access::constant, 5);
@@ -41,7 +43,7 @@ SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number
   ObjectEntry& count = dictionary.add(mapping_, 0, DataType::unsigned8, Access::read_write, 0);
   count.before_write = [this](std::int64_t value) { return check_count(value); };
   count.after_write = reconfigure;
-  for (std::uint8_t i = 1; i <= 8; ++i) {
+  for (std::uint8_t i = 1; i <= most_; ++i) {
     dictionary.add(mapping_, i, DataType::unsigned32, Access::read_write, 0).before_write = [this](std::int64_t value) {
       return check_object(value);
     };
@@ -68,7 +70,7 @@ void SlavePdo::configure() noexcept {
   type_ = static_cast<std::uint8_t>(dictionary_.number(parameters_, 2));
   inhibit_ns_ = dictionary_.number(parameters_, 3) * 100'000;
   event_timer_ns_ = dictionary_.number(parameters_, 5) * 1'000'000;
-  const std::int64_t wanted = std::min<std::int64_t>(dictionary_.number(mapping_, 0), 8);
+  const std::int64_t wanted = std::min<std::int64_t>(dictionary_.number(mapping_, 0), most_);
   count_ = 0;
   length_ = 0;
   for (std::int64_t i = 1; i <= wanted; ++i) {
@@ -118,7 +120,7 @@ SdoAbort SlavePdo::check_type(std::int64_t value) const noexcept {
 // The mapping changes only while the PDO isn't valid, and becomes active when its number of objects is written.
 SdoAbort SlavePdo::check_count(std::int64_t value) const noexcept {
   if ((dictionary_.number(parameters_, 1) & not_valid) == 0) return SdoAbort::unsupported_access;
-  if (value > 8) return SdoAbort::pdo_length_exceeded;
+  if (value > most_) return SdoAbort::pdo_length_exceeded;
   int length = 0;
   for (std::int64_t i = 1; i <= value; ++i) {
     Mapped mapped;
@@ -126,7 +128,7 @@ SdoAbort SlavePdo::check_count(std::int64_t value) const noexcept {
     if (const SdoAbort abort = resolve(object, mapped); abort != SdoAbort::none) return abort;
     length += mapped.length;
   }
-  return length > 8 ? SdoAbort::pdo_length_exceeded : SdoAbort::none;
+  return length > most_ ? SdoAbort::pdo_length_exceeded : SdoAbort::none;
 }
 
 SdoAbort SlavePdo::check_object(std::int64_t value) const noexcept {
@@ -146,7 +148,7 @@ void SlavePdo::unpack(std::span<const std::uint8_t> bytes) {
   }
 }
 
-void SlavePdo::pack(std::array<std::uint8_t, 8>& bytes) const noexcept {
+void SlavePdo::pack(std::array<std::uint8_t, 64>& bytes) const noexcept {
   std::size_t at = 0;
   for (std::uint8_t i = 0; i < count_; ++i) {
     std::copy_n(mapped_[i].entry->value.begin(), mapped_[i].length, bytes.begin() + static_cast<std::ptrdiff_t>(at));

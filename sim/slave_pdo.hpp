@@ -20,7 +20,9 @@ class SlavePdo {
   enum class Direction : std::uint8_t { receive, transmit };
 
   // Adds the PDO's objects; `number` 1..4. Not valid at first unless `valid`.
-  SlavePdo(ObjectDictionary& dictionary, Direction direction, int number, std::uint8_t node, bool valid);
+  // CAN FD: up to 64 bytes and objects, otherwise 8.
+  SlavePdo(ObjectDictionary& dictionary, Direction direction, int number, std::uint8_t node, bool valid,
+           bool fd = false);
   SlavePdo(const SlavePdo&) = delete;
   SlavePdo& operator=(const SlavePdo&) = delete;
 
@@ -35,12 +37,12 @@ class SlavePdo {
   [[nodiscard]] bool synchronous() const noexcept { return type_ <= 240; }
   [[nodiscard]] std::int64_t inhibit_ns() const noexcept { return inhibit_ns_; }
   [[nodiscard]] std::int64_t event_timer_ns() const noexcept { return event_timer_ns_; }
-  [[nodiscard]] std::uint8_t length() const noexcept { return length_; }  // bytes mapped, 0..8
+  [[nodiscard]] std::uint8_t length() const noexcept { return length_; }  // bytes mapped, 0..8, CAN FD 0..64
 
   // Writes the mapped objects from a PDO of at least length() bytes.
   void unpack(std::span<const std::uint8_t> bytes);
   // Builds the PDO's data; bytes past length() stay as they are.
-  void pack(std::array<std::uint8_t, 8>& bytes) const noexcept;
+  void pack(std::array<std::uint8_t, 64>& bytes) const noexcept;
 
  private:
   struct Mapped {
@@ -64,7 +66,8 @@ class SlavePdo {
   std::uint8_t type_ = 255;
   std::int64_t inhibit_ns_ = 0;
   std::int64_t event_timer_ns_ = 0;
-  std::array<Mapped, 8> mapped_{};
+  std::int64_t most_;  // objects, and bytes
+  std::array<Mapped, 64> mapped_{};
   std::uint8_t count_ = 0;
   std::uint8_t length_ = 0;
 };

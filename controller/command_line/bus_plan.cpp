@@ -61,11 +61,14 @@ class TypicalPdos {
     std::vector<fieldbus::CanFrame> frames(typical_samples);
     for (fieldbus::CanFrame& frame : frames) {
       frame.id = id;
+      frame.fd = frame.bit_rate_switch = drive_.fd;
       for (const fieldbus::MappedObject& mapped : mapping) {
-        fieldbus::write_u32_le(&frame.data[frame.length], value_of(mapped));  // the next one overwrites what is above
+        std::array<std::uint8_t, 4> bytes{};
+        fieldbus::write_u32_le(bytes.data(), value_of(mapped));
+        std::copy_n(bytes.begin(), mapped.bits / 8, frame.data.begin() + frame.length);
         frame.length = static_cast<std::uint8_t>(frame.length + mapped.bits / 8);
       }
-      std::fill(frame.data.begin() + frame.length, frame.data.end(), std::uint8_t{0});
+      frame.length = static_cast<std::uint8_t>(fieldbus::padded_length(frame.length, drive_.fd));
     }
     return frames;
   }
@@ -126,12 +129,14 @@ void add_drive(PlannedBus& bus, const description::DriveDescription& drive, doub
   TypicalPdos typical(drive, start_rad);
   PlannedFrame feedback{.name = drive.joint + " TPDO1",
                         .id = fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 1, node)};
-  feedback.shape.bytes = fieldbus::pdo_bytes(fieldbus::tpdo_mapping(drive));
+  feedback.shape.bytes = fieldbus::padded_length(fieldbus::pdo_bytes(fieldbus::tpdo_mapping(drive)), drive.fd);
+  feedback.shape.fd = feedback.shape.bit_rate_switch = drive.fd;
   feedback.typical = typical(feedback.id, fieldbus::tpdo_mapping(drive));
   feedback.sender = drive.joint;
   feedback.after = "SYNC";
   PlannedFrame target{.name = drive.joint + " RPDO1", .id = fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, node)};
   target.shape.bytes = fieldbus::pdo_bytes(fieldbus::rpdo_mapping(drive));
+  target.shape.fd = target.shape.bit_rate_switch = drive.fd;
   target.typical = typical(target.id, fieldbus::rpdo_mapping(drive));
   target.sender = "controller";
   target.release = controller::receive_window;

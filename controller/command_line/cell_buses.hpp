@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "controller/bring_up.hpp"
+#include "fieldbus/socket_can_network.hpp"
 #include "models/description/cell.hpp"
 
 namespace proxarm::command_line {
@@ -13,5 +14,8 @@ std::vector<std::string> bus_names(const description::Cell& cell);
 
 // For a network that has the cell's buses in the cell's order.
 controller::BusIndices buses_in_order(const description::Cell& cell);
+
+// Throws SetupError where a bus with a data bitrate is to be on an interface that is set up for classic CAN.
+void require_fd(const description::Cell& cell, fieldbus::SocketCanNetwork& network);
 
 }  // namespace proxarm::command_line

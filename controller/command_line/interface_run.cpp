@@ -183,6 +183,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   require_nodes_apart(session, interfaces);
   SocketCanNetwork network(interfaces, {.closed = true});
   refuse_real_interfaces(interfaces);
+  require_fd(session.cell, network);
   const controller::BusIndices indices = indices_in(network, interfaces.size());
   warn_if_not_carried(session, indices);
 

@@ -27,6 +27,7 @@ int sim_command(const RunOptions& options) {
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
   fieldbus::SocketCanNetwork network(interfaces, {.closed = true});
+  require_fd(session.cell, network);
   std::vector<std::size_t> interface_of_bus;
   for (std::size_t i = 0; i < interfaces.size(); ++i) interface_of_bus.push_back(network.bus_of(i));
   sim::set_acceptance_filters(network, session.cell, session.sensor, interface_of_bus);

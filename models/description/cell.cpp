@@ -179,6 +179,26 @@ DriveObjects read_objects(const YamlNode& node) {
   return o;
 }
 
+// Statusword, position and, with torques, the actual one come first.
+std::vector<DriveFeedback> read_feedback(const YamlNode& node, const DriveDescription& drive) {
+  std::vector<DriveFeedback> feedback;
+  int bytes = drive.mode == "cst" ? 8 : 6;
+  const int most = drive.fd ? 64 : 8;
+  for (const YamlNode& each : node.list("feedback", 1, 64)) {
+    feedback.push_back({read_object(each, "object"), static_cast<std::uint8_t>(each.integer("bits", 8, 32))});
+    const int bits = feedback.back().bits;
+    if (bits % 8 != 0 || bits == 24) throw each.error_at("bits", "8, 16 or 32");
+    bytes += bits / 8;
+  }
+  if (bytes > most) {
+    throw node.error_at("feedback",
+                        "at most " + std::to_string(most) + " bytes with statusword and position" +
+                            (drive.fd ? "" : " (64 with fd: true)"),
+                        std::to_string(bytes) + " bytes");
+  }
+  return feedback;
+}
+
 DriveDescription read_drive(const YamlNode& node) {
   DriveDescription d;
   d.joint = node.string("joint");
@@ -195,6 +215,8 @@ DriveDescription read_drive(const YamlNode& node) {
   if (d.on_can()) {
     if (node.has("eds")) d.eds = node.existing_file("eds").string();
     if (const auto objects = node.find_map("objects")) d.objects = read_objects(*objects);
+    d.fd = node.boolean_or("fd", false);
+    if (node.has("feedback")) d.feedback = read_feedback(node, d);
   }
   d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
   d.counts_per_motor_revolution =
@@ -306,11 +328,27 @@ void check_line(const YamlNode& node, const std::string& line, const std::vector
                                            : "one of this cell's modbus_lines: " + one_of(names));
 }
 
+// A classic node answers every FD frame with an error frame.
+void check_format(const YamlNode& node, const DriveDescription& drive, const std::vector<BusDescription>& buses) {
+  const auto bus =
+      std::find_if(buses.begin(), buses.end(), [&](const BusDescription& b) { return b.name == drive.bus; });
+  if (drive.fd && bus->data_bitrate == 0) {
+    throw node.error_at("fd", "false: bus " + drive.bus + " is classic CAN, it has no data_bitrate", "true");
+  }
+  if (!drive.fd && bus->data_bitrate != 0) {
+    throw node.error_at("bus", "a classic bus, or fd: true at this drive", in_quotes(drive.bus),
+                        "the drive of " + drive.joint +
+                            " is classic CAN but the bus carries CAN FD: it would answer "
+                            "every FD frame with an error frame");
+  }
+}
+
 void read_drives(const YamlNode& root, Cell& cell) {
   for (const YamlNode& node : root.list("drives", 1, 32)) {
     const DriveDescription drive = read_drive(node);
     if (drive.on_can()) {
       check_bus(node, drive.bus, cell.buses);
+      check_format(node, drive, cell.buses);
     } else {
       check_line(node, drive.bus, cell.modbus_lines);
     }

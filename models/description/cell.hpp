@@ -66,6 +66,12 @@ struct DriveObjects {
   std::uint32_t interpolation_value = 0x60C201, interpolation_index = 0x60C202;
 };
 
+// One more object in the drive's TPDO1.
+struct DriveFeedback {
+  std::uint32_t object = 0;  // index << 8 | sub-index
+  std::uint8_t bits = 0;     // 8, 16, 32
+};
+
 struct DriveDescription {
   std::string joint;      // name in the URDF; of a linear one, read m for rad, N for Nm and kg for kg m² all along
   std::string bus;        // CAN bus or Modbus line
@@ -75,6 +81,8 @@ struct DriveDescription {
   std::string mode = "csp";        // "csp", "ip", "cst"
   std::string eds;                 // cia402: path of the maker's EDS or DCF file, absolute; may be empty
   DriveObjects objects;            // cia402
+  bool fd = false;                 // cia402: its PDOs are CAN FD frames at the data bitrate
+  std::vector<DriveFeedback> feedback;     // cia402: behind what the controller needs, for the record
   std::uint32_t device_type = 0x00020192;  // expected in 1000h: CiA 402 servo drive
   double counts_per_motor_revolution = 1048576.0;
   double gear_ratio = 100.0;       // motor revolutions per joint revolution

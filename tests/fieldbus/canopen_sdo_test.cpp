@@ -250,6 +250,191 @@ TEST_F(SdoTest, RefusesASizeThatNoObjectHas) {
   EXPECT_EQ(client.abort_code(), sdo_abort::out_of_memory);
 }
 
+// --- aborts of the transfer layer (CiA 301, 7.2.4.3.17), the client's own: what it is sent, and what it says to that
+
+enum class Way { segmented_upload, segmented_download, block_upload, block_download };
+
+struct AbortCase {
+  const char* name;
+  Way way;
+  std::vector<std::string> lines;
+  std::uint32_t code;
+};
+
+const std::vector<std::string> block_download_begin{"> 602#C60020001E000000"};
+const std::vector<std::string> block_segments{"> 602#0141207265616C6C", "> 602#0279207265616C6C",
+                                              "> 602#0379206C6F6E6720", "> 602#04737472696E672E",
+                                              "> 602#852E2E0000000000"};
+const std::vector<std::string> block_upload_begin{"> 602#A40810007F000000"};
+
+std::vector<std::string> operator+(std::vector<std::string> one, const std::vector<std::string>& two) {
+  one.insert(one.end(), two.begin(), two.end());
+  return one;
+}
+
+const std::vector<std::string> block_uploaded =
+    block_upload_begin + std::vector<std::string>{"< 582#C20810001A000000", "> 602#A300000000000000",
+                                                  "< 582#0154696E79204E6F", "< 582#026465202D204D65",
+                                                  "< 582#03676120446F6D61", "< 582#84696E7320210000",
+                                                  "> 602#A2047F0000000000"};
+
+const std::vector<AbortCase> abort_cases{
+    {"toggle bit of a download",
+     Way::segmented_download,
+     {"> 602#210020000D000000", "< 582#6000200000000000", "> 602#0041206C6F6E6720", "< 582#3000000000000000",
+      "> 602#8000200000000305"},
+     0x05030000},
+    {"no command of a segmented download",
+     Way::segmented_download,
+     {"> 602#210020000D000000", "< 582#6000200000000000", "> 602#0041206C6F6E6720", "< 582#4000000000000000",
+      "> 602#8000200001000405"},
+     0x05040001},
+    {"no command of a segmented upload",
+     Way::segmented_upload,
+     {"> 602#4008100000000000", "< 582#410810001A000000", "> 602#6000000000000000", "< 582#2000000000000000",
+      "> 602#8008100001000405"},
+     0x05040001},
+    {"a segment shorter than it says",
+     Way::segmented_upload,
+     {"> 602#4008100000000000", "< 582#410810001A000000", "> 602#6000000000000000", "< 582#0054696E79",
+      "> 602#8008100010000706"},
+     0x06070010},
+    {"blocks of no segment", Way::block_download,
+     block_download_begin + std::vector<std::string>{"< 582#A400200000000000", "> 602#8000200002000405"}, 0x05040002},
+    {"blocks of 128 segments", Way::block_download,
+     block_download_begin + std::vector<std::string>{"< 582#A400200080000000", "> 602#8000200002000405"}, 0x05040002},
+    {"more segments acknowledged than sent", Way::block_download,
+     block_download_begin + std::vector<std::string>{"< 582#A40020007F000000"} + block_segments +
+         std::vector<std::string>{"< 582#A2067F0000000000", "> 602#8000200003000405"},
+     0x05040003},
+    {"a next block of no segment", Way::block_download,
+     block_download_begin + std::vector<std::string>{"< 582#A40020007F000000"} + block_segments +
+         std::vector<std::string>{"< 582#A205000000000000", "> 602#8000200002000405"},
+     0x05040002},
+    {"no acknowledgement of a block", Way::block_download,
+     block_download_begin + std::vector<std::string>{"< 582#A40020007F000000"} + block_segments +
+         std::vector<std::string>{"< 582#A100000000000000", "> 602#8000200001000405"},
+     0x05040001},
+    {"segment number 0", Way::block_upload,
+     block_upload_begin + std::vector<std::string>{"< 582#C20810001A000000", "> 602#A300000000000000",
+                                                   "< 582#0054696E79204E6F", "> 602#8008100003000405"},
+     0x05040003},
+    {"a short segment in the middle", Way::block_upload,
+     block_upload_begin + std::vector<std::string>{"< 582#C20810001A000000", "> 602#A300000000000000",
+                                                   "< 582#0154696E79", "> 602#8008100010000706"},
+     0x06070010},
+    {"a block of 4 GiB", Way::block_upload,
+     block_upload_begin + std::vector<std::string>{"< 582#C2081000FFFFFFFF", "> 602#8008100005000405"}, 0x05040005},
+    {"no end of a block", Way::block_upload,
+     block_uploaded + std::vector<std::string>{"< 582#C400000000000000", "> 602#8008100001000405"}, 0x05040001},
+    {"a block of another size than announced", Way::block_upload,
+     block_uploaded + std::vector<std::string>{"< 582#C500000000000000", "> 602#8008100010000706"}, 0x06070010},
+};
+
+struct SdoAborts : SdoTest {
+  void transfer(Way way) {
+    switch (way) {
+      case Way::segmented_upload:
+        return upload(device_name);
+      case Way::segmented_download:
+        return download(writable_string, bytes_of("A long string"));
+      case Way::block_upload:
+        return upload(device_name, SdoTransfer::block);
+      case Way::block_download:
+        return download(writable_string, bytes_of("A really really long string..."), SdoTransfer::block);
+    }
+  }
+};
+
+TEST_F(SdoAborts, SaysByTheStandardsNumbersWhatIsWrongWithATransfer) {
+  for (const AbortCase& each : abort_cases) {
+    SCOPED_TRACE(each.name);
+    Conversation c(bus, each.lines);
+    transfer(each.way);
+    EXPECT_TRUE(c.complete()) << c.mistakes;
+    EXPECT_EQ(client.outcome(), SdoOutcome::aborted_by_client);
+    EXPECT_EQ(client.abort_code(), each.code);
+  }
+}
+
+TEST_F(SdoAborts, RefusesToTakeMoreThanThereIsRoomFor) {
+  SdoClient small(bus, 2, {.max_upload_bytes = 10});
+  Conversation c(
+      bus, {"> 602#4008100000000000", "< 582#4008100000000000", "> 602#6000000000000000", "< 582#0054696E79204E6F",
+            "> 602#7000000000000000", "< 582#106465202D204D65", "> 602#8008100005000405"});
+  small.start_upload(device_name, network.time_ns);
+  pump_frames(
+      network, network.time_ns + 1'000'000'000,
+      [&](std::size_t, const TimedFrame& received) { small.on_frame(received.frame, received.time_ns); },
+      [&](std::int64_t now_ns) {
+        small.poll(now_ns);
+        return small.finished() ? pump_done : small.wake_ns(now_ns);
+      });
+  EXPECT_TRUE(c.complete()) << c.mistakes;
+  EXPECT_EQ(small.abort_code(), sdo_abort::out_of_memory);
+}
+
+// Whole conversations of each kind, cut off before each of the server's answers.
+const std::vector<std::pair<Way, std::vector<std::string>>> whole_transfers{
+    {Way::segmented_upload,
+     {"> 602#4008100000000000", "< 582#410810001A000000", "> 602#6000000000000000", "< 582#0054696E79204E6F",
+      "> 602#7000000000000000", "< 582#106465202D204D65"}},
+    {Way::segmented_download,
+     {"> 602#210020000D000000", "< 582#6000200000000000", "> 602#0041206C6F6E6720", "< 582#2000200000000000",
+      "> 602#13737472696E6700", "< 582#3000200000000000"}},
+    {Way::block_upload, block_uploaded + std::vector<std::string>{"< 582#C900000000000000"}},
+    {Way::block_download,
+     block_download_begin + std::vector<std::string>{"< 582#A40020007F000000"} + block_segments +
+         std::vector<std::string>{"< 582#A2057F0000000000", "> 602#D545690000000000", "< 582#A100000000000000"}}};
+
+TEST_F(SdoAborts, GivesUpWhereverAServerFallsSilent) {
+  for (const auto& [way, lines] : whole_transfers) {
+    for (std::size_t cut = 0; cut < lines.size(); ++cut) {
+      if (lines[cut][0] != '<') continue;
+      SCOPED_TRACE(::testing::Message() << "way " << static_cast<int>(way) << ", before " << lines[cut]);
+      std::vector<CanFrame> sent;
+      std::size_t next = 0;
+      const auto answer = [&] {
+        for (; next < cut && lines[next][0] == '<'; ++next) bus.arrive(lines[next].substr(2), 100'000);
+      };
+      bus.on_send = [&](const CanFrame& frame) {
+        sent.push_back(frame);
+        if (next < cut && lines[next][0] == '>') ++next;
+        answer();
+      };
+      const std::int64_t begun_ns = network.time_ns;
+      transfer(way);
+      bus.on_send = nullptr;
+      EXPECT_EQ(client.outcome(), SdoOutcome::timed_out);
+      ASSERT_FALSE(sent.empty());
+      EXPECT_EQ(text_of(sent.back()).substr(0, 6), "602#80");
+      EXPECT_EQ(text_of(sent.back()).substr(12), "00000405");
+      // Each answer may take the timeout, and a block is asked for again as often as it may be.
+      const std::int64_t most = static_cast<std::int64_t>(SdoClientConfig{}.max_block_repeats) + 1;
+      EXPECT_LE(network.time_ns - begun_ns, most * SdoClientConfig{}.timeout_ns + 10'000'000);
+    }
+  }
+}
+
+TEST_F(SdoAborts, EndsWhereverAServerAborts) {
+  for (const auto& [way, lines] : whole_transfers) {
+    const bool upload_way = way == Way::segmented_upload || way == Way::block_upload;
+    for (std::size_t cut = 0; cut < lines.size(); ++cut) {
+      if (lines[cut][0] != '<') continue;
+      SCOPED_TRACE(::testing::Message() << "way " << static_cast<int>(way) << ", instead of " << lines[cut]);
+      std::vector<std::string> cut_off(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(cut));
+      cut_off.emplace_back(upload_way ? "< 582#8008100022000008" : "< 582#8000200022000008");
+      Conversation c(bus, cut_off);
+      transfer(way);
+      EXPECT_TRUE(c.complete()) << c.mistakes;
+      EXPECT_EQ(client.outcome(), SdoOutcome::aborted_by_server);
+      EXPECT_EQ(describe_sdo_abort(client.abort_code()),
+                "SDO abort 08000022: data cannot be transferred or stored to the application because of the present "
+                "device state");
+    }
+  }
+}
+
 TEST_F(SdoTest, IgnoresLateAnswersToAnotherObject) {
   Conversation c(
       bus, {"> 602#4018100100000000", "< 582#4300100092010200", "< 582#8000100000000206", "< 582#4318100104000000"});

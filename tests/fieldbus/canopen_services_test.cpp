@@ -129,6 +129,12 @@ TEST(Pdo, MappingsThatDoNotFitAreRefused) {
   EXPECT_THROW((void)pdo_steps(pdo), std::invalid_argument) << "nothing mapped";
   pdo.mapping = {{{0x607A, 0}, 32}, {{0x60FF, 0}, 32}, {{0x6040, 0}, 8}};
   EXPECT_THROW((void)pdo_steps(pdo), std::invalid_argument) << "72 bits";
+  pdo.fd = true;
+  EXPECT_EQ(pdo_steps(pdo).size(), 8U) << "disable, clear, three objects, count, type, enable";
+  pdo.mapping.assign(16, {{0x607A, 0}, 32});
+  EXPECT_EQ(pdo_steps(pdo).size(), 21U) << "64 bytes";
+  pdo.mapping.push_back({{0x6060, 0}, 8});
+  EXPECT_THROW((void)pdo_steps(pdo), std::invalid_argument) << "65 bytes";
 }
 
 // Writes and read-backs of one PDO: disable, clear, map, count, type, timer, enable; each is read back.

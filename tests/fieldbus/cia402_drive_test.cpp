@@ -70,6 +70,36 @@ TEST_F(Cia402DriveTest, WantsItsOwnFramesOnly) {
   EXPECT_FALSE(drive.on_frame(error, 0));
 }
 
+// Mapped are 6041h, 6064h and, for the record, 606Ch, 60F4h and 603Fh: 16 bytes. The RPDO keeps its six.
+TEST(Cia402FdDrive, HasPdosThatAreCanFdFrames) {
+  DriveDescription description = thousand_counts_per_rad();
+  description.fd = true;
+  description.feedback = {{0x606C00, 32}, {0x60F400, 32}, {0x603F00, 16}};
+  ServoDrive drive(description, DriveSettings{});
+  std::vector<std::uint32_t> mapped;
+  for (const SdoStep& step : drive.configuration_steps()) {
+    if (step.object.index == 0x1A00 && step.object.sub > 0) mapped.push_back(step.value);
+  }
+  EXPECT_EQ(mapped, (std::vector<std::uint32_t>{0x60410010, 0x60640020, 0x606C0020, 0x60F40020, 0x603F0010}));
+  CanFrame tpdo;
+  tpdo.id = 0x183;
+  tpdo.fd = tpdo.bit_rate_switch = true;
+  tpdo.length = 16;
+  tpdo.data = {0x50, 0x02, 0x64, 0x00, 0x00, 0x00, 0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88, 0x99, 0xAA};
+  drive.on_sync(ms);
+  EXPECT_TRUE(drive.on_frame(tpdo, ms));
+  EXPECT_EQ(drive.actual_counts(), 100);
+  CanFrame rpdo;
+  drive.request(DriveGoal::operation_enabled);
+  ASSERT_TRUE(drive.encode_rpdo(rpdo));
+  EXPECT_EQ(text_of(rpdo), "203#060064000000");
+  EXPECT_TRUE(rpdo.fd);
+  EXPECT_TRUE(rpdo.bit_rate_switch);
+  tpdo.length = 12;
+  EXPECT_TRUE(drive.on_frame(tpdo, ms));
+  EXPECT_EQ(drive.fault(), DriveFault::pdo_short);
+}
+
 TEST_F(Cia402DriveTest, SendsNothingBeforeAPositionIsKnown) { EXPECT_EQ(cycle(""), ""); }
 
 // The whole way up, with a position that sags by a count per cycle: the target follows it until the drive follows us.

@@ -1,8 +1,10 @@
 #!/usr/bin/python3
-"""A Modbus drive by python3-pymodbus, for modbus_peer_test.cpp: `modbus_peer.py tcp|rtu`.
+"""A Modbus drive or sensor by python3-pymodbus, for modbus_peer_test.cpp and python_sensor_test.py:
+`modbus_peer.py tcp|rtu|ft300`.
 
-Prints where it listens (a port, a pseudo-terminal) on one line, serves unit 1 with registers 0..99, register n holding
-1000 + n at first, and ends with its standard input.
+Prints where it listens (a port, a pseudo-terminal) on one line and ends with its standard input. The drive is unit 1 with
+registers 0..99, register n holding 1000 + n at first. The sensor is a Robotiq FT 300 by its manual: unit 9 on RTU,
+holding registers 180 to 185, hundredths of N and thousandths of Nm, as 16-bit two's complement.
 """
 import asyncio
 import logging
@@ -35,9 +37,19 @@ def crossed_terminals():
     return [os.ttyname(slave) for _, slave in ends]
 
 
+async def be_noisy(block):
+    """Fz: a count comes and goes."""
+    while True:
+        await asyncio.sleep(0.01)
+        block.setValues(182, [1 - block.getValues(182, 1)[0]])
+
+
 async def serve(wire):
-    block = ModbusSequentialDataBlock(0, [1000 + n for n in range(100)])
-    units = ModbusServerContext(slaves={1: ModbusSlaveContext(hr=block, zero_mode=True)}, single=False)
+    unit, block = 1, ModbusSequentialDataBlock(0, [1000 + n for n in range(100)])
+    if wire == "ft300":
+        unit, block = 9, ModbusSequentialDataBlock(180, [0x04D2, 0xFE0C, 0x0000, 0x0190, 0xFDA8, 0x00FA])
+        asyncio.create_task(be_noisy(block))
+    units = ModbusServerContext(slaves={unit: ModbusSlaveContext(hr=block, zero_mode=True)}, single=False)
     if wire == "tcp":
         server = ModbusTcpServer(units, framer=ModbusSocketFramer, address=("127.0.0.1", 0))
         task = asyncio.create_task(server.serve_forever())

@@ -242,6 +242,45 @@ TEST_F(CanopenSlaveTest, LeavesOutPdosAfterTheSynchronousWindow) {
   EXPECT_EQ(slave.dictionary().number(0x607A), 5);
 }
 
+// CAN FD: the PDOs are FD frames of up to 64 bytes, everything else is classic; each frame in the other format is
+// nobody's.
+TEST(CanopenFdSlave, HasLongPdosAndClassicServices) {
+  Application application;
+  testing::RecordingPort port;
+  CanopenSlave slave({.node = 5, .fd = true, .boot_time_ns = ms}, application, port);
+  ObjectDictionary& od = slave.dictionary();
+  od.add(0x6040, 0, DataType::unsigned16, Access::read_write, 0, true);
+  od.add(0x6041, 0, DataType::unsigned16, Access::read_only, 0x0240, true);
+  od.add(0x6064, 0, DataType::integer32, Access::read_only, 0x12345678, true);
+  slave.receive_pdo(1).set_default_mapping({0x60400010});
+  slave.transmit_pdo(1).set_default_mapping({0x60410010, 0x60640020, 0x60640020, 0x60640020, 0x60640020, 0x60640020});
+  slave.power_on(0);
+  slave.on_time(2 * ms);
+  EXPECT_THAT(port.take(), ElementsAre("705#00"));
+  slave.on_frame(testing::from_text("605#2F00180201000000"), 2 * ms);
+  EXPECT_THAT(port.take(), ElementsAre("585#6000180200000000"));
+  slave.on_frame(testing::from_text("000#0105"), 2 * ms);
+  slave.on_frame(testing::from_text("080#"), 3 * ms);
+  ASSERT_EQ(port.frames.size(), 1U);
+  EXPECT_TRUE(port.frames[0].fd);
+  EXPECT_TRUE(port.frames[0].bit_rate_switch);
+  EXPECT_THAT(port.take(), ElementsAre("185#400278563412785634127856341278563412785634120000"))
+      << "22 bytes, filled up to 24";
+  fieldbus::CanFrame target = testing::from_text("205#0F00");
+  slave.on_frame(target, 3 * ms);
+  slave.on_frame(testing::from_text("080#"), 4 * ms);
+  EXPECT_EQ(od.number(0x6040), 0) << "a classic frame is no PDO of this node";
+  target.fd = true;
+  slave.on_frame(target, 4 * ms);
+  slave.on_frame(testing::from_text("080#"), 5 * ms);
+  EXPECT_EQ(od.number(0x6040), 0x0F);
+  port.take();
+  fieldbus::CanFrame request = testing::from_text("605#4000100000000000");
+  request.fd = true;
+  slave.on_frame(request, 5 * ms);
+  EXPECT_THAT(port.take(), IsEmpty()) << "an SDO is a classic frame";
+}
+
 TEST_F(CanopenSlaveTest, KeepsTheRulesOfPdoMapping) {
   boot();
   EXPECT_THAT(ask("605#2F00160000000000"), ElementsAre("585#8000160000000106"));  // while the PDO is valid

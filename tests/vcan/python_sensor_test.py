@@ -175,13 +175,16 @@ class PythonSensors(two.VcanTestCase):
         commands = iter(sensor.commands)
         for identifier, data in kind.told:
             self.assertIn((identifier, data), commands, "in this order, whatever else it is told")
+        self.assert_recorded(record, kind.wrench)
+
+    def assert_recorded(self, record, wrench):
         with open(record / "signals.csv") as signals:
             rows = list(csv.DictReader(signals))
         self.assertGreater(len(rows), 400)
         names = [f"{what}_S_{axis}" for what, unit in (("force", "N"), ("torque", "Nm")) for axis in
                  (f"x_{unit}", f"y_{unit}", f"z_{unit}")]
         for row in rows:
-            for name, value in zip(names, kind.wrench):
+            for name, value in zip(names, wrench):
                 noise = 1.0 if name == "force_S_z_N" else 0.0  # the count that comes and goes, a newton of the coarsest
                 self.assertLessEqual(abs(float(row[name]) - value), noise + 1e-9, (row["cycle"], name))
         self.assertEqual(len({row["force_S_z_N"] for row in rows}), 2, "new samples")
@@ -200,6 +203,23 @@ class PythonSensors(two.VcanTestCase):
 
     def test_ati(self):
         self.assert_read(Ati)
+
+    def test_ft300_on_modbus(self):
+        """12.34 N, -5.00 N, 0, 0.4 Nm, -0.6 Nm, 0.25 Nm."""
+        text = self.cell_with(Aidin).read_text().replace("/aidin_aft200.yaml", "/robotiq_ft300.yaml")
+        record, cell = self.folder / "ft300", self.folder / "ft300.yaml"
+        peer_program = Path(__file__).resolve().parents[1] / "fieldbus/modbus_peer.py"
+        with subprocess.Popen(["/usr/bin/python3", peer_program, "ft300"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                              text=True) as peer:
+            terminal = peer.stdout.readline().strip()
+            text = text.replace("\ndrives:", "\nmodbus_lines:\n"
+                                f"  - {{name: ft, device: {terminal}, baud: 19200, parity: none}}\ndrives:")
+            cell.write_text(text.replace("  bus: sensor\n", "  bus: ft\n  base_id: 9\n"))
+            with two.simulated_arm("axes_1_3=vcan0,axes_4_6=vcan1,sensor=vcan3"), \
+                    two.controller(two.THREE, "0.2s", record, cell) as run:
+                self.assertEqual(run.wait(), 0, run.errors() + run.output())
+            peer.stdin.close()
+        self.assert_recorded(record, (12.34, -5.0, 0.0, 0.4, -0.6, 0.25))
 
     def test_scan_hears_those_that_stream_and_polls_the_one_it_is_told_to(self):
         scan = [two.PROGRAM, "scan", "--bus", "vcan2"]
