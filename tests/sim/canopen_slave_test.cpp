@@ -247,7 +247,7 @@ TEST_F(CanopenSlaveTest, LeavesOutPdosAfterTheSynchronousWindow) {
 TEST(CanopenFdSlave, HasLongPdosAndClassicServices) {
   Application application;
   testing::RecordingPort port;
-  CanopenSlave slave({.node = 5, .fd = true, .boot_time_ns = ms}, application, port);
+  CanopenSlave slave({.node = 5, .device_name = "test", .fd = true, .boot_time_ns = ms}, application, port);
   ObjectDictionary& od = slave.dictionary();
   od.add(0x6040, 0, DataType::unsigned16, Access::read_write, 0, true);
   od.add(0x6041, 0, DataType::unsigned16, Access::read_only, 0x0240, true);
