@@ -402,6 +402,9 @@ void Cycle::record_world(const WorldStep& step) noexcept {
   record_.contact_force_W_N = triple(step.f_W);
   record_.normal_W = triple(step.normal_W);
   record_.contact_object = step.object;
+  record_.friction = step.friction;
+  record_.proxy_mass_kg = step.mass_kg;
+  record_.proxy_damping_Ns_per_m = step.damping_Ns_per_m;
   record_.contact_count = static_cast<std::uint8_t>(step.contacts);
   record_.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
 }

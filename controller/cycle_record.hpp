@@ -84,12 +84,14 @@ struct CycleRecord {
   Triple contact_force_W_N{};         // f(k), (25a): on the proxy
   Triple normal_W{};                  // of the first contact; zero when free
   std::int32_t contact_object = -1;   // of the first contact, by its index in the scene; −1 when free
-  double friction = 0.0;              // its μ
+  double friction = 0.0;              // its μ, as it is now
   Triple tool_W_m{};                  // the rendered point by the encoders, at t_k
   double proxy_clearance_m = 0.0;     // signed distance of the proxy to the nearest surface; below 0: inside
   double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders
   std::array<std::int32_t, max_axes> target_counts{};  // 607A sent in this cycle; in torque mode 6071
   std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
+
+  double proxy_mass_kg = 0.0, proxy_damping_Ns_per_m = 0.0;  // M and B of this step; impedance type: 0
 
   // Of PassivityObserver, where it is wanted.
   PortEnergies energies_J{};

@@ -1,6 +1,7 @@
 #include "controller/rendered_world.hpp"
 
 #include "controller/limited_algorithm.hpp"
+#include "controller/scene_changes.hpp"
 #include "controller/scene_space.hpp"
 
 namespace proxarm::controller {
@@ -15,6 +16,7 @@ class WorldOfDimension final : public RenderedWorld {
  public:
   WorldOfDimension(scenes::CompiledScene& scene, const AdmittanceConfig& config)
       : scene_(&scene),
+        changes_(scene, config.period_s),
         space_(scene),
         limited_(scene.algorithm<N>()),
         proxy_(config, limited_),
@@ -46,6 +48,7 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   WorldStep step(const Vec3& h_W, const StepLimits& limits) noexcept override {
+    changes_.step();
     limited_.set_limits(limits, space_.basis(), proxy_.q());
     ProxyFault fault = proxy_.step(space_.basis().transpose() * h_W);
     if (fault == ProxyFault::none && limited_.squeezed()) fault = ProxyFault::squeezed;
@@ -65,6 +68,7 @@ class WorldOfDimension final : public RenderedWorld {
     last_.mass_kg = proxy_.config().mass_kg;
     last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
     add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
+    last_.friction = changes_.friction(last_.object);
     return last_;
   }
 
@@ -79,6 +83,10 @@ class WorldOfDimension final : public RenderedWorld {
       case Parameter::spring:
         proxy_.set_spring(change.value);
         break;
+      case Parameter::friction:
+      case Parameter::position:
+        changes_.set(change);
+        break;
       case Parameter::none:
         break;
     }
@@ -89,11 +97,12 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   void archive(fieldbus::StateArchive& state) noexcept override {
-    state(proxy_, space_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_);
+    state(proxy_, space_, changes_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_);
   }
 
  private:
   scenes::CompiledScene* scene_;
+  SceneChanges changes_;
   SceneSpace<N> space_;
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;

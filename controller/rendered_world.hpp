@@ -29,6 +29,7 @@ struct WorldStep {
   models::Vec3 v_W = models::Vec3::Zero();
   models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
   std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
+  double friction = 0.0;                         // its μ
   int contacts = 0;
   bool slips = false;
   ActiveLimits limits;                                // that held the proxy back

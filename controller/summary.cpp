@@ -93,6 +93,7 @@ struct SummaryBuilder::State {
   void count(const CycleRecord& record);
   void track(const CycleRecord& record);
   void observe(const CycleRecord& record);
+  void follow_changes(const CycleRecord& record);
   void penetrate(const CycleRecord& record);
   void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
   void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
@@ -106,6 +107,7 @@ struct SummaryBuilder::State {
   Slide sliding;
   double contact_s = 0.0;                                  // how long the contact has lasted
   std::uint64_t rendered = 0, touching = 0, slipping = 0;  // cycles
+  double mass_kg = 0.0;                                    // of the proxy, in the record before
   std::optional<Vec3> start;                               // x₀ of the spring
   std::deque<CycleRecord> recent;                          // consecutive cycles of rendering, newest last
 };
@@ -126,6 +128,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   }
   if (record.phase != Phase::rendering) return;
   if (!s.start) s.start = vec3(record.proxy_W_m);
+  s.follow_changes(record);
   ++s.rendered;
   s.recent.push_back(record);
   s.penetrate(record);
@@ -154,6 +157,18 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
     }
   }
   if (record.has(RecordFlag::truth)) summary.from_truth = true;
+}
+
+// What was set while rendering counts from then on, and the felt mass is that of the last one.
+void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
+  if (record.proxy_mass_kg != mass_kg) {
+    if (mass_kg > 0.0) {
+      config.felt_mass_kg = record.proxy_mass_kg + config.handle_mass_kg;
+      apparent = ApparentMass(config.period_s);
+    }
+    mass_kg = record.proxy_mass_kg;
+  }
+  if (mass_kg > 0.0) config.damping_Ns_per_m = record.proxy_damping_Ns_per_m;
 }
 
 void SummaryBuilder::State::observe(const CycleRecord& record) {

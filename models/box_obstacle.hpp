@@ -24,6 +24,7 @@ class BoxObstacle final : public Obstacle {
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override;
   [[nodiscard]] double distance(const Vec3& x) const noexcept override;
   [[nodiscard]] Bounds bounds() const noexcept override;
+  void set_friction(double friction) noexcept override { mu_ = friction; }
 
   // Faces 2 k and 2 k + 1: along +axis k and −axis k. Shared with boxes from inside.
   static std::array<FlatSurface<3>, 6> faces(const Pose& X, const Vec3& size_m);

@@ -21,6 +21,10 @@ class CylinderObstacle final : public Obstacle {
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override;
   [[nodiscard]] double distance(const Vec3& x) const noexcept override;
   [[nodiscard]] Bounds bounds() const noexcept override;
+  void set_friction(double friction) noexcept override {
+    side_.set_friction(friction);
+    for (PlaneObstacle& end : end_) end.set_friction(friction);
+  }
 
  private:
   enum Feature : std::int32_t { side = 0, far_end = 1, near_end = 2 };

@@ -77,6 +77,8 @@ class FrictionPlane final : public GeometricAlgorithm<N> {
 
   [[nodiscard]] const FlatSurface<N>& surface() const noexcept { return surface_; }
   [[nodiscard]] double friction() const noexcept { return mu_; }
+  // From the next step on; finite and not negative.
+  void set_friction(double friction) noexcept { mu_ = friction; }
 
  private:
   FlatSurface<N> surface_;

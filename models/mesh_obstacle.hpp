@@ -71,6 +71,7 @@ class MeshObstacle final : public Obstacle {
   [[nodiscard]] double distance(const Vec3& x) const noexcept override {
     return mesh().distance(x, std::numeric_limits<double>::infinity(), near_);
   }
+  void set_friction(double friction) noexcept override { surface_.set_friction(friction); }
   [[nodiscard]] Bounds bounds() const noexcept override { return mesh().bounds(); }
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return surface_.mesh(); }

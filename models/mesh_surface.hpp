@@ -50,6 +50,8 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   [[nodiscard]] double friction(std::uint32_t face) const noexcept {
     return friction_of_face_.empty() ? mu_ : friction_of_face_[face];
   }
+  // From the next step on, where it isn't by face; finite and not negative.
+  void set_friction(double friction) noexcept { mu_ = friction; }
 
  private:
   struct Walk;  // one step on its way

@@ -86,6 +86,7 @@ class MovingObstacle final : public Obstacle {
     return rests() ? q : Vec3(now_ * (before_.inverse(Eigen::Isometry) * q));
   }
   [[nodiscard]] bool moves() const noexcept override { return true; }
+  void set_friction(double friction) noexcept override { still_->set_friction(friction); }
 
  private:
   [[nodiscard]] bool rests() const noexcept { return now_.matrix() == before_.matrix(); }

@@ -76,6 +76,9 @@ class Obstacle {
 
   [[nodiscard]] virtual bool moves() const noexcept { return false; }
 
+  // From the next step on; finite and not negative.
+  virtual void set_friction(double friction) noexcept = 0;
+
   virtual void set_time(double /*time_s*/, double /*period_s*/) noexcept {}
 };
 

@@ -33,6 +33,7 @@ class PlaneObstacle final : public Obstacle {
     return {surface_, mu_};
   }
   [[nodiscard]] double distance(const Vec3& x) const noexcept override { return surface_.height(x); }
+  void set_friction(double friction) noexcept override { mu_ = friction; }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
 
  private:

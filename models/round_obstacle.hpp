@@ -149,6 +149,7 @@ class RoundObstacle final : public Obstacle {
 
   [[nodiscard]] double distance(const Vec3& x) const noexcept override { return at(core_, x, x).height; }
 
+  void set_friction(double friction) noexcept override { mu_ = friction; }
   [[nodiscard]] Bounds bounds() const noexcept override {
     if (sign_ < 0.0) return {};
     const Bounds core = core_.bounds();

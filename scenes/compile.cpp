@@ -151,7 +151,9 @@ Algorithm<N> one_plane(const HalfSpace<N>& plane, CompiledScene& out) {
   out.skipped.push_back({"composition", "a single surface"});
   if (object.friction > 0.0 && N > 1) {
     out.stages.push_back({"wall with friction, equation (4)", object.name + ", μ = " + number_text(object.friction)});
-    return std::make_unique<models::FrictionPlane<N>>(plane.point, plane.normal, object.friction);
+    auto wall = std::make_unique<models::FrictionPlane<N>>(plane.point, plane.normal, object.friction);
+    out.rubbing.emplace_back(plane.index, [surface = wall.get()](double mu) { surface->set_friction(mu); });
+    return wall;
   }
   out.stages.push_back({"wall, equation (2)", object.name});
   out.skipped.push_back({"friction", object.friction > 0.0 ? "a line has no tangent to slip along" : "μ = 0"});
@@ -182,7 +184,16 @@ Algorithm<N> several_planes(const Cut<N>& cut, CompiledScene& out) {
        "sets of at most three contacts, solved directly"});
   if (!friction) out.skipped.push_back({"friction", "μ = 0 everywhere"});
   out.skipped.push_back({"search", "all surfaces are flat and few"});
-  return in_space<N>(std::make_unique<models::PlaneComposition>(std::move(faces)));
+  auto composition = std::make_unique<models::PlaneComposition>(std::move(faces));
+  if (N > 1) {
+    for (const auto& plane : cut.planes) {
+      if (plane.feature != 0) continue;  // once for an object
+      out.rubbing.emplace_back(plane.index, [planes = composition.get(), object = plane.index](double mu) {
+        planes->set_friction(object, mu);
+      });
+    }
+  }
+  return in_space<N>(std::move(composition));
 }
 
 std::unique_ptr<models::Obstacle> moved(std::unique_ptr<models::Obstacle> still, const Object& object,
@@ -239,6 +250,12 @@ Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   if (rubbing == 0) out.skipped.push_back({"friction", "μ = 0 everywhere"});
   if (moving == 0) out.skipped.push_back({"motion", "nothing moves"});
   if (layers == 0) out.skipped.push_back({"elastic layers", "none"});
+  for (const models::World::Entry& entry : entries) {
+    // Friction by triangle stays as the scene has it.
+    if (N == 1 || !scene.objects[static_cast<std::size_t>(entry.object)].friction_regions.empty()) continue;
+    out.rubbing.emplace_back(entry.object,
+                             [obstacle = entry.obstacle.get()](double mu) { obstacle->set_friction(mu); });
+  }
   return in_space<N>(std::make_unique<models::World>(std::move(entries)));
 }
 
@@ -281,7 +298,12 @@ Algorithm<3> one_mesh(const Scene& scene, const Object& object, const MeshShape&
   out.skipped.push_back({"composition", "a single object"});
   if (!has_friction(object)) out.skipped.push_back({"friction", "μ = 0"});
   out.skipped.push_back({"motion", "nothing moves"});
-  return std::make_unique<models::MeshSurface>(shape.mesh, object.friction, friction_by_face(scene, object));
+  auto surface =
+      std::make_unique<models::MeshSurface>(shape.mesh, object.friction, friction_by_face(scene, object));
+  if (object.friction_regions.empty()) {
+    out.rubbing.emplace_back(0, [mesh_surface = surface.get()](double mu) { mesh_surface->set_friction(mu); });
+  }
+  return surface;
 }
 
 template <int N>
@@ -353,6 +375,7 @@ CompiledScene compile(const Scene& scene) {
   CompiledScene out;
   out.name = scene.name;
   out.space = scene.space;
+  for (const Object& object : scene.objects) out.frictions.push_back(object.friction);
   switch (scene.space.dimensions) {
     case 1:
       out.any_algorithm = build<1>(scene, out);
@@ -373,15 +396,27 @@ void CompiledScene::drive(std::size_t object, const models::Pose& X) noexcept {
   }
 }
 
+void CompiledScene::set_friction(std::size_t object, double friction) noexcept {
+  for (const auto& [index, set] : rubbing) {
+    if (static_cast<std::size_t>(index) == object) set(friction);
+  }
+}
+
+bool CompiledScene::has_friction(std::size_t object) const noexcept {
+  return std::any_of(rubbing.begin(), rubbing.end(),
+                     [object](const auto& part) { return static_cast<std::size_t>(part.first) == object; });
+}
+
 double clearance_m(const Scene& scene, const Vec3& x_W) {
   double least = std::numeric_limits<double>::infinity();
   for (const Object& object : scene.objects) least = std::min(least, distance_to(object, x_W));
   return least;
 }
 
-double clearance_m(const Scene& scene, const Vec3& x_W, double time_s) {
+double clearance_m(const Scene& scene, const Vec3& x_W, double time_s, Driven driven) {
   double least = std::numeric_limits<double>::infinity();
   for (const Object& object : scene.objects) {
+    if (object.motion && object.motion->driven && driven == Driven::left_out) continue;
     const bool moves = object.motion && !object.motion->driven;
     const Vec3 x = moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) * x_W : x_W;
     least = std::min(least, distance_to(object, x));

@@ -6,6 +6,7 @@
 //   const Vec3 q = g(M / (T * T), p_hat, q_k1);                    // (26b)
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -47,6 +48,12 @@ struct CompiledScene {
   void drive(std::size_t object, const models::Pose& X) noexcept;
   std::vector<std::pair<std::int32_t, models::MovingObstacle*>> driven;  // parts of any_algorithm
 
+  // Sets an object's friction, from the next step on; finite and not negative. Only where the 𝒢 has friction for it.
+  void set_friction(std::size_t object, double friction) noexcept;
+  [[nodiscard]] bool has_friction(std::size_t object) const noexcept;
+  std::vector<double> frictions;                                              // of all objects, as described
+  std::vector<std::pair<std::int32_t, std::function<void(double)>>> rubbing;  // parts of any_algorithm
+
   // Coordinates of the space ↔ points of W.
   template <int N>
   [[nodiscard]] models::Vec3 to_W(const models::Vec<N>& x) const noexcept {
@@ -66,7 +73,8 @@ CompiledScene compile(const Scene& scene);
 // count where they are described, layers as gone. For summaries and tests, not for the cycle.
 double clearance_m(const Scene& scene, const models::Vec3& x_W);
 // The same at a time of the scene's scripts, which the k-th step of a proxy (from 1) takes to be k T. Objects that are
-// driven count where they are described.
-double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s);
+// driven count where they are described, or, if where they are now isn't known, not at all.
+enum class Driven { as_described, left_out };
+double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s, Driven driven = Driven::as_described);
 
 }  // namespace proxarm::scenes

@@ -161,9 +161,13 @@ std::string ask_control_socket(const fs::path& path, const std::string& line) {
   error_code error;
   socket.connect(endpoint_of(fs::absolute(path)), error);
   if (error) {
+    const bool nobody = error == boost::asio::error::connection_refused;
+    const bool nothing = error == boost::system::errc::no_such_file_or_directory;
     throw SetupError({.file = path.string(),
                       .key = "--control",
-                      .found = error.message(),
+                      .found = nothing  ? "no such socket"
+                               : nobody ? "a socket whose session has ended"
+                                        : error.message(),
                       .expected = "a session that listens there",
                       .advice = "start it with `proxarm run --control " + path.string() + "`"});
   }

@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <sstream>
 
 #include "models/description/quantity.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/description/text.hpp"
+#include "scenes/compile.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
 namespace fs = std::filesystem;
+using controller::Change;
 using controller::Parameter;
 using description::SetupError;
 
@@ -31,9 +35,67 @@ const Live& find(const std::string& text) {
     if (name == parameter.name && text.find('=') != std::string::npos) return parameter;
     known.emplace_back(parameter.name);
   }
-  throw SetupError({.key = "--set",
-                    .found = description::in_quotes(text),
-                    .expected = "NAME=VALUE with NAME " + description::one_of(known)});
+  throw SetupError(
+      {.key = "--set",
+       .found = description::in_quotes(text),
+       .expected = "NAME=VALUE with NAME " + description::one_of(known) + ", or OBJECT.friction, OBJECT.position_m"});
+}
+
+[[noreturn]] void refuse(const std::string& key, const std::string& found, const std::string& expected,
+                         const std::string& advice = "") {
+  throw SetupError({.key = key, .found = found, .expected = expected, .advice = advice});
+}
+
+double number_of(const std::string& text, const std::string& key, const std::string& expected, double least,
+                 double most) {
+  const std::optional<double> value = description::strict_number(text);
+  if (!value || !(*value >= least && *value <= most)) refuse(key, description::in_quotes(text), expected);
+  return *value;
+}
+
+constexpr double most_friction = 10.0;
+constexpr double farthest_m = 10.0;
+
+// "NAME.friction=MU", "NAME.position_m=X,Y,Z". Nothing where there is no such key.
+std::optional<Change> change_of_object(const std::string& text, const scenes::Scene& scene) {
+  const std::size_t equals = text.find('='), dot = text.rfind('.', equals);
+  if (equals == std::string::npos || dot == std::string::npos) return {};
+  const std::string name = text.substr(0, dot), what = text.substr(dot + 1, equals - dot - 1);
+  const std::string key = text.substr(0, equals), value = text.substr(equals + 1);
+  if (what != "friction" && what != "position_m") refuse(key, description::in_quotes(what), "friction or position_m");
+  const auto object =
+      std::find_if(scene.objects.begin(), scene.objects.end(), [&](const scenes::Object& o) { return o.name == name; });
+  if (object == scene.objects.end()) {
+    std::vector<std::string> names;
+    for (const scenes::Object& o : scene.objects) names.push_back(o.name);
+    refuse(
+        key, description::in_quotes(name),
+        names.empty() ? "an object, and this scene has none" : "an object of the scene: " + description::one_of(names));
+  }
+  Change change;
+  change.object = static_cast<std::int32_t>(object - scene.objects.begin());
+  if (what == "friction") {
+    change.parameter = Parameter::friction;
+    change.value = number_of(value, key, "a friction coefficient from 0 to 10", 0.0, most_friction);
+    if (scenes::compile(scene).has_friction(static_cast<std::size_t>(change.object))) return change;
+    refuse(key, "a single wall without friction, which is compiled without, or friction by region",
+           "an object whose friction can change", "give it some in the scene file, such as friction: 0.001");
+  }
+  change.parameter = Parameter::position;
+  if (!object->motion || !object->motion->driven) {
+    refuse(key, "an object that stands still", "an object that is driven",
+           "give it motion: {driven: true} in the scene file");
+  }
+  std::istringstream parts(value + ",");
+  for (double& x : change.position_m) {
+    std::string part;
+    std::getline(parts, part, ',');
+    x = number_of(part, key, "three numbers X,Y,Z, metres from where it is described, at most 10", -farthest_m,
+                  farthest_m);
+  }
+  if (parts.peek() != std::istringstream::traits_type::eof())
+    refuse(key, description::in_quotes(value), "three numbers");
+  return change;
 }
 
 fs::path control_path(const RunOptions& options) {
@@ -46,6 +108,12 @@ LiveParameters::LiveParameters(const PreparedSession& session, const RunOptions&
     : session_(session), options_(options) {}
 
 controller::Change LiveParameters::take(const std::string& text) {
+  if (text.compare(0, 9, "timestep=") == 0) {
+    refuse(
+        "timestep", "a change while rendering",
+        "a new session with --timestep: drives take their interpolation period (60C2h) before they are enabled only");
+  }
+  if (const std::optional<Change> change = change_of_object(text, session_.scene)) return *change;
   const Live& parameter = find(text);
   const double value = parameter.parse(text.substr(text.find('=') + 1), parameter.name);
   PreparedSession changed = session_;
@@ -59,6 +127,8 @@ controller::Change LiveParameters::take(const std::string& text) {
     case Parameter::spring:
       changed.settings.spring_N_per_m = changed.loop.spring_N_per_m = value;
       break;
+    case Parameter::friction:
+    case Parameter::position:
     case Parameter::none:
       break;
   }

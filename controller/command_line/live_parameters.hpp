@@ -1,4 +1,5 @@
-// The parameters of a session that may change while it runs, as text: "mass=3", "damping=20Ns/m", "spring=0".
+// The parameters of a session that may change while it runs, as text: "mass=3", "damping=20Ns/m", "spring=0"; of an
+// object by its name "wall.friction=0.5", "plate.position_m=0.1,0,0".
 //
 // Each change is judged as it would be at the start, with what has been changed before; what is refused changes
 // nothing.

@@ -148,7 +148,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,
-                 "change a parameter while rendering, such as mass=3@4s (mass, damping, spring); may be repeated")
+                 "change a parameter while rendering, such as mass=3@4s (mass, damping, spring, OBJECT.friction, "
+                 "OBJECT.position_m); may be repeated")
       ->type_name("NAME=VALUE@TIME")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -273,7 +274,8 @@ int run(int argc, char** argv) {
   scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
 
   command_line::SetOptions set_options;
-  CLI::App* set_app = app.add_subcommand("set", "change mass, damping or spring of a running session");
+  CLI::App* set_app =
+      app.add_subcommand("set", "change mass, damping, spring, or an object's friction or place, in a running session");
   set_app->add_option("changes", set_options.changes, "NAME=VALUE, such as mass=3")->required();
   set_app->add_option("--control", set_options.control, "the session's socket")->type_name("PATH");
   set_app->callback([&] { command = [&] { return command_line::set_command(set_options); }; });

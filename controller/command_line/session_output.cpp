@@ -44,8 +44,12 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
 void complete(CycleRecord& record, const PreparedSession& session, std::uint64_t proxy_steps) {
   const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
   const double scene_time_s = static_cast<double>(proxy_steps) * session.settings.period_s;
-  record.proxy_clearance_m = scenes::clearance_m(session.scene, controller::vec3(record.proxy_W_m), scene_time_s);
-  record.tool_clearance_m = scenes::clearance_m(session.scene, controller::vec3(tool), scene_time_s);
+  const auto clearance_m = [&](const controller::Triple& x_W) {
+    return scenes::clearance_m(session.scene, controller::vec3(x_W), scene_time_s, scenes::Driven::left_out);
+  };
+  record.proxy_clearance_m = clearance_m(record.proxy_W_m);
+  record.tool_clearance_m = clearance_m(tool);
+  if (!session.impedance()) return;
   if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
     record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
   }

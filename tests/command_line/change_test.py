@@ -45,6 +45,14 @@ class Script(ProgramTest):
             script += ["--set", f"mass={3 if i % 2 else 20}@{200 * i}ms",
                        "--set", f"damping={40 if i % 3 else 0}@{200 * i}ms"]
         rows = self.signals(*SWEEP, "--duration", "4s", *script)
+        self.assert_setpoints_within_limits(rows)
+        v = [[(float(b[f"proxy_W_{c}_m"]) - float(a[f"proxy_W_{c}_m"])) / 1e-3 for c in "xyz"]
+             for a, b in zip(rows, rows[1:])]
+        steps = [max(abs(x - y) for x, y in zip(a, b)) for a, b in zip(v, v[1:])]
+        # limits.max_tool_acceleration_m_per_s2 is 20: 0.02 m/s a cycle.
+        self.assertLess(max(steps), 0.02)
+
+    def assert_setpoints_within_limits(self, rows):
         cell = (SOURCE / "models/cells/default.yaml").read_text()
         gears = [float(x) for x in re.findall(r"gear_ratio: (\S+)", cell)]
         limits = [float(x) for x in re.findall(r"max_acceleration_rad_per_s2: (\S+)", cell)]
@@ -54,11 +62,6 @@ class Script(ProgramTest):
             counts = [int(row[f"{axis}_target_counts"]) for row in rows]
             second = [abs(c - 2 * b + a) for a, b, c in zip(counts, counts[1:], counts[2:])]
             self.assertLess(max(second), limit * per_rad * 1e-6 + 2, axis)  # two counts: three roundings
-        v = [[(float(b[f"proxy_W_{c}_m"]) - float(a[f"proxy_W_{c}_m"])) / 1e-3 for c in "xyz"]
-             for a, b in zip(rows, rows[1:])]
-        steps = [max(abs(x - y) for x, y in zip(a, b)) for a, b in zip(v, v[1:])]
-        # limits.max_tool_acceleration_m_per_s2 is 20: 0.02 m/s a cycle.
-        self.assertLess(max(steps), 0.02)
 
     def test_two_runs_and_the_replay_are_the_same(self):
         arguments = ("--duration", "3s", "--set", "mass=6@1s", "--set", "spring=50@1500ms", "--set", "damping=10@2s")
@@ -74,6 +77,78 @@ class Script(ProgramTest):
                              ("mass=nan@1s", "mass"), ("damping=3kg@1s", "damping"), ("=@1s", "NAME=VALUE")):
             with self.subTest(change):
                 self.assert_refused(self.call("run", "--set", change), said)
+
+
+PLATE = """name: a plate that is pushed
+objects:
+  - box:
+      centre_m: [0.65, 0, 0.6]
+      size_m: [0.05, 0.3, 0.3]
+      name: plate
+      friction: 0.2
+      motion: {driven: true}
+"""
+STILL = "name: still\nstiffness_N_per_m: 300\ndamping_Ns_per_m: 20\nwaypoints:\n  - {time_s: 0, offset_m: [0, 0, 0]}\n"
+
+
+class Objects(Script):
+    def column(self, rows, name):
+        return [float(row[name]) for row in rows]
+
+    def test_friction_goes_evenly_to_its_new_value_and_is_that_of_the_force(self):
+        """While it slips, the force along the wall is mu times the one across, by the mu of that very cycle."""
+        rows = self.signals("--duration", "7.5s", "--set", "wall.friction=0.1@6s")
+        mu = self.column(rows, "friction_1")
+        touching = [k for k, row in enumerate(rows) if row["contact"] == "slip" and k > 5400]
+        self.assertGreater(len(touching), 1500)
+        self.assertEqual(mu[5990], 0.3)
+        self.assertAlmostEqual(mu[6300], 0.1)
+        for a, b in zip(mu[5400:], mu[5401:]):
+            self.assertLessEqual(abs(b - a), 1e-3 + 1e-12)  # 1/s, 1 ms; both are of a wall that is touched throughout
+        for k in touching:
+            x, y, z = (float(rows[k][f"contact_force_W_{c}_N"]) for c in "xyz")
+            if x > -1:
+                continue
+            self.assertAlmostEqual(math.hypot(y, z), mu[k] * -x, delta=1e-6)
+        self.assertEqual(self.call("replay", "session").status, 0)
+
+    def test_an_object_sweeps_the_proxy_and_never_appears_on_it(self):
+        """The plate's near face starts 25 mm behind the tool, at x 0.675, and goes to 0.775: by the straight law of its
+        motion at every moment the tool is in front of it."""
+        scene, hand = self.written("plate.yaml", PLATE), self.written("still.yaml", STILL)
+        rows = self.signals("--scene", scene, "--hand", hand, "--duration", "3s", "--set", "plate.position_m=0.1,0,0@500ms")
+        q = self.column(rows, "proxy_W_x_m")
+        at, speed, face = 0.0, 0.0, []
+        for k in range(len(rows)):
+            if k >= 500 and at < 0.1:
+                speed = min(speed + 0.5e-3, 0.1, math.sqrt(2 * 0.5 * (0.1 - at)))
+                at = min(at + speed * 1e-3, 0.1)
+            face.append(0.675 + at)
+        self.assertGreater(q[-1], 0.77)
+        self.assertGreater(min(a - b for a, b in zip(q, face)), -1e-9)
+        v = [(b - a) / 1e-3 for a, b in zip(q, q[1:])]
+        self.assertLess(max(v), 0.11)  # the plate's 0.1 m/s, and what the touch's own spring back adds
+        self.assert_setpoints_within_limits(rows)
+        self.assertEqual(self.call("replay", "session").status, 0)
+
+    def test_what_an_object_can_not_is_refused(self):
+        for change, said in (("wall.friction=-1@1s", "from 0 to 10"), ("wall.friction=nan@1s", "from 0 to 10"),
+                             ("wal.friction=1@1s", "wall"), ("wall.colour=1@1s", "friction or position_m"),
+                             ("wall.position_m=0,0,0@1s", "driven: true"), ("timestep=2ms@1s", "60C2h")):
+            with self.subTest(change):
+                self.assert_refused(self.call("run", "--set", change), said)
+        scene = self.written("plate.yaml", PLATE)
+        for value in ("0", "0,0", "0,0,0,0", "0,0,11", "a,0,0", ""):
+            with self.subTest(value):
+                self.assert_refused(self.call("run", "--scene", scene, "--set", f"plate.position_m={value}@1s"),
+                                    "plate.position_m")
+        self.assert_refused(self.call("run", "--scene", "scenes/frictionless_wall.yaml", "--set", "wall.friction=1@1s"),
+                            "compiled")
+
+    def test_the_felt_mass_is_that_of_the_last_one(self):
+        figures = self.summary(*SWEEP, "--duration", "10s", "--set", "mass=6@3s")
+        self.assertEqual(figures["felt_mass_kg"], 6)
+        self.assertAlmostEqual(figures["apparent_mass_kg"], 6, delta=0.06)  # 1 %, as without changes
 
 
 class Socket(ProgramTest):

@@ -66,8 +66,11 @@ RigOptions random_session(Random& random) {
   options.settings.passivity = random.chance(0.3) ? Passivity::on : Passivity::off;
   if (random.chance(0.5)) options.device_faults.push_back(random_device_fault(random));
   for (std::uint64_t cycle = 0; cycle < 2000; cycle += static_cast<std::uint64_t>(50 + random.below(500))) {
-    const auto parameter = static_cast<Parameter>(1 + random.below(3));
-    options.changes.push_back({cycle, {parameter, random.log_uniform(0.5, 50.0)}});
+    const auto parameter = static_cast<Parameter>(1 + random.below(5));
+    Change change{parameter, random.log_uniform(0.5, 50.0), random.below(2)};
+    if (parameter == Parameter::friction) change.value *= 0.02;
+    for (double& x : change.position_m) x = random.uniform(-0.1, 0.1);
+    options.changes.push_back({cycle, change});
   }
   for (int i = random.below(4); i > 0; --i) {
     const auto from_ns = static_cast<std::int64_t>(1e9 * random.uniform(0.5, 2.0));
