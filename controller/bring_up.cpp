@@ -7,6 +7,7 @@
 #include "fieldbus/canopen_pdo.hpp"
 #include "fieldbus/described_sensor.hpp"
 #include "fieldbus/identifier_check.hpp"
+#include "models/description/eds_bitrates.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::controller {
@@ -48,7 +49,9 @@ DriveOnBus make_drive(const description::Cell& cell, const description::DriveDes
   if (drive.on_can()) {
     auto servo = std::make_unique<fieldbus::ServoDrive>(drive, drive_settings(settings));
     fieldbus::ServoDrive& on_can = *servo;
-    return {std::move(servo), on_can, &on_can, bus_indices[index_of(cell, drive.bus)]};
+    const std::size_t bus = index_of(cell, drive.bus);
+    if (!drive.eds.empty()) description::require_bitrate(drive.eds, cell.buses[bus].bitrate);
+    return {std::move(servo), on_can, &on_can, bus_indices[bus]};
   }
   auto modbus = std::make_unique<fieldbus::ModbusDrive>(drive, description::load_modbus_drive(drive.description),
                                                         std::llround(settings.period_s * 1e9));

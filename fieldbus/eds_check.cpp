@@ -99,6 +99,15 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
       step.value = *value;
       step.advice = "is another device set to this node, or is this another device's EDS?";
     }
+    // The upper half of the revision changes with what the device does on the bus, the lower half with its firmware
+    // (CiA 301, 7.5.2.19). A file that states none has 0 there.
+    if (const std::uint32_t major = eds.revision.value_or(0) & 0xFFFF0000U;
+        major != 0 && step.object == ObjectAddress{0x1018, 3}) {
+      step.kind = SdoStep::Kind::expect;
+      step.value = major;
+      step.mask = 0xFFFF0000U;
+      step.advice = "the device has another major revision than its EDS: get the file of its firmware";
+    }
     checked.push_back(step);
   }
   constexpr std::uint32_t first_of_device = 0x200000;  // those of the communication are the master's to set

@@ -43,10 +43,9 @@ SlavePdo::SlavePdo(ObjectDictionary& dictionary, Direction direction, int number
   ObjectEntry& count = dictionary.add(mapping_, 0, DataType::unsigned8, Access::read_write, 0);
   count.before_write = [this](std::int64_t value) { return check_count(value); };
   count.after_write = reconfigure;
-  for (std::uint8_t i = 1; i <= most_; ++i) {
-    dictionary.add(mapping_, i, DataType::unsigned32, Access::read_write, 0).before_write = [this](std::int64_t value) {
-      return check_object(value);
-    };
+  for (int i = 1; i <= most_; ++i) {
+    dictionary.add(mapping_, static_cast<std::uint8_t>(i), DataType::unsigned32, Access::read_write, 0).before_write =
+        [this](std::int64_t value) { return check_object(value); };
   }
 }
 

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "models/description/eds_bitrates.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/description/text.hpp"
 
@@ -222,12 +223,35 @@ EdsFile parse_eds(std::string_view text, const std::filesystem::path& file) {
   return eds;
 }
 
-EdsFile load_eds(const std::filesystem::path& file) {
+namespace {
+
+std::string read_text(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw SetupError({.file = file.string(), .expected = "a file that can be read"});
   std::ostringstream text;
   text << in.rdbuf();
-  return parse_eds(text.str(), file);
+  return text.str();
+}
+
+}  // namespace
+
+EdsFile load_eds(const std::filesystem::path& file) { return parse_eds(read_text(file), file); }
+
+void require_bitrate(std::string_view eds_text, const std::filesystem::path& file, std::int64_t bitrate) {
+  const Ini ini(eds_text, file);
+  std::string known;
+  for (const int kilobits : {10, 20, 50, 125, 250, 500, 800, 1000}) {
+    if (ini.number("deviceinfo", "BaudRate_" + std::to_string(kilobits), 0, 1).value_or(0) == 0) continue;
+    if (bitrate == std::int64_t{1000} * kilobits) return;
+    known += (known.empty() ? "" : ", ") + std::to_string(1000 * kilobits);
+  }
+  if (known.empty()) return;
+  throw ini.error("deviceinfo", "BaudRate_" + std::to_string(bitrate / 1000), "not there, or 0",
+                  "1: the cell's bus runs at " + std::to_string(bitrate) + " bit/s, this device at " + known);
+}
+
+void require_bitrate(const std::filesystem::path& file, std::int64_t bitrate) {
+  require_bitrate(read_text(file), file, bitrate);
 }
 
 }  // namespace proxarm::description

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "models/description/eds_bitrates.hpp"
 #include "models/description/setup_error.hpp"
 #include "tests/source_file.hpp"
 
@@ -10,6 +11,21 @@ namespace proxarm::description {
 namespace {
 
 using ::testing::HasSubstr;
+
+TEST(EdsBitrates, AreThoseThatTheFileLists) {
+  const std::string text = "[DeviceInfo]\nBaudRate_500=1\nbaudrate_1000=0x1\nBaudRate_250=0\n";
+  EXPECT_NO_THROW(require_bitrate(text, "drive.eds", 500'000));
+  EXPECT_NO_THROW(require_bitrate(text, "drive.eds", 1'000'000));
+  EXPECT_NO_THROW(require_bitrate("[DeviceInfo]\n", "drive.eds", 123'456)) << "it says nothing of them";
+  try {
+    require_bitrate(text, "drive.eds", 250'000);
+    FAIL();
+  } catch (const SetupError& error) {
+    EXPECT_STREQ(error.what(),
+                 "drive.eds:4: [deviceinfo] BaudRate_250: found not there, or 0, expected 1: the cell's bus runs at "
+                 "250000 bit/s, this device at 500000, 1000000");
+  }
+}
 
 // As makers' tools write them: any case, comments, signed and octal numbers, $NODEID, compact arrays.
 constexpr const char* small = R"([FileInfo]

@@ -73,7 +73,11 @@ TEST(EdsCheck, AsksForTheIdentityThatTheFileStates) {
   ASSERT_NE(find(steps, {0x1018, 1}), nullptr);
   EXPECT_EQ(find(steps, {0x1018, 1})->kind, SdoStep::Kind::expect);
   EXPECT_EQ(find(steps, {0x1018, 1})->value, 0xABu);
-  EXPECT_EQ(find(steps, {0x1018, 3})->kind, SdoStep::Kind::read) << "firmware changes";
+  EXPECT_EQ(find(steps, {0x1018, 3})->kind, SdoStep::Kind::expect);
+  EXPECT_EQ(find(steps, {0x1018, 3})->value, 0x00010000u);
+  EXPECT_EQ(find(steps, {0x1018, 3})->mask, 0xFFFF0000u) << "firmware changes";
+  const auto stateless = steps_with("RevisionNumber=0x00010000", "RevisionNumber=0x00000005");
+  EXPECT_EQ(find(stateless, {0x1018, 3})->kind, SdoStep::Kind::read);
 }
 
 TEST(EdsCheck, LeavesOutOptionalObjectsThatTheDriveHasNot) {
