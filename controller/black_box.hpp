@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "controller/change.hpp"
+#include "controller/command.hpp"
 #include "controller/cycle_record.hpp"
 #include "fieldbus/can_network.hpp"
 #include "fieldbus/state_archive.hpp"
@@ -46,6 +47,7 @@ struct BoxCycle {
   std::uint32_t overruns_in_a_row = 0;
   bool stop_requested = false;
   Change change;
+  Command command;
   std::array<BusInput, max_buses> buses{};
   std::uint16_t input_bytes = 0;
   std::array<std::byte, 512> inputs{};  // CyclicDrive::archive_input() of all drives

@@ -47,7 +47,10 @@ std::vector<DriveBus> drive_buses(const std::vector<DriveOnBus>& drives) {
 DriveOnBus make_drive(const description::Cell& cell, const description::DriveDescription& drive,
                       const SessionSettings& settings, const BusIndices& bus_indices) {
   if (drive.on_can()) {
-    auto servo = std::make_unique<fieldbus::ServoDrive>(drive, drive_settings(settings));
+    fieldbus::DriveSettings own = drive_settings(settings);
+    const bool has_inputs = cell.enabling_input && cell.enabling_input->drive == drive.joint;
+    if (has_inputs && !settings.without_enabling_input) own.inputs_object = cell.enabling_input->object;
+    auto servo = std::make_unique<fieldbus::ServoDrive>(drive, own);
     fieldbus::ServoDrive& on_can = *servo;
     const std::size_t bus = index_of(cell, drive.bus);
     if (!drive.eds.empty()) description::require_bitrate(drive.eds, cell.buses[bus].bitrate);
@@ -116,6 +119,12 @@ ImpedanceConfig impedance_config(const SessionSettings& settings) {
           .period_s = settings.period_s};
 }
 
+std::optional<EnablingInput> make_enabling_input(const description::Cell& cell, const SessionSettings& settings,
+                                                 const BusIndices& bus_indices) {
+  if (!cell.enabling_input || settings.without_enabling_input) return std::nullopt;
+  return EnablingInput(*cell.enabling_input, cell, bus_indices[index_of(cell, cell.enabling_input->bus)]);
+}
+
 std::vector<fieldbus::DriveSlot> slots(CycleParts& parts) {
   std::vector<fieldbus::DriveSlot> slots;
   for (DriveOnBus& axis : parts.drives) {
@@ -142,6 +151,7 @@ void refuse_shared_identifiers(CycleParts& parts) {
     }
   }
   for (const std::uint32_t id : parts.sensor->used_ids()) used.push_back({parts.sensor_bus, id, "force sensor"});
+  if (parts.enabling) used.push_back({parts.enabling->bus(), parts.enabling->wanted_id(), "enabling input"});
   fieldbus::refuse_shared_identifiers(used, names);
 }
 
@@ -206,6 +216,8 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
     inverse.emplace(*arm, inverse_config(cell, settings.period_s));
     world = make_rendered_world(scene, settings, proxy_mass(cell, settings));
   }
+  std::unique_ptr<FreeMotion> freeing;
+  if (!torque) freeing = std::make_unique<FreeMotion>(settings, cell.supervision.release_speed_m_per_s);
   ElasticSetpoint elastic(*arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s);
   std::vector<DriveBus> buses = drive_buses(drives);
   const std::size_t sensor_bus = index_of(cell, cell.sensor.bus);
@@ -221,7 +233,10 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
                     std::move(world),
                     std::move(torque),
                     OrientationProxy(orientation_config(settings)),
-                    WrenchCompensation(cell)};
+                    WrenchCompensation(cell),
+                    make_enabling_input(cell, settings, bus_indices),
+                    std::move(freeing),
+                    cell.supervision};
 }
 
 std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) {
@@ -241,6 +256,7 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
   if (bus == parts.sensor_bus) {
     for (const std::uint32_t id : parts.sensor->wanted_ids()) ids.push_back(id);
   }
+  if (parts.enabling && parts.enabling->bus() == bus) ids.push_back(parts.enabling->wanted_id());
   return ids;
 }
 

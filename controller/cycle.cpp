@@ -30,6 +30,17 @@ std::vector<description::DriveDescription> descriptions(const CycleParts& parts)
   return all;
 }
 
+// What a torque can't do, a stop does: nothing is held or slowed there.
+Reactions reactions_for(const CycleParts& parts) {
+  Reactions reactions = reactions_of(parts.supervision);
+  if (!parts.torque) return reactions;
+  for (Reaction& reaction : reactions) {
+    if (reaction == Reaction::hold || reaction == Reaction::slow) reaction = Reaction::stop_1;
+  }
+  reactions[static_cast<std::size_t>(Fault::sensor_late)] = Reaction::carry_on;
+  return reactions;
+}
+
 // By its last word, which a drive that has gone silent can't take back.
 bool is_off(const DriveOnBus& axis) noexcept {
   return axis.drive.state() != fieldbus::DriveState::operation_enabled &&
@@ -46,6 +57,9 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       period_ns_(std::llround(settings.period_s * 1e9)),
       receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
       outboxes_(parts_.network.bus_count()),
+      supervisor_(reactions_for(parts_)),
+      speed_limit_m_per_s_(limits.max_tool_speed_m_per_s),
+      stale_cycles_(JointVector::Zero(parts_.arm->axes())),
       link_rad_(parts_.arm->start_rad()),
       target_rad_(parts_.arm->start_rad()),
       torque_Nm_(JointVector::Zero(parts_.arm->axes())),
@@ -90,7 +104,7 @@ void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
   const SteadyTime begun = std::chrono::steady_clock::now();
   if (cycle_ == 0) {
     first_cycle_ns_ = t_k_ns;
-    supervisor_.handle(Event::begin);
+    if (!parts_.enabling) supervisor_.handle(Event::begin);
   }
   record_ = {};
   active_ = {};
@@ -126,6 +140,7 @@ void Cycle::deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexc
   for (DriveOnBus& axis : parts_.drives) {
     if (axis.bus == bus && axis.drive.on_frame(received.frame, received.time_ns)) return;
   }
+  if (parts_.enabling && parts_.enabling->on_frame(bus, received.frame, received.time_ns)) return;
   // Own frames don't come back: somebody else has sent it.
   if (is_masters_own(bus, received.frame)) {
     raise(Fault::second_master, static_cast<std::int32_t>(bus), received.frame.id);
@@ -157,6 +172,7 @@ void Cycle::measure() noexcept {
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
     motor_rad[i] = drive.actual_rad();
+    judge_encoder(i, motor_rad[i] - actual_rad_[i]);
     // Over two answers, where they come more seldom than cycles.
     const double T = settings_.period_s, share = T / (T + 2.0 * drive.feedback_period_s());
     moved_rad_[i] += share * (motor_rad[i] - actual_rad_[i] - moved_rad_[i]);
@@ -180,17 +196,22 @@ void Cycle::measure() noexcept {
 void Cycle::judge(std::int64_t t_k_ns) noexcept {
   stop_seen_ = stop_requested_.load(std::memory_order_relaxed);
   if (stop_seen_) supervisor_.handle(Event::stop);
+  judge_enabling(t_k_ns);
   judge_buses();
   judge_drives();
   judge_sensor();
   if (overruns_in_a_row_ > settings_.max_overruns) {
     raise(Fault::overrun, -1, overruns_in_a_row_, settings_.max_overruns);
   }
+  take_command(t_k_ns);
+  supervise_hold(t_k_ns);
   enter(supervisor_.phase(), t_k_ns);
 }
 
 void Cycle::judge_sensor() noexcept {
   missed_samples_ = sample_is_new_ ? 0 : missed_samples_ + 1;
+  // The limit is three of the sensor's own samples: a third of it is one.
+  judge_lateness(missed_samples_ >= std::max(1u, settings_.max_missed_samples / 3));
   if (missed_samples_ > settings_.max_missed_samples) {
     // A counter that stands still makes each sample an old one: it is there, and frozen.
     const bool frozen = parts_.sensor->latest().repeats > settings_.max_missed_samples;
@@ -200,7 +221,7 @@ void Cycle::judge_sensor() noexcept {
   const fieldbus::ForceSample& sample = parts_.sensor->latest();
   if (!reading_S_.force.allFinite() || !reading_S_.torque.allFinite()) return raise(Fault::force_not_finite, -1);
   if (!sample.healthy) return raise(Fault::sensor_status, -1);
-  if (sample.saturated) return raise(Fault::sensor_saturated, -1);
+  if (sample.saturated && needs_force()) return raise(Fault::sensor_saturated, -1);
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
   }
@@ -211,12 +232,14 @@ void Cycle::judge_sensor() noexcept {
 }
 
 void Cycle::judge_drives() noexcept {
-  if (supervisor_.phase() == Phase::disabling || supervisor_.phase() == Phase::done) return;
+  if (supervisor_.phase() >= Phase::disabling) return;
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
     const auto where = static_cast<std::int32_t>(i);
     if (drive.cycles_without_tpdo() > settings_.max_missed_feedback) {
       raise(Fault::drive_silent, where, drive.cycles_without_tpdo(), settings_.max_missed_feedback);
+    } else if (!drive.fresh() && supervisor_.live()) {
+      raise(Fault::feedback_late, where, drive.cycles_without_tpdo() + 1.0, settings_.max_missed_feedback);
     }
     switch (drive.fault()) {
       case fieldbus::DriveFault::none:
@@ -246,8 +269,10 @@ void Cycle::judge_buses() noexcept {
     if (status.state == fieldbus::BusState::down) raise(Fault::interface_down, where);
     if (status.state == fieldbus::BusState::bus_off) raise(Fault::bus_off, where);
     if (status.state == fieldbus::BusState::error_passive) raise(Fault::error_passive, where);
-    if (status.receive_overflows > 0) {
-      raise(Fault::receive_overflow, where, static_cast<double>(status.receive_overflows));
+    if (bus >= overflows_before_.size() || status.receive_overflows <= overflows_before_[bus]) continue;
+    raise(Fault::receive_overflow, where, static_cast<double>(status.receive_overflows - overflows_before_[bus]));
+    if (supervisor_.reaction(Fault::receive_overflow) < Reaction::stop_1) {
+      overflows_before_[bus] = status.receive_overflows;
     }
   }
 }
@@ -255,26 +280,20 @@ void Cycle::judge_buses() noexcept {
 // What a phase does when it begins.
 void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
   if (phase == entered_phase_) return;
+  const Phase from = entered_phase_;
   entered_phase_ = phase;
   phase_since_ns_ = t_k_ns;
   fieldbus::DriveGoal goal = fieldbus::DriveGoal::operation_enabled;
-  if (phase == Phase::disabling || phase == Phase::done) goal = fieldbus::DriveGoal::switched_off;
+  if (phase >= Phase::disabling) goal = fieldbus::DriveGoal::switched_off;
+  // Without the drive's own ramp.
+  const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == Reaction::stop_0;
+  if (phase == Phase::disabling && at_once) goal = fieldbus::DriveGoal::none;
   for (DriveOnBus& axis : parts_.drives) axis.drive.request(goal);
   if (phase == Phase::taring) {
     for (Eigen::Index i = 0; i < target_rad_.size(); ++i) target_rad_[i] = parts_.drives[i].drive.target_rad();
   }
-  if (phase == Phase::rendering) start_rendering();
-  if (phase == Phase::stopping) {
-    double stop_s = settings_.period_s;
-    for (Eigen::Index i = 0; i < target_rad_.size(); ++i) {
-      const double deceleration = parts_.drives[i].drive.description().max_acceleration_rad_per_s2;
-      stop_s = std::max(stop_s, std::abs(guard_.speed_rad_per_s()[i]) / deceleration);
-    }
-    guard_.follow_from_here();
-    run_out_rad_per_s_ = guard_.speed_rad_per_s();
-    run_out_scale_ = 1.0;
-    run_out_per_cycle_ = settings_.period_s / stop_s;
-  }
+  if (phase == Phase::rendering || phase == Phase::freeing) start_rendering();
+  if (phase == Phase::stopping || phase == Phase::holding) start_run_out(from);
 }
 
 // A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one; unless
@@ -298,6 +317,10 @@ void Cycle::act(std::int64_t t_k_ns) noexcept {
     case Phase::rendering:
       render();
       break;
+    case Phase::freeing:
+      free_motion();
+      break;
+    case Phase::holding:
     case Phase::stopping:
       run_out();
       break;
@@ -305,6 +328,11 @@ void Cycle::act(std::int64_t t_k_ns) noexcept {
       await_disabled(t_k_ns);
       break;
     case Phase::idle:
+      await_begin(t_k_ns);
+      break;
+    case Phase::faulted:
+      await_reset(t_k_ns);
+      break;
     case Phase::done:
       break;
   }
@@ -317,7 +345,7 @@ void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
   const auto not_following = std::find_if(parts_.drives.begin(), parts_.drives.end(),
                                           [](const DriveOnBus& a) { return !a.drive.following(); });
   if (not_following == parts_.drives.end()) {
-    supervisor_.handle(Event::enabled);
+    supervisor_.handle(tared_ && !parts_.torque ? Event::reenabled : Event::enabled);
   } else if (static_cast<double>(t_k_ns - phase_since_ns_) * seconds_per_ns > settings_.enable_timeout_s) {
     raise(Fault::drive_not_enabled, static_cast<std::int32_t>(not_following - parts_.drives.begin()),
           settings_.enable_timeout_s, settings_.enable_timeout_s);
@@ -331,7 +359,8 @@ void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
         std::find_if(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& axis) { return !is_off(axis); });
     raise(Fault::drive_not_disabled, static_cast<std::int32_t>(still_on - parts_.drives.begin()));
   }
-  supervisor_.handle(Event::disabled);
+  const bool wait = supervisor_.faulted() && settings_.wait_after_fault_s > 0.0 && drives_off() && !stop_seen_;
+  supervisor_.handle(wait && !parts_.torque ? Event::wait : Event::disabled);
 }
 
 bool Cycle::drives_off() const noexcept { return std::all_of(parts_.drives.begin(), parts_.drives.end(), is_off); }
@@ -345,6 +374,7 @@ void Cycle::tare(std::int64_t t_k_ns) noexcept {
   } else if (static_cast<double>(t_k_ns - phase_since_ns_) * seconds_per_ns >= settings_.tare_s) {
     parts_.compensation.finish_tare();
     hand_W_ = parts_.compensation.hand_wrench_W(reading_S_, R_WS_);
+    tared_ = true;
     supervisor_.handle(Event::tared);
   }
 }
@@ -352,13 +382,14 @@ void Cycle::tare(std::int64_t t_k_ns) noexcept {
 // The proxy starts at rest where the targets stand, so the first setpoint equals the last one.
 void Cycle::start_rendering() noexcept {
   if (parts_.torque) return parts_.torque->start(measured_link_rad_);
+  force_share_ = 0.0;
   link_rad_ = parts_.arm->link_from_motor(target_rad_);
   const models::Pose X_WT = parts_.arm->tool_pose(link_rad_);
   parts_.elastic.start(link_rad_);
   proxy_W_ = proxy_k1_W_ = X_WT.translation();
   parts_.arm->kinematics(link_rad_, solution_.kinematics);
   guard_.start(target_rad_);
-  parts_.world->start(proxy_W_);
+  world().start(proxy_W_);
   if (passivity_) passivity_->start(tool_W_);
   parts_.orientation.start(Eigen::Quaterniond(X_WT.linear()).normalized());
 }
@@ -379,8 +410,9 @@ void Cycle::render() noexcept {
   take_change();
   make_limits();
   if (passivity_) parts_.world->add_damping(passivity_->observe_hand(hand_W_.force, tool_W_));
-  const WorldStep step = parts_.world->step(hand_W_.force, step_limits_);
-  const ProxyFault turned = parts_.orientation.step(hand_W_.torque);
+  ramp_in();
+  const WorldStep step = parts_.world->step(force_share_ * hand_W_.force, step_limits_);
+  const ProxyFault turned = parts_.orientation.step(force_share_ * hand_W_.torque);
   if (step.fault == ProxyFault::squeezed) return raise(Fault::proxy_squeezed, -1);
   if (step.fault != ProxyFault::none || turned != ProxyFault::none) return raise(Fault::proxy_not_finite, -1);
   active_.add(step.limits);
@@ -401,6 +433,7 @@ void Cycle::record_world(const WorldStep& step) noexcept {
   record_.p_hat_W_m = triple(step.p_hat_W);
   record_.contact_force_W_N = triple(step.f_W);
   record_.normal_W = triple(step.normal_W);
+  if (step.contacts > 0) last_normal_W_ = step.normal_W;
   record_.contact_object = step.object;
   record_.friction = step.friction;
   record_.proxy_mass_kg = step.mass_kg;
@@ -444,13 +477,15 @@ void Cycle::render_torques() noexcept {
 
 // The sets of this step, around the proxy and what is commanded behind the filter of the setpoints.
 void Cycle::make_limits() noexcept {
+  limit_speed();
   parts_.arm->kinematics(parts_.elastic.link_rad(), filtered_);
   const StepStart start{.q_k1_W = proxy_W_,
                         .q_k2_W = proxy_k1_W_,
                         .filtered_W = filtered_.X_WT.translation(),
                         .filtered_velocity_W = filtered_.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
                         .measured_W = tool_W_,
-                        .force_N = hand_W_.force.norm()};
+                        .force_N = hand_W_.force.norm(),
+                        .max_speed_m_per_s = speed_limit_m_per_s_};
   limiter_.make(start, link_rad_, target_rad_ - parts_.elastic.link_rad(), solution_.kinematics.J_W, step_limits_);
 }
 
@@ -467,7 +502,7 @@ void Cycle::follow_proxy() noexcept {
   if (solution_.status != models::InverseKinematicsResult::Status::converged) {
     active_.set(Limit::singularity);
     const models::Vec3& reached_W = solution_.kinematics.X_WT.translation();
-    proxy_k1_W_ = proxy_W_ = parts_.world->resume(reached_W, (reached_W - reached_k1_W) / settings_.period_s);
+    proxy_k1_W_ = proxy_W_ = world().resume(reached_W, (reached_W - reached_k1_W) / settings_.period_s);
   }
   command(parts_.elastic.step(link_rad_));
 }
@@ -513,18 +548,21 @@ void Cycle::wind_back() noexcept {
   link_rad_ = parts_.elastic.link_rad() + parts_.elastic.lead_s() * speed;
   parts_.arm->kinematics(link_rad_, solution_.kinematics);
   const models::Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
-  proxy_W_ = parts_.world->resume(solution_.kinematics.X_WT.translation(), velocity_W);
+  proxy_W_ = world().resume(solution_.kinematics.X_WT.translation(), velocity_W);
   proxy_k1_W_ = proxy_W_ - settings_.period_s * velocity_W;
   parts_.orientation.start(Eigen::Quaterniond(solution_.kinematics.X_WT.linear()).normalized());
 }
 
 // Every joint keeps its share of the last motion while that shrinks to nothing, within each joint's deceleration.
 void Cycle::run_out() noexcept {
-  if (parts_.torque) return supervisor_.handle(Event::at_rest);
+  if (parts_.torque) {
+    supervisor_.handle(Event::at_rest);
+    return;
+  }
   run_out_scale_ = std::max(0.0, run_out_scale_ - run_out_per_cycle_);
   active_.add(guard_.step(target_rad_ + run_out_scale_ * settings_.period_s * run_out_rad_per_s_));
   target_rad_ = guard_.target_rad();
-  if (run_out_scale_ <= 0.0 && guard_.at_rest()) supervisor_.handle(Event::at_rest);
+  if (supervisor_.phase() == Phase::stopping && stands()) supervisor_.handle(Event::at_rest);
 }
 
 void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
@@ -600,6 +638,9 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
     if (!drive.fresh()) record_.set(RecordFlag::feedback_missing);
   }
   record_.compute_ns = compute_ns_;
+  shown_phase_.store(supervisor_.phase(), std::memory_order_relaxed);
+  pressed_.store(!parts_.enabling || parts_.enabling->pressed(), std::memory_order_relaxed);
+  cause_lasts_.store(!may_move(), std::memory_order_relaxed);
   records_.push(record_);
 }
 
@@ -633,10 +674,14 @@ void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   if (parts_.torque) parts_.torque->archive(state);
   if (parts_.world) parts_.world->archive(state);
   if (passivity_) passivity_->archive(state);
+  if (parts_.enabling) parts_.enabling->archive(state);
+  if (parts_.freeing) parts_.freeing->archive(state);
   state(parts_.elastic, parts_.orientation, parts_.compensation, supervisor_, entered_phase_, phase_since_ns_,
         first_cycle_ns_, cycle_, rendered_cycles_, missed_samples_, reading_S_.force, reading_S_.torque, R_WS_,
         hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, torque_Nm_,
-        run_out_rad_per_s_, measured_link_rad_, actual_rad_, moved_rad_, guard_, run_out_scale_, run_out_per_cycle_);
+        run_out_rad_per_s_, measured_link_rad_, actual_rad_, moved_rad_, guard_, run_out_scale_, run_out_per_cycle_,
+        tared_, wants_resume_, late_score_, force_share_, speed_limit_m_per_s_, last_normal_W_, stale_cycles_,
+        overflows_before_);
   if (state.reading()) parts_.arm->kinematics(link_rad_, solution_.kinematics);
 }
 

@@ -15,18 +15,23 @@
 // it where it stands; stopping is the drives' own, from whatever torque on their slow-down ramp (6084h).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "controller/black_box.hpp"
 #include "controller/change.hpp"
+#include "controller/command.hpp"
 #include "controller/cycle_record.hpp"
 #include "controller/elastic_setpoint.hpp"
+#include "controller/enabling_input.hpp"
+#include "controller/free_motion.hpp"
 #include "controller/joint_guard.hpp"
 #include "controller/orientation_proxy.hpp"
 #include "controller/passivity.hpp"
@@ -83,6 +88,9 @@ struct CycleParts {
   std::unique_ptr<TorqueRendering> torque;  // impedance type
   OrientationProxy orientation;
   WrenchCompensation compensation;
+  std::optional<EnablingInput> enabling;
+  std::unique_ptr<FreeMotion> freeing;  // admittance type
+  description::SupervisionDescription supervision;
 };
 
 class Cycle {
@@ -99,6 +107,13 @@ class Cycle {
   // Checked parameters for the next rendered cycles, one each, from one thread; and those of a script, by their times.
   [[nodiscard]] SpscRing<Change>& changes() noexcept { return changes_; }
   void schedule(std::vector<ScheduledChange> changes) { scheduled_ = std::move(changes); }
+  // The same of commands, in any phase. One that the phase has no use for is dropped; refusal() says so beforehand.
+  [[nodiscard]] SpscRing<Command>& commands() noexcept { return commands_; }
+  void schedule(std::vector<ScheduledCommand> commands) { scripted_ = std::move(commands); }
+  // Any thread: why a command would do nothing now; nullptr: it would do something.
+  [[nodiscard]] const char* refusal(Order order) const noexcept;
+  // Any thread: the phase of the last cycle.
+  [[nodiscard]] Phase shown_phase() const noexcept { return shown_phase_.load(std::memory_order_relaxed); }
   // The loop's owner: this many cycles in a row were late.
   void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
 
@@ -114,6 +129,11 @@ class Cycle {
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return rendered_cycles_; }
   // After the last cycle: whether every drive has said that it doesn't hold its axis any more.
   [[nodiscard]] bool drives_off() const noexcept;
+  // Faults that were reset, the latest eight, the oldest of them first; and how many there were.
+  [[nodiscard]] std::span<const FaultReport> past_faults() const noexcept {
+    return std::span(past_faults_).first(std::min<std::size_t>(past_fault_count_, past_faults_.size()));
+  }
+  [[nodiscard]] std::uint64_t past_fault_count() const noexcept { return past_fault_count_; }
   [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return records_; }
 
@@ -146,6 +166,27 @@ class Cycle {
   void start_rendering() noexcept;
   void render() noexcept;
   void take_change() noexcept;
+  // cycle_supervision.cpp
+  void judge_enabling(std::int64_t t_k_ns) noexcept;
+  void judge_encoder(Eigen::Index axis, double moved_rad) noexcept;
+  void judge_lateness(bool late) noexcept;
+  [[nodiscard]] bool may_move() const noexcept;
+  [[nodiscard]] bool needs_force() const noexcept;
+  void take_command(std::int64_t t_k_ns) noexcept;
+  void obey(const Command& command) noexcept;
+  void supervise_hold(std::int64_t t_k_ns) noexcept;
+  void await_begin(std::int64_t t_k_ns) noexcept;
+  void await_reset(std::int64_t t_k_ns) noexcept;
+  void reset() noexcept;
+  void start_run_out(Phase from) noexcept;
+  void start_freeing(const Command& command) noexcept;
+  void free_motion() noexcept;
+  void limit_speed() noexcept;
+  void ramp_in() noexcept;
+  [[nodiscard]] bool stands() const noexcept { return run_out_scale_ <= 0.0 && guard_.at_rest(); }
+  [[nodiscard]] RenderedWorld& world() noexcept {
+    return entered_phase_ == Phase::freeing ? parts_.freeing->world() : *parts_.world;
+  }
   void make_limits() noexcept;
   void hold() noexcept;
   void render_torques() noexcept;
@@ -187,6 +228,22 @@ class Cycle {
   std::atomic<bool> stop_requested_{false};
   bool stop_seen_ = false;  // in this cycle
   bool commanded_ = false;  // the guard has made this cycle's setpoints
+
+  SpscRing<Command> commands_{16};
+  std::vector<ScheduledCommand> scripted_;
+  std::size_t next_scripted_ = 0;
+  std::atomic<Phase> shown_phase_{Phase::idle};
+  std::atomic<bool> cause_lasts_{false}, pressed_{true};  // for refusal()
+  std::array<FaultReport, 8> past_faults_{};
+  std::uint64_t past_fault_count_ = 0;
+  bool tared_ = false;
+  bool wants_resume_ = false;                                // the enabling input was pressed anew in this hold
+  std::uint32_t late_score_ = 0;                             // of the sensor's samples, in sixteenths
+  double force_share_ = 1.0;                                 // of the hand's force that is let in
+  double speed_limit_m_per_s_;                               // of the tool
+  models::Vec3 last_normal_W_ = models::Vec3::Zero();        // of the last contact; zero: there was none
+  JointVector stale_cycles_;                                 // since each drive's position came
+  std::array<std::uint64_t, max_buses> overflows_before_{};  // that a reset has left behind
 
   bool sample_is_new_ = false;
   models::Wrench reading_S_;

@@ -39,6 +39,8 @@ enum class RecordFlag : std::uint32_t {
   limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
   limit_joint_torque = 1u << 17,     // impedance type: the rendered torques were cut
   oscillation = 1u << 18,            // motion above the hand's band (passivity.hpp)
+  ramp_in = 1u << 24,                // only a share of the hand's force was let in
+  slowed = 1u << 25,                 // the tool's speed limit is below the cell's, because of a fault
 };
 
 // The flag of a limit, and the parameter that holds it ("limits.leash_m").

@@ -26,6 +26,9 @@ class WorldOfDimension final : public RenderedWorld {
     space_.start(q_W);
     ProxyStart<N> start;
     start.q = space_.start();
+    // Out of a hold the scene goes on from where it stood.
+    if (started_) start.time_s = proxy_.time_s() + lead_s();
+    started_ = true;
     proxy_.start(start);
     proxy_.set_reference(start.q);
     last_ = {};
@@ -36,11 +39,10 @@ class WorldOfDimension final : public RenderedWorld {
     // As far as the scene lets it: a step of 𝒢, whose κ doesn't matter.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
-    const double lead_s = proxy_.config().order == 2 ? proxy_.config().period_s : 0.0;
     ProxyStart<N> start;
     start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, proxy_.q());
     start.v = v;
-    start.time_s = proxy_.time_s() + lead_s;
+    start.time_s = proxy_.time_s() + lead_s();
     proxy_.start(start);
     proxy_.set_reference(space_.start());
     last_.q_W = space_.to_W(start.q);
@@ -97,10 +99,12 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   void archive(fieldbus::StateArchive& state) noexcept override {
-    state(proxy_, space_, changes_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_);
+    state(proxy_, space_, changes_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_, started_);
   }
 
  private:
+  [[nodiscard]] double lead_s() const noexcept { return proxy_.config().order == 2 ? proxy_.config().period_s : 0.0; }
+
   scenes::CompiledScene* scene_;
   SceneChanges changes_;
   SceneSpace<N> space_;
@@ -108,6 +112,7 @@ class WorldOfDimension final : public RenderedWorld {
   AdmittanceProxy<N> proxy_;
   WorldStep last_;
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
+  bool started_ = false;
 };
 
 }  // namespace

@@ -38,6 +38,9 @@ struct SessionSettings {
   double tare_s = 0.2;         // how long the sensor is averaged at rest before rendering
   double tare_spread_N = 5.0;  // a reading that far from the mean means a hand on the handle
   double enable_timeout_s = 5.0;
+  double enabling_timeout_s = 60.0;      // for the enabling input to be let go and pressed
+  double wait_after_fault_s = 0.0;       // how long a stop by a fault waits for a reset before the session ends
+  bool without_enabling_input = false;   // the cell's is left out
   std::uint32_t max_missed_samples = 3;  // cycles in a row without a complete sensor sample
   // Samples in a row with exactly the reading of the one before, all six gauges; 0: not judged. With a noise of half a
   // count (standard deviation) per gauge, a sample repeats the last one with probability 0.49⁶ = 0.013, and 20 in a row

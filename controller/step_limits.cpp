@@ -84,7 +84,8 @@ void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, cons
 }
 
 void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexcept {
-  const double T = period_s_, omega = omega_rad_per_s_, v = commanded_share * limits_.max_tool_speed_m_per_s;
+  const double T = period_s_, omega = omega_rad_per_s_;
+  const double v = commanded_share * std::min(limits_.max_tool_speed_m_per_s, start.max_speed_m_per_s);
   const double a = limits_.max_tool_acceleration_m_per_s2;
   out.soft[out.soft_count++] = {start.measured_W - start.q_k1_W, limits_.leash_m, Limit::leash};
   if (limits_.max_power_W > 0.0 && start.force_N * v > limits_.max_power_W) {

@@ -28,6 +28,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -107,7 +108,8 @@ struct StepStart {
   models::Vec3 q_k1_W = models::Vec3::Zero(), q_k2_W = models::Vec3::Zero();
   models::Vec3 filtered_W = models::Vec3::Zero(), filtered_velocity_W = models::Vec3::Zero();  // x, v above
   models::Vec3 measured_W = models::Vec3::Zero();
-  double force_N = 0.0;  // of the hand
+  double force_N = 0.0;                                                // of the hand
+  double max_speed_m_per_s = std::numeric_limits<double>::infinity();  // of the tool, where lower than the cell's
 };
 
 class StepLimiter {

@@ -227,7 +227,8 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   if (now.contact == ContactPhase::free) {
     // A world without contacts may act all the same: a field of friction, a soft layer. And where a limit acts the mass
     // isn't what moves.
-    if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now)) return apparent.add(hand - spring, x);
+    if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in))
+      return apparent.add(hand - spring, x);
   }
   apparent.end_segment();
   if (now.contact == ContactPhase::free) return;

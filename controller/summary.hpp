@@ -59,6 +59,14 @@ struct FaultSummary {
   Fault fault = Fault::none;
   std::uint64_t cycle = 0;
   std::string text;  // describe()
+  bool was_reset = false;
+};
+
+// What was there without a stop: carried on, slowed down for, or held for.
+struct NoticeSummary {
+  Fault fault = Fault::none;
+  Reaction reaction = Reaction::carry_on;
+  std::uint64_t times = 0, cycles = 0;
 };
 
 struct ComputeTime {
@@ -104,8 +112,9 @@ struct Summary {
   std::uint64_t limited_cycles = 0;                    // some limit was active
   std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
-  std::uint64_t held_samples = 0;    // cycles without a new sample of the sensor
-  std::vector<FaultSummary> faults;  // set by the caller
+  std::uint64_t held_samples = 0;      // cycles without a new sample of the sensor
+  std::vector<FaultSummary> faults;    // set by the caller
+  std::vector<NoticeSummary> notices;  // set by the caller
   bool from_truth = false;
   std::string setpoint_sha256;
   double felt_mass_kg = 0.0;  // as configured, for comparison

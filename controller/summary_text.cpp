@@ -16,7 +16,10 @@ Json optional_number(const std::optional<double>& value) { return value ? Json(*
 Json faults(const Summary& summary) {
   Json list = Json::array();
   for (const FaultSummary& fault : summary.faults) {
-    list.push_back({{"fault", fault_name(fault.fault)}, {"cycle", fault.cycle}, {"text", fault.text}});
+    list.push_back({{"fault", fault_name(fault.fault)},
+                    {"cycle", fault.cycle},
+                    {"text", fault.text},
+                    {"was_reset", fault.was_reset}});
   }
   return list;
 }
@@ -77,6 +80,13 @@ void add_repeatable(Json& json, const Summary& s) {
   json["held_samples"] = s.held_samples;
   json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
   json["faults"] = faults(s);
+  json["notices"] = Json::array();
+  for (const NoticeSummary& notice : s.notices) {
+    json["notices"].push_back({{"fault", fault_name(notice.fault)},
+                               {"reaction", reaction_name(notice.reaction)},
+                               {"times", notice.times},
+                               {"cycles", notice.cycles}});
+  }
   json["setpoint_sha256"] = s.setpoint_sha256;
 }
 
@@ -182,8 +192,13 @@ std::string summary_text(const Summary& s) {
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
   line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
   line("setpoints (SHA-256)", s.setpoint_sha256);
+  for (const NoticeSummary& notice : s.notices) {
+    const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";
+    line("noticed", fault_name(notice.fault) + (" " + times) + ", " + std::to_string(notice.cycles) +
+                        " cycles; reaction: " + reaction_name(notice.reaction));
+  }
   if (s.faults.empty()) line("faults", "none");
-  for (const FaultSummary& fault : s.faults) line("FAULT", fault.text);
+  for (const FaultSummary& fault : s.faults) line(fault.was_reset ? "fault, then reset" : "FAULT", fault.text);
   return text;
 }
 

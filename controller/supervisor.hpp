@@ -1,15 +1,20 @@
-// Which phase a session is in, and what moves it on: one table.
+// Which phase a session is in, and what moves it on: one table, transitions(), which docs/supervision.md shows.
 //
-//   idle ──begin──▶ enabling ──enabled──▶ taring ──tared──▶ rendering ──stop──▶ stopping ──at_rest──▶ disabling
-//   ──disabled──▶ done
-//                      │                     │                  │                    ▲                    ▲
-//                      └────────fault────────┴──────────────────┴────────────────────┘                    │
-//                     (nothing moves yet before rendering: a fault there goes straight to disabling) ─────┘
+//   idle ─▶ enabling ─▶ taring ─▶ rendering ─▶ stopping ─▶ disabling ─▶ done
+//                                 ▲       │                    │
+//                          resume │       ▼ hold               ▼
+//                                  holding ◀─ enabling ◀── faulted
+//                                  ▲     │            reset
+//                                  └─────▼
+//                                  freeing
 //
-// A fault is latched: the first one is kept and reported, and no event leads back to rendering.
+// A fault acts by its reaction (fault.hpp). A stop latches it: the first one is kept and reported, and nothing but a
+// reset leads back, into a hold. What only slows down, holds or is carried on is counted.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 
 #include "controller/fault.hpp"
 #include "fieldbus/state_archive.hpp"
@@ -17,36 +22,106 @@
 namespace proxarm::controller {
 
 enum class Phase : std::uint8_t {
-  idle,       // drives configured, nothing sent but SYNC and heartbeat
+  idle,       // drives configured, nothing sent but SYNC and heartbeat; waits for the enabling input
   enabling,   // the CiA 402 state machines are led to operation enabled; targets follow the actual positions
   taring,     // targets stand still; the sensor's bias is averaged
   rendering,  // the proxy moves, the arm follows
+  holding,    // every joint decelerates at its own limit along its last direction, and stands; drives stay enabled
+  freeing,    // out of a hold, slowly: the arm follows the hand's force, or backs off, without the scene
   stopping,   // every joint decelerates at its own limit along its last direction
   disabling,  // targets stand still; the drives are led to switched off
+  faulted,    // drives off; waits for a reset
   done,
 };
+inline constexpr std::size_t phase_count = static_cast<std::size_t>(Phase::done) + 1;
 
-enum class Event : std::uint8_t { begin, enabled, tared, stop, at_rest, disabled, fault };
+enum class Event : std::uint8_t {
+  begin,      // first cycle; with an enabling input: it was let go and pressed
+  enabled,    // all drives follow
+  reenabled,  // the same after a reset: the sensor is tared already, and somebody may be pinned
+  tared,      //
+  hold,       // a fault with this reaction, or a command
+  resume,     // the cause is gone and the enabling input pressed, or a command
+  free,       // a command: release, or back off
+  freed,      // a command, the way backed off, or a fault that holds
+  stop,       // asked for: end of the duration, signal
+  fault,      // stop category 1
+  fault_off,  // stop category 0
+  at_rest,    //
+  disabled,   // all drives off, or they don't say so
+  wait,       // the same with a fault that may be reset
+  reset,      // a command
+};
+inline constexpr std::size_t event_count = static_cast<std::size_t>(Event::reset) + 1;
 
 const char* phase_name(Phase phase) noexcept;
+const char* event_name(Event event) noexcept;
+
+struct Transition {
+  Phase from;
+  Event event;
+  Phase to;
+};
+[[nodiscard]] std::span<const Transition> transitions() noexcept;
+
+// How often a fault that didn't stop the arm was there.
+struct Notice {
+  std::uint32_t times = 0;   // begun anew, after a cycle without it
+  std::uint64_t cycles = 0;  // with it
+  std::uint64_t last = 0;    // one more than the last of them; 0: none
+};
 
 class Supervisor {
  public:
-  [[nodiscard]] Phase phase() const noexcept { return phase_; }
-  [[nodiscard]] bool faulted() const noexcept { return report_.fault != Fault::none; }
-  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }
+  Supervisor() : Supervisor(reactions_of({})) {}
+  explicit Supervisor(const Reactions& reactions) noexcept : reactions_(reactions) {}
 
-  // Moves on where the table has a row for it; any other event is ignored in this phase.
-  void handle(Event event) noexcept;
-  // Latches the first fault and handles Event::fault.
-  void raise(const FaultReport& report) noexcept;
+  [[nodiscard]] Phase phase() const noexcept { return phase_; }
+  // Drives may move: the enabling input must be pressed.
+  [[nodiscard]] bool live() const noexcept {
+    return phase_ == Phase::rendering || phase_ == Phase::holding || phase_ == Phase::freeing;
+  }
+  [[nodiscard]] bool faulted() const noexcept { return report_.fault != Fault::none; }
+  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }      // of the stop
+  [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // of the last hold; none: asked for
+  [[nodiscard]] Reaction reaction(Fault fault) const noexcept { return reactions_[static_cast<std::size_t>(fault)]; }
+  [[nodiscard]] const Notice& notice(Fault fault) const noexcept { return notices_[static_cast<std::size_t>(fault)]; }
+  // Whether a fault that slows was there in one of the last `cycles`.
+  [[nodiscard]] bool slowed(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
+    return slow_end_ > 0 && cycle < slow_end_ + cycles;
+  }
+  // Whether what it was held for is there still, or was in one of the last `cycles`.
+  [[nodiscard]] bool cause_lasts(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
+    return held_for_.fault != Fault::none && cycle < notice(held_for_.fault).last + cycles;
+  }
+
+  // Moves on where the table has a row for it; any other event is ignored in this phase. True: moved.
+  bool handle(Event event) noexcept;
+  // Does what the fault's reaction says.
+  void raise(FaultReport report) noexcept;
+  // A hold that lasted too long: a stop for what it was held for.
+  void give_up_hold() noexcept;
+  // Asked for: held_for() is none.
+  void hold() noexcept;
+  // Out of faulted; the fault is forgotten here, so whoever wants it has taken it. False: not in faulted.
+  bool reset() noexcept;
+
   void archive(fieldbus::StateArchive& state) noexcept {
-    state(phase_, report_.fault, report_.where, report_.cycle, report_.value, report_.limit);
+    state(phase_, slow_end_);
+    for (FaultReport* report : {&report_, &held_for_}) {
+      state(report->fault, report->where, report->cycle, report->value, report->limit, report->reaction);
+    }
+    for (Notice& notice : notices_) state(notice.times, notice.cycles, notice.last);
   }
 
  private:
+  void note(const FaultReport& report) noexcept;
+
+  Reactions reactions_;
   Phase phase_ = Phase::idle;
-  FaultReport report_;
+  FaultReport report_, held_for_;
+  std::uint64_t slow_end_ = 0;  // one more than the last cycle with a fault that slows; 0: none
+  std::array<Notice, fault_count> notices_{};
 };
 
 }  // namespace proxarm::controller

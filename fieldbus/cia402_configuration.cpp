@@ -63,7 +63,8 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
 }
 
 // Quiet first: nothing but what the cycle needs may be on the bus.
-void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms) {
+void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms,
+                 std::uint32_t inputs_object) {
   const std::uint8_t node = drive.node;
   for (std::uint8_t number = 2; number <= 4; ++number) {
     steps.push_back(disable_pdo_step(PdoDirection::receive, number, node));
@@ -83,6 +84,13 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .event_timer_ms = 0,
                            .fd = drive.fd,
                            .mapping = tpdo_mapping(drive)}));
+  if (inputs_object == 0) return;
+  append(steps, pdo_steps({.direction = PdoDirection::transmit,
+                           .number = 2,
+                           .id = pdo_id(PdoDirection::transmit, 2, node),
+                           .transmission_type = every_sync,
+                           .event_timer_ms = 0,
+                           .mapping = {{object_address(inputs_object), 32}}}));
 }
 
 // The drive itself keeps to the torque and the speed that the cell allows. 6076h is the motor's, before the gear, in
@@ -204,7 +212,7 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
-  append_pdos(steps, description_, rpdo_timeout_ms(settings_, mode_.torque));
+  append_pdos(steps, description_, rpdo_timeout_ms(settings_, mode_.torque), settings_.inputs_object);
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
                             "interpolation time period value"));
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_index), 1, as_u8(period.exponent),

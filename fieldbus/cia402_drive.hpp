@@ -45,6 +45,9 @@ struct DriveSettings {
   std::uint16_t torque_timeout_periods = 3;
   double following_error_window_rad = 0.05;    // 6065h, at the joint
   std::uint16_t following_error_time_ms = 10;  // 6066h
+  // An object of 32 bits (index << 8 | sub-index), such as the digital inputs, 60FDh, that this drive sends in TPDO2 at
+  // every SYNC; 0: none. Not for decoding here.
+  std::uint32_t inputs_object = 0;
   SdoSequenceConfig sdo{};
   std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
 
@@ -117,6 +120,10 @@ class ServoDrive final : public CyclicDrive {
   }  // the first one, kept until clear_fault()
   [[nodiscard]] std::int64_t fault_time_ns() const noexcept { return fault_time_ns_; }
   void clear_fault() noexcept { fault_ = DriveFault::none; }
+  void forget_fault() noexcept override {
+    clear_fault();
+    old_fault_ = true;
+  }
   [[nodiscard]] const Emergency& latest_emergency() const noexcept { return emergency_; }
   [[nodiscard]] std::uint64_t emergencies() const noexcept { return emergencies_; }
   [[nodiscard]] std::uint64_t repeated_tpdos() const noexcept { return repeated_tpdos_; }

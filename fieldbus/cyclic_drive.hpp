@@ -57,6 +57,8 @@ class CyclicDrive {
   [[nodiscard]] virtual std::int32_t target_counts() const noexcept = 0;
   [[nodiscard]] virtual double target_rad() const noexcept = 0;
   [[nodiscard]] virtual DriveFault fault() const noexcept = 0;  // the first one
+  // A reset: the next request for operation may find it in a fault again, and resets that on the way.
+  virtual void forget_fault() noexcept = 0;
   // State and fault in words; not for the cycle.
   [[nodiscard]] virtual std::string describe() const = 0;
 

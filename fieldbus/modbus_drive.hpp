@@ -59,6 +59,7 @@ class ModbusDrive final : public CyclicDrive {
   [[nodiscard]] std::int32_t target_counts() const noexcept override { return target_counts_; }
   [[nodiscard]] double target_rad() const noexcept override { return scale_.angle_rad(target_counts_); }
   [[nodiscard]] DriveFault fault() const noexcept override { return fault_; }
+  void forget_fault() noexcept override { fault_ = DriveFault::none; }
   [[nodiscard]] std::string describe() const override;
   void archive(StateArchive& state) noexcept override {
     state(feedback_, goal_, state_, fault_, now_ns_, target_counts_, previous_target_, fresh_, following_);

@@ -19,6 +19,7 @@ void DeviceNode::set_power(bool on, std::int64_t time_ns) noexcept {
 void DeviceNode::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
   if (!powered_ || cuts_ > 0 || device_ == nullptr) return;
   clockwork_.advance_to(time_ns);
+  clockwork_.seen(frame, time_ns);
   device_->on_frame(frame, time_ns);
 }
 

@@ -17,6 +17,8 @@ class Clockwork {
  public:
   virtual ~Clockwork() = default;
   virtual void advance_to(std::int64_t time_ns) noexcept = 0;
+  // The frame itself, before the device has it.
+  virtual void seen(const fieldbus::CanFrame& /*frame*/, std::int64_t /*time_ns*/) noexcept {}
 };
 
 // One node. The device is given later since it needs the node's port first.

@@ -82,6 +82,7 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   od.add(0x6076, 0, unsigned32, constant, config.rated_torque_mNm);
   torque_ = &od.add(0x6077, 0, integer16, read_only, 0, true);
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
+  digital_inputs_ = &od.add(0x60FD, 0, unsigned32, read_only, 0, true);
   std::int64_t supported = 0;
   for (const std::int64_t mode : modes) supported |= std::int64_t{1} << (mode - 1);
   od.add(0x6502, 0, unsigned32, constant, supported);

@@ -62,6 +62,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
 
   // A fault of the drive's own appears, with its EMCY code: transition 13. Stays until it is reset.
   void inject_fault(std::uint16_t code, std::int64_t time_ns) noexcept;
+  // 60FDh, of what is wired to it.
+  void set_digital_inputs(std::uint32_t bits) noexcept { digital_inputs_->set(bits); }
 
  private:
   static constexpr std::int64_t never = INT64_MIN;
@@ -105,7 +107,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
               *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr,
-              *target_torque_ = nullptr, *max_torque_ = nullptr;
+              *target_torque_ = nullptr, *max_torque_ = nullptr, *digital_inputs_ = nullptr;
 
   std::int64_t now_ns_ = 0;
   DriveState state_ = DriveState::not_ready_to_switch_on;

@@ -195,6 +195,7 @@ SimulatedCell::SimulatedCell(const description::Cell& cell, const description::S
       add_modbus_drive(axis);
     }
   }
+  add_enabling(config.enabling);
   add_sensor(sensor);
   check_faults(sensor);
 }
@@ -214,6 +215,33 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
   nodes_.push_back(std::make_unique<DeviceNode>(drive.joint, bus, events_, clockwork));
   drives_[axis] = std::make_unique<DriveDevice>(device, *axes_[axis], *nodes_.back());
   nodes_.back()->set_device(*drives_[axis]);
+}
+
+// Wired to a drive's inputs, or a node with a message of its own.
+void SimulatedCell::add_enabling(const std::vector<PressedSpan>& spans) {
+  if (!cell_.enabling_input) return;
+  const description::EnablingInputDescription& input = *cell_.enabling_input;
+  enabling_axis_ = axis_of(input.drive);
+  if (!input.drive.empty()) {
+    enabling_ = std::make_unique<EnablingSwitch>(input, spans, nullptr);
+    return;
+  }
+  Clockwork& clockwork = *this;
+  nodes_.push_back(
+      std::make_unique<DeviceNode>("enabling input", bus_index(input.bus, "enabling_input.bus"), events_, clockwork));
+  enabling_ = std::make_unique<EnablingSwitch>(input, spans, nodes_.back().get());
+  nodes_.back()->set_device(*enabling_);
+}
+
+void SimulatedCell::seen(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
+  constexpr std::uint32_t sync = 0x080;
+  if (enabling_ && frame.id == sync && !frame.extended) enabling_->on_sync(time_ns);
+}
+
+void SimulatedCell::press(std::int64_t time_ns) noexcept {
+  if (!enabling_ || enabling_axis_ >= drives_.size() || !drives_[enabling_axis_]) return;
+  enabling_->on_time(time_ns);
+  drives_[enabling_axis_]->set_digital_inputs(enabling_->digital_inputs());
 }
 
 void SimulatedCell::add_modbus_drive(std::size_t axis) {
@@ -302,6 +330,8 @@ void SimulatedCell::power_on() {
   const std::int64_t now_ns = events_.now_ns();
   advance_to(now_ns);
   for (const auto& node : nodes_) node->set_power(true, now_ns);
+  const bool any_sync = std::any_of(drives_.begin(), drives_.end(), [](const auto& drive) { return drive != nullptr; });
+  if (enabling_ && !any_sync) enabling_->begin_without_sync(now_ns);
   if (sensor_registers_) described_sensor_->power_on(now_ns);
   schedule_faults();
   if (described_sensor_ && described_sensor_->period_ns() > 0) {
@@ -314,6 +344,7 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   events_.schedule(time_ns + tick_ns_, [this](std::int64_t next_ns) { tick(next_ns); });
   advance_to(time_ns);
   for (const auto& node : nodes_) node->on_time(time_ns);
+  press(time_ns);
   for (const auto& drive : modbus_drives_) {
     if (drive) drive->on_time(time_ns);
   }

@@ -23,6 +23,7 @@
 #include "sim/device_fault.hpp"
 #include "sim/device_node.hpp"
 #include "sim/drive_device.hpp"
+#include "sim/enabling_switch.hpp"
 #include "sim/modbus_device.hpp"
 #include "sim/modbus_sensor_device.hpp"
 #include "sim/plant.hpp"
@@ -32,7 +33,8 @@ namespace proxarm::sim {
 struct SimulatedCellConfig {
   PlantConfig plant;
   std::vector<DeviceFault> faults;
-  std::int64_t tick_ns = 1'000'000;  // how often devices look at the clock; physics has its own step
+  std::vector<PressedSpan> enabling;  // of the cell's enabling input; none: pressed from 0.1 s on
+  std::int64_t tick_ns = 1'000'000;   // how often devices look at the clock; physics has its own step
   std::int64_t drive_boot_time_ns = 20'000'000;
   std::int64_t brake_release_ns = 30'000'000;
 };
@@ -62,7 +64,8 @@ class SimulatedCell final : private Clockwork {
   SimulatedCell& operator=(const SimulatedCell&) = delete;
   ~SimulatedCell() override;
 
-  // Nodes, one per drive on CAN in the cell's order and then the sensor, if it is on CAN: to be connected to their
+  // Nodes, one per drive on CAN in the cell's order, then the enabling switch where it has a message and the sensor, if
+  // it is on CAN: to be connected to their
   // buses before power_on().
   [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
   [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
@@ -96,6 +99,9 @@ class SimulatedCell final : private Clockwork {
   class PlantWrench;
 
   void advance_to(std::int64_t time_ns) noexcept override;
+  void seen(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
+  void add_enabling(const std::vector<PressedSpan>& spans);
+  void press(std::int64_t time_ns) noexcept;
   [[nodiscard]] Truth present_truth() const noexcept;
   void add_drive(std::size_t axis, const SimulatedCellConfig& config);
   void add_modbus_drive(std::size_t axis);
@@ -126,6 +132,8 @@ class SimulatedCell final : private Clockwork {
   std::unique_ptr<AtiDevice> sensor_;                     // one of these two
   std::unique_ptr<ModbusSensorDevice> sensor_registers_;  // of the latter, where it is on Modbus
   std::unique_ptr<DescribedDevice> described_sensor_;
+  std::unique_ptr<EnablingSwitch> enabling_;
+  std::size_t enabling_axis_ = 0;  // that it is wired to
   std::function<void(const Truth&)> observer_;
 };
 

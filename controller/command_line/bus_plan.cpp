@@ -162,6 +162,28 @@ std::vector<fieldbus::CanFrame> typical_gauges(const PreparedSession& session, P
   return frames;
 }
 
+// In TPDO2 of its drive, or a message that comes at least twice before it is too old.
+void add_enabling_input(PlannedBus& bus, const PreparedSession& session) {
+  const description::EnablingInputDescription& input = *session.cell.enabling_input;
+  PlannedFrame frame{.name = "enabling input", .id = input.identifier};
+  if (!input.drive.empty()) {
+    const auto& drives = session.cell.drives;
+    const auto drive =
+        std::find_if(drives.begin(), drives.end(), [&](const auto& d) { return d.joint == input.drive; });
+    frame.id = fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 2, drive->node);
+    frame.shape.bytes = 4;
+    frame.sender = input.drive;
+    frame.after = input.drive + " TPDO1";
+  } else {
+    frame.shape.bytes = 8;
+    frame.shape.extended = input.extended;
+    frame.sender = "enabling input";
+    frame.any_time = true;
+    frame.every_cycles = cycles_of(session, std::max(1, static_cast<int>(500.0 * input.timeout_s)));
+  }
+  bus.frames.push_back(frame);
+}
+
 // ATI Net CAN OEM: a poll, and two answers.
 void add_sensor(PlannedBus& bus, const PreparedSession& session) {
   const std::uint32_t base = session.cell.sensor.base_id << 4;
@@ -247,6 +269,10 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
     }
     for (std::size_t axis = 0; axis < session.cell.drives.size(); ++axis) {
       if (on_it(session.cell.drives[axis])) add_drive(bus, session.cell.drives[axis], session.cell.start_rad[axis]);
+    }
+    const auto& enabling = session.cell.enabling_input;
+    if (enabling && enabling->bus == own.name && !session.settings.without_enabling_input) {
+      add_enabling_input(bus, session);
     }
     if (session.cell.sensor.bus != own.name) continue;
     if (session.sensor.described) {

@@ -10,6 +10,7 @@
 #include "controller/bring_up.hpp"
 #include "controller/command_line/bus_plan.hpp"
 #include "controller/command_line/cell_buses.hpp"
+#include "controller/command_line/hardware_consent.hpp"
 #include "controller/command_line/live_parameters.hpp"
 #include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/realtime.hpp"
@@ -34,17 +35,6 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, should a disk take that long
 constexpr std::size_t frame_capacity = 262144;
 constexpr auto drain_interval = std::chrono::milliseconds(5);
-
-void refuse_real_interfaces(const std::vector<std::string>& interfaces) {
-  for (const std::string& interface : interfaces) {
-    if (fieldbus::is_virtual_can(interface)) continue;
-    throw description::SetupError(
-        {.bus = interface,
-         .message = "this is a real CAN interface, and this version enables drives on virtual ones only (vcan, vxcan)",
-         .advice =
-             "limits and supervision for a person next to a moving arm aren't complete yet; use --bus sim or vcan"});
-  }
-}
 
 controller::BusIndices indices_in(const SocketCanNetwork& network, std::size_t buses) {
   controller::BusIndices indices;
@@ -182,7 +172,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
   SocketCanNetwork network(interfaces, {.closed = true});
-  refuse_real_interfaces(interfaces);
+  require_hardware_consent(session, options, interfaces);
   require_fd(session.cell, network);
   const controller::BusIndices indices = indices_in(network, interfaces.size());
   warn_if_not_carried(session, indices);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <sstream>
 
+#include "controller/command_line/orders.hpp"
 #include "models/description/quantity.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/description/text.hpp"
@@ -173,22 +174,33 @@ std::vector<controller::ScheduledChange> scheduled_changes(const std::vector<std
 }  // namespace
 
 void require_changes(const PreparedSession& session, const RunOptions& options) {
-  if (session.impedance() && (!options.changes.empty() || !options.control.empty())) {
-    throw SetupError({.key = options.changes.empty() ? "--control" : "--set",
+  const bool asked = !options.changes.empty() || !options.control.empty() || !options.orders.empty();
+  if (session.impedance() && asked) {
+    throw SetupError({.key = !options.changes.empty()  ? "--set"
+                             : !options.orders.empty() ? "--do"
+                                                       : "--control",
                       .found = "the impedance type",
                       .expected = "--scheme admittance: mass, damping and spring are the proxy's"});
   }
   (void)scheduled_changes(options.changes, session, options);
+  (void)scheduled_orders(options.orders);
   if (!options.control.empty()) require_control_path(control_path(options));
 }
 
 std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
                                             const RunOptions& options) {
   cycle.schedule(scheduled_changes(options.changes, session, options));
+  cycle.schedule(scheduled_orders(options.orders));
   if (options.control.empty()) return nullptr;
   const auto parameters = std::make_shared<LiveParameters>(session, options);
   return std::make_unique<ControlSocket>(
       control_path(options), [&cycle, parameters](const std::string& line) -> std::string {
+        if (const auto command = parse_order(line)) {
+          const char* const refusal = cycle.refusal(command->order);
+          if (refusal != nullptr) throw SetupError({.message = refusal});
+          if (!cycle.commands().push(*command)) throw SetupError({.found = "too many commands at once"});
+          return line;
+        }
         const controller::Change change = parameters->take(line);
         if (!cycle.changes().push(change)) {
           throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});

@@ -64,6 +64,43 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void add_enabling_option(CLI::App& app, RunOptions& options) {
+  app.add_option("--enabling", CLI::callback_t([&](const CLI::results_t& words) {
+                   for (const std::string& word : words) options.enabling.push_back(sim::parse_pressed_span(word));
+                   return true;
+                 }),
+                 "simulated enabling switch only, may be repeated: when it is pressed, FROM..UNTIL counted from the "
+                 "first cycle, such as 0.5s..3s (default: from 0.1s on)")
+      ->type_name("TIME..TIME")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+void add_supervision_options(CLI::App& app, RunOptions& options) {
+  app.add_option("--do", options.orders,
+                 "by script, counted from the first cycle: hold, resume, release, \"back-off 20mm\" or reset, such as "
+                 "hold@2s; may be repeated")
+      ->type_name("ORDER@TIME")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--wait-after-fault",
+                 quantity([](const std::string& w) { return description::parse_duration(w, "--wait-after-fault"); },
+                          [&](double value) { options.settings.wait_after_fault_s = value; }),
+                 "after a stop by a fault, how long to wait for `proxarm reset` (default: the session ends)")
+      ->type_name("TIME");
+  app.add_option("--accept-force",
+                 quantity([](const std::string& w) { return description::parse_force(w, "--accept-force"); },
+                          [&](double value) { options.settings.tare_spread_N = value; }),
+                 "start with a hand on the handle whose force varies by up to this while the sensor is tared (default "
+                 "5N); its mean is taken as zero")
+      ->type_name("N");
+  app.add_flag("--without-enabling-input", options.settings.without_enabling_input,
+               "leave out the cell's enabling input; needed on real interfaces for a cell that has none");
+  app.add_flag("--hardware{ask}", options.hardware,
+               "drives on real interfaces: shows a checklist to be confirmed on the terminal (scripts: "
+               "--hardware=checked)");
+}
+
 void add_session_options(CLI::App& app, RunOptions& options) {
   app.add_option("cell", options.cell, "cell file (default: the six-axis arm of the 150 kg class)");
   app.add_option("--scene", options.scene, "scene file (default: the cell's)");
@@ -122,6 +159,8 @@ void add_session_options(CLI::App& app, RunOptions& options) {
 void add_run_options(CLI::App& app, RunOptions& options) {
   add_session_options(app, options);
   add_fault_option(app, options);
+  add_enabling_option(app, options);
+  add_supervision_options(app, options);
   app.add_option("--pace",
                  choice<Pace>("--pace", {{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}},
                               [&](Pace value) { options.pace = value; }),
@@ -253,6 +292,7 @@ int run(int argc, char** argv) {
   CLI::App* sim_app = app.add_subcommand("sim", "the simulated arm as a process of its own on CAN interfaces");
   add_session_options(*sim_app, sim_options);
   add_fault_option(*sim_app, sim_options);
+  add_enabling_option(*sim_app, sim_options);
   sim_app->callback([&] { command = [&] { return command_line::sim_command(sim_options); }; });
 
   CLI::App* plan_app = app.add_subcommand("plan", "bus budget of a cell; status 1 if it can't be carried");
@@ -279,6 +319,26 @@ int run(int argc, char** argv) {
   set_app->add_option("changes", set_options.changes, "NAME=VALUE, such as mass=3")->required();
   set_app->add_option("--control", set_options.control, "the session's socket")->type_name("PATH");
   set_app->callback([&] { command = [&] { return command_line::set_command(set_options); }; });
+
+  // Orders to a running session, each a line on its socket.
+  command_line::SetOptions order_options;
+  std::string distance;
+  const std::pair<const char*, const char*> orders[] = {
+      {"hold", "stop the arm of a running session, its drives enabled"},
+      {"resume", "go on out of a hold"},
+      {"release", "out of a hold: let the arm follow the hand slowly, without the scene; hold ends it"},
+      {"back-off", "out of a hold: move the tool away from what was touched last"},
+      {"reset", "after a fault, with --wait-after-fault: enable the drives again, into a hold"}};
+  for (const auto& [name, help] : orders) {
+    CLI::App* order_app = app.add_subcommand(name, help);
+    order_app->add_option("--control", order_options.control, "the session's socket")->type_name("PATH");
+    const bool has_distance = std::string(name) == "back-off";
+    if (has_distance) order_app->add_option("distance", distance, "such as 20mm")->required();
+    order_app->callback([&, line = std::string(name), has_distance] {
+      order_options.changes = {has_distance ? line + " " + distance : line};
+      command = [&] { return command_line::set_command(order_options); };
+    });
+  }
 
   command_line::ReplayOptions replay_options;
   CLI::App* replay_app = app.add_subcommand("replay", "a recorded session or black box again, by the controller alone");

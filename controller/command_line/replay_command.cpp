@@ -100,6 +100,7 @@ class Replay {
     network_.load(recorded, frames);
     cycle_->report_overruns(recorded.overruns_in_a_row);
     if (recorded.change.parameter != controller::Parameter::none) cycle_->changes().push(recorded.change);
+    if (recorded.command.order != controller::Order::none) cycle_->commands().push(recorded.command);
     if (recorded.stop_requested) cycle_->request_stop();
     fieldbus::StateArchive inputs =
         fieldbus::StateArchive::reader(std::span(recorded.inputs).first(recorded.input_bytes));

@@ -10,6 +10,7 @@
 
 #include "controller/session_settings.hpp"
 #include "sim/device_fault.hpp"
+#include "sim/enabling_switch.hpp"
 
 namespace proxarm::command_line {
 
@@ -46,13 +47,16 @@ struct RunOptions {
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;     // empty: no record
   std::vector<std::string> changes;     // NAME=VALUE@TIME
+  std::vector<std::string> orders;      // ORDER@TIME
+  std::string hardware;                 // empty: simulations only; ask, checked
   std::filesystem::path control;        // socket that takes changes; empty: none
   std::filesystem::path black_box_dir;  // empty: in the record, or proxarm-black-box
   std::filesystem::path plot_file;      // empty: proxarm-run.svg, none with --json
   bool plot = true;
   bool json = false;
   bool force_unstable = false;
-  std::vector<sim::DeviceFault> faults;  // of the simulated devices
+  std::vector<sim::DeviceFault> faults;    // of the simulated devices
+  std::vector<sim::PressedSpan> enabling;  // of the simulated enabling switch
 };
 
 }  // namespace proxarm::command_line

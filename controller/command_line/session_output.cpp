@@ -158,10 +158,20 @@ Summary SessionOutput::summary(const controller::Cycle& cycle) {
   Summary summary = builder_.finish();
   // A medium takes its share along the surface, too, which the ratio would count as friction.
   if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
+  for (const controller::FaultReport& report : cycle.past_faults()) {
+    summary.faults.push_back({report.fault, report.cycle, describe(report, place_of(report, cycle.parts())), true});
+  }
   const controller::FaultReport& report = cycle.supervisor().report();
   if (report.fault != Fault::none) {
     summary.faults.push_back(
         {report.fault, report.cycle, describe(report, place_of(report, cycle.parts()), cycle.drives_off())});
+  }
+  for (std::size_t i = 1; i < controller::fault_count; ++i) {
+    const auto fault = static_cast<Fault>(i);
+    const controller::Notice& notice = cycle.supervisor().notice(fault);
+    const controller::Reaction reaction = cycle.supervisor().reaction(fault);
+    if (notice.times == 0 || reaction >= controller::Reaction::stop_1) continue;
+    summary.notices.push_back({fault, reaction, notice.times, notice.cycles});
   }
   return summary;
 }
@@ -176,8 +186,10 @@ int SessionOutput::finish(const Summary& summary, BlackBoxKeeper& keeper) {
   std::fflush(stdout);
   const bool drawn = draw_plot();
   if (writer_) writer_->finish(summary);
-  keeper.finish(summary.faults.empty() ? "" : summary.faults.front().text);
-  if (!summary.faults.empty()) {
+  // Faults that were reset come first.
+  const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
+  keeper.finish(ended_by_fault ? summary.faults.back().text : "");
+  if (ended_by_fault) {
     if (!options_.json) std::printf("  black box:                %s\n", keeper.folder().c_str());
     return fault_ended_the_run;
   }

@@ -33,6 +33,7 @@ int sim_command(const RunOptions& options) {
   sim::set_acceptance_filters(network, session.cell, session.sensor, interface_of_bus);
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
+  config.enabling = options.enabling;
   sim::FarEndProcess process(session.cell, session.sensor, session.hand, network, interface_of_bus, config);
   std::vector<std::unique_ptr<sim::ModbusServer>> servers;
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {

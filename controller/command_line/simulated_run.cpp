@@ -24,6 +24,7 @@ constexpr std::size_t record_capacity = 64;  // drained after every cycle
 sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
+  config.enabling = options.enabling;
   return config;
 }
 

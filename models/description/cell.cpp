@@ -377,6 +377,21 @@ void read_start(const YamlNode& root, Cell& cell) {
   }
 }
 
+// The enabling input's drive must be one on CAN; its bus is the drive's.
+EnablingInputDescription read_enabling(const YamlNode& node, const Cell& cell) {
+  EnablingInputDescription input = read_enabling_input(node);
+  if (input.drive.empty()) {
+    check_bus(node, input.bus, cell.buses);
+    return input;
+  }
+  const auto found = std::find_if(cell.drives.begin(), cell.drives.end(),
+                                  [&](const DriveDescription& drive) { return drive.joint == input.drive; });
+  if (found == cell.drives.end()) throw node.error_at("drive", "the joint of one of this cell's drives");
+  if (!found->on_can()) throw node.error_at("drive", "a drive on CAN: a Modbus drive's inputs aren't read");
+  input.bus = found->bus;
+  return input;
+}
+
 }  // namespace
 
 double DriveDescription::counts_per_rad() const noexcept {
@@ -404,6 +419,8 @@ Cell read_cell(const YamlNode& root) {
   if (!on_line) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
   cell.passivity = root.choice_or("passivity", cell.passivity, {"off", "observe", "on"});
+  if (const auto supervision = root.find_map("supervision")) cell.supervision = read_supervision(*supervision);
+  if (const auto input = root.find_map("enabling_input")) cell.enabling_input = read_enabling(*input, cell);
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
   cell.default_scene = absolute_path_or_empty(root, "default_scene");

@@ -9,8 +9,11 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "models/description/supervision.hpp"
 
 namespace proxarm::description {
 
@@ -163,6 +166,8 @@ struct Cell {
   SensorPlacement sensor;
   CellLimits limits;
   std::string passivity = "off";  // "off", "observe", "on" (--passivity)
+  SupervisionDescription supervision;
+  std::optional<EnablingInputDescription> enabling_input;
   double default_period_s = 1e-3;
   double default_mass_kg = 4.0;
   std::string default_scene;  // path, absolute (in the cell's file: relative to its folder); may be empty

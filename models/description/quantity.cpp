@@ -28,6 +28,8 @@ constexpr Unit durations[] = {{"s", 1, 1},    {"ms", 1, 1e3}, {"us", 1, 1e6},   
                               {"μs", 1, 1e6}, {"ns", 1, 1e9}, {"min", 60, 1.0}, {"h", 3600, 1}};
 constexpr Unit masses[] = {{"kg", 1, 1}, {"g", 1, 1e3}};
 constexpr Unit dampings[] = {{"Ns/m", 1, 1}, {"N*s/m", 1, 1}, {"N·s/m", 1, 1}};
+constexpr Unit lengths[] = {{"m", 1, 1}, {"mm", 1, 1e3}, {"cm", 1, 1e2}};
+constexpr Unit forces[] = {{"N", 1, 1}};
 constexpr Unit stiffnesses[] = {{"N/m", 1, 1}, {"N/mm", 1e3, 1}};
 
 std::string expected(const Kind& kind) {
@@ -55,7 +57,8 @@ double parse(std::string_view text, std::string_view option, const Kind& kind) {
   if (unit.empty()) {
     if (kind.needs_unit) {
       const std::string written(rest.substr(0, length));
-      throw fail("the unit is missing: " + written + "ms? " + written + "s?");
+      const bool time = kind.units.front().name == "s";
+      throw fail("the unit is missing: " + written + (time ? "ms? " : "mm? ") + written + (time ? "s?" : "m?"));
     }
     unit = kind.units.front().name;
   }
@@ -83,6 +86,12 @@ double parse_damping(std::string_view text, std::string_view option) {
 }
 double parse_stiffness(std::string_view text, std::string_view option) {
   return parse(text, option, {"a stiffness", "500N/m", stiffnesses, false, true});
+}
+double parse_length(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a length", "20mm", lengths, true, false});
+}
+double parse_force(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a force", "20N", forces, false, false});
 }
 
 }  // namespace proxarm::description

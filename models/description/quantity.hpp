@@ -20,4 +20,10 @@ double parse_damping(std::string_view text, std::string_view option = "damping")
 // "500", "500N/m" → N/m, zero or more.
 double parse_stiffness(std::string_view text, std::string_view option = "stiffness");
 
+// "20mm", "0.02m" → m, above zero. The unit is required.
+double parse_length(std::string_view text, std::string_view option = "length");
+
+// "20", "20N" → N, above zero.
+double parse_force(std::string_view text, std::string_view option = "force");
+
 }  // namespace proxarm::description

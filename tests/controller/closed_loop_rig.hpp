@@ -38,6 +38,12 @@ struct RigOptions {
   std::array<double, 6> start_error_rad{};     // by which the controller is wrong about where the arm stands
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
   std::vector<ScheduledChange> changes{};
+  std::vector<ScheduledCommand> commands{};
+  std::vector<sim::PressedSpan> enabling{};               // of the cell's enabling switch, from the first SYNC
+  std::function<void(description::Cell&)> edit_cell{};    // for both ends
+  std::function<void(description::Cell&)> edit_belief{};  // the controller's alone
+  std::function<void(description::HandDescription&)> edit_hand{};
+  std::function<void(CycleParts&)> edit_parts{};                      // before the bring-up
   std::function<void(fieldbus::SimulatedCanNetwork&)> after_cycle{};  // such as to take a nap, and be late
   std::int64_t restart_ns = 0;                                        // of all buses, after bus-off by errors
   BlackBox* box = nullptr;
@@ -47,9 +53,9 @@ class ClosedLoopRig {
  public:
   explicit ClosedLoopRig(const RigOptions& rig)
       : options(rig),
-        cell(delayed(description::load_cell(source_file(rig.cell)), rig.sensor_delay_s)),
+        cell(edited(delayed(description::load_cell(source_file(rig.cell)), rig.sensor_delay_s), rig.edit_cell)),
         sensor(biased(description::load_sensor(source_file("models/sensors/ati_net_can_oem.yaml")), rig)),
-        hand(description::load_hand(source_file(rig.hand))),
+        hand(edited(description::load_hand(source_file(rig.hand)), rig.edit_hand)),
         scene(scenes::load_scene(source_file(rig.scene))),
         compiled(scenes::compile(scene)),
         network(buses_of(cell, rig)),
@@ -72,6 +78,7 @@ class ClosedLoopRig {
                              }};
     cycle->schedule(options.changes);
     if (options.box != nullptr) cycle->write_to(*options.box);
+    cycle->schedule(options.commands);
     tally = run_session(*cycle, through, options.settings.period_s, options.duration_s, hooks);
     cycle->shut_down();
     network.sleep_until(network.now_ns() + 1'500'000'000);  // the drives stop, and the gears ring out
@@ -81,10 +88,12 @@ class ClosedLoopRig {
   CycleParts prepared_parts(fieldbus::CanNetwork& through) {
     description::Cell believed = cell;
     for (std::size_t i = 0; i < cell.drives.size(); ++i) believed.start_rad[i] += options.start_error_rad[i];
+    if (options.edit_belief) options.edit_belief(believed);
     BusIndices indices(cell.buses.size());
     std::iota(indices.begin(), indices.end(), std::size_t{0});
     CycleParts parts = build_parts(believed, sensor, compiled, options.settings, through, indices,
                                    [this](const auto& line, double) { return far_end.modbus_client(line.name); });
+    if (options.edit_parts) options.edit_parts(parts);
     bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(line, network.now_ns()); });
     return parts;
   }
@@ -110,6 +119,11 @@ class ClosedLoopRig {
   std::int64_t first_cycle_ns = 0;
 
  private:
+  template <typename Description>
+  static Description edited(Description description, const std::function<void(Description&)>& edit) {
+    if (edit) edit(description);
+    return description;
+  }
   static std::vector<fieldbus::SimulatedBusConfig> buses_of(const description::Cell& cell, const RigOptions& rig) {
     std::vector<fieldbus::SimulatedBusConfig> buses;
     for (const auto& bus : cell.buses) buses.push_back({.name = bus.name, .restart_ns = rig.restart_ns});
@@ -130,6 +144,7 @@ class ClosedLoopRig {
   }
   static sim::SimulatedCellConfig with_faults(const RigOptions& rig) {
     sim::SimulatedCellConfig config;
+    config.enabling = rig.enabling;
     for (const std::string& text : rig.device_faults) config.faults.push_back(sim::parse_device_fault(text));
     return config;
   }

@@ -104,9 +104,12 @@ TEST(ClosedLoop, StopsTheOthersWhenADriveFallsSilent) {
 }
 
 // Nothing can be sent on that bus any more; the drives there stop by themselves when the controller's RPDOs stay away.
+// By the cell's choice: without one, the drives there are switched off at once.
 TEST(ClosedLoop, StopsTheOtherBusAtOnceWhenACableIsCut) {
-  ClosedLoopRig rig(
-      {.script = {{{.action = fieldbus::FaultAction::bus_off, .bus = "axes_1_3", .from_ns = failure_ns}}}});
+  RigOptions options{
+      .script = {{{.action = fieldbus::FaultAction::bus_off, .bus = "axes_1_3", .from_ns = failure_ns}}}};
+  options.edit_cell = [](description::Cell& cell) { cell.supervision.reactions = {{"bus_off", "stop_1"}}; };
+  ClosedLoopRig rig(options);
   rig.run();
   expect_controlled_stop(rig, Fault::bus_off, 0, 1);
 }
@@ -122,9 +125,12 @@ TEST(ClosedLoop, StopsTheOtherBusAtOnceWhenAnInterfaceGoesDown) {
 }
 
 // The bus still works, but the next errors would end it.
+// By the cell's choice: without one, the arm slows down.
 TEST(ClosedLoop, StopsAtOnceWhenABusIsErrorPassive) {
-  ClosedLoopRig rig(
-      {.script = {{{.action = fieldbus::FaultAction::error_passive, .bus = "axes_1_3", .from_ns = failure_ns}}}});
+  RigOptions options{
+      .script = {{{.action = fieldbus::FaultAction::error_passive, .bus = "axes_1_3", .from_ns = failure_ns}}}};
+  options.edit_cell = [](description::Cell& cell) { cell.supervision.reactions = {{"error_passive", "stop_1"}}; };
+  ClosedLoopRig rig(options);
   rig.run();
   expect_controlled_stop(rig, Fault::error_passive, 0, 1);
 }

@@ -1,0 +1,72 @@
+#include "models/description/supervision.hpp"
+
+#include "models/description/text.hpp"
+#include "models/description/yaml_file.hpp"
+
+namespace proxarm::description {
+
+const std::vector<ReactionChoice>& reaction_choices() {
+  static const std::vector<ReactionChoice> choices{
+      {"sensor_lost", {"stop_1", "hold"}},
+      {"sensor_late", {"slow", "continue", "hold", "stop_1"}},
+      {"sensor_saturated", {"stop_1", "hold"}},
+      {"force_excessive", {"stop_1", "hold"}},
+      {"feedback_late", {"continue", "slow"}},
+      {"position_implausible", {"stop_0", "stop_1"}},
+      {"leash_exceeded", {"stop_1", "hold"}},
+      {"proxy_squeezed", {"stop_1", "hold"}},
+      {"bus_off", {"stop_1", "stop_0"}},
+      {"interface_down", {"stop_1", "stop_0"}},
+      {"receive_overflow", {"stop_1", "slow"}},
+      {"overrun", {"stop_1", "hold"}},
+      {"second_master", {"stop_1", "stop_0"}},
+      {"error_passive", {"slow", "hold", "stop_1"}},
+      {"enabling_released", {"hold", "stop_1", "stop_0"}},
+  };
+  return choices;
+}
+
+SupervisionDescription read_supervision(const YamlNode& node) {
+  SupervisionDescription s;
+  s.hold_s = node.number_or("hold_s", s.hold_s, 0.1, 3600.0);
+  s.ramp_in_s = node.number_or("ramp_in_s", s.ramp_in_s, 0.0, 10.0);
+  s.slow_speed_m_per_s = node.number_or("slow_speed_m_per_s", s.slow_speed_m_per_s, 0.01, 1.0);
+  s.release_speed_m_per_s = node.number_or("release_speed_m_per_s", s.release_speed_m_per_s, 0.005, 0.25);
+  s.brake_release = node.string_or("brake_release", "");
+  if (s.brake_release.size() > 120) throw node.error_at("brake_release", "at most 120 characters");
+  const auto reactions = node.find_map("reactions");
+  if (!reactions) return s;
+  for (const ReactionChoice& choice : reaction_choices()) {
+    if (reactions->has(choice.fault)) s.reactions[choice.fault] = reactions->choice(choice.fault, choice.allowed);
+  }
+  return s;
+}
+
+EnablingInputDescription read_enabling_input(const YamlNode& node) {
+  EnablingInputDescription input;
+  if (node.has("drive") == node.has("identifier")) {
+    throw node.error("either drive (and bit, of its object 60FDh) or bus, identifier, byte and bit of a CAN message");
+  }
+  input.pressed_is = node.integer_or("pressed_is", 1, 0, 1) == 1;
+  input.timeout_s = node.number_or("timeout_s", input.timeout_s, 0.002, 1.0);
+  if (node.has("drive")) {
+    input.drive = node.string("drive");
+    input.bit = static_cast<int>(node.integer("bit", 0, 31));
+    if (node.has("object")) {
+      const auto index = strict_integer(node.string("object"));
+      if (!index || *index < 0x1000 || *index > 0xFFFF) {
+        throw node.error_at("object", "an object of 32 bits, its index in hexadecimal: \"0x60FD\"");
+      }
+      input.object = static_cast<std::uint32_t>(*index << 8);
+    }
+    return input;
+  }
+  input.bus = node.string("bus");
+  input.extended = node.boolean_or("extended", false);
+  input.identifier = static_cast<std::uint32_t>(node.integer("identifier", 1, input.extended ? 0x1FFFFFFF : 0x7FF));
+  input.byte = static_cast<int>(node.integer("byte", 0, 7));
+  input.bit = static_cast<int>(node.integer("bit", 0, 7));
+  return input;
+}
+
+}  // namespace proxarm::description
