@@ -84,7 +84,9 @@ constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
                                    {RecordFlag::limit_leash, "limit_leash"},
                                    {RecordFlag::limit_orientation, "limit_orientation"},
                                    {RecordFlag::contact_multivalued, "contact_multivalued"},
-                                   {RecordFlag::oscillation, "oscillation"}};
+                                   {RecordFlag::oscillation, "oscillation"},
+                                   {RecordFlag::ramp_in, "ramp_in"},
+                                   {RecordFlag::slowed, "slowed"}};
 
 void append_flags(std::string& row, const CycleRecord& record) {
   bool first = true;

@@ -137,8 +137,27 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
   std::fflush(stdout);
 }
 
+// On standard error, when it matters.
+void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
+  const std::string& brakes = session_.cell.supervision.brake_release;
+  const std::string by_hand = brakes.empty() ? "" : "; brakes: " + brakes;
+  if (phase == controller::Phase::holding) {
+    std::fprintf(stderr,
+                 "proxarm: holding, drives enabled for %.3g s. Somebody pinned: `proxarm release` or `proxarm back-off "
+                 "20mm`, with the enabling input pressed; to go on: press it anew, or `proxarm resume`%s\n",
+                 session_.cell.supervision.hold_s, by_hand.c_str());
+  } else if (phase == controller::Phase::faulted) {
+    std::fprintf(stderr,
+                 "proxarm: stopped by a fault, drives off. `proxarm reset` within %.3g s enables them again, into a "
+                 "hold; somebody pinned: then `proxarm release`%s\n",
+                 session_.settings.wait_after_fault_s, by_hand.c_str());
+  }
+}
+
 void SessionOutput::add(CycleRecord record) {
   if (record.phase == controller::Phase::rendering) ++proxy_steps_;
+  if (record.phase != last_phase_) say_how_to_get_free(record.phase);
+  last_phase_ = record.phase;
   complete(record, session_, proxy_steps_);
   builder_.add(record);
   if (writer_) writer_->add(record);
@@ -165,6 +184,8 @@ Summary SessionOutput::summary(const controller::Cycle& cycle) {
   if (report.fault != Fault::none) {
     summary.faults.push_back(
         {report.fault, report.cycle, describe(report, place_of(report, cycle.parts()), cycle.drives_off())});
+    const std::string& brakes = session_.cell.supervision.brake_release;
+    if (!brakes.empty()) summary.faults.back().text += "; somebody pinned: open the brakes by " + brakes;
   }
   for (std::size_t i = 1; i < controller::fault_count; ++i) {
     const auto fault = static_cast<Fault>(i);

@@ -41,6 +41,7 @@ class SessionOutput {
  private:
   void refuse_lost_plot() const;
   bool draw_plot();
+  void say_how_to_get_free(controller::Phase phase) const;
 
   const PreparedSession& session_;
   const RunOptions& options_;
@@ -49,6 +50,7 @@ class SessionOutput {
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
   std::uint64_t proxy_steps_ = 0;
+  controller::Phase last_phase_ = controller::Phase::idle;
 };
 
 }  // namespace proxarm::command_line

@@ -104,11 +104,9 @@ TEST(ClosedLoop, StopsTheOthersWhenADriveFallsSilent) {
 }
 
 // Nothing can be sent on that bus any more; the drives there stop by themselves when the controller's RPDOs stay away.
-// By the cell's choice: without one, the drives there are switched off at once.
 TEST(ClosedLoop, StopsTheOtherBusAtOnceWhenACableIsCut) {
   RigOptions options{
       .script = {{{.action = fieldbus::FaultAction::bus_off, .bus = "axes_1_3", .from_ns = failure_ns}}}};
-  options.edit_cell = [](description::Cell& cell) { cell.supervision.reactions = {{"bus_off", "stop_1"}}; };
   ClosedLoopRig rig(options);
   rig.run();
   expect_controlled_stop(rig, Fault::bus_off, 0, 1);

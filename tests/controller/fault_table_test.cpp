@@ -140,11 +140,12 @@ void spoil_targets(CycleParts& parts) {
   parts.drives = std::move(drives);
 }
 
-// A kernel that drops frames.
-class OverflowingNetwork final : public fieldbus::CanNetwork {
+// A kernel that drops frames, or whose queues are full.
+class FullNetwork final : public fieldbus::CanNetwork {
  public:
-  explicit OverflowingNetwork(fieldbus::CanNetwork& inner) : inner_(inner) {
-    for (std::size_t i = 0; i < inner.bus_count(); ++i) buses_.push_back(std::make_unique<Bus>(inner.bus(i), inner));
+  FullNetwork(fieldbus::CanNetwork& inner, Fault fault) : inner_(inner) {
+    for (std::size_t i = 0; i < inner.bus_count(); ++i)
+      buses_.push_back(std::make_unique<Bus>(inner.bus(i), inner, fault));
   }
   [[nodiscard]] std::size_t bus_count() const noexcept override { return buses_.size(); }
   [[nodiscard]] fieldbus::CanBus& bus(std::size_t index) noexcept override { return *buses_[index]; }
@@ -154,17 +155,24 @@ class OverflowingNetwork final : public fieldbus::CanNetwork {
 
  private:
   struct Bus final : fieldbus::CanBus {
-    Bus(fieldbus::CanBus& bus, fieldbus::CanNetwork& its_network) : inner(bus), network(its_network) {}
-    fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override { return inner.send(frame); }
+    Bus(fieldbus::CanBus& bus, fieldbus::CanNetwork& its_network, Fault its_fault)
+        : inner(bus), network(its_network), fault(its_fault) {}
+    [[nodiscard]] bool fails(Fault asked) const noexcept {
+      return fault == asked && network.now_ns() >= failure_ns && network.now_ns() < failure_ns + 5'000'000;
+    }
+    fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override {
+      return fails(Fault::send_failed) ? fieldbus::SendResult::queue_full : inner.send(frame);
+    }
     bool receive(fieldbus::TimedFrame& out) noexcept override { return inner.receive(out); }
     [[nodiscard]] const fieldbus::BusStatus& status() const noexcept override {
       own = inner.status();
-      if (network.now_ns() >= failure_ns) own.receive_overflows += 3;
+      if (fault == Fault::receive_overflow && network.now_ns() >= failure_ns) own.receive_overflows += 3;
       return own;
     }
     [[nodiscard]] const std::string& name() const noexcept override { return inner.name(); }
     fieldbus::CanBus& inner;
     fieldbus::CanNetwork& network;
+    Fault fault;
     mutable fieldbus::BusStatus own;
   };
   fieldbus::CanNetwork& inner_;
@@ -313,7 +321,7 @@ struct Row {
   std::function<RigOptions()> options;
   // Where the failure is at another time: the first cycle with it.
   std::function<std::size_t(const ClosedLoopRig&)> failed = {};
-  bool overflows = false;
+  bool of_the_kernel = false;
 };
 
 std::size_t at_start(const ClosedLoopRig& /*rig*/) { return 0; }
@@ -403,10 +411,9 @@ std::vector<Row> rows() {
        [] { return wrong_world([](WorldStep& step) { step.fault = ProxyFault::result_not_finite; }); }, world_is_wrong},
       {proxy_squeezed, Reaction::stop_1, 1, way_m,
        [] { return wrong_world([](WorldStep& step) { step.fault = ProxyFault::squeezed; }); }, world_is_wrong},
-      {bus_off, Reaction::stop_0, 1, way_m,
+      {bus_off, Reaction::stop_1, 1, way_m,
        [] { return failing_bus({.action = FaultAction::bus_off, .bus = "axes_1_3"}); }},
-      {send_failed, Reaction::stop_1, 1, way_m,
-       [] { return failing_bus({.action = FaultAction::port_down, .bus = "axes_4_6"}); }},
+      {send_failed, Reaction::stop_1, 1, way_m, [] { return RigOptions{}; }, {}, true},
       {receive_overflow, Reaction::stop_1, 1, way_m, [] { return RigOptions{}; }, {}, true},
       {overrun, Reaction::stop_1, 8, way_m + 1e-3, naps},
       {second_master, Reaction::stop_1, 2, way_m,
@@ -422,6 +429,8 @@ std::vector<Row> rows() {
          return failing_bus(
              {.action = FaultAction::error_passive, .bus = "axes_1_3", .to_ns = failure_ns + 300'000'000});
        }},
+      {interface_down, Reaction::stop_1, 1, way_m,
+       [] { return failing_bus({.action = FaultAction::port_down, .bus = "axes_4_6"}); }},
       {enabling_released, Reaction::hold, 3, way_m,
        [] {
          return with_enabling_input({{100'000'000, 1'700'000'000}, {2'700'000'000, INT64_MAX}});
@@ -478,9 +487,9 @@ class Measured {
 
 void expect_row(const Row& row) {
   ClosedLoopRig rig(row.options());
-  if (row.overflows) {
-    OverflowingNetwork overflowing(rig.network);
-    rig.run(overflowing);
+  if (row.of_the_kernel) {
+    FullNetwork full(rig.network, row.fault);
+    rig.run(full);
   } else {
     rig.run();
   }

@@ -167,14 +167,14 @@ TEST(Supervisor, ForgetsTheFaultWithAReset) {
 
 TEST(Supervisor, TakesTheCellsChoices) {
   proxarm::description::SupervisionDescription cell;
-  cell.reactions = {{"sensor_lost", "hold"}, {"bus_off", "stop_1"}};
+  cell.reactions = {{"sensor_lost", "hold"}, {"bus_off", "stop_0"}};
   Supervisor supervisor{reactions_of(cell)};
   for (const Event event : {Event::begin, Event::enabled, Event::tared}) supervisor.handle(event);
   supervisor.raise({Fault::sensor_lost, -1, 17});
   EXPECT_EQ(supervisor.phase(), Phase::holding);
   EXPECT_EQ(supervisor.held_for().fault, Fault::sensor_lost);
   supervisor.raise({Fault::bus_off, 0, 18});
-  EXPECT_EQ(supervisor.phase(), Phase::stopping);
+  EXPECT_EQ(supervisor.phase(), Phase::disabling);
 }
 
 // The names and defaults that cell files are read by are those of the faults.
