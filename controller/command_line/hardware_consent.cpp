@@ -19,11 +19,6 @@ using description::SetupError;
 
 constexpr const char* confirmation = "checked";
 
-// A server or a pseudo-terminal on this machine is what a simulated drive is behind.
-bool stays_here(const description::ModbusLineDescription& line) {
-  return line.serial() ? line.device.rfind("/dev/pts/", 0) == 0 : line.host.rfind("127.", 0) == 0 || line.host == "::1";
-}
-
 std::string list(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
@@ -69,22 +64,19 @@ void require_enabling_input(const PreparedSession& session) {
 
 }  // namespace
 
-std::vector<std::string> real_connections(const PreparedSession& session, const std::vector<std::string>& interfaces,
-                                          const HardwareSurroundings& surroundings) {
+std::vector<std::string> real_interfaces(const std::vector<std::string>& interfaces,
+                                         const HardwareSurroundings& surroundings) {
   std::vector<std::string> real;
   for (const std::string& interface : interfaces) {
     const bool known = std::find(real.begin(), real.end(), interface) != real.end();
     if (!known && !surroundings.is_virtual(interface)) real.push_back(interface);
-  }
-  for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
-    if (!stays_here(line)) real.push_back(line.serial() ? line.device : line.host);
   }
   return real;
 }
 
 void require_hardware_consent(const PreparedSession& session, const RunOptions& options,
                               const std::vector<std::string>& interfaces, const HardwareSurroundings& surroundings) {
-  const std::vector<std::string> real = real_connections(session, interfaces, surroundings);
+  const std::vector<std::string> real = real_interfaces(interfaces, surroundings);
   if (!options.hardware.empty() && options.hardware != "ask" && options.hardware != confirmation) {
     throw SetupError({.key = "--hardware",
                       .found = description::in_quotes(options.hardware),
@@ -94,7 +86,7 @@ void require_hardware_consent(const PreparedSession& session, const RunOptions& 
   if (options.hardware.empty()) {
     throw SetupError(
         {.bus = real.front(),
-         .message = "this is no virtual CAN interface (vcan, vxcan) or simulated drive: a real arm would move",
+         .message = "this is no virtual CAN interface (vcan, vxcan): a real arm would move",
          .advice = "use --bus sim or vcan; for a real arm --hardware, which shows what must be checked before"});
   }
   require_enabling_input(session);

@@ -19,9 +19,9 @@ struct HardwareSurroundings {
   std::ostream& out;
 };
 
-// What of the session isn't simulated: interfaces that aren't vcan or vxcan, Modbus lines that leave the machine.
-std::vector<std::string> real_connections(const PreparedSession& session, const std::vector<std::string>& interfaces,
-                                          const HardwareSurroundings& surroundings);
+// Those that aren't vcan or vxcan, each once. (Modbus peers beyond this machine are refused by open_modbus().)
+std::vector<std::string> real_interfaces(const std::vector<std::string>& interfaces,
+                                         const HardwareSurroundings& surroundings);
 
 // Returns where nothing is real, or where --hardware was given and the checklist confirmed. Throws SetupError that says
 // what is missing.

@@ -143,6 +143,38 @@ TEST(ClosedLoopSupervision, LetsTheForceInSlowlyAfterAHold) {
   }
 }
 
+// A hand that pushes while the sensor is tared: refused with the force, unless that much is accepted. Then its mean is
+// zero, and the rest is let in by the ramp.
+TEST(ClosedLoopSupervision, StartsWithAForceOnTheHandleOnlyWhenToldTo) {
+  for (const double accepted_N : {5.0, 40.0}) {
+    SCOPED_TRACE(accepted_N);
+    RigOptions options{.duration_s = 0.5, .scene = "scenes/free.yaml"};
+    options.settings.tare_spread_N = accepted_N;
+    options.edit_hand = [](description::HandDescription& hand) {
+      hand.multisine.clear();
+      hand.waypoints = {{0.05, {0, 0, 0}}, {0.15, {0.02, 0, 0}}};  // 10 N
+    };
+    ClosedLoopRig rig(options);
+    rig.run();
+    if (accepted_N < 10.0) {
+      EXPECT_EQ(rig.fault().fault, Fault::force_at_start);
+      EXPECT_GT(rig.fault().value, accepted_N);
+      EXPECT_NE(describe(rig.fault(), "").find(" N, limit 5)"), std::string::npos);
+      continue;
+    }
+    ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
+    expect_within_joint_limits(rig);
+    const std::size_t begin = first_in(rig, Phase::rendering);
+    const double T = options.settings.period_s, M = options.settings.mass_kg - rig.cell.tool.mass_kg;
+    double impulse_Ns = 0.0;
+    for (std::size_t i = 0; i < 100; ++i) {
+      impulse_Ns += T * static_cast<double>(i + 1) * T / 0.2 * vec3(rig.records[begin + i].force_W_N).norm();
+      if (i == 0) continue;
+      EXPECT_LE(proxy_speed(rig, begin + i), impulse_Ns / M + 1e-9) << i;
+    }
+  }
+}
+
 // A wire that breaks says nothing any more.
 TEST(ClosedLoopSupervision, TakesABrokenWireForReleased) {
   for (const bool message : {false, true}) {

@@ -42,6 +42,7 @@ class WrongWorld final : public RenderedWorld {
     return inner_->resume(q_W, v_W);
   }
   void set(const Change& change) noexcept override { inner_->set(change); }
+  void add_damping(double damping_Ns_per_m) noexcept override { inner_->add_damping(damping_Ns_per_m); }
   void archive(fieldbus::StateArchive& state) noexcept override { inner_->archive(state); }
 
  private:

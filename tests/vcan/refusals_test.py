@@ -1,5 +1,7 @@
 """What `proxarm run` and `proxarm sim` refuse on a real kernel's interfaces: one clear line, exit status 2."""
 import json
+import os
+import pty
 import re
 import subprocess
 import time
@@ -84,6 +86,55 @@ class Refusals(two.VcanTestCase):
 
     def test_virtual_time_on_an_interface(self):
         self.assertIn("--pace", self.refused("run", "--bus", two.ONE, "--pace", "virtual"))
+
+    def as_if_real(self, *options, typed=None):
+        """A run on interfaces that are to be taken for real ones; status and standard error. `typed`: on a terminal."""
+        environment = {**os.environ, "PROXARM_TREAT_AS_REAL": "vcan0"}
+        command = [two.PROGRAM, "run", "--bus", two.THREE, "--duration", "0.2s", "--json", "--no-plot",
+                   *map(str, options)]
+        if typed is None:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment,
+                                  stdin=subprocess.DEVNULL)
+            return done.returncode, done.stderr
+        ours, theirs = pty.openpty()
+        with subprocess.Popen(command, stdin=theirs, stderr=theirs, stdout=subprocess.DEVNULL, env=environment) as run:
+            os.close(theirs)
+            os.write(ours, typed.encode() + b"\n")
+            shown = b""
+            try:
+                while part := os.read(ours, 4096):
+                    shown += part
+            except OSError:  # the terminal is gone with the process
+                pass
+            os.close(ours)
+            return run.wait(60), shown.decode()
+
+    def test_a_real_interface_needs_its_option_a_checklist_and_an_enabling_input(self):
+        text = (CELLS / "default.yaml").read_text()
+        text = re.sub(r"(:\s*)(\.\./[\w./]+)", lambda m: m[1] + str((CELLS / m[2]).resolve()), text)
+        cell = self.folder / "cell.yaml"
+        cell.write_text(text + "enabling_input: {drive: axis_2, bit: 16}\n")
+        status, errors = self.as_if_real()
+        self.assertEqual(status, 2)
+        self.assertIn("bus vcan0: this is no virtual CAN interface", errors)
+        self.assertIn("for a real arm --hardware", errors)
+        status, errors = self.as_if_real("--hardware=checked")
+        self.assertEqual(status, 2)
+        self.assertIn("enabling_input: found none, expected one", errors)
+        status, errors = self.as_if_real(cell, "--hardware")
+        self.assertEqual(status, 2)
+        self.assertIn("no terminal to confirm on", errors)
+        self.assertIn("E-stop and STO act in hardware", errors)
+        self.assertEqual(self.as_if_real(cell, "--hardware=yes")[0], 2)
+        status, shown = self.as_if_real(cell, "--hardware", typed="yes")
+        self.assertEqual(status, 2, shown)
+        self.assertIn('found "yes", expected "checked"', shown)
+        with two.simulated_arm(two.THREE, cell):
+            for options, typed in ((("--hardware=checked",), None), (("--hardware",), "checked"),
+                                   (("--hardware=checked", "--without-enabling-input"), None)):
+                status, shown = self.as_if_real(cell, *options, typed=typed)
+                self.assertEqual(status, 0, shown)
+                self.assertIn("bit 16 of the inputs of axis_2" if len(options) == 1 else "NONE", shown)
 
     def setUp(self):
         super().setUp()
