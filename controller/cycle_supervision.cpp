@@ -83,7 +83,8 @@ void Cycle::judge_lateness(bool late) noexcept {
   }
   late_score_ = std::min(late_score_, 2 * late_limit);
   if (!supervisor_.live() || late_score_ <= late_limit) return;
-  raise(Fault::sensor_late, -1, late_score_ / late_sample, late_limit / late_sample);
+  constexpr double samples = 1.0 / late_sample;
+  raise(Fault::sensor_late, -1, samples * late_score_, samples * late_limit);
 }
 
 // ---- commands

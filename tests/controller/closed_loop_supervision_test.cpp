@@ -12,7 +12,6 @@ namespace proxarm::controller {
 namespace {
 
 using models::Vec3;
-using sim::PressedSpan;
 using testing::ClosedLoopRig;
 using testing::RigOptions;
 

@@ -130,9 +130,8 @@ class Refusals(two.VcanTestCase):
         self.assertEqual(status, 2, shown)
         self.assertIn('found "yes", expected "checked"', shown)
         with two.simulated_arm(two.THREE, cell):
-            for options, typed in ((("--hardware=checked",), None), (("--hardware",), "checked"),
-                                   (("--hardware=checked", "--without-enabling-input"), None)):
-                status, shown = self.as_if_real(cell, *options, typed=typed)
+            for options in (("--hardware=checked",), ("--hardware=checked", "--without-enabling-input")):
+                status, shown = self.as_if_real(cell, *options)
                 self.assertEqual(status, 0, shown)
                 self.assertIn("bit 16 of the inputs of axis_2" if len(options) == 1 else "NONE", shown)
 
