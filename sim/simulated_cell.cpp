@@ -318,7 +318,7 @@ void SimulatedCell::attach_to(fieldbus::SimulatedCanNetwork& network) {
   for (const auto& node : nodes_) {
     const auto drive = std::find_if(cell_.drives.begin(), cell_.drives.end(),
                                     [&](const description::DriveDescription& d) { return d.joint == node->name(); });
-    const bool fd = drive == cell_.drives.end() ? fd_sensor : drive->fd;
+    const bool fd = drive == cell_.drives.end() ? fd_sensor && node == nodes_.back() : drive->fd;
     const NodeFormat format = fd ? NodeFormat::fd : NodeFormat::classic;
     node->connect(network.simulated_bus(cell_.buses[node->bus()].name).attach(*node, node->name(), format));
   }
