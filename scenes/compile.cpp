@@ -298,8 +298,7 @@ Algorithm<3> one_mesh(const Scene& scene, const Object& object, const MeshShape&
   out.skipped.push_back({"composition", "a single object"});
   if (!has_friction(object)) out.skipped.push_back({"friction", "μ = 0"});
   out.skipped.push_back({"motion", "nothing moves"});
-  auto surface =
-      std::make_unique<models::MeshSurface>(shape.mesh, object.friction, friction_by_face(scene, object));
+  auto surface = std::make_unique<models::MeshSurface>(shape.mesh, object.friction, friction_by_face(scene, object));
   if (object.friction_regions.empty()) {
     out.rubbing.emplace_back(0, [mesh_surface = surface.get()](double mu) { mesh_surface->set_friction(mu); });
   }
