@@ -388,7 +388,9 @@ const std::vector<std::pair<Way, std::vector<std::string>>> whole_transfers{
          std::vector<std::string>{"< 582#A2057F0000000000", "> 602#D545690000000000", "< 582#A100000000000000"}}};
 
 TEST_F(SdoAborts, GivesUpWhereverAServerFallsSilent) {
-  for (const auto& [way, lines] : whole_transfers) {
+  for (const auto& whole : whole_transfers) {
+    const Way way = whole.first;
+    const std::vector<std::string>& lines = whole.second;
     for (std::size_t cut = 0; cut < lines.size(); ++cut) {
       if (lines[cut][0] != '<') continue;
       SCOPED_TRACE(::testing::Message() << "way " << static_cast<int>(way) << ", before " << lines[cut]);
