@@ -265,7 +265,8 @@ void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& cand
           const std::array<Obstacle::Tangent, 3> next{tangent(0), tangent(1), tangent(2)};
           bool flat = true;
           for (std::size_t j = 0; j < 3; ++j) flat = flat && next[j].surface.normal() == t[j].surface.normal();
-          if (flat || has_settled(move, last_move, move / last_move, r)) break;
+          const double contraction = last_move < infinity ? move / last_move : infinity;
+          if (flat || has_settled(move, last_move, contraction, r)) break;
           s.found = false;
           last_move = move;
           t = next;

@@ -154,4 +154,17 @@ class ClosedLoopRig {
   }
 };
 
+// What a drive is sent in cycle k (from 2) doesn't go beyond its joint's speed and acceleration. In counts: each
+// setpoint is rounded by half a one, so a step by one and a difference of steps by two.
+inline void expect_step_within_limits(const ClosedLoopRig& rig, std::size_t axis, std::size_t k) {
+  const double T = rig.options.settings.period_s;
+  const description::DriveDescription& drive = rig.cell.drives[axis];
+  const double per_rad = std::abs(drive.counts_per_rad());
+  const double step = rig.records[k].target_counts[axis] - rig.records[k - 1].target_counts[axis];
+  const double step_k1 = rig.records[k - 1].target_counts[axis] - rig.records[k - 2].target_counts[axis];
+  ASSERT_LE(std::abs(step), drive.max_speed_rad_per_s * T * per_rad + 1.0) << drive.joint << " in " << k;
+  ASSERT_LE(std::abs(step - step_k1), drive.max_acceleration_rad_per_s2 * T * T * per_rad + 2.0)
+      << drive.joint << " in " << k;
+}
+
 }  // namespace proxarm::controller::testing

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "tests/controller/closed_loop_rig.hpp"
+#include "tests/controller/replay_network.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -141,43 +142,25 @@ void spoil_targets(CycleParts& parts) {
   parts.drives = std::move(drives);
 }
 
-// A kernel that drops frames, or whose queues are full.
-class FullNetwork final : public fieldbus::CanNetwork {
- public:
-  FullNetwork(fieldbus::CanNetwork& inner, Fault fault) : inner_(inner) {
-    for (std::size_t i = 0; i < inner.bus_count(); ++i)
-      buses_.push_back(std::make_unique<Bus>(inner.bus(i), inner, fault));
+// Of a kernel that drops frames, or whose queues are full.
+struct FullBus final : testing::BusAround {
+  FullBus(fieldbus::CanBus& bus, fieldbus::CanNetwork& its_network, Fault its_fault)
+      : BusAround(bus), network(its_network), fault(its_fault) {}
+  [[nodiscard]] bool fails(Fault asked) const noexcept {
+    return fault == asked && network.now_ns() >= failure_ns && network.now_ns() < failure_ns + 5'000'000;
   }
-  [[nodiscard]] std::size_t bus_count() const noexcept override { return buses_.size(); }
-  [[nodiscard]] fieldbus::CanBus& bus(std::size_t index) noexcept override { return *buses_[index]; }
-  [[nodiscard]] std::int64_t now_ns() const noexcept override { return inner_.now_ns(); }
-  void sleep_until(std::int64_t deadline_ns) noexcept override { inner_.sleep_until(deadline_ns); }
-  bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return inner_.wait_for_frame(deadline_ns); }
+  fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override {
+    return fails(Fault::send_failed) ? fieldbus::SendResult::queue_full : inner.send(frame);
+  }
+  [[nodiscard]] const fieldbus::BusStatus& status() const noexcept override {
+    own = inner.status();
+    if (fault == Fault::receive_overflow && network.now_ns() >= failure_ns) own.receive_overflows += 3;
+    return own;
+  }
 
- private:
-  struct Bus final : fieldbus::CanBus {
-    Bus(fieldbus::CanBus& bus, fieldbus::CanNetwork& its_network, Fault its_fault)
-        : inner(bus), network(its_network), fault(its_fault) {}
-    [[nodiscard]] bool fails(Fault asked) const noexcept {
-      return fault == asked && network.now_ns() >= failure_ns && network.now_ns() < failure_ns + 5'000'000;
-    }
-    fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override {
-      return fails(Fault::send_failed) ? fieldbus::SendResult::queue_full : inner.send(frame);
-    }
-    bool receive(fieldbus::TimedFrame& out) noexcept override { return inner.receive(out); }
-    [[nodiscard]] const fieldbus::BusStatus& status() const noexcept override {
-      own = inner.status();
-      if (fault == Fault::receive_overflow && network.now_ns() >= failure_ns) own.receive_overflows += 3;
-      return own;
-    }
-    [[nodiscard]] const std::string& name() const noexcept override { return inner.name(); }
-    fieldbus::CanBus& inner;
-    fieldbus::CanNetwork& network;
-    Fault fault;
-    mutable fieldbus::BusStatus own;
-  };
-  fieldbus::CanNetwork& inner_;
-  std::vector<std::unique_ptr<Bus>> buses_;
+  fieldbus::CanNetwork& network;
+  Fault fault;
+  mutable fieldbus::BusStatus own;
 };
 
 // ---- what can ------------------------------------------------------------------------------------------------------
@@ -489,7 +472,7 @@ class Measured {
 void expect_row(const Row& row) {
   ClosedLoopRig rig(row.options());
   if (row.of_the_kernel) {
-    FullNetwork full(rig.network, row.fault);
+    testing::NetworkAround<FullBus> full(rig.network, rig.network, row.fault);
     rig.run(full);
   } else {
     rig.run();

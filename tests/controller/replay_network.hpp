@@ -14,15 +14,27 @@ namespace proxarm::controller::testing {
 
 using Recording = std::vector<std::vector<fieldbus::TimedFrame>>;  // per bus, in the order of receipt
 
-class RecordingNetwork final : public fieldbus::CanNetwork {
+// A bus that passes everything on.
+struct BusAround : fieldbus::CanBus {
+  explicit BusAround(fieldbus::CanBus& bus) : inner(bus) {}
+  fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override { return inner.send(frame); }
+  bool receive(fieldbus::TimedFrame& out) noexcept override { return inner.receive(out); }
+  [[nodiscard]] const fieldbus::BusStatus& status() const noexcept override { return inner.status(); }
+  [[nodiscard]] const std::string& name() const noexcept override { return inner.name(); }
+
+  fieldbus::CanBus& inner;
+};
+
+// A network with a Bus (a BusAround) around each of its buses.
+template <typename Bus>
+class NetworkAround : public fieldbus::CanNetwork {
  public:
-  explicit RecordingNetwork(fieldbus::CanNetwork& inner) : inner_(inner) {
-    for (std::size_t i = 0; i < inner.bus_count(); ++i) buses_.push_back(std::make_unique<Bus>(inner.bus(i)));
-  }
-  [[nodiscard]] Recording recording() const {
-    Recording all;
-    for (const auto& bus : buses_) all.push_back(bus->received);
-    return all;
+  // `arguments`: of each Bus, behind the bus that it is around.
+  template <typename... Arguments>
+  explicit NetworkAround(fieldbus::CanNetwork& inner, Arguments&&... arguments) : inner_(inner) {
+    for (std::size_t i = 0; i < inner.bus_count(); ++i) {
+      buses_.push_back(std::make_unique<Bus>(inner.bus(i), arguments...));
+    }
   }
   [[nodiscard]] std::size_t bus_count() const noexcept override { return buses_.size(); }
   [[nodiscard]] fieldbus::CanBus& bus(std::size_t index) noexcept override { return *buses_[index]; }
@@ -30,24 +42,30 @@ class RecordingNetwork final : public fieldbus::CanNetwork {
   void sleep_until(std::int64_t deadline_ns) noexcept override { inner_.sleep_until(deadline_ns); }
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return inner_.wait_for_frame(deadline_ns); }
 
- private:
-  struct Bus final : fieldbus::CanBus {
-    explicit Bus(fieldbus::CanBus& bus) : inner(bus) {}
-    fieldbus::SendResult send(const fieldbus::CanFrame& frame) noexcept override { return inner.send(frame); }
-    bool receive(fieldbus::TimedFrame& out) noexcept override {
-      if (!inner.receive(out)) return false;
-      received.push_back(out);
-      return true;
-    }
-    [[nodiscard]] const fieldbus::BusStatus& status() const noexcept override { return inner.status(); }
-    [[nodiscard]] const std::string& name() const noexcept override { return inner.name(); }
-
-    fieldbus::CanBus& inner;
-    std::vector<fieldbus::TimedFrame> received;
-  };
-
+ protected:
   fieldbus::CanNetwork& inner_;
   std::vector<std::unique_ptr<Bus>> buses_;
+};
+
+struct RecordingBus final : BusAround {
+  using BusAround::BusAround;
+  bool receive(fieldbus::TimedFrame& out) noexcept override {
+    if (!inner.receive(out)) return false;
+    received.push_back(out);
+    return true;
+  }
+
+  std::vector<fieldbus::TimedFrame> received;
+};
+
+class RecordingNetwork final : public NetworkAround<RecordingBus> {
+ public:
+  using NetworkAround::NetworkAround;
+  [[nodiscard]] Recording recording() const {
+    Recording all;
+    for (const auto& bus : buses_) all.push_back(bus->received);
+    return all;
+  }
 };
 
 class ReplayNetwork final : public fieldbus::CanNetwork {

@@ -15,6 +15,7 @@
 
 #include "tests/controller/closed_loop_rig.hpp"
 #include "tests/models/random_states.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -64,8 +65,8 @@ double resident_MB() {
 }
 
 // To and fro, into the wall and along it, for as long as the session may last.
-std::string wandering_hand(Random& random, double duration_s) {
-  const std::string file = ::testing::TempDir() + "soak_hand_" + std::to_string(getpid()) + ".yaml";
+std::string wandering_hand(const tests::ScratchFolder& folder, Random& random, double duration_s) {
+  const std::string file = folder / "hand.yaml";
   std::ofstream out(file);
   out << "name: wanders\nmass_kg: 1\nstiffness_N_per_m: " << random.log_uniform(200.0, 800.0)
       << "\ndamping_Ns_per_m: 20\nwaypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n";
@@ -84,7 +85,7 @@ struct Session {
 
 // Something every two to eight seconds: up to two lost frames, a sensor that stands still or is silent for two cycles.
 // In a third of the sessions, one more that can't be ridden through.
-Session session_of(Random& random) {
+Session session_of(const tests::ScratchFolder& folder, Random& random) {
   constexpr std::array scenes{"wall", "groove", "room", "free", "moving_plate", "honey"};
   constexpr std::array brief{"sensor:frozen", "sensor:samples", "sensor:half"};
   constexpr std::array grave{"sensor:silent", "sensor:status=0x4000", "axis_3:fault=0x4210", "axis_2:silent",
@@ -93,7 +94,7 @@ Session session_of(Random& random) {
   RigOptions& o = session.options;
   o.duration_s = random.uniform(10.0, 60.0);
   o.scene = std::string("scenes/") + scenes[random.below(scenes.size())] + ".yaml";
-  o.hand = wandering_hand(random, o.duration_s);
+  o.hand = wandering_hand(folder, random, o.duration_s);
   o.settings.mass_kg = random.uniform(4.0, 12.0);
   o.settings.order = random.chance(0.3) ? 2 : 1;
   o.settings.passivity = random.chance(0.5) ? Passivity::on : Passivity::off;
@@ -178,12 +179,13 @@ constexpr bool judges_memory = true;
 constexpr std::uint64_t warm_up = 3;  // sessions; libraries and the heap's own tables have grown by then
 
 int soak(double hours, const std::string& file, std::uint64_t seed) {
+  const tests::ScratchFolder folder;
   State state = restored(file, seed);
   double base_MB = 0.0, most_MB = 0.0, base_heap_MB = 0.0;
   for (std::uint64_t here = 1; state.simulated_s < 3600.0 * hours; ++here) {
     const std::uint64_t number = state.sessions;
     Random random(1'000'003 * state.seed + number);
-    const std::string wrong = run(session_of(random), state);
+    const std::string wrong = run(session_of(folder, random), state);
     malloc_trim(0);
     const double now_MB = resident_MB(), heap_MB = 1e-6 * static_cast<double>(mallinfo2().uordblks);
     if (here == warm_up) base_MB = now_MB, base_heap_MB = heap_MB;

@@ -3,15 +3,12 @@
 Nothing of it is shared with the controller or its simulation: the drive is a table of objects and the standard's state
 machine, written down once more.
 """
-import contextlib
 import json
 import struct
-import threading
 import time
 import unittest
 
-import can  # python3-can
-
+import python_peer
 import two_processes as two
 
 NODE = 6
@@ -21,13 +18,11 @@ PRE_OPERATIONAL, OPERATIONAL = 0x7F, 0x05
 SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED, QUICK_STOP = 0x0250, 0x0231, 0x0233, 0x1237, 0x0217
 
 
-class PythonDrive(threading.Thread):
+class PythonDrive(python_peer.Peer):
     """Cyclic synchronous position: at SYNC it is where the last target was."""
 
     def __init__(self, interface):
-        super().__init__(daemon=True)
-        self.bus = can.Bus(interface="socketcan", channel=interface)
-        self.over = threading.Event()
+        super().__init__(interface)
         self.nmt, self.state = PRE_OPERATIONAL, SWITCH_ON_DISABLED
         self.controlword, self.target, self.position = 0, 0, 0
         self.next_heartbeat = 0.0
@@ -48,9 +43,6 @@ class PythonDrive(threading.Thread):
                 self.objects[mapping, entry] = (4, 0)
         self.objects[0x60C2, 1] = (1, 1)
         self.objects[0x60C2, 2] = (1, 0xFD)
-
-    def send(self, identifier, data):
-        self.bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
 
     def run(self):
         self.send(two.HEARTBEAT + NODE, [0])  # boot-up
@@ -114,16 +106,6 @@ class PythonDrive(threading.Thread):
         if (index, sub) == (0x6060, 0):
             self.objects[0x6061, 0] = (1, value)
         return struct.pack("<BHBI", 0x60, index, sub, 0)
-
-    @contextlib.contextmanager
-    def running(self):
-        self.start()
-        try:
-            yield self
-        finally:
-            self.over.set()
-            self.join()
-            self.bus.shutdown()
 
 
 class PythonCiA402Drive(two.VcanTestCase):

@@ -8,31 +8,22 @@ import csv
 import re
 import struct
 import subprocess
-import threading
 import time
 import unittest
 from pathlib import Path
 
-import can  # python3-can
-
+import python_peer
 import two_processes as two
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 PERIOD_S = 0.001
 
 
-class Sensor(threading.Thread):
+class Sensor(python_peer.Peer):
     """Sends its frames every millisecond while it streams; what it is told is in `commands`."""
-    extended = False
-
     def __init__(self, interface, streaming=False):
-        super().__init__(daemon=True)
-        self.bus = can.Bus(interface="socketcan", channel=interface)
-        self.over = threading.Event()
+        super().__init__(interface)
         self.streaming, self.commands, self.samples = streaming, [], 0
-
-    def send(self, identifier, data):
-        self.bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=self.extended))
 
     def send_sample(self):
         for identifier, data in self.frames(self.samples):
@@ -51,16 +42,6 @@ class Sensor(threading.Thread):
                 due += PERIOD_S
             elif not self.streaming:
                 due = time.monotonic()
-
-    @contextlib.contextmanager
-    def running(self):
-        self.start()
-        try:
-            yield self
-        finally:
-            self.over.set()
-            self.join()
-            self.bus.shutdown()
 
 
 class Aidin(Sensor):
