@@ -52,7 +52,20 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
   after_impact_ = false;
   first_order_steps_ = 0;
   prepare();
+  // In an established contact the place before may be on either side of the surface by rounding.
+  if (q_k1_ != start.q && !start.contact_established) go_back(start);
   return true;
+}
+
+// The plain label of order 2 begins a period before the start. Where that place can't be reached from the start, because
+// an object is in between, the history is no free motion: it begins where 𝒢 leaves it, and without a look further back.
+template <int N>
+void AdmittanceProxy<N>::go_back(const ProxyStart<N>& start) noexcept {
+  if (timed_) g_->set_time({start.time_s, config_.period_s});
+  const V reached = (*g_)(kappa_, q_k1_, start.q);
+  if (reached == q_k1_ || !reached.allFinite()) return;
+  q_k1_ = p_hat_ = reached;
+  restart_steps_left_ = 1;
 }
 
 template <int N>
@@ -162,8 +175,9 @@ ProxyFault AdmittanceProxy<N>::parabola(const V& h, Trial& out) noexcept {
 //   κ = 9M/(4T²) + 3B/(2T) + K_v,   q̃ = (4q₁ − q₂)/3   (so that v = (q − q̃)/(2T/3): 𝒢's previous proxy, and its T)
 //   p̂ = [M(12q₁ − 3q₂ + 2T(4v₁ − v₂))/(4T²) + (3B/2T) q̃ + K_v q_ref + h]/κ,   q = 𝒢(κ, p̂, q̃)
 // below with q₁ taken out of the brackets. Before that, 𝒢 is asked from the true q₁: whether the way from there meets
-// something (q̃ may lie beyond a thin wall), and whether the contacts are still those of the step before. Where nothing
-// acts on it from there, that is the step. A step for which 𝒢 has no answer that keeps its laws is an event, too.
+// something, and whether the contacts are still those of the step before. Where nothing acts on it from there, that is
+// the step. Else the answer from q̃ must have the same contacts, each from the same side: q̃ may lie beyond a wall that
+// holds from both. A step for which 𝒢 has no answer that keeps its laws is an event, too.
 // `now`: the contacts that the step ends with.
 template <int N>
 ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, bool& contacts_changed) noexcept {
@@ -175,6 +189,8 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
   out.p_hat = q_k1_ + ahead;
   contacts_changed = false;
   const std::uint64_t unresolved = g_->unresolved_steps();
+  ContactSet from_q1;
+  std::array<V, max_contacts> normals;  // of from_q1
   for (const bool from_q_tilde : {false, true}) {
     const V& from = from_q_tilde ? q_tilde : q_k1_;
     const ProxyFault fault = solve(out, from, from_q_tilde ? 2.0 / 3.0 * T : T);
@@ -183,11 +199,15 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
     const auto contacts = g_->contacts();
     const bool free = contacts.empty() && out.q == out.p_hat;
     set_contacts(now, contacts, out.held);
-    if (g_->unresolved_steps() != unresolved || (contacts_.known && !same(contacts_, now))) {
+    const bool changed = from_q_tilde ? !same(from_q1, now) || !same_sides(from_q1, normals, contacts)
+                                      : contacts_.known && !same(contacts_, now);
+    if (g_->unresolved_steps() != unresolved || changed) {
       contacts_changed = true;
       return ProxyFault::none;
     }
     if (free) break;
+    from_q1 = now;
+    for (std::size_t i = 0; i < now.count; ++i) normals[i] = contacts[i].normal;
   }
   out.v = (0.5 * rate_Hz_) * (3.0 * (out.q - q_k1_) - move);
   return ProxyFault::none;
@@ -253,6 +273,22 @@ void AdmittanceProxy<N>::set_contacts(ContactSet& set, std::span<const models::C
   for (std::size_t i = 0; i < set.count; ++i) {
     set.keys[i] = {contacts[i].object, contacts[i].feature, contacts[i].slips};
   }
+}
+
+// Are the normals of the contacts that are in `set` within 90° of those there? A curved surface that turns by more in a
+// third of a step is an event as well.
+template <int N>
+bool AdmittanceProxy<N>::same_sides(const ContactSet& set, const std::array<V, max_contacts>& normals,
+                                    std::span<const models::Contact<N>> contacts) noexcept {
+  for (const models::Contact<N>& contact : contacts) {
+    for (std::size_t i = 0; i < set.count; ++i) {
+      const auto& key = set.keys[i];
+      if (key.object == contact.object && key.feature == contact.feature && !(normals[i].dot(contact.normal) > 0.0)) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 // Does `now` hold a contact that `before` doesn't?

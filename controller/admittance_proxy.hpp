@@ -153,6 +153,9 @@ class AdmittanceProxy {
   static void set_contacts(ContactSet& set, std::span<const models::Contact<N>> contacts, bool held) noexcept;
   static bool same(const ContactSet& a, const ContactSet& b) noexcept;
   static bool gained(const ContactSet& before, const ContactSet& now) noexcept;
+  static bool same_sides(const ContactSet& set, const std::array<V, max_contacts>& normals,
+                         std::span<const models::Contact<N>> contacts) noexcept;
+  void go_back(const ProxyStart<N>& start) noexcept;
 
   void prepare() noexcept;
   ProxyFault verlet(const V& h, Trial& out) noexcept;
