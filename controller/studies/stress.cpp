@@ -146,6 +146,9 @@ class Laws {
     double tolerance = coulomb * (1.0 + 1e-9) + condition(call) * 64.0 * epsilon * K * call.size();
     // On curvature, a tool that is deep against the radius (0.01 m is the smallest here) amplifies rounding again.
     tolerance += f.norm() * 64.0 * epsilon * (call.p - call.r).norm() / 0.01;
+    // A Coulomb medium's force is found by how far the proxy moves in it, which a short move's rounding leaves unsure.
+    const double moved = (call.r - call.q).norm();
+    if (moved > 0.0) tolerance += coulomb * std::min(16.0 * epsilon * call.size() / moved, 1e-3);
     std::vector<models::ForceCone> cones;
     for (const Contact<N>& contact : call.contacts) {
       const Vec3 n = lift<N>(contact.normal);

@@ -1,0 +1,192 @@
+// One step in a Coulomb medium of force F, over any rest of the world 𝒢'.
+//
+// The medium adds −F (r − q)/‖r − q‖ (16) to ℳ, which is a viscous one of λ = F/‖r − q‖: with τ = λ/(κ + λ),
+//   r(τ) = 𝒢'(κ/(1 − τ), p + τ (q − p), q),   κ τ/(1 − τ) ‖r(τ) − q‖ = F,
+// linear in τ where 𝒢' is free or slides on a plane; (3) is its solution there.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "models/geometric_algorithm.hpp"
+
+namespace proxarm::models {
+
+template <int N>
+class CoulombStep {
+ public:
+  CoulombStep(GeometricAlgorithm<N>& rest, double kappa, double force_N, const Vec<N>& p, const Vec<N>& q) noexcept
+      : rest_(rest), kappa_(kappa), F_(force_N), p_(p), q_(q), d_(q - p), size_(d_.norm()) {}
+
+  // r; what it touches is then rest.contacts(). `found` is false where no τ gives F: r is the nearest to it that there
+  // is, so the medium takes more or less than F in that step.
+  Vec<N> solve(bool& found) noexcept {
+    found = true;
+    if (Vec<N> free; goes_free(0, free)) return free;
+    Sample low{0.0, -F_, q_}, high = at(held_at);
+    Vec<N> R = (high.r - q_) / (1.0 - held_at);
+    if (!(kappa_ * R.norm() > 2.0 * F_)) {
+      const bool place = is_place(q_);
+      look_closer(R, high);
+      const double pull = kappa_ * R.norm();
+      if (place && (!(pull > F_) || !(kappa_ * size_ > F_))) return q_;  // (3), first case
+      if (place && F_ >= high.tau * pull) return at(F_ / pull).r;
+      // q lies behind a surface, as the reference of order 2 may, or something moves the proxy: r(τ) doesn't end in q,
+      // and what the medium does grows without bound.
+      while (high.excess < 0.0 && 1.0 - high.tau > 1e-15) {
+        low = high;
+        high = at(1.0 - 0.1 * (1.0 - high.tau));
+      }
+    }
+    found = search(low, high) || goes_free(8, last_.r) || search_each_answer();
+    return last_.r;
+  }
+
+ private:
+  struct Sample {
+    double tau = 0.0, excess = 0.0;  // of the medium's force over F, N
+    Vec<N> r;
+  };
+
+  Sample at(double tau) noexcept {
+    Sample sample{tau, 0.0, rest_(kappa_ / (1.0 - tau), Vec<N>(p_ + tau * d_), q_)};
+    sample.excess = kappa_ * tau / (1.0 - tau) * (sample.r - q_).norm() - F_;
+    return sample;
+  }
+
+  // As near to F as rounding of r and of p + τ (q − p) lets it come, N.
+  [[nodiscard]] double rounding_N(const Vec<N>& r) const noexcept {
+    const double places = 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
+    return F_ * places / (r - q_).norm() + kappa_ * (places + 16.0 * u * p_.template lpNorm<1>());
+  }
+
+  // (3), second case: where nothing else touches, however near the rest is. `tries` times more, each some units in the
+  // last place aside: past the middle of a ball, 𝒢' may see the way free here and blocked there.
+  bool goes_free(int tries, Vec<N>& r) noexcept {
+    const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // of the way to p; NaN where there is no way
+    if (!(share > 0.0)) return false;
+    for (int k = 0; k <= tries; ++k) {
+      const double off = 4.0 * u * ((k + 1) / 2) * (k % 2 == 0 ? 1 : -1);
+      const Vec<N> aim = q_ - share * (1.0 + off) * d_;
+      r = rest_(kappa_ / share, aim, q_);
+      if (r == aim) return true;
+    }
+    return false;
+  }
+  // Whether the rest of the world leaves a proxy from q at r, within the rounding of r; held so stiffly there that no
+  // elastic layer moves it.
+  bool is_place(const Vec<N>& r) noexcept {
+    return (rest_(1e15 * kappa_, r, q_) - r).norm() <= 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
+  }
+
+  // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R. How near that is: tenfold nearer
+  // each time, until R stays what it is within rounding, or grows because r(τ) doesn't end in q.
+  void look_closer(Vec<N>& R, Sample& high) noexcept {
+    for (double s = 0.1 * (1.0 - held_at); s > 1e-10; s *= 0.1) {
+      const Sample next = at(1.0 - s);
+      const Vec<N> nearer = (next.r - q_) / (1.0 - next.tau);
+      const double rounding = 16.0 * u * (next.r.template lpNorm<1>() + q_.template lpNorm<1>()) / (1.0 - next.tau);
+      if ((nearer - R).norm() <= rounding || nearer.norm() > 2.0 * R.norm()) return;
+      R = nearer;
+      high = next;
+    }
+  }
+
+  // Illinois between two samples with F between them.
+  bool search(Sample low, Sample high) noexcept {
+    double e_low = low.excess, e_high = high.excess;
+    double tau = F_ / (kappa_ * size_);
+    for (int k = 0, side = 0; k < 100; ++k) {
+      if (!(tau > low.tau && tau < high.tau)) tau = 0.5 * (low.tau + high.tau);
+      if (!(tau > low.tau && tau < high.tau)) break;
+      last_ = at(tau);
+      if (std::abs(last_.excess) <= close_enough * F_) return true;
+      const int now = last_.excess < 0.0 ? -1 : 1;
+      (now < 0 ? low : high) = last_;
+      (now < 0 ? e_low : e_high) = last_.excess;
+      if (side == now) (now < 0 ? e_high : e_low) *= 0.5;
+      side = now;
+      tau = k % 8 == 7 ? 0.5 * (low.tau + high.tau) : (low.tau * e_high - high.tau * e_low) / (e_high - e_low);
+    }
+    return std::abs(last_.excess) <= rounding_N(last_.r);
+  }
+
+  // Where 𝒢' has several answers (a push straight through a ball's middle, two faces of a box), r(τ) jumps from one to
+  // another, and F may lie in the jump. Each by itself is smooth, and is known by what it touches.
+  struct Answer {
+    std::uint64_t touches = 0;
+    Sample low{.tau = -1.0, .excess = 0.0, .r = {}}, high{.tau = 2.0, .excess = 0.0, .r = {}};
+
+    void narrow(const Sample& sample) noexcept {
+      if (sample.excess < 0.0 && sample.tau > low.tau) low = sample;
+      if (sample.excess >= 0.0 && sample.tau < high.tau) high = sample;
+    }
+  };
+  using Answers = std::array<Answer, 6>;
+
+  [[nodiscard]] std::uint64_t touches() const noexcept {
+    std::uint64_t sum = 1;
+    for (const Contact<N>& contact : rest_.contacts()) {
+      const auto object = static_cast<std::uint32_t>(contact.object);
+      const auto feature = static_cast<std::uint32_t>(contact.feature);
+      sum += ((std::uint64_t{object} << 33U) ^ (std::uint64_t{feature} << 1U) ^ (contact.slips ? 1U : 0U)) *
+             0x9E3779B97F4A7C15ULL;
+    }
+    return sum;
+  }
+
+  bool search_each_answer() noexcept {
+    const double nearest = last_.tau;
+    Answers answers;
+    std::size_t count = 0;
+    for (int k = -24; k <= 24; ++k) {
+      const double ratio = std::pow(10.0, 0.25 * k);  // τ/(1 − τ)
+      const Sample sample = at(ratio / (1.0 + ratio));
+      const std::uint64_t name = touches();
+      std::size_t i = 0;
+      while (i < count && answers[i].touches != name) ++i;
+      if (i == answers.size()) continue;
+      if (i == count) answers[count++].touches = name;
+      answers[i].narrow(sample);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (search_within(answers[i])) return true;
+    }
+    last_ = at(nearest);
+    return false;
+  }
+
+  // The secant while it stays with this answer, else somewhere between.
+  bool search_within(Answer& answer) noexcept {
+    constexpr double golden = 0.6180339887498949;
+    bool same = true;
+    for (int k = 1; k <= 80; ++k) {
+      const Sample &low = answer.low, &high = answer.high;
+      if (low.tau < 0.0 || high.tau > 1.0 || low.tau >= high.tau) return false;
+      const double secant = low.excess / (low.excess - high.excess), anywhere = golden * k - std::floor(golden * k);
+      last_ = at(low.tau + (same && k % 4 != 0 ? secant : anywhere) * (high.tau - low.tau));
+      same = touches() == answer.touches;
+      if (!same) continue;
+      if (std::abs(last_.excess) <= std::max(close_enough * F_, rounding_N(last_.r))) return true;
+      answer.narrow(last_);
+    }
+    return false;
+  }
+
+  // Where rest is looked at from first: a hundredth of the way to p, far above rounding.
+  static constexpr double held_at = 0.99;
+  static constexpr double close_enough = 1e-14;
+  static constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+
+  GeometricAlgorithm<N>& rest_;
+  double kappa_, F_;
+  const Vec<N>&p_, &q_;
+  Vec<N> d_;
+  double size_;
+  Sample last_{};  // in the searches: the last that 𝒢' was asked for
+};
+
+}  // namespace proxarm::models
