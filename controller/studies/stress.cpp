@@ -150,6 +150,7 @@ class Laws {
     const double moved = (call.r - call.q).norm();
     if (moved > 0.0) tolerance += coulomb * std::min(16.0 * epsilon * call.size() / moved, 1e-3);
     std::vector<models::ForceCone> cones;
+    double unsure = 8.0 * epsilon;  // of a cone's axis
     for (const Contact<N>& contact : call.contacts) {
       const Vec3 n = lift<N>(contact.normal);
       const auto object = static_cast<std::size_t>(contact.object);
@@ -160,11 +161,34 @@ class Laws {
       if (contact.slips && uncertain < 1e-3) {
         cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
         tolerance += mu * f.norm() * uncertain * condition(call);
+        unsure += mu * uncertain;
       } else {
         cones.push_back({n, mu});
       }
     }
-    return models::in_sum_of_cones(f, cones, tolerance);
+    return models::in_sum_of_cones(f, cones, tolerance + unsure * squeeze(f, cones));
+  }
+
+  // Contacts that slip may press nearly against each other, with forces that are far above f; their axes' rounding then
+  // counts by these. The sum of the forces, N, where each contact bears one along a line, else none.
+  [[nodiscard]] static double squeeze(const Vec3& f, const std::vector<models::ForceCone>& cones) {
+    if (cones.size() < 2 || cones.size() > 3) return 0.0;
+    Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
+    for (std::size_t i = 0; i < cones.size(); ++i) {
+      if (cones[i].mu > 0.0) return 0.0;
+      axes.col(static_cast<Eigen::Index>(i)) = cones[i].axis;
+    }
+    const Vec3 forces = axes.completeOrthogonalDecomposition().solve(f);
+    return forces.minCoeff() >= 0.0 ? forces.sum() : 0.0;
+  }
+
+  // How far the objects have been carried, metres: their places are rounded by that.
+  [[nodiscard]] double carriage(double time_s) const {
+    double farthest = 0.0;
+    for (std::size_t i = 0; i < scripts_.size(); ++i) {
+      if (scene_.objects[i].motion) farthest = std::max(farthest, scripts_[i].at(time_s).translation().norm());
+    }
+    return farthest;
   }
 
   // Where the object's motion takes q.
@@ -378,7 +402,8 @@ class Judge {
     const double kappa = call.K * random_.log_uniform(1e-3, 1e3);
     const Call<N> other = g_.ask(kappa, Vec<N>(call.r - f / kappa));
     const double allowed = condition(call) * 64.0 * epsilon *
-                           ((0.1 + call.r.norm() + call.q.norm()) * (1.0 + call.K / kappa) + f.norm() / kappa);
+                               ((0.1 + call.r.norm() + call.q.norm()) * (1.0 + call.K / kappa) + f.norm() / kappa) +
+                           8.0 * epsilon * laws_.carriage(call.time.time_s);
     const double error = (other.r - call.r).norm();
     if (error <= allowed) return;
     // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
