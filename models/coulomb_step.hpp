@@ -30,10 +30,17 @@ class CoulombStep {
     Vec<N> R = (high.r - q_) / (1.0 - held_at);
     if (!(kappa_ * R.norm() > 2.0 * F_)) {
       const bool place = is_place(q_);
-      look_closer(R, high);
+      const bool flat = !place || look_closer(R, high);
       const double pull = kappa_ * R.norm();
-      if (place && (!(pull > F_) || !(kappa_ * size_ > F_))) return q_;  // (3), first case
-      if (place && F_ >= high.tau * pull) return at(F_ / pull).r;
+      if (place && (!(pull > F_) || !(kappa_ * size_ > F_))) {  // (3), first case
+        if (!flat) touch_at_rest();
+        return q_;
+      }
+      if (place && F_ >= high.tau * pull) {
+        const Vec<N> r = at(F_ / pull).r;
+        if (rest_.contacts().empty()) touch_at_rest();
+        return r;
+      }
       // q lies behind a surface, as the reference of order 2 may, or something moves the proxy: r(τ) doesn't end in q,
       // and what the medium does grows without bound.
       while (high.excess < 0.0 && 1.0 - high.tau > 1e-15) {
@@ -83,16 +90,26 @@ class CoulombStep {
   }
 
   // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R. How near that is: tenfold nearer
-  // each time, until R stays what it is within rounding, or grows because r(τ) doesn't end in q.
-  void look_closer(Vec<N>& R, Sample& high) noexcept {
+  // each time, until R stays what it is within rounding. What of a change then is more than that of one result, is a
+  // bend that goes on to nothing. True where there is none from the start.
+  bool look_closer(Vec<N>& R, Sample& high) noexcept {
     for (double s = 0.1 * (1.0 - held_at); s > 1e-10; s *= 0.1) {
       const Sample next = at(1.0 - s);
-      const Vec<N> nearer = (next.r - q_) / (1.0 - next.tau);
-      const double rounding = 16.0 * u * (next.r.template lpNorm<1>() + q_.template lpNorm<1>()) / (1.0 - next.tau);
-      if ((nearer - R).norm() <= rounding || nearer.norm() > 2.0 * R.norm()) return;
-      R = nearer;
+      const double left = 1.0 - next.tau, place = u * (next.r.template lpNorm<1>() + q_.template lpNorm<1>());
+      const Vec<N> nearer = (next.r - q_) / left;
+      const double change = (nearer - R).norm() * left;
+      if (change <= 2.0 * place) return high.tau == held_at;
+      R = change <= 16.0 * place ? Vec<N>(nearer + (nearer - R) / 9.0) : nearer;
       high = next;
+      if (change <= 16.0 * place) break;
     }
+    return false;
+  }
+
+  // For the contacts at q: as near to it as a touch shows above rounding, else a hundredth of the way.
+  void touch_at_rest() noexcept {
+    at(1.0 - std::min(1e3 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
+    if (rest_.contacts().empty()) at(held_at);
   }
 
   // Illinois between two samples with F between them.

@@ -9,8 +9,10 @@
 #include "models/coulomb_field.hpp"
 #include "models/free_space.hpp"
 #include "models/friction_plane.hpp"
+#include "models/mesh_surface.hpp"
 #include "models/plane.hpp"
 #include "models/plane_composition.hpp"
+#include "tests/models/mesh_shapes.hpp"
 #include "tests/models/random_states.hpp"
 
 namespace proxarm::controller {
@@ -171,6 +173,29 @@ TEST(RenderedModels, MatchedLabelsAmplifyNoise) {
   EXPECT_LT(bdf2, 1.0);
   EXPECT_GT(matched, bdf2);
   EXPECT_LT(matched, std::sqrt(5.0));
+}
+
+// A mesh holds from both sides. Order 2 looks from a point that is a third of a step ahead of the proxy, and begins a
+// period before its start: neither may lead behind a face.
+TEST(RenderedModels, OrderTwoStaysOutOfAMesh) {
+  Random random(104);
+  const double half = 0.1;
+  const auto mesh = std::make_shared<const models::TriangleMesh>(tests::block(Vec3::Constant(2.0 * half)));
+  for (std::int64_t run = 0; run < scaled(2000); ++run) {
+    models::MeshSurface g(mesh, random.chance(0.3) ? 0.0 : random.uniform(0.0, 1.0));
+    const double M = random.log_uniform(0.01, 100), T = random.log_uniform(1e-3, 14e-3);
+    AdmittanceProxy<3> proxy({.mass_kg = M, .period_s = T, .order = 2, .matched_labels = random.chance(0.5)}, g);
+    Vec3 q = random_vector(random, 0.2);
+    q[random.below(3)] = half + random.log_uniform(1e-4, 0.1);
+    ASSERT_TRUE(proxy.start({.q = q, .v = random.log_uniform(1e-3, 10.0) * random.direction<3>()}));
+    Vec3 h = Vec3::Zero();
+    for (int k = 0; k < 100; ++k) {
+      if (k % 10 == 0) h = random.log_uniform(1e-4, 0.1) * M / (T * T) * random.direction<3>();
+      // Back to the block, as a spring that the timestep carries would.
+      ASSERT_EQ(proxy.step(h - 0.01 * M / (T * T) * proxy.q()), ProxyFault::none);
+      ASSERT_GE(proxy.q().cwiseAbs().maxCoeff(), half - 1e-15) << "run " << run << ", step " << k;
+    }
+  }
 }
 
 }  // namespace
