@@ -93,8 +93,8 @@ void expect_law_at_a_ball(GeometricAlgorithm<3>& g, double K, double F, const Ve
   const double moved = (r - q).norm(), size = r.norm() + p.norm() + q.norm();
   // How far r moved is known to some units of its coordinates, and f to the same times K.
   double tolerance = 256.0 * 2.2e-16 * K * size + F * 1e-9;
-  // Whether it rests is seen where the ball looks flat: from as near as a hundred-thousandth of the way.
-  tolerance += F * std::min(16.0 * 2.2e-16 * size / (moved > 0.0 ? moved : 1e-5 * F / K), 1e-3);
+  // Whether it rests is seen where the ball looks flat: from as near as a millionth of the way, deep in one.
+  tolerance += F * std::min(16.0 * 2.2e-16 * size / (moved > 0.0 ? moved : 1e-6 * F / K), 1e-3);
   if (g.contacts().empty()) {
     ASSERT_LE(f.norm(), F + tolerance) << q.transpose() << " to " << p.transpose();
     if (moved > 0.0) {
