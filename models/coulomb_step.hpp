@@ -30,16 +30,15 @@ class CoulombStep {
     Vec<N> R = (high.r - q_) / (1.0 - held_at);
     if (!(kappa_ * R.norm() > 2.0 * F_)) {
       const bool place = is_place(q_);
-      const bool flat = !place || look_closer(R, high);
+      const bool flat = !place || extrapolate(R, high);
       const double pull = kappa_ * R.norm();
       if (place && (!(pull > F_) || !(kappa_ * size_ > F_))) {  // (3), first case
         if (!flat) touch_at_rest();
         return q_;
       }
       if (place && F_ >= high.tau * pull) {
-        const Vec<N> r = at(F_ / pull).r;
-        if (rest_.contacts().empty()) touch_at_rest();
-        return r;
+        Vec<N> r;
+        if (slip(F_ / pull, pull, r)) return r;
       }
       // q lies behind a surface, as the reference of order 2 may, or something moves the proxy: r(τ) doesn't end in q,
       // and what the medium does grows without bound.
@@ -59,7 +58,8 @@ class CoulombStep {
   };
 
   Sample at(double tau) noexcept {
-    Sample sample{tau, 0.0, rest_(kappa_ / (1.0 - tau), Vec<N>(p_ + tau * d_), q_)};
+    const Vec<N> aim = tau < 0.5 ? Vec<N>(p_ + tau * d_) : Vec<N>(q_ - (1.0 - tau) * d_);  // the nearer end rounds less
+    Sample sample{tau, 0.0, rest_(kappa_ / (1.0 - tau), aim, q_)};
     sample.excess = kappa_ * tau / (1.0 - tau) * (sample.r - q_).norm() - F_;
     return sample;
   }
@@ -89,26 +89,58 @@ class CoulombStep {
     return (rest_(1e15 * kappa_, r, q_) - r).norm() <= 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
   }
 
-  // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R. How near that is: tenfold nearer
-  // each time, until R stays what it is within rounding. What of a change then is more than that of one result, is a
-  // bend that goes on to nothing. True where there is none from the start.
-  bool look_closer(Vec<N>& R, Sample& high) noexcept {
-    for (double s = 0.1 * (1.0 - held_at); s > 1e-10; s *= 0.1) {
-      const Sample next = at(1.0 - s);
-      const double left = 1.0 - next.tau, place = u * (next.r.template lpNorm<1>() + q_.template lpNorm<1>());
-      const Vec<N> nearer = (next.r - q_) / left;
-      const double change = (nearer - R).norm() * left;
-      if (change <= 2.0 * place) return high.tau == held_at;
-      R = change <= 16.0 * place ? Vec<N>(nearer + (nearer - R) / 9.0) : nearer;
-      high = next;
-      if (change <= 16.0 * place) break;
+  // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R. R is taken to 1 − τ = 0 by
+  // Neville's polynomials through what is found at a few 1 − τ, each a quarter of the one before, until that changes no
+  // more than the rounding of r; `high` is the last of them. True where the world is flat from the start.
+  bool extrapolate(Vec<N>& R, Sample& high) noexcept {
+    constexpr int most = 14;
+    std::array<Vec<N>, most> row;  // of the polynomials that end with the last sample, by degree
+    row[0] = R;
+    Sample sample = high;
+    double least = std::numeric_limits<double>::infinity();
+    for (int k = 1; k < most; ++k) {
+      sample = at(1.0 - 0.25 * (1.0 - sample.tau));
+      const double left = 1.0 - sample.tau;
+      const double rounding = 8.0 * u * (sample.r.template lpNorm<1>() + q_.template lpNorm<1>()) / left;
+      const Vec<N> last = row[k - 1];
+      Vec<N> previous = row[0];
+      row[0] = (sample.r - q_) / left;
+      if (k == 1 && (row[0] - previous).norm() <= rounding) return true;
+      double ratio = 4.0;
+      for (int degree = 1; degree <= k; ++degree, ratio *= 4.0) {
+        const Vec<N> higher = row[degree - 1] + (row[degree - 1] - previous) / (ratio - 1.0);
+        previous = row[degree];
+        row[degree] = higher;
+      }
+      const double change = (row[k] - last).norm();
+      if (change > least && least <= 100.0 * rounding) break;
+      least = change;
+      R = row[k];
+      high = sample;
+      if (change <= rounding) break;
     }
     return false;
   }
 
-  // For the contacts at q: as near to it as a touch shows above rounding, else a hundredth of the way.
+  // A slip so short that r(τ) is nearly q + (1 − τ) R, from where that would end; by secants.
+  bool slip(double tau, double pull, Vec<N>& r) noexcept {
+    Sample sample = at(tau);
+    double slope = pull;
+    for (int k = 0; k < 10 && std::abs(sample.excess) > rounding_N(sample.r); ++k) {
+      const double next = sample.tau - sample.excess / slope;
+      if (!(next > 0.0 && next < 1.0) || next == sample.tau) return false;
+      const Sample before = sample;
+      sample = at(next);
+      slope = (sample.excess - before.excess) / (sample.tau - before.tau);
+    }
+    r = sample.r;
+    if (rest_.contacts().empty()) touch_at_rest();
+    return std::abs(sample.excess) <= rounding_N(sample.r);
+  }
+
+  // For the contacts at q: as near to it as touches show above rounding, else where they did.
   void touch_at_rest() noexcept {
-    at(1.0 - std::min(1e3 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
+    at(1.0 - std::min(1e6 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
     if (rest_.contacts().empty()) at(held_at);
   }
 
@@ -193,8 +225,8 @@ class CoulombStep {
     return false;
   }
 
-  // Where rest is looked at from first: a hundredth of the way to p, far above rounding.
-  static constexpr double held_at = 0.99;
+  // Where rest is looked at from first: some hundredths of the way to p, far above rounding.
+  static constexpr double held_at = 0.96;
   static constexpr double close_enough = 1e-14;
   static constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 
