@@ -57,19 +57,32 @@ class MeshObstacle final : public Obstacle {
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const Vec3 reached = surface_(1.0, r, q);
     if (reached == r) return false;
-    return !((reached - r).norm() <= 8.0 * mesh().lift_m()) || mesh().first_hit(reached, r).any();
+    return !((reached - r).norm() <= 8.0 * surface_.lift_m()) || mesh().first_hit(reached, r).any();
   }
 
   [[nodiscard]] Tangent tangent(const Vec3& /*r*/, std::int32_t feature) const noexcept override {
     const auto index = static_cast<std::uint32_t>(feature < 0 ? ~feature : feature);
     const TriangleMesh::Face& face = mesh().face(index);
     const Vec3 n = feature < 0 ? Vec3(-face.normal) : face.normal;
-    return {FlatSurface<3>::of_unit(face.corner + mesh().lift_m() * n, n), surface_.friction(index)};
+    return {FlatSurface<3>::of_unit(face.corner + surface_.lift_m() * n, n), surface_.friction(index)};
   }
 
   // Not signed: both sides of a mesh hold.
   [[nodiscard]] double distance(const Vec3& x) const noexcept override {
     return mesh().distance(x, std::numeric_limits<double>::infinity(), near_);
+  }
+  [[nodiscard]] bool comes_within(const Vec3& x, double reach) const noexcept override {
+    const double most = reach + 8.0 * surface_.lift_m();
+    return mesh().distance(x, most, near_) < most;
+  }
+  [[nodiscard]] bool parts(const Vec3& x, const Vec3& y) const noexcept override { return surface_.parts(x, y); }
+  // Carried by a pose with a translation t of ‖t‖₁ ≤ `size`, a touched point has coordinates of ‖x‖₁ ≤ √3 S + size in
+  // W, S as in TriangleMesh::lift_m. On its way to W and back each coordinate is rounded by 8 u (‖x‖₁ + ‖t‖₁) and,
+  // where a rotation is one within rounding only, 10 u √3 S; World takes it there and back twice. Together less than 32
+  // u (2 S + 2 size); as much again keeps computed heights off the faces.
+  void set_rounding_size(double size_m) noexcept override {
+    constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+    surface_.set_lift(3.0 * mesh().lift_m() + 128.0 * u * size_m);
   }
   void set_friction(double friction) noexcept override { surface_.set_friction(friction); }
   [[nodiscard]] Bounds bounds() const noexcept override { return mesh().bounds(); }

@@ -20,6 +20,13 @@ MeshSurface::MeshSurface(std::shared_ptr<const TriangleMesh> mesh, double fricti
   }
 }
 
+void MeshSurface::set_lift(double lift_m) noexcept {
+  if (lift_m == lift_) return;
+  lift_ = lift_m;
+  near_radius_ = clearance_ = -1.0;  // what is remembered counts in lifts
+  held_.side = 0;
+}
+
 bool MeshSurface::is_clear(const Vec3& p, const Vec3& q) const noexcept {
   const double clear2 = clearance_ > 0.0 ? clearance_ * clearance_ : 0.0;
   return (p - clear_at_).squaredNorm() < clear2 && (q - clear_at_).squaredNorm() < clear2;
@@ -31,7 +38,7 @@ void MeshSurface::find_clearance(const Vec3& q) noexcept {
   const double distance = mesh_->distance_at_least(q, std::numeric_limits<double>::infinity(), nearest_face_, 0.5);
   // What rounding may add to a distance: a few u of the coordinates, which the lift (64 u S) exceeds on the mesh's
   // part; two lifts more, so that whoever is clear doesn't touch either.
-  clearance_ = distance * (1.0 - 16.0 * u) - 3.0 * mesh_->lift_m() - 16.0 * u * q.lpNorm<1>();
+  clearance_ = distance * (1.0 - 16.0 * u) - 3.0 * lift_ - 16.0 * u * q.lpNorm<1>();
   clear_at_ = q;
 }
 

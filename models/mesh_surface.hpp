@@ -53,6 +53,15 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   // From the next step on, where it isn't by face; finite and not negative.
   void set_friction(double friction) noexcept { mu_ = friction; }
 
+  // How far the surface that is touched is in front of the faces: TriangleMesh::lift_m(), or more where q and p come
+  // with more rounding than the mesh's own coordinates explain. A proxy on the former surface is brought to the new one
+  // by its next step, as long as they differ by a factor of two at most.
+  [[nodiscard]] double lift_m() const noexcept { return lift_; }
+  void set_lift(double lift_m) noexcept;
+
+  // Exactly: whether a face has a point in common with the segment.
+  [[nodiscard]] bool parts(const Vec3& x, const Vec3& y) noexcept { return x != y && first_hit(x, y).any(); }
+
  private:
   struct Walk;  // one step on its way
 

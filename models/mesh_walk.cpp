@@ -32,7 +32,7 @@ constexpr double kSharpest = 0.0078;  // 1 + cos φ at 172°
 MeshSurface::Walk::Walk(MeshSurface& surface, const Vec3& to, const Vec3& from) noexcept
     : s(surface),
       mesh(*surface.mesh_),
-      lift(surface.mesh_->lift_m()),
+      lift(surface.lift_),
       p(to),
       q(from),
       c(from),

@@ -4,6 +4,11 @@
 // is X(t − T)⁻¹ q, and p is X(t)⁻¹ p. Everything else happens in that frame, where the object stands still: so friction
 // acts against the relative motion, and an object can sweep onto a resting proxy. Across an elastic or a rigid surface
 // alike.
+//
+// A mesh has no inside from which it could bring a proxy back, so its sides must outlast the way from its frame to W
+// and back: its touched surface is in front of the faces by more than that rounds (Obstacle::set_rounding_size), what
+// is returned has been taken back and tested, and the pose that a step comes from is, bit for bit, the one that the
+// step before went to.
 #pragma once
 
 #include <memory>
@@ -38,64 +43,78 @@ class MovingObstacle final : public Obstacle {
   // `still`: the object as it would be if the motion were none.
   MovingObstacle(std::unique_ptr<Obstacle> still, const ScriptedMotion& motion)
       : still_(std::move(still)), motion_(motion), scripted_(true) {
-    set_time(0.0, 0.0);
+    last_ = now_ = motion_.at(0.0);
+    go_from(now_);
   }
   // Driven: stands at `start` until drive() is called.
   MovingObstacle(std::unique_ptr<Obstacle> still, const Pose& start)
-      : still_(std::move(still)), now_(start), before_(start) {}
+      : still_(std::move(still)), now_(rigid(start)), driven_from_(now_) {
+    go_from(now_);
+  }
 
-  // The pose for the step to come; that of the last call is where it comes from. Call it once before each step.
+  // The pose for the step to come; that of the last call is where it comes from. Call it once before each step. A
+  // rotation that is one to less than rounding is made one.
   void drive(const Pose& X) noexcept {
-    before_ = now_;
-    now_ = X;
+    driven_from_ = now_;
+    now_ = rigid(X);
+    go_from(driven_from_);
   }
 
-  void set_time(double time_s, double period_s) noexcept override {
-    if (!scripted_) return;
-    now_ = motion_.at(time_s);
-    before_ = motion_.at(time_s - period_s);
-  }
+  // A second call for the same time with a shorter period is order 2's q̃: see from().
+  void set_time(double time_s, double period_s) noexcept override;
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
-    const Vec3 q_O = before_.inverse(Eigen::Isometry) * q;
-    Step s = still_->step(K, now_.inverse(Eigen::Isometry) * p, q_O);
+    const Vec3 q_O = from(q);
+    Step s = still_->step(K, now_inverse_ * p, q_O);
+    s.r = s.touches ? to_W(s, q_O, q) : p;
     s.normal = now_.linear() * s.normal;
-    s.r = !s.touches ? p : (rests() && s.r == q_O) ? q : Vec3(now_ * s.r);
     return s;
   }
+  [[nodiscard]] std::size_t contacts(double K, const Vec3& p, const Vec3& q, const Step& s,
+                                     std::array<Contact<3>, 3>& out) const noexcept override;
 
   // q as World passes it: carried already.
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
-    const Pose inverse = now_.inverse(Eigen::Isometry);
-    return still_->excludes(inverse * q, inverse * r);
+    return still_->excludes(now_inverse_ * q, now_inverse_ * r);
   }
   [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override {
-    const Pose inverse = now_.inverse(Eigen::Isometry);
-    const Vec3 q_O = before_.inverse(Eigen::Isometry) * q, w = still_->detour(inverse * p, q_O);
+    const Vec3 q_O = from(q), w = still_->detour(now_inverse_ * p, q_O);
     return w == q_O ? q : Vec3(now_ * w);
   }
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override {
-    const Tangent t = still_->tangent(now_.inverse(Eigen::Isometry) * r, feature);
+    const Tangent t = still_->tangent(now_inverse_ * r, feature);
     return {FlatSurface<3>::of_unit(now_ * t.surface.point(), now_.linear() * t.surface.normal()), t.mu};
   }
-  [[nodiscard]] double distance(const Vec3& x) const noexcept override {
-    return still_->distance(now_.inverse(Eigen::Isometry) * x);
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return still_->distance(now_inverse_ * x); }
+  [[nodiscard]] bool comes_within(const Vec3& x, double reach) const noexcept override {
+    return still_->comes_within(now_inverse_ * x, reach);
+  }
+  [[nodiscard]] bool parts(const Vec3& x, const Vec3& y) const noexcept override {
+    return still_->parts(now_inverse_ * x, now_inverse_ * y);
   }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
-  [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override {
-    return rests() ? q : Vec3(now_ * (before_.inverse(Eigen::Isometry) * q));
-  }
+  [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override { return rests_ ? q : Vec3(now_ * from(q)); }
   [[nodiscard]] bool moves() const noexcept override { return true; }
   void set_friction(double friction) noexcept override { still_->set_friction(friction); }
 
  private:
-  [[nodiscard]] bool rests() const noexcept { return now_.matrix() == before_.matrix(); }
+  static Pose rigid(Pose X) noexcept;
+  void go_from(const Pose& before) noexcept;
+  [[nodiscard]] Vec3 from(const Vec3& q) const noexcept;
+  [[nodiscard]] Vec3 to_W(const Step& s, const Vec3& q_O, const Vec3& q) const noexcept;
 
   std::unique_ptr<Obstacle> still_;
   ScriptedMotion motion_;
   bool scripted_ = false;
   Pose now_ = Pose::Identity();
-  Pose before_ = Pose::Identity();
+  Pose now_inverse_ = Pose::Identity(), before_inverse_ = Pose::Identity();
+  bool rests_ = true;  // both poses are the same
+  // Where it was at the last time that isn't that of now_.
+  Pose last_ = Pose::Identity(), driven_from_ = Pose::Identity();
+  double time_s_ = 0.0, last_time_s_ = 0.0;
+  double whole_period_s_ = 0.0;
+  bool shortened_ = false;
+  mutable Vec3 whole_from_ = Vec3::Zero();  // the last from() of a whole period
 };
 
 }  // namespace proxarm::models

@@ -154,7 +154,7 @@ double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   }
   for (const std::size_t i : moving_) {
     const Obstacle& obstacle = *entries_[i].obstacle;
-    if (obstacle.distance(middle) <= radius + (obstacle.carry(q) - q).norm()) near_.push_back(i);
+    if (obstacle.comes_within(middle, radius + (obstacle.carry(q) - q).norm())) near_.push_back(i);
   }
   return radius;
 }

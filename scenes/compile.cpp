@@ -245,7 +245,10 @@ Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   out.stages.push_back({std::string("contact") + (rubbing > 0 ? " with friction" : ""),
                         "each surface alone, exactly" + std::string(many ? "; then pairs and triples" : "")});
   if (layers > 0) out.stages.push_back({"elastic layer", scene.objects.front().name});
-  if (moving > 0) out.stages.push_back({"motion", std::to_string(moving) + " objects; q is carried along"});
+  if (moving > 0) {
+    out.stages.push_back({"motion", std::to_string(moving) + (moving > 1 ? " objects" : " object") +
+                                        "; q is carried along, and met in the object's frame"});
+  }
   if (!many) out.skipped.push_back({"composition", "a single surface"});
   if (rubbing == 0) out.skipped.push_back({"friction", "μ = 0 everywhere"});
   if (moving == 0) out.skipped.push_back({"motion", "nothing moves"});

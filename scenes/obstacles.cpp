@@ -149,14 +149,6 @@ std::vector<Part> parts_of(const Scene& scene, const Object& object) {
     }
     layer = {object.layer->stiffness_N_per_m, object.layer->thickness_m};
   }
-  if (object.motion && std::holds_alternative<MeshShape>(object.shape)) {
-    // Carried to and fro, coordinates are rounded by more than the proxy is in front of a mesh.
-    throw description::SetupError({.file = scene.file.string(),
-                                   .line = object.line,
-                                   .key = "motion",
-                                   .found = "motion of the mesh " + object.name,
-                                   .expected = "a mesh that stands still"});
-  }
   return std::visit(MakeParts{object.friction, layer, friction_by_face(scene, object)}, object.shape);
 }
 

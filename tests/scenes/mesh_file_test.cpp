@@ -340,6 +340,37 @@ TEST_F(MeshFile, HasFrictionByRegion) {
   }
 }
 
+// A sheet that is drawn away under a proxy pressed on it, half of it rough: friction acts against the relative motion.
+TEST_F(MeshFile, MovesWithFrictionByRegion) {
+  write("sheet.obj", obj_of(field(2, 1.0, [](double, double) { return 0.0; })));
+  for (const std::string motion : {"{velocity_m_per_s: [-0.5, 0, 0]}", "{driven: true}"}) {
+    CompiledScene compiled = scenes::compile(
+        scene("objects:\n"
+              "  - mesh:\n"
+              "      file: sheet.obj\n"
+              "      friction: 0.1\n"
+              "      friction_regions: [{within: {box: {centre_m: [1, 0, 0], size_m: [2, 3, 1]}}, friction: 2}]\n"
+              "      motion: " +
+              motion + "\n"));
+    auto& g = compiled.algorithm<3>();
+    Vec3 q(-0.5, 0.03, 1e-4);
+    models::Pose X = models::Pose::Identity();
+    for (int k = 1; k <= 2000; ++k) {
+      X.translation().x() = -5e-4 * k;
+      compiled.drive(0, X);
+      g.set_time({.time_s = 1e-3 * k, .period_s = 1e-3});
+      const Vec3 r = g(1e6, q - Vec3(0, 0, 1e-3), q);
+      // On the rough half it rides along, on the other (4) leaves it 0.1 mm of 0.5 mm.
+      const double on_sheet = q.x() + 5e-4 * (k - 1);
+      if (k > 1 && std::abs(on_sheet) > 1e-3) {
+        ASSERT_NEAR(r.x() - q.x(), on_sheet > 0.0 ? -5e-4 : -1e-4, 1e-12) << motion << k;
+      }
+      q = r;
+    }
+    EXPECT_GT(q.x() + 1.0, 0.0) << "came to the rough half";
+  }
+}
+
 TEST_F(MeshFile, RefusesARegionThatHoldsNothing) {
   write("ball.obj", obj_of(ball(2, 0.5)));
   const auto refused = [&](const std::string& regions) {
