@@ -75,7 +75,9 @@ class MeshObstacle final : public Obstacle {
     const double most = reach + 8.0 * surface_.lift_m();
     return mesh().distance(x, most, near_) < most;
   }
-  [[nodiscard]] bool parts(const Vec3& x, const Vec3& y) const noexcept override { return surface_.parts(x, y); }
+  bool parts(const Vec3& x, const Vec3& y, Vec3& normal) const noexcept override {
+    return surface_.parts(x, y, normal);
+  }
   // Carried by a pose with a translation t of ‖t‖₁ ≤ `size`, a touched point has coordinates of ‖x‖₁ ≤ √3 S + size in
   // W, S as in TriangleMesh::lift_m. On its way to W and back each coordinate is rounded by 8 u (‖x‖₁ + ‖t‖₁) and,
   // where a rotation is one within rounding only, 10 u √3 S; World takes it there and back twice. Together less than 32

@@ -101,6 +101,14 @@ TriangleMesh::Hit MeshSurface::first_hit(const Vec3& x, const Vec3& y) noexcept 
   return hit;
 }
 
+bool MeshSurface::parts(const Vec3& x, const Vec3& y, Vec3& normal) noexcept {
+  if (x == y) return false;
+  const TriangleMesh::Hit hit = first_hit(x, y);
+  if (!hit.any()) return false;
+  normal = mesh_->side(hit.face, x) < 0 ? Vec3(-mesh_->face(hit.face).normal) : mesh_->face(hit.face).normal;
+  return true;
+}
+
 void MeshSurface::keep_side(const Contact<3>& contact) noexcept {
   const auto index = static_cast<std::uint32_t>(contact.feature);
   const TriangleMesh::Face& face = mesh_->face(index);

@@ -59,8 +59,8 @@ class MeshSurface final : public GeometricAlgorithm<3> {
   [[nodiscard]] double lift_m() const noexcept { return lift_; }
   void set_lift(double lift_m) noexcept;
 
-  // Exactly: whether a face has a point in common with the segment.
-  [[nodiscard]] bool parts(const Vec3& x, const Vec3& y) noexcept { return x != y && first_hit(x, y).any(); }
+  // Exactly: whether a face has a point in common with the segment; if so, the normal of the first such, towards x.
+  bool parts(const Vec3& x, const Vec3& y, Vec3& normal) noexcept;
 
  private:
   struct Walk;  // one step on its way

@@ -66,17 +66,22 @@ Vec3 MovingObstacle::from(const Vec3& q) const noexcept {
     whole_from_ = q_O;
     return q_O;
   }
-  return still_->parts(whole_from_, q_O) ? still_->step(1.0, q_O, whole_from_).r : q_O;
+  Vec3 normal;
+  return still_->parts(whole_from_, q_O, normal) ? still_->step(1.0, q_O, whole_from_).r : q_O;
 }
 
 // A touched point in W. What sticks to an object at rest stays bit for bit.
-Vec3 MovingObstacle::to_W(const Step& s, const Vec3& q_O, const Vec3& q) const noexcept {
-  if (rests_ && s.r == q_O) return q;
-  Vec3 r = now_ * s.r;
-  // A mesh between the point and what the next step takes for it: the latter was within rounding of a face. A unit in
-  // the last place along the normal is rounding as well, sixteen of them aren't.
-  double away = 4.0 * std::numeric_limits<double>::epsilon() * (r.lpNorm<1>() + now_.translation().lpNorm<1>());
-  for (int k = 0; k < 8 && still_->parts(s.r, now_inverse_ * r); ++k, away *= 2.0) r = now_ * (s.r + away * s.normal);
+Vec3 MovingObstacle::to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept {
+  if (rests_ && r_O == q_O) return q;
+  Vec3 r = now_ * r_O, moved = r_O, normal;
+  // A mesh between the point and what the next step takes for it: the point is within rounding of a face that it
+  // doesn't touch, beside a vertex or deep in a spike. Away from whatever is in between then, farther with each try.
+  double away = 16.0 * std::numeric_limits<double>::epsilon() * (r.lpNorm<1>() + now_.translation().lpNorm<1>());
+  for (int k = 0; k < 24 && still_->parts(r_O, now_inverse_ * r, normal); ++k) {
+    moved += away * normal;
+    if (k % 2 == 1) away *= 2.0;
+    r = now_ * moved;
+  }
   return r;
 }
 

@@ -66,7 +66,7 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
     const Vec3 q_O = from(q);
     Step s = still_->step(K, now_inverse_ * p, q_O);
-    s.r = s.touches ? to_W(s, q_O, q) : p;
+    s.r = s.touches ? to_W(s.r, q_O, q) : p;
     s.normal = now_.linear() * s.normal;
     return s;
   }
@@ -89,8 +89,10 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] bool comes_within(const Vec3& x, double reach) const noexcept override {
     return still_->comes_within(now_inverse_ * x, reach);
   }
-  [[nodiscard]] bool parts(const Vec3& x, const Vec3& y) const noexcept override {
-    return still_->parts(now_inverse_ * x, now_inverse_ * y);
+  bool parts(const Vec3& x, const Vec3& y, Vec3& normal) const noexcept override {
+    if (!still_->parts(now_inverse_ * x, now_inverse_ * y, normal)) return false;
+    normal = now_.linear() * normal;
+    return true;
   }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
   [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override { return rests_ ? q : Vec3(now_ * from(q)); }
@@ -101,7 +103,7 @@ class MovingObstacle final : public Obstacle {
   static Pose rigid(Pose X) noexcept;
   void go_from(const Pose& before) noexcept;
   [[nodiscard]] Vec3 from(const Vec3& q) const noexcept;
-  [[nodiscard]] Vec3 to_W(const Step& s, const Vec3& q_O, const Vec3& q) const noexcept;
+  [[nodiscard]] Vec3 to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept;
 
   std::unique_ptr<Obstacle> still_;
   ScriptedMotion motion_;

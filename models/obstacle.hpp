@@ -79,8 +79,9 @@ class Obstacle {
   // False only if nothing of it comes within `reach` (finite) of x.
   [[nodiscard]] virtual bool comes_within(const Vec3& x, double reach) const noexcept { return distance(x) <= reach; }
 
-  // For an object without an inside, whose sides are all there is: whether it lies between two points.
-  [[nodiscard]] virtual bool parts(const Vec3& /*x*/, const Vec3& /*y*/) const noexcept { return false; }
+  // For an object without an inside, whose sides are all there is: whether it lies between two points, and then the
+  // normal of what does so, towards x.
+  virtual bool parts(const Vec3& /*x*/, const Vec3& /*y*/, Vec3& /*normal*/) const noexcept { return false; }
 
   // An object that is carried about is asked with coordinates that are rounded as those of this size are, metres.
   virtual void set_rounding_size(double /*size_m*/) noexcept {}
