@@ -195,6 +195,12 @@ void require_scheme(const description::Cell& cell, const SessionSettings& settin
   }
 }
 
+ModbusOpener opener_of(fieldbus::ModbusPeers peers) {
+  return [peers](const description::ModbusLineDescription& line, double response_timeout_s) {
+    return fieldbus::open_modbus(line, response_timeout_s, peers);
+  };
+}
+
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
                        const BusIndices& bus_indices, const ModbusOpener& open_line) {

@@ -22,6 +22,8 @@ using BusIndices = std::vector<std::size_t>;
 // Opens a Modbus line; the response timeout is that of its slowest drive.
 using ModbusOpener = std::function<std::unique_ptr<fieldbus::ModbusClient>(const description::ModbusLineDescription&,
                                                                            double response_timeout_s)>;
+// Through fieldbus::open_modbus().
+ModbusOpener opener_of(fieldbus::ModbusPeers peers);
 
 // Throws SetupError where the cell's base_id isn't one of the sensor's.
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
@@ -33,7 +35,8 @@ void require_scheme(const description::Cell& cell, const SessionSettings& settin
 // `scene` must outlive the parts.
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
-                       const BusIndices& bus_indices, const ModbusOpener& open_line = fieldbus::open_modbus);
+                       const BusIndices& bus_indices,
+                       const ModbusOpener& open_line = opener_of(fieldbus::ModbusPeers::on_this_machine));
 
 // Identifiers that a bus of the network must let through, for the kernel's filters.
 std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus);

@@ -1,5 +1,6 @@
 #include "fieldbus/modbus_client.hpp"
 
+#include <arpa/inet.h>
 #include <modbus/modbus.h>
 
 #include <algorithm>
@@ -84,24 +85,12 @@ void set_timeouts(modbus_t& context, double timeout_s) {
   modbus_set_byte_timeout(&context, us / 1'000'000, us % 1'000'000);
 }
 
-SetupError refusal(const ModbusLineDescription& line, const std::string& found) {
-  return SetupError({.bus = line.name,
-                     .message = "this is a Modbus peer outside this machine, and this version drives none",
-                     .found = found,
-                     .expected = line.serial() ? "a pseudo-terminal, /dev/pts/N" : "a loopback address, 127.x.x.x",
-                     .advice = "limits and supervision for a person next to a moving axis aren't complete yet"});
-}
-
-void require_own_machine(const ModbusLineDescription& line) {
-  if (!line.serial()) {
-    if (line.host.rfind("127.", 0) != 0 || line.host.find_first_not_of("0123456789.") != std::string::npos) {
-      throw refusal(line, line.host);
-    }
-    return;
-  }
-  std::error_code error;
-  const std::filesystem::path device = std::filesystem::weakly_canonical(line.device, error);
-  if (error || device.string().rfind("/dev/pts/", 0) != 0) throw refusal(line, line.device);
+void require_on_this_machine(const ModbusLineDescription& line) {
+  if (is_on_this_machine(line)) return;
+  throw SetupError({.bus = line.name,
+                    .message = "this Modbus peer isn't a process of this machine: a real axis would move",
+                    .found = line.serial() ? line.device : line.host,
+                    .expected = line.serial() ? "a pseudo-terminal, /dev/pts/N" : "a loopback address, 127.x.x.x"});
 }
 
 }  // namespace
@@ -129,16 +118,30 @@ ModbusResult ModbusClient::read_write(std::uint8_t unit, std::uint16_t read_at, 
   return exchange(encode_read_write(unit, read_at, read_values.size(), at, values), read_values);
 }
 
-std::unique_ptr<ModbusClient> open_modbus(const ModbusLineDescription& line, double response_timeout_s) {
-  require_own_machine(line);
+bool is_on_this_machine(const ModbusLineDescription& line) {
+  if (!line.serial()) {
+    in_addr address{};
+    return inet_pton(AF_INET, line.host.c_str(), &address) == 1 && ntohl(address.s_addr) >> 24 == 127;
+  }
+  std::error_code error;
+  const std::filesystem::path device = std::filesystem::weakly_canonical(line.device, error);
+  return !error && device.string().rfind("/dev/pts/", 0) == 0;
+}
+
+std::string peer_text(const ModbusLineDescription& line) {
+  return line.serial() ? line.device : line.host + ", port " + std::to_string(line.port);
+}
+
+std::unique_ptr<ModbusClient> open_modbus(const ModbusLineDescription& line, double response_timeout_s,
+                                          ModbusPeers peers) {
+  if (peers == ModbusPeers::on_this_machine) require_on_this_machine(line);
   const char parity = line.parity == "none" ? 'N' : line.parity == "odd" ? 'O' : 'E';
   Context context(line.serial() ? modbus_new_rtu(line.device.c_str(), line.baud, parity, 8, line.stop_bits)
                                 : modbus_new_tcp(line.host.c_str(), line.port));
-  const std::string place = line.serial() ? line.device : line.host + ", port " + std::to_string(line.port);
   const auto fail = [&](int error) {
     return SetupError({.bus = line.name,
                        .message = "the Modbus line can't be opened",
-                       .found = place + ": " + std::strerror(error),
+                       .found = peer_text(line) + ": " + std::strerror(error),
                        .advice = "is the drive on, and its address in the cell file the drive's?"});
   };
   if (!context) throw fail(errno);

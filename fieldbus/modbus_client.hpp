@@ -37,9 +37,21 @@ class ModbusClient {
   int exception_ = 0;
 };
 
-// Opens the line. Throws SetupError: nobody there, no such device, and, in this version, any peer but one on this very
-// machine (a loopback address, a pseudo-terminal): drives on Modbus have no supervision yet that a person may rely on.
+// Is the peer a process of this very machine, so that nothing real can move: a loopback address, a pseudo-terminal? A
+// tunnel from one of those to a real drive can't be seen.
+[[nodiscard]] bool is_on_this_machine(const description::ModbusLineDescription& line);
+
+// "10.0.0.5, port 502" or "/dev/ttyUSB0".
+[[nodiscard]] std::string peer_text(const description::ModbusLineDescription& line);
+
+enum class ModbusPeers {
+  on_this_machine,
+  any,  // somebody has said that real axes may move
+};
+
+// Opens the line. Throws SetupError: nobody there, no such device, or a peer that isn't allowed.
 [[nodiscard]] std::unique_ptr<ModbusClient> open_modbus(const description::ModbusLineDescription& line,
-                                                        double response_timeout_s);
+                                                        double response_timeout_s,
+                                                        ModbusPeers peers = ModbusPeers::on_this_machine);
 
 }  // namespace proxarm::fieldbus

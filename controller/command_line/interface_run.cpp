@@ -180,7 +180,8 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::FrameTap tap(network, frame_capacity);
   controller::CycleParts parts =
-      controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices);
+      controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices,
+                              controller::opener_of(fieldbus::ModbusPeers::any));  // consent was given above
   set_filters(network, parts);
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;

@@ -1,5 +1,7 @@
 #include "models/description/cell.hpp"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -96,6 +98,10 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
   }
   if (node.has("host")) {
     line.host = node.string("host");
+    in_addr address{};
+    if (inet_pton(AF_INET, line.host.c_str(), &address) != 1) {
+      throw node.error_at("host", "a numeric address, such as 192.168.0.10");
+    }
     line.port = static_cast<int>(node.integer_or("port", line.port, 1, 65535));
     return line;
   }

@@ -36,7 +36,7 @@ struct BusDescription {
 // `--bus` and the bus budget know nothing of it.
 struct ModbusLineDescription {
   std::string name;
-  std::string host;    // TCP: numeric address; empty for a serial line
+  std::string host;    // TCP: numeric IPv4 address; empty for a serial line
   int port = 502;      // TCP
   std::string device;  // RTU: such as /dev/ttyUSB0
   int baud = 115200;

@@ -9,6 +9,7 @@
 #include "fieldbus/modbus_line.hpp"
 #include "models/description/setup_error.hpp"
 #include "models/description/yaml_file.hpp"
+#include "tests/scratch_folder.hpp"
 #include "tests/source_file.hpp"
 
 namespace proxarm::fieldbus {
@@ -16,9 +17,11 @@ namespace {
 
 using description::DriveDescription;
 using description::ModbusDriveDescription;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
+using tests::ScratchFolder;
 using Bytes = std::vector<std::uint8_t>;
 
 Bytes bytes_of(const ModbusMessage& message) { return {message.span().begin(), message.span().end()}; }
@@ -306,24 +309,58 @@ TEST(ModbusRate, IsMeasured) {
 
 // ---- mistakes -------------------------------------------------------------------------------------------------------
 
-std::string refusal_of(const description::ModbusLineDescription& line) {
+std::string refusal_of(const description::ModbusLineDescription& line,
+                       ModbusPeers peers = ModbusPeers::on_this_machine) {
   try {
-    (void)open_modbus(line, 0.02);
+    (void)open_modbus(line, 0.02, peers);
   } catch (const description::SetupError& error) {
     return error.what();
   }
   return "";
 }
 
-TEST(ModbusRefuses, PeersOutsideThisMachine) {
+TEST(ModbusPeer, IsOnThisMachineOnlyByLoopbackAddressOrPseudoTerminal) {
   description::ModbusLineDescription line;
-  line.host = "192.168.0.10";
-  EXPECT_THAT(refusal_of(line), HasSubstr("found 192.168.0.10, expected a loopback address"));
-  line.host = "127.0.0.1.example.org";
-  EXPECT_THAT(refusal_of(line), HasSubstr("a loopback address"));
+  for (const char* const host : {"127.0.0.1", "127.255.0.3"}) {
+    line.host = host;
+    EXPECT_TRUE(is_on_this_machine(line)) << host;
+  }
+  // An address of this machine's in a network, names that only look like a loopback address, octal and short forms.
+  for (const char* const host : {"192.168.0.10", "10.0.0.127", "0.0.0.0", "127.0.0.1.example.org", "127.1",
+                                 "0127.0.0.1", "localhost", "::1", "128.0.0.1", "255.255.255.255"}) {
+    line.host = host;
+    EXPECT_FALSE(is_on_this_machine(line)) << host;
+  }
   line.host.clear();
-  line.device = "/dev/ttyUSB0";
-  EXPECT_THAT(refusal_of(line), HasSubstr("found /dev/ttyUSB0, expected a pseudo-terminal"));
+  for (const char* const device : {"/dev/ttyUSB0", "/dev/ttyS0", "/dev/serial/by-id/usb-x", "/dev/pts/../ttyS0", ""}) {
+    line.device = device;
+    EXPECT_FALSE(is_on_this_machine(line)) << device;
+  }
+  line.device = "/dev/pts/0";
+  EXPECT_TRUE(is_on_this_machine(line));
+}
+
+// A link is what it leads to.
+TEST(ModbusPeer, LinkToARealPortIsReal) {
+  const ScratchFolder folder;
+  description::ModbusLineDescription line;
+  line.device = folder.path() / "arm";
+  std::filesystem::create_symlink("/dev/ttyS0", line.device);
+  EXPECT_FALSE(is_on_this_machine(line));
+  std::filesystem::remove(line.device);
+  std::filesystem::create_symlink("/dev/pts/ptmx", line.device);
+  EXPECT_TRUE(is_on_this_machine(line));
+}
+
+TEST(ModbusRefuses, PeersOutsideThisMachineUnlessTheyAreAllowed) {
+  description::ModbusLineDescription line;
+  line.host = "192.0.2.1";  // RFC 5737: nobody's
+  EXPECT_THAT(refusal_of(line), HasSubstr("found 192.0.2.1, expected a loopback address"));
+  line.host.clear();
+  line.device = "/dev/ttyUSB_none";
+  EXPECT_THAT(refusal_of(line), HasSubstr("found /dev/ttyUSB_none, expected a pseudo-terminal"));
+  EXPECT_THAT(refusal_of(line, ModbusPeers::any),
+              AllOf(HasSubstr("the Modbus line can't be opened"), HasSubstr("/dev/ttyUSB_none: No such file")));
 }
 
 TEST(ModbusRefuses, DescriptionsThatCannotBe) {
