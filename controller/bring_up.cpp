@@ -30,53 +30,104 @@ fieldbus::DriveSettings drive_settings(const SessionSettings& settings) {
   return drive;
 }
 
-std::vector<DriveBus> drive_buses(const std::vector<DriveOnBus>& drives) {
+// A bus with drives is there once, whatever number of them it has.
+std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives) {
   const fieldbus::DriveSettings defaults;
   std::vector<DriveBus> buses;
-  for (const DriveOnBus& axis : drives) {
-    if (axis.on_can == nullptr) continue;
-    const bool known = std::any_of(buses.begin(), buses.end(), [&](const DriveBus& b) { return b.bus == axis.bus; });
+  for (const fieldbus::DriveSlot& slot : drives) {
+    const bool known = std::any_of(buses.begin(), buses.end(), [&](const DriveBus& b) { return b.bus == slot.bus; });
     if (known) continue;
     buses.push_back(
-        {axis.bus, fieldbus::SyncProducer(),
+        {slot.bus, fieldbus::SyncProducer(),
          fieldbus::HeartbeatProducer(defaults.master_node, std::int64_t{defaults.master_heartbeat_ms} * 1'000'000)});
   }
   return buses;
 }
 
-DriveOnBus make_drive(const description::Cell& cell, const description::DriveDescription& drive,
-                      const SessionSettings& settings, const BusIndices& bus_indices) {
-  if (drive.on_can()) {
-    fieldbus::DriveSettings own = drive_settings(settings);
-    const bool has_inputs = cell.enabling_input && cell.enabling_input->drive == drive.joint;
-    if (has_inputs && !settings.without_enabling_input) own.inputs_object = cell.enabling_input->object;
-    auto servo = std::make_unique<fieldbus::ServoDrive>(drive, own);
-    fieldbus::ServoDrive& on_can = *servo;
-    const std::size_t bus = index_of(cell, drive.bus);
-    if (!drive.eds.empty()) description::require_bitrate(drive.eds, cell.buses[bus].bitrate);
-    return {std::move(servo), on_can, &on_can, bus_indices[bus]};
+// All drives in the order of the joints, and each once more among those of its kind.
+struct Drives {
+  std::vector<DriveOnBus> all;
+  std::vector<fieldbus::DriveSlot> can;
+  std::vector<fieldbus::ModbusDrive*> modbus;
+};
+
+std::unique_ptr<fieldbus::ServoDrive> make_can_drive(const description::Cell& cell,
+                                                     const description::DriveDescription& drive,
+                                                     const SessionSettings& settings) {
+  fieldbus::DriveSettings own = drive_settings(settings);
+  const bool has_inputs = cell.enabling_input && cell.enabling_input->drive == drive.joint;
+  if (has_inputs && !settings.without_enabling_input) own.inputs_object = cell.enabling_input->object;
+  auto servo = std::make_unique<fieldbus::ServoDrive>(drive, own);
+  if (!drive.eds.empty()) {
+    description::require_bitrate(drive.eds, cell.buses[index_of(cell, drive.bus)].bitrate);
   }
-  auto modbus = std::make_unique<fieldbus::ModbusDrive>(drive, description::load_modbus_drive(drive.description),
-                                                        std::llround(settings.period_s * 1e9));
-  fieldbus::ModbusDrive& on_line = *modbus;
-  return {std::move(modbus), on_line, nullptr, DriveOnBus::no_bus};
+  return servo;
+}
+
+Drives make_drives(const description::Cell& cell, const SessionSettings& settings, const BusIndices& bus_indices) {
+  Drives drives;
+  for (const description::DriveDescription& drive : cell.drives) {
+    if (drive.on_can()) {
+      auto servo = make_can_drive(cell, drive, settings);
+      const std::size_t bus = bus_indices[index_of(cell, drive.bus)];
+      fieldbus::ServoDrive& made = *servo;
+      drives.can.push_back({&made, bus});
+      drives.all.push_back({std::move(servo), made, bus});
+    } else {
+      auto on_line = std::make_unique<fieldbus::ModbusDrive>(drive, description::load_modbus_drive(drive.description),
+                                                             std::llround(settings.period_s * 1e9));
+      fieldbus::ModbusDrive& made = *on_line;
+      drives.modbus.push_back(&made);
+      drives.all.push_back({std::move(on_line), made, DriveOnBus::no_bus});
+    }
+  }
+  return drives;
+}
+
+struct Sensor {
+  std::unique_ptr<fieldbus::ForceSensor> owned;
+  fieldbus::ModbusSensor* on_line = nullptr;  // the same, or null: on a CAN bus
+};
+
+Sensor build_sensor(const description::Cell& cell, const description::SensorDescription& sensor) {
+  const bool on_line = index_of(cell, cell.sensor.bus) == cell.buses.size();
+  if (on_line != (sensor.described && sensor.described->registers)) {
+    throw SetupError({.file = cell.file.string(),
+                      .key = "sensor.bus",
+                      .found = description::in_quotes(cell.sensor.bus),
+                      .expected = on_line ? "a CAN bus: " + sensor.name + " sends frames"
+                                          : "a Modbus line: " + sensor.name + " has registers"});
+  }
+  if (on_line) {
+    auto made = std::make_unique<fieldbus::ModbusSensor>(sensor, cell.sensor.base_id, cell.sensor.bus);
+    fieldbus::ModbusSensor* const same = made.get();
+    return {std::move(made), same};
+  }
+  if (sensor.protocol == "ati_net_can_oem") {
+    fieldbus::AtiNetCanOemSettings settings;
+    settings.bus_name = cell.sensor.bus;
+    settings.base_id = cell.sensor.base_id;
+    return {std::make_unique<fieldbus::AtiNetCanOem>(settings)};
+  }
+  fieldbus::DescribedSensorSettings settings;
+  settings.bus_name = cell.sensor.bus;
+  settings.base_id = cell.sensor.base_id;
+  return {std::make_unique<fieldbus::DescribedSensor>(sensor, settings)};
 }
 
 // One worker and one connection per line. A TCP drive has an address of its own, and thereby a line of its own; units
 // behind a gateway share its.
 std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const description::Cell& cell,
-                                                                std::vector<DriveOnBus>& drives,
-                                                                fieldbus::ForceSensor& sensor,
-                                                                const std::string& sensor_bus,
+                                                                const std::vector<fieldbus::ModbusDrive*>& drives,
+                                                                fieldbus::ModbusSensor* sensor,
                                                                 const ModbusOpener& open_line) {
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines;
   for (const description::ModbusLineDescription& line : cell.modbus_lines) {
     std::vector<fieldbus::ModbusDrive*> on_it;
-    for (DriveOnBus& axis : drives) {
-      if (axis.on_can != nullptr || axis.drive.description().bus != line.name) continue;
-      on_it.push_back(static_cast<fieldbus::ModbusDrive*>(&axis.drive));
+    for (fieldbus::ModbusDrive* drive : drives) {
+      if (drive->description().bus == line.name) on_it.push_back(drive);
     }
-    auto* sensor_on_it = line.name == sensor_bus ? static_cast<fieldbus::ModbusSensor*>(&sensor) : nullptr;
+    fieldbus::ModbusSensor* const sensor_on_it = line.name == cell.sensor.bus ? sensor : nullptr;
     if (on_it.empty() && sensor_on_it == nullptr) continue;
     double timeout_s = sensor_on_it != nullptr ? sensor_on_it->response_timeout_s() : 0.0;
     for (const auto* drive : on_it) timeout_s = std::max(timeout_s, drive->registers().response_timeout_s);
@@ -125,14 +176,6 @@ std::optional<EnablingInput> make_enabling_input(const description::Cell& cell, 
   return EnablingInput(*cell.enabling_input, cell, bus_indices[index_of(cell, cell.enabling_input->bus)]);
 }
 
-std::vector<fieldbus::DriveSlot> slots(CycleParts& parts) {
-  std::vector<fieldbus::DriveSlot> slots;
-  for (DriveOnBus& axis : parts.drives) {
-    if (axis.on_can != nullptr) slots.push_back({axis.on_can, axis.bus});
-  }
-  return slots;
-}
-
 // Several of the cell's buses may be on one interface; the controller itself has NMT, SYNC and its heartbeat there.
 void refuse_shared_identifiers(CycleParts& parts) {
   std::vector<fieldbus::UsedIdentifier> used;
@@ -144,10 +187,9 @@ void refuse_shared_identifiers(CycleParts& parts) {
       used.push_back({bus.bus, id, "the controller"});
     }
   }
-  for (const DriveOnBus& axis : parts.drives) {
-    if (axis.on_can == nullptr) continue;
-    for (const std::uint32_t id : axis.on_can->used_ids()) {
-      used.push_back({axis.bus, id, "drive of " + axis.drive.description().joint});
+  for (const fieldbus::DriveSlot& slot : parts.can_drives) {
+    for (const std::uint32_t id : slot.drive->used_ids()) {
+      used.push_back({slot.bus, id, "drive of " + slot.drive->description().joint});
     }
   }
   for (const std::uint32_t id : parts.sensor->used_ids()) used.push_back({parts.sensor_bus, id, "force sensor"});
@@ -159,25 +201,7 @@ void refuse_shared_identifiers(CycleParts& parts) {
 
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor) {
-  const bool on_line = index_of(cell, cell.sensor.bus) == cell.buses.size();
-  if (on_line != (sensor.described && sensor.described->registers)) {
-    throw SetupError({.file = cell.file.string(),
-                      .key = "sensor.bus",
-                      .found = description::in_quotes(cell.sensor.bus),
-                      .expected = on_line ? "a CAN bus: " + sensor.name + " sends frames"
-                                          : "a Modbus line: " + sensor.name + " has registers"});
-  }
-  if (on_line) return std::make_unique<fieldbus::ModbusSensor>(sensor, cell.sensor.base_id, cell.sensor.bus);
-  if (sensor.protocol == "ati_net_can_oem") {
-    fieldbus::AtiNetCanOemSettings settings;
-    settings.bus_name = cell.sensor.bus;
-    settings.base_id = cell.sensor.base_id;
-    return std::make_unique<fieldbus::AtiNetCanOem>(settings);
-  }
-  fieldbus::DescribedSensorSettings settings;
-  settings.bus_name = cell.sensor.bus;
-  settings.base_id = cell.sensor.base_id;
-  return std::make_unique<fieldbus::DescribedSensor>(sensor, settings);
+  return build_sensor(cell, sensor).owned;
 }
 
 // Torques for drives that take them, positions for those that don't.
@@ -205,13 +229,10 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,
                        const BusIndices& bus_indices, const ModbusOpener& open_line) {
   require_scheme(cell, settings);
-  std::vector<DriveOnBus> drives;
-  for (const description::DriveDescription& drive : cell.drives) {
-    drives.push_back(make_drive(cell, drive, settings, bus_indices));
-  }
-  std::unique_ptr<fieldbus::ForceSensor> force_sensor = make_sensor(cell, sensor);
+  Drives drives = make_drives(cell, settings, bus_indices);
+  Sensor force_sensor = build_sensor(cell, sensor);
   std::vector<std::unique_ptr<fieldbus::ModbusLine>> lines =
-      modbus_lines(cell, drives, *force_sensor, cell.sensor.bus, open_line);
+      modbus_lines(cell, drives.modbus, force_sensor.on_line, open_line);
   auto arm = std::make_unique<models::Arm>(cell);
   std::optional<models::InverseKinematics> inverse;
   std::unique_ptr<RenderedWorld> world;
@@ -225,12 +246,13 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
   std::unique_ptr<FreeMotion> freeing;
   if (!torque) freeing = std::make_unique<FreeMotion>(settings, cell.supervision.release_speed_m_per_s);
   ElasticSetpoint elastic(*arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s);
-  std::vector<DriveBus> buses = drive_buses(drives);
+  std::vector<DriveBus> buses = drive_buses(drives.can);
   const std::size_t sensor_bus = index_of(cell, cell.sensor.bus);
   return CycleParts{network,
-                    std::move(drives),
+                    std::move(drives.all),
+                    std::move(drives.can),
                     std::move(buses),
-                    std::move(force_sensor),
+                    std::move(force_sensor.owned),
                     sensor_bus < bus_indices.size() ? bus_indices[sensor_bus] : DriveOnBus::no_bus,
                     std::move(lines),
                     std::move(arm),
@@ -247,11 +269,11 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
 
 std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) {
   std::vector<std::uint32_t> ids;
-  for (const DriveOnBus& axis : parts.drives) {
-    if (axis.on_can == nullptr || axis.bus != bus) continue;
-    for (const std::uint32_t id : axis.on_can->wanted_ids()) ids.push_back(id);
+  for (const fieldbus::DriveSlot& slot : parts.can_drives) {
+    if (slot.bus != bus) continue;
+    for (const std::uint32_t id : slot.drive->wanted_ids()) ids.push_back(id);
     // Of another master.
-    ids.push_back(fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, axis.on_can->node()));
+    ids.push_back(fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, slot.drive->node()));
   }
   if (!ids.empty()) {
     for (const std::uint32_t id :
@@ -276,15 +298,15 @@ Identities bring_up(CycleParts& parts, const LineStarter& start_line) {
     start_line(*line);
   }
   if (!parts.modbus_lines.empty()) parts.network.sleep_until(parts.network.now_ns() + rate_measurement_ns);
-  const std::vector<fieldbus::DriveSlot> drives = slots(parts);
-  const std::vector<fieldbus::DriveIdentity> identities = fieldbus::bring_up_drives(parts.network, drives);
+  const std::vector<fieldbus::DriveIdentity> identities = fieldbus::bring_up_drives(parts.network, parts.can_drives);
   for (std::size_t i = 0; i < identities.size(); ++i) {
-    lines.push_back("drive of " + drives[i].drive->description().joint + ": " + describe(identities[i]));
+    lines.push_back("drive of " + parts.can_drives[i].drive->description().joint + ": " + describe(identities[i]));
   }
-  for (DriveOnBus& axis : parts.drives) {
-    if (axis.on_can != nullptr) continue;
-    axis.drive.on_sync(parts.network.now_ns());
-    lines.push_back(axis.drive.describe());
+  for (const auto& line : parts.modbus_lines) {
+    for (fieldbus::ModbusDrive* drive : line->drives()) {
+      drive->on_sync(parts.network.now_ns());
+      lines.push_back(drive->describe());
+    }
   }
   return lines;
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "fieldbus/canopen_nmt.hpp"
 #include "fieldbus/canopen_pdo.hpp"
 
 namespace proxarm::controller {
@@ -93,10 +92,8 @@ void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
 }
 
 void Cycle::shut_down() noexcept {
-  for (const DriveOnBus& axis : parts_.drives) {
-    if (axis.on_can == nullptr) continue;
-    send(axis.bus, fieldbus::nmt_frame(fieldbus::NmtCommand::enter_pre_operational, axis.on_can->node()));
-  }
+  fieldbus::shut_down_drives(parts_.can_drives,
+                             [this](std::size_t bus, const fieldbus::CanFrame& frame) noexcept { send(bus, frame); });
   hand_over();
 }
 
@@ -155,9 +152,8 @@ bool Cycle::is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) con
   if (!drives_here) return false;
   if (frame.id == nmt_id || frame.id == fieldbus::sync_id) return true;
   if (frame.id == fieldbus::heartbeat_id(fieldbus::DriveSettings{}.master_node)) return true;
-  return std::any_of(parts_.drives.begin(), parts_.drives.end(), [&](const DriveOnBus& axis) {
-    return axis.on_can != nullptr && axis.bus == bus &&
-           frame.id == fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, axis.on_can->node());
+  return std::any_of(parts_.can_drives.begin(), parts_.can_drives.end(), [&](const fieldbus::DriveSlot& slot) {
+    return slot.bus == bus && frame.id == fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, slot.drive->node());
   });
 }
 
@@ -570,7 +566,7 @@ void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
     if (parts_.torque) {
-      parts_.drives[i].on_can->set_target_torque_Nm(torque_Nm_[static_cast<Eigen::Index>(i)]);
+      parts_.can_drives[i].drive->set_target_torque_Nm(torque_Nm_[static_cast<Eigen::Index>(i)]);
     } else {
       drive.set_target_rad(target_rad_[static_cast<Eigen::Index>(i)]);
     }
@@ -633,7 +629,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record_.tool_W_m = triple(tool_W_);
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     const fieldbus::CyclicDrive& drive = parts_.drives[i].drive;
-    record_.target_counts[i] = parts_.torque ? parts_.drives[i].on_can->target_torque() : drive.target_counts();
+    record_.target_counts[i] = parts_.torque ? parts_.can_drives[i].drive->target_torque() : drive.target_counts();
     record_.actual_counts[i] = drive.actual_counts();
     if (!drive.fresh()) record_.set(RecordFlag::feedback_missing);
   }

@@ -45,7 +45,7 @@
 #include "fieldbus/can_network.hpp"
 #include "fieldbus/canopen_heartbeat.hpp"
 #include "fieldbus/canopen_sync.hpp"
-#include "fieldbus/cia402_drive.hpp"
+#include "fieldbus/cia402_bring_up.hpp"
 #include "fieldbus/force_sensor.hpp"
 #include "fieldbus/modbus_line.hpp"
 #include "models/arm.hpp"
@@ -57,13 +57,13 @@ namespace proxarm::controller {
 // sent.
 inline constexpr double receive_window = 0.45;
 
+// An axis' drive, of either kind.
 struct DriveOnBus {
   static constexpr std::size_t no_bus = static_cast<std::size_t>(-1);
 
   std::unique_ptr<fieldbus::CyclicDrive> owned;
   fieldbus::CyclicDrive& drive;  // *owned
-  fieldbus::ServoDrive* on_can;  // the same, or null: on a Modbus line
-  std::size_t bus;               // index in the network; no_bus: none
+  std::size_t bus;               // index in the network; no_bus: on a Modbus line
 };
 
 // A bus with drives: who gets SYNC and the controller's heartbeat.
@@ -77,6 +77,7 @@ struct DriveBus {
 struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
+  std::vector<fieldbus::DriveSlot> can_drives;  // those of them on CAN; with torques, all. The others are their line's
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
   std::size_t sensor_bus;                                           // DriveOnBus::no_bus: on a Modbus line

@@ -62,28 +62,12 @@ void AtiNetCanOem::complete(std::int64_t time_ns) noexcept {
   for (const std::int16_t gauge : gauges_) {
     if (gauge >= settings_.rail_counts || gauge <= -settings_.rail_counts) latest_.saturated = true;
   }
-  if (tare_wanted_ > 0 && latest_.healthy && !latest_.saturated) {
-    for (std::size_t i = 0; i < 6; ++i) tare_sum_[i] += gauges_[i];
-    if (++tare_taken_ == tare_wanted_) {
-      for (std::size_t i = 0; i < 6; ++i) {
-        bias_[i] = static_cast<double>(tare_sum_[i]) / static_cast<double>(tare_taken_);
-      }
-      known_wrench_S_ = tare_known_S_;
-      tare_wanted_ = 0;
-    }
-  }
+  if (latest_.healthy && !latest_.saturated) tare_.add(std::span<const std::int16_t>(gauges_));
   for (std::size_t row = 0; row < 6; ++row) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < 6; ++i) sum += scaled_[row][i] * (gauges_[i] - bias_[i]);
-    latest_.wrench_S[row] = sum + known_wrench_S_[row];
+    for (std::size_t i = 0; i < 6; ++i) sum += scaled_[row][i] * (gauges_[i] - tare_.bias()[i]);
+    latest_.wrench_S[row] = sum + tare_.known_wrench_S()[row];
   }
-}
-
-void AtiNetCanOem::begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept {
-  tare_wanted_ = samples;
-  tare_taken_ = 0;
-  tare_sum_ = {};
-  tare_known_S_ = known_wrench_S;
 }
 
 }  // namespace proxarm::fieldbus

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "fieldbus/force_sensor.hpp"
+#include "fieldbus/sensor_tare.hpp"
 
 namespace proxarm::fieldbus {
 
@@ -47,19 +48,21 @@ class AtiNetCanOem final : public ForceSensor {
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
   [[nodiscard]] const ForceSample& latest() const noexcept override { return latest_; }
-  void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override;
-  [[nodiscard]] bool taring() const noexcept override { return tare_wanted_ > 0; }
+  void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override {
+    tare_.begin(samples, known_wrench_S);
+  }
+  [[nodiscard]] bool taring() const noexcept override { return tare_.running(); }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
   void archive(StateArchive& state) noexcept override {
-    state(scaled_, bias_, known_wrench_S_, tare_wanted_, tare_taken_, tare_sum_, tare_known_S_, poll_ns_, polled_,
-          half_, half_status_, half_gauges_, gauges_, fresh_, latest_, incomplete_, dropped_, wrong_lengths_);
+    state(scaled_, tare_, poll_ns_, polled_, half_, half_status_, half_gauges_, gauges_, fresh_, latest_, incomplete_,
+          dropped_, wrong_lengths_);
   }
 
   // What was read at start, and what has been wrong since.
   [[nodiscard]] const std::array<std::array<double, 6>, 6>& matrix() const noexcept { return matrix_; }
   [[nodiscard]] const std::array<std::uint32_t, 2>& counts_per_unit() const noexcept { return counts_per_unit_; }
   [[nodiscard]] const Gauges& gauges() const noexcept { return gauges_; }  // of the latest sample
-  [[nodiscard]] const std::array<double, 6>& bias_counts() const noexcept { return bias_; }
+  [[nodiscard]] const std::array<double, 6>& bias_counts() const noexcept { return tare_.bias(); }
   [[nodiscard]] std::uint64_t incomplete_samples() const noexcept { return incomplete_; }
   [[nodiscard]] std::uint64_t dropped_frames() const noexcept { return dropped_; }  // late, repeated, out of order
   [[nodiscard]] std::uint64_t wrong_lengths() const noexcept { return wrong_lengths_; }
@@ -84,12 +87,7 @@ class AtiNetCanOem final : public ForceSensor {
   std::string serial_;
   std::string firmware_;
 
-  std::array<double, 6> bias_{};
-  Wrench known_wrench_S_{};
-  std::size_t tare_wanted_ = 0;  // samples the running tare takes in all; 0: none runs
-  std::size_t tare_taken_ = 0;
-  std::array<std::int64_t, 6> tare_sum_{};
-  Wrench tare_known_S_{};
+  SensorTare<6> tare_;  // in counts
 
   std::int64_t poll_ns_ = 0;
   bool polled_ = false;

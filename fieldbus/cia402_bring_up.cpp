@@ -183,9 +183,7 @@ std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, co
 }
 
 void shut_down_drives(CanNetwork& network, Slots drives) noexcept {
-  for (const DriveSlot& slot : drives) {
-    (void)network.bus(slot.bus).send(nmt_frame(NmtCommand::enter_pre_operational, slot.drive->node()));
-  }
+  shut_down_drives(drives, [&](std::size_t bus, const CanFrame& frame) { (void)network.bus(bus).send(frame); });
 }
 
 }  // namespace proxarm::fieldbus

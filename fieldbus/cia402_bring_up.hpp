@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "fieldbus/can_network.hpp"
+#include "fieldbus/canopen_nmt.hpp"
 #include "fieldbus/cia402_drive.hpp"
 #include "fieldbus/frame_pump.hpp"
 
@@ -43,7 +44,13 @@ struct DriveIdentity {
 // carry several of the cell's buses). The drives' start_cycle() is called at the end.
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const DriveSlot> drives,
                                            const FrameHandler& other = {});
-// Doesn't wait and doesn't fail: there is nothing left to do if it can't be sent.
+// Doesn't wait and doesn't fail: there is nothing left to do if it can't be sent. `send(bus, frame)`, noexcept.
+template <typename Send>
+void shut_down_drives(std::span<const DriveSlot> drives, Send&& send) noexcept {
+  for (const DriveSlot& slot : drives) {
+    send(slot.bus, nmt_frame(NmtCommand::enter_pre_operational, slot.drive->node()));
+  }
+}
 void shut_down_drives(CanNetwork& network, std::span<const DriveSlot> drives) noexcept;
 
 }  // namespace proxarm::fieldbus

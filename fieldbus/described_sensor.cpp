@@ -204,28 +204,12 @@ void DescribedSensor::decode(std::int64_t time_ns) noexcept {
   latest_.time_ns = time_ns;
   ++latest_.number;
   fresh_ = true;
-  add_to_tare();
+  if (latest_.healthy && !latest_.saturated) tare_.add(std::span<const double>(values_).first(channels_.size()));
   for (std::size_t row = 0; row < 6; ++row) {
     double sum = 0.0;
-    for (std::size_t i = 0; i < channels_.size(); ++i) sum += channels_[i].column[row] * (values_[i] - bias_[i]);
-    latest_.wrench_S[row] = sum + known_wrench_S_[row];
+    for (std::size_t i = 0; i < channels_.size(); ++i) sum += channels_[i].column[row] * (values_[i] - tare_.bias()[i]);
+    latest_.wrench_S[row] = sum + tare_.known_wrench_S()[row];
   }
-}
-
-void DescribedSensor::begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept {
-  tare_wanted_ = samples;
-  tare_taken_ = 0;
-  tare_sum_ = {};
-  tare_known_S_ = known_wrench_S;
-}
-
-void DescribedSensor::add_to_tare() noexcept {
-  if (tare_wanted_ == 0 || !latest_.healthy || latest_.saturated) return;
-  for (std::size_t i = 0; i < channels_.size(); ++i) tare_sum_[i] += values_[i];
-  if (++tare_taken_ < tare_wanted_) return;
-  for (std::size_t i = 0; i < channels_.size(); ++i) bias_[i] = tare_sum_[i] / static_cast<double>(tare_taken_);
-  known_wrench_S_ = tare_known_S_;
-  tare_wanted_ = 0;
 }
 
 }  // namespace proxarm::fieldbus

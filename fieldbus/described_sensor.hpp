@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "fieldbus/force_sensor.hpp"
+#include "fieldbus/sensor_tare.hpp"
 #include "models/description/sensor.hpp"
 
 namespace proxarm::fieldbus {
@@ -50,12 +51,14 @@ class DescribedSensor final : public ForceSensor {
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
   [[nodiscard]] const ForceSample& latest() const noexcept override { return latest_; }
-  void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override;
-  [[nodiscard]] bool taring() const noexcept override { return tare_wanted_ > 0; }
+  void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override {
+    tare_.begin(samples, known_wrench_S);
+  }
+  [[nodiscard]] bool taring() const noexcept override { return tare_.running(); }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
   void archive(StateArchive& state) noexcept override {
-    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, values_, bias_,
-          latest_, known_wrench_S_, tare_known_S_, tare_wanted_, tare_taken_, tare_sum_, counts_);
+    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, values_,
+          latest_, tare_, counts_);
     if (next_ >= slots_.size()) next_ = 0;
   }
 
@@ -97,7 +100,6 @@ class DescribedSensor final : public ForceSensor {
   [[nodiscard]] bool checksum_is_right() const noexcept;
   [[nodiscard]] bool counter_moved() noexcept;
   void decode(std::int64_t time_ns) noexcept;
-  void add_to_tare() noexcept;
 
   [[nodiscard]] std::vector<CanFrame> command_frames(const description::SensorCommand& command) const;
   void send_commands(CanNetwork& network, std::size_t bus, const FrameHandler& other);
@@ -129,11 +131,9 @@ class DescribedSensor final : public ForceSensor {
   bool fresh_ = false;
   bool counted_ = false;  // a counter has been seen
   std::uint64_t last_count_ = 0;
-  std::array<double, max_signals> numbers_{}, values_{}, bias_{};
+  std::array<double, max_signals> numbers_{}, values_{};
   ForceSample latest_{};
-  Wrench known_wrench_S_{}, tare_known_S_{};
-  std::size_t tare_wanted_ = 0, tare_taken_ = 0;
-  std::array<double, max_signals> tare_sum_{};
+  SensorTare<max_signals> tare_;  // of values_
   DescribedSensorCounts counts_{};
 };
 

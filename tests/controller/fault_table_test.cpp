@@ -133,11 +133,10 @@ void spoil_targets(CycleParts& parts) {
   std::vector<DriveOnBus> drives;
   for (std::size_t i = 0; i < parts.drives.size(); ++i) {
     DriveOnBus& axis = parts.drives[i];
-    fieldbus::ServoDrive* const on_can = axis.on_can;
     std::unique_ptr<fieldbus::CyclicDrive> drive = std::move(axis.owned);
     if (i == 2) drive = std::make_unique<WrongTargets>(std::move(drive));
     fieldbus::CyclicDrive& reference = *drive;
-    drives.push_back({std::move(drive), reference, on_can, axis.bus});
+    drives.push_back({std::move(drive), reference, axis.bus});
   }
   parts.drives = std::move(drives);
 }
