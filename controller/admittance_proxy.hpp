@@ -113,6 +113,8 @@ class AdmittanceProxy {
           v_k2_, h_k1_, has_h_k1_, period_k1_s_, q_ref_, f_, p_hat_, kappa_, epoch_s_, steps_, contacts_,
           restart_steps_left_, after_impact_, first_order_steps_);
     prepare();
+    // Where a moving object comes from is where the step before took it, to the bit.
+    if (timed_) g_->set_time({time_s(), config_.period_s});
   }
 
  private:

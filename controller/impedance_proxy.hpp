@@ -84,7 +84,11 @@ class ImpedanceProxy {
   }
   [[nodiscard]] const ImpedanceConfig& config() const noexcept { return config_; }
 
-  void archive(fieldbus::StateArchive& state) noexcept { state(q_k1_, p_k1_, p_hat_, f_, epoch_s_, steps_); }
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(q_k1_, p_k1_, p_hat_, f_, epoch_s_, steps_);
+    // As in AdmittanceProxy::archive().
+    if (steps_ > 0) g_->set_time({epoch_s_ + static_cast<double>(steps_ - 1) * config_.period_s, config_.period_s});
+  }
 
  private:
   ImpedanceConfig config_;
