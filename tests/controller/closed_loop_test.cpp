@@ -35,12 +35,20 @@ TEST(ClosedLoop, WithoutAFaultRunsToItsEndAndSwitchesOff) {
 
 // Missed are 3 samples, which are tolerated, and then one more.
 TEST(ClosedLoop, StopsInFourCyclesWhenTheSensorIsLost) {
-  for (const char* fault : {"sensor:silent", "sensor:samples", "sensor:half", "sensor:short"}) {
+  for (const char* fault : {"sensor:silent", "sensor:samples", "sensor:half", "sensor:short", "sensor:swapped"}) {
     SCOPED_TRACE(fault);
     ClosedLoopRig rig(failing_device(fault));
     rig.run();
     expect_controlled_stop(rig, Fault::sensor_lost, -1, 4);
   }
+}
+
+// Each frame twice: what comes again is no new sample, and nothing is wrong with the first.
+TEST(ClosedLoop, RidesThroughDuplicatedFrames) {
+  ClosedLoopRig rig(failing_device("sensor:duplicated"));
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+  EXPECT_EQ(rig.cycle->rendered_cycles(), 2500u);
 }
 
 TEST(ClosedLoop, RidesThroughThreeMissedSamples) {
@@ -219,6 +227,55 @@ TEST(ClosedLoop, StopsWhenADriveSendsAnEmergencyMessage) {
                                   .period_ns = 1'000'000'000}}}});
   rig.run();
   expect_controlled_stop(rig, Fault::drive_fault, 4, 2);
+}
+
+// At set-up a drive's heartbeat is the only word on its NMT state.
+TEST(ClosedLoop, IsRefusedWhenADrivesHeartbeatStaysAway) {
+  ClosedLoopRig rig({.device_faults = {"axis_2:heartbeat"}});
+  try {
+    rig.run();
+    FAIL();
+  } catch (const description::SetupError& error) {
+    EXPECT_NE(std::string(error.what()).find("NMT state in its heartbeat"), std::string::npos) << error.what();
+    EXPECT_EQ(error.problem().node, 2);
+  }
+}
+
+// From then on a TPDO at every SYNC says the same, fifty times as often: heartbeats are switched off. What is lost with
+// the drive is the TPDO (StopsTheOthersWhenADriveFallsSilent).
+TEST(ClosedLoop, HasNoHeartbeatsOfDrivesToLoseInOperation) {
+  ClosedLoopRig rig(failing_device("axis_2:heartbeat"));
+  int heartbeats = 0;
+  rig.network.set_observer([&](const fieldbus::WireFrame& wire) {
+    if (wire.end_ns > failure_ns && wire.frame.id >= 0x701 && wire.frame.id <= 0x706) ++heartbeats;
+  });
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+  EXPECT_EQ(heartbeats, 0);
+}
+
+// Somebody else takes node 2 out of operational (80h) or resets it (81h): his frame is seen before its effect.
+TEST(ClosedLoop, StopsWhenSomebodyElseResetsADrive) {
+  for (const std::uint8_t command : {std::uint8_t{0x80}, std::uint8_t{0x81}}) {
+    SCOPED_TRACE(int{command});
+    fieldbus::CanFrame nmt;
+    nmt.id = 0x000;
+    nmt.length = 2;
+    nmt.data = {command, 0x02};
+    ClosedLoopRig rig({.script = {{{.action = fieldbus::FaultAction::babble,
+                                    .bus = "axes_1_3",
+                                    .from_ns = failure_ns,
+                                    .to_ns = failure_ns + 1,
+                                    .frame = nmt,
+                                    .period_ns = 1'000'000'000}}}});
+    rig.run();
+    ASSERT_EQ(rig.fault().fault, Fault::second_master) << fault_name(rig.fault().fault);
+    EXPECT_EQ(rig.fault().where, 0) << "the bus";
+    EXPECT_LE(rig.fault().cycle, rig.cycle_at(failure_s) + 2);
+    expect_targets_run_out(rig, {1});
+    expect_arm_at_rest(rig, 0.02);
+    expect_drives_off(rig);
+  }
 }
 
 // Somebody else switches a drive off: shutdown (0006h) in an RPDO for node 3, right after ours.

@@ -1,4 +1,5 @@
-"""The light device on a real vcan: torques from a controller that ends well, and from one that is killed in mid-motion."""
+"""The light device on a real vcan: torques from a controller that ends well, and from one that is killed, stopped or
+hung in mid-motion."""
 import json
 import signal
 import socket
@@ -44,6 +45,20 @@ class Torques(two.VcanTestCase):
             send_syncs()
             seen = two.frames_of(witness)
         self.assert_safe_torque(seen)
+
+    def test_torques_of_a_stopped_controller_end_within_three_setpoints(self):
+        """SIGSTOP, and then SIGCONT: it finds that it was late and another master's SYNCs on the bus, and ends."""
+        with two.simulated_arm(BUSES, CELL), two.candump("vcan0") as witness, \
+                two.controller(BUSES, "60s", None, CELL) as run:
+            time.sleep(MID_MOTION_S)
+            run.send(signal.SIGSTOP)
+            send_syncs()
+            ended_us = time.time_ns() // 1000
+            run.send(signal.SIGCONT)
+            status = run.wait()
+            seen = two.frames_of(witness)
+        self.assertEqual(status, 1)
+        self.assert_safe_torque([f for f in seen if f.time_us < ended_us])
 
     def test_torques_end_within_three_setpoints_when_the_cycles_thread_alone_hangs(self):
         with two.simulated_arm(BUSES, CELL), two.candump("vcan0") as witness, \
