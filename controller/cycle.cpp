@@ -216,7 +216,7 @@ void Cycle::judge_sensor() noexcept {
   if (!sample_is_new_) return;
   const fieldbus::ForceSample& sample = parts_.sensor->latest();
   if (!reading_S_.force.allFinite() || !reading_S_.torque.allFinite()) return raise(Fault::force_not_finite, -1);
-  if (!sample.healthy) return raise(Fault::sensor_status, -1);
+  if (!sample.healthy) return raise(Fault::sensor_status, -1, sample.status);
   if (sample.saturated && needs_force()) return raise(Fault::sensor_saturated, -1);
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);

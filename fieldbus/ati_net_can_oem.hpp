@@ -53,6 +53,7 @@ class AtiNetCanOem final : public ForceSensor {
   }
   [[nodiscard]] bool taring() const noexcept override { return tare_.running(); }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
+  [[nodiscard]] std::string describe_losses() const override;
   void archive(StateArchive& state) noexcept override {
     state(scaled_, tare_, poll_ns_, polled_, half_, half_status_, half_gauges_, gauges_, fresh_, latest_, incomplete_,
           dropped_, wrong_lengths_);

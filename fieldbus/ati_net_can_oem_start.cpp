@@ -271,6 +271,12 @@ std::string AtiNetCanOem::identity() const {
          std::to_string(counts_per_unit_[1]) + " counts/" + (torque != nullptr ? torque->name : "?");
 }
 
+std::string AtiNetCanOem::describe_losses() const {
+  return losses_text({{wrong_lengths_, "frames of a wrong length"},
+                      {incomplete_, "samples incomplete"},
+                      {dropped_, "frames late, repeated or out of order"}});
+}
+
 std::string AtiNetCanOem::describe_status(std::uint32_t status) const {
   if (status == 0) return "no error";
   std::string text = "status " + hex_text(status, 4);

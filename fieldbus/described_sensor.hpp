@@ -53,9 +53,11 @@ class DescribedSensor final : public ForceSensor {
   [[nodiscard]] const ForceSample& latest() const noexcept override { return latest_; }
   void begin_tare(std::size_t samples, const Wrench& known_wrench_S) noexcept override {
     tare_.begin(samples, known_wrench_S);
+    counts_before_ = counts_;
   }
   [[nodiscard]] bool taring() const noexcept override { return tare_.running(); }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
+  [[nodiscard]] std::string describe_losses() const override;
   void archive(StateArchive& state) noexcept override {
     state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, values_,
           latest_, tare_, counts_);
@@ -135,6 +137,7 @@ class DescribedSensor final : public ForceSensor {
   ForceSample latest_{};
   SensorTare<max_signals> tare_;  // of values_
   DescribedSensorCounts counts_{};
+  DescribedSensorCounts counts_before_{};  // the tare: while drives are brought up, nobody takes what a sensor streams
 };
 
 }  // namespace proxarm::fieldbus

@@ -170,6 +170,9 @@ void DescribedSensor::start(CanNetwork& network, std::size_t bus, const FrameHan
     answered = await_sample(network, bus, other);
   }
   if (!answered) refuse_start();
+  // Nobody takes what it streams while others are brought up: that is no loss.
+  counted_ = false;
+  counts_before_ = counts_;
   if (latest_.healthy) return;
   throw SetupError(
       {.bus = settings_.bus_name,
@@ -207,6 +210,15 @@ void DescribedSensor::refuse_start() const {
 std::string DescribedSensor::identity() const {
   return name_ + " (" + file_ + "), " +
          (streams_ ? "streams " + description::number_text(protocol_.rate_Hz) + " samples a second" : "polled");
+}
+
+std::string DescribedSensor::describe_losses() const {
+  return losses_text({{counts_.wrong_lengths - counts_before_.wrong_lengths, "frames of a wrong length"},
+                      {counts_.incomplete - counts_before_.incomplete, "samples incomplete"},
+                      {counts_.bad_checksums - counts_before_.bad_checksums, "samples with a bad checksum"},
+                      {counts_.repeated - counts_before_.repeated, "samples with an old counter"},
+                      {counts_.lost - counts_before_.lost, "samples left out by the counter"},
+                      {counts_.dropped - counts_before_.dropped, "frames late, repeated or out of order"}});
 }
 
 std::string DescribedSensor::describe_status(std::uint32_t status) const {

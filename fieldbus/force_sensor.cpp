@@ -47,4 +47,12 @@ void ForceSensor::tare(CanNetwork& network, std::size_t bus, std::size_t samples
   }
 }
 
+std::string losses_text(std::initializer_list<LossCount> losses) {
+  std::string text;
+  for (const LossCount& loss : losses) {
+    if (loss.count > 0) text += (text.empty() ? "" : ", ") + std::to_string(loss.count) + " " + loss.what;
+  }
+  return text;
+}
+
 }  // namespace proxarm::fieldbus

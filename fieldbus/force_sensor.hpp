@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -72,11 +73,20 @@ class ForceSensor {
 
   // ---- in words, not for the cycle ----
   [[nodiscard]] virtual std::string describe_status(std::uint32_t status) const = 0;
+  // What has been wrong with what came since it was tared: "4 samples with a bad checksum"; empty: nothing.
+  [[nodiscard]] virtual std::string describe_losses() const { return {}; }
 
   // Polls until the tare is done, one sample per period, before the cycle runs; throws SetupError when the sensor
   // falls silent, or reports an error or saturation.
   void tare(CanNetwork& network, std::size_t bus, std::size_t samples, std::int64_t period_ns,
             const Wrench& known_wrench_S = {}, const FrameHandler& other = {});
 };
+
+// "12 frames late, 3 samples incomplete": those of the counts that aren't 0.
+struct LossCount {
+  std::uint64_t count;
+  const char* what;
+};
+[[nodiscard]] std::string losses_text(std::initializer_list<LossCount> losses);
 
 }  // namespace proxarm::fieldbus

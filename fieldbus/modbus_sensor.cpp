@@ -37,7 +37,12 @@ ModbusSensor::ModbusSensor(const description::SensorDescription& sensor, std::ui
 void ModbusSensor::exchange(ModbusClient& client, std::int64_t now_ns) noexcept {
   std::array<std::uint16_t, description::max_sensor_registers> values{};
   const auto count = static_cast<std::size_t>(protocol_.registers->count);
-  if (client.read(unit_, protocol_.registers->at, {values.data(), count}) != ModbusResult::ok) return;
+  const ModbusResult result = client.read(unit_, protocol_.registers->at, {values.data(), count});
+  if (result != ModbusResult::ok) {
+    last_failure_.store(result, std::memory_order_relaxed);
+    failures_.fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
   for (std::size_t i = 0; i < count; ++i) {
     read_.frame.data[2 * i] = static_cast<std::uint8_t>(values[i] >> 8);
     read_.frame.data[2 * i + 1] = static_cast<std::uint8_t>(values[i]);
@@ -61,6 +66,19 @@ void ModbusSensor::start_up(ModbusClient& client, std::int64_t now_ns) {
 
 std::string ModbusSensor::identity() const {
   return decoder_.identity() + ", unit " + std::to_string(unit_) + " of Modbus line " + line_;
+}
+
+std::string ModbusSensor::describe_losses() const {
+  const std::uint64_t failures = failures_.load(std::memory_order_relaxed);
+  if (failures == 0) return {};
+  constexpr std::array why{"",
+                           "no answer",
+                           "the connection was closed",
+                           "an exception",
+                           "another unit answered",
+                           "an answer that isn't one"};
+  return losses_text({{failures, "reads failed, the last: "}}) +
+         why[static_cast<std::size_t>(last_failure_.load(std::memory_order_relaxed))];
 }
 
 bool ModbusSensor::poll(std::int64_t now_ns, CanFrame& frame) noexcept {

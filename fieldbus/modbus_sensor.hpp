@@ -6,6 +6,8 @@
 // waits. An exchange that fails is a sample that is missing.
 #pragma once
 
+#include <atomic>
+
 #include "fieldbus/described_sensor.hpp"
 #include "fieldbus/modbus_client.hpp"
 #include "fieldbus/triple_buffer.hpp"
@@ -42,6 +44,7 @@ class ModbusSensor final : public ForceSensor {
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override {
     return decoder_.describe_status(status);
   }
+  [[nodiscard]] std::string describe_losses() const override;
 
  private:
   struct Sample {
@@ -56,6 +59,8 @@ class ModbusSensor final : public ForceSensor {
   std::uint8_t unit_;
   DescribedSensor decoder_;
   TripleBuffer<Sample> samples_;
+  std::atomic<std::uint64_t> failures_{0};
+  std::atomic<ModbusResult> last_failure_{ModbusResult::ok};
   Sample read_;   // the worker's
   Sample taken_;  // the cycle's
   bool took_ = false;

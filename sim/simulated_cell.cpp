@@ -160,6 +160,10 @@ void require_fault_of_sensor(const DeviceFault& fault, const description::Sensor
   if (fault.kind == DeviceFaultKind::status && described && !sensor.described->status) {
     refuse("sensor:status for a sensor whose samples have no status word", "another fault, or a sensor with one");
   }
+  if (fault.kind == DeviceFaultKind::status && described &&
+      std::uint64_t{fault.value} >> sensor.described->status->number.bits != 0) {
+    refuse("sensor:status with bits that the status word hasn't", "one of that word's width");
+  }
   constexpr DeviceFaultKind of_registers[] = {DeviceFaultKind::sensor_silent, DeviceFaultKind::frozen,
                                               DeviceFaultKind::saturated, DeviceFaultKind::status};
   const bool has_it = std::find(std::begin(of_registers), std::end(of_registers), fault.kind) != std::end(of_registers);

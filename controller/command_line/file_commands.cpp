@@ -11,6 +11,7 @@
 #include "controller/command_line/exit_status.hpp"
 #include "models/arm.hpp"
 #include "models/description/cell.hpp"
+#include "models/description/dbc_file.hpp"
 #include "models/description/eds_file.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
@@ -25,13 +26,14 @@ namespace {
 namespace fs = std::filesystem;
 
 // What a file is, by a key that only its kind has.
-enum class Kind { cell, scene, hand, sensor, registers, eds };
+enum class Kind { cell, scene, hand, sensor, registers, eds, dbc };
 
 Kind kind_of(const fs::path& file) {
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
   if (extension == ".eds" || extension == ".dcf") return Kind::eds;
+  if (extension == ".dbc") return Kind::dbc;
   if (fs::is_directory(file)) return Kind::scene;  // yaml-cpp loses memory on one
   try {
     const YAML::Node root = YAML::LoadFile(file.string());
@@ -82,6 +84,9 @@ const char* check(const fs::path& file) {
     case Kind::eds:
       description::load_eds(file);
       return "description of a CANopen device";
+    case Kind::dbc:
+      (void)description::load_dbc(file);
+      return "list of messages and signals";
     case Kind::sensor:
       description::load_sensor(file);
       return "sensor";

@@ -1,8 +1,12 @@
 #include "controller/command_line/modbus_rates.hpp"
 
+#include <algorithm>
 #include <cstdio>
 
+#include "fieldbus/modbus_client.hpp"
 #include "fieldbus/modbus_drive.hpp"
+#include "fieldbus/modbus_line.hpp"
+#include "models/description/modbus_drive.hpp"
 #include "models/description/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -34,7 +38,61 @@ void warn_if_unstable(const PreparedSession& session, const std::string& joint, 
   }
 }
 
+std::string short_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+struct DriveOnLine {
+  const description::DriveDescription* drive;
+  description::ModbusDriveDescription registers;
+};
+
+std::vector<DriveOnLine> drives_on(const description::Cell& cell, const description::ModbusLineDescription& line) {
+  std::vector<DriveOnLine> drives;
+  for (const description::DriveDescription& drive : cell.drives) {
+    if (drive.bus == line.name) drives.push_back({&drive, description::load_modbus_drive(drive.description)});
+  }
+  return drives;
+}
+
+std::string in_ms(double time_s) { return short_text(1e3 * time_s) + " ms"; }
+
 }  // namespace
+
+std::string modbus_plan_text(const PreparedSession& session) {
+  std::string text;
+  for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
+    const std::vector<DriveOnLine> drives = drives_on(session.cell, line);
+    const bool sensor_here = session.cell.sensor.bus == line.name;
+    const int devices = static_cast<int>(drives.size()) + (sensor_here ? 1 : 0);
+    text += line.name + ": Modbus " + (line.serial() ? "RTU" : "TCP") + ", " + fieldbus::peer_text(line) +
+            (line.serial() ? ", " + std::to_string(line.baud) + " baud" : "") + "\n";
+    for (const DriveOnLine& on_it : drives) {
+      const double rate_Hz = fieldbus::modbus_expected_rate_Hz(on_it.registers, line, devices);
+      text += "  " + on_it.drive->joint + ", unit " + std::to_string(on_it.drive->node) + ": ";
+      if (line.serial()) {
+        text += in_ms(fieldbus::modbus_rtu_exchange_s(on_it.registers, line)) + " an exchange, " +
+                std::to_string(devices) + (devices == 1 ? " device" : " devices") + " on the line: ";
+      }
+      text += short_text(rate_Hz) + " exchanges/s of " + short_text(on_it.registers.rate_Hz) +
+              " wanted; a setpoint comes " + in_ms(exchanges_late / rate_Hz) + " later than on CAN\n";
+      warn_if_unstable(session, on_it.drive->joint, rate_Hz);
+    }
+    if (!sensor_here || !session.sensor.described || !session.sensor.described->registers) continue;
+    double rate_Hz = session.sensor.described->rate_Hz;
+    if (line.serial()) {
+      const double read_s = fieldbus::modbus_rtu_read_s(session.sensor.described->registers->count, line);
+      text += "  sensor: " + in_ms(read_s) + " an exchange, ";
+      rate_Hz = std::min(rate_Hz, 1.0 / (devices * read_s));
+    } else {
+      text += "  sensor: ";
+    }
+    text += short_text(rate_Hz) + " samples/s\n";
+  }
+  return text;
+}
 
 void report_modbus_rates(const PreparedSession& session, const controller::CycleParts& parts) {
   for (const auto& line : parts.modbus_lines) {

@@ -4,6 +4,7 @@
 #include "controller/command_line/bus_plan.hpp"
 #include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/modbus_rates.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -33,6 +34,7 @@ int plan_command(const RunOptions& options) {
     std::printf("%s", fieldbus::plan_text(plan).c_str());
     all_fit = all_fit && plan.fits;
   }
+  std::printf("%s", modbus_plan_text(session).c_str());
   return all_fit ? 0 : not_carried;
 }
 

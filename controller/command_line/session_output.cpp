@@ -57,7 +57,27 @@ void complete(CycleRecord& record, const PreparedSession& session, std::uint64_t
 
 namespace {
 
-std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts) {
+// Which cable, what was wrong with what came through it, and what the sensor says itself.
+std::string sensor_text(const controller::FaultReport& report, const fieldbus::ForceSensor& sensor,
+                        const std::string& bus) {
+  std::string text = "bus " + bus;
+  if (report.fault == Fault::sensor_status) {
+    text += ": " + sensor.describe_status(static_cast<std::uint32_t>(report.value));
+  } else if (report.fault == Fault::sensor_lost || report.fault == Fault::sensor_late) {
+    const std::string losses = sensor.describe_losses();
+    text += losses.empty() ? ": no faulty frame" : ": so far " + losses;
+  }
+  return text;
+}
+
+bool is_of_sensor(Fault fault) noexcept {
+  return fault == Fault::sensor_lost || fault == Fault::sensor_late || fault == Fault::sensor_status ||
+         fault == Fault::sensor_saturated || fault == Fault::sensor_frozen;
+}
+
+std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts,
+                     const description::Cell& cell) {
+  if (is_of_sensor(report.fault)) return sensor_text(report, *parts.sensor, cell.sensor.bus);
   if (report.where < 0) return "";
   const auto where = static_cast<std::size_t>(report.where);
   if (report.fault == Fault::bus_off || report.fault == Fault::error_passive || report.fault == Fault::interface_down ||
@@ -178,12 +198,13 @@ Summary SessionOutput::summary(const controller::Cycle& cycle) {
   // A medium takes its share along the surface, too, which the ratio would count as friction.
   if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
   for (const controller::FaultReport& report : cycle.past_faults()) {
-    summary.faults.push_back({report.fault, report.cycle, describe(report, place_of(report, cycle.parts())), true});
+    summary.faults.push_back(
+        {report.fault, report.cycle, describe(report, place_of(report, cycle.parts(), session_.cell)), true});
   }
   const controller::FaultReport& report = cycle.supervisor().report();
   if (report.fault != Fault::none) {
-    summary.faults.push_back(
-        {report.fault, report.cycle, describe(report, place_of(report, cycle.parts()), cycle.drives_off())});
+    summary.faults.push_back({report.fault, report.cycle,
+                              describe(report, place_of(report, cycle.parts(), session_.cell), cycle.drives_off())});
     const std::string& brakes = session_.cell.supervision.brake_release;
     if (!brakes.empty()) summary.faults.back().text += "; somebody pinned: open the brakes by " + brakes;
   }

@@ -272,6 +272,12 @@ class Options(ProgramTest):
         for file in ("own.yaml", "cell.yaml"):
             self.assert_refused(self.call("check", file), "own.yaml:", "settings[0].register", "overlap")
 
+    def test_check_reads_dbc_files(self):
+        good = self.written("sensor.dbc", 'VERSION ""\nBO_ 291 FORCE: 6 X\n SG_ Fx : 7|16@0- (0.01,0) [-300|300] "N" X\n')
+        self.assertEqual(self.call("check", good).status, 0)
+        bad = self.written("bad.dbc", 'BO_ 291 FORCE: 6 X\n SG_ Fx : 47|16@0- (0.01,0) [-300|300] "N" X\n')
+        self.assert_refused(self.call("check", bad), "bad.dbc:2", "within the 6 bytes of FORCE")
+
     def test_a_session_lasts_at_most_a_week(self):
         self.assert_refused(self.call("run", "--duration", "1e30s"), "--duration", "at most a week")
 

@@ -9,7 +9,7 @@ import re
 import unittest
 
 from harness import SOURCE, ProgramTest
-from sensors_test import MAKES, OtherSensors
+import sensors_test  # not its classes: they would run here, too
 
 BUS = re.compile(r"^(\S+): 1 Mbit/s, timestep ([\d.]+) ms$")
 LOAD = re.compile(r"load at worst ([\d.]+) % .*, at least ([\d.]+) %, over many cycles at most ([\d.]+) %, "
@@ -43,7 +43,7 @@ def bits_on_the_wire(identifier, extended, data):
 
 
 class Plan(ProgramTest):
-    cell_with = OtherSensors.cell_with
+    cell_with = sensors_test.OtherSensors.cell_with
 
     def planned(self, *arguments):
         """Bus -> its loads and, by identifier, the ends that the plan gives its frames (µs after a cycle's start)."""
@@ -106,9 +106,26 @@ class Plan(ProgramTest):
             self.assert_agrees(["--timestep", "2ms"])
 
     def test_agrees_with_the_log_of_every_sensor(self):
-        for name in MAKES:
+        for name in sensors_test.MAKES:
             with self.subTest(name):
                 self.assert_agrees([self.cell_with(name)], streaming=True)
+
+    def test_modbus_lines_are_told_with_their_arithmetic(self):
+        rail = (SOURCE / "models/cells/rail.yaml").read_text()
+        for path in ("../arms", "../../scenes", "../../sim", "../sensors", "../drives"):
+            rail = rail.replace(path + "/", str((SOURCE / "models/cells" / path).resolve()) + "/")
+        tcp = self.call("plan", self.written("tcp.yaml", rail))
+        self.assertEqual(tcp.status, 0, tcp.err)
+        self.assertIn("rail: Modbus TCP, 127.0.0.1, port 15020\n  rail, unit 1: 200 exchanges/s of 200 wanted; a setpoint "
+                      "comes 7.5 ms later than on CAN\n", tcp.out)
+        # The arithmetic stands in docs/buses.md: 34 characters of 11 bits at 115,200 baud, and twice 1.75 ms.
+        line = "device: /dev/ttyUSB0, baud: 115200"
+        rtu = self.call("plan", self.written("rtu.yaml", rail.replace("host: 127.0.0.1, port: 15020", line)))
+        self.assertIn("rail: Modbus RTU, /dev/ttyUSB0, 115200 baud\n  rail, unit 1: 6.75 ms an exchange, 1 device on the "
+                      "line: 148 exchanges/s of 200 wanted; a setpoint comes 10.1 ms later than on CAN\n", rtu.out)
+        slow = self.call("plan", self.written("slow.yaml", rail.replace("host: 127.0.0.1, port: 15020",
+                                                                          line.replace("115200", "9600"))))
+        self.assertIn("warning: the loop through rail can't be stable at", slow.err)
 
 
 if __name__ == "__main__":

@@ -125,7 +125,7 @@ class BlackBox(ProgramTest):
         outcome = self.box_of("--duration", "20s", "--fault", "sensor:frozen@14s")
         box = self.folder / "proxarm-black-box"
         self.assertIn(f"black box:                {box}", outcome.out)
-        self.assertIn("sensor_frozen: ", (box / "reason.txt").read_text())
+        self.assertIn("sensor_frozen (bus sensor): ", (box / "reason.txt").read_text())
         cycles, first = self.assert_same(box)
         self.assertGreater(first, 0)
         self.assertGreaterEqual(cycles, 10000)

@@ -1,5 +1,7 @@
 """Runs with the sensors that are known by their files alone: a new sensor is a new file, no code."""
+import csv
 import json
+import math
 import re
 import unittest
 
@@ -29,15 +31,6 @@ class OtherSensors(ProgramTest):
             with self.subTest(name):
                 summary = self.summary(self.cell_with(name), "--duration", "1s")
                 self.assertEqual(summary["faults"], [])
-
-    def test_their_faults_end_the_run_with_a_name(self):
-        for fault, name in (("half", "sensor_lost"), ("checksum", "sensor_lost"), ("saturated", "sensor_saturated"),
-                            ("frozen", "sensor_frozen"), ("status=0x0400", "sensor_status")):
-            with self.subTest(fault):
-                outcome = self.call("run", "--json", self.cell_with("onrobot_hex"), "--fault", f"sensor:{fault}@0.5s",
-                                    "--duration", "1s")
-                self.assertEqual(outcome.status, 1, outcome.err)
-                self.assertIn(name, json.dumps(outcome.summary["faults"]))
 
     def test_a_sensor_on_can_fd_needs_a_bus_of_its_own_with_a_data_rate(self):
         """All six values in one frame of 12 bytes, at the data phase's rate."""
@@ -73,13 +66,14 @@ class OtherSensors(ProgramTest):
         self.assertGreater(summary["contact_time_s"], 0.5)
         for fault, name in (("silent", "sensor_lost"), ("frozen", "sensor_frozen")):
             outcome = self.call("run", "--json", cell, "--fault", f"sensor:{fault}@1s", "--duration", "5s")
-            self.assertIn(name, json.dumps(outcome.summary["faults"]))
+            self.assertIn(name + " (bus ft", json.dumps(outcome.summary["faults"]))
         refused = self.call("run", cell, "--fault", "sensor:half@1s")
         self.assertEqual(refused.status, 2)
         self.assertIn("a fault of CAN frames for a sensor on Modbus", refused.err)
 
     def test_faults_that_a_sensor_cannot_have_are_refused(self):
-        for name, fault in (("aidin_aft200", "checksum"), ("aidin_aft200", "status=0x1"), ("wacoh_dynpick", "checksum")):
+        for name, fault in (("aidin_aft200", "checksum"), ("aidin_aft200", "status=0x1"), ("wacoh_dynpick", "checksum"),
+                            ("robotous_rft", "status=0x0400")):
             with self.subTest(name + fault):
                 outcome = self.call("run", self.cell_with(name), "--fault", f"sensor:{fault}@0.5s")
                 self.assertEqual(outcome.status, 2, outcome.err)
@@ -104,6 +98,74 @@ class OtherSensors(ProgramTest):
         self.assertEqual(outcome.status, 2)
         self.assertEqual(len(outcome.err.strip().splitlines()), 1, outcome.err)
         self.assertEqual(self.call("scan", "--bus", "nosuch0", "--poll-sensor", "0x80").status, 2)
+        self.assertIn("to scan a simulated arm: proxarm sim", self.call("scan", "--bus", "sim").err)
+
+
+class SensorsThatFail(ProgramTest):
+    cell_with = OtherSensors.cell_with
+
+    def stop_of(self, cell, fault):
+        """Summary of a session whose sensor fails in mid-motion, and cycles from there to the stop (None: there is
+        none). A stop's setpoints come to rest without a jump, and the black box has the second before it."""
+        # Power on to the first SYNC takes each sensor another time; the hand moves from 0.5 s to 2.5 s after it.
+        outcome = self.call("run", "--json", "--no-plot", cell, "--fault", f"sensor:{fault}@1.9s", "--duration", "2.5s",
+                            "--record", "session")
+        self.assertIn(outcome.status, (0, 1), outcome.err)
+        folder = self.folder / "session"
+        sync = next(line for line in (folder / "frames.log").read_text().splitlines() if " 080#" in line)
+        failed = math.ceil(1000 * (1.9 - float(sync[1:sync.index(")")])))
+        rows = list(csv.DictReader((folder / "signals.csv").read_text().splitlines()))
+        stopping = [int(row["cycle"]) for row in rows if row["phase"] == "stopping"]
+        if not stopping:
+            return outcome.summary, None
+        for axis in range(1, 7):
+            targets = [int(row[f"axis_{axis}_target_counts"]) for row in rows[stopping[0] - 2:stopping[-1] + 2]]
+            steps = [abs(b - a) for a, b in zip(targets, targets[1:])]
+            for one, next_one in zip(steps, steps[1:]):
+                self.assertLessEqual(next_one, one + 1, "slower from setpoint to setpoint, but for rounding")
+            self.assertLessEqual(steps[-1], 1)
+        boxed = (folder / "black-box/signals.csv").read_text().splitlines()
+        self.assertGreater(len(boxed) - 1, stopping[-1] - stopping[0] + 1000)
+        return outcome.summary, stopping[0] - failed
+
+    def test_what_each_make_does_when_it_fails(self):
+        """Cycles to the reaction: three samples may be missing, and the first may be that of the cycle before. Which
+        cable, and what came through it, is in the message."""
+        table = (
+            ("silent", "sensor_lost", 4, "no faulty frame"),
+            ("samples", "sensor_lost", 4, "no faulty frame"),
+            ("half", "sensor_lost", 4, r"samples incomplete|frames late, repeated or out of order"),
+            ("swapped", "sensor_lost", 4, "frames late, repeated or out of order"),
+            ("short", "sensor_lost", 4, "frames of a wrong length"),
+            ("lost=2", "sensor_lost", 5, None),
+            ("checksum", "sensor_lost", 4, "samples with a bad checksum"),
+            ("status=0x0400", "sensor_status", 1, "status 0x0400"),
+            ("saturated", "sensor_saturated", 1, None),
+            ("frozen", "sensor_frozen", 22, None),
+            ("duplicated", None, None, None),
+            ("delay=1500", None, None, None),
+        )
+        cannot = {("aidin_aft200", "checksum"), ("robotous_rft", "checksum"), ("wacoh_dynpick", "checksum"),
+                  ("aidin_aft200", "status=0x0400"), ("robotous_rft", "status=0x0400"),
+                  ("wacoh_dynpick", "status=0x0400")}
+        for make in MAKES:
+            cell = self.cell_with(make)
+            for fault, name, cycles, words in table:
+                if (make, fault) in cannot:
+                    continue
+                with self.subTest(make=make, fault=fault):
+                    summary, reaction = self.stop_of(cell, fault)
+                    if name is None:
+                        self.assertEqual(summary["faults"], [])
+                        self.assertLessEqual(summary["held_samples"], 1)
+                        continue
+                    self.assertEqual([entry["fault"] for entry in summary["faults"]], [name])
+                    self.assertTrue(0 <= reaction <= cycles, reaction)
+                    text = summary["faults"][0]["text"]
+                    self.assertIn(name + " (bus sensor", text)
+                    self.assertIn("the arm made a controlled stop and the drives were switched off", text)
+                    if words:
+                        self.assertRegex(text, words)
 
 
 if __name__ == "__main__":
