@@ -154,17 +154,24 @@ class ClosedLoopRig {
   }
 };
 
-// What a drive is sent in cycle k (from 2) doesn't go beyond its joint's speed and acceleration. In counts: each
-// setpoint is rounded by half a one, so a step by one and a difference of steps by two.
-inline void expect_step_within_limits(const ClosedLoopRig& rig, std::size_t axis, std::size_t k) {
+// What a drive is sent in three cycles one after the other doesn't go beyond its joint's speed and acceleration. In
+// counts: each setpoint is rounded by half a one, so a step by one and a difference of steps by two.
+inline bool step_within_limits(const ClosedLoopRig& rig, std::size_t axis, const CycleRecord& k2, const CycleRecord& k1,
+                               const CycleRecord& k) {
   const double T = rig.options.settings.period_s;
   const description::DriveDescription& drive = rig.cell.drives[axis];
   const double per_rad = std::abs(drive.counts_per_rad());
-  const double step = rig.records[k].target_counts[axis] - rig.records[k - 1].target_counts[axis];
-  const double step_k1 = rig.records[k - 1].target_counts[axis] - rig.records[k - 2].target_counts[axis];
-  ASSERT_LE(std::abs(step), drive.max_speed_rad_per_s * T * per_rad + 1.0) << drive.joint << " in " << k;
-  ASSERT_LE(std::abs(step - step_k1), drive.max_acceleration_rad_per_s2 * T * T * per_rad + 2.0)
-      << drive.joint << " in " << k;
+  const double step = k.target_counts[axis] - k1.target_counts[axis];
+  const double step_k1 = k1.target_counts[axis] - k2.target_counts[axis];
+  return std::abs(step) <= drive.max_speed_rad_per_s * T * per_rad + 1.0 &&
+         std::abs(step - step_k1) <= drive.max_acceleration_rad_per_s2 * T * T * per_rad + 2.0;
+}
+
+inline void expect_step_within_limits(const ClosedLoopRig& rig, std::size_t axis, std::size_t k) {
+  const auto counts = [&](std::size_t i) { return rig.records[i].target_counts[axis]; };
+  ASSERT_TRUE(step_within_limits(rig, axis, rig.records[k - 2], rig.records[k - 1], rig.records[k]))
+      << rig.cell.drives[axis].joint << " in " << k << ": " << counts(k - 2) << ", " << counts(k - 1) << ", "
+      << counts(k) << " counts";
 }
 
 }  // namespace proxarm::controller::testing

@@ -1,17 +1,21 @@
 // Hours of simulated time, session after session in one process, each with something that fails every few seconds: most
-// of it is to be ridden through, some of it ends a session, and the next one is the recovery.
+// of it is to be ridden through, some of it stops the arm until a person resets it, some of it ends the session, and
+// the next one is the recovery.
 //
-//   soak --hours H [--checkpoint FILE] [--seed N]
-// After each session the state goes to FILE; a soak that finds one goes on behind it. Ends with status 1, and the
-// session's number, where a session doesn't end, ends for no reason, leaves drives on, loses time, commands a joint
-// beyond its speed, or where memory grows.
+//   soak [--hours H] [--seed N] [--checkpoint FILE]
+// After each session the state goes to FILE; a soak that finds one goes on behind it, and ends as one that was never
+// interrupted: each session follows from the seed and its number alone. Ends with status 1, and the session's number,
+// where a session doesn't end, ends for no reason, leaves drives on, loses time, commands a joint beyond its speed or
+// acceleration, where memory grows, or where a session that is repeated every hour commands anything else than before.
 #include <malloc.h>
 
+#include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <fstream>
+#include <limits>
 #include <map>
+#include <optional>
+#include <stdexcept>
 
 #include "tests/controller/closed_loop_rig.hpp"
 #include "tests/models/random_states.hpp"
@@ -24,21 +28,34 @@ using testing::ClosedLoopRig;
 using testing::RigOptions;
 using tests::Random;
 
+// FNV-1a over setpoints: the same number, the same motion.
+struct Digest {
+  std::uint64_t value = 14695981039346656037u;
+  void add(const CycleRecord& record) {
+    for (std::size_t i = 0; i < record.axes; ++i) {
+      value = (value ^ static_cast<std::uint32_t>(record.target_counts[i])) * 1099511628211u;
+    }
+  }
+};
+
 struct State {
   std::uint64_t seed = 1, sessions = 0, cycles = 0;
   double simulated_s = 0.0;
   std::uint64_t ridden_through = 0;           // faults after which the session went on
+  std::uint64_t resets = 0;                   // faults that stopped the arm, and were reset
+  std::uint64_t reference = 0;                // digest of the session that is repeated; 0: not run yet
+  Digest digest;                              // of all others
   std::map<std::string, std::uint64_t> ends;  // sessions by the fault that ended them
 };
 
-State restored(const std::string& file, std::uint64_t seed) {
-  State state;
-  state.seed = seed;
+// Nothing where there is no such file.
+std::optional<State> restored(const std::string& file) {
   std::ifstream in(file);
-  if (!(in >> state.seed >> state.sessions >> state.cycles >> state.simulated_s >> state.ridden_through)) {
-    State fresh;
-    fresh.seed = seed;
-    return fresh;
+  if (file.empty() || !in) return std::nullopt;
+  State state;
+  if (!(in >> state.seed >> state.sessions >> state.cycles >> state.simulated_s >> state.ridden_through >>
+        state.resets >> state.reference >> state.digest.value)) {
+    throw std::runtime_error(file + ": not a soak's checkpoint");
   }
   std::string name;
   std::uint64_t count = 0;
@@ -50,12 +67,22 @@ void keep(const std::string& file, const State& state) {
   if (file.empty()) return;
   {
     std::ofstream out(file + ".new");
+    out.precision(std::numeric_limits<double>::max_digits10);
     out << state.seed << ' ' << state.sessions << ' ' << state.cycles << ' ' << state.simulated_s << ' '
-        << state.ridden_through << '\n';
+        << state.ridden_through << ' ' << state.resets << ' ' << state.reference << ' ' << state.digest.value << '\n';
     for (const auto& [name, count] : state.ends) out << name << ' ' << count << '\n';
+    if (!out.flush()) throw std::runtime_error(file + ".new: can't be written");
   }
-  std::rename((file + ".new").c_str(), file.c_str());
+  if (std::rename((file + ".new").c_str(), file.c_str()) != 0) throw std::runtime_error(file + ": can't be replaced");
 }
+
+#ifdef PROXARM_SANITIZED
+constexpr bool judges_memory = false;  // a sanitizer keeps what is freed
+#else
+constexpr bool judges_memory = true;
+#endif
+
+double heap_MB() { return 1e-6 * static_cast<double>(mallinfo2().uordblks); }
 
 double resident_MB() {
   std::ifstream in("/proc/self/statm");
@@ -65,10 +92,10 @@ double resident_MB() {
 }
 
 // To and fro, into the wall and along it, for as long as the session may last.
-std::string wandering_hand(const tests::ScratchFolder& folder, Random& random, double duration_s) {
+std::string wandering_hand(const tests::ScratchFolder& folder, Random& random, double duration_s, double most_N_per_m) {
   const std::string file = folder / "hand.yaml";
   std::ofstream out(file);
-  out << "name: wanders\nmass_kg: 1\nstiffness_N_per_m: " << random.log_uniform(200.0, 800.0)
+  out << "name: wanders\nmass_kg: 1\nstiffness_N_per_m: " << random.log_uniform(200.0, most_N_per_m)
       << "\ndamping_Ns_per_m: 20\nwaypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n";
   for (double time_s = 2.0; time_s < duration_s; time_s += random.uniform(0.8, 3.0)) {
     out << "  - {time_s: " << time_s << ", offset_m: [" << random.uniform(-0.1, 0.24) << ", "
@@ -81,153 +108,304 @@ struct Session {
   RigOptions options;
   std::uint64_t harmless = 0;  // faults that mustn't end it
   bool ends = false;           // whether one may
+  double pauses_s = 0.0;       // for which it may be held, at most
 };
 
-// Something every two to eight seconds: up to two lost frames, a sensor that stands still or is silent for two cycles.
-// In a third of the sessions, one more that can't be ridden through.
+std::string span_of(const char* fault, double from_s, double duration_s) {
+  return std::string(fault) + "@" + std::to_string(from_s) + "s.." + std::to_string(from_s + duration_s) + "s";
+}
+
+// Up to two lost frames, a sensor that stands still or is silent for two cycles.
+void add_brief_fault(Session& session, Random& random, double t) {
+  constexpr std::array brief{"sensor:frozen", "sensor:samples", "sensor:half"};
+  ++session.harmless;
+  if (random.chance(0.5)) {
+    session.options.script.rules.push_back({.action = fieldbus::FaultAction::drop,
+                                            .from_ns = static_cast<std::int64_t>(1e9 * t),
+                                            .count = static_cast<std::uint64_t>(1 + random.below(2)),
+                                            .receiver = "controller"});
+  } else {
+    session.options.device_faults.push_back(span_of(brief[random.below(brief.size())], t, 0.002));
+  }
+}
+
+// A few times, as a person does until it is heard: an order is dropped while a cause lasts.
+void order(Session& session, double t, Command command) {
+  for (const double later_s : {0.0, 0.3, 0.6}) {
+    session.options.commands.push_back({static_cast<std::int64_t>(1e9 * (t + later_s)), command});
+  }
+}
+
+// Stops the arm by a fault that goes away; a reset and a resume later it moves again.
+void add_reset(Session& session, Random& random, double t) {
+  constexpr std::array passing{"sensor:silent", "sensor:status=0x4000", "axis_3:fault=0x4210", "axis_6:fault=0x4210"};
+  session.options.device_faults.push_back(span_of(passing[random.below(passing.size())], t, 1.0));
+  order(session, t + 1.4, {Order::reset});
+  order(session, t + 2.8, {Order::resume});
+  session.pauses_s += 5.0;
+}
+
+// A hold by order, out of which the tool backs off, or is let go, or neither.
+void add_hold(Session& session, Random& random, double t) {
+  order(session, t, {Order::hold});
+  if (random.chance(0.6)) {
+    const bool backs_off = random.chance(0.5);
+    order(session, t + 1.0,
+          {backs_off ? Order::back_off : Order::release, backs_off ? random.uniform(0.001, 0.02) : 0.0});
+    order(session, t + 2.2, {Order::hold});
+  }
+  order(session, t + 3.4, {Order::resume});
+  session.pauses_s += 5.0;
+}
+
+// A CAN message's bit as enabling input, let go now and then: a hold each.
+void add_enabling_input(Session& session, Random& random) {
+  session.options.edit_cell = [](description::Cell& cell) {
+    description::EnablingInputDescription input;
+    input.bus = "sensor";
+    input.identifier = 0x1A0;
+    cell.enabling_input = input;
+  };
+  double from_s = 0.1;
+  while (from_s < 2.0 * session.options.duration_s) {
+    const double until_s = from_s + random.uniform(3.0, 15.0);
+    session.options.enabling.push_back(
+        {static_cast<std::int64_t>(1e9 * from_s), static_cast<std::int64_t>(1e9 * until_s)});
+    from_s = until_s + random.uniform(0.2, 2.0);
+    session.pauses_s += 2.5;
+  }
+  session.options.enabling.back().until_ns = std::numeric_limits<std::int64_t>::max();
+}
+
+// Something every two to eight seconds that is ridden through. In a third of the sessions a person holds and resets, in
+// another the enabling input is let go; and in a third of all something ends them.
 Session session_of(const tests::ScratchFolder& folder, Random& random) {
   constexpr std::array scenes{"wall", "groove", "room", "free", "moving_plate", "honey"};
-  constexpr std::array brief{"sensor:frozen", "sensor:samples", "sensor:half"};
   constexpr std::array grave{"sensor:silent", "sensor:status=0x4000", "axis_3:fault=0x4210", "axis_2:silent",
                              "axis_5:power"};
   Session session;
   RigOptions& o = session.options;
-  o.duration_s = random.uniform(10.0, 60.0);
+  o.duration_s = random.chance(0.9) ? random.uniform(10.0, 60.0) : random.log_uniform(60.0, 1200.0);
   o.scene = std::string("scenes/") + scenes[random.below(scenes.size())] + ".yaml";
-  o.hand = wandering_hand(folder, random, o.duration_s);
+  const int kind = random.below(3);
+  // Where the arm is held, the hand moves on without it: by up to 0.5 m, and 200 N are a fault.
+  o.hand = wandering_hand(folder, random, o.duration_s, kind == 2 ? 800.0 : 300.0);
   o.settings.mass_kg = random.uniform(4.0, 12.0);
   o.settings.order = random.chance(0.3) ? 2 : 1;
   o.settings.passivity = random.chance(0.5) ? Passivity::on : Passivity::off;
-  for (double t = 2.0; t < o.duration_s; t += random.uniform(2.0, 8.0)) {
-    ++session.harmless;
-    if (random.chance(0.5)) {
-      o.script.rules.push_back({.action = fieldbus::FaultAction::drop,
-                                .from_ns = static_cast<std::int64_t>(1e9 * t),
-                                .count = static_cast<std::uint64_t>(1 + random.below(2)),
-                                .receiver = "controller"});
-    } else {
-      o.device_faults.push_back(std::string(brief[random.below(brief.size())]) + "@" + std::to_string(t) + "s.." +
-                                std::to_string(t + 0.002) + "s");
-    }
-  }
+  for (double t = 2.0; t < o.duration_s; t += random.uniform(2.0, 8.0)) add_brief_fault(session, random, t);
   for (std::uint64_t cycle = 1000; cycle < 20'000; cycle += static_cast<std::uint64_t>(500 + random.below(5000))) {
     o.changes.push_back({cycle, {Parameter::mass, random.uniform(3.8, 12.0)}});
+  }
+  if (kind == 0) {
+    o.settings.wait_after_fault_s = 4.0;
+    for (double t = 3.0; t < o.duration_s; t += random.uniform(7.0, 20.0)) {
+      random.chance(0.5) ? add_reset(session, random, t) : add_hold(session, random, t);
+    }
+  } else if (kind == 1) {
+    add_enabling_input(session, random);
   }
   session.ends = random.chance(0.33);
   if (session.ends) {
     const double t = random.uniform(3.0, o.duration_s);
-    o.device_faults.push_back(std::string(grave[random.below(grave.size())]) + "@" + std::to_string(t) + "s.." +
-                              std::to_string(t + 1.0) + "s");
+    o.device_faults.push_back(span_of(grave[random.below(grave.size())], t, 1.0));
   }
   return session;
 }
 
+// Sees every record of a session, and what is wrong with them.
+class Watch {
+ public:
+  explicit Watch(const ClosedLoopRig& rig) : rig_(rig) {}
+
+  void see(const CycleRecord& record, Digest& digest) {
+    digest.add(record);
+    if (seen_ >= 2) judge_motion(record);
+    k2_ = k1_;
+    k1_ = record;
+    ++seen_;
+    // After the hand's first ten seconds nothing more is wanted from the heap.
+    if (seen_ == heap_every) base_MB_ = heap_MB();
+    if (judges_memory && seen_ % heap_every == 0 && heap_MB() > base_MB_ + 1.0) {
+      wrong_ = "the heap grows while it runs: from " + std::to_string(base_MB_) + " to " + std::to_string(heap_MB()) +
+               " MB in " + std::to_string(seen_) + " cycles";
+    }
+  }
+  [[nodiscard]] std::uint64_t seen() const { return seen_; }
+  [[nodiscard]] const std::string& wrong() const { return wrong_; }
+
+ private:
+  static constexpr std::uint64_t heap_every = 10'000;  // cycles
+
+  // As in the property test of whole sessions; the setpoint of a drive that is off by itself follows it.
+  void judge_motion(const CycleRecord& record) {
+    const std::array<const CycleRecord*, 3> three{&k2_, &k1_, &record};
+    for (const CycleRecord* r : three) {
+      if (r->phase < Phase::rendering || r->phase > Phase::stopping) return;
+    }
+    for (std::size_t axis = 0; axis < record.axes; ++axis) {
+      bool follows = false;
+      for (const CycleRecord* r : three) {
+        follows |= r->target_counts[axis] == r->actual_counts[axis];
+      }
+      if (follows || testing::step_within_limits(rig_, axis, k2_, k1_, record)) continue;
+      wrong_ = rig_.cell.drives[axis].joint + " beyond its limits in cycle " + std::to_string(record.cycle);
+    }
+  }
+
+  const ClosedLoopRig& rig_;
+  CycleRecord k1_, k2_;
+  std::uint64_t seen_ = 0;
+  double base_MB_ = 0.0;
+  std::string wrong_;
+};
+
 // What is wrong with it; empty: nothing.
-std::string run(const Session& session, State& state) {
+std::string run(const Session& session, State& state, Digest& digest) {
   ClosedLoopRig rig(session.options);
   Cycle cycle(rig.prepared_parts(rig.network), session.options.settings, rig.cell.limits, 64);
   cycle.schedule(session.options.changes);
-  std::string wrong;
-  CycleRecord record, before;
+  cycle.schedule(session.options.commands);
+  Watch watch(rig);
+  CycleRecord record;
   std::int64_t begun_ns = 0;
-  std::uint64_t seen = 0;
   const double T = session.options.settings.period_s;
-  const SessionHooks hooks{
-      [&](std::int64_t t_k_ns) {
-        if (seen == 0) begun_ns = t_k_ns;
-      },
-      [&] {
-        while (cycle.records().pop(record)) {
-          ++seen;
-          if (static_cast<double>(seen) * T > session.options.duration_s + 10.0) cycle.request_stop();
-          for (std::size_t i = 0; i < record.axes && seen > 1; ++i) {
-            const description::DriveDescription& drive = rig.cell.drives[i];
-            const double step = record.target_counts[i] - before.target_counts[i];
-            const double most = drive.max_speed_rad_per_s * T * std::abs(drive.counts_per_rad()) + 1.0;
-            if (before.phase == Phase::rendering && record.phase == Phase::rendering && std::abs(step) > most) {
-              wrong = drive.joint + " faster than its limit in cycle " + std::to_string(record.cycle);
-            }
-          }
-          before = record;
-        }
-      }};
+  const double patience_s = session.options.duration_s + session.pauses_s + 10.0;
+  const SessionHooks hooks{[&](std::int64_t t_k_ns) {
+                             if (watch.seen() == 0) begun_ns = t_k_ns;
+                           },
+                           [&] {
+                             while (cycle.records().pop(record)) watch.see(record, digest);
+                             if (static_cast<double>(watch.seen()) * T > patience_s) cycle.request_stop();
+                           }};
   const SessionTally tally = run_session(cycle, rig.network, T, session.options.duration_s, hooks);
   const double elapsed_s = 1e-9 * static_cast<double>(rig.network.now_ns() - begun_ns);
   const Fault fault = cycle.supervisor().report().fault;
-  if (wrong.empty() && elapsed_s - static_cast<double>(tally.cycles) * T > 2.0 * T) wrong = "time was lost";
-  if (wrong.empty() && fault != Fault::none && !session.ends) wrong = std::string("ended by ") + fault_name(fault);
-  if (wrong.empty() && !cycle.drives_off() && fault != Fault::drive_silent) wrong = "drives that are still on";
   const auto wanted = static_cast<std::uint64_t>(session.options.duration_s / T);
-  if (wrong.empty() && fault == Fault::none && cycle.rendered_cycles() < wanted) wrong = "it stopped early";
+  std::string wrong = watch.wrong();
+  if (!wrong.empty()) {
+  } else if (elapsed_s - static_cast<double>(tally.cycles) * T > 2.0 * T) {
+    wrong = "time was lost";
+  } else if (fault != Fault::none && !session.ends) {
+    wrong = "ended by " + describe(cycle.supervisor().report(), "");
+  } else if (!cycle.drives_off() && fault != Fault::drive_silent) {
+    wrong = "drives that are still on";
+  } else if (fault == Fault::none && cycle.rendered_cycles() < wanted) {
+    wrong = "it rendered for " + std::to_string(T * static_cast<double>(cycle.rendered_cycles())) + " s of " +
+            std::to_string(session.options.duration_s);
+  }
   cycle.shut_down();
   rig.network.sleep_until(rig.network.now_ns() + 100'000'000);
   ++state.sessions;
   state.cycles += tally.cycles;
   state.simulated_s += elapsed_s;
+  state.resets += cycle.past_fault_count();
   if (fault == Fault::none) state.ridden_through += session.harmless;
   ++state.ends[fault_name(fault)];
   return wrong;
 }
 
-// 8 MB: some hundred times what a session's allocations differ by, and 3 kB a session over a day of them.
-constexpr double most_growth_MB = 8.0;
-#ifdef PROXARM_SANITIZED
-constexpr bool judges_memory = false;  // a sanitizer keeps what is freed
-#else
-constexpr bool judges_memory = true;
-#endif
-constexpr std::uint64_t warm_up = 3;  // sessions; libraries and the heap's own tables have grown by then
+// The same session every hour: what earlier ones leave behind in the process, it would show.
+std::string run_reference(const tests::ScratchFolder& folder, State& state) {
+  Random random(state.seed);
+  Session session = session_of(folder, random);
+  session.options.duration_s = 10.0;
+  State apart;
+  Digest digest;
+  const std::string wrong = run(session, apart, digest);
+  if (!wrong.empty()) return "the repeated session: " + wrong;
+  if (state.reference == 0) state.reference = digest.value;
+  return state.reference == digest.value ? "" : "the repeated session commanded something else than at first";
+}
 
-int soak(double hours, const std::string& file, std::uint64_t seed) {
-  const tests::ScratchFolder folder;
-  State state = restored(file, seed);
-  double base_MB = 0.0, most_MB = 0.0, base_heap_MB = 0.0;
-  for (std::uint64_t here = 1; state.simulated_s < 3600.0 * hours; ++here) {
-    const std::uint64_t number = state.sessions;
-    Random random(1'000'003 * state.seed + number);
-    const std::string wrong = run(session_of(folder, random), state);
+// Bounds on what is left when a session has ended: 8 MB resident is some hundred times what sessions differ by.
+class Memory {
+ public:
+  // After each session; what is wrong with it.
+  std::string judge() {
     malloc_trim(0);
-    const double now_MB = resident_MB(), heap_MB = 1e-6 * static_cast<double>(mallinfo2().uordblks);
-    if (here == warm_up) base_MB = now_MB, base_heap_MB = heap_MB;
-    if (here >= warm_up) most_MB = std::max(most_MB, now_MB);
+    const double now = resident_MB(), heap = heap_MB();
+    ++sessions_;
+    if (sessions_ == warm_up) base_ = now, base_heap_ = heap;
+    if (sessions_ >= warm_up) most_ = std::max(most_, now);
+    const bool grown = now > base_ + most_growth_MB || heap > base_heap_ + 1.0;
+    if (!judges_memory || sessions_ <= warm_up || !grown) return "";
+    return "memory has grown from " + std::to_string(base_) + " to " + std::to_string(now) +
+           " MB, the heap in use from " + std::to_string(base_heap_) + " to " + std::to_string(heap) + " MB";
+  }
+  void print() const {
+    std::printf("memory: %.1f MB, at most %.1f; the heap in use %.2f MB, %.2f now\n", base_, most_, base_heap_,
+                heap_MB());
+  }
+
+ private:
+  static constexpr double most_growth_MB = 8.0;
+  static constexpr std::uint64_t warm_up = 3;  // sessions; libraries and the heap's own tables have grown by then
+  std::uint64_t sessions_ = 0;
+  double base_ = 0.0, most_ = 0.0, base_heap_ = 0.0;
+};
+
+void print(const State& state) {
+  std::printf("%.3f h simulated, %llu sessions, %llu cycles, %llu faults ridden through, %llu reset\n",
+              state.simulated_s / 3600.0, static_cast<unsigned long long>(state.sessions),
+              static_cast<unsigned long long>(state.cycles), static_cast<unsigned long long>(state.ridden_through),
+              static_cast<unsigned long long>(state.resets));
+  std::fflush(stdout);
+}
+
+int soak(double hours, const std::string& file, State state) {
+  const tests::ScratchFolder folder;
+  Memory memory;
+  const auto hour = [&] { return static_cast<std::uint64_t>(state.simulated_s / 3600.0); };
+  bool repeats = true;
+  while (state.simulated_s < 3600.0 * hours) {
+    const std::uint64_t number = state.sessions, hour_before = hour();
+    std::string wrong = repeats ? run_reference(folder, state) : "";
+    Random random(1'000'003 * state.seed + number);
+    if (wrong.empty()) wrong = run(session_of(folder, random), state, state.digest);
+    if (wrong.empty()) wrong = memory.judge();
     if (!wrong.empty()) {
       std::printf("session %llu of seed %llu: %s\n", static_cast<unsigned long long>(number),
                   static_cast<unsigned long long>(state.seed), wrong.c_str());
       return 1;
     }
-    if (judges_memory && here > warm_up && (now_MB > base_MB + most_growth_MB || heap_MB > base_heap_MB + 1.0)) {
-      std::printf("session %llu: memory has grown from %.1f to %.1f MB, the heap in use from %.2f to %.2f MB\n",
-                  static_cast<unsigned long long>(number), base_MB, now_MB, base_heap_MB, heap_MB);
-      return 1;
-    }
     keep(file, state);
+    repeats = hour() > hour_before;
+    if (repeats) print(state),
   }
-  std::printf(
-      "%.3f h simulated, %llu sessions, %llu cycles, %llu faults ridden through; memory from %.1f to at most "
-      "%.1f MB\n",
-      state.simulated_s / 3600.0, static_cast<unsigned long long>(state.sessions),
-      static_cast<unsigned long long>(state.cycles), static_cast<unsigned long long>(state.ridden_through), base_MB,
-      most_MB);
+  print(state);
   for (const auto& [fault, sessions] : state.ends) {
     std::printf("  %s: %llu\n", fault.c_str(), static_cast<unsigned long long>(sessions));
   }
+  std::printf("setpoints: %016llx\n", static_cast<unsigned long long>(state.digest.value));
+
   return 0;
+}
+
+int main_of(int argc, char** argv) {
+  CLI::App app{"Hours of simulated time with faults and recoveries, judged."};
+  double hours = 0.08;
+  std::string file;
+  State fresh;
+  app.add_option("--hours", hours, "of simulated time, those of the checkpoint included")
+      ->check(CLI::Range(0.0, 1e5))
+      ->capture_default_str();
+  const CLI::Option* seed = app.add_option("--seed", fresh.seed)->capture_default_str();
+  app.add_option("--checkpoint", file, "kept here after each session; one that is there is gone on with");
+  CLI11_PARSE(app, argc, argv);
+  const State state = restored(file).value_or(fresh);
+  if (seed->count() > 0 && state.seed != fresh.seed) {
+    throw std::runtime_error(file + " is of seed " + std::to_string(state.seed));
+  }
+  return soak(hours, file, state);
 }
 
 }  // namespace
 }  // namespace proxarm::controller
 
 int main(int argc, char** argv) {
-  double hours = 0.08;
-  std::string file;
-  std::uint64_t seed = 1;
-  for (int i = 1; i + 1 < argc; i += 2) {
-    if (std::strcmp(argv[i], "--hours") == 0) hours = std::atof(argv[i + 1]);
-    if (std::strcmp(argv[i], "--checkpoint") == 0) file = argv[i + 1];
-    if (std::strcmp(argv[i], "--seed") == 0) seed = std::strtoull(argv[i + 1], nullptr, 10);
-  }
   try {
-    return proxarm::controller::soak(hours, file, seed);
+    return proxarm::controller::main_of(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "soak: %s\n", error.what());
     return 2;
