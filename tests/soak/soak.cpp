@@ -371,7 +371,9 @@ int soak(double hours, const std::string& file, State state) {
     }
     keep(file, state);
     repeats = hour() > hour_before;
-    if (repeats) print(state),
+    if (!repeats) continue;
+    print(state);
+    memory.print();
   }
   print(state);
   for (const auto& [fault, sessions] : state.ends) {
