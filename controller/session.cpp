@@ -9,6 +9,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, double per
   const std::int64_t period_ns = std::llround(period_s * 1e9);
   const auto wanted_cycles = static_cast<std::uint64_t>(std::ceil(duration_s / period_s - 1e-9));
   SessionTally tally;
+  PageFaults before;
   std::uint32_t overruns_in_a_row = 0;
   std::int64_t t_k_ns = network.now_ns() + period_ns;
   while (cycle.supervisor().phase() != Phase::done) {
@@ -18,6 +19,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, double per
     ++tally.cycles;
     if (cycle.rendered_cycles() >= wanted_cycles) cycle.request_stop();
     if (hooks.after_cycle) hooks.after_cycle();
+    if (tally.cycles == 1) before = thread_page_faults();
 
     t_k_ns += period_ns;
     const std::int64_t late_ns = network.now_ns() - t_k_ns;
@@ -32,6 +34,7 @@ SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, double per
       cycle.report_overruns(0);
     }
   }
+  tally.page_faults = thread_page_faults().since(before);
   return tally;
 }
 

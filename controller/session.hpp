@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "controller/cycle.hpp"
+#include "controller/page_faults.hpp"
 
 namespace proxarm::controller {
 
@@ -20,6 +21,7 @@ struct SessionTally {
   std::uint64_t cycles = 0;
   std::uint64_t overruns = 0;  // cycles that ended late
   std::uint64_t skipped = 0;   // periods without a cycle
+  PageFaults page_faults;      // of the loop's thread, after the first cycle
 };
 
 // Runs from the first cycle until the drives are off again; after `duration_s` of rendering it asks for the stop.

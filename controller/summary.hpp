@@ -39,6 +39,7 @@
 
 #include "controller/cycle_record.hpp"
 #include "controller/fault.hpp"
+#include "controller/page_faults.hpp"
 
 namespace proxarm::controller {
 
@@ -97,6 +98,7 @@ struct Summary {
   std::uint64_t overruns = 0;                        // all phases
   ComputeTime compute_us;                            // all phases
   std::map<std::string, LatencySummary> latency_us;  // by name; set by the caller; empty in virtual time
+  std::optional<PageFaults> page_faults;             // of the cycle's thread; set by the caller; absent in virtual time
   std::map<std::string, double> bus_load;            // set by the caller
   double penetration_max_m = 0.0;
   double tool_penetration_max_m = 0.0;

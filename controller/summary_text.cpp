@@ -35,6 +35,7 @@ void add_timing(Json& json, const Summary& s) {
                                 {"max", latency.max},
                                 {"histogram", latency.histogram}};
   }
+  if (s.page_faults) json["page_faults"] = {{"minor", s.page_faults->minor}, {"major", s.page_faults->major}};
 }
 
 Json passivity(const std::optional<PassivitySummary>& summary) {
@@ -156,6 +157,10 @@ std::string summary_text(const Summary& s) {
     std::replace(words.begin(), words.end(), '_', ' ');
     line(words.c_str(), format("median %.0f, ", latency.median) + format("p99 %.0f, ", latency.p99) +
                             format("p99.9 %.0f, ", latency.p999) + format("max %.1f µs", latency.max));
+  }
+  if (s.page_faults) {
+    line("page faults", std::to_string(s.page_faults->minor) + " minor, " + std::to_string(s.page_faults->major) +
+                            " major after the first cycle");
   }
   std::string loads;
   for (const auto& [bus, load] : s.bus_load)

@@ -213,6 +213,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   controller::Summary summary = output.summary(cycle);
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
+  summary.page_faults = tally.page_faults;
   summary.latency_us = {{"wake_up", figures(meter.latencies().wake_up)},
                         {"compute", figures(meter.latencies().compute)},
                         {"sensor_to_setpoint", figures(meter.latencies().sensor_to_setpoint)}};

@@ -1,6 +1,10 @@
-// The cycle takes nothing from the heap, whatever it goes through: a session is recorded, and then played to a
-// controller that runs alone, so that what is counted is its own.
+// The cycle takes nothing from the heap and waits for no page of memory, whatever it goes through: a session is
+// recorded, and then played to a controller that runs alone, so that what is counted is its own.
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <cstring>
 
 #include "tests/allocation_count.hpp"
 #include "tests/controller/closed_loop_rig.hpp"
@@ -25,6 +29,7 @@ struct Played {
   std::vector<CycleRecord> records;
   std::uint64_t allocations = 0;
   std::uint64_t first_cycle_with_one = 0;
+  PageFaults page_faults;  // from the first cycle on
   Fault fault = Fault::none;
   std::uint64_t contact_cycles = 0, slip_cycles = 0;
 };
@@ -48,8 +53,12 @@ Played play(const RigOptions& options, std::vector<CycleRecord>* recorded) {
   for (std::int64_t t_k_ns = rig.first_cycle_ns; cycle.supervisor().phase() != Phase::done; t_k_ns += 1'000'000) {
     network.sleep_until(t_k_ns);
     const std::uint64_t before = tests::allocation_count();
+    const PageFaults faults_before = thread_page_faults();
     cycle.run_cycle(t_k_ns);
     if (cycle.rendered_cycles() >= wanted) cycle.request_stop();
+    const PageFaults faults = thread_page_faults().since(faults_before);
+    played.page_faults.minor += faults.minor;
+    played.page_faults.major += faults.major;
     const std::uint64_t taken = tests::allocation_count() - before;
     if (taken > 0 && played.allocations == 0) played.first_cycle_with_one = played.records.size();
     played.allocations += taken;
@@ -120,6 +129,32 @@ TEST(CycleAllocation, IsNoneInAFaultAndTheStopAfterIt) {
   expect_no_allocation({.device_faults = {"axis_3:fault=0x4210@1.9s"}}, Fault::drive_fault);
   expect_no_allocation({.device_faults = {"axis_2:silent@1.9s"}}, Fault::drive_silent);
   expect_no_allocation({.device_faults = {"sensor:frozen@1.9s"}}, Fault::sensor_frozen);
+}
+
+// As a session on interfaces does (realtime.cpp): with locked memory there is none, from the first cycle to the stop.
+// Needs RLIMIT_MEMLOCK of some 200 MB, or root.
+TEST(CycleAllocation, WaitsForNoPageOfLockedMemory) {
+  if (!tests::allocations_are_counted()) GTEST_SKIP() << "a sanitizer's memory can't be locked";
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) GTEST_SKIP() << "mlockall: " << std::strerror(errno);
+  const Played moved = play({.duration_s = 6.0}, nullptr);
+  const Played stopped = play({.device_faults = {"sensor:silent@1.9s"}}, nullptr);
+  munlockall();
+  EXPECT_GT(moved.slip_cycles, 100u);
+  EXPECT_EQ(stopped.fault, Fault::sensor_lost);
+  for (const Played* played : {&moved, &stopped}) {
+    EXPECT_EQ(played->page_faults.minor, 0);
+    EXPECT_EQ(played->page_faults.major, 0);
+  }
+}
+
+TEST(CycleAllocation, PageFaultsOfThisThreadAreCounted) {
+  constexpr std::size_t bytes = 16 * 4096;
+  void* fresh = mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(fresh, MAP_FAILED);
+  const PageFaults before = thread_page_faults();
+  for (std::size_t i = 0; i < bytes; i += 4096) static_cast<volatile char*>(fresh)[i] = 1;
+  EXPECT_GE(thread_page_faults().since(before).minor, 1);
+  munmap(fresh, bytes);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
-// Whole sessions of all that can come together: hands that shake and pull, scenes, narrow limits, masses that are
-// changed (to unstable ones, too), late cycles, lost frames, devices that fail. Whatever happens, no drive that follows
-// is told to go beyond its range, speed or acceleration.
+// Whole sessions of all that can come together: hands that shake and pull, scenes, narrow limits, timesteps, poses at
+// and beside singularities, masses that are changed (to unstable ones, too), late cycles, lost frames, devices that
+// fail, holds, resets and what leads out of them. Whatever happens, no drive that follows is told to go beyond its
+// range, speed or acceleration.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -83,6 +84,38 @@ RigOptions random_session(Random& random) {
   return options;
 }
 
+// The wrist's axes 4 and 6 in line or nearly so, the elbow anywhere between folded and stretched.
+void start_beside_a_singularity(Random& random, RigOptions& options) {
+  const double wrist_rad = (random.chance(0.5) ? 1.0 : -1.0) * random.log_uniform(1e-6, 0.2);
+  const double shoulder_rad = random.uniform(-0.4, 1.2), elbow_rad = random.uniform(-1.3, 1.5);
+  options.scene = "scenes/free.yaml";
+  options.edit_cell = [=](description::Cell& cell) {
+    cell.start_rad[1] = shoulder_rad;
+    cell.start_rad[2] = elbow_rad;
+    cell.start_rad[4] = wrist_rad;
+  };
+}
+
+// Orders that make sense and orders that don't, every 20 to 300 ms.
+void order_about(Random& random, RigOptions& options) {
+  constexpr std::array orders{Order::hold, Order::resume, Order::release, Order::back_off, Order::reset};
+  options.settings.wait_after_fault_s = 1.0;
+  for (double t = 0.1; t < 4.0; t += random.log_uniform(0.02, 0.3)) {
+    options.commands.push_back(
+        {static_cast<std::int64_t>(1e9 * t), {orders[random.below(orders.size())], random.log_uniform(1e-4, 0.1)}});
+  }
+  // An arm that was let go follows the hand for as long as nobody ends it.
+  options.commands.push_back({4'200'000'000, {Order::hold}});
+}
+
+// What was added later draws its own numbers, so that sessions that once failed stay what they were.
+void add_more(std::int64_t run, RigOptions& options) {
+  Random random(static_cast<std::uint64_t>(7'000'000 + run));
+  if (run % 4 == 0) start_beside_a_singularity(random, options);
+  if (run % 5 == 0) options.settings.period_s = random.chance(0.5) ? 0.002 : 0.004;
+  if (run % 3 == 1) order_about(random, options);
+}
+
 void narrow(Random& random, ClosedLoopRig& rig) {
   for (std::size_t i = 0; i < 6; ++i) {
     description::DriveDescription& drive = rig.cell.drives[i];
@@ -104,10 +137,14 @@ void expect_within_limits(const ClosedLoopRig& rig) {
     const double per_rad = std::abs(drive.counts_per_rad());
     for (std::size_t k = 2; k < rig.records.size(); ++k) {
       const CycleRecord& r = rig.records[k];
-      if (r.phase != Phase::rendering && r.phase != Phase::stopping) continue;
-      if (rig.records[k - 2].phase < Phase::taring) continue;
-      // A drive that has left operation by itself (it tripped, or a long pause made it do so) is told where it is.
-      if (r.phase == Phase::stopping && r.target_counts[axis] == r.actual_counts[axis]) break;
+      if (r.phase < Phase::rendering || r.phase > Phase::stopping) continue;
+      const auto apart = [&](std::size_t i) {
+        const CycleRecord& record = rig.records[i];
+        // A drive that has left operation by itself (it tripped, or a long pause made it do so) is told where it is.
+        const bool off = record.phase == Phase::stopping && record.target_counts[axis] == record.actual_counts[axis];
+        return record.phase < Phase::taring || record.phase > Phase::stopping || off;
+      };
+      if (apart(k) || apart(k - 1) || apart(k - 2)) continue;
       const double angle = (r.target_counts[axis] - drive.offset_counts) / drive.counts_per_rad();
       expect_step_within_limits(rig, axis, k);
       if (::testing::Test::HasFatalFailure()) return;
@@ -122,30 +159,46 @@ void expect_within_limits(const ClosedLoopRig& rig) {
 TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
   const std::int64_t runs = std::max<std::int64_t>(10, tests::scaled(25));  // fewer may have no late cycle
   std::uint64_t cycles = 0, limited = 0, overruns = 0;
-  std::map<std::string, int> ends;
+  std::uint64_t resets = 0, singular = 0;
+  std::map<std::string, int> ends, phases;
   const char* only = std::getenv("PROXARM_TEST_SESSION");  // one that failed, again
   for (std::int64_t run = only != nullptr ? std::atoll(only) : 0; run < runs; ++run) {
     SCOPED_TRACE("session " + std::to_string(run));
     Random random(static_cast<std::uint64_t>(1000 + run));
     RigOptions options = random_session(random);
+    add_more(run, options);
     Random naps(static_cast<std::uint64_t>(run));
     options.after_cycle = [&naps](fieldbus::SimulatedCanNetwork& network) {
       if (naps.chance(0.001)) network.sleep_until(network.now_ns() + static_cast<std::int64_t>(naps.uniform(0, 3e6)));
     };
     ClosedLoopRig rig(options);
     narrow(random, rig);
+    if (run % 3 == 1) rig.cell.supervision.hold_s = 1.0;
+    if (run % 4 == 0) rig.cell.limits.keep_out.clear();  // it may start within
     rig.run();
     expect_within_limits(rig);
     if (HasFatalFailure()) return;
     cycles += rig.records.size();
     overruns += rig.tally.overruns;
     ++ends[fault_name(rig.fault().fault)];
-    for (const CycleRecord& r : rig.records) limited += r.limited_axes != 0 ? 1 : 0;
+    resets += rig.cycle->past_fault_count();
+    for (std::size_t k = 1; k < rig.records.size(); ++k) {
+      const Phase phase = rig.records[k].phase;
+      if (phase != rig.records[k - 1].phase) ++phases[phase_name(phase)];
+    }
+    for (const CycleRecord& r : rig.records) {
+      limited += r.limited_axes != 0 ? 1 : 0;
+      singular += r.has(RecordFlag::limit_singularity) ? 1 : 0;
+    }
   }
   std::printf("%lld sessions, %llu cycles, %llu of them limited by a joint, %llu late\n", static_cast<long long>(runs),
               static_cast<unsigned long long>(cycles), static_cast<unsigned long long>(limited),
               static_cast<unsigned long long>(overruns));
+  std::printf("%llu at a singularity, %llu resets; ends:\n", static_cast<unsigned long long>(singular),
+              static_cast<unsigned long long>(resets));
   for (const auto& [fault, sessions] : ends) std::printf("  %s: %d\n", fault.c_str(), sessions);
+  std::printf("phases entered:\n");
+  for (const auto& [phase, times] : phases) std::printf("  %s: %d\n", phase.c_str(), times);
   EXPECT_GT(limited, cycles / 100) << "or the test says little";
   EXPECT_GT(overruns, 0u);
 }

@@ -85,6 +85,10 @@ class ClosedLoop:
                 self.assertLessEqual(latency["p99"], latency["max"] + 1)
                 self.assertEqual(sum(n for _, n in latency["histogram"]), self.session.summary["cycles"])
 
+    def test_the_cycle_waits_for_no_page_of_memory(self):
+        """With all memory locked (the guest grants that) none has to be found any more once it runs."""
+        self.assertEqual(self.session.summary["page_faults"], {"minor": 0, "major": 0})
+
     def test_targets_on_the_wire_have_the_hash_of_the_summary(self):
         self.assertEqual(two.setpoints_sha256(self.session.seen), self.session.summary["setpoint_sha256"])
 
