@@ -289,6 +289,10 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
     for (Eigen::Index i = 0; i < target_rad_.size(); ++i) target_rad_[i] = parts_.drives[i].drive.target_rad();
   }
   if (phase == Phase::rendering || phase == Phase::freeing) start_rendering();
+  // The tool may have been led into an object while nothing was rendered: slowly out of it.
+  if (from == Phase::holding && phase == Phase::rendering) {
+    speed_limit_m_per_s_ = std::min(speed_limit_m_per_s_, parts_.supervision.release_speed_m_per_s);
+  }
   if (phase == Phase::stopping || phase == Phase::holding) start_run_out(from);
 }
 

@@ -195,7 +195,7 @@ void Cycle::reset() noexcept {
 
 // ---- speed and force
 
-// The tool's speed limit of this cycle. Where it stands, any limit holds at once.
+// The tool's speed limit of this cycle. Where it stands, a lower one holds at once.
 void Cycle::limit_speed() noexcept {
   const bool slowed = supervisor_.slowed(cycle_, cycles_of(clear_of_slow_s, settings_.period_s));
   const double most = limits_.max_tool_speed_m_per_s;
@@ -204,7 +204,7 @@ void Cycle::limit_speed() noexcept {
   const double step =
       settings_.period_s * std::min(speed_limit_m_per_s2, 0.25 * limits_.max_tool_acceleration_m_per_s2);
   speed_limit_m_per_s_ = std::clamp(wanted, speed_limit_m_per_s_ - step, speed_limit_m_per_s_ + step);
-  if (proxy_W_ == proxy_k1_W_ && guard_.at_rest()) speed_limit_m_per_s_ = wanted;
+  if (proxy_W_ == proxy_k1_W_ && guard_.at_rest()) speed_limit_m_per_s_ = std::min(speed_limit_m_per_s_, wanted);
   record_.set(RecordFlag::slowed, entered_phase_ == Phase::rendering && speed_limit_m_per_s_ < most);
 }
 

@@ -11,6 +11,8 @@ using models::Vec3;
 
 namespace {
 
+constexpr double rounding_m = 1e-12;  // of positions of some metres, a few operations
+
 template <int N>
 class WorldOfDimension final : public RenderedWorld {
  public:
@@ -36,11 +38,14 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
-    // As far as the scene lets it: a step of 𝒢, whose κ doesn't matter.
+    // As far as the scene lets it: a step of 𝒢, whose κ doesn't matter. From outside of all objects that leads nearer
+    // to what is wanted; from within one, where limits made the contact give way, 𝒢 leads out at once, however far that
+    // is.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;
     start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, proxy_.q());
+    if (!((start.q - wanted).norm() <= (proxy_.q() - wanted).norm() + rounding_m)) start.q = wanted;
     start.v = v;
     start.time_s = proxy_.time_s() + lead_s();
     proxy_.start(start);

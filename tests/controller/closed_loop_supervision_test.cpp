@@ -246,6 +246,43 @@ TEST(ClosedLoopSupervision, SlowsDownWhileABusIsErrorPassiveAndLetsGoAgain) {
   expect_within_joint_limits(rig);
 }
 
+// A day's soak found that an arm which a hand had led into an object, released from a hold, jumped out of it when it
+// was resumed: its drives couldn't follow the first step, and the proxy was put onto the surface 22 mm away.
+TEST(ClosedLoopSupervision, LeavesAnObjectIntoWhichItWasReleasedWithinItsSpeed) {
+  for (const int order : {1, 2}) {
+    SCOPED_TRACE(order);
+    RigOptions options{.duration_s = 5.0};
+    options.settings.order = order;
+    // The wall is 0.2 m away; what the hand wants lies 40 mm behind it.
+    options.edit_hand = [](description::HandDescription& hand) {
+      hand.multisine.clear();
+      hand.waypoints = {{0.2, {0, 0, 0}}, {2.0, {0.2, 0, 0}}, {2.5, {0.2, 0, 0}}, {3.0, {0.24, 0, 0}}};
+    };
+    options.commands = {{2200 * ms, {Order::hold}},
+                        {2600 * ms, {Order::release}},
+                        {4000 * ms, {Order::hold}},
+                        {4600 * ms, {Order::resume}}};
+    ClosedLoopRig rig(options);
+    rig.run();
+    ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
+    const std::size_t resumed = first_in(rig, Phase::rendering, first_in(rig, Phase::freeing));
+    ASSERT_LT(resumed + 1500, rig.records.size());
+    const double begin_m = rig.records[resumed - 1].tool_W_m[0], end_m = rig.records[resumed + 1500].tool_W_m[0];
+    EXPECT_GT(begin_m, 0.92) << "m: it was to be behind the wall, which is at 0.9";
+    EXPECT_LT(end_m, 0.905);
+    double fastest = 0.0;
+    for (std::size_t k = resumed; k < resumed + 1500; ++k) {
+      const double speed = rig.truths[k].velocity_W.norm();
+      fastest = std::max(fastest, speed);
+      // From release_speed_m_per_s on by 1 m/s², and gears that ring by a tenth.
+      const double after_s = 1e-3 * static_cast<double>(k - resumed);
+      ASSERT_LE(speed, 1.1 * (rig.cell.supervision.release_speed_m_per_s + after_s)) << k;
+    }
+    std::printf("order %d: %.1f mm out of the wall, at most %.3f m/s\n", order, 1e3 * (begin_m - end_m), fastest);
+    expect_within_joint_limits(rig);
+  }
+}
+
 // A drive's fault, which its reset takes away: again into a hold, without taring, and on from there, three times.
 TEST(ClosedLoopSupervision, GoesOnAfterAReset) {
   RigOptions options{.duration_s = 4.0};
