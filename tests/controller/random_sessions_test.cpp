@@ -123,7 +123,8 @@ void narrow(Random& random, ClosedLoopRig& rig) {
     drive.max_acceleration_rad_per_s2 *= random.log_uniform(0.2, 1.0);
     if (!random.chance(0.3)) continue;
     const double start = rig.cell.start_rad[i];
-    drive.range_rad = {start - random.uniform(0.02, 0.3), start + random.uniform(0.02, 0.3)};
+    const double below = random.uniform(0.02, 0.3), above = random.uniform(0.02, 0.3);
+    drive.range_rad = {std::max(drive.range_rad[0], start - below), std::min(drive.range_rad[1], start + above)};
   }
   if (random.chance(0.3)) rig.cell.limits.max_tool_speed_m_per_s = random.log_uniform(0.02, 1.0);
   if (random.chance(0.8)) rig.cell.limits.max_force_N = 5000.0;
