@@ -16,6 +16,14 @@ bool is_setpoint(const fieldbus::CanFrame& frame) {
 
 }  // namespace
 
+LatencySummary latency_summary(const LatencyHistogram& times) {
+  LatencySummary summary{times.quantile_us(0.5), times.quantile_us(0.99), times.quantile_us(0.999), times.max_us(), {}};
+  for (std::size_t us = 0; us < times.counts().size(); ++us) {
+    if (times.counts()[us] > 0) summary.histogram.emplace_back(static_cast<int>(us), times.counts()[us]);
+  }
+  return summary;
+}
+
 void LatencyMeter::drain() {
   BoxCycle cycle;
   std::vector<BoxFrame> frames;

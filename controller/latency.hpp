@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "controller/black_box.hpp"
+#include "controller/summary.hpp"
 
 namespace proxarm::controller {
 
@@ -48,6 +49,8 @@ class LatencyHistogram {
   std::uint64_t count_ = 0;
   std::int64_t max_ns_ = 0;
 };
+
+[[nodiscard]] LatencySummary latency_summary(const LatencyHistogram& times);
 
 struct Latencies {
   LatencyHistogram wake_up, compute, sensor_to_setpoint;

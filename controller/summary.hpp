@@ -116,6 +116,7 @@ struct Summary {
   std::optional<PassivitySummary> passivity;
   std::uint64_t held_samples = 0;      // cycles without a new sample of the sensor
   std::vector<FaultSummary> faults;    // set by the caller
+  std::string black_box;               // its folder, after a fault; set by the caller
   std::vector<NoticeSummary> notices;  // set by the caller
   bool from_truth = false;
   std::string setpoint_sha256;

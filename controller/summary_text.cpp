@@ -121,6 +121,7 @@ std::string summary_json(const Summary& s) {
   json["cycles"] = s.cycles;
   add_timing(json, s);
   add_repeatable(json, s);
+  if (!s.black_box.empty()) json["black_box"] = s.black_box;
   return json.dump();
 }
 

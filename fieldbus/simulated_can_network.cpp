@@ -74,11 +74,13 @@ void SimulatedCanNetwork::follow_real_time() {
   real_time_offset_ns_ = monotonic_ns() - now_ns();
 }
 
-void SimulatedCanNetwork::pace(std::int64_t time_ns) const noexcept {
+void SimulatedCanNetwork::pace(std::int64_t time_ns) noexcept {
   const std::int64_t until = time_ns + real_time_offset_ns_;
+  if (monotonic_ns() >= until) return;
   const timespec when{static_cast<std::time_t>(until / 1'000'000'000), static_cast<long>(until % 1'000'000'000)};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) == EINTR) {
   }
+  woken_late_ns_ = monotonic_ns() - until;
 }
 
 void SimulatedCanNetwork::sleep_until(std::int64_t deadline_ns) noexcept {

@@ -41,6 +41,8 @@ class SimulatedCanNetwork final : public CanNetwork {
   void set_observer(const WireObserver& observer);
   // Never runs ahead of the machine's monotonic clock from now on: an in-process run at the pace of real time.
   void follow_real_time();
+  // By how much the machine was late when the last sleep ended, which was due at some event or deadline.
+  [[nodiscard]] std::int64_t woken_late_ns() const noexcept { return woken_late_ns_; }
 
   [[nodiscard]] std::size_t bus_count() const noexcept override { return buses_.size(); }
   [[nodiscard]] CanBus& bus(std::size_t index) noexcept override { return *buses_[index]; }
@@ -51,13 +53,13 @@ class SimulatedCanNetwork final : public CanNetwork {
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override;
 
  private:
-  void pace(std::int64_t time_ns) const noexcept;
+  void pace(std::int64_t time_ns) noexcept;
 
   EventQueue events_;
   std::size_t frames_waiting_ = 0;
   std::vector<std::unique_ptr<SimulatedCanBus>> buses_;
   bool real_time_ = false;
-  std::int64_t real_time_offset_ns_ = 0;  // of the monotonic clock against virtual time
+  std::int64_t real_time_offset_ns_ = 0, woken_late_ns_ = 0;  // of the monotonic clock against virtual time
 };
 
 }  // namespace proxarm::fieldbus

@@ -85,15 +85,6 @@ std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const c
   return rates;
 }
 
-controller::LatencySummary figures(const controller::LatencyHistogram& times) {
-  controller::LatencySummary figures{
-      times.quantile_us(0.5), times.quantile_us(0.99), times.quantile_us(0.999), times.max_us(), {}};
-  for (std::size_t us = 0; us < times.counts().size(); ++us) {
-    if (times.counts()[us] > 0) figures.histogram.emplace_back(static_cast<int>(us), times.counts()[us]);
-  }
-  return figures;
-}
-
 // Takes records and frames out of the cycle's rings and hands them on, in a thread of its own. Counts how long the
 // frames would occupy a bus of the cell's bitrates, since a virtual interface takes no time.
 class Drain {
@@ -214,9 +205,9 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
   summary.page_faults = tally.page_faults;
-  summary.latency_us = {{"wake_up", figures(meter.latencies().wake_up)},
-                        {"compute", figures(meter.latencies().compute)},
-                        {"sensor_to_setpoint", figures(meter.latencies().sensor_to_setpoint)}};
+  summary.latency_us = {{"wake_up", controller::latency_summary(meter.latencies().wake_up)},
+                        {"compute", controller::latency_summary(meter.latencies().compute)},
+                        {"sensor_to_setpoint", controller::latency_summary(meter.latencies().sensor_to_setpoint)}};
   summary.bus_load = drain.loads();
   return output.finish(summary, keeper);
 }

@@ -144,14 +144,30 @@ void SessionOutput::refuse_lost_plot() const {
   if (access(folder.c_str(), W_OK) != 0 || fs::is_directory(file, ignored)) refuse("a file that can be written");
 }
 
+namespace {
+// What of the gears' ringing the stability check, whose arm is rigid, doesn't see.
+void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
+  constexpr double most_modes = 3.0;  // measured: docs/safety.md
+  const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
+  if (!(bandwidth_Hz >= most_modes * mode_Hz)) return;
+  std::fprintf(
+      stderr,
+      "proxarm: warning: limits.setpoint_bandwidth_Hz: found %.4g Hz, expected less than three times the arm's "
+      "first mode (%.3g Hz here): gears ring under the setpoints, which the stability check doesn't see; a "
+      "larger mass is calmer\n",
+      bandwidth_Hz, mode_Hz);
+}
+}  // namespace
+
 void SessionOutput::introduce(const controller::CycleParts& parts) const {
+  const double mode_Hz = parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad());
+  if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
   if (options_.json) return;  // nothing but the summary goes to standard output then
   const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad());
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
               session_.scene.name.c_str(), rendered_text(session_).c_str(), 1e3 * session_.settings.period_s,
               1e3 * total_delay_s(session_));
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
-  const double mode_Hz = parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad());
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
   std::printf("\n");
   std::fflush(stdout);
@@ -218,8 +234,11 @@ Summary SessionOutput::summary(const controller::Cycle& cycle) {
   return summary;
 }
 
-int SessionOutput::finish(const Summary& summary, BlackBoxKeeper& keeper) {
+int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   progress_.clear();
+  // Faults that were reset come first.
+  const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
+  if (ended_by_fault) summary.black_box = keeper.folder().string();
   if (options_.json) {
     std::printf("%s\n", controller::summary_json(summary).c_str());
   } else {
@@ -228,8 +247,6 @@ int SessionOutput::finish(const Summary& summary, BlackBoxKeeper& keeper) {
   std::fflush(stdout);
   const bool drawn = draw_plot();
   if (writer_) writer_->finish(summary);
-  // Faults that were reset come first.
-  const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
   keeper.finish(ended_by_fault ? summary.faults.back().text : "");
   if (ended_by_fault) {
     if (!options_.json) std::printf("  black box:                %s\n", keeper.folder().c_str());

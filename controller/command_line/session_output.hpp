@@ -36,7 +36,7 @@ class SessionOutput {
   [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle);
   // Writes files, draws the plot, prints the summary to standard output, has the black box written after a fault.
   // Returns the exit status.
-  int finish(const controller::Summary& summary, BlackBoxKeeper& keeper);
+  int finish(controller::Summary summary, BlackBoxKeeper& keeper);
 
  private:
   void refuse_lost_plot() const;

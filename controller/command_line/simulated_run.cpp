@@ -8,6 +8,7 @@
 #include "controller/command_line/live_parameters.hpp"
 #include "controller/command_line/modbus_rates.hpp"
 #include "controller/command_line/signal_watch.hpp"
+#include "controller/latency.hpp"
 #include "controller/session.hpp"
 
 namespace proxarm::command_line {
@@ -76,7 +77,11 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
     network_.simulated_bus(i).statistics().reset(network_.now_ns());
   }
   const SteadyClock::time_point begun = SteadyClock::now();
-  const controller::SessionHooks hooks{[this](std::int64_t) { truth_ = far_end_.truth(); },
+  controller::LatencyHistogram wake_up;
+  const controller::SessionHooks hooks{[&, this](std::int64_t) {
+                                         wake_up.add(network_.woken_late_ns());
+                                         truth_ = far_end_.truth();
+                                       },
                                        [&] { drain(cycle.records()); }};
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_.settings.period_s, session_.duration_s, hooks);
@@ -84,6 +89,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   controller::Summary summary = output_.summary(cycle);
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;
+  if (options_.pace == Pace::realtime) summary.latency_us["wake_up"] = controller::latency_summary(wake_up);
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     summary.bus_load[network_.bus(i).name()] = network_.simulated_bus(i).load();
   }

@@ -2,6 +2,7 @@
 import math
 import os
 import struct
+import time
 import unittest
 
 from harness import ProgramTest
@@ -10,6 +11,10 @@ from harness import ProgramTest
 # The same program has been seen to take 2.7 times as long on one of our machines as on another (cycles of 14 and 5 µs), so
 # what the targets say of a good machine is asked of a slow one with this factor.
 SLOW_MACHINE = 2.0
+
+# What slowness() measures with CPython 3.11 on the machine whose p99 with 328 thousand triangles is 5.3 µs alone on a
+# processor and 7.4 to 8.2 among others.
+REFERENCE_US = 8.5
 
 
 def bumpy_ball(file, rows=405, columns=406, radius_m=0.15, centre_m=(1.05, 0.0, 0.6)):
@@ -32,6 +37,20 @@ def bumpy_ball(file, rows=405, columns=406, radius_m=0.15, centre_m=(1.05, 0.0, 
     file.write_bytes(bytes(80) + struct.pack("<I", len(triangles)) + b"".join(
         struct.pack("<12fH", 0, 0, 0, *a, *b, *c, 0) for a, b, c in triangles))
     return len(triangles)
+
+
+def slowness():
+    """How much longer a fixed piece of arithmetic takes than on the machine that docs/safety.md has its figures from.
+
+    Its median over 0.2 s, so that it shows the processor and not who else runs."""
+    def chunk_ns():
+        begun, x = time.perf_counter_ns(), 0.0
+        for i in range(400):
+            x = x * 0.999 + i
+        return time.perf_counter_ns() - begun
+
+    times = sorted(chunk_ns() for _ in range(20_000))
+    return max(1.0, 1e-3 * times[len(times) // 2] / REFERENCE_US)
 
 
 @unittest.skipIf(os.environ.get("PROXARM_SLOW_BUILD"), "a debug or sanitizer build says nothing about speed")
@@ -58,12 +77,13 @@ class Timing(ProgramTest):
         """Six axes, and a session that touches the mesh and slides on it."""
         self.assertEqual(bumpy_ball(self.folder / "ball.stl"), 328_048)
         scene = self.written("ball.yaml", "name: ball\nobjects:\n  - mesh: {name: ball, file: ball.stl, friction: 0.3}\n")
-        p99_us = []
+        measured = []
         for _ in range(5):
+            before = slowness()
             figures = self.summary("--scene", scene, "--duration", "9s")
-            p99_us.append(figures["compute_us"]["p99"])
             self.assertGreater(figures["sliding_time_s"], 0.5)
-        self.assertLess(min(p99_us), SLOW_MACHINE * 10.0, p99_us)
+            measured.append((figures["compute_us"]["p99"], min(before, slowness())))
+        self.assertLessEqual(min(p99_us / slow for p99_us, slow in measured), 10.0, measured)
 
 
 if __name__ == "__main__":
