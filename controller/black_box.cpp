@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <new>
 
 namespace proxarm::controller {
@@ -24,8 +25,11 @@ BlackBox::BlackBox(double period_s, std::size_t frames_per_cycle)
       bytes_(sizeof(Head) + cycle_capacity_ * sizeof(BoxCycle) + frame_capacity_ * sizeof(BoxFrame) +
              state_count * sizeof(State)) {
   static_assert(alignof(BoxCycle) <= 8 && alignof(BoxFrame) <= 8 && alignof(State) <= 8 && sizeof(Head) % 8 == 0);
-  void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+  void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
+  // Populated isn't enough: where the processor keeps no dirty bits (User-Mode Linux, some ARM) the first write to each
+  // page of a shared mapping would still be a fault, in the cycle.
+  std::memset(memory, 0, bytes_);
   memory_ = static_cast<std::byte*>(memory);
   head_ = new (memory_) Head;
   cycles_ = reinterpret_cast<BoxCycle*>(memory_ + sizeof(Head));
