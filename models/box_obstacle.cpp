@@ -142,6 +142,14 @@ bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // beyond it, and it wouldn't have let the proxy around
 }
 
+// In the middle of what the way has inside it is deepest, or half as deep as that at least.
+bool BoxObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
+  const Crossing c = cross(x, y);
+  if (!c.any()) return false;
+  const Vec3 middle = x + 0.5 * (std::max(c.enter, 0.0) + std::min(c.leave, 1.0)) * (y - x);
+  return distance(middle) < -2.0 * rounding(middle);
+}
+
 // From where the straight way enters, along the face to its edge.
 Vec3 BoxObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
   const Crossing c = cross(q, p);

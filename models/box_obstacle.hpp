@@ -20,6 +20,7 @@ class BoxObstacle final : public Obstacle {
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override;
   [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override;
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override;
   [[nodiscard]] double distance(const Vec3& x) const noexcept override;

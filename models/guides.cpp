@@ -73,13 +73,27 @@ Vec3 PolylineGuide::report(const Vec3& r, const Vec3& p, std::size_t piece, bool
   last_ = piece;
   const Vec3 f = r - p;
   const double size = f.norm();
-  contact_.normal = size > 0.0 ? Vec3(f / size) : pieces_[piece].e.unitOrthogonal();
-  contact_.feature = static_cast<std::int32_t>(piece);
-  contact_.slips = slips;
+  contacts_[0].normal = size > 0.0 ? Vec3(f / size) : pieces_[piece].e.unitOrthogonal();
+  contacts_[0].feature = static_cast<std::int32_t>(piece);
+  contacts_[0].slips = slips;
   return r;
 }
 
+// Whether the straight way to a point is free; if not, the point becomes the one where it ends, or `from` itself if
+// that is as near as rounding tells.
+bool PolylineGuide::leads(const Vec3& from, Vec3& to) noexcept {
+  if (!objects_ || from == to) return true;
+  const World::Way way = objects_->go_straight(from, to);
+  if (!way.stopped) return true;
+  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+  to = (way.end - from).lpNorm<1>() <= 64.0 * u * (from.lpNorm<1>() + 1.0) ? from : way.end;
+  contacts_[1] = way.contact;
+  count_ = 2;
+  return false;
+}
+
 Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept {
+  count_ = 1;
   std::size_t i = nearest_piece(q);
   const Piece& first = pieces_[i];
   const double s_q = std::clamp(first.e.dot(q - first.a), first.begin, first.length);
@@ -103,10 +117,13 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   int direction = slide(first, s_q, to);
   const bool corner = pieces_.size() > 1 && (s_q <= 0.0 || s_q >= first.length);
   if (direction == 0 && !corner) return report(on ? q : q_on, p, i, false);
+  Vec3 here = on ? q : q_on;
   for (std::size_t visited = 0; visited <= 2 * pieces_.size(); ++visited) {
     const Piece& piece = pieces_[i];
     if (to >= piece.begin && to <= piece.length && direction != 0) {
-      return report(piece.a + to * piece.e, p, i, mu_ > 0.0);
+      Vec3 r = piece.a + to * piece.e;
+      const bool free = leads(here, r);
+      return report(r, p, i, free && mu_ > 0.0);
     }
     // The end of the piece (or it doesn't move on it): does the next one lead on?
     const bool forward = direction > 0 || (direction == 0 && s >= piece.length);
@@ -116,7 +133,9 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
     const Vec3 corner_point = piece.a + end * piece.e;
     if (!at_end) return report(on ? q : q_on, p, i, false);
     const bool moved = (corner_point - q_on).squaredNorm() > 0.0;
-    const Vec3 held = moved ? corner_point : (on ? q : q_on);
+    Vec3 held = moved ? corner_point : (on ? q : q_on);
+    if (!leads(here, held)) return report(held, p, i, false);
+    here = held;
     if (last_piece && !closed_) return report(held, p, i, false);
     const std::size_t next = forward ? (i + 1) % pieces_.size() : (i + pieces_.size() - 1) % pieces_.size();
     const double enter = forward ? 0.0 : pieces_[next].length;

@@ -75,6 +75,10 @@ class MeshObstacle final : public Obstacle {
     const double most = reach + 8.0 * surface_.lift_m();
     return mesh().distance(x, most, near_) < most;
   }
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
+    Vec3 normal;
+    return surface_.parts(x, y, normal);
+  }
   bool parts(const Vec3& x, const Vec3& y, Vec3& normal) const noexcept override {
     return surface_.parts(x, y, normal);
   }

@@ -77,6 +77,9 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     return still_->excludes(now_inverse_ * q, now_inverse_ * r);
   }
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
+    return still_->bars(now_inverse_ * x, now_inverse_ * y);
+  }
   [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override {
     const Vec3 q_O = from(q), w = still_->detour(now_inverse_ * p, q_O);
     return w == q_O ? q : Vec3(now_ * w);

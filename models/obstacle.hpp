@@ -59,6 +59,9 @@ class Obstacle {
   // True if r can't be where a proxy from q ends: inside by more than rounding, or on the far side of a thin object.
   [[nodiscard]] virtual bool excludes(const Vec3& q, const Vec3& r) const noexcept = 0;
 
+  // Whether the straight way from x, which is allowed, to y leads inside or through, by more than rounding.
+  [[nodiscard]] virtual bool bars(const Vec3& x, const Vec3& y) const noexcept = 0;
+
   // Where a proxy that gets around the object on its way from q to p (step() doesn't touch, though the straight way
   // passes the inside) leaves the surface it slid on; q itself if there is no such point.
   [[nodiscard]] virtual Vec3 detour(const Vec3& /*p*/, const Vec3& q) const noexcept { return q; }

@@ -26,20 +26,25 @@ class PlaneObstacle final : public Obstacle {
   }
 
   [[nodiscard]] bool excludes(const Vec3& /*q*/, const Vec3& r) const noexcept override {
-    return surface_.height(r) < -surface_.rounding(r) - (layer_.soft() ? layer_.thickness_m : 0.0);
+    return surface_.height(r) < -slack_ * surface_.rounding(r) - (layer_.soft() ? layer_.thickness_m : 0.0);
   }
+
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override { return excludes(x, y); }
 
   [[nodiscard]] Tangent tangent(const Vec3& /*r*/, std::int32_t /*feature*/) const noexcept override {
     return {surface_, mu_};
   }
   [[nodiscard]] double distance(const Vec3& x) const noexcept override { return surface_.height(x); }
   void set_friction(double friction) noexcept override { mu_ = friction; }
+  // How much rounding doesn't count as behind: one, but where a second surface lies back to back with this one.
+  void set_slack(double roundings) noexcept { slack_ = roundings; }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
 
  private:
   FlatSurface<3> surface_;
   double mu_;
   Layer layer_;
+  double slack_ = 1.0;
 };
 
 }  // namespace proxarm::models

@@ -142,6 +142,10 @@ class RoundObstacle final : public Obstacle {
     return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // beyond it, and it would have held the proxy
   }
 
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
+    return sign_ > 0.0 ? passes(x, y) : at(core_, y, x).height < -4.0 * rounding(y);
+  }
+
   [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t /*feature*/) const noexcept override {
     const At here = at(core_, r, r);
     return {FlatSurface<3>::of_unit(here.foot + sign_ * R_ * here.normal, here.normal), mu_};

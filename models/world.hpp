@@ -37,6 +37,14 @@ class World final : public GeometricAlgorithm<3> {
   // Signed distance to the nearest obstacle, metres; infinite if there is none.
   [[nodiscard]] double distance(const Vec3& x) const noexcept;
 
+  // As far along the straight way from x, which is allowed, as nothing is in it; for what only can go there.
+  struct Way {
+    Vec3 end;
+    bool stopped = false;
+    Contact<3> contact;  // with what has stopped it
+  };
+  [[nodiscard]] Way go_straight(const Vec3& x, const Vec3& y) noexcept;
+
   // Steps so far for which no set of contacts was complete (a jam, or a tool deeper than a curved surface's radius):
   // the proxy then goes as far as a shorter step leads, or stays.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }

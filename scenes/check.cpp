@@ -222,6 +222,36 @@ std::vector<Vec3> around(const Object& object, Random& random, int count) {
   return places;
 }
 
+// Points of a guide where nothing is, half of them within 2 mm of an object: from a random one along the guide, by as
+// much as there is room.
+std::vector<Vec3> on_guide(const Scene& scene, Random& random) {
+  const GuideDescription& guide = *scene.guide;
+  std::vector<Vec3> places;
+  for (int i = 0; i < 400; ++i) {
+    Vec3 x = guide.points_m.front(), along = guide.direction.normalized();
+    if (guide.kind == GuideDescription::Kind::plane) {
+      along = along.cross(random.direction<3>()).normalized();
+    } else if (guide.kind == GuideDescription::Kind::polyline) {
+      const std::size_t pieces = guide.points_m.size() - (guide.closed ? 0 : 1);
+      const auto k = static_cast<std::size_t>(random.uniform(0.0, static_cast<double>(pieces))) % pieces;
+      x = guide.points_m[k];
+      along = guide.points_m[(k + 1) % guide.points_m.size()] - x;
+    }
+    const bool bounded = guide.kind == GuideDescription::Kind::polyline;
+    double s = bounded ? random.uniform(0.0, 1.0) : random.uniform(-1.0, 1.0);
+    double room = clearance_m(scene, x + s * along);
+    const double way = (random.uniform(0.0, 1.0) < 0.5 ? 1.0 : -1.0) / along.norm();
+    for (int k = 0; k < 100 && i % 2 == 1 && room > 2e-3 && room < 1.0; ++k) {
+      const double next = s + way * (room - 1e-3);
+      if (bounded && !(next > 0.0 && next < 1.0)) break;
+      s = next;
+      room = clearance_m(scene, x + s * along);
+    }
+    if (room >= 0.0) places.push_back(x + s * along);
+  }
+  return places;
+}
+
 template <int N>
 CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, const CheckOptions& options) {
   const CompiledScene compiled = compile(scene);
@@ -239,7 +269,10 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   region.acts_without_contact = !scene.media.empty() || scene.coulomb_force_N || scene.guide;
   region.bends = scene.guide && scene.guide->kind == GuideDescription::Kind::polyline;
   if (scene.guide) region.centre = compiled.from_W<N>(scene.guide->points_m.front());
-  for (const Vec3& x : places) {
+  // A proxy gets onto a guide before it meets objects.
+  Random random(options.seed);
+  const bool guided = scene.guide && !scene.objects.empty();
+  for (const Vec3& x : guided ? on_guide(scene, random) : places) {
     // Nowhere inside anything else.
     if (clearance_m(scene, x) >= 0.0) region.places.push_back(compiled.from_W<N>(x));
   }

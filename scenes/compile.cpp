@@ -207,8 +207,19 @@ std::unique_ptr<models::Obstacle> moved(std::unique_ptr<models::Obstacle> still,
   return driven;
 }
 
+// What a guide on a plane is among objects: the half-spaces on both its sides, in contacts as one more object.
+void add_plane_guide(const Scene& scene, std::vector<models::World::Entry>& entries) {
+  const GuideDescription& guide = *scene.guide;
+  for (const double side : {1.0, -1.0}) {
+    auto half =
+        std::make_unique<models::PlaneObstacle>(guide.points_m.front(), Vec3(side * guide.direction), guide.friction);
+    half->set_slack(8.0);  // a point of the one mustn't be behind the other for its rounding
+    entries.push_back({std::move(half), static_cast<std::int32_t>(scene.objects.size()), side > 0.0 ? 0 : 1});
+  }
+}
+
 template <int N>
-Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
+std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   std::vector<models::World::Entry> entries;
   std::size_t moving = 0, layers = 0, rubbing = 0;
   for (const auto& plane : cut.planes) {
@@ -233,9 +244,17 @@ Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
     moving += object.motion ? 1 : 0;
     rubbing += has_friction(object) ? 1 : 0;
   }
+  if (layers > 0 && scene.guide) {
+    throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide",
+                  "give a layer to an object that is alone in its scene (media may act with it)");
+  }
   if (layers > 0 && scene.objects.size() > 1) {
     throw refusal(scene, scene.objects.front().line, "found an elastic layer in a scene of several objects",
                   "give a layer to an object that is alone in its scene (media may act with it)");
+  }
+  if (scene.guide && scene.guide->kind == GuideDescription::Kind::plane) {
+    add_plane_guide(scene, entries);
+    rubbing += scene.guide->friction > 0.0 ? 1 : 0;
   }
   const bool many = entries.size() > 1;
   out.stages.push_back({"clearance", moving > 0 ? "of no use here: something moves"
@@ -254,18 +273,51 @@ Algorithm<N> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   if (moving == 0) out.skipped.push_back({"motion", "nothing moves"});
   if (layers == 0) out.skipped.push_back({"elastic layers", "none"});
   for (const models::World::Entry& entry : entries) {
-    // Friction by triangle stays as the scene has it.
-    if (N == 1 || !scene.objects[static_cast<std::size_t>(entry.object)].friction_regions.empty()) continue;
+    // A guide's friction and that by triangle stay as the scene has them.
+    if (N == 1 || static_cast<std::size_t>(entry.object) >= scene.objects.size() ||
+        !scene.objects[static_cast<std::size_t>(entry.object)].friction_regions.empty())
+      continue;
     out.rubbing.emplace_back(entry.object,
                              [obstacle = entry.obstacle.get()](double mu) { obstacle->set_friction(mu); });
   }
-  return in_space<N>(std::make_unique<models::World>(std::move(entries)));
+  return std::make_unique<models::World>(std::move(entries));
+}
+
+// An object that moves would push the proxy along a line or off it; where to, and with what, isn't said by a straight
+// way that ends.
+void require_still(const Scene& scene) {
+  for (const Object& object : scene.objects) {
+    if (!object.motion) continue;
+    throw refusal(scene, object.line, "found " + object.name + ", that moves, beside a guide along a line",
+                  "let objects stand still there, or use a guide on a plane");
+  }
+}
+
+Algorithm<3> guide_among_objects(const Scene& scene, const GuideDescription& guide, CompiledScene& out) {
+  const auto index = static_cast<std::int32_t>(scene.objects.size());
+  if (guide.kind == GuideDescription::Kind::plane) {
+    out.stages.push_back({"guide on a plane", "two half-spaces back to back, among the objects"});
+    return world<3>(scene, cut_scene<3>(scene, out), out);
+  }
+  require_still(scene);
+  CompiledScene objects;  // whose friction doesn't matter: what is in the way stops the proxy
+  models::PolylineGuide along =
+      guide.kind == GuideDescription::Kind::line
+          ? models::PolylineGuide::line(guide.points_m.front(), guide.direction, guide.friction)
+          : models::PolylineGuide(guide.points_m, guide.closed, guide.friction);
+  along.stop_at(world<3>(scene, cut_scene<3>(scene, objects), objects), index);
+  out.stages.push_back({guide.kind == GuideDescription::Kind::line
+                            ? "guide on a line"
+                            : "guide along " + std::to_string(guide.points_m.size()) + " points",
+                        guide.friction > 0.0 ? "μ = " + number_text(guide.friction) : "without friction"});
+  out.stages.push_back({"stop", "at the first of " + std::to_string(scene.objects.size()) +
+                                    (scene.objects.size() > 1 ? " objects" : " object") + " on the way"});
+  out.skipped.push_back({"friction of objects", "there is one way to go, and what stops it holds"});
+  return std::make_unique<models::PolylineGuide>(std::move(along));
 }
 
 Algorithm<3> guide(const Scene& scene, const GuideDescription& guide, CompiledScene& out) {
-  if (!scene.objects.empty()) {
-    throw refusal(scene, guide.line_number, "found a guide together with objects", "use one of them in a scene");
-  }
+  if (!scene.objects.empty()) return guide_among_objects(scene, guide, out);
   out.skipped.push_back({"contacts", "no objects"});
   if (!(guide.friction > 0.0)) out.skipped.push_back({"friction", "μ = 0"});
   switch (guide.kind) {
@@ -336,7 +388,7 @@ Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
       if (mesh != nullptr && !object.motion && !object.layer) return one_mesh(scene, object, *mesh, out);
     }
   }
-  return world<N>(scene, cut, out);
+  return in_space<N>(world<N>(scene, cut, out));
 }
 
 template <int N>
