@@ -9,12 +9,16 @@
 #include <assimp/Importer.hpp>
 #include <cctype>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include "models/description/setup_error.hpp"
+#include "scenes/apart.hpp"
 #include "scenes/mesh_cache.hpp"
 
 namespace proxarm::scenes {
@@ -77,6 +81,84 @@ bool prepare_for_triangulation(const aiScene& scene) {
   return true;
 }
 
+// By assimp, which some damaged files end or keep for ever: in a process of its own. Throws std::runtime_error with
+// what was found.
+TriangleSoup read_by_assimp(const std::filesystem::path& file, const std::string& extension) {
+  Assimp::Importer importer;
+  keep_reader_of(extension, importer);
+  // Only what a surface needs; node transforms are applied. Vertices are welded later, exactly.
+  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
+                                                          aiComponent_COLORS | aiComponent_TEXCOORDS |
+                                                          aiComponent_TEXTURES | aiComponent_MATERIALS);
+  const aiScene* scene = importer.ReadFile(file.string(), aiProcess_RemoveComponent);
+  if (scene != nullptr && prepare_for_triangulation(*scene)) {
+    scene = importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_PreTransformVertices);
+  } else {
+    scene = nullptr;
+  }
+  if (scene == nullptr || scene->mNumMeshes == 0) {
+    const std::string why = importer.GetErrorString();
+    throw std::runtime_error(why.empty() ? "nothing that can be read" : in_quotes(why, 160));
+  }
+  TriangleSoup soup;
+  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+    const aiMesh& mesh = *scene->mMeshes[m];
+    const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+    soup.vertices.reserve(soup.vertices.size() + mesh.mNumVertices);
+    for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+      const aiVector3D& x = mesh.mVertices[v];
+      soup.vertices.emplace_back(x.x, x.y, x.z);
+    }
+    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
+      const aiFace& face = mesh.mFaces[f];
+      if (face.mNumIndices != 3) continue;
+      for (unsigned k = 0; k < 3; ++k) {
+        if (face.mIndices[k] >= mesh.mNumVertices) {
+          throw std::runtime_error("vertex " + std::to_string(face.mIndices[k]) + " in face " + std::to_string(f) +
+                                   " of a mesh of " + std::to_string(mesh.mNumVertices) + " vertices");
+        }
+      }
+      soup.triangles.push_back({first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
+    }
+  }
+  if (soup.triangles.empty()) {
+    throw std::runtime_error("no triangles");
+  }
+  return soup;
+}
+
+// To and from the process that reads.
+std::vector<std::byte> bytes_of(const TriangleSoup& soup) {
+  const std::array<std::uint64_t, 2> counts{soup.vertices.size(), soup.triangles.size()};
+  const std::size_t vertices = soup.vertices.size() * sizeof(Vec3);
+  const std::size_t triangles = soup.triangles.size() * sizeof(soup.triangles[0]);
+  std::vector<std::byte> bytes(sizeof counts + vertices + triangles);
+  std::memcpy(bytes.data(), counts.data(), sizeof counts);
+  std::memcpy(bytes.data() + sizeof counts, soup.vertices.data(), vertices);
+  std::memcpy(bytes.data() + sizeof counts + vertices, soup.triangles.data(), triangles);
+  return bytes;
+}
+
+TriangleSoup soup_of(const std::vector<std::byte>& bytes) {
+  std::array<std::uint64_t, 2> counts{};
+  if (bytes.size() < sizeof counts) throw std::runtime_error("nothing that can be read");
+  std::memcpy(counts.data(), bytes.data(), sizeof counts);
+  TriangleSoup soup;
+  const std::size_t rest = bytes.size() - sizeof counts;
+  if (counts[0] > rest / sizeof(Vec3) || counts[1] > rest / sizeof(soup.triangles[0]) ||
+      counts[0] * sizeof(Vec3) + counts[1] * sizeof(soup.triangles[0]) != rest) {
+    throw std::runtime_error("nothing that can be read");
+  }
+  soup.vertices.resize(counts[0]);
+  soup.triangles.resize(counts[1]);
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v) {
+    std::memcpy(soup.vertices[v].data(), bytes.data() + sizeof counts + v * sizeof(Vec3), sizeof(Vec3));
+  }
+  std::memcpy(soup.triangles.data(), bytes.data() + sizeof counts + counts[0] * sizeof(Vec3),
+              counts[1] * sizeof(soup.triangles[0]));
+  return soup;
+}
+
 }  // namespace
 
 TriangleSoup read_mesh_file(const std::filesystem::path& file) {
@@ -93,50 +175,15 @@ TriangleSoup read_mesh_file(const std::filesystem::path& file) {
   if (extension == ".ply" && has_no_end_of_header(file)) {
     throw SetupError({.file = file.string(), .found = "no end_header", .expected = kExpected});
   }
-  Assimp::Importer importer;
-  keep_reader_of(extension, importer);
-  // Only what a surface needs; node transforms are applied. Vertices are welded later, exactly.
-  importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
-                                                          aiComponent_COLORS | aiComponent_TEXCOORDS |
-                                                          aiComponent_TEXTURES | aiComponent_MATERIALS);
-  const aiScene* scene = importer.ReadFile(file.string(), aiProcess_RemoveComponent);
-  if (scene != nullptr && prepare_for_triangulation(*scene)) {
-    scene = importer.ApplyPostProcessing(aiProcess_Triangulate | aiProcess_PreTransformVertices);
-  } else {
-    scene = nullptr;
+  // Ten times as long, and as much memory, as STL, OBJ and PLY files take.
+  const double megabytes = 1e-6 * static_cast<double>(std::filesystem::file_size(file, error));
+  const ReaderLimits limits{.seconds = 2.0 + megabytes,
+                            .memory = 1'000'000'000 + static_cast<std::size_t>(60e6 * megabytes)};
+  try {
+    return soup_of(read_apart([&] { return bytes_of(read_by_assimp(file, extension)); }, limits));
+  } catch (const std::runtime_error& mistake) {
+    throw SetupError({.file = file.string(), .found = mistake.what(), .expected = kExpected});
   }
-  if (scene == nullptr || scene->mNumMeshes == 0) {
-    const std::string why = importer.GetErrorString();
-    throw SetupError({.file = file.string(),
-                      .found = why.empty() ? "nothing that can be read" : in_quotes(why, 160),
-                      .expected = kExpected});
-  }
-  TriangleSoup soup;
-  for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-    const aiMesh& mesh = *scene->mMeshes[m];
-    const auto first = static_cast<std::uint32_t>(soup.vertices.size());
-    soup.vertices.reserve(soup.vertices.size() + mesh.mNumVertices);
-    for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
-      const aiVector3D& x = mesh.mVertices[v];
-      soup.vertices.emplace_back(x.x, x.y, x.z);
-    }
-    for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-      const aiFace& face = mesh.mFaces[f];
-      if (face.mNumIndices != 3) continue;
-      for (unsigned k = 0; k < 3; ++k) {
-        if (face.mIndices[k] >= mesh.mNumVertices) {
-          throw SetupError({.file = file.string(),
-                            .found = "vertex " + std::to_string(face.mIndices[k]) + " in face " + std::to_string(f),
-                            .expected = "a vertex below " + std::to_string(mesh.mNumVertices)});
-        }
-      }
-      soup.triangles.push_back({first + face.mIndices[0], first + face.mIndices[1], first + face.mIndices[2]});
-    }
-  }
-  if (soup.triangles.empty()) {
-    throw SetupError({.file = file.string(), .found = "no triangles", .expected = kExpected});
-  }
-  return soup;
 }
 
 std::shared_ptr<const models::TriangleMesh> load_mesh(const std::filesystem::path& file, double scale,
