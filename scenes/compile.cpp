@@ -17,6 +17,7 @@
 #include "models/plane_obstacle.hpp"
 #include "models/world.hpp"
 #include "scenes/obstacles.hpp"
+#include "scenes/section.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -58,11 +59,13 @@ struct Ball {
   bool inside_out = false;
 };
 
-// All that the proxy's space has of a scene, sorted by what it takes to render it.
+// All that the proxy's space has of a scene, sorted by what it takes to render
+// it.
 template <int N>
 struct Cut {
   std::vector<HalfSpace<N>> planes;  // flat, rigid and still, faces of boxes from inside among them
   std::vector<Ball> balls;           // with N < 3 only
+  std::vector<std::pair<const Object*, std::int32_t>> solids;  // with N < 3 only: see section_of()
   std::vector<std::pair<const Object*, std::int32_t>> others;
 };
 
@@ -71,7 +74,8 @@ SetupError inside(const Scene& scene, const Object& object) {
                  "move `space` or the object");
 }
 
-// n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W, not of length one where the cut is oblique.
+// n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W, not
+// of length one where the cut is oblique.
 template <int N>
 void cut_plane(const Scene& scene, const Object& object, std::int32_t index, std::int32_t feature,
                const PlaneShape& plane, Cut<N>& cut, CompiledScene& out) {
@@ -86,7 +90,8 @@ void cut_plane(const Scene& scene, const Object& object, std::int32_t index, std
   const Vec<N> m = A.transpose() * n;
   const Vec<N> near = A.transpose() * (plane.point_m - scene.space.origin_m);
   const double height = n.dot(scene.space.origin_m + A * near - plane.point_m);
-  // A space that is parallel to the plane within rounding of both meets it nowhere or lies in it.
+  // A space that is parallel to the plane within rounding of both meets it
+  // nowhere or lies in it.
   if (m.norm() < 1e-12) {
     if (height < 0.0) throw inside(scene, object);
     out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
@@ -129,15 +134,18 @@ Cut<N> cut_scene(const Scene& scene, CompiledScene& out) {
       continue;
     }
     if constexpr (N < 3) {
-      const auto* sphere = std::get_if<SphereShape>(&object.shape);
-      if (sphere == nullptr || !plain) {
+      if (!plain) {
         throw refusal(scene, object.line,
                       "found " + object.name + " (" + kind_of(object.shape) + (object.layer ? " with a layer" : "") +
                           (object.motion ? " that moves" : "") + ") in a scene of " + std::to_string(N) +
                           (N == 1 ? " dimension" : " dimensions"),
-                      "use planes, spheres and boxes from inside there, or `dimensions: 3`");
+                      "use rigid objects that stand still there, or `dimensions: 3`");
       }
-      cut_sphere<N>(scene, object, index, *sphere, cut, out);
+      if (const auto* sphere = std::get_if<SphereShape>(&object.shape)) {
+        cut_sphere<N>(scene, object, index, *sphere, cut, out);
+      } else {
+        cut.solids.emplace_back(&object, index);
+      }
     } else {
       cut.others.emplace_back(&object, index);
     }
@@ -207,7 +215,8 @@ std::unique_ptr<models::Obstacle> moved(std::unique_ptr<models::Obstacle> still,
   return driven;
 }
 
-// What a guide on a plane is among objects: the half-spaces on both its sides, in contacts as one more object.
+// What a guide on a plane is among objects: the half-spaces on both its sides,
+// in contacts as one more object.
 void add_plane_guide(const Scene& scene, std::vector<models::World::Entry>& entries) {
   const GuideDescription& guide = *scene.guide;
   for (const double side : {1.0, -1.0}) {
@@ -234,6 +243,11 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
         {std::make_unique<models::Sphere>(models::PointCore{ball.centre}, ball.radius_m, mu, ball.inside_out),
          ball.index, 0});
   }
+  for (const auto& [object, index] : cut.solids) {
+    std::vector<Part> parts = section_of(scene, *object);
+    if (parts.empty()) out.skipped.push_back({object->name, "doesn't meet the proxy's space"});
+    for (Part& part : parts) entries.push_back({std::move(part.obstacle), index, part.feature});
+  }
   for (const auto& [object, index] : cut.others) {
     for (Part& part : parts_of(scene, *object)) {
       entries.push_back({moved(std::move(part.obstacle), *object, index, out), index, part.feature});
@@ -246,11 +260,13 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
   }
   if (layers > 0 && scene.guide) {
     throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide",
-                  "give a layer to an object that is alone in its scene (media may act with it)");
+                  "give a layer to an object that is alone in its scene (media "
+                  "may act with it)");
   }
   if (layers > 0 && scene.objects.size() > 1) {
     throw refusal(scene, scene.objects.front().line, "found an elastic layer in a scene of several objects",
-                  "give a layer to an object that is alone in its scene (media may act with it)");
+                  "give a layer to an object that is alone in its scene (media "
+                  "may act with it)");
   }
   if (scene.guide && scene.guide->kind == GuideDescription::Kind::plane) {
     add_plane_guide(scene, entries);
@@ -283,8 +299,8 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
   return std::make_unique<models::World>(std::move(entries));
 }
 
-// An object that moves would push the proxy along a line or off it; where to, and with what, isn't said by a straight
-// way that ends.
+// An object that moves would push the proxy along a line or off it; where to,
+// and with what, isn't said by a straight way that ends.
 void require_still(const Scene& scene) {
   for (const Object& object : scene.objects) {
     if (!object.motion) continue;
@@ -300,7 +316,8 @@ Algorithm<3> guide_among_objects(const Scene& scene, const GuideDescription& gui
     return world<3>(scene, cut_scene<3>(scene, out), out);
   }
   require_still(scene);
-  CompiledScene objects;  // whose friction doesn't matter: what is in the way stops the proxy
+  CompiledScene objects;  // whose friction doesn't matter: what is in the way
+                          // stops the proxy
   models::PolylineGuide along =
       guide.kind == GuideDescription::Kind::line
           ? models::PolylineGuide::line(guide.points_m.front(), guide.direction, guide.friction)
@@ -371,14 +388,15 @@ Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
     }
   }
   const Cut<N> cut = cut_scene<N>(scene, out);
-  if (cut.balls.empty() && cut.others.empty()) {
+  if (cut.balls.empty() && cut.solids.empty() && cut.others.empty()) {
     if (cut.planes.empty()) {
       out.skipped.push_back({"contacts", "nothing to touch"});
       return nullptr;
     }
     out.skipped.push_back({"motion", "nothing moves"});
     if (cut.planes.size() == 1) return one_plane<N>(cut.planes.front(), out);
-    // Flat surfaces have no bounds that a tree could use; looking at each is as good, and this many are few.
+    // Flat surfaces have no bounds that a tree could use; looking at each is as
+    // good, and this many are few.
     if (cut.planes.size() <= 64) return several_planes<N>(cut, out);
   }
   if constexpr (N == 3) {
@@ -397,7 +415,9 @@ Algorithm<N> build(const Scene& scene, CompiledScene& out) {
   std::vector<models::Medium> media;
   for (const MediumDescription& medium : scene.media) {
     if (medium.within && N < 3) {
-      throw refusal(scene, medium.line, "found a medium within a shape in a scene of fewer than three dimensions",
+      throw refusal(scene, medium.line,
+                    "found a medium within a shape in a scene of fewer than "
+                    "three dimensions",
                     "let it act everywhere, or use `dimensions: 3`");
     }
     media.push_back({medium.damping_Ns_per_m, medium.force_N, medium.within ? region_of(*medium.within) : nullptr});
