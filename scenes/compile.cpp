@@ -59,8 +59,7 @@ struct Ball {
   bool inside_out = false;
 };
 
-// All that the proxy's space has of a scene, sorted by what it takes to render
-// it.
+// All that the proxy's space has of a scene, sorted by what it takes to render it.
 template <int N>
 struct Cut {
   std::vector<HalfSpace<N>> planes;  // flat, rigid and still, faces of boxes from inside among them
@@ -74,8 +73,7 @@ SetupError inside(const Scene& scene, const Object& object) {
                  "move `space` or the object");
 }
 
-// n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W, not
-// of length one where the cut is oblique.
+// n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W, not of length one where the cut is oblique.
 template <int N>
 void cut_plane(const Scene& scene, const Object& object, std::int32_t index, std::int32_t feature,
                const PlaneShape& plane, Cut<N>& cut, CompiledScene& out) {
@@ -90,8 +88,7 @@ void cut_plane(const Scene& scene, const Object& object, std::int32_t index, std
   const Vec<N> m = A.transpose() * n;
   const Vec<N> near = A.transpose() * (plane.point_m - scene.space.origin_m);
   const double height = n.dot(scene.space.origin_m + A * near - plane.point_m);
-  // A space that is parallel to the plane within rounding of both meets it
-  // nowhere or lies in it.
+  // A space that is parallel to the plane within rounding of both meets it nowhere or lies in it.
   if (m.norm() < 1e-12) {
     if (height < 0.0) throw inside(scene, object);
     out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
@@ -215,8 +212,7 @@ std::unique_ptr<models::Obstacle> moved(std::unique_ptr<models::Obstacle> still,
   return driven;
 }
 
-// What a guide on a plane is among objects: the half-spaces on both its sides,
-// in contacts as one more object.
+// What a guide on a plane is among objects: the half-spaces on both its sides, in contacts as one more object.
 void add_plane_guide(const Scene& scene, std::vector<models::World::Entry>& entries) {
   const GuideDescription& guide = *scene.guide;
   for (const double side : {1.0, -1.0}) {
@@ -260,13 +256,11 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
   }
   if (layers > 0 && scene.guide) {
     throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide",
-                  "give a layer to an object that is alone in its scene (media "
-                  "may act with it)");
+                  "give a layer to an object that is alone in its scene (media may act with it)");
   }
   if (layers > 0 && scene.objects.size() > 1) {
     throw refusal(scene, scene.objects.front().line, "found an elastic layer in a scene of several objects",
-                  "give a layer to an object that is alone in its scene (media "
-                  "may act with it)");
+                  "give a layer to an object that is alone in its scene (media may act with it)");
   }
   if (scene.guide && scene.guide->kind == GuideDescription::Kind::plane) {
     add_plane_guide(scene, entries);
@@ -299,8 +293,8 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
   return std::make_unique<models::World>(std::move(entries));
 }
 
-// An object that moves would push the proxy along a line or off it; where to,
-// and with what, isn't said by a straight way that ends.
+// An object that moves would push the proxy along a line or off it; where to, and with what, isn't said by a straight
+// way that ends.
 void require_still(const Scene& scene) {
   for (const Object& object : scene.objects) {
     if (!object.motion) continue;
@@ -395,8 +389,7 @@ Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
     }
     out.skipped.push_back({"motion", "nothing moves"});
     if (cut.planes.size() == 1) return one_plane<N>(cut.planes.front(), out);
-    // Flat surfaces have no bounds that a tree could use; looking at each is as
-    // good, and this many are few.
+    // Flat surfaces have no bounds that a tree could use; looking at each is as good, and this many are few.
     if (cut.planes.size() <= 64) return several_planes<N>(cut, out);
   }
   if constexpr (N == 3) {

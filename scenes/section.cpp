@@ -21,8 +21,7 @@ using models::Pose;
 using models::Vec3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-// Of a direction that is given in round numbers; a space's own axes are held to
-// as much.
+// Of a direction that is given in round numbers; a space's own axes are held to as much.
 constexpr double straight = 1e-6;
 
 // Along a line, from a to b.
@@ -104,8 +103,7 @@ class Section {
   std::vector<Part> operator()(const CapsuleShape& s) const {
     const models::SegmentCore core(s.from_m, s.to_m);
     if (line()) {
-      // Convex: from the least to the greatest of what its middle and its ends
-      // hold.
+      // Convex: from the least to the greatest of what its middle and its ends hold.
       const Vec3 u = origin() - s.from_m, d = axis(0);
       Interval held = within_radius(u - core.e * core.e.dot(u), d - core.e * core.e.dot(d), s.radius_m);
       const Interval slab = within_slab(core.e.dot(u) - 0.5 * core.end, core.e.dot(d), 0.5 * core.end);
@@ -234,9 +232,8 @@ class Section {
     walls.triangles.push_back({first, first + 2, first + 3});
   }
 
-  // Where z = 0 cuts the triangle. A corner at z = 0 counts as above; where a
-  // side is cut doesn't depend on which of its triangles is asked, so that
-  // walls meet.
+  // Where z = 0 cuts the triangle. A corner at z = 0 counts as above; where a side is cut doesn't depend on which of
+  // its triangles is asked, so that walls meet.
   static void add_segment(const std::array<Vec3, 3>& x, double deep, models::TriangleSoup& walls) {
     std::array<Vec3, 2> ends;
     std::size_t count = 0;
