@@ -115,7 +115,8 @@ class CoulombStep {
       const double change = (row[k] - last).norm();
       if (change > least && least <= 100.0 * rounding) break;
       least = change;
-      R = row[k];
+      // Where they agree by so much, the one before is as good but for its rounding, which is a quarter.
+      R = change <= 0.5 * rounding ? last : row[k];
       high = sample;
       if (change <= rounding) break;
     }

@@ -361,7 +361,7 @@ class Judge {
   void judge_depth(const Call<N>& call) {
     const double depth = laws_.depth(lift<N>(call.r), call.time.time_s);
     if (call.unresolved) return;
-    tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.norm()));
+    tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.norm() + call.p.norm()));
     // Rounding of r, of distances, and of an object's own motion, each some units of ‖r‖ ε.
     if (depth > 1e-12 * (1.0 + call.r.norm()) * condition(call) + 16.0 * epsilon * call.p.norm())
       note(inside, call, depth);
