@@ -134,7 +134,9 @@ std::vector<std::byte> bytes_of(const TriangleSoup& soup) {
   const std::size_t triangles = soup.triangles.size() * sizeof(soup.triangles[0]);
   std::vector<std::byte> bytes(sizeof counts + vertices + triangles);
   std::memcpy(bytes.data(), counts.data(), sizeof counts);
-  std::memcpy(bytes.data() + sizeof counts, soup.vertices.data(), vertices);
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v) {
+    std::memcpy(bytes.data() + sizeof counts + v * sizeof(Vec3), soup.vertices[v].data(), sizeof(Vec3));
+  }
   std::memcpy(bytes.data() + sizeof counts + vertices, soup.triangles.data(), triangles);
   return bytes;
 }
