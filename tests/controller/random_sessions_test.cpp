@@ -12,6 +12,7 @@
 
 #include "tests/controller/closed_loop_rig.hpp"
 #include "tests/models/random_states.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -21,8 +22,8 @@ using testing::expect_step_within_limits;
 using testing::RigOptions;
 using tests::Random;
 
-std::string random_hand(Random& random) {
-  const std::string file = ::testing::TempDir() + "random_hand.yaml";
+std::string random_hand(const tests::ScratchFolder& folder, Random& random) {
+  const std::string file = folder / "hand.yaml";
   std::ofstream out(file);
   const auto offset = [&] {
     return "[" + std::to_string(random.uniform(-0.3, 0.3)) + ", " + std::to_string(random.uniform(-0.3, 0.3)) + ", " +
@@ -54,12 +55,12 @@ std::string random_device_fault(Random& random) {
          std::to_string(from_s + random.log_uniform(0.001, 0.5)) + "s";
 }
 
-RigOptions random_session(Random& random) {
+RigOptions random_session(const tests::ScratchFolder& folder, Random& random) {
   constexpr std::array scenes{"wall", "free", "groove", "line", "plane_2d", "room", "moving_plate", "honey", "coulomb"};
   RigOptions options;
   options.duration_s = 2.0;
   options.scene = std::string("scenes/") + scenes[random.below(scenes.size())] + ".yaml";
-  options.hand = random_hand(random);
+  options.hand = random_hand(folder, random);
   options.settings.mass_kg = random.log_uniform(1.5, 30.0);
   options.settings.damping_Ns_per_m = random.chance(0.5) ? random.log_uniform(1.0, 100.0) : 0.0;
   if (random.chance(0.9)) options.settings.tare_spread_N = 1e6;  // the hand is never still
@@ -163,6 +164,7 @@ void expect_within_limits(const ClosedLoopRig& rig) {
 // Session 287 found that a leash which snapped had the guard make two steps in one cycle, the proxy's and the stop's.
 // 10⁷ cycles at PROXARM_TEST_SCALE=300.
 TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
+  const tests::ScratchFolder folder;
   const std::int64_t runs = std::max<std::int64_t>(10, tests::scaled(25));  // fewer may have no late cycle
   std::uint64_t cycles = 0, limited = 0, overruns = 0;
   std::uint64_t resets = 0, singular = 0;
@@ -171,7 +173,7 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
   for (std::int64_t run = only != nullptr ? std::atoll(only) : 0; run < runs; ++run) {
     SCOPED_TRACE("session " + std::to_string(run));
     Random random(static_cast<std::uint64_t>(1000 + run));
-    RigOptions options = random_session(random);
+    RigOptions options = random_session(folder, random);
     add_more(run, options);
     Random naps(static_cast<std::uint64_t>(run));
     options.after_cycle = [&naps](fieldbus::SimulatedCanNetwork& network) {
