@@ -403,7 +403,7 @@ class Judge {
     const Call<N> other = g_.ask(kappa, Vec<N>(call.r - f / kappa));
     const double allowed = condition(call) * 64.0 * epsilon *
                                ((0.1 + call.r.norm() + call.q.norm()) * (1.0 + call.K / kappa) + f.norm() / kappa) +
-                           8.0 * epsilon * laws_.carriage(call.time.time_s);
+                           8.0 * epsilon * laws_.carriage(call.time.time_s) + slip_rounding(call);
     const double error = (other.r - call.r).norm();
     if (error <= allowed) return;
     // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
@@ -414,6 +414,14 @@ class Judge {
     } else {
       note(stiffness, other, error);
     }
+  }
+
+  // Whether a proxy slips in a Coulomb medium, and how little, is seen from a few hundredths to thousandths of its way
+  // (coulomb_step.hpp): the rounding of r counts by their inverse. Half a picometre per metre.
+  [[nodiscard]] double slip_rounding(const Call<N>& call) const {
+    double coulomb = 0.0, K = 0.0;
+    laws_.template without_media<N>(call, coulomb, K);
+    return coulomb > 0.0 ? 2048.0 * epsilon * (call.r.norm() + call.q.norm()) : 0.0;
   }
 
   const Laws& laws_;
