@@ -420,7 +420,7 @@ class Judge {
   // (coulomb_step.hpp): the rounding of r counts by their inverse. Half a picometre per metre.
   [[nodiscard]] double slip_rounding(const Call<N>& call) const {
     double coulomb = 0.0, K = 0.0;
-    laws_.template without_media<N>(call, coulomb, K);
+    (void)laws_.template without_media<N>(call, coulomb, K);
     return coulomb > 0.0 ? 2048.0 * epsilon * (call.r.norm() + call.q.norm()) : 0.0;
   }
 
