@@ -57,8 +57,9 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
   return true;
 }
 
-// The plain label of order 2 begins a period before the start. Where that place can't be reached from the start, because
-// an object is in between, the history is no free motion: it begins where 𝒢 leaves it, and without a look further back.
+// The plain label of order 2 begins a period before the start. Where that place can't be reached from the start,
+// because an object is in between, the history is no free motion: it begins where 𝒢 leaves it, and without a look
+// further back.
 template <int N>
 void AdmittanceProxy<N>::go_back(const ProxyStart<N>& start) noexcept {
   if (timed_) g_->set_time({start.time_s, config_.period_s});
