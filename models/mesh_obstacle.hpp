@@ -1,8 +1,8 @@
 // A triangle mesh among other obstacles. Each has its own, since it remembers where the proxy was; the TriangleMesh may
 // be shared.
 //
-// Where the mesh holds the proxy with several of its own faces, the others see the one that presses most: a groove of
-// the mesh together with another object is solved only as far as that goes, and the World holds the proxy beyond.
+// Where the mesh holds the proxy with several of its own faces, the others see the one that presses most; a further
+// face that a solution with others would lead through joins them (World::fits).
 #pragma once
 
 #include <limits>

@@ -112,6 +112,18 @@ void World::Candidates::add(std::size_t i, const Obstacle::Step& step) noexcept 
   grew = true;
 }
 
+// One more face of a mesh that is a candidate already; for what it does together with others, not alone.
+void World::add_face(std::size_t i, const Obstacle::Step& step, Candidates& candidates) noexcept {
+  if (candidates.count == Candidates::most || !step.touches) return;
+  for (std::size_t c = 0; c < candidates.count; ++c) {
+    if (candidates.index[c] == i && candidates.alone[c].feature == step.feature) return;
+  }
+  candidates.index[candidates.count] = i;
+  candidates.alone[candidates.count] = step;
+  candidates.alone[candidates.count++].touches = false;
+  candidates.grew = true;
+}
+
 World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
   std::vector<BoundsTree::Leaf> leaves;
   for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -181,14 +193,21 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
                  const Vec3& p) const noexcept {
   bool all = true;
   for (const std::size_t i : near_) {
-    if (std::find(contacts.begin(), contacts.end(), i) != contacts.end()) continue;
     const Obstacle& obstacle = *entries_[i].obstacle;
-    if (!obstacle.excludes(obstacle.carry(q), r)) continue;
-    if (candidates.around && gets_around(obstacle, p, q, r)) continue;
+    const bool member = std::find(contacts.begin(), contacts.end(), i) != contacts.end();
+    // What holds the proxy by one face may be in its way with another, if it is a mesh; alone it has seen to that.
+    Vec3 normal;
+    if (member && (contacts.size() < 2 || !obstacle.parts(obstacle.carry(q), r, normal))) continue;
+    if (!member && !obstacle.excludes(obstacle.carry(q), r)) continue;
+    if (!member && candidates.around && gets_around(obstacle, p, q, r)) continue;
     all = false;
-    if (!candidates.has(i)) {
-      // It isn't in the way of p, but of the trial: what it would do to that tells its feature.
-      Obstacle::Step s = obstacle.step(K, r, q);
+    const bool known = candidates.has(i);
+    if (known && !member && !obstacle.parts(obstacle.carry(q), r, normal)) continue;
+    // It isn't in the way of p, but of the trial: what it would do to that tells its feature.
+    Obstacle::Step s = obstacle.step(K, r, q);
+    if (known) {
+      add_face(i, s, candidates);
+    } else {
       s.touches = s.touches && obstacle.step(K, p, q).touches;
       candidates.add(i, s);
     }
@@ -214,9 +233,9 @@ void World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& cand
 void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
   for (std::size_t c = 1; c < candidates.count; ++c) {
     for (std::size_t d = 0; d < c; ++d) {
-      const std::size_t m[2] = {std::min(candidates.index[c], candidates.index[d]),
-                                std::max(candidates.index[c], candidates.index[d])};
-      const std::size_t own[2] = {m[0] == candidates.index[d] ? d : c, m[0] == candidates.index[d] ? c : d};
+      const bool in_order = candidates.index[d] <= candidates.index[c];
+      const std::size_t own[2] = {in_order ? d : c, in_order ? c : d};
+      const std::size_t m[2] = {candidates.index[own[0]], candidates.index[own[1]]};
       const PairOfSurfaces pair{*entries_[m[0]].obstacle, *entries_[m[1]].obstacle, candidates.alone[own[0]].feature,
                                 candidates.alone[own[1]].feature};
       SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);

@@ -72,6 +72,7 @@ class World final : public GeometricAlgorithm<3> {
 
   double gather(const Vec3& p, const Vec3& q, double reach) noexcept;
   void add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept;
+  static void add_face(std::size_t i, const Obstacle::Step& step, Candidates& candidates) noexcept;
   [[nodiscard]] bool is_free(const Vec3& q, const Vec3& r) const noexcept;
   bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
             const Vec3& p) const noexcept;
