@@ -76,7 +76,8 @@ class CoulombStep {
     const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // of the way to p; NaN where there is no way
     if (!(share > 0.0)) return false;
     for (int k = 0; k <= tries; ++k) {
-      const double off = 4.0 * u * ((k + 1) / 2) * (k % 2 == 0 ? 1 : -1);
+      const int units = k % 2 == 0 ? -2 * k : 2 * (k + 1);
+      const double off = u * units;
       const Vec<N> aim = q_ - share * (1.0 + off) * d_;
       r = rest_(kappa_ / share, aim, q_);
       if (r == aim) return true;
