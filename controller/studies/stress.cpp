@@ -157,7 +157,7 @@ class Laws {
       const double mu = N == 1 || object >= scene_.objects.size() ? 0.0 : scene_.objects[object].friction;
       const Vec3 motion = lift<N>(call.r) - carried(object, call.time, lift<N>(call.q));
       const Vec3 v = motion - n * n.dot(motion);
-      const double uncertain = 16.0 * epsilon * call.size() / v.norm();
+      const double uncertain = 16.0 * epsilon * (call.size() + carriage(call.time.time_s)) / v.norm();
       if (contact.slips && uncertain < 1e-3) {
         cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
         tolerance += mu * f.norm() * uncertain * condition(call);

@@ -31,20 +31,20 @@ class NetworkAround : public fieldbus::CanNetwork {
  public:
   // `arguments`: of each Bus, behind the bus that it is around.
   template <typename... Arguments>
-  explicit NetworkAround(fieldbus::CanNetwork& inner, Arguments&&... arguments) : inner_(inner) {
+  explicit NetworkAround(fieldbus::CanNetwork& inner, Arguments&&... arguments) : network(inner) {
     for (std::size_t i = 0; i < inner.bus_count(); ++i) {
-      buses_.push_back(std::make_unique<Bus>(inner.bus(i), arguments...));
+      buses.push_back(std::make_unique<Bus>(inner.bus(i), arguments...));
     }
   }
-  [[nodiscard]] std::size_t bus_count() const noexcept override { return buses_.size(); }
-  [[nodiscard]] fieldbus::CanBus& bus(std::size_t index) noexcept override { return *buses_[index]; }
-  [[nodiscard]] std::int64_t now_ns() const noexcept override { return inner_.now_ns(); }
-  void sleep_until(std::int64_t deadline_ns) noexcept override { inner_.sleep_until(deadline_ns); }
-  bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return inner_.wait_for_frame(deadline_ns); }
+  [[nodiscard]] std::size_t bus_count() const noexcept override { return buses.size(); }
+  [[nodiscard]] fieldbus::CanBus& bus(std::size_t index) noexcept override { return *buses[index]; }
+  [[nodiscard]] std::int64_t now_ns() const noexcept override { return network.now_ns(); }
+  void sleep_until(std::int64_t deadline_ns) noexcept override { network.sleep_until(deadline_ns); }
+  bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return network.wait_for_frame(deadline_ns); }
 
  protected:
-  fieldbus::CanNetwork& inner_;
-  std::vector<std::unique_ptr<Bus>> buses_;
+  fieldbus::CanNetwork& network;
+  std::vector<std::unique_ptr<Bus>> buses;
 };
 
 struct RecordingBus final : BusAround {
@@ -63,7 +63,7 @@ class RecordingNetwork final : public NetworkAround<RecordingBus> {
   using NetworkAround::NetworkAround;
   [[nodiscard]] Recording recording() const {
     Recording all;
-    for (const auto& bus : buses_) all.push_back(bus->received);
+    for (const auto& bus : buses) all.push_back(bus->received);
     return all;
   }
 };

@@ -337,6 +337,9 @@ TEST_F(MeshFile, RefusesInScenesWhatAMeshCannot) {
   TriangleSoup open = block({1, 1, 1});
   open.triangles.pop_back();
   write("open.stl", stl_of(open));
+  const std::string regions_on_a_line =
+      "dimensions: 1\nspace: {axes: [[1, 0, 0]]}\nobjects:\n  - mesh: {file: block.stl, friction_regions: "
+      "[{within: {sphere: {centre_m: [0, 0, 0], radius_m: 9}}, friction: 1}]}\n";
   for (const char* text : {
            "objects:\n  - mesh: {file: other.stl}\n",
            "objects:\n  - mesh: {}\n",
@@ -346,9 +349,7 @@ TEST_F(MeshFile, RefusesInScenesWhatAMeshCannot) {
            "objects:\n  - mesh: {file: open.stl, inside_out: true}\n",
            "objects:\n  - mesh: {file: block.stl, layer: {thickness_m: 0.01, stiffness_N_per_m: 100}}\n",
            "media:\n  - viscous: {damping_Ns_per_m: 1, within: {mesh: {file: block.stl}}}\n",
-           "dimensions: 1\nspace: {axes: [[1, 0, 0]]}\nobjects:\n  - mesh: {file: block.stl, friction_regions: "
-           "[{within: "
-           "{sphere: {centre_m: [0, 0, 0], radius_m: 9}}, friction: 1}]}\n",
+           regions_on_a_line.c_str(),
        }) {
     EXPECT_THROW(scenes::compile(scene(text)), SetupError) << text;
   }
