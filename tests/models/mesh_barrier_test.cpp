@@ -199,7 +199,7 @@ void expect_sealed_moving(const Shape& shape, double steps, std::uint64_t seed) 
   }
   std::cout << "  " << shape.name << ": " << contacts << " contacts, " << unresolved << " unresolved, seed " << seed
             << "\n";
-  EXPECT_GT(static_cast<double>(contacts), 0.1 * steps);
+  EXPECT_GT(static_cast<double>(contacts), 0.1 * static_cast<double>(scaled(steps)));
   EXPECT_LE(static_cast<double>(unresolved), 0.01 * static_cast<double>(scaled(steps)));
 }
 

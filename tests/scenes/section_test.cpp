@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "models/description/setup_error.hpp"
@@ -67,8 +68,7 @@ std::string text_of(const Case& c, int dimensions) {
          "]}\nobjects:\n  - " + c.object + "\n";
 }
 
-// Random steps, from outside or inside: never where the solid of W is, and
-// stopped right at it.
+// Random steps, from outside or inside: never where the solid of W is, and stopped right at it.
 template <int N>
 void expect_held_by_the_solid(const Case& c) {
   const Scene scene = parse_scene(text_of(c, N), "section.yaml");
@@ -79,7 +79,7 @@ void expect_held_by_the_solid(const Case& c) {
   const Vec<N> start = q;
   double least = 1.0, nearest = 1.0;
   std::size_t contacts = 0;
-  for (std::int64_t i = 0; i < scaled(10'000); ++i) {
+  for (std::int64_t i = 0; i < std::max(scaled(10'000), std::int64_t{10'000}); ++i) {
     q = g(1e6, q + random.log_uniform(1e-6, 0.3) * random.template direction<N>(), q);
     const double clearance = scenes::clearance_m(scene, world.to_W(q));
     least = std::min(least, clearance);
