@@ -192,6 +192,7 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
   const std::uint64_t unresolved = g_->unresolved_steps();
   ContactSet from_q1;
   std::array<V, max_contacts> normals;  // of from_q1
+  V first = q_k1_;                      // the answer from q₁
   for (const bool from_q_tilde : {false, true}) {
     const V& from = from_q_tilde ? q_tilde : q_k1_;
     const ProxyFault fault = solve(out, from, from_q_tilde ? 2.0 / 3.0 * T : T);
@@ -207,6 +208,22 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
       return ProxyFault::none;
     }
     if (free) break;
+    if (from_q_tilde) {
+      // Behind a mesh, beside another object that holds the same way there, q̃ leads on behind it: an answer that isn't
+      // all but that from q₁ must be in reach from there, so stiffly held that no medium counts.
+      if (!((out.q - first).norm() > 1e-3 * (first - q_k1_).norm())) break;
+      Trial way{.kappa = 1e15 * out.kappa, .p_hat = out.q, .q = out.q, .v = out.v, .f = out.f};
+      const bool reached = solve(way, q_k1_, T) == ProxyFault::none &&
+                           (way.q - out.q).norm() <= 1e-9 * (1.0 + out.q.template lpNorm<1>());
+      if (!reached) {
+        contacts_changed = true;
+        return ProxyFault::none;
+      }
+      const ProxyFault again = solve(out, from, 2.0 / 3.0 * T);  // its contacts are the step's
+      if (again != ProxyFault::none) return again;
+      break;
+    }
+    first = out.q;
     from_q1 = now;
     for (std::size_t i = 0; i < now.count; ++i) normals[i] = contacts[i].normal;
   }
