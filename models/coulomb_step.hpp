@@ -29,7 +29,7 @@ class CoulombStep {
     Sample low{0.0, -F_, q_}, high = at(held_at);
     Vec<N> R = (high.r - q_) / (1.0 - held_at);
     if (!(kappa_ * R.norm() > 2.0 * F_)) {
-      const bool place = is_place(q_);
+      const bool place = q_is_place();
       const bool flat = !place || extrapolate(R, high);
       const double pull = kappa_ * R.norm();
       if (place && (!(pull > F_) || !(kappa_ * size_ > F_))) {  // (3), first case
@@ -84,10 +84,11 @@ class CoulombStep {
     }
     return false;
   }
-  // Whether the rest of the world leaves a proxy from q at r, within the rounding of r; held so stiffly there that no
-  // elastic layer moves it.
-  bool is_place(const Vec<N>& r) noexcept {
-    return (rest_(1e15 * kappa_, r, q_) - r).norm() <= 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
+
+  // Whether the rest of the world leaves a proxy at q, within the rounding of q; held so stiffly there that no elastic
+  // layer moves it.
+  bool q_is_place() noexcept {
+    return (rest_(1e15 * kappa_, q_, q_) - q_).norm() <= 32.0 * u * q_.template lpNorm<1>();
   }
 
   // Next to rest (τ → 1) the way is short, the world flat, and r(τ) = q + (1 − τ) R. R is taken to 1 − τ = 0 by

@@ -30,6 +30,13 @@
 #endif
 
 namespace proxarm::scenes {
+
+#ifdef PROXARM_HUGE_ADDRESS_SPACE
+const bool reader_memory_is_limited = false;
+#else
+const bool reader_memory_is_limited = true;
+#endif
+
 namespace {
 
 // At the beginning of what the child leaves.
@@ -57,10 +64,11 @@ class Descriptor {
   int fd_;
 };
 
-bool write_all(int fd, const void* data, std::size_t size, off_t at) noexcept {
-  const auto* bytes = static_cast<const char*>(data);
+// transfer(bytes, size, at), as pread() and pwrite() do, until all is there.
+template <typename Byte, typename Transfer>
+bool all(Byte* bytes, std::size_t size, off_t at, Transfer transfer) noexcept {
   while (size > 0) {
-    const ssize_t n = ::pwrite(fd, bytes, size, at);
+    const ssize_t n = transfer(bytes, size, at);
     if (n < 0 && errno == EINTR) continue;
     if (n <= 0) return false;
     bytes += n;
@@ -70,17 +78,14 @@ bool write_all(int fd, const void* data, std::size_t size, off_t at) noexcept {
   return true;
 }
 
+bool write_all(int fd, const void* data, std::size_t size, off_t at) noexcept {
+  return all(static_cast<const char*>(data), size, at,
+             [fd](const char* bytes, std::size_t left, off_t from) { return ::pwrite(fd, bytes, left, from); });
+}
+
 bool read_all(int fd, void* data, std::size_t size, off_t at) noexcept {
-  auto* bytes = static_cast<char*>(data);
-  while (size > 0) {
-    const ssize_t n = ::pread(fd, bytes, size, at);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes += n;
-    at += n;
-    size -= static_cast<std::size_t>(n);
-  }
-  return true;
+  return all(static_cast<char*>(data), size, at,
+             [fd](char* bytes, std::size_t left, off_t from) { return ::pread(fd, bytes, left, from); });
 }
 
 void limit(int resource, rlim_t most) noexcept {
@@ -97,11 +102,11 @@ void confine(const ReaderLimits& limits) noexcept {
   }
   limit(RLIMIT_CORE, 0);
   limit(RLIMIT_CPU, static_cast<rlim_t>(std::ceil(limits.seconds)));
-#ifndef PROXARM_HUGE_ADDRESS_SPACE
-  std::size_t pages = 0;
-  std::ifstream("/proc/self/statm") >> pages;
-  limit(RLIMIT_AS, static_cast<rlim_t>(pages) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + limits.memory);
-#endif
+  if (reader_memory_is_limited) {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    limit(RLIMIT_AS, static_cast<rlim_t>(pages) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + limits.memory);
+  }
   const int nowhere = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   if (nowhere >= 0) {
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::dup2(nowhere, fd);

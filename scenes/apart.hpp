@@ -14,6 +14,9 @@ struct ReaderLimits {
   std::size_t memory = 1'000'000'000;  // bytes, more than the process has when it begins
 };
 
+// Not under a sanitizer that reserves more addresses than a limit can hold.
+extern const bool reader_memory_is_limited;
+
 // What `read` returns, called in a child. Throws std::runtime_error with what ended it: an exception of `read` (its
 // text), the limits, a signal. Where no process can be had, that is an error, too.
 std::vector<std::byte> read_apart(const std::function<std::vector<std::byte>()>& read, const ReaderLimits& limits);
