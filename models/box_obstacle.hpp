@@ -19,6 +19,10 @@ class BoxObstacle final : public Obstacle {
   BoxObstacle(const Pose& X, const Vec3& size_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
+  [[nodiscard]] Layer layer() const noexcept override { return layer_; }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return layer_.soft() && distance(r) < -2.0 * rounding(r);
+  }
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
   [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override;
   [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override;

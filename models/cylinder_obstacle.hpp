@@ -16,6 +16,10 @@ class CylinderObstacle final : public Obstacle {
   CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction, const Layer& layer = {});
 
   [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
+  [[nodiscard]] Layer layer() const noexcept override { return end_[0].layer(); }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return depth_ > 0.0 && distance(r) < -2.0 * rounding(r);
+  }
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
   [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override;
   [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override;

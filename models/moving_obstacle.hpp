@@ -101,6 +101,8 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override { return rests_ ? q : Vec3(now_ * from(q)); }
   [[nodiscard]] bool moves() const noexcept override { return true; }
   void set_friction(double friction) noexcept override { still_->set_friction(friction); }
+  [[nodiscard]] Layer layer() const noexcept override { return still_->layer(); }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override { return still_->presses_at(now_inverse_ * r); }
 
  private:
   static Pose rigid(Pose X) noexcept;

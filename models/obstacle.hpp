@@ -10,6 +10,7 @@
 
 #include "models/flat_surface.hpp"
 #include "models/geometric_algorithm.hpp"
+#include "models/layer.hpp"
 
 namespace proxarm::models {
 
@@ -55,6 +56,10 @@ class Obstacle {
     out[0] = {0, s.feature, s.slips, s.normal};
     return 1;
   }
+
+  // Its elastic layer, if it has one, and whether that presses on a proxy at r.
+  [[nodiscard]] virtual Layer layer() const noexcept { return {}; }
+  [[nodiscard]] virtual bool presses_at(const Vec3& /*r*/) const noexcept { return false; }
 
   // True if r can't be where a proxy from q ends: inside by more than rounding, or on the far side of a thin object.
   [[nodiscard]] virtual bool excludes(const Vec3& q, const Vec3& r) const noexcept = 0;

@@ -25,6 +25,10 @@ class PlaneObstacle final : public Obstacle {
     return {s.r, surface_.normal(), 0, s.touches, s.slips};
   }
 
+  [[nodiscard]] Layer layer() const noexcept override { return layer_; }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return layer_.soft() && surface_.height(r) < -surface_.rounding(r);
+  }
   [[nodiscard]] bool excludes(const Vec3& /*q*/, const Vec3& r) const noexcept override {
     return surface_.height(r) < -slack_ * surface_.rounding(r) - (layer_.soft() ? layer_.thickness_m : 0.0);
   }

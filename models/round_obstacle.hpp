@@ -136,6 +136,10 @@ class RoundObstacle final : public Obstacle {
     return slide(K, p, q, trial.excess);
   }
 
+  [[nodiscard]] Layer layer() const noexcept override { return layer_; }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return layer_.soft() && at(core_, r, r).height < -4.0 * rounding(r);
+  }
   [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
     const double hard = at(core_, r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
     if (hard < -4.0 * rounding(r)) return true;

@@ -6,21 +6,13 @@
 
 #include "models/corner.hpp"
 #include "models/groove.hpp"
+#include "models/settling.hpp"
+#include "models/shared_hold.hpp"
 
 namespace proxarm::models {
 namespace {
 
-// Curved surfaces gain the factor penetration / radius with each new tangent plane, and more where they are slow.
-constexpr int most_settling = 60;
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-// No closer than rounding lets it. Tiny moves (their squares, by which planes and curved surfaces differ, are nothing)
-// are the last where the next one, shorter by `contraction`, would be nothing, or where they have stopped shrinking (a
-// slip that is short against a deep p amplifies rounding, so a fixed threshold would not do).
-bool has_settled(double move, double last_move, double contraction, const Vec3& r) noexcept {
-  const double size = 1e-3 + r.lpNorm<1>(), nothing = 5e-17 * size;
-  return move <= nothing || (move <= 1e-9 * size && (contraction * move <= nothing || move > 0.5 * last_move));
-}
 
 // Two objects that hold the proxy between them, each by one of its features.
 struct PairOfSurfaces {
@@ -83,8 +75,9 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, Vec
 struct World::Choice {
   double distance2 = infinity;  // ‖r − p‖²
   Vec3 r = Vec3::Zero();
-  std::array<Contact<3>, 3> contacts{};
+  std::array<Contact<3>, 3> contacts{};  // in shared_ where they share the force
   std::size_t count = 0;
+  bool shared = false;
   bool free = false;  // nothing in the way of p
   bool resolved = true;
 
@@ -129,6 +122,8 @@ World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
   for (std::size_t i = 0; i < entries_.size(); ++i) {
     const Obstacle& obstacle = *entries_[i].obstacle;
     const Bounds bounds = obstacle.bounds();
+    elastic_.push_back(obstacle.layer().soft());
+    soft_ = soft_ || elastic_.back();
     if (obstacle.moves()) {
       moving_.push_back(i);
     } else if (bounds.finite()) {
@@ -198,8 +193,9 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
     // What holds the proxy by one face may be in its way with another, if it is a mesh; alone it has seen to that.
     Vec3 normal;
     if (member && (contacts.size() < 2 || !obstacle.parts(obstacle.carry(q), r, normal))) continue;
-    if (!member && !obstacle.excludes(obstacle.carry(q), r)) continue;
-    if (!member && candidates.around && gets_around(obstacle, p, q, r)) continue;
+    const bool presses = !member && soft_ && obstacle.presses_at(r);
+    if (!member && !presses && !obstacle.excludes(obstacle.carry(q), r)) continue;
+    if (!member && !presses && candidates.around && gets_around(obstacle, p, q, r)) continue;
     all = false;
     const bool known = candidates.has(i);
     if (known && !member && !obstacle.parts(obstacle.carry(q), r, normal)) continue;
@@ -232,7 +228,9 @@ void World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& cand
 
 void World::try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
   for (std::size_t c = 1; c < candidates.count; ++c) {
+    if (elastic_[candidates.index[c]]) continue;
     for (std::size_t d = 0; d < c; ++d) {
+      if (elastic_[candidates.index[d]]) continue;
       const bool in_order = candidates.index[d] <= candidates.index[c];
       const std::size_t own[2] = {in_order ? d : c, in_order ? c : d};
       const std::size_t m[2] = {candidates.index[own[0]], candidates.index[own[1]]};
@@ -258,6 +256,7 @@ void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& cand
       for (std::size_t e = 0; e < d; ++e) {
         const std::size_t own[3] = {e, d, c};
         const std::size_t m[3] = {candidates.index[e], candidates.index[d], candidates.index[c]};
+        if (elastic_[m[0]] || elastic_[m[1]] || elastic_[m[2]]) continue;
         Vec3 r = q, carried[3];
         const Vec3* q_each[3];
         for (std::size_t j = 0; j < 3; ++j) {
@@ -301,7 +300,29 @@ void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& cand
   }
 }
 
-bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept {
+// All candidates at once, where one of them has an elastic layer: those that press share the force.
+void World::try_together(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
+  const std::span<const std::size_t> all{candidates.index.data(), candidates.count};
+  if (std::none_of(all.begin(), all.end(), [this](std::size_t i) { return elastic_[i]; })) return;
+  SharedHold hold;
+  hold.count = candidates.count;
+  for (std::size_t c = 0; c < hold.count; ++c) {
+    hold.obstacle[c] = entries_[candidates.index[c]].obstacle.get();
+    hold.step[c] = candidates.alone[c];
+  }
+  if (!hold.solve(K, p, q) || !fits(q, hold.r, all, candidates, K, p)) return;
+  choice.better(p, hold.r, 0);
+  choice.shared = true;
+  for (std::size_t c = 0; c < hold.count; ++c) {
+    const Obstacle::Step& s = hold.step[c];
+    if (!s.touches) continue;
+    const Entry& entry = entries_[candidates.index[c]];
+    shared_[choice.count++] = {entry.object, entry.feature < 0 ? s.feature : entry.feature, s.slips, s.normal};
+    choice.resolved = choice.resolved && s.resolved;
+  }
+}
+
+bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
   do {
     candidates.grew = false;
     try_singles(K, p, q, candidates, choice);
@@ -311,6 +332,9 @@ bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidate
     if (choice.found()) return true;
     if (candidates.grew) continue;
     try_triples(K, p, q, candidates, choice);
+    if (choice.found()) return true;
+    if (!soft_ || candidates.grew) continue;
+    try_together(K, p, q, candidates, choice);
     if (choice.found()) return true;
   } while (candidates.grew);
   return false;
@@ -422,6 +446,7 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   }
   contacts_ = choice.contacts;
   count_ = choice.count;
+  are_shared_ = choice.shared;
   if (choice.free && moving_.empty()) {
     // Nothing in the way. How much room is there? Only what stands still is remembered.
     double room = infinity;

@@ -5,6 +5,8 @@
 // itself: a curved surface's plane is taken again at each new point until it stays (the error shrinks by penetration
 // over radius each time). The choice among complete sets is the same: fewest contacts, then the smallest ‖q − p‖.
 //
+// Where an elastic layer presses together with others, all that press share the force (models/shared_hold.hpp).
+//
 // A step is first compared with the last known clearance: if both q and p are within it, nothing can be touched.
 #pragma once
 
@@ -32,7 +34,9 @@ class World final : public GeometricAlgorithm<3> {
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
   void set_time(const StepTime& time) noexcept override;
   [[nodiscard]] bool wants_time() const noexcept override { return !moving_.empty(); }
-  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
+  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override {
+    return {are_shared_ ? shared_.data() : contacts_.data(), count_};
+  }
 
   // Signed distance to the nearest obstacle, metres; infinite if there is none.
   [[nodiscard]] double distance(const Vec3& x) const noexcept;
@@ -80,7 +84,8 @@ class World final : public GeometricAlgorithm<3> {
   void try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   void try_pairs(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   void try_triples(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
-  bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  void try_together(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept;
+  bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept;
 
   bool solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept;
   void hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept;
@@ -89,6 +94,8 @@ class World final : public GeometricAlgorithm<3> {
   std::vector<std::size_t> unbounded_;  // obstacles without finite bounds
   std::vector<std::size_t> moving_;     // those that move, bounded or not
   BoundsTree tree_;                     // all others
+  std::vector<bool> elastic_;           // which of all have elastic layers
+  bool soft_ = false;                   // some have
   // What a step may meet: first what stands still and comes within near_radius_ of near_centre_, which is asked for
   // again only when a step leaves that ball; then the movers that are close now.
   std::vector<std::size_t> near_;
@@ -97,6 +104,8 @@ class World final : public GeometricAlgorithm<3> {
   double near_radius_ = -1.0;
   Candidates candidates_;  // of this step; kept, so that a step sets up no more than it needs
   std::array<Contact<3>, 3> contacts_{};
+  std::array<Contact<3>, Candidates::most> shared_{};  // instead of those, where elastic ones share the force
+  bool are_shared_ = false;
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;

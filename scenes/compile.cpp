@@ -258,10 +258,6 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
     throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide",
                   "give a layer to an object that is alone in its scene (media may act with it)");
   }
-  if (layers > 0 && scene.objects.size() > 1) {
-    throw refusal(scene, scene.objects.front().line, "found an elastic layer in a scene of several objects",
-                  "give a layer to an object that is alone in its scene (media may act with it)");
-  }
   if (scene.guide && scene.guide->kind == GuideDescription::Kind::plane) {
     add_plane_guide(scene, entries);
     rubbing += scene.guide->friction > 0.0 ? 1 : 0;
@@ -273,7 +269,11 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
     out.stages.push_back({"search among " + std::to_string(entries.size()) + " surfaces", "by a tree of boxes"});
   out.stages.push_back({std::string("contact") + (rubbing > 0 ? " with friction" : ""),
                         "each surface alone, exactly" + std::string(many ? "; then pairs and triples" : "")});
-  if (layers > 0) out.stages.push_back({"elastic layer", scene.objects.front().name});
+  if (layers > 0) {
+    out.stages.push_back(
+        {std::to_string(layers) + (layers > 1 ? " elastic layers" : " elastic layer"),
+         many ? "alone exactly; with others the force is shared by sweeps" : scene.objects.front().name});
+  }
   if (moving > 0) {
     out.stages.push_back({"motion", std::to_string(moving) + (moving > 1 ? " objects" : " object") +
                                         "; q is carried along, and met in the object's frame"});

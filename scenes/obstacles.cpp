@@ -44,7 +44,7 @@ struct MakeParts {
     if (!s.inside_out) return one(std::make_unique<models::BoxObstacle>(s.pose_W, s.size_m, mu, layer));
     std::vector<Part> parts;
     for (const auto& face : models::BoxObstacle::faces(s.pose_W, s.size_m)) {
-      parts.push_back({std::make_unique<models::PlaneObstacle>(face.point(), Vec3(-face.normal()), mu),
+      parts.push_back({std::make_unique<models::PlaneObstacle>(face.point(), Vec3(-face.normal()), mu, layer),
                        static_cast<std::int32_t>(parts.size())});
     }
     return parts;
@@ -53,9 +53,10 @@ struct MakeParts {
     if (!s.inside_out) return one(std::make_unique<models::CylinderObstacle>(s.from_m, s.to_m, s.radius_m, mu, layer));
     std::vector<Part> parts;
     const Vec3 e = direction(s);
-    parts.push_back({std::make_unique<models::RoundBar>(models::LineCore{s.from_m, e}, s.radius_m, mu, true), 0});
-    parts.push_back({std::make_unique<models::PlaneObstacle>(s.to_m, Vec3(-e), mu), 1});
-    parts.push_back({std::make_unique<models::PlaneObstacle>(s.from_m, e, mu), 2});
+    parts.push_back(
+        {std::make_unique<models::RoundBar>(models::LineCore{s.from_m, e}, s.radius_m, mu, true, layer), 0});
+    parts.push_back({std::make_unique<models::PlaneObstacle>(s.to_m, Vec3(-e), mu, layer), 1});
+    parts.push_back({std::make_unique<models::PlaneObstacle>(s.from_m, e, mu, layer), 2});
     return parts;
   }
   std::vector<Part> operator()(const MeshShape& s) const {
@@ -121,9 +122,9 @@ struct Thickness {
   double operator()(const PlaneShape&) const { return kEndless; }
   double operator()(const SphereShape& s) const { return s.inside_out ? kEndless : 2.0 * s.radius_m; }
   double operator()(const CapsuleShape& s) const { return s.inside_out ? kEndless : 2.0 * s.radius_m; }
-  double operator()(const BoxShape& s) const { return s.inside_out ? 0.0 : s.size_m.minCoeff(); }
+  double operator()(const BoxShape& s) const { return s.inside_out ? kEndless : s.size_m.minCoeff(); }
   double operator()(const CylinderShape& s) const {
-    return s.inside_out ? 0.0 : std::min(2.0 * s.radius_m, (s.to_m - s.from_m).norm());
+    return s.inside_out ? kEndless : std::min(2.0 * s.radius_m, (s.to_m - s.from_m).norm());
   }
   double operator()(const MeshShape&) const { return 0.0; }
 };
@@ -136,7 +137,7 @@ double size_of(const Shape& shape) { return std::visit(Size{}, shape); }
 std::vector<Part> parts_of(const Scene& scene, const Object& object) {
   Layer layer;
   if (object.layer) {
-    // From inside, a box or a cylinder is several surfaces, and within a layer a mesh's faces have no exact sides.
+    // Within a layer a mesh's faces have no exact sides.
     const double thickness = std::visit(Thickness{}, object.shape);
     if (!(object.layer->thickness_m < 0.5 * thickness)) {
       throw description::SetupError(
@@ -144,8 +145,8 @@ std::vector<Part> parts_of(const Scene& scene, const Object& object) {
            .line = object.line,
            .key = "layer",
            .found = "a layer of " + description::number_text(object.layer->thickness_m) + " m on " + object.name,
-           .expected = thickness > 0.0 ? "less than half of how thick the object is"
-                                       : "a layer on a plane, sphere or capsule, or on a solid box or cylinder"});
+           .expected =
+               thickness > 0.0 ? "less than half of how thick the object is" : "a layer on an object that is no mesh"});
     }
     layer = {object.layer->stiffness_N_per_m, object.layer->thickness_m};
   }

@@ -16,8 +16,8 @@ struct Part {
   std::int32_t feature = -1;  // to be reported; −1: the obstacle's own
 };
 
-// The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on a mesh, on a box or a
-// cylinder from inside, or as thick as what it is on.
+// The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on a mesh, or as thick as
+// what it is on.
 std::vector<Part> parts_of(const Scene& scene, const Object& object);
 
 // Friction by face of a mesh with regions; empty for any other object. Throws SetupError for a region without a

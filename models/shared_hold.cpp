@@ -1,0 +1,263 @@
+#include "models/shared_hold.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "models/settling.hpp"
+
+namespace proxarm::models {
+namespace {
+
+constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+constexpr std::size_t most = SharedHold::most;
+constexpr int most_rounds = 4;
+constexpr int most_rows = 3 * static_cast<int>(most);
+// On the stack.
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_rows, 1>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most_rows, most_rows>;
+
+// One contact on its tangent plane.
+struct FlatContact {
+  FlatSurface<3> surface = FlatSurface<3>::of_unit(Vec3::Zero(), Vec3::UnitZ());
+  double mu = 0.0;
+  Layer layer;
+  Vec3 q = Vec3::Zero();  // as the obstacle sees it
+};
+
+// What (4) with its layer makes of p_i, and how that changes with p_i.
+struct Response {
+  Vec3 r;
+  Mat3 D;
+};
+
+Response respond(const FlatContact& c, double K, const Vec3& p) noexcept {
+  const Vec3& n = c.surface.normal();
+  const double h_p = c.surface.height(p);
+  if (h_p > 0.0) return {p, Mat3::Identity()};
+  double h = 0.0, gives = 0.0;  // height of r, and its derivative
+  if (c.layer.soft()) {
+    gives = K / (K + c.layer.stiffness_N_per_m);
+    h = gives * h_p;
+    if (h < -c.layer.thickness_m) {
+      h = -c.layer.thickness_m;
+      gives = 0.0;
+    }
+  }
+  const Mat3 nn = n * n.transpose();
+  const Vec3 p_t = p + n * (h - h_p), q_t = c.q + n * (h - c.surface.height(c.q)), d = p_t - q_t;
+  const double distance = d.norm(), reach = c.mu * (h - h_p);
+  if (!(distance > reach)) return {q_t, gives * nn};
+  const Vec3 e = d / distance;
+  const double share = reach / distance;
+  const Mat3 T = Mat3::Identity() - nn;
+  return {p_t - share * d,
+          gives * nn + (1.0 - share) * T + share * e * e.transpose() + c.mu * (1.0 - gives) * e * n.transpose()};
+}
+
+// The forces of all over K, and what each contact makes of them.
+class FlatHold {
+ public:
+  std::array<FlatContact, most> contact;
+  std::array<Vec3, most> x;  // f_i / K
+  std::size_t count = 0;
+  Vec3 r;
+
+  // What a contact does with a force is the same by every stiffness (Assumption 1), and Newton's steps get along better
+  // with one or another: the own, or one that keeps all points near their surfaces. Found by another, the forces are as
+  // exact as that one's steps: once more by the own.
+  bool solve(double K, const Vec3& p) noexcept {
+    const std::array<Vec3, most> start = x;
+    double k = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (contact[i].layer.soft()) k = std::max(k, contact[i].layer.stiffness_N_per_m);
+    }
+    stiffer_ = 1.0;
+    sweep(K, p);
+    if (solve_from_here(K, p, Haste::few_steps)) return true;
+    for (const double stiffer : {100.0, 1e3, k / K, 30.0, 30.0 * k / K, 1.0 / 30.0, k / K / 30.0, 1.0}) {
+      x = start;
+      sweep(K, p);
+      stiffer_ = stiffer;
+      const bool found = solve_from_here(K, p, Haste::none);
+      stiffer_ = 1.0;
+      if (found && (stiffer == 1.0 || solve_from_here(K, p, Haste::few_steps))) return true;
+    }
+    return false;
+  }
+
+ private:
+  enum class Haste : std::uint8_t { few_steps, none };
+  static constexpr int most_steps = 40, bold_steps = 8, most_stuck = 4;
+
+  // Newton's steps: the first ones wherever they lead, then while they lead somewhere, and sweeps where they don't.
+  bool solve_from_here(double K, const Vec3& p, Haste haste) noexcept {
+    double apart = evaluate(K, p);
+    int stuck = 0;
+    for (int k = 0; k < (haste == Haste::few_steps ? bold_steps : most_steps); ++k) {
+      const double nothing = u * size_;
+      if (!std::isfinite(apart)) return false;
+      if (apart <= nothing) return true;
+      if (step(K, p, apart, k < bold_steps && apart > 64.0 * nothing)) {
+        stuck = 0;
+        continue;
+      }
+      // Rounding is all that is left, or Newton's steps lead nowhere.
+      if (apart <= 64.0 * nothing) return true;
+      if (++stuck > most_stuck) return false;
+      for (int s = 0; s < 3 * stuck; ++s) sweep(K, p);
+      apart = evaluate(K, p);
+    }
+    return apart <= 64.0 * u * size_;
+  }
+
+  // Each in turn with the others' latest held; what is rigid first, since the layers' forces are known by where the
+  // proxy was.
+  void sweep(double K, const Vec3& p) noexcept {
+    for (const bool soft : {false, true}) {
+      for (std::size_t i = 0; i < count; ++i) {
+        if (contact[i].layer.soft() != soft) continue;
+        Vec3 p_i = p;
+        for (std::size_t j = 0; j < count; ++j) {
+          if (j != i) p_i += x[j];
+        }
+        x[i] = respond(contact[i], K, p_i).r - p_i;
+      }
+    }
+  }
+
+  // R_i = 𝒢_i(K, r − x_i) − r with r = p + Σ x_j; returns the largest.
+  double evaluate(double K, const Vec3& p) noexcept {
+    r = p;
+    size_ = p.lpNorm<1>();
+    for (std::size_t i = 0; i < count; ++i) {
+      r += x[i];
+      size_ += x[i].lpNorm<1>() + contact[i].q.lpNorm<1>();
+    }
+    double apart = 0.0;
+    for (std::size_t i = 0; i < count; ++i) {
+      response_[i] = respond(contact[i], stiffer_ * K, r - x[i] / stiffer_);
+      apart = std::max(apart, (response_[i].r - r).lpNorm<Eigen::Infinity>());
+    }
+    return apart;
+  }
+
+  // dR_i = (D_i − I) Σ dx_j − D_i dx_i = −R_i. True where that took a part of `apart` off; `bold`: in any case.
+  bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
+    const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);
+    Square A(n, n);
+    Rows b(n);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto row = 3 * static_cast<Eigen::Index>(i);
+      b.segment<3>(row) = r - response_[i].r;
+      for (std::size_t j = 0; j < count; ++j) {
+        const auto column = 3 * static_cast<Eigen::Index>(j);
+        A.block<3, 3>(row, column) = response_[i].D - Mat3::Identity();
+        if (j == i) A.block<3, 3>(row, column) -= response_[i].D / stiffer_;
+      }
+    }
+    const Rows dx = A.colPivHouseholderQr().solve(b);
+    if (!dx.allFinite()) return false;
+    const std::array<Vec3, most> before = x;
+    const double apart_before = apart;
+    for (const double share : {1.0, 0.5, 0.25, 0.125}) {
+      for (std::size_t i = 0; i < count; ++i) {
+        x[i] = before[i] + share * dx.segment<3>(3 * static_cast<Eigen::Index>(i));
+      }
+      apart = evaluate(K, p);
+      if (bold || apart < (1.0 - 0.25 * share) * apart_before) return true;
+    }
+    x = before;
+    apart = evaluate(K, p);
+    return false;
+  }
+
+  std::array<Response, most> response_;
+  double size_ = 0.0, stiffer_ = 1.0;
+};
+
+// On tangent planes at `at`; at = r is wanted.
+bool settle(SharedHold& hold, FlatHold& flat, double K, const Vec3& p, const Vec3& q) noexcept {
+  Vec3 at = q;
+  double last_move = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < most_settling; ++k) {
+    bool same = k > 0;
+    for (std::size_t i = 0; i < flat.count; ++i) {
+      const Obstacle::Tangent t = hold.obstacle[i]->tangent(at, hold.step[i].feature);
+      same = same && t.surface.normal() == flat.contact[i].surface.normal();
+      flat.contact[i].surface = t.surface;
+      flat.contact[i].mu = t.mu;
+    }
+    if (same) return true;
+    if (!flat.solve(K, p)) return false;
+    const double move = (flat.r - at).norm();
+    at = flat.r;
+    if (k > 0 && has_settled(move, last_move, move / last_move, at)) return true;
+    last_move = move;
+  }
+  return false;
+}
+
+enum class Confirmed : std::uint8_t { yes, no, other_features };
+
+// What each obstacle itself says, edges and curvature and all, with the others' forces held.
+Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& p, const Vec3& q) noexcept {
+  // Edges and curvature are off by far more than that if they are; rounding by less, of objects of a hundred metres.
+  const double nothing = 1e-12 * (1.0 + p.lpNorm<1>() + q.lpNorm<1>());
+  bool agree = true, others = false;
+  hold.r = flat.r;
+  for (std::size_t i = 0; i < flat.count; ++i) {
+    Obstacle::Step& s = hold.step[i];
+    const std::int32_t feature = s.feature;
+    const Obstacle::Step own = hold.obstacle[i]->step(K, flat.r - flat.x[i], q);
+    const bool here = (own.r - flat.r).lpNorm<Eigen::Infinity>() <= nothing;
+    agree = agree && here;
+    others = others || (own.touches && own.feature != feature);
+    s = own;
+    if (!own.touches) s.feature = feature;
+  }
+  if (agree) {
+    // What is rigid knows best where its surface is; who sticks to something stays bit for bit.
+    for (std::size_t i = 0; i < hold.count; ++i) {
+      if (hold.step[i].touches && !flat.contact[i].layer.soft()) hold.r = hold.step[i].r;
+    }
+    for (std::size_t i = 0; i < hold.count; ++i) {
+      if (hold.step[i].touches && hold.step[i].r == q) hold.r = q;
+    }
+    return Confirmed::yes;
+  }
+  return others ? Confirmed::other_features : Confirmed::no;
+}
+
+}  // namespace
+
+bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
+  FlatHold flat;
+  flat.count = count;
+  for (std::size_t i = 0; i < count; ++i) {
+    FlatContact& c = flat.contact[i];
+    c.q = obstacle[i]->carry(q);
+    c.layer = obstacle[i]->layer();
+    flat.x[i] = Vec3::Zero();
+    if (!c.layer.soft()) continue;
+    // Where friction elsewhere holds the proxy this is its force; sweeps would take K / k off what is missing.
+    const FlatSurface<3> surface = obstacle[i]->tangent(c.q, step[i].feature).surface;
+    const double depth = std::clamp(-surface.height(c.q), 0.0, c.layer.thickness_m);
+    flat.x[i] = (c.layer.stiffness_N_per_m / K * depth) * surface.normal();
+  }
+  for (int round = 0; round < most_rounds; ++round) {
+    if (!settle(*this, flat, K, p, q)) return false;
+    switch (confirm(*this, flat, K, p, q)) {
+      case Confirmed::yes:
+        return true;
+      case Confirmed::no:
+        return false;
+      case Confirmed::other_features:
+        break;
+    }
+  }
+  return false;
+}
+
+}  // namespace proxarm::models
