@@ -26,13 +26,17 @@ struct Medium {
 template <int N>
 class Media final : public GeometricAlgorithm<N> {
  public:
-  Media(std::unique_ptr<GeometricAlgorithm<N>> rest, std::vector<Medium> media, double period_s = 1e-3)
-      : rest_(std::move(rest)), media_(std::move(media)), T_(period_s) {}
+  static constexpr double first_period_s = 1e-3;  // until set_time() says another
+
+  // `X_WS`: of the space whose first N coordinates the proxy has; shapes are in W.
+  Media(std::unique_ptr<GeometricAlgorithm<N>> rest, std::vector<Medium> media, double period_s = first_period_s,
+        const Pose& X_WS = Pose::Identity())
+      : rest_(std::move(rest)), media_(std::move(media)), X_WS_(X_WS), T_(period_s) {}
 
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
     double c = 0.0, F = 0.0;
     for (const Medium& medium : media_) {
-      if (medium.shape != nullptr && medium.shape->distance(lift<N>(q)) > 0.0) continue;
+      if (medium.shape != nullptr && medium.shape->distance(in_W(q)) > 0.0) continue;
       c += medium.damping_Ns_per_m / T_;
       F += medium.force_N;
     }
@@ -52,6 +56,10 @@ class Media final : public GeometricAlgorithm<N> {
   [[nodiscard]] bool squeezed() const noexcept override { return rest_->squeezed(); }
 
  private:
+  [[nodiscard]] Vec3 in_W(const Vec<N>& q) const noexcept {
+    if constexpr (N == 3) return q;
+    return X_WS_ * lift<N>(q);
+  }
   Vec<N> coulomb(double kappa, double F, const Vec<N>& p, const Vec<N>& q) noexcept {
     bool found = true;
     const Vec<N> r = CoulombStep<N>(*rest_, kappa, F, p, q).solve(found);
@@ -61,6 +69,7 @@ class Media final : public GeometricAlgorithm<N> {
 
   std::unique_ptr<GeometricAlgorithm<N>> rest_;
   std::vector<Medium> media_;
+  Pose X_WS_;
   double T_;
   std::uint64_t unresolved_ = 0;
 };

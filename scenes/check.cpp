@@ -8,8 +8,10 @@
 
 #include "models/cone_sum.hpp"
 #include "models/mechanistic_map.hpp"
+#include "models/media.hpp"
 #include "scenes/compile.hpp"
 #include "scenes/obstacles.hpp"
+#include "scenes/section.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -94,8 +96,9 @@ double condition(const State<N>& s) {
 // How far f is from what the contacts can bear, in parts of what rounding explains (0 or 2: a test, not a distance).
 template <int N>
 double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
-  double tolerance = condition(s) * 64.0 * epsilon * s.K * s.size();
-  const Vec3 f = lift<N>(s.f()), motion = lift<N>(s.r - s.q);
+  const double viscous = region.viscous_N_per_m ? region.viscous_N_per_m(s.q) : 0.0;
+  double tolerance = condition(s) * 64.0 * epsilon * (s.K + viscous) * s.size();
+  const Vec3 f = lift<N>(s.f() + viscous * (s.r - s.q)), motion = lift<N>(s.r - s.q);
   std::vector<models::ForceCone> cones;
   for (const auto& contact : s.contacts) {
     const Vec3 n = lift<N>(contact.normal);
@@ -203,18 +206,29 @@ class Checker {
   CheckReport report_;
 };
 
-// Points just outside of an object's surface, by walking along the distance's slope.
-std::vector<Vec3> around(const Object& object, Random& random, int count) {
+// The point of the proxy's space next to x.
+Vec3 onto(const Space& space, const Vec3& x_W) {
+  if (space.dimensions == 3) return x_W;
+  const auto axes = space.axes.leftCols(space.dimensions);
+  return space.origin_m + axes * (axes.transpose() * (x_W - space.origin_m));
+}
+
+// Points of the proxy's space just outside of an object's surface, by walking along the distance's slope.
+std::vector<Vec3> around(const Object& object, const Space& space, Random& random, int count) {
   const Vec3 middle = middle_of(object.shape);
   const double size = size_of(object.shape);
   std::vector<Vec3> places;
   for (int i = 0; i < count; ++i) {
-    Vec3 x = middle + random.in_box<3>(1.2 * size);
+    Vec3 x = onto(space, middle + random.in_box<3>(1.2 * size));
     for (int k = 0; k < 20; ++k) {
       const double d = distance_to(object, x), h = 1e-6 * size;
-      Vec3 slope;
-      for (int a = 0; a < 3; ++a) slope[a] = (distance_to(object, x + h * Vec3::Unit(a)) - d) / h;
-      x -= (d - 1e-3 * size) * slope;
+      Vec3 slope = Vec3::Zero();
+      for (int a = 0; a < space.dimensions; ++a) {
+        const Vec3 axis = space.dimensions == 3 ? Vec3(Vec3::Unit(a)) : Vec3(space.axes.col(a));
+        slope += (distance_to(object, x + h * axis) - d) / h * axis;
+      }
+      // In a space that cuts the object the slope along it is less than one.
+      x -= (d - 1e-3 * size) / (space.dimensions == 3 ? 1.0 : std::max(slope.squaredNorm(), 0.1)) * slope;
       if (std::abs(d - 1e-3 * size) < 1e-4 * size) break;
     }
     places.push_back(x);
@@ -225,7 +239,11 @@ std::vector<Vec3> around(const Object& object, Random& random, int count) {
 // Points of a guide where nothing is, half of them within 2 mm of an object: from a random one along the guide, by as
 // much as there is room.
 std::vector<Vec3> on_guide(const Scene& scene, Random& random) {
-  const GuideDescription& guide = *scene.guide;
+  GuideDescription guide = guide_in_space(scene);
+  if (scene.space.dimensions < 3) {
+    for (Vec3& point : guide.points_m) point = scene.space.origin_m + scene.space.axes * point;
+    guide.direction = scene.space.axes * guide.direction;
+  }
   std::vector<Vec3> places;
   for (int i = 0; i < 400; ++i) {
     Vec3 x = guide.points_m.front(), along = guide.direction.normalized();
@@ -266,7 +284,23 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   // Contacts don't say which region of a mesh they are on.
   const auto has_regions = [](const Object& object) { return !object.friction_regions.empty(); };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), has_regions)) region.friction.reset();
-  region.acts_without_contact = !scene.media.empty() || scene.coulomb_force_N || scene.guide;
+  const auto rubs = [](const MediumDescription& medium) { return medium.force_N > 0.0; };
+  region.acts_without_contact =
+      std::any_of(scene.media.begin(), scene.media.end(), rubs) || scene.coulomb_force_N || scene.guide;
+  std::vector<models::Medium> media;
+  for (const MediumDescription& medium : scene.media) {
+    media.push_back({medium.damping_Ns_per_m, 0.0, medium.within ? region_of(*medium.within) : nullptr});
+  }
+  if (!media.empty()) {
+    region.viscous_N_per_m = [&](const Vec<N>& q) {
+      double sum = 0.0;
+      for (const models::Medium& medium : media) {
+        if (medium.shape != nullptr && medium.shape->distance(compiled.to_W<N>(q)) > 0.0) continue;
+        sum += medium.damping_Ns_per_m / models::Media<N>::first_period_s;
+      }
+      return sum;
+    };
+  }
   region.bends = scene.guide && scene.guide->kind == GuideDescription::Kind::polyline;
   if (scene.guide) region.centre = compiled.from_W<N>(scene.guide->points_m.front());
   // A proxy gets onto a guide before it meets objects.
@@ -326,7 +360,7 @@ std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& opt
   Random random(options.seed);
   std::vector<Vec3> all;
   for (const Object& object : scene.objects) {
-    const std::vector<Vec3> places = around(object, random, scene.objects.size() > 100 ? 4 : 200);
+    const std::vector<Vec3> places = around(object, scene.space, random, scene.objects.size() > 100 ? 4 : 200);
     all.insert(all.end(), places.begin(), places.end());
     if (scene.objects.size() < 2 || scene.objects.size() > 100) continue;
     Scene alone = scene;

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,7 +37,9 @@ struct CheckRegion {
   double size_m = 0.5;                            // half-width
   std::vector<models::Vec<N>> places{};           // points of the free space to look around; none: anywhere
   std::optional<std::vector<double>> friction{};  // μ by contact's object; unknown: forces must only not pull
-  bool acts_without_contact = false;              // a field, a medium or a guide
+  bool acts_without_contact = false;              // a field, a Coulomb medium or a guide
+  // What viscous media add to the coupling at q: b/T, N/m. Their force isn't the contacts'.
+  std::function<double(const models::Vec<N>& q)> viscous_N_per_m{};
   bool bends = false;  // a chain of pieces: near its corners another piece may be a solution too
   bool soft = false;   // an elastic layer: nothing rests in it without a force
 };

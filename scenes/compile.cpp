@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "models/box_obstacle.hpp"
 #include "models/coulomb_field.hpp"
@@ -68,33 +69,17 @@ struct Cut {
   std::vector<std::pair<const Object*, std::int32_t>> others;
 };
 
-SetupError inside(const Scene& scene, const Object& object) {
-  return refusal(scene, object.line, "the proxy's space lies inside the object " + object.name,
-                 "move `space` or the object");
-}
-
-// n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W, not of length one where the cut is oblique.
 template <int N>
 void cut_plane(const Scene& scene, const Object& object, std::int32_t index, std::int32_t feature,
                const PlaneShape& plane, Cut<N>& cut, CompiledScene& out) {
   if constexpr (N == 3) {
-    if (scene.space.axes.isIdentity(0.0) && scene.space.origin_m.isZero(0.0)) {
-      cut.planes.push_back({&object, index, feature, plane.point_m, plane.normal});
-      return;
-    }
-  }
-  const auto A = scene.space.axes.leftCols<N>();
-  const Vec3 n = plane.normal.normalized();
-  const Vec<N> m = A.transpose() * n;
-  const Vec<N> near = A.transpose() * (plane.point_m - scene.space.origin_m);
-  const double height = n.dot(scene.space.origin_m + A * near - plane.point_m);
-  // A space that is parallel to the plane within rounding of both meets it nowhere or lies in it.
-  if (m.norm() < 1e-12) {
-    if (height < 0.0) throw inside(scene, object);
+    cut.planes.push_back({&object, index, feature, plane.point_m, plane.normal});
+  } else if (const auto in_space = plane_in_space(scene, object, plane)) {
+    cut.planes.push_back(
+        {&object, index, feature, in_space->point_m.template head<N>(), in_space->normal.template head<N>()});
+  } else {
     out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
-    return;
   }
-  cut.planes.push_back({&object, index, feature, near - m * (height / m.squaredNorm()), m});
 }
 
 template <int N>
@@ -104,7 +89,10 @@ void cut_sphere(const Scene& scene, const Object& object, std::int32_t index, co
   const Vec<N> near = A.transpose() * (sphere.centre_m - scene.space.origin_m);
   const double away = (scene.space.origin_m + A * near - sphere.centre_m).norm();
   if (!(away < sphere.radius_m)) {
-    if (sphere.inside_out) throw inside(scene, object);
+    if (sphere.inside_out) {
+      throw refusal(scene, object.line, "the proxy's space lies inside the object " + object.name,
+                    "move `space` or the object");
+    }
     out.skipped.push_back({object.name, "doesn't meet the proxy's space"});
     return;
   }
@@ -131,14 +119,8 @@ Cut<N> cut_scene(const Scene& scene, CompiledScene& out) {
       continue;
     }
     if constexpr (N < 3) {
-      if (!plain) {
-        throw refusal(scene, object.line,
-                      "found " + object.name + " (" + kind_of(object.shape) + (object.layer ? " with a layer" : "") +
-                          (object.motion ? " that moves" : "") + ") in a scene of " + std::to_string(N) +
-                          (N == 1 ? " dimension" : " dimensions"),
-                      "use rigid objects that stand still there, or `dimensions: 3`");
-      }
-      if (const auto* sphere = std::get_if<SphereShape>(&object.shape)) {
+      const auto* sphere = std::get_if<SphereShape>(&object.shape);
+      if (sphere != nullptr && plain) {
         cut_sphere<N>(scene, object, index, *sphere, cut, out);
       } else {
         cut.solids.emplace_back(&object, index);
@@ -191,8 +173,9 @@ Algorithm<N> several_planes(const Cut<N>& cut, CompiledScene& out) {
   out.skipped.push_back({"search", "all surfaces are flat and few"});
   auto composition = std::make_unique<models::PlaneComposition>(std::move(faces));
   if (N > 1) {
+    std::int32_t last = -1;
     for (const auto& plane : cut.planes) {
-      if (plane.feature != 0) continue;  // once for an object
+      if (std::exchange(last, plane.index) == plane.index) continue;  // once for an object
       out.rubbing.emplace_back(plane.index, [planes = composition.get(), object = plane.index](double mu) {
         planes->set_friction(object, mu);
       });
@@ -202,10 +185,10 @@ Algorithm<N> several_planes(const Cut<N>& cut, CompiledScene& out) {
 }
 
 std::unique_ptr<models::Obstacle> moved(std::unique_ptr<models::Obstacle> still, const Object& object,
-                                        std::int32_t index, CompiledScene& out) {
+                                        const Scene& scene, std::int32_t index, CompiledScene& out) {
   if (!object.motion) return still;
   if (!object.motion->driven) {
-    return std::make_unique<models::MovingObstacle>(std::move(still), script_of(*object.motion));
+    return std::make_unique<models::MovingObstacle>(std::move(still), script_in_space(scene, object));
   }
   auto driven = std::make_unique<models::MovingObstacle>(std::move(still), models::Pose::Identity());
   out.driven.emplace_back(index, driven.get());
@@ -242,11 +225,14 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
   for (const auto& [object, index] : cut.solids) {
     std::vector<Part> parts = section_of(scene, *object);
     if (parts.empty()) out.skipped.push_back({object->name, "doesn't meet the proxy's space"});
-    for (Part& part : parts) entries.push_back({std::move(part.obstacle), index, part.feature});
+    for (Part& part : parts) {
+      entries.push_back({moved(std::move(part.obstacle), *object, scene, index, out), index, part.feature});
+    }
+    layers += object->layer ? 1 : 0;
   }
   for (const auto& [object, index] : cut.others) {
     for (Part& part : parts_of(scene, *object)) {
-      entries.push_back({moved(std::move(part.obstacle), *object, index, out), index, part.feature});
+      entries.push_back({moved(std::move(part.obstacle), *object, scene, index, out), index, part.feature});
     }
     layers += object->layer ? 1 : 0;
   }
@@ -303,11 +289,12 @@ void require_still(const Scene& scene) {
   }
 }
 
+template <int N>
 Algorithm<3> guide_among_objects(const Scene& scene, const GuideDescription& guide, CompiledScene& out) {
   const auto index = static_cast<std::int32_t>(scene.objects.size());
   if (guide.kind == GuideDescription::Kind::plane) {
     out.stages.push_back({"guide on a plane", "two half-spaces back to back, among the objects"});
-    return world<3>(scene, cut_scene<3>(scene, out), out);
+    return world<N>(scene, cut_scene<N>(scene, out), out);
   }
   require_still(scene);
   CompiledScene objects;  // whose friction doesn't matter: what is in the way
@@ -316,7 +303,7 @@ Algorithm<3> guide_among_objects(const Scene& scene, const GuideDescription& gui
       guide.kind == GuideDescription::Kind::line
           ? models::PolylineGuide::line(guide.points_m.front(), guide.direction, guide.friction)
           : models::PolylineGuide(guide.points_m, guide.closed, guide.friction);
-  along.stop_at(world<3>(scene, cut_scene<3>(scene, objects), objects), index);
+  along.stop_at(world<N>(scene, cut_scene<N>(scene, objects), objects), index);
   out.stages.push_back({guide.kind == GuideDescription::Kind::line
                             ? "guide on a line"
                             : "guide along " + std::to_string(guide.points_m.size()) + " points",
@@ -327,8 +314,9 @@ Algorithm<3> guide_among_objects(const Scene& scene, const GuideDescription& gui
   return std::make_unique<models::PolylineGuide>(std::move(along));
 }
 
+template <int N>
 Algorithm<3> guide(const Scene& scene, const GuideDescription& guide, CompiledScene& out) {
-  if (!scene.objects.empty()) return guide_among_objects(scene, guide, out);
+  if (!scene.objects.empty()) return guide_among_objects<N>(scene, guide, out);
   out.skipped.push_back({"contacts", "no objects"});
   if (!(guide.friction > 0.0)) out.skipped.push_back({"friction", "μ = 0"});
   switch (guide.kind) {
@@ -373,14 +361,7 @@ Algorithm<3> one_mesh(const Scene& scene, const Object& object, const MeshShape&
 
 template <int N>
 Algorithm<N> contacts(const Scene& scene, CompiledScene& out) {
-  if (scene.guide) {
-    if constexpr (N == 3) {
-      return guide(scene, *scene.guide, out);
-    } else {
-      throw refusal(scene, scene.guide->line_number, "found a guide in a scene of fewer than three dimensions",
-                    "a space of one or two dimensions is a guide already");
-    }
-  }
+  if (scene.guide) return in_space<N>(guide<N>(scene, guide_in_space(scene), out));
   const Cut<N> cut = cut_scene<N>(scene, out);
   if (cut.balls.empty() && cut.solids.empty() && cut.others.empty()) {
     if (cut.planes.empty()) {
@@ -407,12 +388,6 @@ Algorithm<N> build(const Scene& scene, CompiledScene& out) {
   Algorithm<N> g = contacts<N>(scene, out);
   std::vector<models::Medium> media;
   for (const MediumDescription& medium : scene.media) {
-    if (medium.within && N < 3) {
-      throw refusal(scene, medium.line,
-                    "found a medium within a shape in a scene of fewer than "
-                    "three dimensions",
-                    "let it act everywhere, or use `dimensions: 3`");
-    }
     media.push_back({medium.damping_Ns_per_m, medium.force_N, medium.within ? region_of(*medium.within) : nullptr});
     out.stages.push_back({medium.force_N > 0.0 ? "Coulomb medium" : "viscous medium",
                           medium.within ? "within a " + kind_of(*medium.within) : "everywhere"});
@@ -433,7 +408,10 @@ Algorithm<N> build(const Scene& scene, CompiledScene& out) {
     out.skipped.push_back({"media", "none"});
     return g;
   }
-  return std::make_unique<models::Media<N>>(std::move(g), std::move(media));
+  models::Pose X_WS = models::Pose::Identity();
+  X_WS.linear() = scene.space.axes;
+  X_WS.translation() = scene.space.origin_m;
+  return std::make_unique<models::Media<N>>(std::move(g), std::move(media), models::Media<N>::first_period_s, X_WS);
 }
 
 }  // namespace
@@ -441,7 +419,8 @@ Algorithm<N> build(const Scene& scene, CompiledScene& out) {
 CompiledScene compile(const Scene& scene) {
   CompiledScene out;
   out.name = scene.name;
-  out.space = scene.space;
+  // Three dimensions are all of W, in its own coordinates.
+  if (scene.space.dimensions < 3) out.space = scene.space;
   for (const Object& object : scene.objects) out.frictions.push_back(object.friction);
   switch (scene.space.dimensions) {
     case 1:
@@ -458,8 +437,9 @@ CompiledScene compile(const Scene& scene) {
 }
 
 void CompiledScene::drive(std::size_t object, const models::Pose& X) noexcept {
+  const models::Pose X_S = pose_in_space(space, X);
   for (const auto& [index, part] : driven) {
-    if (static_cast<std::size_t>(index) == object) part->drive(X);
+    if (static_cast<std::size_t>(index) == object) part->drive(X_S);
   }
 }
 

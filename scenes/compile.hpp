@@ -44,7 +44,8 @@ struct CompiledScene {
   }
 
   // Moves an object whose motion is `driven` (by its index in the scene) to X, relative to where it was described. Call
-  // it once before each step; the proxy feels the motion from the last call to this one.
+  // it once before each step; the proxy feels the motion from the last call to this one. Of a scene of fewer
+  // dimensions, only what leads along its space counts.
   void drive(std::size_t object, const models::Pose& X) noexcept;
   std::vector<std::pair<std::int32_t, models::MovingObstacle*>> driven;  // parts of any_algorithm
 

@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <map>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -23,6 +24,38 @@ using models::Vec3;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 // Of a direction that is given in round numbers; a space's own axes are held to as much.
 constexpr double straight = 1e-6;
+
+// Of a guide's point from the space, metres: the arm knows its place to as much.
+constexpr double beside_m = 1e-6;
+
+description::SetupError refusal(const Scene& scene, int line, std::string message, std::string advice) {
+  return description::SetupError(
+      {.file = scene.file.string(), .line = line, .message = std::move(message), .advice = std::move(advice)});
+}
+
+std::string in_dimensions(const Scene& scene) {
+  return " in a scene of " + (scene.space.dimensions == 1 ? std::string("1 dimension")
+                                                          : std::to_string(scene.space.dimensions) + " dimensions");
+}
+
+// The nearest point of the space, in its coordinates.
+Vec3 nearest_in(const Space& space, const Vec3& x_W) noexcept {
+  Vec3 x = space.axes.transpose() * (x_W - space.origin_m);
+  for (int k = space.dimensions; k < 3; ++k) x[k] = 0.0;
+  return x;
+}
+
+// The part of a direction, and the length of the rest.
+Vec3 along(const Space& space, const Vec3& v_W, double& rest) noexcept {
+  Vec3 v = space.axes.transpose() * v_W;
+  double out = 0.0;
+  for (int k = space.dimensions; k < 3; ++k) {
+    out = std::hypot(out, v[k]);
+    v[k] = 0.0;
+  }
+  rest = out;
+  return v;
+}
 
 // Along a line, from a to b.
 struct Interval {
@@ -56,12 +89,17 @@ class Section {
   Section(const Scene& scene, const Object& object)
       : scene_(scene), object_(object), mu_(scene.space.dimensions > 1 ? object.friction : 0.0) {}
 
-  std::vector<Part> operator()(const PlaneShape& /*shape*/) const { return {}; }  // compile.cpp cuts it itself
+  std::vector<Part> operator()(const PlaneShape& s) const {
+    const auto plane = plane_in_space(scene_, object_, s);
+    if (!plane) return {};
+    return one(std::make_unique<models::PlaneObstacle>(plane->point_m, plane->normal, mu_, layer_on(infinity)));
+  }
   std::vector<Part> operator()(const SphereShape& s) const {
     return (*this)(CapsuleShape{s.centre_m, s.centre_m, s.radius_m, s.inside_out});
   }
 
   std::vector<Part> operator()(const BoxShape& s) const {
+    if (s.inside_out) return room(s);
     const models::Mat3& R = s.pose_W.linear();
     const Vec3 centre = s.pose_W.translation(), half = 0.5 * s.size_m;
     if (line()) {
@@ -71,14 +109,14 @@ class Section {
         const Interval slab = within_slab(u[k], d[k], half[k]);
         held.meet(slab.a, slab.b);
       }
-      return interval(held, s.inside_out);
+      return interval(held, false);
     }
     for (int k = 0; k < 3; ++k) {
       if (!(R.col(k).cross(axis(2)).norm() < straight)) continue;
-      if (!(std::abs(axis(2).dot(centre - origin())) < half[k])) return outside(s.inside_out);
-      return rectangle(centre, R.col((k + 1) % 3), half[(k + 1) % 3], half[(k + 2) % 3], s.inside_out);
+      if (!(std::abs(axis(2).dot(centre - origin())) < half[k])) return {};
+      return rectangle(centre, R.col((k + 1) % 3), half[(k + 1) % 3], half[(k + 2) % 3], false);
     }
-    throw askew();
+    return polygon(s);
   }
 
   std::vector<Part> operator()(const CylinderShape& s) const {
@@ -123,38 +161,36 @@ class Section {
     const double radius = std::sqrt((s.radius_m - away) * (s.radius_m + away));
     if (across) return disc(s.from_m, radius, s.inside_out);
     return one(std::make_unique<models::Capsule>(models::SegmentCore(in_space(s.from_m), in_space(s.to_m)), radius, mu_,
-                                                 s.inside_out));
+                                                 s.inside_out, layer_on(s.inside_out ? infinity : 2.0 * radius)));
   }
 
   std::vector<Part> operator()(const MeshShape& s) const {
-    if (!object_.friction_regions.empty()) {
-      throw error("found friction_regions of " + object_.name, "give the mesh one friction there");
-    }
+    const std::vector<double> friction = friction_by_face(scene_, object_);
     models::TriangleSoup walls;
+    FrictionOfWalls of_walls;
     const double deep = 2.0 * (s.mesh->bounds().high - s.mesh->bounds().low).norm();
     for (std::uint32_t face = 0; face < s.mesh->size(); ++face) {
       std::array<Vec3, 3> x;
-      for (std::size_t k = 0; k < 3; ++k) {
-        const Vec3 d = s.mesh->corner(face, k) - origin();
-        x[k] = {axis(0).dot(d), axis(1).dot(d), axis(2).dot(d)};
-      }
+      for (std::size_t k = 0; k < 3; ++k) x[k] = coordinates(s.mesh->corner(face, k));
+      const std::size_t before = walls.vertices.size();
       line() ? add_point(x, deep, walls) : add_segment(x, deep, walls);
+      if (friction.empty() || walls.vertices.size() == before) continue;
+      of_walls[ends_of(walls.vertices[before], walls.vertices[before + 1])] = friction[face];
     }
-    if (walls.triangles.empty()) return outside(s.inside_out);
-    return one(
-        std::make_unique<models::MeshObstacle>(std::make_shared<const models::TriangleMesh>(std::move(walls)), mu_));
+    if (walls.triangles.empty()) return {};
+    return standing(std::move(walls), of_walls);
   }
 
  private:
   [[nodiscard]] bool line() const noexcept { return scene_.space.dimensions == 1; }
   [[nodiscard]] const Vec3& origin() const noexcept { return scene_.space.origin_m; }
   [[nodiscard]] Vec3 axis(Eigen::Index k) const noexcept { return scene_.space.axes.col(k); }
-  // The nearest point of the space, in its coordinates.
-  [[nodiscard]] Vec3 in_space(const Vec3& x_W) const noexcept {
-    Vec3 x = scene_.space.axes.transpose() * (x_W - origin());
-    for (int k = scene_.space.dimensions; k < 3; ++k) x[k] = 0.0;
-    return x;
+  // Of a point of W, those across the space among them.
+  [[nodiscard]] Vec3 coordinates(const Vec3& x_W) const noexcept {
+    const Vec3 d = x_W - origin();
+    return {axis(0).dot(d), axis(1).dot(d), axis(2).dot(d)};
   }
+  [[nodiscard]] Vec3 in_space(const Vec3& x_W) const noexcept { return nearest_in(scene_.space, x_W); }
 
   static std::vector<Part> one(std::unique_ptr<models::Obstacle> obstacle) {
     std::vector<Part> parts;
@@ -163,35 +199,51 @@ class Section {
   }
 
   [[nodiscard]] description::SetupError error(std::string message, std::string advice) const {
-    return description::SetupError({.file = scene_.file.string(),
-                                    .line = object_.line,
-                                    .message = std::move(message) + " in a scene of " +
-                                               std::to_string(scene_.space.dimensions) +
-                                               (line() ? " dimension" : " dimensions"),
-                                    .advice = std::move(advice)});
+    return refusal(scene_, object_.line, std::move(message) + in_dimensions(scene_), std::move(advice));
   }
   [[nodiscard]] description::SetupError askew() const {
     return error("found " + object_.name + " (" + kind_of(object_.shape) + "), which the space cuts askew,",
-                 "turn one of its axes into the space or across it, or use "
-                 "`dimensions: 3`");
+                 "turn one of its axes into the space or across it, or use `dimensions: 3` with `guide: plane`");
+  }
+
+  // The object's layer, on a section that is so thick; 0: on one that can have none.
+  [[nodiscard]] models::Layer layer_on(double thickness_m) const {
+    if (!object_.layer) return {};
+    if (!(object_.layer->thickness_m < 0.5 * thickness_m)) {
+      throw description::SetupError(
+          {.file = scene_.file.string(),
+           .line = object_.line,
+           .key = "layer",
+           .found = "a layer of " + description::number_text(object_.layer->thickness_m) + " m on " + object_.name,
+           .expected =
+               thickness_m > 0.0
+                   ? "less than half of how thick its section is, " + description::number_text(thickness_m) + " m"
+                   : "a layer on a plane, a sphere or a capsule, or on what isn't inside_out and has its axes "
+                     "in the space or across it"});
+    }
+    return {object_.layer->stiffness_N_per_m, object_.layer->thickness_m};
   }
 
   // The space doesn't meet the solid.
   [[nodiscard]] std::vector<Part> outside(bool inside_out) const {
-    if (inside_out && object_.shape.index() != 5) {
+    if (inside_out)
       throw error("the proxy's space lies inside the object " + object_.name, "move `space` or the object");
-    }
     return {};
   }
 
   [[nodiscard]] std::vector<Part> disc(const Vec3& centre_W, double radius, bool inside_out) const {
-    return one(std::make_unique<models::Sphere>(models::PointCore{in_space(centre_W)}, radius, mu_, inside_out));
+    return one(std::make_unique<models::Sphere>(models::PointCore{in_space(centre_W)}, radius, mu_, inside_out,
+                                                layer_on(inside_out ? infinity : 2.0 * radius)));
   }
 
   [[nodiscard]] std::vector<Part> interval(const Interval& held, bool inside_out) const {
     if (held.empty() || !std::isfinite(held.b - held.a)) return outside(inside_out);
-    return block(Vec3(0.5 * (held.a + held.b), 0.0, 0.0), models::Mat3::Identity(), {0.5 * (held.b - held.a)},
-                 inside_out);
+    const double half = 0.5 * (held.b - held.a);
+    if (inside_out && object_.layer) {
+      return one(std::make_unique<models::Sphere>(models::PointCore{Vec3(0.5 * (held.a + held.b), 0.0, 0.0)}, half, mu_,
+                                                  true, layer_on(infinity)));
+    }
+    return block(Vec3(0.5 * (held.a + held.b), 0.0, 0.0), models::Mat3::Identity(), {half}, inside_out);
   }
 
   [[nodiscard]] std::vector<Part> rectangle(const Vec3& centre_W, const Vec3& e_W, double along, double across,
@@ -213,7 +265,9 @@ class Section {
     const double deep = 10.0 * *std::max_element(half.begin(), half.end());
     Vec3 size = Vec3::Constant(2.0 * deep);
     for (std::size_t k = 0; k < half.size(); ++k) size[static_cast<Eigen::Index>(k)] = 2.0 * half[k];
-    if (!inside_out) return one(std::make_unique<models::BoxObstacle>(pose, size, mu_));
+    const double thickness = 2.0 * *std::min_element(half.begin(), half.end());
+    if (!inside_out) return one(std::make_unique<models::BoxObstacle>(pose, size, mu_, layer_on(thickness)));
+    static_cast<void>(layer_on(0.0));
     std::vector<Part> parts;
     for (const auto& face : models::BoxObstacle::faces(pose, size)) {
       if (parts.size() == 2 * half.size()) break;
@@ -221,6 +275,61 @@ class Section {
                        static_cast<std::int32_t>(parts.size())});
     }
     return parts;
+  }
+
+  // A box from inside: its faces that meet the space.
+  [[nodiscard]] std::vector<Part> room(const BoxShape& s) const {
+    static_cast<void>(layer_on(0.0));
+    std::vector<Part> parts;
+    std::int32_t feature = 0;
+    for (const auto& face : models::BoxObstacle::faces(s.pose_W, s.size_m)) {
+      const auto plane = plane_in_space(scene_, object_, {face.point(), Vec3(-face.normal())});
+      if (plane)
+        parts.push_back({std::make_unique<models::PlaneObstacle>(plane->point_m, plane->normal, mu_), feature});
+      ++feature;
+    }
+    return parts;
+  }
+
+  // A box that is cut askew: walls on three to six segments.
+  [[nodiscard]] std::vector<Part> polygon(const BoxShape& s) const {
+    models::TriangleSoup walls;
+    const auto corner = [&](int axis, double first, double second, double third) {
+      Vec3 sign;
+      sign[axis] = first;
+      sign[(axis + 1) % 3] = second;
+      sign[(axis + 2) % 3] = third;
+      return coordinates(s.pose_W * Vec3(0.5 * s.size_m.cwiseProduct(sign)));
+    };
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double side : {-1.0, 1.0}) {
+        const std::array<Vec3, 4> face{corner(axis, side, -1, -1), corner(axis, side, 1, -1), corner(axis, side, 1, 1),
+                                       corner(axis, side, -1, 1)};
+        add_segment(face, 2.0 * s.size_m.norm(), walls);
+      }
+    }
+    if (walls.triangles.empty()) return {};
+    return standing(std::move(walls), {});
+  }
+
+  // Friction by where a wall stands: the ends of its segment, the lesser first.
+  using FrictionOfWalls = std::map<std::array<double, 4>, double>;
+  static std::array<double, 4> ends_of(const Vec3& a, const Vec3& b) {
+    const bool in_order = a.x() < b.x() || (a.x() == b.x() && a.y() < b.y());
+    const Vec3 &first = in_order ? a : b, &second = in_order ? b : a;
+    return {first.x(), first.y(), second.x(), second.y()};
+  }
+
+  [[nodiscard]] std::vector<Part> standing(models::TriangleSoup walls, const FrictionOfWalls& friction) const {
+    static_cast<void>(layer_on(0.0));
+    const auto mesh = std::make_shared<const models::TriangleMesh>(std::move(walls));
+    std::vector<double> by_face;
+    for (std::uint32_t face = 0; face < mesh->size() && !friction.empty() && !line(); ++face) {
+      // Two of its corners are one over the other.
+      const Vec3 &a = mesh->corner(face, 0), &b = mesh->corner(face, 1), &c = mesh->corner(face, 2);
+      by_face.push_back(friction.at(ends_of(a, a.head<2>() == b.head<2>() ? c : b)));
+    }
+    return one(std::make_unique<models::MeshObstacle>(mesh, mu_, std::move(by_face)));
   }
 
   // An upright rectangle over the segment from a to b.
@@ -232,13 +341,13 @@ class Section {
     walls.triangles.push_back({first, first + 2, first + 3});
   }
 
-  // Where z = 0 cuts the triangle. A corner at z = 0 counts as above; where a side is cut doesn't depend on which of
-  // its triangles is asked, so that walls meet.
-  static void add_segment(const std::array<Vec3, 3>& x, double deep, models::TriangleSoup& walls) {
+  // Where z = 0 cuts the triangle or the rectangle. A corner at z = 0 counts as above; where a side is cut doesn't
+  // depend on which of its faces is asked, so that walls meet.
+  static void add_segment(std::span<const Vec3> x, double deep, models::TriangleSoup& walls) {
     std::array<Vec3, 2> ends;
     std::size_t count = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 &a = x[k], &b = x[(k + 1) % 3];
+    for (std::size_t k = 0; k < x.size() && count < 2; ++k) {
+      const Vec3 &a = x[k], &b = x[(k + 1) % x.size()];
       if ((a.z() < 0.0) == (b.z() < 0.0)) continue;
       const Vec3 &low = a.z() < 0.0 ? a : b, &high = a.z() < 0.0 ? b : a;
       ends[count] = low + low.z() / (low.z() - high.z()) * (high - low);
@@ -263,10 +372,107 @@ class Section {
   double mu_;
 };
 
+bool leads_out(double rest, const Vec3& v) { return rest > straight * v.norm(); }
+
 }  // namespace
 
 std::vector<Part> section_of(const Scene& scene, const Object& object) {
   return std::visit(Section(scene, object), object.shape);
+}
+
+// n_Wᵀ(origin + A ξ − point_W) ≥ 0 in coordinates ξ: the normal is Aᵀn_W.
+std::optional<PlaneShape> plane_in_space(const Scene& scene, const Object& object, const PlaneShape& plane) {
+  const Space& space = scene.space;
+  const Vec3 n = plane.normal.normalized(), near = nearest_in(space, plane.point_m);
+  double rest = 0.0;
+  const Vec3 m = along(space, n, rest);
+  const double height = n.dot(space.origin_m + space.axes * near - plane.point_m);
+  // A space that is parallel to the plane within rounding of both meets it nowhere or lies in it.
+  if (m.norm() < 1e-12) {
+    if (!(height < 0.0)) return std::nullopt;
+    throw refusal(scene, object.line, "the proxy's space lies inside the object " + object.name,
+                  "move `space` or the object");
+  }
+  return PlaneShape{near - m * (height / m.squaredNorm()), m};
+}
+
+models::ScriptedMotion script_in_space(const Scene& scene, const Object& object) {
+  models::ScriptedMotion script = script_of(*object.motion);
+  const Space& space = scene.space;
+  if (space.dimensions == 3) return script;
+  double out_v = 0.0, out_a = 0.0, out_axis = 0.0;
+  const Vec3 v = along(space, script.velocity_m_per_s, out_v), a = along(space, script.amplitude_m, out_a);
+  Vec3 axis = space.axes.transpose() * script.axis;
+  out_axis = space.dimensions == 1 ? 1.0 : axis.head<2>().norm();
+  const bool turns = script.turn_rad_per_s != 0.0;
+  if (leads_out(out_v, script.velocity_m_per_s) || leads_out(out_a, script.amplitude_m) ||
+      (turns && out_axis > straight)) {
+    throw refusal(scene, object.line,
+                  "found " + object.name + ", whose motion leads out of the proxy's space," + in_dimensions(scene),
+                  space.dimensions == 1 ? "let it move along the line, or use `dimensions: 3` with `guide: line`"
+                                        : "let it move within the plane and turn about an axis across it, or use "
+                                          "`dimensions: 3` with `guide: plane`");
+  }
+  script.velocity_m_per_s = v;
+  script.amplitude_m = a;
+  script.axis = std::copysign(1.0, axis.z()) * Vec3::UnitZ();
+  script.centre_m = nearest_in(space, script.centre_m);
+  if (!turns) script.centre_m.setZero();
+  return script;
+}
+
+Pose pose_in_space(const Space& space, const Pose& X_W) noexcept {
+  if (space.dimensions == 3) return X_W;
+  Pose X = Pose::Identity();
+  const Vec3 moved = X_W.linear() * space.origin_m + X_W.translation() - space.origin_m;
+  double rest = 0.0;
+  X.translation() = along(space, X_W.linear().isIdentity(0.0) ? Vec3(X_W.translation()) : moved, rest);
+  if (space.dimensions == 1 || X_W.linear().isIdentity(0.0)) return X;
+  const models::Mat3 R = space.axes.transpose() * X_W.linear() * space.axes;
+  const double c = R(0, 0) + R(1, 1), s = R(1, 0) - R(0, 1), length = std::hypot(c, s);
+  if (!(length > 0.0)) return X;
+  X.linear().topLeftCorner<2, 2>() << c / length, -s / length, s / length, c / length;
+  return X;
+}
+
+GuideDescription guide_in_space(const Scene& scene) {
+  using Kind = GuideDescription::Kind;
+  GuideDescription guide = *scene.guide;
+  const Space& space = scene.space;
+  if (space.dimensions == 3) return guide;
+  const auto refuse = [&](const std::string& what, std::string advice) -> description::SetupError {
+    return refusal(scene, guide.line_number, "found a guide" + what + in_dimensions(scene), std::move(advice));
+  };
+  if (space.dimensions == 1) throw refuse("", "leave it out: the line that the proxy lives on guides it");
+  if (guide.kind == Kind::plane) {
+    double rest = 0.0;
+    const Vec3 n = guide.direction.normalized(), m = along(space, n, rest);
+    const Vec3 near = nearest_in(space, guide.points_m.front());
+    if (m.norm() < straight) throw refuse(" on a plane along the proxy's own", "leave it out, or use `dimensions: 3`");
+    const double height = n.dot(space.origin_m + space.axes * near - guide.points_m.front());
+    guide.points_m = {near - m * (height / m.squaredNorm())};
+    guide.direction = Vec3(-m.y(), m.x(), 0.0);
+    guide.kind = Kind::line;
+    return guide;
+  }
+  const auto leads_off = [&] {
+    return refuse(" that leads out of the proxy's plane", "move it into `space`, or use `dimensions: 3`");
+  };
+  for (Vec3& point : guide.points_m) {
+    if (!(std::abs(space.axes.col(2).dot(point - space.origin_m)) <= beside_m)) throw leads_off();
+    point = nearest_in(space, point);
+  }
+  const std::size_t count = guide.points_m.size();
+  for (std::size_t i = guide.closed ? 0 : 1; i < count; ++i) {
+    if (guide.points_m[i] == guide.points_m[(i + count - 1) % count]) throw leads_off();
+  }
+  double rest = 0.0;
+  const Vec3 direction = along(space, guide.direction, rest);
+  if (guide.kind == Kind::line) {
+    if (leads_out(rest, guide.direction)) throw leads_off();
+    guide.direction = direction;
+  }
+  return guide;
 }
 
 }  // namespace proxarm::scenes

@@ -84,12 +84,17 @@ void require_outside(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move or turn the object, or change start_rad in the cell file"});
 }
 
+template <int N>
+double first_step_m(const scenes::CompiledScene& world, const Vec3& start_W) {
+  const models::Vec<N> start = world.from_W<N>(start_W);
+  return (world.algorithm<N>()(1.0, start, start) - start).norm();
+}
+
 // A guide that is not at the tool would draw the proxy onto it in one step.
 void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
   if (!session.scene.guide) return;
   const scenes::CompiledScene world = scenes::compile(session.scene);
-  if (world.dimensions() != 3) return;
-  const double away_m = (world.algorithm<3>()(1.0, start_W, start_W) - start_W).norm();
+  const double away_m = world.dimensions() == 2 ? first_step_m<2>(world, start_W) : first_step_m<3>(world, start_W);
   if (away_m <= start_tolerance_m) return;
   char found[64];
   std::snprintf(found, sizeof found, ") %.3g m away from it", away_m);

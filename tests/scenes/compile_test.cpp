@@ -151,7 +151,7 @@ TEST(Compile, RefusesWhatCantBe) {
   };
   const std::string two = "dimensions: 2\nspace: {axes: [[1, 0, 0], [0, 1, 0]]}\n";
   refuses(two + "objects:\n  - capsule: {from_m: [0, 0, 0], to_m: [1, 0, 1], radius_m: 0.1}\n");
-  refuses(two + "guide: {line: {point_m: [0, 0, 0], direction: [1, 0, 0]}}\n");
+  refuses(two + "guide: {line: {point_m: [0, 0, 0], direction: [1, 0, 1]}}\n");
   refuses(two + "objects:\n  - sphere: {centre_m: [0, 0, 2], radius_m: 1, inside_out: true}\n");
   const std::string box = "objects:\n  - box: {centre_m: [0, 0, 0], size_m: [1, 1, 1], ";
   refuses(box + "inside_out: true, layer: {thickness_m: 0.1, stiffness_N_per_m: 1}}\n");

@@ -338,9 +338,6 @@ TEST_F(MeshFile, RefusesInScenesWhatAMeshCannot) {
   TriangleSoup open = block({1, 1, 1});
   open.triangles.pop_back();
   write("open.stl", stl_of(open));
-  const std::string regions_on_a_line =
-      "dimensions: 1\nspace: {axes: [[1, 0, 0]]}\nobjects:\n  - mesh: {file: block.stl, friction_regions: "
-      "[{within: {sphere: {centre_m: [0, 0, 0], radius_m: 9}}, friction: 1}]}\n";
   for (const char* text : {
            "objects:\n  - mesh: {file: other.stl}\n",
            "objects:\n  - mesh: {}\n",
@@ -350,7 +347,6 @@ TEST_F(MeshFile, RefusesInScenesWhatAMeshCannot) {
            "objects:\n  - mesh: {file: open.stl, inside_out: true}\n",
            "objects:\n  - mesh: {file: block.stl, layer: {thickness_m: 0.01, stiffness_N_per_m: 100}}\n",
            "media:\n  - viscous: {damping_Ns_per_m: 1, within: {mesh: {file: block.stl}}}\n",
-           regions_on_a_line.c_str(),
        }) {
     EXPECT_THROW(scenes::compile(scene(text)), SetupError) << text;
   }
@@ -393,6 +389,20 @@ TEST_F(MeshFile, HasFrictionByRegion) {
     const double on_smooth = g(1e6, Vec3(-0.5 + 1e-3, 0.03, -1e-3), Vec3(-0.5, 0.03, 0.0)).x() + 0.5;
     EXPECT_NEAR(on_smooth, 0.9e-3, 1e-12);  // (4): what friction of 0.1 leaves
   }
+}
+
+// The same, cut to a line of the plane y = 0.03 by a proxy's space of two dimensions.
+TEST_F(MeshFile, HasFrictionByRegionInAPlane) {
+  write("sheet.obj", obj_of(field(20, 1.0, [](double, double) { return 0.0; })));
+  const CompiledScene compiled = scenes::compile(
+      scene("dimensions: 2\nspace: {origin_m: [0, 0.03, 0], axes: [[1, 0, 0], [0, 0, 1]]}\n"
+            "objects:\n  - mesh:\n      file: sheet.obj\n      friction: 0.1\n"
+            "      friction_regions: [{within: {box: {centre_m: [1, 0, 0], size_m: [2, 3, 1]}}, friction: 2}]\n"));
+  using Vec2 = models::Vec<2>;
+  auto& g = compiled.algorithm<2>();
+  EXPECT_NEAR(g(1e6, Vec2(-0.5 + 1e-3, -1e-3), Vec2(-0.5, 0.0)).x() + 0.5, 0.9e-3, 1e-12);
+  EXPECT_NEAR(g(1e6, Vec2(0.5 + 1e-3, -1e-3), Vec2(0.5, 0.0)).x() - 0.5, 0.0, 1e-12);
+  EXPECT_NEAR(g(1e6, Vec2(0.5 + 3e-3, -1e-3), Vec2(0.5, 0.0)).x() - 0.5, 1e-3, 1e-12);
 }
 
 // A sheet that is drawn away under a proxy pressed on it, half of it rough: friction acts against the relative motion.
