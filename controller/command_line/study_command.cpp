@@ -21,9 +21,12 @@ int study_command(const StudyOptions& options) {
   const studies::StudyList list = studies::all_studies(run_arm);
   const std::string& name = options.words.front();
   if (options.replay) {
-    require(name == "stress" && options.words.size() == 1, "--replay", "another study", "study stress --replay SEED");
+    const bool meshes = name == "stress_meshes";
+    require((meshes || name == "stress") && options.words.size() == 1, "--replay", "another study",
+            "study stress --replay SEED, or stress_meshes");
     std::string text;
-    const bool violated = studies::Stress::replay(*options.replay, text);
+    using Worlds = studies::Stress::Worlds;
+    const bool violated = studies::Stress::replay(*options.replay, text, meshes ? Worlds::meshes : Worlds::all);
     std::printf("%s", text.c_str());
     return violated ? found_something : 0;
   }

@@ -57,6 +57,19 @@ Shape some_mesh(Random& random) {
   return globe_mesh(rings, sectors, [&](const Vec3& x) { return Vec3(pose * Vec3(half.cwiseProduct(x))); });
 }
 
+// One whose faces turn inwards here and there, seen whole from its middle.
+Shape some_concave_mesh(Random& random) {
+  const auto rings = static_cast<std::uint32_t>(3 + random.below(5)),
+             sectors = static_cast<std::uint32_t>(4 + random.below(8));
+  const Pose pose = some_pose(random, random.in_box(0.3));
+  const Vec3 half = Vec3::Constant(0.25) + random.in_box(0.1);
+  const double deepest = random.uniform(0.05, 0.6);
+  return globe_mesh(rings, sectors, [&](const Vec3& x) {
+    const double share = 1.0 - random.uniform(0.0, deepest);
+    return Vec3(pose * Vec3(share * half.cwiseProduct(x)));
+  });
+}
+
 scenes::Motion some_motion(Random& random) {
   scenes::Motion motion;
   if (random.chance(0.4)) motion.velocity_m_per_s = random.log_arrow(0.01, 2.0);
@@ -115,6 +128,10 @@ void add_guide(Random& random, Scene& scene) {
   scene.guide = guide;
 }
 
+void name_objects(Scene& scene) {
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) scene.objects[i].name = "object " + std::to_string(i);
+}
+
 }  // namespace
 
 RandomScene random_scene(Random& random) {
@@ -163,7 +180,25 @@ RandomScene random_scene(Random& random) {
       if (random.chance(0.3)) scene.objects.push_back(object(random, some_plane(random)));
       break;
   }
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) scene.objects[i].name = "object " + std::to_string(i);
+  name_objects(scene);
+  return made;
+}
+
+RandomScene random_mesh_scene(Random& random) {
+  RandomScene made;
+  Scene& scene = made.scene;
+  const bool moves = random.chance(0.5), concave = !moves || random.chance(0.5);
+  made.kind = moves ? "moving_mesh" : "concave_mesh";
+  scene.objects.push_back(object(random, concave ? some_concave_mesh(random) : some_mesh(random)));
+  if (moves) scene.objects.back().motion = some_motion(random);
+  if (random.chance(0.5)) {
+    const double which = random.uniform(0.0, 1.0);
+    scene.objects.push_back(object(random, which < 0.5   ? some_plane(random)
+                                           : which < 0.8 ? some_round(random, random.in_box(0.5), false)
+                                                         : some_concave_mesh(random)));
+    if (moves && random.chance(0.5)) scene.objects.back().motion = some_motion(random);
+  }
+  name_objects(scene);
   return made;
 }
 

@@ -53,4 +53,8 @@ struct RandomScene {
 
 RandomScene random_scene(Random& random);
 
+// Worlds of meshes: concave ones, and any that move (kinds concave_mesh, moving_mesh), half of them with another
+// object.
+RandomScene random_mesh_scene(Random& random);
+
 }  // namespace proxarm::studies

@@ -15,6 +15,8 @@
 #include "controller/studies/random_scene.hpp"
 #include "models/cone_sum.hpp"
 #include "models/description/setup_error.hpp"
+#include "models/mesh_obstacle.hpp"
+#include "models/moving_obstacle.hpp"
 #include "scenes/compile.hpp"
 #include "scenes/obstacles.hpp"
 
@@ -40,6 +42,7 @@ struct Call {
   double K = 0.0;
   Vec<N> p = Vec<N>::Zero(), q = Vec<N>::Zero(), r = Vec<N>::Zero();
   models::StepTime time;
+  std::vector<Vec3> carried;  // q, by objects' motion: where 𝒢 begins, of meshes at order 2
   std::vector<Contact<N>> contacts;
   bool unresolved = false;
 
@@ -51,7 +54,16 @@ struct Call {
 template <int N>
 class Witness final : public models::GeometricAlgorithm<N> {
  public:
-  explicit Witness(models::GeometricAlgorithm<N>& g) : g_(g) {}
+  Witness(models::GeometricAlgorithm<N>& g, const scenes::Scene& scene) : g_(g) {
+    for (const scenes::Object& object : scene.objects) {
+      const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape);
+      auto& mover = movers_.emplace_back();
+      if (mesh == nullptr || !object.motion) continue;
+      mover = std::make_unique<models::MovingObstacle>(
+          std::make_unique<models::MeshObstacle>(mesh->mesh, object.friction), scenes::script_of(*object.motion));
+    }
+    call_.carried.resize(movers_.size(), Vec3::Zero());
+  }
 
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
     const std::uint64_t before = g_.unresolved_steps();
@@ -61,12 +73,19 @@ class Witness final : public models::GeometricAlgorithm<N> {
     call_.r = g_(K, p, q);
     call_.unresolved = g_.unresolved_steps() != before;
     call_.contacts.assign(g_.contacts().begin(), g_.contacts().end());
+    for (std::size_t i = 0; i < movers_.size(); ++i) {
+      if (movers_[i]) call_.carried[i] = movers_[i]->carry(lift<N>(q));
+    }
     return call_.r;
   }
   void set_time(const models::StepTime& time) noexcept override {
     call_.time = time;
     g_.set_time(time);
+    for (const auto& mover : movers_) {
+      if (mover) mover->set_time(time.time_s, time.period_s);
+    }
   }
+  [[nodiscard]] bool squeezed() const noexcept override { return g_.squeezed(); }
   [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return call_.contacts; }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return g_.unresolved_steps(); }
 
@@ -85,6 +104,7 @@ class Witness final : public models::GeometricAlgorithm<N> {
 
  private:
   models::GeometricAlgorithm<N>& g_;
+  std::vector<std::unique_ptr<models::MovingObstacle>> movers_;  // meshes, by object
   Call<N> call_;
 };
 
@@ -108,11 +128,15 @@ class Laws {
     for (const scenes::Object& object : scene.objects) {
       moving_ = moving_ || object.motion.has_value();
       scripts_.push_back(object.motion ? scenes::script_of(*object.motion) : models::ScriptedMotion{});
+      const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape);
+      meshes_ = meshes_ || mesh != nullptr;
+      convex_.push_back(mesh != nullptr && is_convex(*mesh->mesh));
     }
   }
 
   [[nodiscard]] bool judged() const noexcept { return !scene_.guide; }
   [[nodiscard]] bool moving() const noexcept { return moving_; }
+  [[nodiscard]] bool meshes() const noexcept { return meshes_; }
   [[nodiscard]] bool soft() const noexcept {
     return !scene_.objects.empty() && scene_.objects.front().layer.has_value();
   }
@@ -155,7 +179,10 @@ class Laws {
       const Vec3 n = lift<N>(contact.normal);
       const auto object = static_cast<std::size_t>(contact.object);
       const double mu = N == 1 || object >= scene_.objects.size() ? 0.0 : scene_.objects[object].friction;
-      const Vec3 motion = lift<N>(call.r) - carried(object, call.time, lift<N>(call.q));
+      const bool moving_mesh = object < scene_.objects.size() && scene_.objects[object].motion &&
+                               std::holds_alternative<scenes::MeshShape>(scene_.objects[object].shape);
+      const Vec3 begin = moving_mesh ? call.carried[object] : carried(object, call.time, lift<N>(call.q));
+      const Vec3 motion = lift<N>(call.r) - begin;
       const Vec3 v = motion - n * n.dot(motion);
       const double uncertain = 16.0 * epsilon * (call.size() + carriage(call.time.time_s)) / v.norm();
       if (contact.slips && uncertain < 1e-3) {
@@ -204,7 +231,7 @@ class Laws {
     for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
       const scenes::Object& object = scene_.objects[i];
       const Vec3 x = object.motion ? Vec3(scripts_[i].at(time_s).inverse(Eigen::Isometry) * r) : r;
-      deepest = std::max(deepest, -distance(object, x));
+      deepest = std::max(deepest, -(convex_[i] ? convex_distance(object, x) : scenes::distance_to(object, x)));
     }
     return deepest;
   }
@@ -232,20 +259,31 @@ class Laws {
   }
 
  private:
+  static bool is_convex(const models::TriangleMesh& mesh) {
+    for (std::uint32_t face = 0; face < mesh.size(); ++face) {
+      for (std::uint32_t other = 0; other < mesh.size(); ++other) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          if (models::TriangleMesh::height(mesh.face(face), mesh.corner(other, k)) > 1e-12) return false;
+        }
+      }
+    }
+    return true;
+  }
+
   // Of a convex mesh: the height over the face that sees most of x.
-  static double distance(const scenes::Object& object, const Vec3& x) {
-    const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape);
-    if (mesh == nullptr) return scenes::distance_to(object, x);
+  static double convex_distance(const scenes::Object& object, const Vec3& x) {
+    const models::TriangleMesh& mesh = *std::get<scenes::MeshShape>(object.shape).mesh;
     double highest = -infinity;
-    for (std::uint32_t face = 0; face < mesh->mesh->size(); ++face) {
-      highest = std::max(highest, models::TriangleMesh::height(mesh->mesh->face(face), x));
+    for (std::uint32_t face = 0; face < mesh.size(); ++face) {
+      highest = std::max(highest, models::TriangleMesh::height(mesh.face(face), x));
     }
     return highest;
   }
 
   const scenes::Scene& scene_;
-  bool moving_ = false;
+  bool moving_ = false, meshes_ = false;
   std::vector<models::ScriptedMotion> scripts_;
+  std::vector<bool> convex_;  // meshes
 };
 
 // A force that a hand, a machine or a broken sensor might make.
@@ -443,11 +481,11 @@ bool find_start(Random& random, const Laws& laws, Vec<N>& q) {
 }
 
 template <int N>
-void run_in(const scenes::CompiledScene& compiled, const Laws& laws, const Vec3& towards, Random& random, Tally& tally,
-            std::string* report) {
+void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, const Laws& laws, const Vec3& towards,
+            Random& random, Tally& tally, std::string* report) {
   Vec<N> q0;
   if (!find_start<N>(random, laws, q0)) q0.setZero();
-  Witness<N> g(compiled.algorithm<N>());
+  Witness<N> g(compiled.algorithm<N>(), scene);
   controller::AdmittanceConfig config;
   config.mass_kg = tally.mass_kg = random.log_uniform(1e-3, 1e3);
   config.period_s = tally.period_s = random.log_uniform(1e-5, 50e-3);
@@ -466,13 +504,14 @@ void run_in(const scenes::CompiledScene& compiled, const Laws& laws, const Vec3&
         push(k, lift<N>(proxy.q()), lift<N>(proxy.velocity()), config.mass_kg, config.period_s).template head<N>();
     const bool fault = proxy.step(h) != controller::ProxyFault::none;
     judge.step(k, fault);
-    if (fault) return;
+    // A session ends there; what a mesh was pushed through stays beyond it.
+    if (fault || (laws.meshes() && g.squeezed())) return;
   }
 }
 
-Tally run_seed(std::uint64_t seed, std::string* report) {
+Tally run_seed(std::uint64_t seed, Stress::Worlds worlds, std::string* report) {
   Random random(seed);
-  const RandomScene made = random_scene(random);
+  const RandomScene made = worlds == Stress::Worlds::all ? random_scene(random) : random_mesh_scene(random);
   Tally tally;
   tally.kind = made.kind;
   tally.dimensions = made.scene.space.dimensions;
@@ -486,13 +525,13 @@ Tally run_seed(std::uint64_t seed, std::string* report) {
                 made.scene.objects[static_cast<std::size_t>(random.below(static_cast<int>(tally.objects)))].shape);
   switch (tally.dimensions) {
     case 1:
-      run_in<1>(compiled, laws, towards, random, tally, report);
+      run_in<1>(made.scene, compiled, laws, towards, random, tally, report);
       break;
     case 2:
-      run_in<2>(compiled, laws, towards, random, tally, report);
+      run_in<2>(made.scene, compiled, laws, towards, random, tally, report);
       break;
     default:
-      run_in<3>(compiled, laws, towards, random, tally, report);
+      run_in<3>(made.scene, compiled, laws, towards, random, tally, report);
       break;
   }
   return tally;
@@ -519,7 +558,7 @@ std::size_t Stress::jobs(const Options& options) const {
 
 std::vector<Row> Stress::run(std::size_t job, const Options& options) const {
   const std::uint64_t seed = job_seed(options.seed, job);
-  const Tally t = run_seed(seed, nullptr);
+  const Tally t = run_seed(seed, worlds_, nullptr);
   Row row{static_cast<double>(seed),
           t.kind,
           static_cast<double>(t.dimensions),
@@ -605,7 +644,7 @@ json Stress::headline(const Table& table, const Options& options) const {
          "steps in contact whose work isn't judged: moving objects, layers (they give back what they took), order 2 "
          "(its q is no place of the proxy), several contacts with a convex one"},
         {"deepest_m", "the deepest that any proxy was inside of anything in a resolved step, per metre of coordinates"},
-        {"failing", "up to 50 runs with a violation: proxarm study stress --replay RUN_SEED shows one"},
+        {"failing", "up to 50 runs with a violation: proxarm study " + name() + " --replay RUN_SEED shows one"},
         {"seed", "of the study; run seeds follow from it"}}}};
 }
 
@@ -645,7 +684,7 @@ std::vector<std::string> Stress::plot(const Table& table, const Options& /*optio
     panel.curves.push_back(curve);
   }
   chart.panels.push_back(panel);
-  const std::string warning = draw(chart, out / "stress.svg");
+  const std::string warning = draw(chart, out / (name() + ".svg"));
   return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
 }
 
@@ -657,7 +696,7 @@ std::string Stress::text(const json& headline) const {
        << ", edges " << headline.at("edge") << ", work not judged " << headline.at("not_judged") << "\n";
   for (const json& run : headline.at("failing")) {
     text << "run seed " << run.at("run_seed") << ": " << run.at("first").get<std::string>() << " at step "
-         << run.at("step") << " (" << run.at("kind").get<std::string>() << "); proxarm study stress --replay "
+         << run.at("step") << " (" << run.at("kind").get<std::string>() << "); proxarm study " << name() << " --replay "
          << run.at("run_seed") << "\n";
   }
   return text.str();
@@ -665,9 +704,9 @@ std::string Stress::text(const json& headline) const {
 
 bool Stress::failed(const json& headline) const { return headline.at("violations").get<std::int64_t>() > 0; }
 
-bool Stress::replay(std::uint64_t seed, std::string& text) {
+bool Stress::replay(std::uint64_t seed, std::string& text, Worlds worlds) {
   std::string report;
-  const Tally t = run_seed(seed, &report);
+  const Tally t = run_seed(seed, worlds, &report);
   std::ostringstream out;
   out << "run seed " << seed << ": " << t.kind << ", " << t.dimensions << " dimensions, " << t.objects << " objects, "
       << t.mass_kg << " kg, T = " << 1e3 * t.period_s << " ms, order " << t.order << ", " << t.force_N << " N; "

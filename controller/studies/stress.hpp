@@ -28,7 +28,12 @@ class Stress final : public Study {
  public:
   static constexpr int steps_per_run = 1000;
 
-  std::string name() const override { return "stress"; }
+  // Which worlds: those of random_scene(), or those of random_mesh_scene(), as a study of its own (`stress_meshes`), so
+  // that what a seed gives in the one stays what it was.
+  enum class Worlds { all, meshes };
+  explicit Stress(Worlds worlds = Worlds::all) : worlds_(worlds) {}
+
+  std::string name() const override { return worlds_ == Worlds::all ? "stress" : "stress_meshes"; }
   std::vector<Column> columns() const override;
   std::size_t jobs(const Options& options) const override;
   std::vector<Row> run(std::size_t job, const Options& options) const override;
@@ -39,7 +44,10 @@ class Stress final : public Study {
   bool failed(const nlohmann::json& headline) const override;
 
   // One run alone, by its own seed: what it was made of, and each violation with its state. True if there was one.
-  static bool replay(std::uint64_t run_seed, std::string& text);
+  static bool replay(std::uint64_t run_seed, std::string& text, Worlds worlds = Worlds::all);
+
+ private:
+  Worlds worlds_;
 };
 
 }  // namespace proxarm::studies

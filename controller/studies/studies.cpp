@@ -14,6 +14,7 @@ StudyList all_studies(const ArmRun& arm) {
   StudyList list;
   list.push_back(std::make_unique<Figure5>());
   list.push_back(std::make_unique<Stress>());
+  list.push_back(std::make_unique<Stress>(Stress::Worlds::meshes));
   list.push_back(std::make_unique<ErrorStudy>());
   list.push_back(std::make_unique<StabilityMap>());
   list.push_back(std::make_unique<Fidelity>(arm));

@@ -11,8 +11,8 @@ namespace {
 
 // Always the same worlds, so that a change of the code is what a failure shows; it names the run's own seed.
 // `proxarm study stress --seed N` is for others.
-void expect_no_violation(std::uint64_t seed, double runs) {
-  const Stress study;
+void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds = Stress::Worlds::all) {
+  const Stress study(worlds);
   const Options options{.seed = seed};
   Table table(study.columns());
   const auto count = static_cast<std::size_t>(tests::scaled(runs));
@@ -25,6 +25,8 @@ void expect_no_violation(std::uint64_t seed, double runs) {
 }
 
 TEST(Stress, HoldsInRandomWorlds) { expect_no_violation(2, 10'000); }
+
+TEST(Stress, HoldsAmongMeshes) { expect_no_violation(2, 1'000, Stress::Worlds::meshes); }
 
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
