@@ -123,10 +123,12 @@ void TriangleMesh::weld(TriangleSoup& soup) {
   const auto& given = soup.vertices;
   std::vector<std::uint32_t> becomes(given.size()), place(given.size());
   std::vector<std::uint32_t> table(std::bit_ceil(2 * given.size() + 1), kUnused);
+  // A product's upper bits are the mixed ones: coordinates of single precision have nothing below their 29th.
+  const int below = 64 - std::countr_zero(table.size());
   for (std::uint32_t i = 0; i < given.size(); ++i) {
     std::uint64_t hash = 0;
     for (const double x : given[i]) hash = (hash ^ std::bit_cast<std::uint64_t>(x)) * 0x9e3779b97f4a7c15u;
-    std::size_t at = (hash >> 20) & (table.size() - 1);
+    std::size_t at = hash >> below;
     while (table[at] != kUnused && given[table[at]] != given[i]) at = (at + 1) & (table.size() - 1);
     if (table[at] == kUnused) table[at] = i;
     becomes[i] = table[at];

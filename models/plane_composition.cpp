@@ -15,7 +15,7 @@ constexpr std::size_t stored_corners = 8;  // 8³ corners of 104 bytes: 53 kB
 // The faces that may be part of the solution: those that p is behind, and those that a trial ran into.
 struct PlaneComposition::Candidates {
   static constexpr std::size_t most = 12;
-  std::array<std::size_t, most> index{};
+  std::array<std::size_t, most> index;
   std::size_t count = 0;
   bool friction = true;
   bool grew = false;
@@ -83,6 +83,7 @@ bool PlaneComposition::fits(const Vec3& q, const Vec3& r, std::size_t i, std::si
     // Within rounding it is on the face; but a face that q was on is not to be entered even by so little, or a proxy
     // that is held by two of them would creep along while one alone can't quite hold it.
     if (height < 0.0 && (height < -surface.rounding(r) || (creeps && height < surface.height(q)))) {
+      if (candidates.count == faces_.size()) return false;  // nothing to be added
       candidates.add(m);
       fits = false;
     }

@@ -240,9 +240,9 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
     moving += object.motion ? 1 : 0;
     rubbing += has_friction(object) ? 1 : 0;
   }
-  if (layers > 0 && scene.guide) {
-    throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide",
-                  "give a layer to an object that is alone in its scene (media may act with it)");
+  if (layers > 0 && scene.guide && scene.guide->kind != GuideDescription::Kind::plane) {
+    throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide along a line",
+                  "no layer there: on a line an object only says how far the proxy may go");
   }
   if (scene.guide && scene.guide->kind == GuideDescription::Kind::plane) {
     add_plane_guide(scene, entries);
@@ -258,7 +258,7 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
   if (layers > 0) {
     out.stages.push_back(
         {std::to_string(layers) + (layers > 1 ? " elastic layers" : " elastic layer"),
-         many ? "alone exactly; with others the force is shared by sweeps" : scene.objects.front().name});
+         many ? "alone exactly; with others the force is shared, by Newton's method" : scene.objects.front().name});
   }
   if (moving > 0) {
     out.stages.push_back({"motion", std::to_string(moving) + (moving > 1 ? " objects" : " object") +

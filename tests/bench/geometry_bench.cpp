@@ -133,6 +133,17 @@ void box(benchmark::State& state) {
 }
 BENCHMARK(box);
 
+// A corner of a hard plane and one under an elastic layer, both of which press.
+void layer_and_plane(benchmark::State& state) {
+  const Vec3 o(0.1, 0.2, 0.3);
+  std::vector<World::Entry> entries;
+  entries.push_back({std::make_unique<PlaneObstacle>(o, Vec3(1, 0.1, 0), 0.3, Layer{2e3, 0.02}), 0, -1});
+  entries.push_back({std::make_unique<PlaneObstacle>(o, Vec3(0, 1, 0.1), 0.2), 1, -1});
+  World g(std::move(entries));
+  steps(state, g, o, pushes(Vec3(1, 1, 0).normalized(), 5e-6));
+}
+BENCHMARK(layer_and_plane);
+
 void sphere_on_plane(benchmark::State& state) {
   std::vector<World::Entry> entries;
   entries.push_back({std::make_unique<Sphere>(PointCore{Vec3(0, 0, 0)}, 0.1, 0.3, false), 0, -1});

@@ -157,8 +157,9 @@ TEST(GuideAmongObjects, RefusesWhatHasNoMeaning) {
   };
   const std::string ball = "objects:\n  - sphere: {centre_m: [1, 0, 0], radius_m: 0.1, ";
   EXPECT_THAT(refused(ball + "motion: {velocity_m_per_s: [1, 0, 0]}}\n" + along_x), testing::HasSubstr("that moves"));
-  EXPECT_THAT(refused(ball + "layer: {thickness_m: 0.01, stiffness_N_per_m: 1000}}\n" + on_floor),
-              testing::HasSubstr("elastic layer beside a guide"));
+  EXPECT_THAT(refused(ball + "layer: {thickness_m: 0.01, stiffness_N_per_m: 1000}}\n" + along_x),
+              testing::HasSubstr("elastic layer beside a guide along a line"));
+  EXPECT_EQ(refused(ball + "layer: {thickness_m: 0.01, stiffness_N_per_m: 1000}}\n" + on_floor), "accepted");
 }
 
 }  // namespace
