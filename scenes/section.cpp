@@ -218,8 +218,7 @@ class Section {
            .expected =
                thickness_m > 0.0
                    ? "less than half of how thick its section is, " + description::number_text(thickness_m) + " m"
-                   : "a layer on a plane, a sphere or a capsule, or on what isn't inside_out and has its axes "
-                     "in the space or across it"});
+                   : "a layer on what is no mesh and, if it is solid, has its axes in the space or across it"});
     }
     return {object_.layer->stiffness_N_per_m, object_.layer->thickness_m};
   }
@@ -239,10 +238,6 @@ class Section {
   [[nodiscard]] std::vector<Part> interval(const Interval& held, bool inside_out) const {
     if (held.empty() || !std::isfinite(held.b - held.a)) return outside(inside_out);
     const double half = 0.5 * (held.b - held.a);
-    if (inside_out && object_.layer) {
-      return one(std::make_unique<models::Sphere>(models::PointCore{Vec3(0.5 * (held.a + held.b), 0.0, 0.0)}, half, mu_,
-                                                  true, layer_on(infinity)));
-    }
     return block(Vec3(0.5 * (held.a + held.b), 0.0, 0.0), models::Mat3::Identity(), {half}, inside_out);
   }
 
@@ -267,25 +262,25 @@ class Section {
     for (std::size_t k = 0; k < half.size(); ++k) size[static_cast<Eigen::Index>(k)] = 2.0 * half[k];
     const double thickness = 2.0 * *std::min_element(half.begin(), half.end());
     if (!inside_out) return one(std::make_unique<models::BoxObstacle>(pose, size, mu_, layer_on(thickness)));
-    static_cast<void>(layer_on(0.0));
     std::vector<Part> parts;
     for (const auto& face : models::BoxObstacle::faces(pose, size)) {
       if (parts.size() == 2 * half.size()) break;
-      parts.push_back({std::make_unique<models::PlaneObstacle>(face.point(), Vec3(-face.normal()), mu_),
-                       static_cast<std::int32_t>(parts.size())});
+      parts.push_back(
+          {std::make_unique<models::PlaneObstacle>(face.point(), Vec3(-face.normal()), mu_, layer_on(infinity)),
+           static_cast<std::int32_t>(parts.size())});
     }
     return parts;
   }
 
   // A box from inside: its faces that meet the space.
   [[nodiscard]] std::vector<Part> room(const BoxShape& s) const {
-    static_cast<void>(layer_on(0.0));
     std::vector<Part> parts;
     std::int32_t feature = 0;
     for (const auto& face : models::BoxObstacle::faces(s.pose_W, s.size_m)) {
       const auto plane = plane_in_space(scene_, object_, {face.point(), Vec3(-face.normal())});
       if (plane)
-        parts.push_back({std::make_unique<models::PlaneObstacle>(plane->point_m, plane->normal, mu_), feature});
+        parts.push_back(
+            {std::make_unique<models::PlaneObstacle>(plane->point_m, plane->normal, mu_, layer_on(infinity)), feature});
       ++feature;
     }
     return parts;

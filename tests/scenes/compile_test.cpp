@@ -154,9 +154,11 @@ TEST(Compile, RefusesWhatCantBe) {
   refuses(two + "guide: {line: {point_m: [0, 0, 0], direction: [1, 0, 1]}}\n");
   refuses(two + "objects:\n  - sphere: {centre_m: [0, 0, 2], radius_m: 1, inside_out: true}\n");
   const std::string box = "objects:\n  - box: {centre_m: [0, 0, 0], size_m: [1, 1, 1], ";
-  refuses(box + "inside_out: true, layer: {thickness_m: 0.1, stiffness_N_per_m: 1}}\n");
   refuses(box + "layer: {thickness_m: 0.5, stiffness_N_per_m: 1}}\n");
-  EXPECT_NO_THROW(compile(parse_scene(box + "layer: {thickness_m: 0.1, stiffness_N_per_m: 1}}\n", "scene.yaml")));
+  for (const std::string side : {"", "inside_out: true, "}) {
+    const std::string padded = box + side + "layer: {thickness_m: 0.1, stiffness_N_per_m: 1}}\n";
+    EXPECT_NO_THROW(compile(parse_scene(padded, "scene.yaml"))) << padded;
+  }
 }
 
 TEST(Compile, CutsSpheresInFewerDimensions) {

@@ -219,7 +219,9 @@ TEST(Section, KeepsTheContractOfLayersMediaAndGuides) {
           "sphere: {centre_m: [0.5, 0, 0.03], radius_m: 0.15",
           "sphere: {centre_m: [0.5, 0, 0.03], radius_m: 0.15, inside_out: true",
           "box: {centre_m: [0.5, 0, 0], size_m: [0.2, 0.4, 0.3], friction: 0.3",
-          "cylinder: {from_m: [0.5, 0, -1], to_m: [0.5, 0, 1], radius_m: 0.15, inside_out: true"}) {
+          "cylinder: {from_m: [0.5, 0, -1], to_m: [0.5, 0, 1], radius_m: 0.15, inside_out: true",
+          "box: {centre_m: [0.5, 0, 0], size_m: [0.3, 0.2, 1], inside_out: true",
+          "box: {centre_m: [0.5, 0, 0], size_m: [0.3, 0.2, 1], rpy_rad: [0.3, 0.2, 0], inside_out: true"}) {
       texts.push_back(space + "objects:\n  - " + object + layer);
     }
     const std::string ball = "objects:\n  - sphere: {centre_m: [0.5, 0, 0.03], radius_m: 0.15, friction: 0.3}\n";
