@@ -1,5 +1,6 @@
 #include "models/shared_hold.hpp"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -143,6 +144,15 @@ class FlatHold {
     return apart;
   }
 
+  // A dx = b. Where rigid contacts that stick leave open who bears how much, A has no inverse: any solution will do.
+  template <int Size>
+  static Rows solution(const Square& A, const Rows& b) noexcept {
+    const Eigen::Matrix<double, Size, Size> square = A;
+    const Eigen::Matrix<double, Size, 1> right = b, dx = square.partialPivLu().solve(right);
+    if ((square * dx - right).norm() <= 1e-9 * right.norm()) return dx;
+    return A.colPivHouseholderQr().solve(b);
+  }
+
   // dR_i = (D_i − I) Σ dx_j − D_i dx_i = −R_i. True where that took a part of `apart` off; `bold`: in any case.
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);
@@ -157,7 +167,9 @@ class FlatHold {
         if (j == i) A.block<3, 3>(row, column) -= response_[i].D / stiffer_;
       }
     }
-    const Rows dx = A.colPivHouseholderQr().solve(b);
+    const Rows dx = count == 2   ? solution<6>(A, b)
+                    : count == 3 ? solution<9>(A, b)
+                                 : Rows(A.colPivHouseholderQr().solve(b));
     if (!dx.allFinite()) return false;
     const std::array<Vec3, most> before = x;
     const double apart_before = apart;
