@@ -115,6 +115,33 @@ struct Size {
   double operator()(const MeshShape& s) const { return 0.5 * (s.mesh->bounds().high - s.mesh->bounds().low).norm(); }
 };
 
+// What is left of an object from inside when its layer is used up: walls that stand back by its thickness.
+struct StandBack {
+  double by_m;
+
+  Shape operator()(PlaneShape s) const { return s; }
+  Shape operator()(SphereShape s) const {
+    s.radius_m += by_m;
+    return s;
+  }
+  Shape operator()(CapsuleShape s) const {
+    s.radius_m += by_m;
+    return s;
+  }
+  Shape operator()(BoxShape s) const {
+    s.size_m.array() += 2.0 * by_m;
+    return s;
+  }
+  Shape operator()(CylinderShape s) const {
+    const Vec3 e = direction(s);
+    s.radius_m += by_m;
+    s.from_m -= by_m * e;
+    s.to_m += by_m * e;
+    return s;
+  }
+  Shape operator()(MeshShape s) const { return s; }
+};
+
 // How thick the solid under a layer is; 0 where there can be none.
 struct Thickness {
   static constexpr double kEndless = std::numeric_limits<double>::infinity();
@@ -198,7 +225,16 @@ models::ScriptedMotion script_of(const Motion& motion) {
 }
 
 double distance_to(const Object& object, const Vec3& x_W) {
-  return std::visit(Distance{x_W}, object.shape) + (object.layer ? object.layer->thickness_m : 0.0);
+  if (!object.layer) return std::visit(Distance{x_W}, object.shape);
+  const double thickness = object.layer->thickness_m;
+  const bool inside_out = std::visit(
+      [](const auto& s) {
+        if constexpr (requires { s.inside_out; }) return s.inside_out;
+        return false;
+      },
+      object.shape);
+  if (inside_out) return std::visit(Distance{x_W}, std::visit(StandBack{thickness}, object.shape));
+  return std::visit(Distance{x_W}, object.shape) + thickness;
 }
 
 }  // namespace proxarm::scenes

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 
 #include "controller/command_line/arm_run.hpp"
@@ -21,12 +22,13 @@ int study_command(const StudyOptions& options) {
   const studies::StudyList list = studies::all_studies(run_arm);
   const std::string& name = options.words.front();
   if (options.replay) {
-    const bool meshes = name == "stress_meshes";
-    require((meshes || name == "stress") && options.words.size() == 1, "--replay", "another study",
-            "study stress --replay SEED, or stress_meshes");
+    const auto& known = studies::Stress::worlds_names;
+    const auto which = std::find(known.begin(), known.end(), name);
+    require(which != known.end() && options.words.size() == 1, "--replay", "another study",
+            "study stress --replay SEED, or stress_meshes, stress_layers");
     std::string text;
-    using Worlds = studies::Stress::Worlds;
-    const bool violated = studies::Stress::replay(*options.replay, text, meshes ? Worlds::meshes : Worlds::all);
+    const auto worlds = static_cast<studies::Stress::Worlds>(which - known.begin());
+    const bool violated = studies::Stress::replay(*options.replay, text, worlds);
     std::printf("%s", text.c_str());
     return violated ? found_something : 0;
   }

@@ -202,4 +202,21 @@ RandomScene random_mesh_scene(Random& random) {
   return made;
 }
 
+RandomScene random_layer_scene(Random& random) {
+  RandomScene made;
+  Scene& scene = made.scene;
+  const bool moves = random.chance(0.3);
+  made.kind = moves ? "moving_layers" : "layers";
+  for (int i = 2 + random.below(4); i > 0; --i) {
+    scene.objects.push_back(any_object(random));
+    Object& object = scene.objects.back();
+    // The thinnest object is 20 mm thick.
+    const double thickness = random.log_uniform(1e-4, 9e-3), stiffness = random.log_uniform(100.0, 1e6);
+    if (random.chance(0.7)) object.layer = scenes::ElasticLayer{thickness, stiffness};
+    if (moves && random.chance(0.5)) object.motion = some_motion(random);
+  }
+  name_objects(scene);
+  return made;
+}
+
 }  // namespace proxarm::studies

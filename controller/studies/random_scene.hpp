@@ -57,4 +57,7 @@ RandomScene random_scene(Random& random);
 // object.
 RandomScene random_mesh_scene(Random& random);
 
+// Two to five objects of which most have elastic layers, some of them moving (kinds layers, moving_layers).
+RandomScene random_layer_scene(Random& random);
+
 }  // namespace proxarm::studies

@@ -138,7 +138,8 @@ class Laws {
   [[nodiscard]] bool moving() const noexcept { return moving_; }
   [[nodiscard]] bool meshes() const noexcept { return meshes_; }
   [[nodiscard]] bool soft() const noexcept {
-    return !scene_.objects.empty() && scene_.objects.front().layer.has_value();
+    return std::any_of(scene_.objects.begin(), scene_.objects.end(),
+                       [](const scenes::Object& object) { return object.layer.has_value(); });
   }
   [[nodiscard]] bool bends() const noexcept {
     return scene_.guide && scene_.guide->kind == scenes::GuideDescription::Kind::polyline;
@@ -511,7 +512,9 @@ void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, c
 
 Tally run_seed(std::uint64_t seed, Stress::Worlds worlds, std::string* report) {
   Random random(seed);
-  const RandomScene made = worlds == Stress::Worlds::all ? random_scene(random) : random_mesh_scene(random);
+  const RandomScene made = worlds == Stress::Worlds::meshes   ? random_mesh_scene(random)
+                           : worlds == Stress::Worlds::layers ? random_layer_scene(random)
+                                                              : random_scene(random);
   Tally tally;
   tally.kind = made.kind;
   tally.dimensions = made.scene.space.dimensions;

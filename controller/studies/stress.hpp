@@ -18,7 +18,9 @@
 //                   (they give back what they took), and at order 2, whose q is no place where the proxy was
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "controller/studies/study.hpp"
 
@@ -28,12 +30,13 @@ class Stress final : public Study {
  public:
   static constexpr int steps_per_run = 1000;
 
-  // Which worlds: those of random_scene(), or those of random_mesh_scene(), as a study of its own (`stress_meshes`), so
+  // Which worlds: those of random_scene(), random_mesh_scene() or random_layer_scene(), each a study of its own, so
   // that what a seed gives in the one stays what it was.
-  enum class Worlds { all, meshes };
+  enum class Worlds { all, meshes, layers };
+  static constexpr std::array<std::string_view, 3> worlds_names{"stress", "stress_meshes", "stress_layers"};
   explicit Stress(Worlds worlds = Worlds::all) : worlds_(worlds) {}
 
-  std::string name() const override { return worlds_ == Worlds::all ? "stress" : "stress_meshes"; }
+  std::string name() const override { return std::string(worlds_names[static_cast<std::size_t>(worlds_)]); }
   std::vector<Column> columns() const override;
   std::size_t jobs(const Options& options) const override;
   std::vector<Row> run(std::size_t job, const Options& options) const override;
