@@ -9,6 +9,9 @@ namespace proxarm::models {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+// An object whose surface leans by less than a tenth against the guide doesn't push along it, but across.
+constexpr double longest_push = 10.0;  // of what the object has moved
 
 void check_friction(double friction) {
   if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -81,29 +84,196 @@ Vec3 PolylineGuide::report(const Vec3& r, const Vec3& p, std::size_t piece, bool
 
 // Whether the straight way to a point is free; if not, the point becomes the one where it ends, or `from` itself if
 // that is as near as rounding tells.
-bool PolylineGuide::leads(const Vec3& from, Vec3& to) noexcept {
-  if (!objects_ || from == to) return true;
-  const World::Way way = objects_->go_straight(from, to);
-  if (!way.stopped) return true;
-  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-  to = (way.end - from).lpNorm<1>() <= 64.0 * u * (from.lpNorm<1>() + 1.0) ? from : way.end;
-  contacts_[1] = way.contact;
+bool PolylineGuide::leads(const Vec3& from, Vec3& to, bool past_pushing) noexcept {
+  if (from == to) return true;
+  bool free = true;
+  Vec3 end = to;
+  if (objects_) {
+    const World::Way way = objects_->go_straight(from, to);
+    if (way.stopped) {
+      free = false;
+      end = way.end;
+      contacts_[1] = way.contact;
+    }
+  }
+  for (std::size_t i = 0; movers_ && i < movers_->size(); ++i) {
+    const World::Entry& mover = (*movers_)[i];
+    if ((past_pushing && pushes_[i] != 0) || !mover.obstacle->bars(from, end)) continue;
+    free = false;
+    Vec3 barred = end;
+    end = from;
+    for (int k = 0; k < 1100; ++k) {  // a double's exponent and digits
+      const Vec3 middle = 0.5 * (end + barred);
+      if (middle == end || middle == barred) break;
+      (mover.obstacle->bars(from, middle) ? barred : end) = middle;
+    }
+    // What a step that goes a nanometre in meets there.
+    const Vec3 back = (from - to).normalized();
+    const Obstacle::Step s = mover.obstacle->step(1.0, end - 1e-9 * back, end);
+    contacts_[1] = {mover.object, mover.feature < 0 ? s.feature : mover.feature, false, s.touches ? s.normal : back};
+  }
+  if (free) return true;
+  to = (end - from).lpNorm<1>() <= 64.0 * u * (from.lpNorm<1>() + 1.0) ? from : end;
   count_ = 2;
+  return false;
+}
+
+void PolylineGuide::set_time(const StepTime& time) noexcept {
+  if (!movers_) return;
+  for (const World::Entry& mover : *movers_) mover.obstacle->set_time(time.time_s, time.period_s);
+}
+
+// False at an end.
+bool PolylineGuide::next_piece(std::size_t& piece, bool forward) const noexcept {
+  if (!closed_ && (forward ? piece + 1 == pieces_.size() : piece == 0)) return false;
+  piece = forward ? (piece + 1) % pieces_.size() : (piece + pieces_.size() - 1) % pieces_.size();
+  return true;
+}
+
+// By a length along the guide, to its end at most.
+PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept {
+  const bool forward = by > 0.0;
+  for (std::size_t visited = 0; visited <= pieces_.size(); ++visited) {
+    const Piece& piece = pieces_[at.piece];
+    const double end = forward ? piece.length : piece.begin, left = std::abs(end - at.s);
+    if (std::abs(by) <= left) {
+      at.s += by;
+      break;
+    }
+    by -= std::copysign(left, by);
+    at.s = end;
+    std::size_t next = at.piece;
+    if (!next_piece(next, forward)) break;
+    at.piece = next;
+    at.s = forward ? pieces_[next].begin : pieces_[next].length;
+  }
+  at.x = pieces_[at.piece].a + at.s * pieces_[at.piece].e;
+  return at;
+}
+
+// From a place that the object has come over to the next one on that side that is free of it, within `most`.
+bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
+                             Place& place) const noexcept {
+  const auto is_free = [&](const Vec3& x) { return !object.excludes(carried, x) && object.distance(x) >= 0.0; };
+  if (!(most > 0.0)) return false;
+  double held = 0.0, free = most / 1024.0;
+  Place end = advance(place, side * free);
+  while (!is_free(end.x)) {
+    if (!(free < most)) return false;
+    held = free;
+    free = std::min(2.0 * free, most);
+    end = advance(place, side * free);
+  }
+  const double least = u * (place.x.lpNorm<1>() + most);
+  while (free - held > least) {
+    const double middle = 0.5 * (held + free);
+    if (middle == held || middle == free) break;
+    const Place between = advance(place, side * middle);
+    if (is_free(between.x)) {
+      free = middle;
+      end = between;
+    } else {
+      held = middle;
+    }
+  }
+  place = end;
+  return true;
+}
+
+// To which side along the piece an object that has come over q pushes; 0: across.
+int PolylineGuide::pushed_to(const Obstacle& object, const Vec3& carried, const Vec3& q, std::size_t piece,
+                             Contact<3>& contact) const noexcept {
+  const Obstacle::Step s = object.step(1.0, q, q);
+  contact.normal = s.touches ? s.normal : Vec3((carried - q).normalized());
+  contact.feature = s.feature;
+  contact.slips = false;
+  const double lean = contact.normal.dot(pieces_[piece].e);
+  return lean > 0.0 ? 1 : lean < 0.0 ? -1 : 0;
+}
+
+// Whether nothing but what pushes is on the way along the guide.
+bool PolylineGuide::reaches(Place from, const Place& to, int side) noexcept {
+  for (std::size_t visited = 0; visited <= pieces_.size() && from.piece != to.piece; ++visited) {
+    const Piece& piece = pieces_[from.piece];
+    Vec3 corner = piece.a + (side > 0 ? piece.length : piece.begin) * piece.e;
+    if (!leads(from.x, corner, true)) return false;
+    from.x = corner;
+    if (!next_piece(from.piece, side > 0)) return false;
+  }
+  Vec3 end = to.x;
+  return leads(from.x, end, true);
+}
+
+// Takes the place of q along with the objects that have come over it. False: squeezed, it stays where it was.
+bool PolylineGuide::carry(const Vec3& q, Place& place) noexcept {
+  if (!movers_) return true;
+  const Place begin = place;
+  int side = 0;
+  bool fits = true, any = false;
+  for (std::size_t i = 0; i < movers_->size(); ++i) {
+    const Obstacle& object = *(*movers_)[i].obstacle;
+    const Vec3 carried = object.carry(q);
+    pushes_[i] = object.excludes(carried, begin.x) ? 1 : 0;
+    if (pushes_[i] == 0) continue;
+    any = true;
+    contacts_[1].object = (*movers_)[i].object;
+    const int pushed = pushed_to(object, carried, q, begin.piece, contacts_[1]);
+    if ((*movers_)[i].feature >= 0) contacts_[1].feature = (*movers_)[i].feature;
+    count_ = 2;
+    fits = fits && pushed != 0 && (side == 0 || pushed == side);
+    side = pushed;
+    const double most = longest_push * (carried - q).norm();
+    // One that a further push has made room for already is clear.
+    if (!fits || (!object.excludes(carried, place.x) && object.distance(place.x) >= 0.0)) continue;
+    Place pushed_place = begin;
+    fits = clear_of(object, carried, side, most, pushed_place);
+    if (fits && (pushed_place.x - begin.x).squaredNorm() > (place.x - begin.x).squaredNorm()) place = pushed_place;
+  }
+  if (!any) return true;
+  const Contact<3> pusher = contacts_[1];
+  if (fits && reaches(begin, place, side)) {
+    contacts_[1] = pusher;
+    return true;
+  }
+  place = begin;
   return false;
 }
 
 Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept {
   count_ = 1;
-  std::size_t i = nearest_piece(q);
-  const Piece& first = pieces_[i];
-  const double s_q = std::clamp(first.e.dot(q - first.a), first.begin, first.length);
-  const Vec3 q_on = first.a + s_q * first.e;
-  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+  squeezed_ = false;
+  Place place{nearest_piece(q), 0.0, q};
+  const Piece& nearest = pieces_[place.piece];
+  place.s = std::clamp(nearest.e.dot(q - nearest.a), nearest.begin, nearest.length);
+  const Vec3 foot = nearest.a + place.s * nearest.e;
   // A proxy on the guide within rounding (as FlatSurface::rounding) sticks bit for bit.
-  const bool on = (q - q_on).lpNorm<1>() <= 16.0 * u * (q.lpNorm<1>() + first.a.lpNorm<1>() + std::abs(s_q));
+  if (!((q - foot).lpNorm<1>() <= 16.0 * u * (q.lpNorm<1>() + nearest.a.lpNorm<1>() + std::abs(place.s)))) {
+    place.x = foot;
+  }
+  if (!carry(q, place)) {
+    squeezed_ = true;
+    ++unresolved_;
+    return report(place.x, p, place.piece, false);
+  }
+  const bool pushed = count_ == 2;
+  const Contact<3> pusher = contacts_[1];
+  count_ = 1;
+  const Vec3 r = slide(p, place);
+  if (pushed && count_ == 1 && r == place.x) {
+    contacts_[1] = pusher;
+    count_ = 2;
+  }
+  return r;
+}
+
+// (4) from a place on.
+Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
+  std::size_t i = place.piece;
+  const Piece& first = pieces_[i];
+  const double s_q = place.s;
 
   // Where (4) would take it along this piece, and to which side.
-  const auto slide = [&](const Piece& piece, double from, double& to) {
+  const auto lead = [&](const Piece& piece, double from, double& to) {
     const Vec3 d = p - piece.a;
     const double s_p = piece.e.dot(d), reach = mu_ * (d - s_p * piece.e).norm();
     if (std::abs(s_p - from) <= reach) {
@@ -114,10 +284,10 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
     return s_p > from ? 1 : -1;
   };
   double s = s_q, to = s_q;
-  int direction = slide(first, s_q, to);
+  int direction = lead(first, s_q, to);
   const bool corner = pieces_.size() > 1 && (s_q <= 0.0 || s_q >= first.length);
-  if (direction == 0 && !corner) return report(on ? q : q_on, p, i, false);
-  Vec3 here = on ? q : q_on;
+  if (direction == 0 && !corner) return report(place.x, p, i, false);
+  Vec3 here = place.x;
   for (std::size_t visited = 0; visited <= 2 * pieces_.size(); ++visited) {
     const Piece& piece = pieces_[i];
     if (to >= piece.begin && to <= piece.length && direction != 0) {
@@ -131,23 +301,23 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
     const bool at_end = direction != 0 || s == end;
     const bool last_piece = forward ? i + 1 == pieces_.size() : i == 0;
     const Vec3 corner_point = piece.a + end * piece.e;
-    if (!at_end) return report(on ? q : q_on, p, i, false);
-    const bool moved = (corner_point - q_on).squaredNorm() > 0.0;
-    Vec3 held = moved ? corner_point : (on ? q : q_on);
+    if (!at_end) return report(place.x, p, i, false);
+    Vec3 held = place.s == end && place.piece == i ? place.x : corner_point;
     if (!leads(here, held)) return report(held, p, i, false);
     here = held;
     if (last_piece && !closed_) return report(held, p, i, false);
-    const std::size_t next = forward ? (i + 1) % pieces_.size() : (i + pieces_.size() - 1) % pieces_.size();
+    std::size_t next = i;
+    static_cast<void>(next_piece(next, forward));
     const double enter = forward ? 0.0 : pieces_[next].length;
     double on_next = enter;
-    const int next_direction = slide(pieces_[next], enter, on_next);
+    const int next_direction = lead(pieces_[next], enter, on_next);
     if (next_direction != (forward ? 1 : -1)) return report(held, p, i, false);  // held in the corner
     i = next;
     s = enter;
     to = on_next;
     direction = next_direction;
   }
-  return report(on ? q : q_on, p, i, false);
+  return report(place.x, p, i, false);
 }
 
 }  // namespace proxarm::models

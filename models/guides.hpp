@@ -5,6 +5,14 @@
 //   r = q if |eᵀ(p − q)| ≤ μ ‖f_⟂‖,  else eᵀ(r − p) = ∓ μ ‖f_⟂‖,
 // which is (4) with the distance from the line in the place of the penetration. q is taken to its nearest point first.
 //
+// An object that moves onto the proxy takes it along a line or a polyline, before all else: from q, which it has come
+// over, to the next point q' of the guide that is free of it, on the side to which its surface leans. With q' in the
+// place of q, (4) and the stops are those of objects at rest; that is the solution with a force of the object on the
+// proxy, F ≥ 0 along the guide and 0 unless they touch: r = q' where eᵀ(p − q') ≤ μ ‖f_⟂‖ (e: to the side pushed to),
+// whatever K. q' isn't a matter of p or K, so Assumption 1 holds. Where there is no such point within ten times what
+// the object has moved at q (it comes across the guide, the guide ends, others are in the way), the proxy is
+// squeezed().
+//
 // A plane among objects is two half-spaces back to back (scenes/compile.cpp): a World solves it with them.
 #pragma once
 
@@ -51,9 +59,17 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
     objects_ = std::move(objects);
     contacts_[0].object = index;
   }
+  // Objects that move, without friction, and no meshes: they stop the proxy, too, and push it along.
+  void be_pushed_by(std::vector<World::Entry> movers) {
+    movers_ = std::make_shared<std::vector<World::Entry>>(std::move(movers));
+    pushes_.assign(movers_->size(), 0);
+  }
 
   Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
-  [[nodiscard]] bool wants_time() const noexcept override { return false; }
+  void set_time(const StepTime& time) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return movers_ != nullptr; }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
   // The guide's, and that with what stops the proxy.
   [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
 
@@ -64,16 +80,35 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
     double length;  // infinite for a line
     double begin;   // 0, or minus infinity
   };
+  // A point of it.
+  struct Place {
+    std::size_t piece = 0;
+    double s = 0.0;  // from the piece's beginning
+    Vec3 x = Vec3::Zero();
+  };
   PolylineGuide() = default;
   [[nodiscard]] std::size_t nearest_piece(const Vec3& q) const noexcept;
+  [[nodiscard]] bool next_piece(std::size_t& piece, bool forward) const noexcept;
+  [[nodiscard]] Place advance(Place at, double by) const noexcept;
+  [[nodiscard]] bool clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
+                              Place& place) const noexcept;
+  [[nodiscard]] int pushed_to(const Obstacle& object, const Vec3& carried, const Vec3& q, std::size_t piece,
+                              Contact<3>& contact) const noexcept;
+  [[nodiscard]] bool reaches(Place from, const Place& to, int side) noexcept;
+  bool carry(const Vec3& q, Place& place) noexcept;
+  Vec3 slide(const Vec3& p, const Place& place) noexcept;
   Vec3 report(const Vec3& r, const Vec3& p, std::size_t piece, bool slips) noexcept;
-  bool leads(const Vec3& from, Vec3& to) noexcept;
+  bool leads(const Vec3& from, Vec3& to, bool past_pushing = false) noexcept;
 
   std::vector<Piece> pieces_;
   bool closed_ = false;
   double mu_ = 0.0;
   std::size_t last_ = 0;            // where the proxy was: where the search begins
-  std::shared_ptr<World> objects_;  // none: an empty world
+  std::shared_ptr<World> objects_;  // that stand still; none: an empty world
+  std::shared_ptr<std::vector<World::Entry>> movers_;
+  std::vector<char> pushes_;  // which of them push in this step
+  std::uint64_t unresolved_ = 0;
+  bool squeezed_ = false;
   std::array<Contact<3>, 2> contacts_;
   std::size_t count_ = 1;
 };

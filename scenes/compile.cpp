@@ -207,7 +207,7 @@ void add_plane_guide(const Scene& scene, std::vector<models::World::Entry>& entr
 }
 
 template <int N>
-std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
+std::vector<models::World::Entry> surfaces(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
   std::vector<models::World::Entry> entries;
   std::size_t moving = 0, layers = 0, rubbing = 0;
   for (const auto& plane : cut.planes) {
@@ -276,16 +276,21 @@ std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, Comp
     out.rubbing.emplace_back(entry.object,
                              [obstacle = entry.obstacle.get()](double mu) { obstacle->set_friction(mu); });
   }
-  return std::make_unique<models::World>(std::move(entries));
+  return entries;
 }
 
-// An object that moves would push the proxy along a line or off it; where to, and with what, isn't said by a straight
-// way that ends.
-void require_still(const Scene& scene) {
+template <int N>
+std::unique_ptr<models::World> world(const Scene& scene, const Cut<N>& cut, CompiledScene& out) {
+  return std::make_unique<models::World>(surfaces<N>(scene, cut, out));
+}
+
+// A mesh's sides hold from both of them, and must outlast its motion: a stop on a line is nearer to it than that
+// allows.
+void require_no_moving_mesh(const Scene& scene) {
   for (const Object& object : scene.objects) {
-    if (!object.motion) continue;
-    throw refusal(scene, object.line, "found " + object.name + ", that moves, beside a guide along a line",
-                  "let objects stand still there, or use a guide on a plane");
+    if (!object.motion || !std::holds_alternative<MeshShape>(object.shape)) continue;
+    throw refusal(scene, object.line, "found " + object.name + ", a mesh that moves, beside a guide along a line",
+                  "let it stand still, use another kind of object there, or use a guide on a plane");
   }
 }
 
@@ -296,20 +301,28 @@ Algorithm<3> guide_among_objects(const Scene& scene, const GuideDescription& gui
     out.stages.push_back({"guide on a plane", "two half-spaces back to back, among the objects"});
     return world<N>(scene, cut_scene<N>(scene, out), out);
   }
-  require_still(scene);
-  CompiledScene objects;  // whose friction doesn't matter: what is in the way
-                          // stops the proxy
+  require_no_moving_mesh(scene);
+  CompiledScene objects;  // whose friction doesn't matter: there is one way to go
+  std::vector<models::World::Entry> all = surfaces<N>(scene, cut_scene<N>(scene, objects), objects), still, movers;
+  for (models::World::Entry& entry : all) {
+    if (entry.obstacle->moves()) entry.obstacle->set_friction(0.0);
+    (entry.obstacle->moves() ? movers : still).push_back(std::move(entry));
+  }
+  out.driven = objects.driven;
   models::PolylineGuide along =
       guide.kind == GuideDescription::Kind::line
           ? models::PolylineGuide::line(guide.points_m.front(), guide.direction, guide.friction)
           : models::PolylineGuide(guide.points_m, guide.closed, guide.friction);
-  along.stop_at(world<N>(scene, cut_scene<N>(scene, objects), objects), index);
+  along.stop_at(std::make_shared<models::World>(std::move(still)), index);
+  const std::size_t pushing = movers.size();
+  if (pushing > 0) along.be_pushed_by(std::move(movers));
   out.stages.push_back({guide.kind == GuideDescription::Kind::line
                             ? "guide on a line"
                             : "guide along " + std::to_string(guide.points_m.size()) + " points",
                         guide.friction > 0.0 ? "μ = " + number_text(guide.friction) : "without friction"});
   out.stages.push_back({"stop", "at the first of " + std::to_string(scene.objects.size()) +
                                     (scene.objects.size() > 1 ? " objects" : " object") + " on the way"});
+  if (pushing > 0) out.stages.push_back({"push", "by what moves onto the proxy, to the next free point"});
   out.skipped.push_back({"friction of objects", "there is one way to go, and what stops it holds"});
   return std::make_unique<models::PolylineGuide>(std::move(along));
 }
