@@ -161,6 +161,138 @@ class SceneFile(ProgramTest):
         self.summary("--scene", self.written("near.yaml", guide.format(y=0.00005)), "--duration", "0.2s")
         self.refuse(guide.format(y=0.015), ":1: guide", "0.015 m away", "start_rad")
 
+    def refuse_each(self, rows):
+        for text, *fragments in rows:
+            with self.subTest(text=text):
+                self.refuse(text, *fragments)
+
+    def test_each_kind_refuses_what_is_no_number_or_no_shape(self):
+        def object_of(kind, keys):
+            return f"objects:\n  - {kind}: {{{keys}}}\n"
+        rows = []
+        sound = {
+            "plane": ("point_m: [1, 0, 0]", "normal: [-1, 0, 0]"),
+            "box": ("centre_m: [1, 0, 0]", "size_m: [0.1, 0.1, 0.1]"),
+            "sphere": ("centre_m: [1, 0, 0]", "radius_m: 0.1"),
+            "capsule": ("from_m: [1, 0, 0]", "to_m: [1, 0, 1]", "radius_m: 0.1"),
+            "cylinder": ("from_m: [1, 0, 0]", "to_m: [1, 0, 1]", "radius_m: 0.1"),
+        }
+        for kind, keys in sound.items():
+            place = f":2: objects[0].{kind}."
+            for index, pair in enumerate(keys):
+                key, value = pair.split(": ", 1)
+                for found in (".nan", ".inf", "-.inf"):
+                    # Of a list the first number is the bad one.
+                    changed = value.replace("[1,", f"[{found},").replace("[-1,", f"[{found},")
+                    changed = changed.replace("[0.1,", f"[{found},").replace("0.1", found) if changed == value else changed
+                    others = [other for k, other in enumerate(keys) if k != index]
+                    rows.append((object_of(kind, ", ".join([f"{key}: {changed}", *others])), place + key, found, "expected"))
+            rest = ", ".join(keys)
+            rows.append((object_of(kind, rest + ", friction: -0.1"), place + "friction: found -0.1", "from 0 to 100"))
+            rows.append((object_of(kind, rest + ", friction: .nan"), place + "friction", ".nan", "from 0 to 100"))
+            for motion, key, expected in (("velocity_m_per_s: [0, .nan, 0]", "velocity_m_per_s", "-100 to 100"),
+                                          ("swing: {amplitude_m: [1, 0, 0], frequency_Hz: 0}", "frequency_Hz", "found 0"),
+                                          ("turn: {axis: [0, 0, 0], centre_m: [0, 0, 0], speed_rad_per_s: 1}", "axis",
+                                           "not all zero")):
+                rows.append((object_of(kind, rest + f", motion: {{{motion}}}"), place + "motion.", key, expected))
+            for layer, key in (("thickness_m: 0, stiffness_N_per_m: 1", "thickness_m: found 0"),
+                               ("thickness_m: 0.001, stiffness_N_per_m: .inf", "stiffness_N_per_m")):
+                rows.append((object_of(kind, rest + f", layer: {{{layer}}}"), place + "layer." + key, "expected"))
+        for kind, keys, key in (("plane", "point_m: [1, 0, 0], normal: [0, 0, 0]", "normal"),
+                                ("box", "centre_m: [1, 0, 0], size_m: [0.1, 0, 0.1]", "size_m"),
+                                ("sphere", "centre_m: [1, 0, 0], radius_m: -1", "radius_m: found -1"),
+                                ("capsule", "from_m: [1, 0, 0], to_m: [1, 0, 1], radius_m: 0", "radius_m: found 0"),
+                                ("cylinder", "from_m: [1, 0, 0], to_m: [1, 0, 0], radius_m: 0.1", "to_m")):
+            rows.append((object_of(kind, keys), f":2: objects[0].{kind}.{key}", "expected"))
+        self.refuse_each(rows)
+
+    def test_meshes_that_are_none(self):
+        rows = []
+        for name, text in (("empty.stl", ""), ("none.obj", "v 0 0 0\n"), ("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
+                           ("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
+                           ("nan.obj", "v 0 0 0\nv 1 0 0\nv nan 1 0\nf 1 2 3\n")):
+            self.written(name, text)
+            rows.append((f"objects:\n  - mesh: {{file: {name}}}\n", name))
+        rows.append(("objects:\n  - mesh: {file: lost.stl}\n", "lost.stl"))
+        for text, name in rows:
+            with self.subTest(mesh=name):
+                outcome = self.call("run", "--scene", self.written("scene.yaml", text))
+                expected = {"lost.stl": ":2: objects[0].mesh.file", "flat.obj": "none of the triangles has an area"}
+                self.assert_refused(outcome, name, expected.get(name, "expected a mesh"))
+
+    def test_a_start_inside_of_each_kind(self):
+        self.written("cube.obj", "".join(f"v {0.6 + 0.2 * (k & 1)} {-0.1 + 0.1 * (k & 2)} {0.5 + 0.05 * (k & 4)}\n" for k in range(8)) +
+                     "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n")
+        solids = {
+            "plane": "point_m: [0.65, 0, 0.6], normal: [-1, 0, 0]",
+            "box": "centre_m: [0.7, 0, 0.6], size_m: [0.1, 0.1, 0.1]",
+            "sphere": "centre_m: [0.7, 0, 0.6], radius_m: 0.05",
+            "capsule": "from_m: [0.7, 0, 0.4], to_m: [0.7, 0, 0.8], radius_m: 0.05",
+            "cylinder": "from_m: [0.7, 0, 0.4], to_m: [0.7, 0, 0.8], radius_m: 0.05",
+            "mesh": "file: cube.obj",
+        }
+        rooms = {
+            "box": "centre_m: [1, 0, 0.6], size_m: [0.5, 0.1, 0.1], inside_out: true",
+            "sphere": "centre_m: [1, 0, 0.6], radius_m: 0.25, inside_out: true",
+            "capsule": "from_m: [1, 0, 0.4], to_m: [1, 0, 0.8], radius_m: 0.25, inside_out: true",
+            "cylinder": "from_m: [1, 0, 0.4], to_m: [1, 0, 0.8], radius_m: 0.25, inside_out: true",
+            "mesh": "file: cube.obj, position_m: [0.3, 0, 0], inside_out: true",
+        }
+        message = (":2: it", "x 0.7000, y 0.0000, z 0.6000 m", "inside", "free space", "start_rad")
+        rows = []
+        for shapes in (solids, rooms):
+            for kind, keys in shapes.items():
+                for more in ("", ", motion: {velocity_m_per_s: [0.1, 0, 0]}", ", motion: {driven: true}",
+                             ", layer: {thickness_m: 0.01, stiffness_N_per_m: 1000}"):
+                    if kind == "mesh" and "layer" in more:
+                        continue
+                    rows.append((f"objects:\n  - {kind}: {{name: it, {keys}{more}}}\n", *message))
+        # In a plane and on a line, too.
+        for space in ("dimensions: 2\nspace: {origin_m: [0.7, 0, 0.6], axes: [[1, 0, 0], [0, 1, 0]]}\n",
+                      "dimensions: 1\nspace: {origin_m: [0.7, 0, 0.6], axes: [[1, 0, 0]]}\n"):
+            for kind, keys in solids.items():
+                rows.append((f"{space}objects:\n  - {kind}: {{name: it, {keys}}}\n", ":4: it", *message[1:]))
+        # Within its layer it is where a proxy may be.
+        self.refuse_each(rows)
+        skin = self.written("skin.yaml", "objects:\n  - sphere: {centre_m: [0.745, 0, 0.6], radius_m: 0.05, "
+                                         "layer: {thickness_m: 0.01, stiffness_N_per_m: 1000}}\n")
+        self.summary("--scene", skin, "--duration", "0.1s")
+
+    def test_guides_that_are_none_or_elsewhere(self):
+        rows = []
+        for kind, keys, key in (("line", "point_m: [.nan, 0, 0.6], direction: [1, 0, 0]", "point_m"),
+                                ("line", "point_m: [0.7, 0, 0.6], direction: [0, 0, 0]", "direction"),
+                                ("plane", "point_m: [0.7, 0, 0.6], normal: [0, 0, 0]", "normal"),
+                                ("plane", "point_m: [0.7, 0, 0.6], normal: [0, .inf, 0]", "normal"),
+                                ("polyline", "points_m: [[0.7, 0, 0.6]]", "points_m"),
+                                ("polyline", "points_m: [[0.7, 0, 0.6], [0.7, .nan, 0.6]]", "points_m"),
+                                ("polyline", "points_m: [[0.7, 0, 0.6], [0.7, 0, 0.6]]", "points_m")):
+            rows.append((f"guide: {{{kind}: {{{keys}}}}}\n", f":1: guide.{kind}.{key}", "expected"))
+            rows.append((f"guide: {{{kind}: {{{keys}, friction: -1}}}}\n", "expected"))
+        for kind, keys in (("line", "point_m: [0.8, 0.02, 0.6], direction: [1, 0, 0]"),
+                           ("plane", "point_m: [0.8, 0.02, 0.6], normal: [0, 1, 0]"),
+                           ("polyline", "points_m: [[0.6, 0.02, 0.6], [0.8, 0.02, 0.6]]")):
+            guide = f"guide: {{{kind}: {{{keys}}}}}\n"
+            ball = "objects:\n  - sphere: {centre_m: [1, 0, 0.6], radius_m: 0.1}\n"
+            pushing = ball.replace("0.1}", "0.1, motion: {driven: true}}")
+            flat = "dimensions: 2\nspace: {origin_m: [0.7, 0, 0.6], axes: [[1, 0, 0], [0, 1, 0]]}\n"
+            for before, line in (("", 1), (ball, 3), (pushing, 3), (flat, 3)):
+                rows.append((before + guide, f":{line}: guide", "0.02 m away", "start_rad"))
+        self.refuse_each(rows)
+
+    def test_what_moves_and_leaves_no_room_is_a_fault(self):
+        wall = "  - plane: {point_m: [0.72, 0, 0.6], normal: [-1, 0, 0]}\n"
+        press = "objects:\n  - box: {centre_m: [0.6, 0, 0.6], size_m: [0.1, 0.1, 0.1], motion: {velocity_m_per_s: [0.1, 0, 0]}}\n"
+        rail = "guide: {polyline: {points_m: [[0.5, 0, 0.6], [0.72, 0, 0.6]]}}\n"
+        flat = "dimensions: 2\nspace: {origin_m: [0.7, 0, 0.6], axes: [[1, 0, 0], [0, 1, 0]]}\n"
+        for text in (press + wall, press + rail, press + wall + rail, flat + press + rail,
+                     "dimensions: 1\nspace: {origin_m: [0.7, 0, 0.6], axes: [[1, 0, 0]]}\n" + press + wall):
+            with self.subTest(text=text):
+                outcome = self.call("run", "--scene", self.written("scene.yaml", text), "--duration", "2s", "--json")
+                self.assertEqual(outcome.status, 1, outcome.err + outcome.out)
+                self.assertIn("proxy_squeezed", outcome.out)
+                self.assertNotIn("nan", outcome.out.lower().replace("name", ""))
+
     def test_that_begins_at_the_start_is_fine_up_to_a_tenth_of_a_millimetre(self):
         wall = "objects:\n  - plane: {{point_m: [{x}, 0, 0], normal: [-1, 0, 0]}}\n"
         # The start is at 0.70000 to within 0.02 mm.
