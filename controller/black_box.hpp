@@ -48,10 +48,11 @@ struct BoxCycle {
   bool stop_requested = false;
   Change change;
   Command command;
+  Timestep timestep;
   std::array<BusInput, max_buses> buses{};
   std::uint16_t input_bytes = 0;
   std::array<std::byte, 512> inputs{};  // CyclicDrive::archive_input() of all drives
-  std::uint64_t rendered_cycles = 0;
+  std::int64_t rendered_ns = 0;
   CycleRecord record;
 };
 

@@ -136,15 +136,6 @@ std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines(const descriptio
   return lines;
 }
 
-// One joint per cycle may turn as far as its speed allows.
-models::InverseKinematicsConfig inverse_config(const description::Cell& cell, double period_s) {
-  models::InverseKinematicsConfig config;
-  for (std::size_t i = 0; i < cell.drives.size() && i < config.max_step_rad.size(); ++i) {
-    config.max_step_rad[i] = cell.drives[i].max_speed_rad_per_s * period_s;
-  }
-  return config;
-}
-
 // The tool behind the sensor is felt by itself; (26) gets what is left of the wanted mass.
 double proxy_mass(const description::Cell& cell, const SessionSettings& settings) {
   if (settings.mass_kg > cell.tool.mass_kg) return settings.mass_kg - cell.tool.mass_kg;
@@ -199,6 +190,14 @@ void refuse_shared_identifiers(CycleParts& parts) {
 
 }  // namespace
 
+std::array<double, 6> max_steps_rad(const std::vector<DriveOnBus>& drives, double period_s) noexcept {
+  std::array<double, 6> steps = models::InverseKinematicsConfig{}.max_step_rad;
+  for (std::size_t i = 0; i < drives.size() && i < steps.size(); ++i) {
+    steps[i] = drives[i].drive.description().max_speed_rad_per_s * period_s;
+  }
+  return steps;
+}
+
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor) {
   return build_sensor(cell, sensor).owned;
@@ -217,6 +216,13 @@ void require_scheme(const description::Cell& cell, const SessionSettings& settin
                             : "impedance: the drive of " + drive.joint + " takes torques (mode cst)",
          .advice = torque ? "the impedance type needs mode: cst for all drives" : ""});
   }
+}
+
+void require_timestep(const description::Cell& cell, const SessionSettings& settings) {
+  for (const description::DriveDescription& drive : cell.drives) {
+    if (drive.on_can()) (void)make_can_drive(cell, drive, settings);
+  }
+  orientation_config(settings).validate();
 }
 
 ModbusOpener opener_of(fieldbus::ModbusPeers peers) {
@@ -240,7 +246,8 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
   if (settings.scheme == Scheme::impedance) {
     torque = make_torque_rendering(scene, *arm, cell.drives, cell.limits, impedance_config(settings));
   } else {
-    inverse.emplace(*arm, inverse_config(cell, settings.period_s));
+    inverse.emplace(*arm,
+                    models::InverseKinematicsConfig{.max_step_rad = max_steps_rad(drives.all, settings.period_s)});
     world = make_rendered_world(scene, settings, proxy_mass(cell, settings));
   }
   std::unique_ptr<FreeMotion> freeing;

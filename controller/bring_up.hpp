@@ -32,6 +32,12 @@ std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell
 // Throws SetupError where the drives' modes can't render that way. build_parts() asks, too.
 void require_scheme(const description::Cell& cell, const SessionSettings& settings);
 
+// Throws SetupError where the cell can't have settings.period_s; build_parts() finds the same in its parts.
+void require_timestep(const description::Cell& cell, const SessionSettings& settings);
+
+// One joint per cycle may turn as far as its speed allows.
+std::array<double, 6> max_steps_rad(const std::vector<DriveOnBus>& drives, double period_s) noexcept;
+
 // `scene` must outlive the parts.
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,

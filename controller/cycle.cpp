@@ -57,6 +57,8 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       receive_window_ns_(std::llround(receive_window * settings.period_s * 1e9)),
       outboxes_(parts_.network.bus_count()),
       supervisor_(reactions_for(parts_)),
+      exchange_(parts_.can_drives),
+      shown_period_s_(settings.period_s),
       speed_limit_m_per_s_(limits.max_tool_speed_m_per_s),
       stale_cycles_(JointVector::Zero(parts_.arm->axes())),
       link_rad_(parts_.arm->start_rad()),
@@ -137,6 +139,7 @@ void Cycle::deliver(std::size_t bus, const fieldbus::TimedFrame& received) noexc
   for (DriveOnBus& axis : parts_.drives) {
     if (axis.bus == bus && axis.drive.on_frame(received.frame, received.time_ns)) return;
   }
+  if (changing() && exchange_.on_frame(bus, received.frame)) return;
   if (parts_.enabling && parts_.enabling->on_frame(bus, received.frame, received.time_ns)) return;
   // Own frames don't come back: somebody else has sent it.
   if (is_masters_own(bus, received.frame)) {
@@ -200,6 +203,8 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
     raise(Fault::overrun, -1, overruns_in_a_row_, settings_.max_overruns);
   }
   take_command(t_k_ns);
+  take_timestep();
+  change_timestep(t_k_ns);
   supervise_hold(t_k_ns);
   enter(supervisor_.phase(), t_k_ns);
 }
@@ -207,7 +212,7 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
 void Cycle::judge_sensor() noexcept {
   missed_samples_ = sample_is_new_ ? 0 : missed_samples_ + 1;
   // The limit is three of the sensor's own samples: a third of it is one.
-  judge_lateness(missed_samples_ >= std::max(1u, settings_.max_missed_samples / 3));
+  judge_lateness(!telling() && missed_samples_ >= std::max(1u, settings_.max_missed_samples / 3));
   if (missed_samples_ > settings_.max_missed_samples) {
     // A counter that stands still makes each sample an old one: it is there, and frozen.
     const bool frozen = parts_.sensor->latest().repeats > settings_.max_missed_samples;
@@ -234,7 +239,7 @@ void Cycle::judge_drives() noexcept {
     const auto where = static_cast<std::int32_t>(i);
     if (drive.cycles_without_tpdo() > settings_.max_missed_feedback) {
       raise(Fault::drive_silent, where, drive.cycles_without_tpdo(), settings_.max_missed_feedback);
-    } else if (!drive.fresh() && supervisor_.live()) {
+    } else if (!drive.fresh() && supervisor_.live() && !telling()) {  // an SDO answer may hold it up by a frame
       raise(Fault::feedback_late, where, drive.cycles_without_tpdo() + 1.0, settings_.max_missed_feedback);
     }
     switch (drive.fault()) {
@@ -321,6 +326,9 @@ void Cycle::act(std::int64_t t_k_ns) noexcept {
       free_motion();
       break;
     case Phase::holding:
+      take_change();
+      run_out();
+      break;
     case Phase::stopping:
       run_out();
       break;
@@ -396,13 +404,14 @@ void Cycle::start_rendering() noexcept {
 
 void Cycle::take_change() noexcept {
   Change change;
-  if (next_scheduled_ < scheduled_.size() && scheduled_[next_scheduled_].rendered_cycles <= rendered_cycles_) {
+  if (next_scheduled_ < scheduled_.size() && scheduled_[next_scheduled_].rendered_ns <= rendered_ns_) {
     change = scheduled_[next_scheduled_++].change;
   } else if (!changes_.pop(change)) {
     return;
   }
-  parts_.world->set(change);
   if (box_ != nullptr) boxed_->change = change;
+  rest_cycles_ = 0;  // the timestep waits for those that were checked before it
+  if (change.period_s == 0.0 || change.period_s == settings_.period_s) parts_.world->set(change);
 }
 
 void Cycle::render() noexcept {
@@ -427,6 +436,7 @@ void Cycle::render() noexcept {
     raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
   }
   ++rendered_cycles_;
+  rendered_ns_ += period_ns_;
 }
 
 void Cycle::record_world(const WorldStep& step) noexcept {
@@ -473,6 +483,7 @@ void Cycle::render_torques() noexcept {
   torque_Nm_ = step.torque_Nm;
   record_world(step.world);
   ++rendered_cycles_;
+  rendered_ns_ += period_ns_;
 }
 
 // The sets of this step, around the proxy and what is commanded behind the filter of the setpoints.
@@ -579,6 +590,7 @@ void Cycle::send_targets(std::int64_t t_k_ns) noexcept {
   for (DriveBus& bus : parts_.drive_buses) {
     if (bus.heartbeat.due(t_k_ns, cycle_, frame)) send(bus.bus, frame);
   }
+  if (changing()) send_period_requests(t_k_ns);
   hand_over();
 }
 
@@ -613,12 +625,15 @@ void Cycle::hand_over(std::size_t bus) noexcept {
 }
 
 void Cycle::raise(Fault fault, std::int32_t where, double value, double limit) noexcept {
+  // What would hold the arm is for a person to go on from.
+  if (changing() && supervisor_.reaction(fault) == Reaction::hold) resumes_after_timestep_ = false;
   supervisor_.raise({fault, where, cycle_, value, limit});
 }
 
 void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record_.cycle = cycle_;
   record_.time_ns = t_k_ns - first_cycle_ns_;
+  record_.period_ns = period_ns_;
   record_.phase = entered_phase_;
   record_.axes = static_cast<std::uint8_t>(parts_.drives.size());
   record_.set(RecordFlag::sample_held, !sample_is_new_);
@@ -638,7 +653,13 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
     if (!drive.fresh()) record_.set(RecordFlag::feedback_missing);
   }
   record_.compute_ns = compute_ns_;
+  record_.set(RecordFlag::timestep, changing());
   shown_phase_.store(supervisor_.phase(), std::memory_order_relaxed);
+  shown_period_s_.store(settings_.period_s, std::memory_order_relaxed);
+  shown_change_.store(changing(), std::memory_order_relaxed);
+  if (!changing() || timestep_stage_ == TimestepStage::unknown) {
+    answered_timesteps_.store(asked_timesteps_, std::memory_order_release);
+  }
   pressed_.store(!parts_.enabling || parts_.enabling->pressed(), std::memory_order_relaxed);
   cause_lasts_.store(!may_move(), std::memory_order_relaxed);
   records_.push(record_);
@@ -662,7 +683,7 @@ void Cycle::finish_box() noexcept {
   for (DriveOnBus& axis : parts_.drives) axis.drive.archive_input(inputs);
   parts_.sensor->archive_input(inputs);
   boxed_->input_bytes = static_cast<std::uint16_t>(inputs.bytes());
-  boxed_->rendered_cycles = rendered_cycles_;
+  boxed_->rendered_ns = rendered_ns_;
   boxed_->record = record_;
   box_->finish();
 }
@@ -676,9 +697,10 @@ void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   if (passivity_) passivity_->archive(state);
   if (parts_.enabling) parts_.enabling->archive(state);
   if (parts_.freeing) parts_.freeing->archive(state);
+  archive_timestep(state);
   state(parts_.elastic, parts_.orientation, parts_.compensation, supervisor_, entered_phase_, phase_since_ns_,
-        first_cycle_ns_, cycle_, rendered_cycles_, missed_samples_, reading_S_.force, reading_S_.torque, R_WS_,
-        hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, torque_Nm_,
+        first_cycle_ns_, cycle_, rendered_cycles_, rendered_ns_, missed_samples_, reading_S_.force, reading_S_.torque,
+        R_WS_, hand_W_.force, hand_W_.torque, tool_W_, proxy_W_, proxy_k1_W_, link_rad_, target_rad_, torque_Nm_,
         run_out_rad_per_s_, measured_link_rad_, actual_rad_, moved_rad_, guard_, run_out_scale_, run_out_per_cycle_,
         tared_, wants_resume_, late_score_, force_share_, speed_limit_m_per_s_, last_normal_W_, stale_cycles_,
         overflows_before_);

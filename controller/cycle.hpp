@@ -46,6 +46,7 @@
 #include "fieldbus/canopen_heartbeat.hpp"
 #include "fieldbus/canopen_sync.hpp"
 #include "fieldbus/cia402_bring_up.hpp"
+#include "fieldbus/cia402_period.hpp"
 #include "fieldbus/force_sensor.hpp"
 #include "fieldbus/modbus_line.hpp"
 #include "models/arm.hpp"
@@ -105,9 +106,23 @@ class Cycle {
 
   // Any thread: asks for a controlled stop at the next cycle.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
-  // Checked parameters for the next rendered cycles, one each, from one thread; and those of a script, by their times.
+  // Checked parameters for the next cycles of rendering or of a hold, one each, from one thread; and those of a script,
+  // by their times.
   [[nodiscard]] SpscRing<Change>& changes() noexcept { return changes_; }
   void schedule(std::vector<ScheduledChange> changes) { scheduled_ = std::move(changes); }
+  // Another T, by the same rules; the drives are on CAN and take positions. The arm stops, the drives are told,
+  // rendering goes on. It waits until the arm is rendering or in a hold.
+  [[nodiscard]] SpscRing<Timestep>& timesteps() noexcept { return timesteps_; }
+  void schedule(std::vector<ScheduledTimestep> timesteps) { scheduled_timesteps_ = std::move(timesteps); }
+  // Any thread: why the timestep can't be changed now; nullptr: it can.
+  [[nodiscard]] const char* timestep_refusal() const noexcept;
+  // Any thread: T, s, and whether it is being changed.
+  [[nodiscard]] double shown_period_s() const noexcept { return shown_period_s_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool changes_timestep() const noexcept { return shown_change_.load(std::memory_order_relaxed); }
+  // How many of those that came through timesteps() are over, taken or not.
+  [[nodiscard]] std::uint32_t answered_timesteps() const noexcept {
+    return answered_timesteps_.load(std::memory_order_acquire);
+  }
   // The same of commands, in any phase. One that the phase has no use for is dropped; refusal() says so beforehand.
   [[nodiscard]] SpscRing<Command>& commands() noexcept { return commands_; }
   void schedule(std::vector<ScheduledCommand> commands) { scripted_ = std::move(commands); }
@@ -128,6 +143,9 @@ class Cycle {
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return rendered_cycles_; }
+  [[nodiscard]] std::int64_t rendered_ns() const noexcept { return rendered_ns_; }
+  // From the last cycle to the next one.
+  [[nodiscard]] std::int64_t period_ns() const noexcept { return period_ns_; }
   // After the last cycle: whether every drive has said that it doesn't hold its axis any more.
   [[nodiscard]] bool drives_off() const noexcept;
   // Faults that were reset, the latest eight, the oldest of them first; and how many there were.
@@ -179,6 +197,22 @@ class Cycle {
   void await_begin(std::int64_t t_k_ns) noexcept;
   void await_reset(std::int64_t t_k_ns) noexcept;
   void reset() noexcept;
+  // cycle_timestep.cpp
+  enum class TimestepStage : std::uint8_t { none, coming_to_rest, telling, taking_back, unknown };
+  void take_timestep() noexcept;
+  void change_timestep(std::int64_t t_k_ns) noexcept;
+  void begin_telling() noexcept;
+  void take_timestep_back(const fieldbus::PeriodRefusal& refusal) noexcept;
+  void end_timestep() noexcept;
+  void apply_period(double period_s) noexcept;
+  void archive_timestep(fieldbus::StateArchive& state) noexcept;
+  void send_period_requests(std::int64_t t_k_ns) noexcept;
+  // SDO answers are on the bus beside the cycle's frames.
+  [[nodiscard]] bool telling() const noexcept {
+    return timestep_stage_ == TimestepStage::telling || timestep_stage_ == TimestepStage::taking_back;
+  }
+  [[nodiscard]] bool changing() const noexcept { return timestep_stage_ != TimestepStage::none; }
+  // cycle_supervision.cpp, further
   void start_run_out(Phase from) noexcept;
   void start_freeing(const Command& command) noexcept;
   void free_motion() noexcept;
@@ -221,11 +255,24 @@ class Cycle {
   std::int64_t first_cycle_ns_ = 0;
   std::uint64_t cycle_ = 0;
   std::uint64_t rendered_cycles_ = 0;
+  std::int64_t rendered_ns_ = 0;
   std::uint32_t missed_samples_ = 0;
   std::uint32_t overruns_in_a_row_ = 0;
   SpscRing<Change> changes_{16};
   std::vector<ScheduledChange> scheduled_;
   std::size_t next_scheduled_ = 0;
+  SpscRing<Timestep> timesteps_{4};
+  std::vector<ScheduledTimestep> scheduled_timesteps_;
+  std::size_t next_timestep_ = 0;
+  fieldbus::PeriodExchange exchange_;
+  TimestepStage timestep_stage_ = TimestepStage::none;
+  Timestep wanted_timestep_, old_timestep_;
+  bool resumes_after_timestep_ = false;
+  std::uint32_t asked_timesteps_ = 0;  // popped
+  std::uint8_t rest_cycles_ = 0;
+  std::atomic<double> shown_period_s_;
+  std::atomic<bool> shown_change_{false};
+  std::atomic<std::uint32_t> answered_timesteps_{0};
   std::atomic<bool> stop_requested_{false};
   bool stop_seen_ = false;  // in this cycle
   bool commanded_ = false;  // the guard has made this cycle's setpoints

@@ -10,6 +10,7 @@
 #include "controller/passivity.hpp"
 #include "controller/step_limits.hpp"
 #include "controller/supervisor.hpp"
+#include "fieldbus/cia402_period.hpp"
 #include "models/geometry.hpp"
 
 namespace proxarm::controller {
@@ -39,6 +40,7 @@ enum class RecordFlag : std::uint32_t {
   limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
   limit_joint_torque = 1u << 17,     // impedance type: the rendered torques were cut
   oscillation = 1u << 18,            // motion above the hand's band (passivity.hpp)
+  timestep = 1u << 19,               // it is being changed: the arm stops for it, or stands
   ramp_in = 1u << 24,                // only a share of the hand's force was let in
   slowed = 1u << 25,                 // the tool's speed limit is below the cell's, because of a fault
 };
@@ -70,8 +72,9 @@ inline models::Vec3 vec3(const Triple& v) noexcept { return {v[0], v[1], v[2]}; 
 inline constexpr std::size_t max_axes = 8;
 
 struct CycleRecord {
-  std::uint64_t cycle = 0;   // k
-  std::int64_t time_ns = 0;  // t_k, as scheduled, from the first cycle of the session
+  std::uint64_t cycle = 0;     // k
+  std::int64_t time_ns = 0;    // t_k, as scheduled, from the first cycle of the session
+  std::int64_t period_ns = 0;  // T, from this cycle to the next one
   Phase phase = Phase::idle;
   ContactPhase contact = ContactPhase::free;
   std::uint8_t contact_count = 0;  // how many things press at once
@@ -98,6 +101,9 @@ struct CycleRecord {
   // Of PassivityObserver, where it is wanted.
   PortEnergies energies_J{};
   double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
+
+  std::int64_t refused_period_ns = 0;          // a timestep that was given up in this cycle; 0: none
+  fieldbus::PeriodRefusal timestep_refusal{};  // by whom
 
   // The simulation's truth at t_k (flag `truth`).
   Triple true_tool_W_m{};

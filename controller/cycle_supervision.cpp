@@ -40,7 +40,7 @@ void Cycle::judge_enabling(std::int64_t t_k_ns) noexcept {
   parts_.enabling->on_cycle(t_k_ns);
   const bool pressed = parts_.enabling->pressed(), anew = parts_.enabling->take_press();
   const Phase phase = supervisor_.phase();
-  if (!pressed) wants_resume_ = false;
+  if (!pressed) wants_resume_ = resumes_after_timestep_ = false;
   if (phase == Phase::idle && anew) supervisor_.handle(Event::begin);
   if (phase == Phase::holding && anew) wants_resume_ = true;
   if (!pressed && (supervisor_.live() || phase == Phase::enabling || phase == Phase::taring)) {
@@ -91,17 +91,21 @@ void Cycle::judge_lateness(bool late) noexcept {
 
 const char* Cycle::refusal(Order order) const noexcept {
   const Phase phase = shown_phase();
+  const bool changing = changes_timestep();
   switch (order) {
     case Order::none:
       return nullptr;
     case Order::hold:
-      return phase == Phase::rendering || phase == Phase::freeing ? nullptr : "the arm isn't moving";
+      return phase == Phase::rendering || phase == Phase::freeing || changing ? nullptr : "the arm isn't moving";
     case Order::reset:
       if (phase != Phase::faulted) return "no stop by a fault waits for a reset";
+      if (changing) return "the drives haven't all confirmed their timestep: where it lasts, start anew";
       break;
-    case Order::resume:
     case Order::release:
     case Order::back_off:
+      if (changing) return "the timestep is being changed: again in a moment";
+      [[fallthrough]];
+    case Order::resume:
       if (phase != Phase::holding) return "the arm isn't in a hold";
       if (cause_lasts_.load(std::memory_order_relaxed)) return "what it is held for is still there";
       break;
@@ -132,6 +136,7 @@ void Cycle::obey(const Command& command) noexcept {
       if (parts_.torque) return;
       if (phase == Phase::rendering) supervisor_.hold();
       if (phase == Phase::freeing) supervisor_.handle(Event::freed);
+      if (changing()) wants_resume_ = resumes_after_timestep_ = false;
       return;
     case Order::resume:
       if (phase == Phase::holding && may_move()) wants_resume_ = true;
@@ -140,7 +145,7 @@ void Cycle::obey(const Command& command) noexcept {
     case Order::back_off:
       return start_freeing(command);
     case Order::reset:
-      if (phase == Phase::faulted && may_move()) reset();
+      if (phase == Phase::faulted && may_move() && !changing()) reset();
       return;
     case Order::none:
       return;
@@ -149,7 +154,7 @@ void Cycle::obey(const Command& command) noexcept {
 
 void Cycle::supervise_hold(std::int64_t t_k_ns) noexcept {
   if (supervisor_.phase() != Phase::holding || entered_phase_ != Phase::holding) return;
-  if (wants_resume_ && stands() && may_move()) {
+  if (wants_resume_ && stands() && may_move() && !changing()) {
     supervisor_.handle(Event::resume);
   } else if (since_s(t_k_ns, phase_since_ns_) > parts_.supervision.hold_s) {
     supervisor_.give_up_hold();
@@ -219,7 +224,9 @@ void Cycle::ramp_in() noexcept {
 
 // Away from what was touched last; where nothing was, to where the hand pushes.
 void Cycle::start_freeing(const Command& command) noexcept {
-  if (supervisor_.phase() != Phase::holding || entered_phase_ != Phase::holding || !stands() || !may_move()) return;
+  if (supervisor_.phase() != Phase::holding || entered_phase_ != Phase::holding || !stands() || !may_move() ||
+      changing())
+    return;
   if (command.order == Order::release) {
     parts_.freeing->start_release();
   } else {

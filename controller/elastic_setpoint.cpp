@@ -10,12 +10,16 @@ using models::JointVector;
 ElasticSetpoint::ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s)
     : arm_(&arm),
       omega_rad_per_s_(2.0 * std::numbers::pi * bandwidth_Hz),
-      decay_(std::exp(-omega_rad_per_s_ * period_s)),
-      period_s_(period_s),
       angle_rad_(arm.start_rad()),
       speed_rad_per_s_(JointVector::Zero(arm.axes())),
       inverse_stiffness_(arm.gear_stiffness_Nm_per_rad()) {
   for (double& compliance : inverse_stiffness_) compliance = compliance > 0.0 ? 1.0 / compliance : 0.0;
+  set_period(period_s);
+}
+
+void ElasticSetpoint::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  decay_ = std::exp(-omega_rad_per_s_ * period_s);
 }
 
 void ElasticSetpoint::start(const JointVector& link_rad) noexcept {

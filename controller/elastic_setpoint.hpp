@@ -27,6 +27,7 @@ class ElasticSetpoint {
   // `arm` must outlive this.
   ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s);
 
+  void set_period(double period_s) noexcept;
   // At rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
   // Goes on from where the motors are and how fast: what wound up in the filter is gone. Of the speed, the gears' part
@@ -45,8 +46,8 @@ class ElasticSetpoint {
  private:
   const models::Arm* arm_;
   double omega_rad_per_s_;
-  double decay_;  // exp(−ωT)
-  double period_s_;
+  double decay_ = 1.0;  // exp(−ωT)
+  double period_s_ = 0.0;
   models::JointVector angle_rad_, speed_rad_per_s_, inverse_stiffness_;
 };
 

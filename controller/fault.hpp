@@ -30,6 +30,7 @@ enum class Fault : std::uint8_t {
   drive_disabled,        // a drive left operation enabled by itself
   drive_not_enabled,     // a drive didn't reach operation enabled in time: nothing moves
   drive_not_disabled,    // a drive didn't confirm within a second that it is switched off
+  timestep_unknown,      // a drive confirms neither the timestep that it was to take nor the one before
   position_implausible,  // an encoder that jumps further than its joint can move
   target_out_of_range,   // a setpoint would leave a joint's range or its counts
   target_too_fast,       // a setpoint would exceed a joint's speed

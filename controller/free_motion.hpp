@@ -27,6 +27,10 @@ class FreeMotion {
 
   FreeMotion(const SessionSettings& settings, double speed_m_per_s);
 
+  void set_period(double period_s) noexcept {
+    period_s_ = period_s;
+    world_->set_period(period_s);
+  }
   [[nodiscard]] RenderedWorld& world() noexcept { return *world_; }
   [[nodiscard]] double speed_m_per_s() const noexcept { return speed_m_per_s_; }
 

@@ -23,6 +23,7 @@ class JointGuard {
  public:
   JointGuard(const std::vector<description::DriveDescription>& drives, double period_s);
 
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
   // At rest there.
   void start(const models::JointVector& target_rad) noexcept;
   // One period; what isn't finite is taken as the last setpoint. Returns which limits held something back.

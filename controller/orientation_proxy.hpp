@@ -37,6 +37,8 @@ class OrientationProxy {
  public:
   explicit OrientationProxy(const OrientationConfig& config);  // validates
 
+  // One that validate() would take.
+  void set_period(double period_s) noexcept { config_.period_s = period_s; }
   // Rests at R. False, and nothing changes, where R isn't within 1e-6 of a unit quaternion (its norm).
   bool start(const Eigen::Quaterniond& R_WT) noexcept;
   // One period under the torque τ(k). On a fault nothing has changed.

@@ -10,7 +10,7 @@ using models::Vec3;
 
 // Bilinear, with the corner where it belongs: Ω = tan(π f T), and per section, of quality Q,
 //   H(z) = (1 − z⁻¹)²/(1 + Ω/Q + Ω²) / (1 + a₁z⁻¹ + a₂z⁻²)
-PassivityObserver::HighPass::HighPass(double corner_Hz, double period_s) noexcept {
+void PassivityObserver::HighPass::design(double corner_Hz, double period_s) noexcept {
   const double pi = std::numbers::pi, omega = std::tan(pi * corner_Hz * period_s);
   const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // of Butterworth's poles
   for (std::size_t i = 0; i < sections.size(); ++i) {
@@ -37,13 +37,17 @@ Vec3 PassivityObserver::Section::step(const Vec3& in) noexcept {
 }
 
 PassivityObserver::PassivityObserver(const PassivityConfig& config, double period_s, bool acts)
-    : config_(config),
-      period_s_(period_s),
-      acts_(acts),
-      average_(1.0 - std::exp(-period_s / config.average_s)),
-      release_(std::exp(-period_s / config.release_s)),
-      force_(config.low_Hz, period_s),
-      motion_(config.low_Hz, period_s) {}
+    : config_(config), acts_(acts) {
+  set_period(period_s);
+}
+
+void PassivityObserver::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  average_ = 1.0 - std::exp(-period_s / config_.average_s);
+  release_ = std::exp(-period_s / config_.release_s);
+  force_.design(config_.low_Hz, period_s);
+  motion_.design(config_.low_Hz, period_s);
+}
 
 void PassivityObserver::start(const Vec3& tool_W) noexcept {
   force_.reset();

@@ -65,6 +65,8 @@ class PassivityObserver {
   // `acts`: adds damping; else B_a stays 0.
   PassivityObserver(const PassivityConfig& config, double period_s, bool acts);
 
+  // Before start(): what the filters hold is of the period before.
+  void set_period(double period_s) noexcept;
   void start(const models::Vec3& tool_W) noexcept;
   // Before a step: this period's force and where the tool is. Returns B_a, Ns/m, for the step.
   double observe_hand(const models::Vec3& h_W, const models::Vec3& tool_W) noexcept;
@@ -95,15 +97,15 @@ class PassivityObserver {
   };
   struct HighPass {
     std::array<Section, 2> sections;
-    HighPass(double corner_Hz, double period_s) noexcept;
+    void design(double corner_Hz, double period_s) noexcept;
     models::Vec3 step(const models::Vec3& in) noexcept { return sections[1].step(sections[0].step(in)); }
     void reset() noexcept;
   };
 
   PassivityConfig config_;
-  double period_s_;
+  double period_s_ = 0.0;
   bool acts_;
-  double average_, release_;  // shares of a period: of a new value in an average, kept of B_a
+  double average_ = 0.0, release_ = 0.0;  // shares of a period: of a new value in an average, kept of B_a
   HighPass force_, motion_;
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();
   double power_ = 0.0, band_ = 0.0, all_ = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩

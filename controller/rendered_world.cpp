@@ -99,6 +99,11 @@ class WorldOfDimension final : public RenderedWorld {
     }
   }
 
+  void set_period(double period_s) noexcept override {
+    if (period_s != proxy_.config().period_s) proxy_.set_period(period_s);
+    changes_.set_period(period_s);
+  }
+
   void add_damping(double damping_Ns_per_m) noexcept override {
     if (proxy_.set_damping(damping_Ns_per_m_ + damping_Ns_per_m)) added_Ns_per_m_ = damping_Ns_per_m;
   }

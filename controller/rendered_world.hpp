@@ -69,6 +69,8 @@ class RenderedWorld {
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
   // From the next step on. Position and velocity stay, so nothing jumps; a value that can't be changes nothing.
   virtual void set(const Change& change) noexcept = 0;
+  // T of the steps to come. What moves doesn't jump, but its history is of the other period: for a proxy at rest.
+  virtual void set_period(double period_s) noexcept = 0;
   // From the next step on, beside what is set: damping that isn't the user's wish.
   virtual void add_damping(double damping_Ns_per_m) noexcept = 0;
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;

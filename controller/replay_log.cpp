@@ -47,8 +47,9 @@ bool archive(fieldbus::StateArchive& state, BoxCycle& cycle, std::vector<BoxFram
              std::uint32_t buses) {
   std::uint32_t count = static_cast<std::uint32_t>(frames.size());
   state(cycle.record.cycle, cycle.t_k_ns, cycle.overruns_in_a_row, cycle.stop_requested, cycle.change.parameter,
-        cycle.change.value, cycle.change.object, cycle.change.position_m, cycle.command.order, cycle.command.value,
-        cycle.input_bytes, count);
+        cycle.change.value, cycle.change.object, cycle.change.position_m, cycle.change.period_s, cycle.command.order,
+        cycle.command.value, cycle.timestep.period_s, cycle.timestep.max_missed_samples,
+        cycle.timestep.max_repeated_samples, cycle.input_bytes, count);
   if (cycle.input_bytes > cycle.inputs.size() || count > most_frames_per_cycle) return false;
   state.raw(std::span(cycle.inputs).first(cycle.input_bytes));
   for (std::uint32_t bus = 0; bus < buses; ++bus) state(cycle.buses[bus].state, cycle.buses[bus].receive_overflows);

@@ -27,6 +27,7 @@ class SceneChanges {
 
   // Parameter::friction or position, of an object that has it; anything else changes nothing.
   void set(const Change& change) noexcept;
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Before each step of the proxy.
   void step() noexcept;
 

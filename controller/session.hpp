@@ -1,6 +1,6 @@
 // The loop around the cycle: wakes at t_k, runs it, looks after lateness, ends after the stop.
 //
-// On time: t_k = t_0 + k T. A cycle that ends after the next t_k has begun is an overrun; the periods that it missed
+// On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k has begun is an overrun; the periods that it missed
 // are skipped, never caught up in a burst, and the drives see a longer step instead.
 #pragma once
 
@@ -25,7 +25,6 @@ struct SessionTally {
 };
 
 // Runs from the first cycle until the drives are off again; after `duration_s` of rendering it asks for the stop.
-SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, double period_s, double duration_s,
-                         const SessionHooks& hooks);
+SessionTally run_session(Cycle& cycle, fieldbus::CanNetwork& network, double duration_s, const SessionHooks& hooks);
 
 }  // namespace proxarm::controller

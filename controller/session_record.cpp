@@ -85,6 +85,7 @@ constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
                                    {RecordFlag::limit_orientation, "limit_orientation"},
                                    {RecordFlag::contact_multivalued, "contact_multivalued"},
                                    {RecordFlag::oscillation, "oscillation"},
+                                   {RecordFlag::timestep, "timestep"},
                                    {RecordFlag::ramp_in, "ramp_in"},
                                    {RecordFlag::slowed, "slowed"}};
 

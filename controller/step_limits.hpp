@@ -117,6 +117,7 @@ class StepLimiter {
   StepLimiter(const std::vector<description::DriveDescription>& drives, const description::CellLimits& limits,
               double period_s);
 
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
   // The sets of one step. `joint_rad`: angles of the links at q₁; `twist_rad`: by how much each motor is ahead of its
   // link; `J_W`: of T at joint_rad. Neither allocates nor throws.
   void make(const StepStart& start, const models::JointVector& joint_rad, const models::JointVector& twist_rad,

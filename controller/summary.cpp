@@ -79,6 +79,8 @@ std::string parameter_name(Limit limit, std::uint8_t axes, const std::vector<std
   return joints + ": " + parameter.substr(of_joints.size());
 }
 
+double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
+
 bool limited(const CycleRecord& record) {
   return record.has(RecordFlag::limit_orientation) ||
          std::any_of(limit_flags.begin(), limit_flags.end(),
@@ -88,12 +90,14 @@ bool limited(const CycleRecord& record) {
 }  // namespace
 
 struct SummaryBuilder::State {
-  explicit State(const SummaryConfig& c) : config(c), apparent(c.period_s) {}
+  explicit State(const SummaryConfig& c) : config(c), apparent(c.period_s), period_ns(std::llround(1e9 * c.period_s)) {}
 
   void count(const CycleRecord& record);
   void track(const CycleRecord& record);
   void observe(const CycleRecord& record);
   void follow_changes(const CycleRecord& record);
+  void follow_timestep(const CycleRecord& record);
+  void take_period(std::int64_t period_ns);
   void penetrate(const CycleRecord& record);
   void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
   void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
@@ -105,11 +109,14 @@ struct SummaryBuilder::State {
   Spread tracking, contact_force;
   ApparentMass apparent;
   Slide sliding;
-  double contact_s = 0.0;                                  // how long the contact has lasted
-  std::uint64_t rendered = 0, touching = 0, slipping = 0;  // cycles
-  double mass_kg = 0.0;                                    // of the proxy, in the record before
-  std::optional<Vec3> start;                               // x₀ of the spring
-  std::deque<CycleRecord> recent;                          // consecutive cycles of rendering, newest last
+  double contact_s = 0.0;  // how long the contact has lasted
+  // Whole periods, so that no sum of them rounds.
+  std::int64_t period_ns, all_ns = 0, rendered_ns = 0, touching_ns = 0, slipping_ns = 0;
+  bool changing = false;  // the timestep
+  std::int64_t asked_ns = 0;
+  double mass_kg = 0.0;            // of the proxy, in the record before
+  std::optional<Vec3> start;       // x₀ of the spring
+  std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
 };
 
 SummaryBuilder::SummaryBuilder(const SummaryConfig& config) : state_(std::make_unique<State>(config)) {}
@@ -119,6 +126,7 @@ SummaryBuilder& SummaryBuilder::operator=(SummaryBuilder&&) noexcept = default;
 
 void SummaryBuilder::add(const CycleRecord& record) {
   State& s = *state_;
+  s.follow_timestep(record);
   s.count(record);
   const bool follows = !s.recent.empty() && s.recent.back().cycle + 1 == record.cycle;
   if (record.phase != Phase::rendering || !follows) {
@@ -129,7 +137,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   if (record.phase != Phase::rendering) return;
   if (!s.start) s.start = vec3(record.proxy_W_m);
   s.follow_changes(record);
-  ++s.rendered;
+  s.rendered_ns += s.period_ns;
   s.recent.push_back(record);
   s.penetrate(record);
   if (s.config.passivity) s.observe(record);
@@ -143,7 +151,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
 // What is counted in every phase.
 void SummaryBuilder::State::count(const CycleRecord& record) {
   ++summary.cycles;
-  summary.simulated_time_s = static_cast<double>(summary.cycles) * config.period_s;
+  all_ns += period_ns;
   hash.add({record.target_counts.data(), std::min<std::size_t>(record.axes, max_axes)});
   durations.add(record.compute_ns);
   if (record.has(RecordFlag::overrun)) ++summary.overruns;
@@ -171,6 +179,35 @@ void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
   if (mass_kg > 0.0) config.damping_Ns_per_m = record.proxy_damping_Ns_per_m;
 }
 
+// While it is being changed nothing is rendered, and the figures go on with the new one; the felt mass is that of the
+// last one.
+void SummaryBuilder::State::follow_timestep(const CycleRecord& record) {
+  const bool was_changing = changing;
+  changing = record.has(RecordFlag::timestep);
+  if (changing && !was_changing) {
+    summary.timesteps.push_back({seconds(record.time_ns), config.period_s, config.period_s, 0.0, ""});
+    asked_ns = record.time_ns;
+  }
+  if (changing || was_changing) {
+    TimestepSummary& last = summary.timesteps.back();
+    last.paused_s = seconds(record.time_ns - asked_ns);
+    if (record.refused_period_ns > 0) {
+      last.to_s = seconds(record.refused_period_ns);
+      last.refused = refusal_text(record.timestep_refusal, config.axis_names);
+    } else if (!changing && last.refused.empty()) {
+      last.to_s = seconds(record.period_ns);
+    }
+  }
+  if (record.period_ns > 0 && record.period_ns != period_ns) take_period(record.period_ns);
+}
+
+void SummaryBuilder::State::take_period(std::int64_t ns) {
+  period_ns = ns;
+  config.period_s = seconds(ns);
+  config.setpoint_delay_cycles = 2 + static_cast<int>(std::lround(config.setpoint_filter_s / config.period_s));
+  apparent = ApparentMass(config.period_s);
+}
+
 void SummaryBuilder::State::observe(const CycleRecord& record) {
   constexpr double noticeable_Ns_per_m = 1.0;
   if (!summary.passivity) summary.passivity.emplace();
@@ -190,8 +227,8 @@ void SummaryBuilder::State::penetrate(const CycleRecord& record) {
   } else {
     if (contact_s == 0.0) ++summary.contacts;
     contact_s += config.period_s;
-    ++touching;
-    if (record.contact == ContactPhase::slip) ++slipping;
+    touching_ns += period_ns;
+    if (record.contact == ContactPhase::slip) slipping_ns += period_ns;
     const double pull = -vec3(record.normal_W).dot(vec3(record.contact_force_W_N));
     // Of several contacts only the sum of their forces is known.
     if (record.contact_count <= 1) summary.pulling_force_max_N = std::max(summary.pulling_force_max_N, pull);
@@ -265,10 +302,10 @@ Summary SummaryBuilder::finish() {
   State& s = *state_;
   s.apparent.end_segment();
   Summary summary = s.summary;
-  const double T = s.config.period_s;
-  summary.rendered_time_s = T * static_cast<double>(s.rendered);
-  summary.contact_time_s = T * static_cast<double>(s.touching);
-  summary.sliding_time_s = T * static_cast<double>(s.slipping);
+  summary.simulated_time_s = seconds(s.all_ns);
+  summary.rendered_time_s = seconds(s.rendered_ns);
+  summary.contact_time_s = seconds(s.touching_ns);
+  summary.sliding_time_s = seconds(s.slipping_ns);
   summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
   summary.tracking_rms_m = s.tracking.rms();
   summary.tracking_max_m = s.tracking.largest();

@@ -50,6 +50,7 @@ struct SummaryConfig {
   double damping_Ns_per_m = 0.0;  // B
   double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
   int setpoint_delay_cycles = 2;
+  double setpoint_filter_s = 0.0;            // of that delay, what the filter takes: for another period
   double touch_s = 0.1;                      // how long a contact counts as a touch
   double settle_s = 0.5;                     // how long the arm may ring from it
   bool passivity = false;                    // observed
@@ -79,6 +80,17 @@ struct LatencySummary {
   double median = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
   std::vector<std::pair<int, std::uint64_t>> histogram;  // µs and how many, of bins that aren't empty
 };
+
+// A timestep that was asked for while the session ran.
+struct TimestepSummary {
+  double time_s = 0.0;  // when it was
+  double from_s = 0.0, to_s = 0.0;
+  double paused_s = 0.0;  // until rendering went on, or until it was done in a hold
+  std::string refused;    // why it stayed as it was; empty: it didn't
+};
+
+// Why a timestep was given up: "drive of axis_3, 60C2h:01: SDO abort …".
+std::string refusal_text(const fieldbus::PeriodRefusal& refusal, const std::vector<std::string>& axis_names);
 
 // Of a session with --passivity; passivity.hpp has the symbols. Work and energies at the end of the rendering.
 struct PassivitySummary {
@@ -118,6 +130,7 @@ struct Summary {
   std::vector<FaultSummary> faults;    // set by the caller
   std::string black_box;               // its folder, after a fault; set by the caller
   std::vector<NoticeSummary> notices;  // set by the caller
+  std::vector<TimestepSummary> timesteps;
   bool from_truth = false;
   std::string setpoint_sha256;
   double felt_mass_kg = 0.0;  // as configured, for comparison

@@ -24,6 +24,18 @@ Json faults(const Summary& summary) {
   return list;
 }
 
+Json timesteps(const Summary& summary) {
+  Json list = Json::array();
+  for (const TimestepSummary& t : summary.timesteps) {
+    list.push_back({{"time_s", t.time_s},
+                    {"from_s", t.from_s},
+                    {"to_s", t.to_s},
+                    {"paused_s", t.paused_s},
+                    {"refused", t.refused}});
+  }
+  return list;
+}
+
 void add_timing(Json& json, const Summary& s) {
   json["wall_time_s"] = s.wall_time_s;
   json["overruns"] = s.overruns;
@@ -88,6 +100,7 @@ void add_repeatable(Json& json, const Summary& s) {
                                {"times", notice.times},
                                {"cycles", notice.cycles}});
   }
+  json["timesteps"] = timesteps(s);
   json["setpoint_sha256"] = s.setpoint_sha256;
 }
 
@@ -114,6 +127,15 @@ std::string number(const std::optional<double>& value, const char* pattern) {
 }
 
 }  // namespace
+
+std::string refusal_text(const fieldbus::PeriodRefusal& refusal, const std::vector<std::string>& axis_names) {
+  if (refusal.drive < 0) return "the session left the hold before all drives had confirmed it";
+  const auto axis = static_cast<std::size_t>(refusal.drive);
+  const std::string drive = axis < axis_names.size() ? axis_names[axis] : std::to_string(axis + 1);
+  const std::string object = fieldbus::to_string(fieldbus::ObjectAddress{refusal.index, refusal.sub});
+  return "drive of " + drive + ", " + object + ": " +
+         (refusal.code != 0 ? fieldbus::describe_sdo_abort(refusal.code) : "it kept another value");
+}
 
 std::string summary_json(const Summary& s) {
   Json json;
@@ -202,6 +224,11 @@ std::string summary_text(const Summary& s) {
     const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";
     line("noticed", fault_name(notice.fault) + (" " + times) + ", " + std::to_string(notice.cycles) +
                         " cycles; reaction: " + reaction_name(notice.reaction));
+  }
+  for (const TimestepSummary& t : s.timesteps) {
+    line("timestep", format("%.4g to ", 1e3 * t.from_s) + format("%.4g ms ", 1e3 * t.to_s) +
+                         format("at %.3f s, ", t.time_s) + format("%.0f ms without rendering", 1e3 * t.paused_s) +
+                         (t.refused.empty() ? "" : "; not taken: " + t.refused));
   }
   if (s.faults.empty()) line("faults", "none");
   for (const FaultSummary& fault : s.faults) line(fault.was_reset ? "fault, then reset" : "FAULT", fault.text);

@@ -1,6 +1,7 @@
 #include "controller/supervisor.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace proxarm::controller {
 namespace {
@@ -105,6 +106,17 @@ void Supervisor::give_up_hold() noexcept {
   }
   if (report_.fault == Fault::none) report_ = held_for_;
   handle(Event::fault);
+}
+
+void Supervisor::rescale(std::uint64_t cycle, double ratio) noexcept {
+  // Of one more than a cycle; 0 is none. Rounded towards now: nothing counts as over too early.
+  const auto at = [&](std::uint64_t end) {
+    if (end == 0 || end > cycle) return end;
+    const double age = std::floor(ratio * static_cast<double>(cycle - end));
+    return age < static_cast<double>(cycle) ? cycle - static_cast<std::uint64_t>(age) : std::uint64_t{1};
+  };
+  slow_end_ = at(slow_end_);
+  for (Notice& notice : notices_) notice.last = at(notice.last);
 }
 
 bool Supervisor::reset() noexcept {

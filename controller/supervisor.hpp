@@ -106,6 +106,9 @@ class Supervisor {
   // Out of faulted; the fault is forgotten here, so whoever wants it has taken it. False: not in faulted.
   bool reset() noexcept;
 
+  // What is counted back from this cycle, in cycles that become `ratio` times as many: the times stay.
+  void rescale(std::uint64_t cycle, double ratio) noexcept;
+
   void archive(fieldbus::StateArchive& state) noexcept {
     state(phase_, slow_end_);
     for (FaultReport* report : {&report_, &held_for_}) {

@@ -35,9 +35,9 @@ std::string period_text(std::int64_t period_ns) { return number_text(static_cast
                     .expected = std::move(expected)});
 }
 
-std::uint16_t rpdo_timeout_ms(const DriveSettings& settings, bool torque) noexcept {
-  if (torque) return static_cast<std::uint16_t>(settings.period_ns * settings.torque_timeout_periods / 1'000'000);
-  const std::int64_t timeout_ns = settings.period_ns * settings.rpdo_timeout_periods;
+std::uint16_t rpdo_timeout_ms(const DriveSettings& settings, std::int64_t period_ns, bool torque) noexcept {
+  if (torque) return static_cast<std::uint16_t>(period_ns * settings.torque_timeout_periods / 1'000'000);
+  const std::int64_t timeout_ns = period_ns * settings.rpdo_timeout_periods;
   return static_cast<std::uint16_t>((timeout_ns + 999'999) / 1'000'000);
 }
 
@@ -130,6 +130,23 @@ std::vector<SdoStep> ServoDrive::operation_steps() const {
   return {sdo_write({0x1017, 0}, 2, 0, "producer heartbeat time")};
 }
 
+PeriodSteps ServoDrive::period_steps(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
+  const auto from = interpolation_period(from_ns).value_or(InterpolationPeriod{}),
+             to = interpolation_period(to_ns).value_or(InterpolationPeriod{});
+  PeriodStep value{object_address(description_.objects.interpolation_value), 1, to.units, from.units};
+  PeriodStep index{object_address(description_.objects.interpolation_index), 1, as_u8(to.exponent),
+                   as_u8(from.exponent)};
+  // In between the period is to.units · 10^from.exponent, or the other way round.
+  const bool value_first = to.units * std::pow(10.0, from.exponent) >= from.units * std::pow(10.0, to.exponent);
+  const PeriodStep sync{{0x1006, 0}, 4, sync_period_us(to_ns).value_or(0), sync_period_us(from_ns).value_or(0), true};
+  const PeriodStep timer{{0x1400, 5},
+                         2,
+                         rpdo_timeout_ms(settings_, to_ns, mode_.torque),
+                         rpdo_timeout_ms(settings_, from_ns, mode_.torque),
+                         true};
+  return {value_first ? value : index, value_first ? index : value, sync, timer};
+}
+
 void DriveSettings::validate() const {
   const auto refuse_setting = [](const char* key, std::string found, std::string expected, std::string advice = "") {
     throw SetupError(
@@ -195,7 +212,7 @@ void ServoDrive::set_up_torque() {
            "more than 0 and at most 32.767 times rated_torque_Nm");
   }
   torque_per_Nm_ = description_.direction * 1e3 / description_.rated_torque_Nm;
-  if (rpdo_timeout_ms(settings_, true) < 1) {
+  if (rpdo_timeout_ms(settings_, settings_.period_ns, true) < 1) {
     throw SetupError({.key = "timestep",
                       .found = period_text(settings_.period_ns),
                       .expected =
@@ -212,7 +229,8 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
-  append_pdos(steps, description_, rpdo_timeout_ms(settings_, mode_.torque), settings_.inputs_object);
+  append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
+              settings_.inputs_object);
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
                             "interpolation time period value"));
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_index), 1, as_u8(period.exponent),

@@ -54,6 +54,15 @@ struct DriveSettings {
   void validate() const;  // throws SetupError
 };
 
+// An object that depends on the period: what it is to be, and what it was.
+struct PeriodStep {
+  ObjectAddress object{};
+  std::uint8_t bytes = 4;
+  std::uint32_t value = 0, old_value = 0;
+  bool is_optional = false;  // left to the maker
+};
+using PeriodSteps = std::array<PeriodStep, 4>;
+
 class ServoDrive final : public CyclicDrive {
  public:
   // Throws SetupError where the description or the settings can't be what a drive is given, by the profile or its EDS.
@@ -64,6 +73,9 @@ class ServoDrive final : public CyclicDrive {
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
   // What is left to write once it is in operational.
   [[nodiscard]] std::vector<SdoStep> operation_steps() const;
+  // From one period to another, in the order in which they are written; of 60C2h the part comes first with which the
+  // period is the longer one until the other part follows. Both periods are such that a drive can hold them.
+  [[nodiscard]] PeriodSteps period_steps(std::int64_t from_ns, std::int64_t to_ns) const noexcept;
   // What the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
   [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
   // All identifiers that the drive and the master use between them: those, RPDO1 and SDO requests.

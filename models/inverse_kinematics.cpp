@@ -77,7 +77,12 @@ InverseKinematics::InverseKinematics(const Arm& arm, const InverseKinematicsConf
                                    .found = std::to_string(arm.axes()) + " axes",
                                    .expected = "six, for position and orientation of the tool"});
   }
-  max_step_ = Eigen::Map<const Vec6>(config.max_step_rad.data());
+  set_max_step(config.max_step_rad);
+}
+
+void InverseKinematics::set_max_step(const std::array<double, 6>& max_step_rad) noexcept {
+  config_.max_step_rad = max_step_rad;
+  max_step_ = Eigen::Map<const Vec6>(config_.max_step_rad.data());
 }
 
 // Refreshes kinematics and residuals at result.q; returns the weighted error.

@@ -66,6 +66,8 @@ class InverseKinematics {
   // and then all over the ranges (the same places each time), the one nearest to q_near; none if none is found.
   [[nodiscard]] std::optional<JointVector> solve_anywhere(const Pose& X_WT, const JointVector& q_near) const;
 
+  // Positive and finite, as the configuration's.
+  void set_max_step(const std::array<double, 6>& max_step_rad) noexcept;
   [[nodiscard]] const InverseKinematicsConfig& config() const noexcept { return config_; }
 
  private:

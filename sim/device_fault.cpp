@@ -28,6 +28,7 @@ constexpr KindName kinds[] = {
     {"device_type", can, DeviceFaultKind::device_type, u32},
     {"heartbeat", can, DeviceFaultKind::heartbeat_lost, none},
     {"sdo", can, DeviceFaultKind::sdo_silent, none},
+    {"period", can, DeviceFaultKind::period_fixed, none},
     {"power", drives, DeviceFaultKind::power_loss, none},
     {"jammed", drives, DeviceFaultKind::jammed, none},
     {"exception", modbus, DeviceFaultKind::modbus_exception, none},

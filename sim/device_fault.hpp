@@ -23,6 +23,7 @@ enum class DeviceFaultKind : std::uint8_t {
   device_type,     // "device_type": 1000h is VALUE; always, no times
   heartbeat_lost,  // "heartbeat": no heartbeat leaves
   sdo_silent,      // "sdo": SDO requests stay unanswered
+  period_fixed,    // "period": refuses another 60C2h while operation is enabled
   power_loss,      // "power": off, and on again at the end
   jammed,          // "jammed": the motor can't turn
   // Drives on a Modbus line, which know "silent", "power" and "jammed" as well

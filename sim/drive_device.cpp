@@ -124,13 +124,14 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
     target_fresh_ = mode_->number() == interpolated_position;
   };
   od.add(0x60C2, 0, unsigned8, constant, 2);
-  const auto not_while_moving = [this](std::int64_t) {
-    return state_ == DriveState::operation_enabled ? SdoAbort::not_in_present_device_state : SdoAbort::none;
+  const auto not_while_enabled = [this](std::int64_t) {
+    return period_fixed_ && state_ == DriveState::operation_enabled ? SdoAbort::not_in_present_device_state
+                                                                    : SdoAbort::none;
   };
   period_value_ = &od.add(0x60C2, 1, unsigned8, read_write, 0);
   period_index_ = &od.add(0x60C2, 2, integer8, read_write, -3);
   for (ObjectEntry* entry : {period_value_, period_index_}) {
-    entry->before_write = not_while_moving;
+    entry->before_write = not_while_enabled;
     entry->after_write = [this] { set_period(); };
   }
   following_window_ = &od.at(0x6065);

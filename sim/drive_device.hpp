@@ -62,6 +62,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
 
   // A fault of the drive's own appears, with its EMCY code: transition 13. Stays until it is reset.
   void inject_fault(std::uint16_t code, std::int64_t time_ns) noexcept;
+  // 60C2h may be written while operation is enabled; a drive that is made otherwise refuses (08000022h).
+  void fix_period_while_enabled(bool fixed) noexcept { period_fixed_ = fixed; }
   // 60FDh, of what is wired to it.
   void set_digital_inputs(std::uint32_t bits) noexcept { digital_inputs_->set(bits); }
 
@@ -114,6 +116,7 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   int last_transition_ = 0;
   std::uint16_t controlword_before_ = 0;
   bool powered_ = false;
+  bool period_fixed_ = false;
   std::int64_t brake_open_ns_ = 0;
   bool stopping_ = false;  // on a ramp that ends in after_stop_
   DriveState after_stop_ = DriveState::switch_on_disabled;

@@ -445,6 +445,8 @@ void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, 
       return drives_[axis]->canopen().mute_heartbeat(on);
     case DeviceFaultKind::sdo_silent:
       return drives_[axis]->canopen().mute_sdo(on);
+    case DeviceFaultKind::period_fixed:
+      return drives_[axis]->fix_period_while_enabled(on);
     case DeviceFaultKind::power_loss:
       if (on) plant_.servo(axis).disable();
       return nodes_[node_of_axis_[axis]]->set_power(!on, time_ns);

@@ -67,7 +67,7 @@ std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
                                              samples.push_back({truth.hand_force_W, truth.X_WT.translation()});
                                          }
                                        }};
-  controller::run_session(cycle, network, session.settings.period_s, session.duration_s, hooks);
+  controller::run_session(cycle, network, session.duration_s, hooks);
   cycle.shut_down();
   return samples;
 }

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -33,6 +34,13 @@ std::size_t frames_per_cycle(const description::Cell& cell) { return 2 * (2 * ce
 fs::path folder_for(const RunOptions& options) {
   if (!options.black_box_dir.empty()) return options.black_box_dir;
   return options.record_dir.empty() ? fs::path(default_folder) : options.record_dir / "black-box";
+}
+
+// For a session whose timestep may change: whatever it comes to, down to 1 ms.
+double shortest_period_s(const PreparedSession& session, const RunOptions& options) {
+  const double period_s = session.settings.period_s;
+  const bool may_change = !options.control.empty() || !options.changes.empty();
+  return may_change ? std::min(period_s, 1e-3) : period_s;
 }
 
 template <std::size_t N>
@@ -87,7 +95,7 @@ struct BlackBoxKeeper::Shared {
 BlackBoxKeeper::BlackBoxKeeper(const PreparedSession& session, const RunOptions& options)
     : session_(session),
       folder_(fs::absolute(folder_for(options))),
-      box_(session.settings.period_s, frames_per_cycle(session.cell)) {
+      box_(shortest_period_s(session, options), frames_per_cycle(session.cell)) {
   if (!options.black_box_dir.empty()) controller::SessionWriter(folder_, {}, false);
   void* const memory = mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
@@ -167,7 +175,7 @@ void BlackBoxKeeper::write(const std::string& reason) const {
   };
   for (std::uint64_t k = box_.oldest_cycle(); k < box_.cycles(); ++k) {
     if (!box_.read(k, cycle, frames)) continue;
-    complete(cycle.record, session_, cycle.rendered_cycles);
+    complete(cycle.record, session_, cycle.rendered_ns);
     figures.add(cycle.record);
     files.add(cycle.record);
     add_frames();

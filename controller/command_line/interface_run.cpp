@@ -194,7 +194,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   controller::SessionTally tally;
   {
     const RealtimeThread realtime;
-    tally = controller::run_session(cycle, tap, session.settings.period_s, session.duration_s, {});
+    tally = controller::run_session(cycle, tap, session.duration_s, {});
   }
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
   cycle.shut_down();

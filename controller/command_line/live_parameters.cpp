@@ -5,6 +5,9 @@
 #include <optional>
 #include <sstream>
 
+#include "controller/bring_up.hpp"
+#include "controller/command_line/bus_plan.hpp"
+#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/orders.hpp"
 #include "models/description/quantity.hpp"
 #include "models/description/setup_error.hpp"
@@ -36,10 +39,10 @@ const Live& find(const std::string& text) {
     if (name == parameter.name && text.find('=') != std::string::npos) return parameter;
     known.emplace_back(parameter.name);
   }
-  throw SetupError(
-      {.key = "--set",
-       .found = description::in_quotes(text),
-       .expected = "NAME=VALUE with NAME " + description::one_of(known) + ", or OBJECT.friction, OBJECT.position_m"});
+  throw SetupError({.key = "--set",
+                    .found = description::in_quotes(text),
+                    .expected = "NAME=VALUE with NAME " + description::one_of(known) +
+                                ", timestep, OBJECT.friction, OBJECT.position_m"});
 }
 
 [[noreturn]] void refuse(const std::string& key, const std::string& found, const std::string& expected,
@@ -108,12 +111,41 @@ fs::path control_path(const RunOptions& options) {
 LiveParameters::LiveParameters(const PreparedSession& session, const RunOptions& options)
     : session_(session), options_(options) {}
 
-controller::Change LiveParameters::take(const std::string& text) {
-  if (text.compare(0, 9, "timestep=") == 0) {
-    refuse(
-        "timestep", "a change while rendering",
-        "a new session with --timestep: drives take their interpolation period (60C2h) before they are enabled only");
+void LiveParameters::follow(double period_s) {
+  if (period_s != session_.settings.period_s) session_ = with_timestep(session_, named(period_s), period_s);
+}
+
+// So that a message names it.
+RunOptions LiveParameters::named(double period_s) const {
+  RunOptions judged = options_;
+  judged.mass_kg = session_.settings.mass_kg;
+  judged.period_s = period_s;
+  return judged;
+}
+
+controller::Timestep LiveParameters::take_timestep(const std::string& text) {
+  const double period_s = description::parse_duration(text.substr(text.find('=') + 1), "timestep");
+  if (!session_.cell.modbus_lines.empty()) {
+    refuse("timestep", "a cell with a Modbus line", "drives and sensor on CAN: what is on a line keeps its timestep",
+           "start a new session with --timestep");
   }
+  const RunOptions judged = named(period_s);
+  PreparedSession changed = with_timestep(session_, judged, period_s);
+  controller::require_timestep(changed.cell, changed.settings);
+  require_stable(changed, judged);
+  if (options_.bus.simulated()) {
+    require_carried(changed);
+  } else {
+    warn_if_not_carried(changed, buses_in_order(changed.cell));
+  }
+  session_ = std::move(changed);
+  const controller::SessionSettings& settings = session_.settings;
+  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples};
+}
+
+bool LiveParameters::is_timestep(const std::string& text) { return text.compare(0, 9, "timestep=") == 0; }
+
+controller::Change LiveParameters::take(const std::string& text) {
   if (const std::optional<Change> change = change_of_object(text, session_.scene)) return *change;
   const Live& parameter = find(text);
   const double value = parameter.parse(text.substr(text.find('=') + 1), parameter.name);
@@ -138,14 +170,18 @@ controller::Change LiveParameters::take(const std::string& text) {
   require_stable(changed, judged);
   session_ = std::move(changed);
   const double handle_kg = parameter.parameter == Parameter::mass ? session_.cell.tool.mass_kg : 0.0;
-  return {parameter.parameter, value - handle_kg};
+  return {.parameter = parameter.parameter, .value = value - handle_kg, .period_s = session_.settings.period_s};
 }
 
 namespace {
 
+struct Script {
+  std::vector<controller::ScheduledChange> changes;
+  std::vector<controller::ScheduledTimestep> timesteps;
+};
+
 // "mass=3@4s", after four seconds of rendering, in any order of times. Throws SetupError.
-std::vector<controller::ScheduledChange> scheduled_changes(const std::vector<std::string>& texts,
-                                                           const PreparedSession& session, const RunOptions& options) {
+Script script_of(const std::vector<std::string>& texts, const PreparedSession& session, const RunOptions& options) {
   struct Timed {
     double time_s;
     std::string text;
@@ -163,12 +199,40 @@ std::vector<controller::ScheduledChange> scheduled_changes(const std::vector<std
   }
   std::stable_sort(timed.begin(), timed.end(), [](const Timed& a, const Timed& b) { return a.time_s < b.time_s; });
   LiveParameters parameters(session, options);
-  std::vector<controller::ScheduledChange> changes;
+  Script script;
   for (const Timed& change : timed) {
-    const auto cycles = static_cast<std::uint64_t>(std::llround(change.time_s / session.settings.period_s));
-    changes.push_back({cycles, parameters.take(change.text)});
+    const std::int64_t rendered_ns = std::llround(1e9 * change.time_s);
+    if (LiveParameters::is_timestep(change.text)) {
+      script.timesteps.push_back({rendered_ns, parameters.take_timestep(change.text)});
+    } else {
+      script.changes.push_back({rendered_ns, parameters.take(change.text)});
+    }
   }
-  return changes;
+  return script;
+}
+
+// What a line through the socket does; the answer.
+std::string obey(controller::Cycle& cycle, LiveParameters& parameters, const std::string& line) {
+  if (const auto command = parse_order(line)) {
+    const char* const refusal = cycle.refusal(command->order);
+    if (refusal != nullptr) throw SetupError({.message = refusal});
+    if (!cycle.commands().push(*command)) throw SetupError({.found = "too many commands at once"});
+    return line;
+  }
+  if (cycle.changes_timestep() || cycle.answered_timesteps() != parameters.asked_timesteps()) {
+    refuse(line, "a timestep that is being changed", "a session that has one", "ask again in a moment");
+  }
+  parameters.follow(cycle.shown_period_s());
+  if (LiveParameters::is_timestep(line)) {
+    if (const char* const refusal = cycle.timestep_refusal()) throw SetupError({.key = "timestep", .message = refusal});
+    if (!cycle.timesteps().push(parameters.take_timestep(line))) throw SetupError({.found = "too many at once"});
+    parameters.count_timestep();
+    return line + ": the arm stops, the drives are told, rendering goes on; the session says whether all have taken it";
+  }
+  if (!cycle.changes().push(parameters.take(line))) {
+    throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});
+  }
+  return line;
 }
 
 }  // namespace
@@ -182,31 +246,21 @@ void require_changes(const PreparedSession& session, const RunOptions& options) 
                       .found = "the impedance type",
                       .expected = "--scheme admittance: mass, damping and spring are the proxy's"});
   }
-  (void)scheduled_changes(options.changes, session, options);
+  (void)script_of(options.changes, session, options);
   (void)scheduled_orders(options.orders);
   if (!options.control.empty()) require_control_path(control_path(options));
 }
 
 std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
                                             const RunOptions& options) {
-  cycle.schedule(scheduled_changes(options.changes, session, options));
+  Script script = script_of(options.changes, session, options);
+  cycle.schedule(std::move(script.changes));
+  cycle.schedule(std::move(script.timesteps));
   cycle.schedule(scheduled_orders(options.orders));
   if (options.control.empty()) return nullptr;
   const auto parameters = std::make_shared<LiveParameters>(session, options);
   return std::make_unique<ControlSocket>(
-      control_path(options), [&cycle, parameters](const std::string& line) -> std::string {
-        if (const auto command = parse_order(line)) {
-          const char* const refusal = cycle.refusal(command->order);
-          if (refusal != nullptr) throw SetupError({.message = refusal});
-          if (!cycle.commands().push(*command)) throw SetupError({.found = "too many commands at once"});
-          return line;
-        }
-        const controller::Change change = parameters->take(line);
-        if (!cycle.changes().push(change)) {
-          throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});
-        }
-        return line;
-      });
+      control_path(options), [&cycle, parameters](const std::string& line) { return obey(cycle, *parameters, line); });
 }
 
 }  // namespace proxarm::command_line

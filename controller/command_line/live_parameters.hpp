@@ -23,10 +23,22 @@ class LiveParameters {
 
   // Throws SetupError.
   controller::Change take(const std::string& text);
+  // "timestep=2ms".
+  [[nodiscard]] static bool is_timestep(const std::string& text);
+  // Judged by what the start judges it by, as far as it depends on T. Throws SetupError.
+  controller::Timestep take_timestep(const std::string& text);
+  // What the session's timestep really is: drives may have refused the last one.
+  void follow(double period_s);
+  // Of those that were handed on.
+  void count_timestep() noexcept { ++asked_timesteps_; }
+  [[nodiscard]] std::uint32_t asked_timesteps() const noexcept { return asked_timesteps_; }
 
  private:
+  [[nodiscard]] RunOptions named(double period_s) const;
+
   PreparedSession session_;
   RunOptions options_;
+  std::uint32_t asked_timesteps_ = 0;
 };
 
 // Of the script and the socket, before a bus is opened. Throws SetupError.

@@ -52,18 +52,18 @@ double drive_time_constant_s(const description::Cell& cell) {
 }
 
 // A sensor without noise repeats itself, and one that is slower than the cycle is read several times per sample.
-std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, const controller::SessionSettings& settings) {
+std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, std::uint32_t samples, double period_s) {
   if (!(sensor.noise_N > 0.0)) return 0;
-  const double reads = sensor.sample_rate_Hz > 0.0 ? 1.0 / (settings.period_s * sensor.sample_rate_Hz) : 1.0;
-  return settings.max_repeated_samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
+  const double reads = sensor.sample_rate_Hz > 0.0 ? 1.0 / (period_s * sensor.sample_rate_Hz) : 1.0;
+  return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
 }
 
 // A sensor that sends less often than the cycle runs is missed only when several of its samples are.
-std::uint32_t missed_samples_allowed(const description::SensorDescription& sensor,
-                                     const controller::SessionSettings& settings) {
-  if (!sensor.described || !sensor.described->streams()) return settings.max_missed_samples;
-  const double cycles = 1.0 / (settings.period_s * sensor.described->rate_Hz);
-  return settings.max_missed_samples * static_cast<std::uint32_t>(std::ceil(std::clamp(cycles, 1.0, 1000.0)));
+std::uint32_t missed_samples_allowed(const description::SensorDescription& sensor, std::uint32_t samples,
+                                     double period_s) {
+  if (!sensor.described || !sensor.described->streams()) return samples;
+  const double cycles = 1.0 / (period_s * sensor.described->rate_Hz);
+  return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(cycles, 1.0, 1000.0)));
 }
 
 // What a stream adds: nothing puts it in step with the cycle.
@@ -91,6 +91,23 @@ void require_period(const PreparedSession& session, const RunOptions& options) {
     refuse("what drives can hold exactly: 1 to 255 times a power of ten of seconds (60C2h), in whole microseconds",
            "such as 0.5ms, 1ms, 1.5ms, 2ms, 4ms");
   }
+}
+
+// T, and what is counted in cycles of it.
+void set_timestep(PreparedSession& session, const RunOptions& options, double period_s) {
+  controller::SessionSettings& settings = session.settings;
+  settings.period_s = session.loop.period_s = period_s;
+  settings.max_repeated_samples = repeats_allowed(session.cell.sensor, options.settings.max_repeated_samples, period_s);
+  settings.max_missed_samples = missed_samples_allowed(session.sensor, options.settings.max_missed_samples, period_s);
+  require_period(session, options);
+}
+
+// A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop. A torque
+// acts for a period.
+double loop_delay_s(const PreparedSession& session) {
+  if (session.impedance()) return 0.5 * session.settings.period_s;
+  return session.settings.period_s + sensor_delay_s(session.cell.sensor) + stream_delay_s(session.sensor) +
+         setpoint_filter_delay_s(session.cell);
 }
 
 // The impedance type renders at the point with the device's own mass: what only a proxy has can't be asked for.
@@ -184,28 +201,25 @@ PreparedSession prepare(const RunOptions& options) {
   session.scene = scenes::load_scene(chosen(options.scene, session.cell, session.cell.default_scene));
   add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;
-  session.settings.period_s = options.period_s.value_or(session.cell.default_period_s);
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
-  session.settings.max_repeated_samples = repeats_allowed(session.cell.sensor, session.settings);
-  session.settings.max_missed_samples = missed_samples_allowed(session.sensor, session.settings);
   session.duration_s = options.duration_s;
-  require_period(session, options);
+  set_timestep(session, options, options.period_s.value_or(session.cell.default_period_s));
   choose_scheme(session, options);
   choose_passivity(session, options);
 
-  session.loop.period_s = session.settings.period_s;
-  if (session.impedance()) {
-    session.loop.delay_s = 0.5 * session.settings.period_s;  // a torque acts for a period
-    return session;
-  }
-  // A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop.
-  session.loop.delay_s = session.settings.period_s + sensor_delay_s(session.cell.sensor) +
-                         stream_delay_s(session.sensor) + setpoint_filter_delay_s(session.cell);
+  session.loop.delay_s = loop_delay_s(session);
+  if (session.impedance()) return session;
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
   session.loop.handle_mass_kg = session.cell.tool.mass_kg;
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
+  return session;
+}
+
+PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s) {
+  set_timestep(session, options, period_s);
+  session.loop.delay_s = loop_delay_s(session);
   return session;
 }
 

@@ -27,6 +27,9 @@ struct PreparedSession {
 // Throws SetupError. Opens no bus and starts nothing.
 PreparedSession prepare(const RunOptions& options);
 
+// The same session with another timestep. Throws SetupError where no drive could hold that one.
+PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s);
+
 // The mass and timestep, judged: throws SetupError where the handle alone is heavier, or where the loop with the hand
 // would be unstable (unless forced, which only a simulation may be). Impedance type: the virtual coupling is judged.
 void require_stable(const PreparedSession& session, const RunOptions& options);

@@ -101,6 +101,7 @@ class Replay {
     cycle_->report_overruns(recorded.overruns_in_a_row);
     if (recorded.change.parameter != controller::Parameter::none) cycle_->changes().push(recorded.change);
     if (recorded.command.order != controller::Order::none) cycle_->commands().push(recorded.command);
+    if (recorded.timestep.period_s > 0.0) cycle_->timesteps().push(recorded.timestep);
     if (recorded.stop_requested) cycle_->request_stop();
     fieldbus::StateArchive inputs =
         fieldbus::StateArchive::reader(std::span(recorded.inputs).first(recorded.input_bytes));

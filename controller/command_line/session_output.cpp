@@ -35,15 +35,16 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   if (!session.impedance()) config.handle_mass_kg = session.cell.tool.mass_kg;
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
+  config.setpoint_filter_s = motion_delay_s(session) - 2.0 * session.settings.period_s;
   config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
   config.passivity = session.settings.passivity != controller::Passivity::off;
   config.axis_names = joint_names(session.cell);
   return config;
 }
 
-void complete(CycleRecord& record, const PreparedSession& session, std::uint64_t proxy_steps) {
+void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
   const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
-  const double scene_time_s = static_cast<double>(proxy_steps) * session.settings.period_s;
+  const double scene_time_s = static_cast<double>(rendered_ns) / 1e9;
   const auto clearance_m = [&](const controller::Triple& x_W) {
     return scenes::clearance_m(session.scene, controller::vec3(x_W), scene_time_s, scenes::Driven::left_out);
   };
@@ -190,11 +191,33 @@ void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
   }
 }
 
+// On standard error: who asked for it hears only that it was begun.
+void SessionOutput::say_timestep(const CycleRecord& record) {
+  if (record.refused_period_ns > 0) {
+    std::fprintf(stderr,
+                 "proxarm: timestep %.4g ms: %s; it stays %.4g ms (a new session with --timestep has its "
+                 "drives told before they are enabled)\n",
+                 1e-6 * static_cast<double>(record.refused_period_ns),
+                 controller::refusal_text(record.timestep_refusal, joint_names(session_.cell)).c_str(),
+                 1e-6 * static_cast<double>(told_period_ns_));
+  } else if (!record.has(controller::RecordFlag::timestep) && record.period_ns != told_period_ns_) {
+    if (told_period_ns_ > 0) {
+      std::fprintf(stderr, "proxarm: timestep %.4g ms from %.4g s on, all drives have confirmed it\n",
+                   1e-6 * static_cast<double>(record.period_ns), 1e-9 * static_cast<double>(record.time_ns));
+    }
+    told_period_ns_ = record.period_ns;
+  }
+}
+
 void SessionOutput::add(CycleRecord record) {
-  if (record.phase == controller::Phase::rendering) ++proxy_steps_;
-  if (record.phase != last_phase_) say_how_to_get_free(record.phase);
-  last_phase_ = record.phase;
-  complete(record, session_, proxy_steps_);
+  if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
+  // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
+  if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
+    if (record.phase != last_phase_) say_how_to_get_free(record.phase);
+    last_phase_ = record.phase;
+  }
+  complete(record, session_, rendered_ns_);
+  say_timestep(record);
   builder_.add(record);
   if (writer_) writer_->add(record);
   if (plot_) plot_->add(record);

@@ -17,8 +17,8 @@ namespace proxarm::command_line {
 
 std::vector<std::string> joint_names(const description::Cell& cell);
 controller::SummaryConfig summary_config(const PreparedSession& session);
-// Fills in what only the scene knows, distances and friction, after so many steps of the proxy.
-void complete(controller::CycleRecord& record, const PreparedSession& session, std::uint64_t proxy_steps);
+// Fills in what only the scene knows, distances and friction, after so much rendering.
+void complete(controller::CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns);
 
 class SessionOutput {
  public:
@@ -41,6 +41,7 @@ class SessionOutput {
  private:
   void refuse_lost_plot() const;
   bool draw_plot();
+  void say_timestep(const controller::CycleRecord& record);
   void say_how_to_get_free(controller::Phase phase) const;
 
   const PreparedSession& session_;
@@ -49,7 +50,8 @@ class SessionOutput {
   controller::Progress progress_;
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
-  std::uint64_t proxy_steps_ = 0;
+  std::int64_t rendered_ns_ = 0;
+  std::int64_t told_period_ns_ = 0;  // that the user knows of
   controller::Phase last_phase_ = controller::Phase::idle;
 };
 

@@ -83,8 +83,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                          truth_ = far_end_.truth();
                                        },
                                        [&] { drain(cycle.records()); }};
-  const controller::SessionTally tally =
-      controller::run_session(cycle, network_, session_.settings.period_s, session_.duration_s, hooks);
+  const controller::SessionTally tally = controller::run_session(cycle, network_, session_.duration_s, hooks);
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
   controller::Summary summary = output_.summary(cycle);
   summary.wall_time_s = wall_s;

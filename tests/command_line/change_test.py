@@ -1,5 +1,6 @@
 """Parameters that change while the arm is led: by a script in virtual time, and through a session's socket."""
 import csv
+import json
 import math
 import os
 import pathlib
@@ -134,7 +135,7 @@ class Objects(Script):
     def test_what_an_object_can_not_is_refused(self):
         for change, said in (("wall.friction=-1@1s", "from 0 to 10"), ("wall.friction=nan@1s", "from 0 to 10"),
                              ("wal.friction=1@1s", "wall"), ("wall.colour=1@1s", "friction or position_m"),
-                             ("wall.position_m=0,0,0@1s", "driven: true"), ("timestep=2ms@1s", "60C2h")):
+                             ("wall.position_m=0,0,0@1s", "driven: true")):
             with self.subTest(change):
                 self.assert_refused(self.call("run", "--set", change), said)
         scene = self.written("plate.yaml", PLATE)
@@ -149,6 +150,95 @@ class Objects(Script):
         figures = self.summary(*SWEEP, "--duration", "10s", "--set", "mass=6@3s")
         self.assertEqual(figures["felt_mass_kg"], 6)
         self.assertAlmostEqual(figures["apparent_mass_kg"], 6, delta=0.06)  # 1 %, as without changes
+
+
+class Timestep(Script):
+    def assert_steps_within_limits(self, rows):
+        """With the timestep of each cycle, by the times of the record; across a change the arm stands."""
+        cell = (SOURCE / "models/cells/default.yaml").read_text()
+        gears = [float(x) for x in re.findall(r"gear_ratio: (\S+)", cell)]
+        limits = [float(x) for x in re.findall(r"max_acceleration_rad_per_s2: (\S+)", cell)]
+        times = [float(row["time_s"]) for row in rows]
+        for axis, gear, limit in zip(AXES, gears, limits):
+            per_rad = 1048576 * gear / (2 * math.pi)
+            counts = [int(row[f"{axis}_target_counts"]) for row in rows]
+            for k in range(2, len(rows) - 1):
+                t, before = times[k + 1] - times[k], times[k] - times[k - 1]
+                step, last = counts[k] - counts[k - 1], (counts[k - 1] - counts[k - 2]) * t / before
+                self.assertLessEqual(abs(step - last), limit * per_rad * t * t + 1 + t / before + 1e-6, (axis, k))
+
+    def figures(self, *arguments):
+        outcome = self.call("run", "--json", *arguments)
+        self.assertEqual(outcome.status, 0, outcome.err)
+        return outcome.summary
+
+    def rows(self):
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            return [row for row in csv.DictReader(file) if row["phase"] in ("rendering", "holding")]
+
+    def test_changes_in_motion_without_a_jump_and_repeats_to_the_bit(self):
+        arguments = (*SWEEP, "--duration", "4s", "--mass", "6", "--set", "timestep=2ms@1s", "--set", "mass=8@2s",
+                     "--set", "timestep=4ms@3s")
+        figures = self.figures("--record", "session", *arguments)
+        self.assertEqual(figures["rendered_time_s"], 4.0)
+        self.assertEqual(figures["faults"], [])
+        self.assertEqual([(t["from_s"], t["to_s"], t["refused"]) for t in figures["timesteps"]],
+                         [(0.001, 0.002, ""), (0.002, 0.004, "")])
+        for change in figures["timesteps"]:
+            self.assertLess(change["paused_s"], 0.3)
+        rows = self.rows()
+        steps = [round(1e6 * (float(b["time_s"]) - float(a["time_s"]))) for a, b in zip(rows, rows[1:])]
+        self.assertEqual(sorted(set(steps)), [1000, 2000, 4000])
+        self.assertEqual(steps, sorted(steps))
+        self.assert_steps_within_limits(rows)
+        # (26a) with the last T and M: in free space every step is the force's, handle (the tool) apart.
+        tail = [row for row in rows if row["phase"] == "rendering"][-100:]
+        q = [float(row["proxy_W_x_m"]) for row in tail]
+        h = [float(row["force_W_x_N"]) for row in tail]
+        p = [a - 2 * b + c for a, b, c in zip(q, q[1:], q[2:])]
+        mass = 16e-6 * sum(f * f for f in h[2:]) / sum(f * a for f, a in zip(h[2:], p))
+        self.assertAlmostEqual(mass, 8 - 0.25, places=6)  # less the tool behind the sensor
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+        self.assertEqual(self.figures(*arguments)["setpoint_sha256"], figures["setpoint_sha256"])
+
+    def test_a_black_box_replays_from_before_and_from_after_it(self):
+        for fault in ("9s", "13s", "19s"):  # at first the oldest state is from before the change, then from after it
+            with self.subTest(fault):
+                outcome = self.call("run", "--duration", "20s", "--set", "timestep=2ms@7s", "--black-box", "box",
+                                    "--fault", f"sensor:silent@{fault}")
+                self.assertEqual(outcome.status, 1, outcome.err)
+                outcome = self.call("replay", "box")
+                self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+    def test_a_drive_that_refuses_keeps_the_old_one(self):
+        outcome = self.call("run", "--json", "--record", "session", "--duration", "3s", "--set", "timestep=2ms@1s",
+                            "--fault", "axis_3:period")
+        self.assertEqual(outcome.status, 0, outcome.err)
+        self.assertIn("drive of axis_3, 60C2h:01: SDO abort 08000022", outcome.err)
+        self.assertIn("it stays 1 ms", outcome.err)
+        change = outcome.summary["timesteps"][0]
+        self.assertEqual((change["from_s"], change["to_s"]), (0.001, 0.002))
+        self.assertIn("axis_3", change["refused"])
+        self.assert_steps_within_limits(self.rows())
+        self.assertEqual(self.call("replay", "session").status, 0)
+
+    def test_a_mass_that_was_checked_for_a_timestep_that_was_refused_is_left_out(self):
+        figures = self.figures("--duration", "3s", "--timestep", "4ms", "--mass", "6", "--set", "timestep=1ms@1s",
+                               "--set", "mass=5@2s", "--fault", "axis_3:period")
+        self.assertEqual(figures["felt_mass_kg"], 6)
+
+    def test_what_would_be_refused_at_the_start_is_refused(self):
+        for change, said in (("timestep=0.5ms@1s", "proxarm plan"), ("timestep=2@1s", "timestep"),
+                             ("timestep=1.2345ms@1s", "60C2h"), ("timestep=3us@1s", "0.05 to 100 ms"),
+                             ("timestep=60ms@1s", "0.1 rad in a period")):
+            with self.subTest(change):
+                self.assert_refused(self.call("run", "--mass", "100", "--set", change), said)
+        self.assert_refused(self.call("run", "--mass", "1.5", "--set", "timestep=20ms@1s"),
+                            "the smallest that is stable")
+        self.assert_refused(self.call("run", SOURCE / "models/cells/light.yaml", "--set", "timestep=2ms@1s"),
+                            "impedance")
+        self.assert_refused(self.call("run", SOURCE / "models/cells/rail.yaml", "--set", "timestep=2ms@1s"), "Modbus")
 
 
 class Socket(ProgramTest):
@@ -207,6 +297,24 @@ except ConnectionError:
         self.assertEqual((outcome.status, outcome.out, outcome.err), (0, "ok: mass=6\nok: damping=5Ns/m\n", ""))
         time.sleep(0.5)
         self.stop()
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+    def test_a_timestep_is_changed(self):
+        self.start()
+        time.sleep(1.0)
+        outcome = self.ask("timestep=2ms")
+        self.assertEqual(outcome.status, 0, outcome.err)
+        self.assertIn("timestep=2ms", outcome.out)
+        time.sleep(1.0)
+        outcome = self.ask("timestep=0.5ms")
+        self.assertEqual(outcome.status, 2)
+        self.assertIn("proxarm plan", outcome.err)
+        self.assertEqual(self.ask("mass=7").status, 0)
+        time.sleep(0.5)
+        figures = json.loads(self.stop())
+        self.assertEqual([(t["from_s"], t["to_s"], t["refused"]) for t in figures["timesteps"]], [(0.001, 0.002, "")])
+        self.assertEqual(figures["felt_mass_kg"], 7)
         outcome = self.call("replay", "session")
         self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
 

@@ -39,6 +39,7 @@ struct RigOptions {
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
   std::vector<ScheduledChange> changes{};
   std::vector<ScheduledCommand> commands{};
+  std::vector<ScheduledTimestep> timesteps{};
   std::vector<sim::PressedSpan> enabling{};               // of the cell's enabling switch, from the first SYNC
   std::function<void(description::Cell&)> edit_cell{};    // for both ends
   std::function<void(description::Cell&)> edit_belief{};  // the controller's alone
@@ -79,7 +80,8 @@ class ClosedLoopRig {
     cycle->schedule(options.changes);
     if (options.box != nullptr) cycle->write_to(*options.box);
     cycle->schedule(options.commands);
-    tally = run_session(*cycle, through, options.settings.period_s, options.duration_s, hooks);
+    cycle->schedule(options.timesteps);
+    tally = run_session(*cycle, through, options.duration_s, hooks);
     cycle->shut_down();
     network.sleep_until(network.now_ns() + 1'500'000'000);  // the drives stop, and the gears ring out
   }
@@ -154,17 +156,18 @@ class ClosedLoopRig {
   }
 };
 
-// What a drive is sent in three cycles one after the other doesn't go beyond its joint's speed and acceleration. In
-// counts: each setpoint is rounded by half a one, so a step by one and a difference of steps by two.
+// What a drive is sent in three cycles one after the other doesn't go beyond its joint's speed and acceleration. T is
+// that of the last step. In counts: each setpoint is rounded by half a one, so a step by one and a difference of steps
+// by two.
 inline bool step_within_limits(const ClosedLoopRig& rig, std::size_t axis, const CycleRecord& k2, const CycleRecord& k1,
                                const CycleRecord& k) {
-  const double T = rig.options.settings.period_s;
+  const double T = 1e-9 * static_cast<double>(k.period_ns), ratio = T / (1e-9 * static_cast<double>(k1.period_ns));
   const description::DriveDescription& drive = rig.cell.drives[axis];
   const double per_rad = std::abs(drive.counts_per_rad());
   const double step = k.target_counts[axis] - k1.target_counts[axis];
-  const double step_k1 = k1.target_counts[axis] - k2.target_counts[axis];
+  const double step_k1 = ratio * (k1.target_counts[axis] - k2.target_counts[axis]);
   return std::abs(step) <= drive.max_speed_rad_per_s * T * per_rad + 1.0 &&
-         std::abs(step - step_k1) <= drive.max_acceleration_rad_per_s2 * T * T * per_rad + 2.0;
+         std::abs(step - step_k1) <= drive.max_acceleration_rad_per_s2 * T * T * per_rad + 1.0 + ratio;
 }
 
 inline void expect_step_within_limits(const ClosedLoopRig& rig, std::size_t axis, std::size_t k) {

@@ -47,15 +47,17 @@ Played play(const RigOptions& options, std::vector<CycleRecord>* recorded) {
   Cycle cycle(parts_of.prepared_parts(network), options.settings, parts_of.cell.limits, 64);
   BlackBox box(options.settings.period_s, 40);
   cycle.write_to(box);
+  cycle.schedule(options.timesteps);
   Played played;
   played.records.reserve(rig.records.size() + 10);
-  const auto wanted = static_cast<std::uint64_t>(std::ceil(options.duration_s / options.settings.period_s - 1e-9));
-  for (std::int64_t t_k_ns = rig.first_cycle_ns; cycle.supervisor().phase() != Phase::done; t_k_ns += 1'000'000) {
+  const std::int64_t wanted_ns = std::llround(1e9 * options.duration_s);
+  for (std::int64_t t_k_ns = rig.first_cycle_ns; cycle.supervisor().phase() != Phase::done;
+       t_k_ns += cycle.period_ns()) {
     network.sleep_until(t_k_ns);
     const std::uint64_t before = tests::allocation_count();
     const PageFaults faults_before = thread_page_faults();
     cycle.run_cycle(t_k_ns);
-    if (cycle.rendered_cycles() >= wanted) cycle.request_stop();
+    if (cycle.rendered_ns() >= wanted_ns) cycle.request_stop();
     const PageFaults faults = thread_page_faults().since(faults_before);
     played.page_faults.minor += faults.minor;
     played.page_faults.major += faults.major;
@@ -129,6 +131,16 @@ TEST(CycleAllocation, IsNoneInAFaultAndTheStopAfterIt) {
   expect_no_allocation({.device_faults = {"axis_3:fault=0x4210@1.9s"}}, Fault::drive_fault);
   expect_no_allocation({.device_faults = {"axis_2:silent@1.9s"}}, Fault::drive_silent);
   expect_no_allocation({.device_faults = {"sensor:frozen@1.9s"}}, Fault::sensor_frozen);
+}
+
+TEST(CycleAllocation, IsNoneInAChangeOfTheTimestep) {
+  RigOptions options{.duration_s = 2.0};
+  options.settings.passivity = Passivity::on;
+  const Timestep to{.period_s = 2e-3, .max_missed_samples = 3, .max_repeated_samples = 20};
+  options.timesteps = {{1'000'000'000, to}};
+  expect_no_allocation(options, Fault::none);
+  options.device_faults = {"axis_5:period"};
+  expect_no_allocation(options, Fault::none);
 }
 
 // As a session on interfaces does (realtime.cpp): with locked memory there is none, from the first cycle to the stop.

@@ -43,6 +43,7 @@ class WrongWorld final : public RenderedWorld {
     return inner_->resume(q_W, v_W);
   }
   void set(const Change& change) noexcept override { inner_->set(change); }
+  void set_period(double period_s) noexcept override { inner_->set_period(period_s); }
   void add_damping(double damping_Ns_per_m) noexcept override { inner_->add_damping(damping_Ns_per_m); }
   void archive(fieldbus::StateArchive& state) noexcept override { inner_->archive(state); }
 
@@ -264,6 +265,13 @@ RigOptions thrown_device() {
   return options;
 }
 
+// The timestep is to change when axis_3 answers no SDO request any more.
+RigOptions deaf_to_the_timestep() {
+  RigOptions options = failing_device("axis_3:sdo");
+  options.timesteps = {{1'465'000'000, {.period_s = 2e-3, .max_missed_samples = 3, .max_repeated_samples = 20}}};
+  return options;
+}
+
 RigOptions naps() {
   RigOptions options;
   options.after_cycle = [](fieldbus::SimulatedCanNetwork& network) {
@@ -366,6 +374,8 @@ std::vector<Row> rows() {
        }},
       {drive_not_enabled, Reaction::stop_1, 505, still_m, never_enabled, at_start},
       {drive_not_disabled, Reaction::stop_0, 1001, way_m, never_disabled, at_the_end},
+      // At rest after 50 ms; then it is asked four times, each time for 200 ms.
+      {timestep_unknown, Reaction::stop_1, 900, way_m, deaf_to_the_timestep},
       {position_implausible, Reaction::stop_0, 1, way_m,
        [] {
          return failing_bus({.action = FaultAction::corrupt,

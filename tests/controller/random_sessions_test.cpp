@@ -1,7 +1,7 @@
 // Whole sessions of all that can come together: hands that shake and pull, scenes, narrow limits, timesteps, poses at
-// and beside singularities, masses that are changed (to unstable ones, too), late cycles, lost frames, devices that
-// fail, holds, resets and what leads out of them. Whatever happens, no drive that follows is told to go beyond its
-// range, speed or acceleration.
+// and beside singularities, masses that are changed (to unstable ones, too), timesteps that are, late cycles, lost
+// frames, devices that fail, holds, resets and what leads out of them. Whatever happens, no drive that follows is told
+// to go beyond its range, speed or acceleration.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -73,7 +73,7 @@ RigOptions random_session(const tests::ScratchFolder& folder, Random& random) {
     Change change{parameter, random.log_uniform(0.5, 50.0), random.below(2)};
     if (parameter == Parameter::friction) change.value *= 0.02;
     for (double& x : change.position_m) x = random.uniform(-0.1, 0.1);
-    options.changes.push_back({cycle, change});
+    options.changes.push_back({static_cast<std::int64_t>(cycle), change});  // in cycles, as yet
   }
   for (int i = random.below(4); i > 0; --i) {
     const auto from_ns = static_cast<std::int64_t>(1e9 * random.uniform(0.5, 2.0));
@@ -109,12 +109,31 @@ void order_about(Random& random, RigOptions& options) {
   options.commands.push_back({4'200'000'000, {Order::hold}});
 }
 
+// One, two or four milliseconds, whatever it is then; on drives that refuse them, too, or that don't answer.
+void change_timesteps(Random& random, RigOptions& options) {
+  constexpr std::array periods_s{1e-3, 2e-3, 4e-3};
+  for (double t = random.uniform(0.0, 1.0); t < 2.0; t += random.log_uniform(0.005, 1.0)) {
+    const Timestep to{.period_s = periods_s[random.below(3)], .max_missed_samples = 3, .max_repeated_samples = 20};
+    options.timesteps.push_back({static_cast<std::int64_t>(1e9 * t), to});
+  }
+  if (random.chance(0.3)) options.device_faults.emplace_back("axis_5:period");
+  const double deaf_s = random.uniform(0.5, 3.0);
+  if (random.chance(0.2)) {
+    options.device_faults.push_back("axis_2:sdo@" + std::to_string(deaf_s) + "s.." +
+                                    std::to_string(deaf_s + random.log_uniform(0.01, 1.0)) + "s");
+  }
+}
+
 // What was added later draws its own numbers, so that sessions that once failed stay what they were.
 void add_more(std::int64_t run, RigOptions& options) {
   Random random(static_cast<std::uint64_t>(7'000'000 + run));
   if (run % 4 == 0) start_beside_a_singularity(random, options);
   if (run % 5 == 0) options.settings.period_s = random.chance(0.5) ? 0.002 : 0.004;
+  const std::int64_t period_ns = std::llround(1e9 * options.settings.period_s);
+  for (ScheduledChange& change : options.changes) change.rendered_ns *= period_ns;
   if (run % 3 == 1) order_about(random, options);
+  Random timesteps(static_cast<std::uint64_t>(9'000'000 + run));
+  if (timesteps.chance(0.4)) change_timesteps(timesteps, options);
 }
 
 void narrow(Random& random, ClosedLoopRig& rig) {
@@ -167,7 +186,7 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
   const tests::ScratchFolder folder;
   const std::int64_t runs = std::max<std::int64_t>(10, tests::scaled(25));  // fewer may have no late cycle
   std::uint64_t cycles = 0, limited = 0, overruns = 0;
-  std::uint64_t resets = 0, singular = 0;
+  std::uint64_t resets = 0, singular = 0, timesteps = 0, refused = 0;
   std::map<std::string, int> ends, phases;
   const char* only = std::getenv("PROXARM_TEST_SESSION");  // one that failed, again
   for (std::int64_t run = only != nullptr ? std::atoll(only) : 0; run < runs; ++run) {
@@ -193,6 +212,8 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
     for (std::size_t k = 1; k < rig.records.size(); ++k) {
       const Phase phase = rig.records[k].phase;
       if (phase != rig.records[k - 1].phase) ++phases[phase_name(phase)];
+      timesteps += rig.records[k].period_ns != rig.records[k - 1].period_ns ? 1 : 0;
+      refused += rig.records[k].refused_period_ns > 0 ? 1 : 0;
     }
     for (const CycleRecord& r : rig.records) {
       limited += r.limited_axes != 0 ? 1 : 0;
@@ -205,10 +226,13 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
   std::printf("%llu at a singularity, %llu resets; ends:\n", static_cast<unsigned long long>(singular),
               static_cast<unsigned long long>(resets));
   for (const auto& [fault, sessions] : ends) std::printf("  %s: %d\n", fault.c_str(), sessions);
+  std::printf("%llu timesteps taken, %llu taken back\n", static_cast<unsigned long long>(timesteps),
+              static_cast<unsigned long long>(refused));
   std::printf("phases entered:\n");
   for (const auto& [phase, times] : phases) std::printf("  %s: %d\n", phase.c_str(), times);
   EXPECT_GT(limited, cycles / 100) << "or the test says little";
   EXPECT_GT(overruns, 0u);
+  EXPECT_GT(timesteps, 0u);
 }
 
 }  // namespace
