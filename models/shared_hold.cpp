@@ -14,6 +14,7 @@ namespace {
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 constexpr std::size_t most = SharedHold::most;
 constexpr int most_rounds = 4;
+constexpr double farthest_m = 1e4;  // forces settle to 64 u of that: 0.1 nm
 constexpr int most_rows = 3 * static_cast<int>(most);
 // On the stack.
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_rows, 1>;
@@ -189,26 +190,45 @@ class FlatHold {
   double size_ = 0.0, stiffer_ = 1.0;
 };
 
-// On tangent planes at `at`; at = r is wanted.
+// On tangent planes, taken again until r stays.
 bool settle(SharedHold& hold, FlatHold& flat, double K, const Vec3& p, const Vec3& q) noexcept {
-  Vec3 at = q;
-  double last_move = std::numeric_limits<double>::infinity();
+  Settling settling(q);
   for (int k = 0; k < most_settling; ++k) {
     bool same = k > 0;
     for (std::size_t i = 0; i < flat.count; ++i) {
-      const Obstacle::Tangent t = hold.obstacle[i]->tangent(at, hold.step[i].feature);
+      const Obstacle::Tangent t = hold.obstacle[i]->tangent(settling.at(), hold.step[i].feature);
       same = same && t.surface.normal() == flat.contact[i].surface.normal();
       flat.contact[i].surface = t.surface;
       flat.contact[i].mu = t.mu;
     }
     if (same) return true;
     if (!flat.solve(K, p)) return false;
-    const double move = (flat.r - at).norm();
-    at = flat.r;
-    if (k > 0 && has_settled(move, last_move, move / last_move, at)) return true;
-    last_move = move;
+    if (settling.take(flat.r)) return true;
   }
   return false;
+}
+
+// r is known to the rounding of all that is added up; what can't give way says to its own where it is: surfaces that
+// are rigid, or pressed through to the core. Who sticks to something stays bit for bit.
+Vec3 placed(const SharedHold& hold, const FlatHold& flat, const Vec3& q) noexcept {
+  Vec3 r = flat.r;
+  std::size_t hard = 0, hardest = 0;
+  for (int turn = 0; turn < 4; ++turn) {
+    hard = 0;
+    for (std::size_t i = 0; i < hold.count; ++i) {
+      const FlatContact& c = flat.contact[i];
+      const double core = c.layer.soft() ? -c.layer.thickness_m : 0.0, height = c.surface.height(r) - core;
+      if (!hold.step[i].touches || std::abs(height) > 1e-9 * (1.0 + core)) continue;
+      r -= height * c.surface.normal();
+      ++hard;
+      if (!c.layer.soft()) hardest = i;
+    }
+  }
+  if (hard == 1 && !flat.contact[hardest].layer.soft()) r = hold.step[hardest].r;
+  for (std::size_t i = 0; i < hold.count; ++i) {
+    if (hold.step[i].touches && hold.step[i].r == q) r = q;
+  }
+  return r;
 }
 
 enum class Confirmed : std::uint8_t { yes, no, other_features };
@@ -218,7 +238,6 @@ Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& 
   // Edges and curvature are off by far more than that if they are; rounding by less, of objects of a hundred metres.
   const double nothing = 1e-12 * (1.0 + p.lpNorm<1>() + q.lpNorm<1>());
   bool agree = true, others = false;
-  hold.r = flat.r;
   for (std::size_t i = 0; i < flat.count; ++i) {
     Obstacle::Step& s = hold.step[i];
     const std::int32_t feature = s.feature;
@@ -230,13 +249,7 @@ Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& 
     if (!own.touches) s.feature = feature;
   }
   if (agree) {
-    // What is rigid knows best where its surface is; who sticks to something stays bit for bit.
-    for (std::size_t i = 0; i < hold.count; ++i) {
-      if (hold.step[i].touches && !flat.contact[i].layer.soft()) hold.r = hold.step[i].r;
-    }
-    for (std::size_t i = 0; i < hold.count; ++i) {
-      if (hold.step[i].touches && hold.step[i].r == q) hold.r = q;
-    }
+    hold.r = placed(hold, flat, q);
     return Confirmed::yes;
   }
   return others ? Confirmed::other_features : Confirmed::no;
@@ -245,6 +258,8 @@ Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& 
 }  // namespace
 
 bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
+  // From so far away rounding is as large as layers are thin.
+  if (!((p - q).norm() <= farthest_m)) return false;
   FlatHold flat;
   flat.count = count;
   for (std::size_t i = 0; i < count; ++i) {

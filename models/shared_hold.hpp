@@ -10,9 +10,9 @@
 // On tangent planes 𝒢_i is (4), with its layer, and smooth where nothing starts to touch, to slip or to be pressed
 // through: the equations are solved by Newton's method with those derivatives (semismooth: L. Qi and J. Sun, "A
 // nonsmooth version of Newton's method", Mathematical Programming 58, 1993), from a sweep over all contacts, each with
-// the latest forces of the others; where its steps lead nowhere, by more sweeps, and with other stiffnesses in the place
-// of K. Curved surfaces' planes are taken again at the solution until it stays. What comes out is accepted if every 𝒢_i
-// itself says so.
+// the latest forces of the others; where its steps lead nowhere, by more sweeps, and with other stiffnesses in the
+// place of K. Curved surfaces' planes are taken again at the solution until it stays. What comes out is accepted if
+// every 𝒢_i itself says so.
 #pragma once
 
 #include <array>

@@ -27,15 +27,16 @@ struct SettledPair {
   Obstacle::Tangent t_a, t_b;
 };
 
-// r = solution(at), on the tangent planes at `at`; at = r is wanted, from `at` on.
-SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, Vec3 at, GrooveSearch search) noexcept {
+SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, const Vec3& from,
+                   GrooveSearch search) noexcept {
   const Vec3 q_a = pair.a.carry(q), q_b = pair.b.carry(q);
-  Vec3 last_at = at, last_r = at, last_f = Vec3::Zero();
-  SettledPair out{
-      .groove = {}, .r = at, .t_a = pair.a.tangent(at, pair.feature_a), .t_b = pair.b.tangent(at, pair.feature_b)};
-  double last_move = infinity;
+  Settling settling(from);
+  SettledPair out{.groove = {},
+                  .r = from,
+                  .t_a = pair.a.tangent(from, pair.feature_a),
+                  .t_b = pair.b.tangent(from, pair.feature_b)};
   for (int k = 0; k < most_settling; ++k) {
-    const GrooveLine line(out.t_a.surface, out.t_b.surface, at);
+    const GrooveLine line(out.t_a.surface, out.t_b.surface, settling.at());
     const auto solve_by = [&](GrooveSearch by) {
       return solve_groove(out.t_a.surface, out.t_a.mu, out.t_b.surface, out.t_b.mu, line, p, q_a, q_b, by);
     };
@@ -45,22 +46,10 @@ SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, Vec
     out.r = out.groove.r;
     if (!out.groove.found || !out.r.allFinite()) break;
     out.groove.found = presses;
-    const Vec3 f = out.r - at;
-    const double move = f.norm();
-    // Of solution() itself: a move from a point that was looked ahead to may be shorter than the next one.
-    const double contraction = k == 0 ? infinity : (out.r - last_r).norm() / std::max((at - last_at).norm(), 1e-300);
-    out.settled = has_settled(move, last_move, contraction, out.r);
+    out.settled = settling.take(out.r);
     if (out.settled) return out;
-    // Where each step only takes a part of the error off, the steps of one and the next tell where they lead.
-    const Vec3 bend = f - last_f;
-    const double theta = k < 2 ? 0.0 : f.dot(bend) / std::max(bend.squaredNorm(), 1e-300);
-    const Vec3 ahead = out.r - theta * (out.r - last_r);
-    last_at = at;
-    last_r = out.r;
-    last_f = f;
-    last_move = move;
-    at = (ahead - out.r).norm() <= 10.0 * move ? ahead : out.r;
-    const Obstacle::Tangent n_a = pair.a.tangent(at, pair.feature_a), n_b = pair.b.tangent(at, pair.feature_b);
+    const Obstacle::Tangent n_a = pair.a.tangent(settling.at(), pair.feature_a),
+                            n_b = pair.b.tangent(settling.at(), pair.feature_b);
     out.settled = n_a.surface.normal() == out.t_a.surface.normal() && n_b.surface.normal() == out.t_b.surface.normal();
     if (out.settled) return out;  // flat
     out.t_a = n_a;
@@ -284,7 +273,7 @@ void World::try_triples(double K, const Vec3& p, const Vec3& q, Candidates& cand
           bool flat = true;
           for (std::size_t j = 0; j < 3; ++j) flat = flat && next[j].surface.normal() == t[j].surface.normal();
           const double contraction = last_move < infinity ? move / last_move : infinity;
-          if (flat || has_settled(move, last_move, contraction, r)) break;
+          if (flat || has_settled(move, move <= 0.5 * last_move, contraction, r)) break;
           s.found = false;
           last_move = move;
           t = next;
