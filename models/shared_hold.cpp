@@ -66,6 +66,13 @@ class FlatHold {
   std::size_t count = 0;
   Vec3 r;
 
+  // The sum of the forces over K.
+  [[nodiscard]] double squeeze_m() const noexcept {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < count; ++i) sum += x[i].norm();
+    return sum;
+  }
+
   // What a contact does with a force is the same by every stiffness (Assumption 1), and Newton's steps get along better
   // with one or another: the own, or one that keeps all points near their surfaces. Found by another, the forces are as
   // exact as that one's steps: once more by the own.
@@ -258,7 +265,7 @@ Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& 
 }  // namespace
 
 bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
-  // From so far away rounding is as large as layers are thin.
+  // From so far away, or squeezed by forces as if from there, rounding is as large as layers are thin.
   if (!((p - q).norm() <= farthest_m)) return false;
   FlatHold flat;
   flat.count = count;
@@ -274,7 +281,7 @@ bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
     flat.x[i] = (c.layer.stiffness_N_per_m / K * depth) * surface.normal();
   }
   for (int round = 0; round < most_rounds; ++round) {
-    if (!settle(*this, flat, K, p, q)) return false;
+    if (!settle(*this, flat, K, p, q) || !(flat.squeeze_m() <= farthest_m)) return false;
     switch (confirm(*this, flat, K, p, q)) {
       case Confirmed::yes:
         return true;
