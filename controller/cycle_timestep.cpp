@@ -62,6 +62,7 @@ void Cycle::take_timestep() noexcept {
 }
 
 void Cycle::change_timestep(std::int64_t t_k_ns) noexcept {
+  if (!changing()) return;
   const bool held = supervisor_.phase() == Phase::holding;
   exchange_.on_cycle(t_k_ns);
   switch (timestep_stage_) {

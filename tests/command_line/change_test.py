@@ -307,13 +307,20 @@ except ConnectionError:
         self.assertEqual(outcome.status, 0, outcome.err)
         self.assertIn("timestep=2ms", outcome.out)
         time.sleep(1.0)
+        # What comes before the drives have answered would be checked for a timestep that it hasn't. (They have, where
+        # this process isn't run for 20 ms.)
+        outcome = self.ask("timestep=1ms", "mass=2")
+        if outcome.status != 0:
+            self.assertIn("being changed", outcome.err)
+        time.sleep(1.0)
         outcome = self.ask("timestep=0.5ms")
         self.assertEqual(outcome.status, 2)
         self.assertIn("proxarm plan", outcome.err)
         self.assertEqual(self.ask("mass=7").status, 0)
         time.sleep(0.5)
         figures = json.loads(self.stop())
-        self.assertEqual([(t["from_s"], t["to_s"], t["refused"]) for t in figures["timesteps"]], [(0.001, 0.002, "")])
+        self.assertEqual([(t["from_s"], t["to_s"], t["refused"]) for t in figures["timesteps"]],
+                         [(0.001, 0.002, ""), (0.002, 0.001, "")])
         self.assertEqual(figures["felt_mass_kg"], 7)
         outcome = self.call("replay", "session")
         self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
