@@ -520,17 +520,17 @@ void Cycle::follow_proxy() noexcept {
 
 void Cycle::command(const JointVector& motor_rad) noexcept {
   JointVector wanted_rad = motor_rad;
-  const bool follow = drives_follow(motor_rad, wanted_rad);
+  const std::uint8_t blocked = find_blocked(motor_rad, wanted_rad);
   active_.add(guard_.step(wanted_rad));
   commanded_ = true;
   target_rad_ = guard_.target_rad();
-  if (!follow || guard_.lag_rad() > limits_.following_error_rad) wind_back();
+  if (blocked != 0 || guard_.lag_rad() > limits_.following_error_rad) wind_back(blocked);
 }
 
 // A drive that is blocked is told to go a little further than it is, not more, and all the others wait with it: so
 // little is wound up that nothing snaps when it comes free. What a drive that follows is behind, after its setpoint's
-// way to it and back, grows with its speed.
-bool Cycle::drives_follow(const JointVector& motor_rad, JointVector& wanted_rad) noexcept {
+// way to it and back, grows with its speed. Those that are blocked, as bits.
+std::uint8_t Cycle::find_blocked(const JointVector& motor_rad, JointVector& wanted_rad) noexcept {
   std::uint8_t blocked = 0;
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const DriveOnBus& axis = parts_.drives[static_cast<std::size_t>(i)];
@@ -543,18 +543,19 @@ bool Cycle::drives_follow(const JointVector& motor_rad, JointVector& wanted_rad)
     blocked = static_cast<std::uint8_t>(blocked | 1u << i);
     wanted_rad[i] = std::clamp(motor_rad[i], actual_rad_[i] - room_rad, actual_rad_[i] + room_rad);
   }
-  if (blocked == 0) return true;
+  if (blocked == 0) return 0;
   active_.set(Limit::following_error, blocked);
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     if ((blocked & 1u << i) == 0) wanted_rad[i] = target_rad_[i];
   }
-  return false;
+  return blocked;
 }
 
-// Filter and proxy go on from what was commanded: nothing of what couldn't be followed is caught up later.
-void Cycle::wind_back() noexcept {
+// Filter and proxy go on from what was commanded: nothing of what couldn't be followed is caught up later. A blocked
+// joint's setpoint may have been fast, and comes to rest where it was told to.
+void Cycle::wind_back(std::uint8_t blocked) noexcept {
   const JointVector& speed = guard_.speed_rad_per_s();
-  guard_.follow_from_here();
+  guard_.follow_from_here(blocked);
   parts_.elastic.resume(target_rad_, speed);
   link_rad_ = parts_.elastic.link_rad() + parts_.elastic.lead_s() * speed;
   parts_.arm->kinematics(link_rad_, solution_.kinematics);

@@ -229,8 +229,8 @@ class Cycle {
   void record_passivity(const WorldStep& step) noexcept;
   void follow_proxy() noexcept;
   void command(const JointVector& motor_rad) noexcept;
-  bool drives_follow(const JointVector& motor_rad, JointVector& wanted_rad) noexcept;
-  void wind_back() noexcept;
+  std::uint8_t find_blocked(const JointVector& motor_rad, JointVector& wanted_rad) noexcept;
+  void wind_back(std::uint8_t blocked) noexcept;
   void run_out() noexcept;
   void send_targets(std::int64_t t_k_ns) noexcept;
   void send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept;

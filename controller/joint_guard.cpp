@@ -34,6 +34,12 @@ void JointGuard::start(const JointVector& target_rad) noexcept {
   speed_rad_per_s_ = JointVector::Zero(target_rad.size());
 }
 
+void JointGuard::follow_from_here(std::uint8_t but_not) noexcept {
+  for (Eigen::Index i = 0; i < target_rad_.size(); ++i) {
+    if ((but_not & 1u << i) == 0) wanted_k1_rad_[i] = target_rad_[i];
+  }
+}
+
 ActiveLimits JointGuard::step(const JointVector& wanted_rad) noexcept {
   ActiveLimits active;
   const double T = period_s_;

@@ -10,6 +10,7 @@
 // time-optimal course: the speed of what is wanted, plus c(lag) towards it. Neither allocates, locks nor throws.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "controller/step_limits.hpp"
@@ -28,8 +29,9 @@ class JointGuard {
   void start(const models::JointVector& target_rad) noexcept;
   // One period; what isn't finite is taken as the last setpoint. Returns which limits held something back.
   ActiveLimits step(const models::JointVector& wanted_rad) noexcept;
-  // Forgets what was wanted so far: no lag is left to catch up.
-  void follow_from_here() noexcept { wanted_k1_rad_ = target_rad_; }
+  // Forgets what was wanted so far: no lag is left to catch up. Not of the joints in `but_not`, as bits: those are on
+  // their way to somewhere, and brake ahead of it.
+  void follow_from_here(std::uint8_t but_not = 0) noexcept;
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }

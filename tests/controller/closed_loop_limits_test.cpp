@@ -87,6 +87,38 @@ TEST(ClosedLoopLimits, WindNothingUpBehindABlockedJoint) {
   }
 }
 
+// Random session 2207 ended by leash_exceeded: axis_2 jammed at 0.77 rad/s, and its setpoint, which had forgotten each
+// cycle how far it still had to brake, swung by 16 mrad to either side of it for as long as it was stuck.
+TEST(ClosedLoopLimits, LetTheSetpointOfAJointThatJamsAtSpeedComeToRest) {
+  ClosedLoopRig rig({.device_faults = {"axis_2:jammed@1.2s..1.6s"},
+                     .duration_s = 2.5,
+                     .scene = "scenes/free.yaml",
+                     .edit_cell = [](description::Cell& cell) { cell.drives[1].max_acceleration_rad_per_s2 = 20.0; },
+                     .edit_hand =
+                         [](description::HandDescription& hand) {
+                           hand.waypoints = {{0.7, {0.0, 0.0, 0.0}}, {1.4, {-0.35, 0.0, 0.0}}};
+                         }});
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::none) << fault_name(rig.fault().fault);
+  expect_within_joint_limits(rig);
+  const description::DriveDescription& drive = rig.cell.drives[1];
+  const auto speed = [&](std::size_t k) {
+    return (rig.records[k].target_counts[1] - rig.records[k - 1].target_counts[1]) / drive.counts_per_rad() /
+           rig.options.settings.period_s;
+  };
+  const double at = std::abs(speed(rig.cycle_at(1.199)));
+  EXPECT_GT(at, 0.4) << "or the test says little";
+  // Braking takes u/a, and so does the way back, at the most; two cycles each to notice.
+  const double settled_s = 1.2 + 2.5 * at / drive.max_acceleration_rad_per_s2 + 0.004;
+  double furthest_rad = 0.0;
+  for (std::size_t k = rig.cycle_at(settled_s); k < rig.cycle_at(1.6); ++k) {
+    const double ahead = rig.records[k].target_counts[1] - rig.records[k].actual_counts[1];
+    furthest_rad = std::max(furthest_rad, std::abs(ahead / drive.counts_per_rad()));
+  }
+  // What the arm's gears let the motor turn when it stops, on top of the rounding to counts.
+  EXPECT_LE(furthest_rad, rig.cell.limits.following_error_rad + 1e-4);
+}
+
 // The hand pulls the tool out to where the arm is stretched: it slows, it doesn't fault, and it comes back.
 TEST(ClosedLoopLimits, SlowTheToolAtTheEndOfItsReach) {
   ClosedLoopRig rig({.duration_s = 5.0, .scene = "scenes/free.yaml"});

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <fstream>
 #include <map>
+#include <string>
+#include <vector>
 
 #include "tests/controller/closed_loop_rig.hpp"
 #include "tests/models/random_states.hpp"
@@ -187,7 +189,8 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
   const std::int64_t runs = std::max<std::int64_t>(10, tests::scaled(25));  // fewer may have no late cycle
   std::uint64_t cycles = 0, limited = 0, overruns = 0;
   std::uint64_t resets = 0, singular = 0, timesteps = 0, refused = 0;
-  std::map<std::string, int> ends, phases;
+  std::map<std::string, std::vector<std::int64_t>> ends;  // sessions by what ended them
+  std::map<std::string, int> phases;
   const char* only = std::getenv("PROXARM_TEST_SESSION");  // one that failed, again
   for (std::int64_t run = only != nullptr ? std::atoll(only) : 0; run < runs; ++run) {
     SCOPED_TRACE("session " + std::to_string(run));
@@ -207,7 +210,7 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
     if (HasFatalFailure()) return;
     cycles += rig.records.size();
     overruns += rig.tally.overruns;
-    ++ends[fault_name(rig.fault().fault)];
+    ends[fault_name(rig.fault().fault)].push_back(run);
     resets += rig.cycle->past_fault_count();
     for (std::size_t k = 1; k < rig.records.size(); ++k) {
       const Phase phase = rig.records[k].phase;
@@ -225,7 +228,13 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
               static_cast<unsigned long long>(overruns));
   std::printf("%llu at a singularity, %llu resets; ends:\n", static_cast<unsigned long long>(singular),
               static_cast<unsigned long long>(resets));
-  for (const auto& [fault, sessions] : ends) std::printf("  %s: %d\n", fault.c_str(), sessions);
+  for (const auto& [fault, sessions] : ends) {
+    std::printf("  %s: %zu (", fault.c_str(), sessions.size());
+    for (std::size_t i = 0; i < std::min<std::size_t>(sessions.size(), 6); ++i) {
+      std::printf("%s%lld", i == 0 ? "" : ", ", static_cast<long long>(sessions[i]));
+    }
+    std::printf("%s)\n", sessions.size() > 6 ? " ..." : "");
+  }
   std::printf("%llu timesteps taken, %llu taken back\n", static_cast<unsigned long long>(timesteps),
               static_cast<unsigned long long>(refused));
   std::printf("phases entered:\n");
