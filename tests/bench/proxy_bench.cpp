@@ -1,8 +1,13 @@
 // What a step of the proxy, its record and the stability check cost.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <random>
+#include <vector>
+
 #include "controller/admittance_proxy.hpp"
 #include "controller/cycle_record.hpp"
+#include "controller/limited_algorithm.hpp"
 #include "controller/passivity.hpp"
 #include "controller/session_record.hpp"
 #include "controller/spsc_ring.hpp"
@@ -60,6 +65,43 @@ void proxy_step_globe(benchmark::State& state) {
   run(state, world);
 }
 BENCHMARK(proxy_step_globe)->Arg(1)->Arg(2);
+
+// A step at a wall that limits touch, as in limits_test.cpp; the argument is the friction in percent.
+void limited_step(benchmark::State& state) {
+  std::mt19937 engine(1);
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(engine); };
+  const auto in_box = [&](double half) {
+    return Vec3(uniform(-half, half), uniform(-half, half), uniform(-half, half));
+  };
+  struct Step {
+    controller::StepLimits limits;
+    Vec3 p, q;
+  };
+  models::FrictionPlane<3> wall(Vec3::Zero(), Vec3::UnitX(), 0.01 * static_cast<double>(state.range(0)));
+  controller::LimitedAlgorithm<3> limited(wall);
+  std::vector<Step> steps;
+  while (steps.size() < 1024) {
+    Step step{{}, Vec3::Zero(), in_box(1e-4)};
+    step.q.x() = std::max(0.0, step.q.x());
+    step.p = step.q + in_box(4e-4);
+    step.limits.hard[step.limits.hard_count++] = {Vec3::Zero(), uniform(1e-5, 3e-4), controller::Limit::speed};
+    step.limits.hard[step.limits.hard_count++] = {in_box(1e-5), uniform(5e-5, 3e-4), controller::Limit::acceleration};
+    for (auto planes = engine() % 4; planes > 0; --planes) {
+      step.limits.planes[step.limits.plane_count++] = {in_box(1.0).normalized(), uniform(0.0, 2e-4),
+                                                       controller::Limit::joint_speed, 1};
+    }
+    limited.set_limits(step.limits, Eigen::Matrix3d::Identity(), step.q);
+    limited(1e6, step.p, step.q);
+    if (limited.active().kinds != 0) steps.push_back(step);
+  }
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const Step& step = steps[++i % steps.size()];
+    limited.set_limits(step.limits, Eigen::Matrix3d::Identity(), step.q);
+    benchmark::DoNotOptimize(limited(1e6, step.p, step.q));
+  }
+}
+BENCHMARK(limited_step)->Arg(0)->Arg(30);
 
 // What --passivity costs a cycle.
 void passivity_step(benchmark::State& state) {
