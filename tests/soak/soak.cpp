@@ -177,6 +177,16 @@ void add_enabling_input(Session& session, Random& random) {
   session.options.enabling.back().until_ns = std::numeric_limits<std::int64_t>::max();
 }
 
+// Every five to thirty seconds another timestep, or the same again.
+void add_timesteps(Session& session, Random& random) {
+  constexpr std::array periods_s{1e-3, 2e-3, 4e-3};
+  for (double t = 3.0; t < session.options.duration_s; t += random.uniform(5.0, 30.0)) {
+    const Timestep to{.period_s = periods_s[random.below(3)], .max_missed_samples = 3, .max_repeated_samples = 20};
+    session.options.timesteps.push_back({static_cast<std::int64_t>(1e9 * t), to});
+    session.pauses_s += 0.5;
+  }
+}
+
 // Something every two to eight seconds that is ridden through. In a third of the sessions a person holds and resets, in
 // another the enabling input is let go; and in a third of all something ends them.
 Session session_of(const tests::ScratchFolder& folder, Random& random) {
@@ -210,6 +220,8 @@ Session session_of(const tests::ScratchFolder& folder, Random& random) {
     const double t = random.uniform(3.0, o.duration_s);
     o.device_faults.push_back(span_of(grave[random.below(grave.size())], t, 1.0));
   }
+  Random apart = random;  // what was added later leaves all else of a seed's sessions as it was
+  if (apart.chance(0.3)) add_timesteps(session, apart);
   return session;
 }
 
