@@ -35,8 +35,9 @@ class Settling {
     // Nor does one along a bar, where nothing bends, tell of the next one across it: the greater of two.
     const double contraction = taken_ == 0 ? std::numeric_limits<double>::infinity()
                                            : (r - last_r_).norm() / std::max((at_ - last_at_).norm(), 1e-300);
-    // Looking ahead makes some moves longer than the last one: rounding is what three in a row don't shrink for.
-    idle_ = move > 0.5 * last_move_ ? idle_ + 1 : 0;
+    // Looking ahead makes some moves longer than the last one: rounding is where three aren't half the least so far.
+    idle_ = move > 0.5 * least_move_ ? idle_ + 1 : 0;
+    least_move_ = std::min(least_move_, move);
     if (has_settled(move, idle_ < 3, std::max(contraction, last_contraction_), r)) return true;
     last_contraction_ = contraction;
     // Where each step only takes a part of the error off, the steps of one and the next tell where they lead.
@@ -47,14 +48,13 @@ class Settling {
     last_at_ = at_;
     last_r_ = r;
     last_f_ = f;
-    last_move_ = move;
     at_ = (ahead - r).norm() <= 10.0 * move ? ahead : r;
     return false;
   }
 
  private:
   Vec3 at_, last_at_, last_r_, last_f_ = Vec3::Zero();
-  double last_move_ = std::numeric_limits<double>::infinity(), last_contraction_ = last_move_;
+  double least_move_ = std::numeric_limits<double>::infinity(), last_contraction_ = least_move_;
   int taken_ = 0, idle_ = 0;
 };
 
