@@ -98,7 +98,10 @@ class MovingObstacle final : public Obstacle {
     return true;
   }
   [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
-  [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override { return rests_ ? q : Vec3(now_ * from(q)); }
+  [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override {
+    const Vec3 q_O = from(q);
+    return rests_ && (!shortened_ || q_O == before_inverse_ * q) ? q : Vec3(now_ * q_O);
+  }
   [[nodiscard]] bool moves() const noexcept override { return true; }
   void set_friction(double friction) noexcept override { still_->set_friction(friction); }
   [[nodiscard]] Layer layer() const noexcept override { return still_->layer(); }

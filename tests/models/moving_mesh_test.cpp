@@ -217,5 +217,20 @@ TEST(MovingMesh, AllocatesNothing) {
   EXPECT_GT(contacts, 1000u);
 }
 
+// Order 2's q̃ behind a mesh that may move but rests now: others in the world were told q̃ itself, which the mesh then
+// seemed to have let through, and friction was judged from there.
+TEST(MovingMesh, CarriesToItsOwnSideAtRest) {
+  const auto sheet = std::make_shared<const models::TriangleMesh>(field(2, 1.0, [](double, double) { return 0.0; }));
+  models::MovingObstacle mesh(std::make_unique<models::MeshObstacle>(sheet, 0.3), models::ScriptedMotion{});
+  const Vec3 q(0.1, 0.2, 1e-3), behind(0.1, 0.2, -1e-3), ahead(0.1, 0.2, 2e-3);
+  for (int k = 1; k <= 3; ++k) {
+    mesh.set_time(1e-3 * k, 1e-3);
+    EXPECT_EQ(mesh.carry(q), q);
+    mesh.set_time(1e-3 * k, 2e-3 / 3.0);
+    EXPECT_GT(mesh.carry(behind).z(), 0.0);
+    EXPECT_EQ(mesh.carry(ahead), ahead);
+  }
+}
+
 }  // namespace
 }  // namespace proxarm::tests
