@@ -210,12 +210,9 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
     if (free) break;
     if (from_q_tilde) {
       // Behind a mesh, beside another object that holds the same way there, q̃ leads on behind it: an answer that isn't
-      // all but that from q₁ must be in reach from there, so stiffly held that no medium counts.
+      // all but that from q₁ must be in reach from there.
       if (!((out.q - first).norm() > 1e-3 * (first - q_k1_).norm())) break;
-      Trial way{.kappa = 1e15 * out.kappa, .p_hat = out.q, .q = out.q, .v = out.v, .f = out.f};
-      const bool reached = solve(way, q_k1_, T) == ProxyFault::none &&
-                           (way.q - out.q).norm() <= 1e-9 * (1.0 + out.q.template lpNorm<1>());
-      if (!reached) {
+      if (!in_reach(out)) {
         contacts_changed = true;
         return ProxyFault::none;
       }
@@ -229,6 +226,14 @@ ProxyFault AdmittanceProxy<N>::bdf2(const V& h, Trial& out, ContactSet& now, boo
   }
   out.v = (0.5 * rate_Hz_) * (3.0 * (out.q - q_k1_) - move);
   return ProxyFault::none;
+}
+
+// Whether q₁ leads to out.q, so stiffly held that no medium counts.
+template <int N>
+bool AdmittanceProxy<N>::in_reach(const Trial& out) noexcept {
+  Trial way{.kappa = 1e15 * out.kappa, .p_hat = out.q, .q = out.q, .v = out.v, .f = out.f};
+  return solve(way, q_k1_, config_.period_s) == ProxyFault::none &&
+         (way.q - out.q).norm() <= 1e-9 * (1.0 + out.q.template lpNorm<1>());
 }
 
 // BDF2 must not look back across an event. An impact is stepped by Euler: BDF2 would rebound where (26) doesn't, and

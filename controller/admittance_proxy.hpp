@@ -165,6 +165,7 @@ class AdmittanceProxy {
   ProxyFault parabola(const V& h, Trial& out) noexcept;
   ProxyFault restart(const V& h, Trial& out, ContactSet& now, bool changed) noexcept;
   ProxyFault bdf2(const V& h, Trial& out, ContactSet& now, bool& contacts_changed) noexcept;
+  bool in_reach(const Trial& out) noexcept;
   ProxyFault second_order(const V& h, Trial& out) noexcept;
   ProxyFault solve(Trial& out, const V& q_previous, double law_period_s) noexcept;
 

@@ -5,26 +5,24 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
+
+#include "scenes/sha256.hpp"
 
 namespace proxarm::controller {
 
 class SetpointHash {
  public:
+  // Throws std::runtime_error where OpenSSL doesn't compute SHA-256.
   SetpointHash();
-  ~SetpointHash();
-  SetpointHash(SetpointHash&&) noexcept;
-  SetpointHash& operator=(SetpointHash&&) noexcept;
 
   void add(std::span<const std::int32_t> counts);
   // 64 lower-case hexadecimal digits, of what has been added so far; adding may go on.
   [[nodiscard]] std::string hex() const;
 
  private:
-  struct Context;
-  std::unique_ptr<Context> context_;
+  scenes::Sha256 hash_;
 };
 
 }  // namespace proxarm::controller

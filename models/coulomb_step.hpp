@@ -25,7 +25,7 @@ class CoulombStep {
   // is, so the medium takes more or less than F in that step.
   Vec<N> solve(bool& found) noexcept {
     found = true;
-    if (Vec<N> free; goes_free(0, free)) return free;
+    if (Vec<N> free; goes_free(0, 0, free)) return free;
     Sample low{0.0, -F_, q_}, high = at(held_at);
     Vec<N> R = (high.r - q_) / (1.0 - held_at);
     if (!(kappa_ * R.norm() > 2.0 * F_)) {
@@ -47,7 +47,7 @@ class CoulombStep {
         high = at(1.0 - 0.1 * (1.0 - high.tau));
       }
     }
-    found = search(low, high) || goes_free(8, last_.r) || search_each_answer();
+    found = search(low, high) || goes_free(1, 8, last_.r) || search_each_answer();
     return last_.r;
   }
 
@@ -70,12 +70,12 @@ class CoulombStep {
     return F_ * places / (r - q_).norm() + kappa_ * (places + 16.0 * u * p_.template lpNorm<1>());
   }
 
-  // (3), second case: where nothing else touches, however near the rest is. `tries` times more, each some units in the
-  // last place aside: past the middle of a ball, 𝒢' may see the way free here and blocked there.
-  bool goes_free(int tries, Vec<N>& r) noexcept {
+  // (3), second case: where nothing else touches, however near the rest is. Tries `first` to `last`, each but 0 some
+  // units in the last place aside: past the middle of a ball, 𝒢' may see the way free here and blocked there.
+  bool goes_free(int first, int last, Vec<N>& r) noexcept {
     const double share = (kappa_ * size_ - F_) / (kappa_ * size_);  // of the way to p; NaN where there is no way
     if (!(share > 0.0)) return false;
-    for (int k = 0; k <= tries; ++k) {
+    for (int k = first; k <= last; ++k) {
       const int units = k % 2 == 0 ? -2 * k : 2 * (k + 1);
       const double off = u * units;
       const Vec<N> aim = q_ - share * (1.0 + off) * d_;

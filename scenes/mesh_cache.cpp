@@ -10,38 +10,21 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <memory>
 #include <span>
 #include <string>
 #include <system_error>
 #include <vector>
+
+#include "scenes/sha256.hpp"
 
 namespace proxarm::scenes {
 namespace {
 
 using models::TriangleMesh;
 using Bytes = std::span<const std::byte>;
-using Digest = std::array<unsigned char, 32>;
+using Digest = Sha256::Digest;
 
 constexpr std::uintmax_t kSmallest = 1'000'000;  // bytes of a mesh file that is worth it: 20,000 triangles
-
-class Sha256 {
- public:
-  Sha256() { fine_ = context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) == 1; }
-  void add(Bytes bytes) { fine_ = fine_ && EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()) == 1; }
-  [[nodiscard]] std::optional<Digest> finish() {
-    Digest digest{};
-    fine_ = fine_ && EVP_DigestFinal_ex(context_.get(), digest.data(), nullptr) == 1;
-    return fine_ ? std::optional(digest) : std::nullopt;
-  }
-
- private:
-  struct Free {
-    void operator()(EVP_MD_CTX* context) const noexcept { EVP_MD_CTX_free(context); }
-  };
-  std::unique_ptr<EVP_MD_CTX, Free> context_{EVP_MD_CTX_new()};
-  bool fine_ = false;
-};
 
 struct Header {
   std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'm', 'e', 's', 'h', ' ', '1', '\n', '\0'};
@@ -77,7 +60,7 @@ std::optional<Digest> content_of(const std::filesystem::path& file, double scale
   while (read(in, some)) hash.add(some);
   if (!in.eof()) return std::nullopt;
   hash.add(std::span(some).first(static_cast<std::size_t>(in.gcount())));
-  return hash.finish();
+  return hash.digest();
 }
 
 std::optional<std::filesystem::path> cache_folder() {
@@ -143,7 +126,7 @@ std::optional<Digest> signature(const Header& header, const TriangleMesh::Struct
   hash.add(bytes_of(structure.vertices));
   hash.add(bytes_of(structure.triangles));
   hash.add(bytes_of(structure.nodes));
-  const auto digest = hash.finish();
+  const auto digest = hash.digest();
   Digest signature{};
   if (!digest || HMAC(EVP_sha256(), secret.data(), static_cast<int>(secret.size()), digest->data(), digest->size(),
                       signature.data(), nullptr) == nullptr) {

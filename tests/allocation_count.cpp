@@ -8,19 +8,13 @@
 #include <cstdlib>
 #include <memory>
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define PROXARM_SANITIZED
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define PROXARM_SANITIZED
-#endif
-#endif
+#include "tests/sanitized.hpp"
 
 namespace {
 std::atomic<std::uint64_t> count{0};
 }
 
-#if defined(__GLIBC__) && !defined(PROXARM_SANITIZED)
+#if defined(__GLIBC__) && !defined(PROXARM_SANITIZED_MALLOC)
 #define PROXARM_COUNTS true
 // glibc's own functions under other names, so that ours can stand before them.
 extern "C" {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/fieldbus/sanitized.hpp"
+#include "tests/sanitized.hpp"
 
 namespace proxarm::fieldbus {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "models/description/setup_error.hpp"
 #include "tests/allocation_count.hpp"
-#include "tests/fieldbus/sanitized.hpp"
+#include "tests/sanitized.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
