@@ -186,8 +186,9 @@ class Checker {
     const double decades = random_.uniform(-options_.kappa_decades, options_.kappa_decades);
     const double kappa = std::max(s.K * std::pow(10.0, decades), f.norm() / options_.deepest_m);
     const State<N> other = ask<N>(g_, kappa, Vec<N>(s.r - f / kappa), s.q);
+    const double sizes = (0.1 + s.r.norm() + s.q.norm()) * (1.0 + s.K / kappa);
     const double allowed =
-        condition(s) * 64.0 * epsilon * ((0.1 + s.r.norm() + s.q.norm()) * (1.0 + s.K / kappa) + f.norm() / kappa);
+        condition(s) * 64.0 * epsilon * (sizes + f.norm() / kappa) + (region_.rubs ? 2048.0 * epsilon * sizes : 0.0);
     const double error = (other.r - s.r).norm() / allowed;
     // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
     const bool lawful =
@@ -285,8 +286,8 @@ CheckReport check_whole(const Scene& scene, const std::vector<Vec3>& places, con
   const auto has_regions = [](const Object& object) { return !object.friction_regions.empty(); };
   if (std::any_of(scene.objects.begin(), scene.objects.end(), has_regions)) region.friction.reset();
   const auto rubs = [](const MediumDescription& medium) { return medium.force_N > 0.0; };
-  region.acts_without_contact =
-      std::any_of(scene.media.begin(), scene.media.end(), rubs) || scene.coulomb_force_N || scene.guide;
+  region.rubs = std::any_of(scene.media.begin(), scene.media.end(), rubs);
+  region.acts_without_contact = region.rubs || scene.coulomb_force_N || scene.guide;
   std::vector<models::Medium> media;
   for (const MediumDescription& medium : scene.media) {
     media.push_back({medium.damping_Ns_per_m, 0.0, medium.within ? region_of(*medium.within) : nullptr});

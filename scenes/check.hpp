@@ -40,6 +40,9 @@ struct CheckRegion {
   bool acts_without_contact = false;              // a field, a Coulomb medium or a guide
   // What viscous media add to the coupling at q: b/T, N/m. Their force isn't the contacts'.
   std::function<double(const models::Vec<N>& q)> viscous_N_per_m{};
+  // A Coulomb medium: whether a proxy slips in it, and how little, is seen from a few thousandths of its way
+  // (models/coulomb_step.hpp), so that rounding counts by their inverse.
+  bool rubs = false;
   bool bends = false;  // a chain of pieces: near its corners another piece may be a solution too
   bool soft = false;   // an elastic layer: nothing rests in it without a force
 };
