@@ -405,6 +405,9 @@ void Cycle::start_rendering() noexcept {
 void Cycle::take_change() noexcept {
   Change change;
   if (next_scheduled_ < scheduled_.size() && scheduled_[next_scheduled_].rendered_ns <= rendered_ns_) {
+    const double for_period_s = scheduled_[next_scheduled_].change.period_s;
+    if (for_period_s != 0.0 && for_period_s != settings_.period_s && timestep_is_due())
+      return;  // it was checked for that
     change = scheduled_[next_scheduled_++].change;
   } else if (!changes_.pop(change)) {
     return;

@@ -207,6 +207,11 @@ class Cycle {
   void apply_period(double period_s) noexcept;
   void archive_timestep(fieldbus::StateArchive& state) noexcept;
   void send_period_requests(std::int64_t t_k_ns) noexcept;
+  // Under way, or next in the script.
+  [[nodiscard]] bool timestep_is_due() const noexcept {
+    return changing() || (next_timestep_ < scheduled_timesteps_.size() &&
+                          scheduled_timesteps_[next_timestep_].rendered_ns <= rendered_ns_);
+  }
   // SDO answers are on the bus beside the cycle's frames.
   [[nodiscard]] bool telling() const noexcept {
     return timestep_stage_ == TimestepStage::telling || timestep_stage_ == TimestepStage::taking_back;

@@ -65,6 +65,7 @@ class FlatHold {
   std::array<Vec3, most> x;  // f_i / K
   std::size_t count = 0;
   Vec3 r;
+  int budget = 0;
 
   // The sum of the forces over K.
   [[nodiscard]] double squeeze_m() const noexcept {
@@ -106,7 +107,7 @@ class FlatHold {
     int stuck = 0;
     for (int k = 0; k < (haste == Haste::few_steps ? bold_steps : most_steps); ++k) {
       const double nothing = u * size_;
-      if (!std::isfinite(apart)) return false;
+      if (!std::isfinite(apart) || budget < 0) return false;
       if (apart <= nothing) return true;
       if (step(K, p, apart, k < bold_steps && apart > 64.0 * nothing)) {
         stuck = 0;
@@ -124,6 +125,7 @@ class FlatHold {
   // Each in turn with the others' latest held; what is rigid first, since the layers' forces are known by where the
   // proxy was.
   void sweep(double K, const Vec3& p) noexcept {
+    budget -= static_cast<int>(count * count);
     for (const bool soft : {false, true}) {
       for (std::size_t i = 0; i < count; ++i) {
         if (contact[i].layer.soft() != soft) continue;
@@ -163,6 +165,7 @@ class FlatHold {
 
   // dR_i = (D_i − I) Σ dx_j − D_i dx_i = −R_i. True where that took a part of `apart` off; `bold`: in any case.
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
+    budget -= static_cast<int>(count * count * count);
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);
     Square A(n, n);
     Rows b(n);
@@ -269,6 +272,7 @@ bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
   if (!((p - q).norm() <= farthest_m)) return false;
   FlatHold flat;
   flat.count = count;
+  flat.budget = budget;
   for (std::size_t i = 0; i < count; ++i) {
     FlatContact& c = flat.contact[i];
     c.q = obstacle[i]->carry(q);
@@ -280,18 +284,13 @@ bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
     const double depth = std::clamp(-surface.height(c.q), 0.0, c.layer.thickness_m);
     flat.x[i] = (c.layer.stiffness_N_per_m / K * depth) * surface.normal();
   }
-  for (int round = 0; round < most_rounds; ++round) {
-    if (!settle(*this, flat, K, p, q) || !(flat.squeeze_m() <= farthest_m)) return false;
-    switch (confirm(*this, flat, K, p, q)) {
-      case Confirmed::yes:
-        return true;
-      case Confirmed::no:
-        return false;
-      case Confirmed::other_features:
-        break;
-    }
+  Confirmed confirmed = Confirmed::other_features;
+  for (int round = 0; round < most_rounds && confirmed == Confirmed::other_features; ++round) {
+    confirmed =
+        settle(*this, flat, K, p, q) && flat.squeeze_m() <= farthest_m ? confirm(*this, flat, K, p, q) : Confirmed::no;
   }
-  return false;
+  budget = flat.budget;
+  return confirmed == Confirmed::yes;
 }
 
 }  // namespace proxarm::models

@@ -28,6 +28,9 @@ struct SharedHold {
   std::array<Obstacle::Step, most> step{};  // of each: alone, then with the others' forces held; touches: it presses
   std::size_t count = 0;
   Vec3 r = Vec3::Zero();
+  // What may still be spent, in parts of some 40 ns; less is left afterwards. Whole cycles depend on it.
+  static constexpr int whole_budget = 10'000;
+  int budget = whole_budget;
 
   // False if no forces are found that all agree on; then r means nothing.
   bool solve(double K, const Vec3& p, const Vec3& q) noexcept;

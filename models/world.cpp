@@ -295,11 +295,14 @@ void World::try_together(double K, const Vec3& p, const Vec3& q, Candidates& can
   if (std::none_of(all.begin(), all.end(), [this](std::size_t i) { return elastic_[i]; })) return;
   SharedHold hold;
   hold.count = candidates.count;
+  hold.budget = hold_budget_;
   for (std::size_t c = 0; c < hold.count; ++c) {
     hold.obstacle[c] = entries_[candidates.index[c]].obstacle.get();
     hold.step[c] = candidates.alone[c];
   }
-  if (!hold.solve(K, p, q) || !fits(q, hold.r, all, candidates, K, p)) return;
+  const bool found = hold.solve(K, p, q);
+  hold_budget_ = hold.budget;
+  if (!found || !fits(q, hold.r, all, candidates, K, p)) return;
   choice.better(p, hold.r, 0);
   choice.shared = true;
   for (std::size_t c = 0; c < hold.count; ++c) {
@@ -417,6 +420,7 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
     return p;
   }
   double radius = gather(p, q, 0.0);
+  hold_budget_ = SharedHold::whole_budget;
   Choice choice;
   bool found = solve(K, p, q, choice);
   // What moves may carry the proxy, or others have squeezed it into something that it comes out of: then it may end

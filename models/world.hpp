@@ -106,6 +106,7 @@ class World final : public GeometricAlgorithm<3> {
   std::array<Contact<3>, 3> contacts_{};
   std::array<Contact<3>, Candidates::most> shared_{};  // instead of those, where elastic ones share the force
   bool are_shared_ = false;
+  int hold_budget_ = 0;  // of SharedHold, what is left in this step
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;

@@ -24,9 +24,10 @@ namespace proxarm::scenes {
 
 struct CheckOptions {
   std::uint64_t seed = 1;
-  std::int64_t states = 20'000;   // for each object, and for the whole
-  double kappa_decades = 6.0;     // on either side of K
-  double deepest_m = 0.02;        // of p below q, for any κ: deeper, curved worlds have several solutions
+  std::int64_t states = 20'000;  // for each object, and for the whole
+  double kappa_decades = 6.0;    // on either side of K
+  // Of p below q, for any κ: deeper, curved worlds have several solutions. At most a tenth of the least radius.
+  double deepest_m = 0.02;
   double several_allowed = 0.02;  // share of states in which κ may choose another of several solutions
 };
 
@@ -57,8 +58,9 @@ struct CheckFigure {
 struct CheckReport {
   std::string subject;
   std::int64_t states = 0, in_contact = 0, slipping = 0;
-  std::int64_t several = 0;  // states with several solutions, counted apart
-  double several_allowed = 0.0;
+  std::int64_t several = 0;      // states with several solutions, counted apart
+  std::int64_t unresolved = 0;   // where elastic layers share a force: states without an answer that all agree on
+  double several_allowed = 0.0;  // of either, as a share of all states
   std::vector<CheckFigure> figures;
 
   [[nodiscard]] bool passed() const noexcept;

@@ -240,9 +240,10 @@ std::vector<models::World::Entry> surfaces(const Scene& scene, const Cut<N>& cut
     moving += object.motion ? 1 : 0;
     rubbing += has_friction(object) ? 1 : 0;
   }
-  if (layers > 0 && scene.guide && scene.guide->kind != GuideDescription::Kind::plane) {
-    throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide along a line",
-                  "no layer there: on a line an object only says how far the proxy may go");
+  if (layers > 0 && scene.guide) {
+    throw refusal(scene, scene.guide->line_number, "found an elastic layer beside a guide",
+                  "no layer there: on a line an object only says how far the proxy may go, and between two planes back "
+                  "to back the force isn't shared out in one way only");
   }
   if (scene.guide && scene.guide->kind == GuideDescription::Kind::plane) {
     add_plane_guide(scene, entries);

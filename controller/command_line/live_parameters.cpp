@@ -240,11 +240,13 @@ std::string obey(controller::Cycle& cycle, LiveParameters& parameters, const std
 void require_changes(const PreparedSession& session, const RunOptions& options) {
   const bool asked = !options.changes.empty() || !options.control.empty() || !options.orders.empty();
   if (session.impedance() && asked) {
-    throw SetupError({.key = !options.changes.empty()  ? "--set"
-                             : !options.orders.empty() ? "--do"
-                                                       : "--control",
-                      .found = "the impedance type",
-                      .expected = "--scheme admittance: mass, damping and spring are the proxy's"});
+    throw SetupError(
+        {.key = !options.changes.empty()  ? "--set"
+                : !options.orders.empty() ? "--do"
+                                          : "--control",
+         .found = "the impedance type",
+         .expected =
+             "--scheme admittance: mass, damping and spring are the proxy's, and torques are made for one timestep"});
   }
   (void)script_of(options.changes, session, options);
   (void)scheduled_orders(options.orders);

@@ -187,8 +187,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,
-                 "change a parameter while rendering, such as mass=3@4s (mass, damping, spring, OBJECT.friction, "
-                 "OBJECT.position_m); may be repeated")
+                 "change a parameter after so much rendering, such as mass=3@4s (mass, damping, spring, timestep, "
+                 "OBJECT.friction, OBJECT.position_m); may be repeated")
       ->type_name("NAME=VALUE@TIME")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -222,7 +222,9 @@ CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_
 }
 
 void add_study_options(CLI::App& app, command_line::StudyOptions& options) {
-  app.add_option("study", options.words, "name of a study; or merge and the folders of its parts")
+  app.add_option("study", options.words,
+                 "figure5, stress, stress_meshes, stress_layers, error, stability, fidelity or skip; or merge and the "
+                 "folders of its parts")
       ->type_name("NAME")
       ->required();
   app.add_option("--out", options.out, "folder for CSV, JSON and plots")->type_name("DIR");
@@ -239,7 +241,7 @@ void add_study_options(CLI::App& app, command_line::StudyOptions& options) {
                  "how many (default: one per core)")
       ->type_name("N");
   app.add_option("--replay", whole_number("--replay", [&](std::uint64_t n) { options.replay = n; }),
-                 "stress only: one run again, by the seed that was printed for it")
+                 "stress, stress_meshes and stress_layers: one run again, by the seed that was printed for it")
       ->type_name("SEED");
 }
 
@@ -314,8 +316,8 @@ int run(int argc, char** argv) {
   scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
 
   command_line::SetOptions set_options;
-  CLI::App* set_app =
-      app.add_subcommand("set", "change mass, damping, spring, or an object's friction or place, in a running session");
+  CLI::App* set_app = app.add_subcommand(
+      "set", "change mass, damping, spring, timestep, or an object's friction or place, in a running session");
   set_app->add_option("changes", set_options.changes, "NAME=VALUE, such as mass=3")->required();
   set_app->add_option("--control", set_options.control, "the session's socket")->type_name("PATH");
   set_app->callback([&] { command = [&] { return command_line::set_command(set_options); }; });

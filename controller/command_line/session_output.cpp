@@ -44,7 +44,9 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
 
 void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
   const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
-  const double scene_time_s = static_cast<double>(rendered_ns) / 1e9;
+  // Order 2's proxy is where it is a period before that of (26): see admittance_proxy.hpp.
+  const std::int64_t later_ns = session.settings.order == 2 ? record.period_ns : 0;
+  const double scene_time_s = static_cast<double>(rendered_ns - later_ns) / 1e9;
   const auto clearance_m = [&](const controller::Triple& x_W) {
     return scenes::clearance_m(session.scene, controller::vec3(x_W), scene_time_s, scenes::Driven::left_out);
   };
@@ -195,7 +197,8 @@ void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
 void SessionOutput::say_timestep(const CycleRecord& record) {
   if (record.refused_period_ns > 0) {
     std::fprintf(stderr,
-                 "proxarm: timestep %.4g ms: %s; it stays %.4g ms (a new session with --timestep has its "
+                 "proxarm: timestep %.4g ms: %s; it stays %.4g ms, and changes of mass, damping and "
+                 "spring that were scripted for it are left out (a new session with --timestep has its "
                  "drives told before they are enabled)\n",
                  1e-6 * static_cast<double>(record.refused_period_ns),
                  controller::refusal_text(record.timestep_refusal, joint_names(session_.cell)).c_str(),
