@@ -67,6 +67,9 @@ class FlatHold {
   Vec3 r;
   int budget = 0;
 
+  // Of r: what forces are taken for settled at.
+  [[nodiscard]] double rounding_m() const noexcept { return 64.0 * u * size_; }
+
   // The sum of the forces over K.
   [[nodiscard]] double squeeze_m() const noexcept {
     double sum = 0.0;
@@ -228,7 +231,7 @@ Vec3 placed(const SharedHold& hold, const FlatHold& flat, const Vec3& q) noexcep
     for (std::size_t i = 0; i < hold.count; ++i) {
       const FlatContact& c = flat.contact[i];
       const double core = c.layer.soft() ? -c.layer.thickness_m : 0.0, height = c.surface.height(r) - core;
-      if (!hold.step[i].touches || std::abs(height) > 1e-9 * (1.0 + core)) continue;
+      if (!hold.step[i].touches || std::abs(height) > flat.rounding_m()) continue;
       r -= height * c.surface.normal();
       ++hard;
       if (!c.layer.soft()) hardest = i;
