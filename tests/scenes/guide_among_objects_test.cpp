@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <initializer_list>
@@ -110,27 +111,24 @@ TEST(GuideAmongObjects, IsPushedAlongALine) {
     std::function<double(double)> face_x;  // at a time
   };
   const double lean = 0.06, half = std::sqrt(0.01 - lean * lean);
-  for (
-      const Push& push : {
-          Push{
-              "box: {centre_m: [-0.2, 0, 0], size_m: [0.2, 0.2, 0.2], friction: 0.4, motion: {velocity_m_per_s: [1, 0, "
-              "0]}}",
-              [](double t) { return -0.1 + t; }},
-          Push{"sphere: {centre_m: [-0.2, 0.06, 0], radius_m: 0.1, motion: {velocity_m_per_s: [0.5, 0, 0]}}",
-               [&](double t) { return -0.2 + half + 0.5 * t; }},
-          // A wedge that comes down on it pushes it twice as fast as it comes.
-          Push{
-              "plane: {point_m: [-0.1, 0, 0], normal: [1, 2, 0], friction: 1, motion: {velocity_m_per_s: [0, 0.5, 0]}}",
-              [](double t) { return -0.1 + t; }},
-          Push{
-              "capsule: {from_m: [-0.2, 0, -1], to_m: [-0.2, 0, 1], radius_m: 0.1, motion: {velocity_m_per_s: [0.6, 0, "
-              "1]}}",
-              [](double t) { return -0.1 + 0.6 * t; }},
-          // A room takes what is in it along.
-          Push{"sphere: {centre_m: [0.1, 0, 0], radius_m: 0.2, inside_out: true, motion: {velocity_m_per_s: [0.7, 0, "
-               "0]}}",
-               [](double t) { return -0.1 + 0.7 * t; }},
-      }) {
+  const std::array pushes{
+      Push{"box: {centre_m: [-0.2, 0, 0], size_m: [0.2, 0.2, 0.2], friction: 0.4, motion: {velocity_m_per_s: [1, 0, "
+           "0]}}",
+           [](double t) { return -0.1 + t; }},
+      Push{"sphere: {centre_m: [-0.2, 0.06, 0], radius_m: 0.1, motion: {velocity_m_per_s: [0.5, 0, 0]}}",
+           [&](double t) { return -0.2 + half + 0.5 * t; }},
+      // A wedge that comes down on it pushes it twice as fast as it comes.
+      Push{"plane: {point_m: [-0.1, 0, 0], normal: [1, 2, 0], friction: 1, motion: {velocity_m_per_s: [0, 0.5, 0]}}",
+           [](double t) { return -0.1 + t; }},
+      Push{"capsule: {from_m: [-0.2, 0, -1], to_m: [-0.2, 0, 1], radius_m: 0.1, motion: {velocity_m_per_s: [0.6, 0, "
+           "1]}}",
+           [](double t) { return -0.1 + 0.6 * t; }},
+      // A room takes what is in it along.
+      Push{"sphere: {centre_m: [0.1, 0, 0], radius_m: 0.2, inside_out: true, motion: {velocity_m_per_s: [0.7, 0, "
+           "0]}}",
+           [](double t) { return -0.1 + 0.7 * t; }},
+  };
+  for (const Push& push : pushes) {
     const auto world = compile(parse_scene(std::string("objects:\n  - ") + push.object + "\n" + along_x, "guide.yaml"));
     auto& g = world.algorithm<3>();
     Vec3 q = Vec3::Zero();
