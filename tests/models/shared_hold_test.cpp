@@ -118,8 +118,8 @@ ContractOptions<3> options(std::vector<double> friction) {
   o.soft = true;
   o.reach_m = 0.05;
   // Centimetres into layers of ten millimetres; in steps of up to a millimetre, below, both are nothing.
-  o.several = 3e-3;
-  o.unresolved = 2e-3;
+  o.several = scaled(o.states) < 5'000 ? 1e-2 : 3e-3;  // of a few hundred states chance finds more
+  o.unresolved = scaled(o.states) < 5'000 ? 1e-2 : 2e-3;
   return o;
 }
 
