@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "models/barred_way.hpp"
 #include "models/friction_plane.hpp"
 
 namespace proxarm::models {
@@ -12,6 +13,11 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 // An object whose surface leans by less than a tenth against the guide doesn't push along it, but across.
 constexpr double longest_push = 10.0;  // of what the object has moved
+
+// Whether a proxy that the object has carried there may be at x, and not within it.
+bool is_clear(const Obstacle& object, const Vec3& carried, const Vec3& x) noexcept {
+  return !object.excludes(carried, x) && object.distance(x) >= 0.0;
+}
 
 void check_friction(double friction) {
   if (!std::isfinite(friction) || !(friction >= 0.0)) {
@@ -100,13 +106,7 @@ bool PolylineGuide::leads(const Vec3& from, Vec3& to, bool past_pushing) noexcep
     const World::Entry& mover = (*movers_)[i];
     if ((past_pushing && pushes_[i] != 0) || !mover.obstacle->bars(from, end)) continue;
     free = false;
-    Vec3 barred = end;
-    end = from;
-    for (int k = 0; k < 1100; ++k) {  // a double's exponent and digits
-      const Vec3 middle = 0.5 * (end + barred);
-      if (middle == end || middle == barred) break;
-      (mover.obstacle->bars(from, middle) ? barred : end) = middle;
-    }
+    end = end_of_free_way(*mover.obstacle, from, end);
     // What a step that goes a nanometre in meets there.
     const Vec3 back = (from - to).normalized();
     const Obstacle::Step s = mover.obstacle->step(1.0, end - 1e-9 * back, end);
@@ -154,11 +154,10 @@ PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept 
 // From a place that the object has come over to the next one on that side that is free of it, within `most`.
 bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
                              Place& place) const noexcept {
-  const auto is_free = [&](const Vec3& x) { return !object.excludes(carried, x) && object.distance(x) >= 0.0; };
   if (!(most > 0.0)) return false;
   double held = 0.0, free = most / 1024.0;
   Place end = advance(place, side * free);
-  while (!is_free(end.x)) {
+  while (!is_clear(object, carried, end.x)) {
     if (!(free < most)) return false;
     held = free;
     free = std::min(2.0 * free, most);
@@ -169,7 +168,7 @@ bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int si
     const double middle = 0.5 * (held + free);
     if (middle == held || middle == free) break;
     const Place between = advance(place, side * middle);
-    if (is_free(between.x)) {
+    if (is_clear(object, carried, between.x)) {
       free = middle;
       end = between;
     } else {
@@ -224,7 +223,7 @@ bool PolylineGuide::carry(const Vec3& q, Place& place) noexcept {
     side = pushed;
     const double most = longest_push * (carried - q).norm();
     // One that a further push has made room for already is clear.
-    if (!fits || (!object.excludes(carried, place.x) && object.distance(place.x) >= 0.0)) continue;
+    if (!fits || is_clear(object, carried, place.x)) continue;
     Place pushed_place = begin;
     fits = clear_of(object, carried, side, most, pushed_place);
     if (fits && (pushed_place.x - begin.x).squaredNorm() > (place.x - begin.x).squaredNorm()) place = pushed_place;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "models/barred_way.hpp"
 #include "models/corner.hpp"
 #include "models/groove.hpp"
 #include "models/settling.hpp"
@@ -396,18 +397,11 @@ World::Way World::go_straight(const Vec3& x, const Vec3& y) noexcept {
   for (const std::size_t i : near_) {
     const Obstacle& obstacle = *entries_[i].obstacle;
     if (!obstacle.bars(x, way.end)) continue;
-    // Halved until nothing is left between what is free and what isn't.
     const Obstacle::Step s = obstacle.step(1.0, way.end, x);
     way.contact = {entries_[i].object, entries_[i].feature < 0 ? s.feature : entries_[i].feature, false,
                    s.touches ? s.normal : Vec3((x - y).normalized())};
     way.stopped = true;
-    Vec3 barred = way.end;
-    way.end = x;
-    for (int k = 0; k < 1100; ++k) {  // a double's exponent and digits
-      const Vec3 middle = 0.5 * (way.end + barred);
-      if (middle == way.end || middle == barred) break;
-      (obstacle.bars(x, middle) ? barred : way.end) = middle;
-    }
+    way.end = end_of_free_way(obstacle, x, way.end);
   }
   return way;
 }
