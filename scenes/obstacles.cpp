@@ -161,22 +161,25 @@ struct Thickness {
 Vec3 middle_of(const Shape& shape) { return std::visit(Middle{}, shape); }
 double size_of(const Shape& shape) { return std::visit(Size{}, shape); }
 
-std::vector<Part> parts_of(const Scene& scene, const Object& object) {
-  Layer layer;
-  if (object.layer) {
-    // Within a layer a mesh's faces have no exact sides.
-    const double thickness = std::visit(Thickness{}, object.shape);
-    if (!(object.layer->thickness_m < 0.5 * thickness)) {
-      throw description::SetupError(
-          {.file = scene.file.string(),
-           .line = object.line,
-           .key = "layer",
-           .found = "a layer of " + description::number_text(object.layer->thickness_m) + " m on " + object.name,
-           .expected =
-               thickness > 0.0 ? "less than half of how thick the object is" : "a layer on an object that is no mesh"});
-    }
-    layer = {object.layer->stiffness_N_per_m, object.layer->thickness_m};
+Layer layer_on(const Scene& scene, const Object& object, double thickness_m, const std::string& expected) {
+  if (!object.layer) return {};
+  if (!(object.layer->thickness_m < 0.5 * thickness_m)) {
+    throw description::SetupError(
+        {.file = scene.file.string(),
+         .line = object.line,
+         .key = "layer",
+         .found = "a layer of " + description::number_text(object.layer->thickness_m) + " m on " + object.name,
+         .expected = expected});
   }
+  return {object.layer->stiffness_N_per_m, object.layer->thickness_m};
+}
+
+std::vector<Part> parts_of(const Scene& scene, const Object& object) {
+  // Within a layer a mesh's faces have no exact sides.
+  const double thickness = std::visit(Thickness{}, object.shape);
+  const Layer layer =
+      layer_on(scene, object, thickness,
+               thickness > 0.0 ? "less than half of how thick the object is" : "a layer on an object that is no mesh");
   return std::visit(MakeParts{object.friction, layer, friction_by_face(scene, object)}, object.shape);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "models/moving_obstacle.hpp"
@@ -19,6 +20,10 @@ struct Part {
 // The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on a mesh, or as thick as
 // what it is on.
 std::vector<Part> parts_of(const Scene& scene, const Object& object);
+
+// The object's layer, on what is so thick (0: on what can have none); throws SetupError, with what was expected, where
+// it is half as thick as that or thicker. {}: it has none.
+models::Layer layer_on(const Scene& scene, const Object& object, double thickness_m, const std::string& expected);
 
 // Friction by face of a mesh with regions; empty for any other object. Throws SetupError for a region without a
 // triangle.

@@ -208,19 +208,11 @@ class Section {
 
   // The object's layer, on a section that is so thick; 0: on one that can have none.
   [[nodiscard]] models::Layer layer_on(double thickness_m) const {
-    if (!object_.layer) return {};
-    if (!(object_.layer->thickness_m < 0.5 * thickness_m)) {
-      throw description::SetupError(
-          {.file = scene_.file.string(),
-           .line = object_.line,
-           .key = "layer",
-           .found = "a layer of " + description::number_text(object_.layer->thickness_m) + " m on " + object_.name,
-           .expected =
-               thickness_m > 0.0
-                   ? "less than half of how thick its section is, " + description::number_text(thickness_m) + " m"
-                   : "a layer on what is no mesh and, if it is solid, has its axes in the space or across it"});
-    }
-    return {object_.layer->stiffness_N_per_m, object_.layer->thickness_m};
+    return scenes::layer_on(
+        scene_, object_, thickness_m,
+        thickness_m > 0.0
+            ? "less than half of how thick its section is, " + description::number_text(thickness_m) + " m"
+            : "a layer on what is no mesh and, if it is solid, has its axes in the space or across it");
   }
 
   // The space doesn't meet the solid.
