@@ -36,11 +36,6 @@ bool has_friction(const Object& object) {
   return object.friction > 0.0 || std::any_of(object.friction_regions.begin(), object.friction_regions.end(), rubs);
 }
 
-SetupError refusal(const Scene& scene, int line, std::string message, std::string advice) {
-  return SetupError(
-      {.file = scene.file.string(), .line = line, .message = std::move(message), .advice = std::move(advice)});
-}
-
 // A plane of W cut by the proxy's space: a half-space of fewer dimensions.
 template <int N>
 struct HalfSpace {

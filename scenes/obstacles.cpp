@@ -161,6 +161,11 @@ struct Thickness {
 Vec3 middle_of(const Shape& shape) { return std::visit(Middle{}, shape); }
 double size_of(const Shape& shape) { return std::visit(Size{}, shape); }
 
+description::SetupError refusal(const Scene& scene, int line, std::string message, std::string advice) {
+  return description::SetupError(
+      {.file = scene.file.string(), .line = line, .message = std::move(message), .advice = std::move(advice)});
+}
+
 Layer layer_on(const Scene& scene, const Object& object, double thickness_m, const std::string& expected) {
   if (!object.layer) return {};
   if (!(object.layer->thickness_m < 0.5 * thickness_m)) {

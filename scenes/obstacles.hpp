@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "models/description/setup_error.hpp"
 #include "models/moving_obstacle.hpp"
 #include "models/obstacle.hpp"
 #include "scenes/scene.hpp"
@@ -20,6 +21,9 @@ struct Part {
 // The parts of an object in W, standing still. Throws SetupError for what can't be: a layer on a mesh, or as thick as
 // what it is on.
 std::vector<Part> parts_of(const Scene& scene, const Object& object);
+
+// To be thrown for what a scene says there, which can't be.
+description::SetupError refusal(const Scene& scene, int line, std::string message, std::string advice);
 
 // The object's layer, on what is so thick (0: on what can have none); throws SetupError, with what was expected, where
 // it is half as thick as that or thicker. {}: it has none.

@@ -28,11 +28,6 @@ constexpr double straight = 1e-6;
 // Of a guide's point from the space, metres: the arm knows its place to as much.
 constexpr double beside_m = 1e-6;
 
-description::SetupError refusal(const Scene& scene, int line, std::string message, std::string advice) {
-  return description::SetupError(
-      {.file = scene.file.string(), .line = line, .message = std::move(message), .advice = std::move(advice)});
-}
-
 std::string in_dimensions(const Scene& scene) {
   return " in a scene of " + (scene.space.dimensions == 1 ? std::string("1 dimension")
                                                           : std::to_string(scene.space.dimensions) + " dimensions");
