@@ -24,7 +24,6 @@ namespace proxarm::scenes {
 namespace {
 
 using description::number_text;
-using description::SetupError;
 using models::Vec;
 using models::Vec3;
 
