@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/command_line/run_options.hpp"
+#include "controller/command_line/preparation/run_options.hpp"
 
 namespace proxarm::command_line {
 
@@ -51,6 +51,8 @@ int set_command(const SetOptions& options);        // of a running session
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);
+// What a study measures and writes, for its help; empty: there is none of that name.
+std::string study_description(const std::string& name);
 int study_command(const StudyOptions& options);
 
 }  // namespace proxarm::command_line

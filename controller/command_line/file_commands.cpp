@@ -1,52 +1,27 @@
-#include <yaml-cpp/yaml.h>
-
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 
-#include "controller/bring_up.hpp"
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/data_files.hpp"
-#include "controller/command_line/exit_status.hpp"
-#include "models/arm.hpp"
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/exit_status.hpp"
+#include "controller/command_line/preparation/file_kind.hpp"
+#include "controller/session/bring_up.hpp"
+#include "models/arm/arm.hpp"
+#include "models/arm/arm_urdf.hpp"
+#include "models/base/setup_error.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/dbc_file.hpp"
-#include "models/description/eds_file.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
-#include "models/description/setup_error.hpp"
-#include "scenes/check.hpp"
-#include "scenes/explain.hpp"
-#include "scenes/scene_file.hpp"
+#include "models/files/eds_file.hpp"
+#include "scenes/compiler/check.hpp"
+#include "scenes/compiler/explain.hpp"
+#include "scenes/format/scene_file.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
 namespace fs = std::filesystem;
-
-// What a file is, by a key that only its kind has.
-enum class Kind { cell, scene, hand, sensor, registers, eds, dbc };
-
-Kind kind_of(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  if (extension == ".eds" || extension == ".dcf") return Kind::eds;
-  if (extension == ".dbc") return Kind::dbc;
-  if (fs::is_directory(file)) return Kind::scene;  // yaml-cpp loses memory on one
-  try {
-    const YAML::Node root = YAML::LoadFile(file.string());
-    if (root.IsMap()) {
-      if (root["drives"] || root["urdf"]) return Kind::cell;
-      if (root["protocol"] && root["command"]) return Kind::registers;
-      if (root["protocol"]) return Kind::sensor;
-      if (root["waypoints"] || root["multisine"] || root["stiffness_N_per_m"]) return Kind::hand;
-    }
-  } catch (const YAML::Exception&) {  // the strict loader says what is wrong, and where
-  }
-  return Kind::scene;
-}
 
 // Assumption 1 for each object and the whole, with the worst figures; null if it doesn't hold.
 const char* check_laws(const scenes::Scene& scene) {
@@ -75,25 +50,29 @@ void check_cell(const fs::path& file) {
 
 const char* check(const fs::path& file) {
   switch (kind_of(file)) {
-    case Kind::cell:
+    case FileKind::cell:
       check_cell(file);
       return "cell";
-    case Kind::registers:
+    case FileKind::registers:
       description::load_modbus_drive(file);
       return "register map of a Modbus drive";
-    case Kind::eds:
+    case FileKind::eds:
       description::load_eds(file);
       return "description of a CANopen device";
-    case Kind::dbc:
+    case FileKind::dbc:
       (void)description::load_dbc(file);
       return "list of messages and signals";
-    case Kind::sensor:
+    case FileKind::sensor:
       description::load_sensor(file);
       return "sensor";
-    case Kind::hand:
+    case FileKind::hand:
       description::load_hand(file);
       return "hand";
-    case Kind::scene:
+    case FileKind::urdf:
+      models::compile(models::load_urdf(file));
+      return "arm";
+    case FileKind::scene:
+    case FileKind::unknown:
       return check_laws(scenes::load_scene(file));
   }
   return "";
@@ -107,7 +86,7 @@ int check_command(const FileOptions& options) {
     try {
       const char* kind = check(user_file(given));
       if (kind != nullptr) {
-        std::printf("%s: fine, a %s\n", given.c_str(), kind);
+        std::printf("%s: fine, %s %s\n", given.c_str(), *kind == 'a' ? "an" : "a", kind);
       } else {
         std::fprintf(stderr, "proxarm: %s: its forces don't keep Assumption 1; the states are given above\n",
                      given.c_str());
@@ -123,7 +102,9 @@ int check_command(const FileOptions& options) {
 
 int explain_command(const FileOptions& options) {
   for (const fs::path& given : options.files) {
-    std::printf("%s: %s", given.c_str(), scenes::explain(scenes::load_scene(user_file(given))).c_str());
+    const fs::path file = user_file(given);
+    require_kind(file, FileKind::scene);
+    std::printf("%s: %s", given.c_str(), scenes::explain(scenes::load_scene(file)).c_str());
   }
   return 0;
 }

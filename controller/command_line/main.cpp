@@ -6,14 +6,18 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
+#include <initializer_list>
 #include <iostream>
+#include <memory>
 
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/exit_status.hpp"
-#include "models/description/quantity.hpp"
-#include "models/description/setup_error.hpp"
-#include "models/description/text.hpp"
-#include "sim/device_fault.hpp"
+#include "controller/command_line/help.hpp"
+#include "controller/command_line/live/standard_streams.hpp"
+#include "controller/command_line/preparation/exit_status.hpp"
+#include "models/base/quantity.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
+#include "sim/devices/device_fault.hpp"
 
 namespace {
 
@@ -55,7 +59,8 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
            return true;
          }),
          "simulated devices only, may be repeated: let one fail, as DEVICE:KIND[=VALUE][@FROM[..UNTIL]], times "
-         "counted from power on. DEVICE is a joint (KIND: silent, fault=EMCY code, device_type=VALUE, heartbeat, sdo, "
+         "counted from power on, some 0.2 s before the first cycle. DEVICE is a joint (KIND: silent, fault=EMCY code, "
+         "device_type=VALUE, heartbeat, sdo, "
          "period, power, jammed) or sensor (KIND: silent, samples, frozen, half, swapped, duplicated, short, checksum, "
          "saturated, lost=N, status=BITS, "
          "delay=US). Such as axis_2:silent@2s, axis_3:fault=0x4210@2s, sensor:frozen@1s..1.5s")
@@ -70,7 +75,7 @@ void add_enabling_option(CLI::App& app, RunOptions& options) {
                    return true;
                  }),
                  "simulated enabling switch only, may be repeated: when it is pressed, FROM..UNTIL counted from the "
-                 "first cycle, such as 0.5s..3s (default: from 0.1s on)")
+                 "first cycle, such as 0.5s..3s (default: from 0.1s on); for a cell with enabling_input")
       ->type_name("TIME..TIME")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -102,9 +107,13 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
 }
 
 void add_session_options(CLI::App& app, RunOptions& options) {
-  app.add_option("cell", options.cell, "cell file (default: the six-axis arm of the 150 kg class)");
-  app.add_option("--scene", options.scene, "scene file (default: the cell's)");
-  app.add_option("--hand", options.hand, "the simulated hand's file (default: the cell's)");
+  app.add_option("cell", options.cell,
+                 "cell file (default: models/cells/default.yaml, a six-axis arm of the 150 kg class)")
+      ->type_name("FILE");
+  app.add_option("--scene", options.scene, "scene file (default: the cell's)")->type_name("FILE");
+  app.add_option("--hand", options.hand,
+                 "file of the simulated hand, such as sim/hands/touch.yaml (default: the cell's)")
+      ->type_name("FILE");
   app.add_option("--mass",
                  quantity([](const std::string& w) { return description::parse_mass(w, "--mass"); },
                           [&](double value) { options.mass_kg = value; }),
@@ -156,6 +165,11 @@ void add_session_options(CLI::App& app, RunOptions& options) {
       ->type_name("BUS");
 }
 
+// What has no effect on a command isn't offered by it.
+void leave_out(CLI::App& app, std::initializer_list<const char*> options) {
+  for (const char* option : options) app.remove_option(app.get_option(option));
+}
+
 void add_run_options(CLI::App& app, RunOptions& options) {
   add_session_options(app, options);
   add_fault_option(app, options);
@@ -187,7 +201,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,
-                 "change a parameter after so much rendering, such as mass=3@4s (mass, damping, spring, timestep, "
+                 "change a parameter when so much time has been rendered (holds and stops don't count), such as "
+                 "mass=3@4s (mass, damping, spring, timestep, "
                  "OBJECT.friction, OBJECT.position_m); may be repeated")
       ->type_name("NAME=VALUE@TIME")
       ->expected(1)
@@ -280,6 +295,7 @@ int run(int argc, char** argv) {
   CLI::App app{"Hold an industrial robot arm and feel a virtual world through it.", "proxarm"};
   app.require_subcommand(1);
   app.set_version_flag("--version", std::string("proxarm ") + PROXARM_VERSION);
+  app.formatter(std::make_shared<command_line::HelpFormatter>());
   app.set_help_all_flag("--help-all", "help of all commands");
 
   std::function<int()> command;
@@ -299,6 +315,8 @@ int run(int argc, char** argv) {
 
   CLI::App* plan_app = app.add_subcommand("plan", "bus budget of a cell; status 1 if it can't be carried");
   add_session_options(*plan_app, plan_options);
+  leave_out(*plan_app,
+            {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay", "--duration"});
   plan_app->callback([&] { command = [&] { return command_line::plan_command(plan_options); }; });
 
   CLI::App* scan_app = app.add_subcommand("scan", "what is on a CAN interface: listens, then asks; changes nothing");
@@ -315,11 +333,23 @@ int run(int argc, char** argv) {
       ->type_name("BASE_ID");
   scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
 
+  constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
   command_line::SetOptions set_options;
   CLI::App* set_app = app.add_subcommand(
       "set", "change mass, damping, spring, timestep, or an object's friction or place, in a running session");
-  set_app->add_option("changes", set_options.changes, "NAME=VALUE, such as mass=3")->required();
-  set_app->add_option("--control", set_options.control, "the session's socket")->type_name("PATH");
+  set_app
+      ->add_option("changes", set_options.changes,
+                   "one or more of:\n"
+                   "mass=6kg: mass that the hand feels, in kg, handle included\n"
+                   "damping=20Ns/m: against the world\n"
+                   "spring=100N/m: to the start position\n"
+                   "timestep=2ms: the arm stops for it, and goes on\n"
+                   "OBJECT.friction=0.6: of an object, by its name in the scene\n"
+                   "OBJECT.position_m=X,Y,Z: of an object with motion: {driven: true}, in metres from where the scene "
+                   "describes it")
+      ->required()
+      ->type_name("NAME=VALUE");
+  set_app->add_option("--control", set_options.control, control_text)->type_name("PATH");
   set_app->callback([&] { command = [&] { return command_line::set_command(set_options); }; });
 
   // Orders to a running session, each a line on its socket.
@@ -333,7 +363,7 @@ int run(int argc, char** argv) {
       {"reset", "after a fault, with --wait-after-fault: enable the drives again, into a hold"}};
   for (const auto& [name, help] : orders) {
     CLI::App* order_app = app.add_subcommand(name, help);
-    order_app->add_option("--control", order_options.control, "the session's socket")->type_name("PATH");
+    order_app->add_option("--control", order_options.control, control_text)->type_name("PATH");
     const bool has_distance = std::string(name) == "back-off";
     if (has_distance) order_app->add_option("distance", distance, "such as 20mm")->required();
     order_app->callback([&, line = std::string(name), has_distance] {
@@ -358,12 +388,15 @@ int run(int argc, char** argv) {
 
   CLI::App* tune_app = app.add_subcommand("tune", "advice on mass, damping and timestep for a cell and a hand");
   add_session_options(*tune_app, tune_options);
+  leave_out(*tune_app, {"--scene", "--stiffness", "--duration", "--bus"});
   tune_app->callback([&] { command = [&] { return command_line::tune_command(tune_options); }; });
 
   command_line::StudyOptions study_options;
   for (int i = 1; i < argc; ++i) study_options.command_line += (i > 1 ? " " : "proxarm ") + std::string(argv[i]);
   CLI::App* study_app = app.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
   add_study_options(*study_app, study_options);
+  const std::string study = argc > 2 ? command_line::study_description(argv[2]) : "";
+  if (!study.empty()) study_app->description(study);
   study_app->callback([&] { command = [&] { return command_line::study_command(study_options); }; });
 
   try {
@@ -378,10 +411,19 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::vector<char*> words(argv, argv + argc);
+  std::string help = "--help";
+  if (argc > 1 && std::string(argv[1]) == "help") {  // "help run" is "run --help"
+    words.erase(words.begin() + 1);
+    words.push_back(help.data());
+  }
+  command_line::open_standard_descriptors();
   try {
-    return run(argc, argv);
+    return command_line::flush_standard_output(run(static_cast<int>(words.size()), words.data()));
   } catch (const description::SetupError& error) {
     std::fprintf(stderr, "proxarm: %s\n", error.what());
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "proxarm: out of memory; see ulimit -v, or give a smaller scene or mesh\n");
   } catch (const std::exception& error) {
     std::fprintf(stderr, "proxarm: %s\n", error.what());
   }

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "controller/command_line/bus_plan.hpp"
-#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/modbus_rates.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/modbus_rates.hpp"
 
 namespace proxarm::command_line {
 namespace {

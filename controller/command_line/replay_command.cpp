@@ -3,13 +3,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "controller/bring_up.hpp"
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/exit_status.hpp"
-#include "controller/replay_log.hpp"
-#include "models/description/setup_error.hpp"
-#include "scenes/compile.hpp"
-#include "scenes/scene_file.hpp"
+#include "controller/command_line/preparation/exit_status.hpp"
+#include "controller/record/replay_log.hpp"
+#include "controller/session/bring_up.hpp"
+#include "models/base/setup_error.hpp"
+#include "scenes/compiler/compile.hpp"
+#include "scenes/format/scene_file.hpp"
 
 namespace proxarm::command_line {
 namespace {

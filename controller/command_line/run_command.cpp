@@ -1,11 +1,11 @@
-#include "controller/command_line/bus_plan.hpp"
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/interface_run.hpp"
-#include "controller/command_line/live_parameters.hpp"
-#include "controller/command_line/prepared_session.hpp"
-#include "controller/command_line/simulated_run.hpp"
-#include "controller/command_line/start_check.hpp"
-#include "models/description/setup_error.hpp"
+#include "controller/command_line/live/live_parameters.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sessions/interface_run.hpp"
+#include "controller/command_line/sessions/simulated_run.hpp"
+#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 
@@ -16,6 +16,12 @@ void refuse_for_interfaces(const RunOptions& options) {
     throw description::SetupError({.key = "--fault",
                                    .found = "a bus that isn't simulated",
                                    .expected = "--bus sim, where devices can be made to fail",
+                                   .advice = "on an interface, give it to `proxarm sim`"});
+  }
+  if (!options.enabling.empty()) {
+    throw description::SetupError({.key = "--enabling",
+                                   .found = "a bus that isn't simulated",
+                                   .expected = "--bus sim, where the enabling switch is simulated",
                                    .advice = "on an interface, give it to `proxarm sim`"});
   }
   if (options.pace == Pace::virtual_time) {
@@ -32,6 +38,7 @@ int run_command(const RunOptions& options) {
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
   require_usable_start(session);
+  require_enabling_switch(session, options);
   require_stable(session, options);
   if (options.bus.simulated()) {
     require_carried(session);

@@ -1,9 +1,9 @@
 #include <cstdio>
 
 #include "controller/command_line/commands.hpp"
-#include "fieldbus/bus_scan.hpp"
-#include "fieldbus/socket_can_network.hpp"
-#include "models/description/setup_error.hpp"
+#include "fieldbus/can/socket_can_network.hpp"
+#include "fieldbus/cia402/bus_scan.hpp"
+#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 

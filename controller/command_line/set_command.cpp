@@ -1,19 +1,40 @@
 #include <cstdio>
+#include <sstream>
 
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/control_socket.hpp"
-#include "controller/command_line/exit_status.hpp"
+#include "controller/command_line/live/control_socket.hpp"
+#include "controller/command_line/preparation/exit_status.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::command_line {
+namespace {
+
+// All in one line: the session makes all of the changes or none.
+std::string line_of(const std::vector<std::string>& changes) {
+  std::string line;
+  for (const std::string& change : changes) {
+    if (change.empty() || change.find('\t') != std::string::npos) {
+      throw description::SetupError({.found = description::in_quotes(change), .expected = "NAME=VALUE"});
+    }
+    line += (line.empty() ? "" : "\t") + change;
+  }
+  return line;
+}
+
+}  // namespace
 
 int set_command(const SetOptions& options) {
   const std::filesystem::path path = options.control.empty() ? default_control_path() : options.control;
-  for (const std::string& change : options.changes) {
-    const std::string answer = ask_control_socket(path, change);
-    const bool refused = answer.rfind("ok: ", 0) != 0;
-    std::fprintf(refused ? stderr : stdout, "%s%s\n", refused ? "proxarm: " : "", answer.c_str());
-    if (refused) return set_up_mistake;
+  const std::string answer = ask_control_socket(path, line_of(options.changes));
+  const std::string fine_word = "ok: ";
+  if (answer.compare(0, fine_word.size(), fine_word) != 0) {
+    std::fprintf(stderr, "proxarm: %s%s\n", answer.c_str(),
+                 options.changes.size() > 1 ? "; none of the changes was made" : "");
+    return set_up_mistake;
   }
+  std::istringstream done(answer.substr(fine_word.size()));
+  for (std::string change; std::getline(done, change, '\t');) std::printf("ok: %s\n", change.c_str());
   return fine;
 }
 

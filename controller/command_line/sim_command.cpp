@@ -2,19 +2,19 @@
 #include <cstdio>
 #include <memory>
 
-#include "controller/command_line/cell_buses.hpp"
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/prepared_session.hpp"
-#include "controller/command_line/signal_watch.hpp"
-#include "controller/command_line/start_check.hpp"
-#include "fieldbus/socket_can_network.hpp"
-#include "models/description/setup_error.hpp"
-#include "sim/far_end_process.hpp"
-#include "sim/modbus_server.hpp"
+#include "controller/command_line/live/signal_watch.hpp"
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "fieldbus/can/socket_can_network.hpp"
+#include "models/base/setup_error.hpp"
+#include "sim/cell/far_end_process.hpp"
+#include "sim/devices/modbus_server.hpp"
 
 namespace proxarm::command_line {
 
-// Runs until SIGINT or SIGTERM.
+// Runs until a signal, or until nobody is there to read what it says.
 int sim_command(const RunOptions& options) {
   if (options.bus.simulated()) {
     throw description::SetupError({.key = "--bus",
@@ -23,6 +23,7 @@ int sim_command(const RunOptions& options) {
                                    .advice = "for both in one process: proxarm run"});
   }
   const PreparedSession session = prepare(options);
+  require_enabling_switch(session, options);
   std::atomic<bool> stop{false};
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
@@ -39,7 +40,7 @@ int sim_command(const RunOptions& options) {
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
   }
-  SignalWatch signals([&](int) { stop.store(true); });
+  SignalWatch signals([&] { stop.store(true); });
   std::fprintf(stderr, "proxarm sim: %s on the wire; Ctrl-C ends it\n", session.cell.name.c_str());
   process.run(stop);
   const sim::FarEndStatistics statistics = process.statistics();

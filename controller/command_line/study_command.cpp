@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "controller/command_line/arm_run.hpp"
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/sessions/arm_run.hpp"
 #include "controller/studies/stress.hpp"
 #include "controller/studies/studies.hpp"
-#include "models/description/setup_error.hpp"
+#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -16,7 +16,48 @@ void require(bool holds, const char* option, const char* found, const char* expe
   if (!holds) throw description::SetupError({.key = option, .found = found, .expected = expected});
 }
 
+struct StudyText {
+  const char* name;
+  const char* text;
+};
+
+constexpr StudyText study_texts[] = {
+    {"figure5",
+     "The paper's experiment: a light impedance-type device is pressed onto a wall with friction, rubbed along it and "
+     "pulled away, by (1), (5) and (23). Writes figure5.csv (force and motion), figure5.json (pull on leaving, kick, "
+     "oscillation) and plots. Nothing in it is random: --seed and --runs have no effect."},
+    {"error",
+     "Error against run time of ten motions with exact solutions: (26), order 2, penalty contact and the rule of "
+     "common "
+     "admittance controllers. Writes error.csv (every run), error.json (orders of convergence) and plots. It measures "
+     "time: leave the machine alone meanwhile. Nothing in it is random."},
+    {"stability",
+     "The smallest stable mass over timestep, hand, delay, drive and order: by eigenvalues and by simulation. Writes "
+     "stability.csv, stability.json (how far they agree) and plots. Nothing in it is random."},
+    {"fidelity",
+     "What the hand feels at the simulated arm from 0.1 to 30 Hz, in free motion and on a wall. Writes fidelity.csv, "
+     "fidelity.json and a plot. Nothing in it is random."},
+    {"skip",
+     "The cost of a step and of start-up against the size of a world. Writes skip.csv, skip.json and a plot. It "
+     "measures "
+     "time: leave the machine alone meanwhile. Nothing in it is random."},
+    {"stress",
+     "Random worlds, invariants at every step: finite, never inside, no pull, within the friction cone, independent of "
+     "K, no work made. Writes stress.csv (every run), stress.json and a plot. Status 1: an invariant was violated; its "
+     "seed is printed, for --replay. Default: 1,000,000 runs, 1000 with --quick."},
+    {"stress_meshes", "The same as stress, among concave meshes and meshes that move."},
+    {"stress_layers", "The same as stress, among objects with elastic layers."},
+    {"merge", "Joins the parts of a study (--shard) in the named folders to the files of one run, in --out."},
+};
+
 }  // namespace
+
+std::string study_description(const std::string& name) {
+  for (const StudyText& study : study_texts) {
+    if (name == study.name) return study.text;
+  }
+  return "";
+}
 
 int study_command(const StudyOptions& options) {
   const studies::StudyList list = studies::all_studies(run_arm);

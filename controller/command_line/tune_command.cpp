@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/prepared_session.hpp"
-#include "models/description/setup_error.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {

@@ -11,11 +11,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "controller/admittance_proxy.hpp"
-#include "controller/studies/chart.hpp"
+#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/studies/common/chart.hpp"
 #include "controller/studies/error_cases.hpp"
-#include "models/round_obstacle.hpp"
-#include "models/world.hpp"
+#include "models/obstacles/round_obstacle.hpp"
+#include "models/world/world.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -32,13 +32,13 @@ enum Method { order_1, order_2, penalty_euler, penalty_rk4, penalty_implicit, ro
 constexpr std::array<const char*, method_count> method_names{
     "1", "2", "penalty_euler", "penalty_rk4", "penalty_implicit", "ros"};
 
-// What a penalty method may choose.
+// The parameters of a penalty method.
 struct Tuning {
   double stiffness_N_per_m = 0.0, damping_ratio = 0.0, friction_slope = 1.0;
 };
 
-// Steps of a motion: timesteps of all sizes between, so that impacts fall anywhere within a step. Up to `instants`,
-// each of them ends at an instant.
+// Numbers of steps of a motion, from coarse to fine with all ratios between, so that impacts fall anywhere within a
+// step. With at most `instants` steps, each step ends at an instant.
 std::vector<int> step_counts(bool quick) {
   std::vector<int> counts{4, 5, 6, 10, 12, 15, 20, 30};
   for (const int per_instant : {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256}) {
@@ -96,7 +96,7 @@ class PenaltyWorld {
   double mu_, medium_, k_, c_ = 0.0, c_t_ = 0.0;
 };
 
-// Every stepper: a state at time t, and step() to the next sample.
+// A method under study: a state at time t, and step() to the next sample.
 class Ours {
  public:
   Ours(const ErrorCase& which, Method method, double T)
@@ -117,7 +117,7 @@ class Ours {
   void step(double t) noexcept {
     const Vec3 before = proxy_.velocity();
     static_cast<void>(proxy_.step(case_.force(t, proxy_.q(), v_)));
-    // At order 1 velocity() belongs to the middle of the step: half a step further, as the last two say.
+    // At order 1 velocity() belongs to the middle of the step; the last two extrapolate it by half a step.
     v_ = first_ ? Vec3(1.5 * proxy_.velocity() - 0.5 * before) : proxy_.velocity();
   }
   [[nodiscard]] const Vec3& q() const noexcept { return proxy_.q(); }
@@ -225,7 +225,7 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps) {
     if ((k + 1) % per_instant != 0) continue;
     const CaseState exact = which.exact(t);
     sum_q += (stepper.q() - exact.q).squaredNorm();
-    // Velocities of a step that holds an impact belong to no instant.
+    // The velocity of a step that contains an impact belongs to no instant.
     if (which.stop_s < 0.0 || std::abs(t - which.stop_s) > 2.0 * which.duration_s / instants) {
       sum_v += (stepper.v() - which.exact(stepper.v_label_s(t)).v).squaredNorm();
       ++counted_v;
@@ -247,7 +247,7 @@ double step_time_ns(const ErrorCase& which, Make make, int steps) {
   double best = infinity;
   const double T = which.duration_s / steps;
   double sink = 0.0;
-  for (int round = 0; round < 15; ++round) {  // short ones: a busy machine leaves most of them alone
+  for (int round = 0; round < 15; ++round) {  // short rounds: on a busy machine most are still undisturbed
     auto stepper = make(T);
     const auto begun = std::chrono::steady_clock::now();
     for (int k = 0; k < steps; ++k) stepper.step(k * T);
@@ -258,13 +258,13 @@ double step_time_ns(const ErrorCase& which, Make make, int steps) {
   return std::isnan(sink) ? best * (1.0 + 1e-15) : best;
 }
 
-// A configuration's runs, from coarse to fine.
+// The runs of one method with one tuning, from coarse to fine.
 struct Runs {
   std::string method;
   Tuning tuning;
   std::vector<double> T, steps, error, cost_ns;
 
-  // The largest error with this and up to twofold finer timesteps.
+  // The largest error among this timestep and those up to twofold finer.
   [[nodiscard]] double envelope(std::size_t i) const {
     double most = error[i];
     for (std::size_t j = i; j < T.size() && T[j] > 0.499 * T[i]; ++j) most = std::max(most, error[j]);
@@ -327,7 +327,7 @@ double median(std::vector<double> values) {
   return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
 }
 
-// The run time of the rivals over ours at equal error, its median over the targets that both reach.
+// The other methods' run time over ours at equal error: the median over the targets that both reach.
 template <typename Cost>
 double speedup(const Runs& ours, Cost rival_cost) {
   std::vector<double> ratios;
@@ -370,8 +370,8 @@ const Runs* fixed_runs(const std::vector<Runs>& list, const Fixed& fixed) {
   return exact != nullptr ? exact : any;
 }
 
-// The one method and tuning that is best over all cases together at 0.1 mm: the least geometric mean of run times,
-// where a case that isn't reached counts as a thousand times the best-tuned one's.
+// The method and tuning that is best over all cases together at 0.1 mm: the one with the least geometric mean of run
+// times. A case in which it doesn't reach 0.1 mm counts as a thousand times the best-tuned one's time.
 Fixed best_fixed(const RunsByCase& all) {
   Fixed best;
   double least = infinity;
@@ -417,13 +417,13 @@ Fit fit_order(const Runs& runs) {
     xy += (x[i] - mx) * (y[i] - my);
   }
   const double slope = xy / xx;
-  if (slope < 0.0) return {0.0, 0.0};  // what grows with the number of steps is rounding
+  if (slope < 0.0) return {0.0, 0.0};  // an error that grows with the number of steps is rounding
   for (std::size_t i = 0; i < x.size(); ++i) rr += std::pow(y[i] - my - slope * (x[i] - mx), 2);
   return {slope, std::sqrt(rr / n)};
 }
 
-// Rate at which (26) changes the speed of a frictionless slide around a sphere, 1/s, and T f_n/(M R), which it should
-// be: lost inside, gained outside.
+// The rate at which (26) changes the speed of a frictionless slide around a sphere, 1/s, and the predicted T f_n/(M R).
+// Speed is lost inside of a sphere and gained outside.
 json energy_rate(bool inside) {
   constexpr double R = 0.1, M = 1.0, T = 1e-3, speed = 0.2, push = 5.0;
   std::vector<models::World::Entry> entries;
@@ -509,7 +509,7 @@ json ErrorStudy::headline(const Table& table, const Options& /*options*/) const 
       against_fixed[name][method] =
           one == nullptr ? 0.0 : speedup(ours, [one](double target) { return one->cost(target); });
     }
-    // Of the others, what is best at 0.1 mm, and its order.
+    // The best of the other methods at 0.1 mm, and its order.
     const Runs* winner = nullptr;
     for (const Runs& runs : list) {
       if (is_penalty(runs) && (winner == nullptr || runs.cost(1e-4) < winner->cost(1e-4))) winner = &runs;
@@ -590,7 +590,7 @@ std::vector<std::string> ErrorStudy::plot(const Table& table, const Options& /*o
       by_time.curves.push_back(time);
       by_step.curves.push_back(step);
     }
-    // Of each other method the envelope over its tunings.
+    // For each other method the envelope over its tunings.
     for (int method = penalty_euler; method < method_count; ++method) {
       static constexpr std::array<const char*, method_count> labels{
           "", "", "penalty, semi-implicit Euler", "penalty, Runge-Kutta", "penalty, implicit Euler", "ROS rule"};

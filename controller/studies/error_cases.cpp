@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/free_space.hpp"
-#include "models/friction_plane.hpp"
-#include "models/media.hpp"
-#include "models/plane.hpp"
-#include "models/plane_composition.hpp"
-#include "models/plane_obstacle.hpp"
-#include "models/round_obstacle.hpp"
+#include "models/obstacles/plane_obstacle.hpp"
+#include "models/obstacles/round_obstacle.hpp"
+#include "models/surfaces/free_space.hpp"
+#include "models/surfaces/friction_plane.hpp"
+#include "models/surfaces/plane.hpp"
+#include "models/surfaces/plane_composition.hpp"
+#include "models/world/media.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -23,7 +23,7 @@ constexpr double g_m_per_s2 = 9.80665;
 
 World free_space() { return std::make_unique<models::FreeSpace<3>>(); }
 
-// A single object without a world around it.
+// The 𝒢 of a single object, without a world around it.
 class OneObstacle final : public GeometricAlgorithm<3> {
  public:
   explicit OneObstacle(std::unique_ptr<models::Obstacle> obstacle) : obstacle_(std::move(obstacle)) {}

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "models/geometric_algorithm.hpp"
-#include "models/obstacle.hpp"
+#include "models/geometry/geometric_algorithm.hpp"
+#include "models/obstacles/obstacle.hpp"
 
 namespace proxarm::studies {
 
@@ -57,7 +57,7 @@ struct ErrorCase {
   double medium_Ns_per_m = 0.0;  // where x > 0
   bool starts_in_contact = false;
   double stop_s = -1.0;  // when it comes to rest; below 0: never
-  bool turns = false;    // normal or direction turn: (26) is of first order there
+  bool turns = false;    // the normal or the slide's direction turns: (26) is of first order there
   std::function<CaseState(double)> exact{};
   std::function<std::unique_ptr<models::GeometricAlgorithm<3>>()> world{};
 };

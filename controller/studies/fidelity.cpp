@@ -10,7 +10,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "controller/studies/chart.hpp"
+#include "controller/studies/common/chart.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -32,8 +32,8 @@ std::vector<ArmSine> sines(bool wall) {
 
 std::vector<ArmSetup> setups(bool quick) {
   std::vector<ArmSetup> list;
-  // The start fades with 2M/D, D = 13 Ns/m (a hand's 20 less what the loop's lag takes away): 12 such times for every
-  // mass, since at 0.1 Hz a tenth of a newton counts.
+  // The transient of the start fades with the time constant 2M/D, D = 13 Ns/m (a hand's 20 Ns/m without what the loop's
+  // lag takes away). Every mass gets 12 of them, since at 0.1 Hz a tenth of a newton counts.
   const auto settling = [quick](double mass) { return std::max(quick ? 3.0 : 12.0, (quick ? 0.6 : 2.0) * mass); };
   const auto add = [&](double mass, double period, double drive, bool wall) {
     list.push_back({.mass_kg = mass,

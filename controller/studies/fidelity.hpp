@@ -4,17 +4,17 @@
 // The hand's intention is a sum of sines; force of the hand on the handle and the tool's true position are sampled once
 // a cycle, over whole periods of all sines, so that one Fourier coefficient per sine is exact. In free motion
 //   F/a = M_apparent(f) complex: its real part is the mass that is felt, its imaginary part −B/ω;
-// apparent_mass_error is |F/a − M|/M. Against a wall F/x is the stiffness that is felt; together they span what is
-// rendered at this frequency (a Z-width).
+// apparent_mass_error is |F/a − M|/M. Against a wall F/x is the stiffness that is felt; The two span the impedances
+// that can be rendered at this frequency (the Z-width).
 //
-// The arm is whoever runs it: the studies know no bus and no drive.
+// The caller provides the arm: the studies know no bus and no drive.
 #pragma once
 
 #include <functional>
 #include <utility>
 
-#include "controller/studies/study.hpp"
-#include "models/geometry.hpp"
+#include "controller/studies/common/study.hpp"
+#include "models/geometry/geometry.hpp"
 
 namespace proxarm::studies {
 

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "controller/impedance_proxy.hpp"
-#include "controller/studies/chart.hpp"
-#include "models/friction_plane.hpp"
+#include "controller/rendering/impedance_proxy.hpp"
+#include "controller/studies/common/chart.hpp"
+#include "models/surfaces/friction_plane.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -36,7 +36,7 @@ double minimum_jerk(double s) {
   return s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
 }
 
-// Presses, rubs to and fro twice, leaves.
+// The hand presses, rubs to and fro twice, and leaves.
 Vec2 intention(double t) {
   const double down = minimum_jerk((t - press_from_s) / (press_to_s - press_from_s));
   const double up = minimum_jerk((t - leave_from_s) / (leave_to_s - leave_from_s));
@@ -154,7 +154,7 @@ std::vector<std::string> Figure5::plot(const Table& table, const Options& /*opti
       Curve curve;
       for (std::size_t row = 0; row < table.rows(); ++row) {
         if (table.text(row, law) != each.name) continue;
-        // What can't be seen at half the size isn't drawn.
+        // Points that couldn't be told apart at half the size aren't drawn.
         const double t = table.number(row, time), value = quantity.factor * table.number(row, column);
         const bool moved =
             !curve.x.empty() && std::abs(value - curve.y.back()) > 0.004 * (quantity.high - quantity.low);

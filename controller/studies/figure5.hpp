@@ -7,7 +7,7 @@
 //   m ẍ = f + K_h (x_int(t) − x) + D_h (ẋ_int(t) − ẋ),   f of the law held over the period
 #pragma once
 
-#include "controller/studies/study.hpp"
+#include "controller/studies/common/study.hpp"
 
 namespace proxarm::studies {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <functional>
 
-#include "models/geometry.hpp"
-#include "scenes/scene.hpp"
+#include "models/geometry/geometry.hpp"
+#include "scenes/format/scene.hpp"
 
 namespace proxarm::studies {
 

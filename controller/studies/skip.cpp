@@ -9,10 +9,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "controller/studies/chart.hpp"
+#include "controller/studies/common/chart.hpp"
 #include "controller/studies/globe_mesh.hpp"
-#include "scenes/compile.hpp"
-#include "scenes/obstacles.hpp"
+#include "scenes/compiler/compile.hpp"
+#include "scenes/compiler/obstacles.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -29,8 +29,8 @@ double elapsed_ns(Clock::time_point begun) {
   return std::chrono::duration<double, std::nano>(Clock::now() - begun).count();
 }
 
-// A step, repeated along a small circle around `at`, each pushed by `push`; best of forty rounds, each so
-// short that a busy machine leaves most of them alone. NaN where a push meets nothing.
+// The time of a step, along a small circle around `at`, each pushed by `push`: the best of forty rounds, so short that
+// on a busy machine most are undisturbed. NaN where a push meets nothing.
 double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& push, int steps) {
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 40; ++round) {
@@ -43,7 +43,7 @@ double step_ns(models::GeometricAlgorithm<3>& g, const Vec3& at, const Vec3& pus
       q = g(K, q + ahead + push, q);
     }
     best = std::min(best, elapsed_ns(begun) / steps);
-    // Nothing there: the push alone leads 5 µm further down in each step.
+    // Free space: the push alone leads 5 µm further down in each step.
     const bool fell = push.z() < 0.0 && at.z() - q.z() > 0.5 * steps * std::abs(push.z());
     if (!q.allFinite() || fell) return nan_value;
   }
@@ -79,7 +79,7 @@ Scene globe(std::size_t count) {
   return scene;
 }
 
-// Every object asked for its distance: what a step costs at least where nothing is skipped.
+// Asks every object for its distance, which is the least that a step costs where no object is skipped.
 double all_ns(const Scene& scene, const Vec3& at) {
   double best = std::numeric_limits<double>::infinity();
   if (const auto* mesh = std::get_if<scenes::MeshShape>(&scene.objects.front().shape)) {
@@ -105,7 +105,7 @@ struct OptionScene {
   Scene scene;
 };
 
-// A wall, and the same wall with one thing more each.
+// A wall, and the same wall with one more option each.
 std::vector<OptionScene> option_scenes() {
   const auto wall = [](double friction) {
     Scene scene;
@@ -187,7 +187,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const double gap = count > 1.0 && kind == "objects" ? 0.05 * surface.z() : 1e-3;
   const double far = step_ns(g, Vec3(0.3, 0.2, 20.0), none, steps);
   const double near = step_ns(g, surface + Vec3(0.0, 0.0, gap), none, steps);
-  // From above onto what is there: a coarse mesh lies below its sphere.
+  // Found from above, since a coarse mesh lies below its sphere.
   const double depth = std::max(0.5 * surface.z(), 1e-3);
   const Vec3 down = empty ? surface : g(K, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
   const double contact = empty ? nan_value : step_ns(g, down, into, steps);

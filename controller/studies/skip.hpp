@@ -1,11 +1,12 @@
-// What a step costs, and what start-up costs, against the size of a world: only what is near may count.
+// What a step and start-up cost against the size of a world: objects that are far away must not cost anything.
 //
-// Worlds of 1 to thousands of spheres on a grid, and meshes of up to a hundred thousand triangles; the proxy far from
-// all, near one, and sliding on one; against evaluating every object at every step. And what each option of a scene
-// costs when it is there, and when it isn't, which must be nothing: the 𝒢 is then another one.
+// The worlds have 1 to thousands of spheres on a grid, or meshes of up to a hundred thousand triangles. The proxy is
+// far from all, near one, or slides on one; the cost is compared with evaluating every object at every step. The study
+// also measures what each option of a scene costs when it is used. Unused it must cost nothing, since the 𝒢 is compiled
+// without it.
 #pragma once
 
-#include "controller/studies/study.hpp"
+#include "controller/studies/common/study.hpp"
 
 namespace proxarm::studies {
 

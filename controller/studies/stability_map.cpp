@@ -9,10 +9,10 @@
 #include <numbers>
 #include <sstream>
 
-#include "controller/admittance_proxy.hpp"
-#include "controller/studies/chart.hpp"
-#include "models/free_space.hpp"
-#include "models/plane.hpp"
+#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/studies/common/chart.hpp"
+#include "models/surfaces/free_space.hpp"
+#include "models/surfaces/plane.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -26,8 +26,8 @@ using Vec1 = Vec<1>;
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
-// Drive, delay and hand of controller/stability.hpp as a simulation: the force that the sensor will read at the next
-// step, of the proxy's position.
+// Simulates drive, delay and hand of controller/stability/stability.hpp: from the proxy's position to the force that
+// the sensor will read at the next step.
 class LinearPlant {
  public:
   LinearPlant(const HandModel& hand, const LoopModel& loop, double intention_m, double start_m)
@@ -79,14 +79,15 @@ controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
 // Of runs that say no more than the sign.
 constexpr double blew_up = 1e3, died = -1e3;
 
-// ln r through what was recorded from `from` (a share of it) on: by least squares over half of ln(q² − q q).
+// ln r of the motion recorded from the share `from` on: the slope, by least squares, of half of
+// ln(q(k)² − q(k+s) q(k−s)).
 double slope(const std::vector<double>& q, double from) {
   const auto begin = static_cast<std::size_t>(from * static_cast<double>(q.size()));
   int crossings = 0;
   for (std::size_t k = begin + 1; k < q.size(); ++k) crossings += (q[k] < 0.0) != (q[k - 1] < 0.0) ? 1 : 0;
   const double theta = std::numbers::pi * crossings / static_cast<double>(q.size() - begin - 1);
-  // Next to half a turn a step it takes several to make a quarter of a turn; at half a turn, none do, and the size is
-  // that of q itself.
+  // sin(sθ) must not vanish: near the Nyquist frequency (θ = π) that takes a stride s of several steps. At Nyquist
+  // itself there is none, and the size of q itself is taken.
   std::size_t s = 0;
   const auto most = std::min<std::size_t>((q.size() - begin) / 4, 20'000);
   for (std::size_t i = 1; i <= most && s == 0; ++i) {
@@ -108,7 +109,7 @@ double slope(const std::vector<double>& q, double from) {
   return spread > 0.0 ? (n * sum_xy - sum_x * sum_y) / spread : 0.0;
 }
 
-// The rate ln|z| per step at which the motion of the slowest mode grows (positive: unstable) or fades.
+// Measures the rate ln|z| per step at which the slowest mode grows (positive: unstable) or fades.
 //
 // Where one mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) whatever its phase: a straight line
 // ln r² over k. The simulation goes on, twice as long each time, until the last quarter of that line is as steep as
@@ -118,7 +119,7 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
   constexpr int most_steps = 400'000, most_half_waves = 1280;
   models::FreeSpace<1> nothing;
   AdmittanceProxy<1> proxy(config(loop, mass_kg), nothing);
-  // Held at rest away from where the hand wants it, then released; the hand wants 0.
+  // The hand wants 0; the proxy is released from rest away from it.
   proxy.start({.q = Vec1(start)});
   static_cast<void>(proxy.set_reference(Vec1::Zero()));
   LinearPlant plant(hand, loop, 0.0, start);
@@ -146,7 +147,7 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
 }
 
 struct Contact {
-  double bounces = 0.0;      // touches in the last third
+  double bounces = 0.0;      // how often it touches in the last third
   double amplitude_m = 0.0;  // of the proxy in it, peak to peak
 };
 
@@ -204,7 +205,7 @@ struct Grid {
   }
 };
 
-// A coarse look at tables that were worked out elsewhere: the smallest stable mass, by eigenvalues.
+// The largest relative error of the smallest stable mass, found by eigenvalues, against its closed form for L = 0.
 double d1_error() {
   double worst = 0.0;
   for (const double T : decades(1e-4, 1e-2, 9)) {
@@ -240,7 +241,7 @@ double measured_boundary_kg(const HandModel& hand, const LoopModel& loop, double
     at_high = growth(hand, loop, high);
   }
   if (!(at_low > 0.0 && at_high < 0.0)) return nan_value;
-  // Halved, not along the line between both rates: where another mode takes over, that line has a bend.
+  // Bisection rather than regula falsi: the rate has a bend where another mode becomes the slowest.
   for (int i = 0; i < 7; ++i) {
     const double middle = std::sqrt(low * high);
     (growth(hand, loop, middle) > 0.0 ? low : high) = middle;
@@ -255,7 +256,7 @@ std::vector<Column> StabilityMap::columns() const {
           {"sensitivity"},  {"contact_bounces"},   {"contact_amplitude_m"}};
 }
 
-// A job: all stiffnesses of one line, so that jobs aren't too small.
+// A job computes all stiffnesses of one line, so that jobs aren't too small.
 std::size_t StabilityMap::jobs(const Options& options) const {
   const Grid grid(options.quick);
   return grid.size() / grid.K.size();
@@ -289,7 +290,7 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
       measured = measured_boundary_kg(hand, loop, *predicted);
       if ((job + i) % 10 == 0) contact = push_against_wall(hand, loop, 1.5 * *predicted);
     } else {
-      // At a mass whose oscillation takes some hundred steps, do both say the same?
+      // Compares measured and predicted rate at a mass whose oscillation takes some hundred steps.
       const double mass = std::clamp(hand.stiffness_N_per_m * std::pow(40.0 * loop.period_s, 2), 1e-2, 1000.0);
       const bool grows = growth(hand, loop, mass) > 0.0;
       measured = grows == (controller::spectral_radius(hand, loop, mass) > 1.0) ? -1.0 : 0.0;

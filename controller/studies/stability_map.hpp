@@ -1,6 +1,6 @@
-// The smallest stable mass over timestep, hand, delay and drive: predicted from eigenvalues (controller/stability.hpp),
-// and measured by running the controller's own proxy against the same linear plant until the motion has grown or
-// shrunk.
+// The smallest stable mass over timestep, hand, delay and drive: predicted from eigenvalues
+// (controller/stability/stability.hpp), and measured by running the controller's own proxy against the same linear
+// plant until the motion has grown or shrunk.
 //
 // Measured: in free motion, the rate at which the oscillation grows or fades once its slowest mode is left, after 40 to
 // 1280 half-waves; the mass at which it does neither is found by halving. A point is ill-conditioned where a per
@@ -10,8 +10,8 @@
 // does it settle, or make and break contact for good?
 #pragma once
 
-#include "controller/stability.hpp"
-#include "controller/studies/study.hpp"
+#include "controller/stability/stability.hpp"
+#include "controller/studies/common/study.hpp"
 
 namespace proxarm::studies {
 

@@ -7,18 +7,19 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <sstream>
 
-#include "controller/admittance_proxy.hpp"
-#include "controller/studies/chart.hpp"
+#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/studies/common/chart.hpp"
 #include "controller/studies/random_scene.hpp"
-#include "models/cone_sum.hpp"
-#include "models/description/setup_error.hpp"
-#include "models/mesh_obstacle.hpp"
-#include "models/moving_obstacle.hpp"
-#include "scenes/compile.hpp"
-#include "scenes/obstacles.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/mesh/mesh_obstacle.hpp"
+#include "models/obstacles/moving_obstacle.hpp"
+#include "models/surfaces/contact_judge.hpp"
+#include "scenes/compiler/compile.hpp"
+#include "scenes/compiler/obstacles.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -108,17 +109,9 @@ class Witness final : public models::GeometricAlgorithm<N> {
   Call<N> call_;
 };
 
-// Near-parallel contacts amplify rounding by one over the sine of their angle.
 template <int N>
 double condition(const Call<N>& call) {
-  double least = 1.0;
-  for (std::size_t i = 0; i < call.contacts.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j) {
-      const double cos = call.contacts[i].normal.dot(call.contacts[j].normal);
-      least = std::min(least, std::sqrt(std::max(0.0, 1.0 - cos * cos)));
-    }
-  }
-  return 4.0 / std::max(least, 1e-8);
+  return models::rounding_amplification<N>(call.contacts);
 }
 
 // What a world's forces are known to be.
@@ -174,26 +167,23 @@ class Laws {
     // A Coulomb medium's force is found by how far the proxy moves in it, which a short move's rounding leaves unsure.
     const double moved = (call.r - call.q).norm();
     if (moved > 0.0) tolerance += coulomb * std::min(16.0 * epsilon * call.size() / moved, 1e-3);
-    std::vector<models::ForceCone> cones;
     double unsure = 8.0 * epsilon;  // of a cone's axis
-    for (const Contact<N>& contact : call.contacts) {
-      const Vec3 n = lift<N>(contact.normal);
+    const auto friction = [&](const Contact<N>& contact) -> std::optional<double> {
       const auto object = static_cast<std::size_t>(contact.object);
-      const double mu = N == 1 || object >= scene_.objects.size() ? 0.0 : scene_.objects[object].friction;
+      return N == 1 || object >= scene_.objects.size() ? 0.0 : scene_.objects[object].friction;
+    };
+    const auto motion = [&](const Contact<N>& contact) -> Vec3 {
+      const auto object = static_cast<std::size_t>(contact.object);
       const bool moving_mesh = object < scene_.objects.size() && scene_.objects[object].motion &&
                                std::holds_alternative<scenes::MeshShape>(scene_.objects[object].shape);
       const Vec3 begin = moving_mesh ? call.carried[object] : carried(object, call.time, lift<N>(call.q));
-      const Vec3 motion = lift<N>(call.r) - begin;
-      const Vec3 v = motion - n * n.dot(motion);
-      const double uncertain = 16.0 * epsilon * (call.size() + carriage(call.time.time_s)) / v.norm();
-      if (contact.slips && uncertain < 1e-3) {
-        cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
-        tolerance += mu * f.norm() * uncertain * condition(call);
-        unsure += mu * uncertain;
-      } else {
-        cones.push_back({n, mu});
-      }
-    }
+      return lift<N>(call.r) - begin;
+    };
+    const std::vector<models::ForceCone> cones = models::cones_of_contacts<N>(
+        call.contacts, call.size() + carriage(call.time.time_s), friction, motion, [&](double mu, double angle) {
+          tolerance += mu * f.norm() * angle * condition(call);
+          unsure += mu * angle;
+        });
     return models::in_sum_of_cones(f, cones, tolerance + unsure * squeeze(f, cones));
   }
 

@@ -9,20 +9,19 @@
 //                   nothing pulls, nothing leaves its cone
 //   stiffness       𝒢(κ', r − f/κ', q) = r for another κ' (Assumption 1)
 //   work            fᵀ(r − q) ≤ f_n ‖r − q‖²/(2R) on one convex surface of radius R, and ≤ 0 on flat and concave ones
-// Counted apart, with their numbers, and not among the violations:
+// These are counted apart and are no violations:
 //   unresolved      steps in which 𝒢 itself says that no set of contacts was complete (a squeeze, a jam)
 //   several         another κ' gave another point that obeys (17) as well: Coulomb's law has several solutions there
 //   edge            work on the edges of boxes, cylinders and meshes, where R is zero
 //   not judged      work with several contacts of which one is convex, with objects that move (they do work), with
-//   layers
-//                   (they give back what they took), and at order 2, whose q is no place where the proxy was
+//                   layers (they give back what they took), and at order 2, whose q is no place where the proxy was
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <string_view>
 
-#include "controller/studies/study.hpp"
+#include "controller/studies/common/study.hpp"
 
 namespace proxarm::studies {
 

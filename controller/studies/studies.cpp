@@ -5,8 +5,8 @@
 #include "controller/studies/skip.hpp"
 #include "controller/studies/stability_map.hpp"
 #include "controller/studies/stress.hpp"
-#include "models/description/setup_error.hpp"
-#include "models/description/text.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::studies {
 

@@ -1,12 +1,12 @@
-// The studies by their names.
+// Finds a study by its name.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "controller/studies/common/study.hpp"
 #include "controller/studies/fidelity.hpp"
-#include "controller/studies/study.hpp"
 
 namespace proxarm::studies {
 
@@ -15,7 +15,7 @@ using StudyList = std::vector<std::unique_ptr<Study>>;
 // `arm` runs the simulated arm for the studies that want it.
 StudyList all_studies(const ArmRun& arm);
 
-// Throws description::SetupError that names what there is.
+// Throws description::SetupError that names the studies there are.
 const Study& study_named(const StudyList& list, const std::string& name);
 
 }  // namespace proxarm::studies

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <set>
 
-#include "models/description/text.hpp"
-#include "models/description/yaml_file.hpp"
+#include "models/base/text.hpp"
+#include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -26,7 +26,7 @@ PoseDescription pose_or_identity(const YamlNode& node, std::string_view key) {
   return pose ? read_pose(*pose) : PoseDescription{};
 }
 
-// Not looked at here: a run may name another scene or hand.
+// The path of a scene or a hand. Whether the file exists isn't checked here: a run may name another one.
 std::string absolute_path_or_empty(const YamlNode& node, std::string_view key) {
   return node.has(key) ? node.path_of(key).string() : std::string();
 }
@@ -112,7 +112,8 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
   return line;
 }
 
-// 0 for none, or a filter whose delay a loop can bear, and its eigenvalues be found in no time.
+// A filter's bandwidth is 0 (no filter) or at least this. With a slower filter a control loop couldn't bear the delay,
+// and the filter's eigenvalues would take long to find.
 constexpr double least_bandwidth_Hz = 5.0;
 
 double bandwidth_or(const YamlNode& node, std::string_view key, double otherwise, double max_Hz) {
@@ -267,7 +268,7 @@ BoxDescription read_box(const YamlNode& node) {
   BoxDescription box{node.vec3("min"), node.vec3("max")};
   for (std::size_t i = 0; i < 3; ++i) {
     if (box.min_m[i] < box.max_m[i]) continue;
-    (void)node.at("max").as_vec3(above(box.min_m[i], 1e6));  // says what is wrong, and where
+    (void)node.at("max").as_vec3(above(box.min_m[i], 1e6));  // throws the error that names the place
   }
   return box;
 }
@@ -276,6 +277,8 @@ CellLimits read_limits(const YamlNode& node) {
   CellLimits limits;
   limits.max_tool_speed_m_per_s =
       node.number_or("max_tool_speed_m_per_s", limits.max_tool_speed_m_per_s, above(0.0, 10.0));
+  limits.max_elbow_speed_m_per_s =
+      node.number_or("max_elbow_speed_m_per_s", limits.max_tool_speed_m_per_s, above(0.0, 10.0));
   limits.max_tool_acceleration_m_per_s2 =
       node.number_or("max_tool_acceleration_m_per_s2", limits.max_tool_acceleration_m_per_s2, above(0.0, 1000.0));
   limits.max_force_N = node.number_or("max_force_N", limits.max_force_N, above(0.0, 1e5));

@@ -46,7 +46,7 @@ struct ModbusLineDescription {
   [[nodiscard]] bool serial() const noexcept { return host.empty(); }
 };
 
-// How the drive of a joint behaves that only a simulation must know.
+// The behaviour of a joint's drive that only a simulation needs to know.
 struct SimulatedDrive {
   double coulomb_friction_Nm = 0.0;  // at the joint, motor side of the gear
   double viscous_friction_Nms_per_rad = 0.0;
@@ -61,7 +61,7 @@ struct SimulatedDrive {
   double servo_rate_Hz = 4000.0;
 };
 
-// Where a CANopen drive has what the profile CiA 402 has elsewhere, as index << 8 | sub-index.
+// Objects that a CANopen drive has elsewhere than the profile CiA 402 says, as index << 8 | sub-index.
 struct DriveObjects {
   std::uint32_t target = 0;  // 0: what the mode has, 607Ah, 60C1h:01 or 6071h
   std::uint32_t controlword = 0x604000, statusword = 0x604100, position = 0x606400, torque = 0x607700;
@@ -137,6 +137,7 @@ struct BoxDescription {
 
 struct CellLimits {
   double max_tool_speed_m_per_s = 0.5;
+  double max_elbow_speed_m_per_s = 0.5;  // of elbow and wrist; a cell that doesn't say has the tool's
   double max_tool_acceleration_m_per_s2 = 20.0;
   double max_force_N = 200.0;         // above it the sensor's reading is taken as a fault
   double max_power_W = 80.0;          // that the arm gives to the hand or takes from it; 0: no limit

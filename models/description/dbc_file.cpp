@@ -5,8 +5,8 @@
 #include <iterator>
 #include <optional>
 
-#include "models/description/setup_error.hpp"
-#include "models/description/text.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::description {
 namespace {

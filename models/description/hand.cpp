@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/description/yaml_file.hpp"
+#include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 #include <tuple>
 
-#include "models/description/yaml_file.hpp"
+#include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -18,7 +18,7 @@ std::uint16_t read_register(const YamlNode& node, std::string_view key) {
 
 int read_width(const YamlNode& node) { return static_cast<int>(node.integer_or("registers", 2, 1, 2)); }
 
-// What fits: signed or unsigned, 16 or 32 bits.
+// The range of values that fit one or two registers, signed or unsigned.
 std::int64_t read_value(const YamlNode& node, std::string_view key, std::int64_t otherwise, int registers) {
   const std::int64_t low = registers == 1 ? -0x8000 : std::numeric_limits<std::int32_t>::min();
   const std::int64_t high = registers == 1 ? 0xFFFF : 0xFFFFFFFF;
@@ -62,7 +62,7 @@ int count_of(const ModbusDriveDescription& drive, ModbusValue::Signal signal) {
                                         [&](const ModbusValue& value) { return value.signal == signal; }));
 }
 
-// What the drive is told in one register can't mean two things, nor can it be found where it was told.
+// The registers that are written must not overlap each other, nor those that are read.
 struct Registers {
   int first, count;
   std::string name;
@@ -109,7 +109,7 @@ void read_control(const YamlNode& node, ModbusDriveDescription& drive) {
   if (drive.control_on == drive.control_off) throw node.error_at("on", "a control word other than `off`");
 }
 
-// Bits that are looked for must be there, and a fault mustn't look like its absence.
+// Masks must name bits of the status word, and a fault's bits must differ from those without a fault.
 void check_status(const YamlNode& node, const ModbusDriveDescription& drive) {
   const std::uint32_t bits = drive.status.registers == 1 ? 0xFFFF : 0xFFFFFFFF;
   const std::tuple<const char*, std::uint32_t, std::uint32_t> masks[] = {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "models/description/yaml_file.hpp"
+#include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
 namespace {

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "models/description/dbc_file.hpp"
-#include "models/description/yaml_file.hpp"
+#include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -53,7 +53,7 @@ struct Reader {
            "big_endian";
   }
 
-  // `within`: how many bytes there are.
+  // Reads where a number is; throws unless it lies within the first `within` bytes.
   [[nodiscard]] NumberField read_number(const YamlNode& node, std::size_t within) const {
     NumberField number;
     if (node.has("signal")) {
@@ -162,7 +162,7 @@ struct Reader {
     return signal;
   }
 
-  // As one frame that is long enough, of whose identifier nobody hears.
+  // The registers count as one frame that is long enough; its identifier isn't used.
   void read_registers() {
     const YamlNode node = root.map("registers");
     SensorRegisters registers;
@@ -183,7 +183,7 @@ struct Reader {
     if (root.has("registers")) return read_registers();
     for (const YamlNode& node : root.list("frames", 1, max_sample_frames)) protocol.frames.push_back(read_frame(node));
     if (protocol.sample_bytes() > max_sample_bytes) throw root.error_at("frames", "up to 256 bytes in all");
-    // Else the second of two frames with one identifier could not be told from the first.
+    // Two frames with the same identifier couldn't be told apart otherwise.
     for (std::size_t i = 1; i < protocol.frames.size(); ++i) {
       const SampleFrame &first = protocol.frames[0], &other = protocol.frames[i];
       if (first.id == other.id && first.bytes == other.bytes && first.starts_with.empty()) {
@@ -302,7 +302,7 @@ struct Reader {
       throw root.error_at("rate_Hz", "a rate whose code, divides_Hz / rate_Hz, is from 1 to " +
                                          number_text(protocol.rate->value->highest()));
     }
-    // 1 % off is another sensor's crystal; more is a mistake.
+    // A deviation of 1 % is that of a sensor's crystal; more is a mistake.
     if (std::abs(protocol.rate->divides_Hz / value - protocol.rate_Hz) > 0.01 * protocol.rate_Hz) {
       throw root.error_at("rate_Hz", "a rate that the sensor has: " + number_text(protocol.rate->divides_Hz / value) +
                                          " is the nearest");

@@ -1,7 +1,7 @@
 #include "models/description/supervision.hpp"
 
-#include "models/description/text.hpp"
-#include "models/description/yaml_file.hpp"
+#include "models/base/text.hpp"
+#include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
 
@@ -14,6 +14,8 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"feedback_late", {"continue", "slow"}},
       {"position_implausible", {"stop_0", "stop_1"}},
       {"leash_exceeded", {"stop_1", "hold"}},
+      {"tool_too_fast", {"stop_0", "stop_1"}},
+      {"tool_off_limits", {"stop_1", "stop_0"}},
       {"proxy_squeezed", {"stop_1", "hold"}},
       {"bus_off", {"stop_1", "stop_0"}},
       {"interface_down", {"stop_1", "stop_0"}},

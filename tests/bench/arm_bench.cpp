@@ -1,7 +1,7 @@
 // What the arm costs in a cycle: kinematics, its inverse, statics.
 #include <benchmark/benchmark.h>
 
-#include "models/inverse_kinematics.hpp"
+#include "models/arm/inverse_kinematics.hpp"
 #include "tests/source_file.hpp"
 
 namespace {

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "fieldbus/bus_budget.hpp"
-#include "fieldbus/candump_log.hpp"
-#include "fieldbus/simulated_can_network.hpp"
+#include "fieldbus/budget/bus_budget.hpp"
+#include "fieldbus/can/candump_log.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
 
 namespace {
 

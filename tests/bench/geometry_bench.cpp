@@ -7,15 +7,15 @@
 #include <random>
 #include <vector>
 
-#include "models/box_obstacle.hpp"
-#include "models/cylinder_obstacle.hpp"
-#include "models/free_space.hpp"
-#include "models/friction_plane.hpp"
-#include "models/mesh_obstacle.hpp"
-#include "models/plane.hpp"
-#include "models/plane_composition.hpp"
-#include "models/plane_obstacle.hpp"
-#include "models/world.hpp"
+#include "models/mesh/mesh_obstacle.hpp"
+#include "models/obstacles/box_obstacle.hpp"
+#include "models/obstacles/cylinder_obstacle.hpp"
+#include "models/obstacles/plane_obstacle.hpp"
+#include "models/surfaces/free_space.hpp"
+#include "models/surfaces/friction_plane.hpp"
+#include "models/surfaces/plane.hpp"
+#include "models/surfaces/plane_composition.hpp"
+#include "models/world/world.hpp"
 
 namespace {
 

@@ -18,9 +18,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "models/mesh_surface.hpp"
-#include "scenes/mesh_file.hpp"
-#include "tests/models/mesh_shapes.hpp"
+#include "models/mesh/mesh_surface.hpp"
+#include "scenes/mesh_files/mesh_file.hpp"
+#include "tests/models/mesh/mesh_shapes.hpp"
 
 namespace {
 

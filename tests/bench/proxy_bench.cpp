@@ -5,18 +5,18 @@
 #include <random>
 #include <vector>
 
-#include "controller/admittance_proxy.hpp"
-#include "controller/cycle_record.hpp"
-#include "controller/limited_algorithm.hpp"
-#include "controller/passivity.hpp"
-#include "controller/session_record.hpp"
-#include "controller/spsc_ring.hpp"
-#include "controller/stability.hpp"
-#include "controller/summary.hpp"
-#include "models/free_space.hpp"
-#include "models/friction_plane.hpp"
-#include "models/round_obstacle.hpp"
-#include "models/world.hpp"
+#include "controller/limits/limited_algorithm.hpp"
+#include "controller/record/cycle_record.hpp"
+#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/report/session_record.hpp"
+#include "controller/report/summary.hpp"
+#include "controller/stability/passivity.hpp"
+#include "controller/stability/stability.hpp"
+#include "models/base/spsc_ring.hpp"
+#include "models/obstacles/round_obstacle.hpp"
+#include "models/surfaces/free_space.hpp"
+#include "models/surfaces/friction_plane.hpp"
+#include "models/world/world.hpp"
 
 namespace {
 

@@ -17,8 +17,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include "tests/controller/closed_loop_rig.hpp"
-#include "tests/models/random_states.hpp"
+#include "tests/controller/closed_loop/closed_loop_rig.hpp"
+#include "tests/models/surfaces/random_states.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace proxarm::controller {
@@ -280,9 +280,9 @@ class Watch {
 std::string run(const Session& session, State& state, Digest& digest) {
   ClosedLoopRig rig(session.options);
   Cycle cycle(rig.prepared_parts(rig.network), session.options.settings, rig.cell.limits, 64);
-  cycle.schedule(session.options.changes);
-  cycle.schedule(session.options.commands);
-  cycle.schedule(session.options.timesteps);
+  cycle.changes().schedule(session.options.changes);
+  cycle.commands().schedule(session.options.commands);
+  cycle.timesteps().schedule(session.options.timesteps);
   Watch watch(rig);
   CycleRecord record;
   std::int64_t begun_ns = 0;
@@ -295,7 +295,7 @@ std::string run(const Session& session, State& state, Digest& digest) {
                              while (cycle.records().pop(record)) watch.see(record, digest);
                              if (watch.seen_s() > patience_s) cycle.request_stop();
                            }};
-  const SessionTally tally = run_session(cycle, rig.network, session.options.duration_s, hooks);
+  const SessionTally tally = run_session(cycle, rig.network, {session.options.duration_s}, hooks);
   const double elapsed_s = 1e-9 * static_cast<double>(rig.network.now_ns() - begun_ns);
   const Fault fault = cycle.supervisor().report().fault;
   const double rendered_s = 1e-9 * static_cast<double>(cycle.rendered_ns());

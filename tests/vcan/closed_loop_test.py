@@ -44,7 +44,7 @@ class ClosedLoop:
         self.assertGreater(summary["contact_time_s"], 2.0)
         self.assertGreater(summary["sliding_time_s"], 0.5)
         self.assertEqual(summary["pulling_force_max_N"], 0.0)
-        self.assertAlmostEqual(summary["apparent_mass_kg"] / summary["felt_mass_kg"], 1.0, delta=0.05)
+        self.assertAlmostEqual(summary["apparent_mass_kg"] / summary["wanted_mass_kg"], 1.0, delta=0.05)
         self.assertLess(summary["tracking_max_m"], 0.5e-3)
         # Encoders stand in for the simulation's truth here.
         self.assertEqual(summary["source"], "sensor and encoders")

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "controller/admittance_proxy.hpp"
-#include "models/geometric_algorithm.hpp"
+#include "controller/rendering/admittance_proxy.hpp"
+#include "models/geometry/geometric_algorithm.hpp"
 
 using proxarm::controller::AdmittanceProxy;
 using proxarm::controller::ProxyFault;

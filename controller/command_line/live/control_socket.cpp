@@ -1,0 +1,329 @@
+#include "controller/command_line/live/control_socket.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <istream>
+#include <optional>
+#include <thread>
+#include <utility>  // before Asio 1.74, which forgets it
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/streambuf.hpp>
+#include <boost/asio/write.hpp>
+
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using boost::asio::local::stream_protocol;
+using boost::system::error_code;
+using description::SetupError;
+
+constexpr std::size_t longest_line = 1024;
+constexpr std::size_t most_connections = 16;        // a person has one or two
+constexpr auto patience = std::chrono::seconds(2);  // with somebody who connects and says nothing
+constexpr auto retry_after =
+    std::chrono::milliseconds(10);  // what keeps accept from succeeding lasts longer than a call
+constexpr auto time_for_a_line = std::chrono::milliseconds(50);  // from connecting, where descriptors are scarce
+constexpr int answer_within_ms = 5000;  // of a session that is alive; changes take some milliseconds
+
+[[noreturn]] void refuse(const fs::path& path, const std::string& found, const std::string& expected) {
+  throw SetupError({.file = path.string(), .key = "--control", .found = found, .expected = expected});
+}
+
+void require_own_folder(const fs::path& folder) {
+  if (mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST) {
+    refuse(folder, std::strerror(errno), "a folder that can be made");
+  }
+  struct stat status {};
+  if (lstat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode)) refuse(folder, "no folder", "a folder");
+  if (status.st_uid != geteuid()) refuse(folder, "a folder of another user", "one of your own");
+  if ((status.st_mode & 077) != 0) refuse(folder, "a folder that others may enter", "mode 0700");
+}
+
+// Of a session that has died; one that lives answers.
+void remove_stale(const fs::path& path) {
+  struct stat status {};
+  if (lstat(path.c_str(), &status) != 0) return;
+  if (!S_ISSOCK(status.st_mode)) refuse(path, "something that is no socket", "a path that is free");
+  boost::asio::io_context context;
+  stream_protocol::socket socket(context);
+  error_code error;
+  socket.connect(stream_protocol::endpoint(path.string()), error);
+  if (!error) refuse(path, "the socket of another session", "a path that is free");
+  unlink(path.c_str());
+}
+
+stream_protocol::endpoint endpoint_of(const fs::path& path) {
+  if (path.string().size() > 100) refuse(path, "a path of more than 100 bytes", "a shorter one");
+  return stream_protocol::endpoint(path.string());
+}
+
+bool is_owner(stream_protocol::socket& socket) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  return getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &peer, &size) == 0 &&
+         (peer.uid == geteuid() || peer.uid == 0);
+}
+
+}  // namespace
+
+namespace {
+
+// A client: one line, one answer.
+struct Connection {
+  explicit Connection(boost::asio::io_context& context) : socket(context), timer(context) {}
+
+  stream_protocol::socket socket;
+  boost::asio::steady_timer timer;
+  boost::asio::streambuf line{longest_line};
+  std::string answer;
+  std::atomic<bool> closed{false};  // read by the thread of changes
+  std::chrono::steady_clock::time_point since = std::chrono::steady_clock::now();
+};
+using Client = std::shared_ptr<Connection>;
+
+// Anything that is thrown is an answer: an exception out of the thread would end the session in motion.
+template <typename Handle>
+std::string answer_of(const Handle& handle) {
+  try {
+    return "ok: " + handle() + "\n";
+  } catch (const std::exception& error) {
+    return std::string("refused: ") + error.what() + "\n";
+  }
+}
+
+// File descriptors that are kept for when there are no others.
+class Reserve {
+ public:
+  Reserve() {
+    kept_.fill(-1);
+    keep();
+  }
+  Reserve(const Reserve&) = delete;
+  Reserve& operator=(const Reserve&) = delete;
+  ~Reserve() { give(); }
+
+  // Of those that were given away, as many as there are again.
+  void keep() noexcept {
+    for (int& kept : kept_) {
+      if (kept < 0) kept = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    }
+  }
+  // False: there is none.
+  bool give() noexcept {
+    bool given = false;
+    for (int& kept : kept_) {
+      if (kept < 0) continue;
+      close(std::exchange(kept, -1));
+      given = true;
+    }
+    return given;
+  }
+
+ private:
+  std::array<int, 4> kept_{};
+};
+
+// Held by the session that listens at `path`. The file stays: removing it would let two hold it.
+class PathLock {
+ public:
+  explicit PathLock(const fs::path& path)
+      : descriptor_(open((path.string() + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600)) {
+    if (descriptor_ >= 0 && flock(descriptor_, LOCK_EX | LOCK_NB) == 0) return;
+    const int why = errno;
+    if (descriptor_ >= 0) close(descriptor_);
+    refuse(path, why == EWOULDBLOCK ? "the socket of another session" : std::strerror(why), "a path that is free");
+  }
+  PathLock(const PathLock&) = delete;
+  PathLock& operator=(const PathLock&) = delete;
+  ~PathLock() { close(descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+// The path, free for a socket and for nobody else. What is done about a socket that is there already is done under the
+// lock: else it could be that of a session which begins.
+std::unique_ptr<PathLock> claim(const fs::path& path) {
+  (void)endpoint_of(path);
+  require_own_folder(path.parent_path());
+  auto lock = std::make_unique<PathLock>(path);
+  remove_stale(path);
+  return lock;
+}
+
+}  // namespace
+
+// Everything but `judge` runs in the thread of `context`.
+struct ControlSocket::State {
+  State(const fs::path& at, ControlHandlers h) : path(at), handlers(std::move(h)), lock(claim(at)) {}
+
+  fs::path path;
+  ControlHandlers handlers;
+  std::unique_ptr<PathLock> lock;
+  boost::asio::io_context context{1}, judging{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work = boost::asio::make_work_guard(judging);
+  stream_protocol::acceptor acceptor{context};
+  boost::asio::steady_timer retry{context};
+  Reserve reserve;
+  std::deque<Client> clients;  // the oldest first
+  std::thread thread, judging_thread;
+
+  void accept() {
+    const Client client = std::make_shared<Connection>(context);
+    acceptor.async_accept(client->socket, [this, client](const error_code& error) {
+      if (error == boost::asio::error::operation_aborted) return;
+      if (error) return accept_later();
+      client->since = std::chrono::steady_clock::now();
+      clients.push_back(client);
+      if (clients.size() > most_connections) end(clients.front());
+      if (is_owner(client->socket)) {
+        listen(client);
+      } else {
+        end(client);
+      }
+      accept();
+    });
+  }
+  // Mostly for want of a file descriptor, which accept takes before it looks whether anybody is there: the clients that
+  // are being served are no reason to end one, unless it had time to say what it wants.
+  void accept_later() {
+    const auto latest = std::chrono::steady_clock::now() - time_for_a_line;
+    if (!reserve.give() && !clients.empty() && clients.front()->since < latest) end(clients.front());
+    retry.expires_after(retry_after);
+    retry.async_wait([this](const error_code& error) {
+      if (!error) accept();
+    });
+  }
+  void listen(const Client& client) {
+    client->timer.expires_after(patience);
+    client->timer.async_wait([this, client](const error_code& error) {
+      if (!error) end(client);
+    });
+    boost::asio::async_read_until(client->socket, client->line, '\n',
+                                  [this, client](const error_code& error, std::size_t) {
+                                    if (error) return end(client);
+                                    take(client);
+                                  });
+  }
+  void take(const Client& client) {
+    std::istream in(&client->line);
+    std::string text;
+    std::getline(in, text);
+    bool is_order = true;
+    std::string answer = answer_of([&] {
+      const std::optional<std::string> done = handlers.order(text);
+      is_order = done.has_value();
+      return done.value_or("");
+    });
+    if (is_order) return reply(client, std::move(answer));
+    boost::asio::post(judging, [this, client, text] { judge(client, text); });
+  }
+  void judge(const Client& client, const std::string& text) {
+    if (client->closed.load()) return;  // nobody would hear what has become of it
+    std::string answer = answer_of([&] { return handlers.change(text); });
+    boost::asio::post(context, [this, client, answer = std::move(answer)] { reply(client, answer); });
+  }
+  void reply(const Client& client, std::string answer) {
+    client->answer = std::move(answer);
+    boost::asio::async_write(client->socket, boost::asio::buffer(client->answer),
+                             [this, client](const error_code&, std::size_t) { end(client); });
+  }
+  void end(Client client) {  // by value: it may be the list's own
+    error_code ignored;
+    client->closed.store(true);
+    client->timer.cancel();
+    client->socket.close(ignored);
+    std::erase(clients, client);
+    reserve.keep();
+  }
+};
+
+ControlSocket::ControlSocket(const fs::path& path, ControlHandlers handlers)
+    : state_(std::make_unique<State>(fs::absolute(path), std::move(handlers))) {
+  const stream_protocol::endpoint endpoint = endpoint_of(state_->path);
+  error_code error;
+  state_->acceptor.open(endpoint.protocol(), error);
+  if (!error) state_->acceptor.bind(endpoint, error);
+  if (error) refuse(path, error.message(), "a path where a socket can be made");
+  chmod(state_->path.c_str(), 0600);  // nobody else could come here before: the folder is ours alone
+  state_->acceptor.listen();
+  state_->accept();
+  state_->judging_thread = std::thread([this] { state_->judging.run(); });
+  state_->thread = std::thread([this] { state_->context.run(); });
+}
+
+ControlSocket::~ControlSocket() {
+  state_->judging.stop();
+  state_->judging_thread.join();
+  state_->context.stop();
+  state_->thread.join();
+  unlink(state_->path.c_str());
+}
+
+void require_control_path(const fs::path& path) { (void)claim(fs::absolute(path)); }
+
+std::string ask_control_socket(const fs::path& path, const std::string& line) {
+  if (line.size() + 1 > longest_line || line.find('\n') != std::string::npos) {
+    throw SetupError({.found = description::in_quotes(line.substr(0, 40)), .expected = "NAME=VALUE"});
+  }
+  boost::asio::io_context context;
+  stream_protocol::socket socket(context);
+  error_code error;
+  socket.connect(endpoint_of(fs::absolute(path)), error);
+  if (error) {
+    const bool nobody = error == boost::asio::error::connection_refused;
+    const bool nothing = error == boost::system::errc::no_such_file_or_directory;
+    throw SetupError({.file = path.string(),
+                      .key = "--control",
+                      .found = nothing  ? "no such socket"
+                               : nobody ? "a socket whose session has ended"
+                                        : error.message(),
+                      .expected = "a session that listens there",
+                      .advice = "start it with `proxarm run --control " + path.string() + "`"});
+  }
+  boost::asio::write(socket, boost::asio::buffer(line + "\n"), error);
+  pollfd answered{socket.native_handle(), POLLIN, 0};
+  boost::asio::streambuf answer;
+  if (poll(&answered, 1, answer_within_ms) == 1) boost::asio::read_until(socket, answer, '\n', error);
+  std::istream in(&answer);
+  std::string text;
+  if (!std::getline(in, text)) {
+    throw SetupError({.file = path.string(),
+                      .key = "--control",
+                      .found = "no answer",
+                      .expected = "one",
+                      .advice = "is the session suspended, or flooded by others?"});
+  }
+  return text;
+}
+
+fs::path default_control_path() {
+  const char* const runtime = std::getenv("XDG_RUNTIME_DIR");
+  if (runtime != nullptr && *runtime != '\0') return fs::path(runtime) / "proxarm" / "control";
+  return fs::path("/tmp") / ("proxarm-" + std::to_string(geteuid())) / "control";
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,298 @@
+#include "controller/command_line/live/live_parameters.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <sstream>
+
+#include "controller/command_line/live/orders.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/session/bring_up.hpp"
+#include "models/base/quantity.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
+#include "scenes/compiler/compile.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using controller::Change;
+using controller::Parameter;
+using description::SetupError;
+
+struct Live {
+  const char* name;
+  Parameter parameter;
+  double (*parse)(std::string_view text, std::string_view option);
+};
+
+constexpr Live live[] = {{"mass", Parameter::mass, description::parse_mass},
+                         {"damping", Parameter::damping, description::parse_damping},
+                         {"spring", Parameter::spring, description::parse_stiffness}};
+
+const Live& find(const std::string& text) {
+  const std::string name = text.substr(0, text.find('='));
+  std::vector<std::string> known;
+  for (const Live& parameter : live) {
+    if (name == parameter.name && text.find('=') != std::string::npos) return parameter;
+    known.emplace_back(parameter.name);
+  }
+  throw SetupError({.key = "--set",
+                    .found = description::in_quotes(text),
+                    .expected = "NAME=VALUE with NAME " + description::one_of(known) +
+                                ", timestep, OBJECT.friction, OBJECT.position_m"});
+}
+
+[[noreturn]] void refuse(const std::string& key, const std::string& found, const std::string& expected,
+                         const std::string& advice = "") {
+  throw SetupError({.key = key, .found = found, .expected = expected, .advice = advice});
+}
+
+double number_of(const std::string& text, const std::string& key, const std::string& expected, double least,
+                 double most) {
+  const std::optional<double> value = description::strict_number(text);
+  if (!value || !(*value >= least && *value <= most)) refuse(key, description::in_quotes(text), expected);
+  return *value;
+}
+
+constexpr double most_friction = 10.0;
+constexpr double farthest_m = 10.0;
+
+// "NAME.friction=MU", "NAME.position_m=X,Y,Z". Nothing where there is no such key.
+std::optional<Change> change_of_object(const std::string& text, const scenes::Scene& scene) {
+  const std::size_t equals = text.find('='), dot = text.rfind('.', equals);
+  if (equals == std::string::npos || dot == std::string::npos) return {};
+  const std::string name = text.substr(0, dot), what = text.substr(dot + 1, equals - dot - 1);
+  const std::string key = text.substr(0, equals), value = text.substr(equals + 1);
+  if (what != "friction" && what != "position_m") refuse(key, description::in_quotes(what), "friction or position_m");
+  const auto object =
+      std::find_if(scene.objects.begin(), scene.objects.end(), [&](const scenes::Object& o) { return o.name == name; });
+  if (object == scene.objects.end()) {
+    std::vector<std::string> names;
+    for (const scenes::Object& o : scene.objects) names.push_back(o.name);
+    refuse(
+        key, description::in_quotes(name),
+        names.empty() ? "an object, and this scene has none" : "an object of the scene: " + description::one_of(names));
+  }
+  Change change;
+  change.object = static_cast<std::int32_t>(object - scene.objects.begin());
+  if (what == "friction") {
+    change.parameter = Parameter::friction;
+    change.value = number_of(value, key, "a friction coefficient from 0 to 10", 0.0, most_friction);
+    if (scenes::compile(scene).has_friction(static_cast<std::size_t>(change.object))) return change;
+    refuse(key, "a single wall without friction, which is compiled without, or friction by region",
+           "an object whose friction can change", "give it some in the scene file, such as friction: 0.001");
+  }
+  change.parameter = Parameter::position;
+  if (!object->motion || !object->motion->driven) {
+    refuse(key, "an object that stands still", "an object that is driven",
+           "give it motion: {driven: true} in the scene file");
+  }
+  std::istringstream parts(value + ",");
+  for (double& x : change.position_m) {
+    std::string part;
+    std::getline(parts, part, ',');
+    x = number_of(part, key, "three numbers X,Y,Z, metres from where it is described, at most 10", -farthest_m,
+                  farthest_m);
+  }
+  if (parts.peek() != std::istringstream::traits_type::eof())
+    refuse(key, description::in_quotes(value), "three numbers");
+  return change;
+}
+
+fs::path control_path(const RunOptions& options) {
+  return options.control == "default" ? default_control_path() : options.control;
+}
+
+}  // namespace
+
+LiveParameters::LiveParameters(const PreparedSession& session, const RunOptions& options)
+    : session_(session), options_(options) {}
+
+void LiveParameters::follow(double period_s) {
+  if (period_s != session_.settings.period_s) session_ = with_timestep(session_, named(period_s), period_s);
+}
+
+// So that a message names it.
+RunOptions LiveParameters::named(double period_s) const {
+  RunOptions judged = options_;
+  judged.mass_kg = session_.settings.mass_kg;
+  judged.period_s = period_s;
+  return judged;
+}
+
+controller::Timestep LiveParameters::take_timestep(const std::string& text) {
+  const double period_s = description::parse_duration(text.substr(text.find('=') + 1), "timestep");
+  if (!session_.cell.modbus_lines.empty()) {
+    refuse("timestep", "a cell with a Modbus line", "drives and sensor on CAN: what is on a line keeps its timestep",
+           "start a new session with --timestep");
+  }
+  const RunOptions judged = named(period_s);
+  PreparedSession changed = with_timestep(session_, judged, period_s);
+  controller::require_timestep(changed.cell, changed.settings);
+  require_stable(changed, judged);
+  if (options_.bus.simulated()) {
+    require_carried(changed);
+  } else {
+    warn_if_not_carried(changed, buses_in_order(changed.cell));
+  }
+  session_ = std::move(changed);
+  const controller::SessionSettings& settings = session_.settings;
+  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples};
+}
+
+bool LiveParameters::is_timestep(const std::string& text) { return text.compare(0, 9, "timestep=") == 0; }
+
+controller::Change LiveParameters::take(const std::string& text) {
+  if (const std::optional<Change> change = change_of_object(text, session_.scene)) return *change;
+  const Live& parameter = find(text);
+  const double value = parameter.parse(text.substr(text.find('=') + 1), parameter.name);
+  PreparedSession changed = session_;
+  switch (parameter.parameter) {
+    case Parameter::mass:
+      changed.settings.mass_kg = value;
+      break;
+    case Parameter::damping:
+      changed.settings.damping_Ns_per_m = changed.loop.damping_Ns_per_m = value;
+      break;
+    case Parameter::spring:
+      changed.settings.spring_N_per_m = changed.loop.spring_N_per_m = value;
+      break;
+    case Parameter::friction:
+    case Parameter::position:
+    case Parameter::none:
+      break;
+  }
+  RunOptions judged = options_;
+  judged.mass_kg = changed.settings.mass_kg;  // so that the message names it
+  require_stable(changed, judged);
+  session_ = std::move(changed);
+  const double handle_kg = parameter.parameter == Parameter::mass ? session_.cell.tool.mass_kg : 0.0;
+  return {.parameter = parameter.parameter, .value = value - handle_kg, .period_s = session_.settings.period_s};
+}
+
+namespace {
+
+struct Script {
+  std::vector<controller::ScheduledChange> changes;
+  std::vector<controller::ScheduledTimestep> timesteps;
+};
+
+// "mass=3@4s", after four seconds of rendering, in any order of times. Throws SetupError.
+Script script_of(const std::vector<std::string>& texts, const PreparedSession& session, const RunOptions& options) {
+  struct Timed {
+    double time_s;
+    std::string text;
+  };
+  std::vector<Timed> timed;
+  for (const std::string& text : texts) {
+    const std::size_t at = text.rfind('@');
+    if (at == std::string::npos) {
+      throw SetupError({.key = "--set",
+                        .found = description::in_quotes(text),
+                        .expected = "NAME=VALUE@TIME",
+                        .advice = "such as mass=3@4s: after four seconds of rendering"});
+    }
+    timed.push_back({description::parse_duration(text.substr(at + 1), "--set"), text.substr(0, at)});
+  }
+  std::stable_sort(timed.begin(), timed.end(), [](const Timed& a, const Timed& b) { return a.time_s < b.time_s; });
+  LiveParameters parameters(session, options);
+  Script script;
+  for (const Timed& change : timed) {
+    const std::int64_t rendered_ns = std::llround(1e9 * change.time_s);
+    if (LiveParameters::is_timestep(change.text)) {
+      script.timesteps.push_back({rendered_ns, parameters.take_timestep(change.text)});
+    } else {
+      script.changes.push_back({rendered_ns, parameters.take(change.text)});
+    }
+  }
+  return script;
+}
+
+// What an order through the socket does; the answer. Nothing: the line is no order.
+std::optional<std::string> obey(controller::Cycle& cycle, const std::string& line) {
+  const auto command = parse_order(line);
+  if (!command) return std::nullopt;
+  const char* const refusal = cycle.status().refusal(command->order);
+  if (refusal != nullptr) throw SetupError({.message = refusal});
+  if (!cycle.commands().push(*command)) throw SetupError({.found = "too many commands at once"});
+  return line;
+}
+
+std::vector<std::string> split_at_tabs(const std::string& line) {
+  std::vector<std::string> parts;
+  std::istringstream in(line);
+  for (std::string part; std::getline(in, part, '\t');) parts.push_back(part);
+  return parts;
+}
+
+// All of a line's changes or, where one of them is refused, none.
+void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std::vector<std::string>& texts) {
+  LiveParameters changed = parameters;
+  std::vector<Change> changes;
+  for (const std::string& text : texts) {
+    if (LiveParameters::is_timestep(text)) {
+      refuse("timestep", "one that is set together with others", "one that is set by itself",
+             "set the others when the drives have confirmed it: what they may be depends on it");
+    }
+    changes.push_back(changed.take(text));
+  }
+  if (cycle.changes().room() < changes.size()) {
+    throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});
+  }
+  for (const Change& change : changes) cycle.changes().push(change);
+  parameters = std::move(changed);
+}
+
+// What changes through the socket do; the answer.
+std::string change(controller::Cycle& cycle, LiveParameters& parameters, const std::string& line) {
+  if (cycle.status().changes_timestep() || cycle.status().answered_timesteps() != parameters.asked_timesteps()) {
+    refuse(line, "a timestep that is being changed", "a session that has one", "ask again in a moment");
+  }
+  parameters.follow(cycle.status().period_s());
+  if (LiveParameters::is_timestep(line) && line.find('\t') == std::string::npos) {
+    if (const char* const refusal = cycle.status().timestep_refusal())
+      throw SetupError({.key = "timestep", .message = refusal});
+    if (!cycle.timesteps().push(parameters.take_timestep(line))) throw SetupError({.found = "too many at once"});
+    parameters.count_timestep();
+    return line + ": the arm stops, the drives are told, rendering goes on; the session says whether all have taken it";
+  }
+  change_all(cycle, parameters, split_at_tabs(line));
+  return line;
+}
+
+}  // namespace
+
+void require_changes(const PreparedSession& session, const RunOptions& options) {
+  const bool asked = !options.changes.empty() || !options.control.empty() || !options.orders.empty();
+  if (session.impedance() && asked) {
+    throw SetupError(
+        {.key = !options.changes.empty()  ? "--set"
+                : !options.orders.empty() ? "--do"
+                                          : "--control",
+         .found = "the impedance type",
+         .expected =
+             "--scheme admittance: mass, damping and spring are the proxy's, and torques are made for one timestep"});
+  }
+  (void)script_of(options.changes, session, options);
+  (void)scheduled_orders(options.orders);
+  if (!options.control.empty()) require_control_path(control_path(options));
+}
+
+std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
+                                            const RunOptions& options) {
+  Script script = script_of(options.changes, session, options);
+  cycle.changes().schedule(std::move(script.changes));
+  cycle.timesteps().schedule(std::move(script.timesteps));
+  cycle.commands().schedule(scheduled_orders(options.orders));
+  if (options.control.empty()) return nullptr;
+  const auto parameters = std::make_shared<LiveParameters>(session, options);
+  return std::make_unique<ControlSocket>(
+      control_path(options),
+      ControlHandlers{[&cycle](const std::string& line) { return obey(cycle, line); },
+                      [&cycle, parameters](const std::string& line) { return change(cycle, *parameters, line); }});
+}
+
+}  // namespace proxarm::command_line

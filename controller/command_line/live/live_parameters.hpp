@@ -1,0 +1,51 @@
+// The parameters of a session that may change while it runs, as text: "mass=3", "damping=20Ns/m", "spring=0"; of an
+// object by its name "wall.friction=0.5", "plate.position_m=0.1,0,0".
+//
+// Each change is judged as it would be at the start, with what has been changed before; what is refused changes
+// nothing.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "controller/command_line/live/control_socket.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/cycle/cycle.hpp"
+#include "controller/rendering/change.hpp"
+
+namespace proxarm::command_line {
+
+class LiveParameters {
+ public:
+  // `force_unstable` as in RunOptions. `session` must outlive it.
+  LiveParameters(const PreparedSession& session, const RunOptions& options);
+
+  // Throws SetupError.
+  controller::Change take(const std::string& text);
+  // "timestep=2ms".
+  [[nodiscard]] static bool is_timestep(const std::string& text);
+  // Judged by what the start judges it by, as far as it depends on T. Throws SetupError.
+  controller::Timestep take_timestep(const std::string& text);
+  // What the session's timestep really is: drives may have refused the last one.
+  void follow(double period_s);
+  // Of those that were handed on.
+  void count_timestep() noexcept { ++asked_timesteps_; }
+  [[nodiscard]] std::uint32_t asked_timesteps() const noexcept { return asked_timesteps_; }
+
+ private:
+  [[nodiscard]] RunOptions named(double period_s) const;
+
+  PreparedSession session_;
+  RunOptions options_;
+  std::uint32_t asked_timesteps_ = 0;
+};
+
+// Of the script and the socket, before a bus is opened. Throws SetupError.
+void require_changes(const PreparedSession& session, const RunOptions& options);
+
+// The session's script, and its socket where one is wanted; null without.
+std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
+                                            const RunOptions& options);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,37 @@
+#include "controller/command_line/live/standard_streams.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+
+#include "controller/command_line/preparation/exit_status.hpp"
+
+namespace proxarm::command_line {
+
+void open_standard_descriptors() noexcept {
+  // open() takes the lowest number that is free, so that each lands where it is wanted.
+  for (int descriptor = STDIN_FILENO; descriptor <= STDERR_FILENO; ++descriptor) {
+    if (fcntl(descriptor, F_GETFD) != -1) continue;
+    [[maybe_unused]] const int opened = open("/dev/null", descriptor == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+  }
+}
+
+int flush_standard_output(int status) noexcept {
+  errno = 0;
+  std::cout.flush();
+  const bool lost = std::fflush(stdout) != 0 || std::ferror(stdout) != 0 || !std::cout;
+  if (!lost) return status;
+  if (errno == 0) {  // it was lost earlier; another character fails for the same reason
+    std::fputc('\n', stdout);
+    std::fflush(stdout);
+  }
+  std::fprintf(stderr, "proxarm: standard output: %s; what was to be printed there is lost\n",
+               errno != 0 ? std::strerror(errno) : "it couldn't be written to");
+  return status == fine ? set_up_mistake : status;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,21 @@
+// The frames of a session's cycle on each bus, and whether the buses can carry them.
+#pragma once
+
+#include <vector>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/session/bring_up.hpp"
+#include "fieldbus/budget/bus_budget.hpp"
+
+namespace proxarm::command_line {
+
+// One plan per bus of the network: buses of the cell that share an interface are one logical bus, with the lowest
+// bitrate among them. `indices[i]` is where the cell's bus i is.
+std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices);
+
+// Throws SetupError with the arithmetic where a bus of the cell, each on a wire of its own, can't carry the timestep.
+void require_carried(const PreparedSession& session);
+// The same as a warning on standard error: virtual interfaces have no bit timing, so the session runs nevertheless.
+void warn_if_not_carried(const PreparedSession& session, const controller::BusIndices& indices);
+
+}  // namespace proxarm::command_line

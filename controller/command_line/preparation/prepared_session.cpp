@@ -1,0 +1,302 @@
+#include "controller/command_line/preparation/prepared_session.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/file_kind.hpp"
+#include "controller/session/bring_up.hpp"
+#include "fieldbus/cia402/cia402_units.hpp"
+#include "models/arm/arm.hpp"
+#include "models/base/setup_error.hpp"
+#include "scenes/format/scene_file.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using std::numbers::pi;
+
+constexpr const char* default_cell = "models/cells/default.yaml";
+
+fs::path beside(const fs::path& file, const std::string& relative) {
+  return (file.parent_path() / relative).lexically_normal();
+}
+
+// Loads a file that the user may have named. One of another kind is told by its kind, not by the first key that is
+// strange to the loader.
+template <typename Load>
+auto loaded(const fs::path& file, FileKind kind, const Load& load) {
+  try {
+    return load(file);
+  } catch (const description::SetupError&) {
+    require_kind(file, kind);
+    throw;
+  }
+}
+
+// A missing file is told with its option: a number in its place is a common slip.
+void require_file(const fs::path& given, const char* option, const char* example) {
+  std::error_code ignored;
+  if (given.empty() || fs::exists(user_file(given), ignored)) return;
+  throw description::SetupError({.key = option,
+                                 .message = given.string() + ": no such file",
+                                 .expected = std::string("a file, such as ") + example});
+}
+
+fs::path chosen(const fs::path& given, const description::Cell& cell, const std::string& cells_own) {
+  return given.empty() ? beside(cell.file, cells_own) : user_file(given);
+}
+
+// Mean age of a sample: its converter holds it for half a period, its filter delays by its time constant.
+double sensor_delay_s(const description::SensorPlacement& sensor) {
+  double delay_s = sensor.delay_s;
+  if (sensor.sample_rate_Hz > 0.0) delay_s += 0.5 / sensor.sample_rate_Hz;
+  if (sensor.bandwidth_Hz > 0.0) delay_s += 1.0 / (2.0 * pi * sensor.bandwidth_Hz);
+  return delay_s;
+}
+
+// Of ElasticSetpoint's critically damped filter: 2/ω.
+double setpoint_filter_delay_s(const description::Cell& cell) {
+  return cell.limits.setpoint_bandwidth_Hz > 0.0 ? 2.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz) : 0.0;
+}
+
+// The slowest drive sets the pace.
+double drive_time_constant_s(const description::Cell& cell) {
+  double slowest_s = 0.0;
+  for (const description::DriveDescription& drive : cell.drives) {
+    slowest_s = std::max(slowest_s, 1.0 / (2.0 * pi * drive.position_bandwidth_Hz));
+  }
+  return slowest_s;
+}
+
+// A simulated sensor without noise repeats itself, a real one never does; and one that is slower than the cycle is read
+// several times per sample. 0: repetitions aren't counted.
+std::uint32_t repeats_allowed(const description::SensorPlacement& sensor, bool real, std::uint32_t samples,
+                              double period_s) {
+  if (!real && !(sensor.noise_N > 0.0)) return 0;
+  const double reads = sensor.sample_rate_Hz > 0.0 ? 1.0 / (period_s * sensor.sample_rate_Hz) : 1.0;
+  return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(reads, 1.0, 1000.0)));
+}
+
+// A sensor that sends less often than the cycle runs is missed only when several of its samples are.
+std::uint32_t missed_samples_allowed(const description::SensorDescription& sensor, std::uint32_t samples,
+                                     double period_s) {
+  if (!sensor.described || !sensor.described->streams()) return samples;
+  const double cycles = 1.0 / (period_s * sensor.described->rate_Hz);
+  return samples * static_cast<std::uint32_t>(std::ceil(std::clamp(cycles, 1.0, 1000.0)));
+}
+
+// What a stream adds: nothing puts it in step with the cycle.
+double stream_delay_s(const description::SensorDescription& sensor) {
+  return sensor.described && sensor.described->streams() ? 0.5 / sensor.described->rate_Hz : 0.0;
+}
+
+// Below, no machine's cycle can be; above, no hand would call it touch. What a drive can hold exactly is in between.
+constexpr double shortest_period_s = 50e-6, longest_period_s = 0.1;
+
+void require_period(const PreparedSession& session, const RunOptions& options) {
+  const double period_s = session.settings.period_s;
+  std::array<char, 32> found{};
+  std::snprintf(found.data(), found.size(), "%.9g ms", 1e3 * period_s);
+  const auto refuse = [&](const char* expected, const char* advice) {
+    throw description::SetupError({.file = options.period_s ? "" : session.cell.file.string(),
+                                   .key = options.period_s ? "--timestep" : "default_period_s",
+                                   .found = found.data(),
+                                   .expected = expected,
+                                   .advice = advice});
+  };
+  if (!(period_s >= shortest_period_s && period_s <= longest_period_s)) refuse("0.05 to 100 ms", "");
+  const std::int64_t period_ns = std::llround(1e9 * period_s);
+  if (period_ns % 1000 != 0 || !fieldbus::interpolation_period(period_ns)) {
+    refuse("what drives can hold exactly: 1 to 255 times a power of ten of seconds (60C2h), in whole microseconds",
+           "such as 0.5ms, 1ms, 1.5ms, 2ms, 4ms");
+  }
+}
+
+// T, and what is counted in cycles of it.
+void set_timestep(PreparedSession& session, const RunOptions& options, double period_s) {
+  controller::SessionSettings& settings = session.settings;
+  settings.period_s = session.loop.period_s = period_s;
+  settings.max_repeated_samples =
+      repeats_allowed(session.cell.sensor, !options.hardware.empty(), options.settings.max_repeated_samples, period_s);
+  settings.max_missed_samples = missed_samples_allowed(session.sensor, options.settings.max_missed_samples, period_s);
+  require_period(session, options);
+}
+
+// A target is reached one period after it is latched: that period is delay beyond the one of any sampled loop. A torque
+// acts for a period.
+double loop_delay_s(const PreparedSession& session) {
+  if (session.impedance()) return 0.5 * session.settings.period_s;
+  return session.settings.period_s + sensor_delay_s(session.cell.sensor) + stream_delay_s(session.sensor) +
+         setpoint_filter_delay_s(session.cell);
+}
+
+// The impedance type renders at the point with the device's own mass: what only a proxy has can't be asked for.
+void choose_scheme(PreparedSession& session, const RunOptions& options) {
+  using controller::Scheme;
+  controller::SessionSettings& settings = session.settings;
+  const auto& drives = session.cell.drives;
+  const bool torques = std::any_of(drives.begin(), drives.end(),
+                                   [](const description::DriveDescription& drive) { return drive.mode == "cst"; });
+  settings.scheme = options.scheme.value_or(torques ? Scheme::impedance : Scheme::admittance);
+  controller::require_scheme(session.cell, settings);
+  const auto refuse = [](const char* key, const char* found, const char* expected) {
+    throw description::SetupError({.key = key, .found = found, .expected = expected});
+  };
+  if (settings.scheme == Scheme::admittance) {
+    if (options.stiffness_N_per_m) refuse("--stiffness", "the admittance type", "--scheme impedance");
+    return;
+  }
+  if (options.mass_kg) refuse("--mass", "the impedance type", "none: the hand feels the device's own mass");
+  if (settings.spring_N_per_m > 0.0) refuse("--spring", "the impedance type", "--scheme admittance");
+  if (settings.order != 1) refuse("--order", "2 with the impedance type", "1");
+  if (settings.orientation != controller::OrientationMode::held) {
+    refuse("--orientation", "free with the impedance type", "none: the tool's orientation isn't rendered");
+  }
+  settings.coupling_stiffness_N_per_m = options.stiffness_N_per_m.value_or(settings.coupling_stiffness_N_per_m);
+  if (settings.damping_Ns_per_m > 0.0) settings.coupling_damping_Ns_per_m = settings.damping_Ns_per_m;
+  settings.damping_Ns_per_m = 0.0;
+  settings.mass_kg = 0.0;
+}
+
+// A wall's K and B must be stable on the device alone, in its lightest and in its heaviest direction.
+void require_stable_coupling(const PreparedSession& session) {
+  const controller::SessionSettings& settings = session.settings;
+  const models::Arm arm(session.cell);
+  const models::TipMass tip = arm.effective_mass_range(arm.start_rad());
+  controller::ImpedanceConfig config{.stiffness_N_per_m = settings.coupling_stiffness_N_per_m,
+                                     .damping_Ns_per_m = settings.coupling_damping_Ns_per_m,
+                                     .period_s = settings.period_s};
+  config.validate();
+  for (const double mass_kg : {tip.min_kg, tip.max_kg}) {
+    if (controller::coupling_spectral_radius(config, mass_kg) < 1.0) continue;
+    std::array<char, 160> found{};
+    std::snprintf(found.data(), found.size(), "%.4g N/m and %.4g Ns/m, unstable at the %.3g kg of the device's tip",
+                  config.stiffness_N_per_m, config.damping_Ns_per_m, mass_kg);
+    const double least_damping = 1.5 * config.stiffness_N_per_m * config.period_s;
+    throw description::SetupError(
+        {.key = "--stiffness",
+         .found = found.data(),
+         .expected = "a coupling that is stable without a hand: damping above " +
+                     description::number_text(std::ceil(100.0 * least_damping) / 100.0) +
+                     " Ns/m for this stiffness (3KT/2, the loop's delay), and not much more than M/T",
+         .advice = "lower --stiffness, change --damping, or take a shorter --timestep"});
+  }
+}
+
+void add_delay(description::SensorPlacement& sensor, double extra_delay_s) {
+  sensor.delay_s += extra_delay_s;
+  if (sensor.delay_s <= description::longest_sensor_delay_s) return;
+  throw description::SetupError(
+      {.key = "--extra-delay",
+       .found = description::number_text(sensor.delay_s) + " s, with the cell's",
+       .expected = "at most " + description::number_text(description::longest_sensor_delay_s) + " s"});
+}
+
+void choose_passivity(PreparedSession& session, const RunOptions& options) {
+  using controller::Passivity;
+  const std::string& cells = session.cell.passivity;
+  const Passivity otherwise = cells == "on" ? Passivity::on : cells == "observe" ? Passivity::observe : Passivity::off;
+  session.settings.passivity = options.passivity.value_or(otherwise);
+  if (!session.impedance() || session.settings.passivity == Passivity::off) return;
+  throw description::SetupError({.file = options.passivity ? "" : session.cell.file.string(),
+                                 .key = options.passivity ? "--passivity" : "passivity",
+                                 .found = "the impedance type",
+                                 .expected = "off: it has no proxy with a mass to be damped"});
+}
+
+}  // namespace
+
+PreparedSession prepare(const RunOptions& options) {
+  constexpr double week_s = 604800.0;
+  if (!(options.duration_s <= week_s)) {
+    throw description::SetupError({.key = "--duration",
+                                   .found = description::number_text(options.duration_s) + " s",
+                                   .expected = "at most a week"});
+  }
+  PreparedSession session;
+  const fs::path cell_file = options.cell.empty() ? shipped_file(default_cell) : user_file(options.cell);
+  require_file(options.scene, "--scene", "scenes/wall.yaml");
+  require_file(options.hand, "--hand", "sim/hands/touch.yaml");
+  session.cell = loaded(cell_file, FileKind::cell, description::load_cell);
+  session.sensor = description::load_sensor(beside(session.cell.file, session.cell.sensor.description));
+  session.hand =
+      loaded(chosen(options.hand, session.cell, session.cell.default_hand), FileKind::hand, description::load_hand);
+  session.scene =
+      loaded(chosen(options.scene, session.cell, session.cell.default_scene), FileKind::scene, scenes::load_scene);
+  add_delay(session.cell.sensor, options.extra_delay_s);
+  session.settings = options.settings;
+  session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
+  session.duration_s = options.duration_s;
+  set_timestep(session, options, options.period_s.value_or(session.cell.default_period_s));
+  choose_scheme(session, options);
+  choose_passivity(session, options);
+
+  session.loop.delay_s = loop_delay_s(session);
+  if (session.impedance()) return session;
+  session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
+  session.loop.handle_mass_kg = session.cell.tool.mass_kg;
+  session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
+  session.loop.spring_N_per_m = session.settings.spring_N_per_m;
+  session.loop.order = session.settings.order;
+  return session;
+}
+
+PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s) {
+  set_timestep(session, options, period_s);
+  session.loop.delay_s = loop_delay_s(session);
+  return session;
+}
+
+namespace {
+// Of what a hand is to move. Beyond, stability isn't computed: numbers of any size would overflow there.
+constexpr double heaviest_kg = 10'000.0;
+
+void require_mass_in_range(const PreparedSession& session, const RunOptions& options) {
+  const double mass_kg = session.settings.mass_kg;
+  if (mass_kg <= heaviest_kg) return;
+  throw description::SetupError({.file = options.mass_kg ? "" : session.cell.file.string(),
+                                 .key = options.mass_kg ? "mass" : "default_mass_kg",
+                                 .found = description::number_text(mass_kg) + " kg",
+                                 .expected = "at most " + description::number_text(heaviest_kg) + " kg"});
+}
+}  // namespace
+
+void require_stable(const PreparedSession& session, const RunOptions& options) {
+  if (session.impedance()) return require_stable_coupling(session);
+  require_mass_in_range(session, options);
+  controller::HandModel hand;
+  const description::Grip grip = description::tightest_grip(session.hand);
+  hand.stiffness_N_per_m = grip.stiffness_N_per_m;
+  hand.damping_Ns_per_m = grip.damping_Ns_per_m;
+  hand.mass_kg = session.hand.mass_kg;
+  if (options.force_unstable && !options.bus.simulated()) {
+    throw description::SetupError({.key = "--force-unstable",
+                                   .found = "a bus that isn't simulated",
+                                   .expected = "--bus sim: an unstable mass is for simulation only"});
+  }
+  try {
+    controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+  } catch (const description::SetupError& error) {
+    if (options.mass_kg) throw;
+    description::SetupProblem problem = error.problem();
+    problem.file = session.cell.file.string();
+    problem.key = "default_mass_kg";
+    throw description::SetupError(problem);
+  }
+}
+
+double motion_delay_s(const PreparedSession& session) {
+  if (session.impedance()) return 0.0;
+  return 2.0 * session.settings.period_s + setpoint_filter_delay_s(session.cell);
+}
+
+double total_delay_s(const PreparedSession& session) {
+  return session.loop.period_s + session.loop.delay_s + session.loop.drive_time_constant_s;
+}
+
+}  // namespace proxarm::command_line

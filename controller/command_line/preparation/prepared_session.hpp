@@ -1,0 +1,44 @@
+// What `run`, `sim` and `plan` know before they open a bus: all files loaded and checked, all defaults filled in.
+#pragma once
+
+#include <string>
+
+#include "controller/command_line/preparation/run_options.hpp"
+#include "controller/stability/stability.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "scenes/format/scene.hpp"
+
+namespace proxarm::command_line {
+
+struct PreparedSession {
+  description::Cell cell;
+  description::SensorDescription sensor;
+  description::HandDescription hand;
+  scenes::Scene scene;
+  controller::SessionSettings settings;
+  double duration_s = 10.0;
+  controller::LoopModel loop;  // how the controller expects the closed loop to behave
+
+  [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
+};
+
+// Throws SetupError. Opens no bus and starts nothing.
+PreparedSession prepare(const RunOptions& options);
+
+// The same session with another timestep. Throws SetupError where no drive could hold that one.
+PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s);
+
+// The mass and timestep, judged: throws SetupError where the handle alone is heavier, or where the loop with the hand
+// would be unstable (unless forced, which only a simulation may be). Impedance type: the virtual coupling is judged.
+void require_stable(const PreparedSession& session, const RunOptions& options);
+
+// From the proxy's step to the links being where it went: latched at the next SYNC, reached a period later, and what
+// the filter of the setpoints takes. Impedance type: 0, the proxy is where the tool may be.
+double motion_delay_s(const PreparedSession& session);
+
+// Total delay from a force on the handle to the arm being where the proxy went, in seconds.
+double total_delay_s(const PreparedSession& session);
+
+}  // namespace proxarm::command_line

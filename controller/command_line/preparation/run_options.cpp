@@ -1,0 +1,61 @@
+#include "controller/command_line/preparation/run_options.hpp"
+
+#include <algorithm>
+#include <sstream>
+
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+std::string join(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+[[noreturn]] void refuse(const std::string& found, const std::string& expected) {
+  throw description::SetupError({.key = "--bus", .found = found, .expected = expected});
+}
+
+}  // namespace
+
+BusMapping BusMapping::parse(const std::string& text) {
+  BusMapping mapping;
+  if (text == "sim") return mapping;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const std::size_t equals = part.find('=');
+    if (equals == std::string::npos) {
+      if (text.find_first_of(",=") != std::string::npos || part.empty()) {
+        refuse("'" + text + "'", "sim, one interface, or NAME=INTERFACE,NAME=INTERFACE,…");
+      }
+      mapping.all_ = part;
+      continue;
+    }
+    const std::string bus = part.substr(0, equals), interface = part.substr(equals + 1);
+    if (bus.empty() || interface.empty() || interface.find('=') != std::string::npos) {
+      refuse("'" + part + "'", "NAME=INTERFACE");
+    }
+    if (!mapping.by_bus_.emplace(bus, interface).second) refuse("'" + bus + "' twice", "each bus once");
+  }
+  if (mapping.simulated()) refuse("'" + text + "'", "sim, one interface, or NAME=INTERFACE,NAME=INTERFACE,…");
+  return mapping;
+}
+
+std::vector<std::string> BusMapping::interfaces(const std::vector<std::string>& bus_names) const {
+  for (const auto& [bus, interface] : by_bus_) {
+    if (std::find(bus_names.begin(), bus_names.end(), bus) == bus_names.end()) {
+      refuse("'" + bus + "'", "a bus of the cell: " + join(bus_names));
+    }
+  }
+  std::vector<std::string> interfaces;
+  for (const std::string& bus : bus_names) {
+    const auto found = by_bus_.find(bus);
+    if (found == by_bus_.end() && !all_) refuse("no interface for '" + bus + "'", "one for each of " + join(bus_names));
+    interfaces.push_back(found != by_bus_.end() ? found->second : *all_);
+  }
+  return interfaces;
+}
+
+}  // namespace proxarm::command_line

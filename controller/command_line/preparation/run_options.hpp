@@ -1,0 +1,62 @@
+// What `proxarm run` and `proxarm sim` were asked to do, as the command line says it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/rendering/session_settings.hpp"
+#include "sim/devices/device_fault.hpp"
+#include "sim/devices/enabling_switch.hpp"
+
+namespace proxarm::command_line {
+
+enum class Pace : std::uint8_t { virtual_time, realtime };
+
+// Which interface carries each bus of the cell. Empty: all of them in-process.
+class BusMapping {
+ public:
+  // "sim", "vcan0", or "axes_1_3=can0,axes_4_6=can1,sensor=can2". Throws SetupError.
+  static BusMapping parse(const std::string& text);
+
+  [[nodiscard]] bool simulated() const noexcept { return !all_ && by_bus_.empty(); }
+  // One interface per bus, in the order of `bus_names`. Throws SetupError where a bus has none, or a name is unknown.
+  [[nodiscard]] std::vector<std::string> interfaces(const std::vector<std::string>& bus_names) const;
+
+ private:
+  std::optional<std::string> all_;
+  std::map<std::string, std::string> by_bus_;
+};
+
+struct RunOptions {
+  std::filesystem::path cell;   // empty: the default cell
+  std::filesystem::path scene;  // empty: the cell's
+  std::filesystem::path hand;   // empty: the cell's
+  std::optional<double> mass_kg;
+  std::optional<double> period_s;
+  double extra_delay_s = 0.0;  // of the sensor's readings
+  double duration_s = 10.0;
+  std::optional<controller::Scheme> scheme;        // unset: what the drives' modes say
+  std::optional<controller::Passivity> passivity;  // unset: the cell's
+  std::optional<double> stiffness_N_per_m;         // impedance type
+  controller::SessionSettings settings;            // all that isn't optional above
+  BusMapping bus;
+  std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
+  std::filesystem::path record_dir;     // empty: no record
+  std::vector<std::string> changes;     // NAME=VALUE@TIME
+  std::vector<std::string> orders;      // ORDER@TIME
+  std::string hardware;                 // empty: simulations only; ask, checked
+  std::filesystem::path control;        // socket that takes changes; empty: none
+  std::filesystem::path black_box_dir;  // empty: in the record, or proxarm-black-box
+  std::filesystem::path plot_file;      // empty: proxarm-run.svg, none with --json
+  bool plot = true;
+  bool json = false;
+  bool force_unstable = false;
+  std::vector<sim::DeviceFault> faults;    // of the simulated devices
+  std::vector<sim::PressedSpan> enabling;  // of the simulated enabling switch
+};
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,193 @@
+#include "controller/command_line/preparation/start_check.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "models/arm/arm.hpp"
+#include "models/arm/inverse_kinematics.hpp"
+#include "models/base/setup_error.hpp"
+#include "scenes/compiler/compile.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using description::SetupError;
+using models::Vec3;
+
+// A start on a surface is fine. start_rad has four decimals in most files: half of the last one on an arm of 1.4 m is
+// 0.07 mm; the first step brings the proxy out of that.
+constexpr double start_tolerance_m = 1e-4;
+
+std::string point_text(const Vec3& point_W) {
+  char text[96];
+  std::snprintf(text, sizeof text, "x %.4f, y %.4f, z %.4f m", point_W.x(), point_W.y(), point_W.z());
+  return text;
+}
+
+// In m/rad. Torques render forces at the point alone; positions need the tool's orientation as well.
+double smallest_singular_value(const PreparedSession& session, const models::Arm& arm) {
+  if (session.impedance()) {
+    models::ToolKinematics tool;
+    arm.kinematics(arm.start_rad(), tool);
+    const models::Mat3 squares = tool.J_W.topRows<3>() * tool.J_W.topRows<3>().transpose();
+    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<models::Mat3>(squares).eigenvalues()[0]));
+  }
+  const models::InverseKinematics inverse(arm);
+  models::InverseKinematicsResult result;
+  inverse.solve(arm.start_rad(), arm.tool_pose(arm.start_rad()), result);
+  return result.smallest_singular_value_m_per_rad;
+}
+
+void require_regular(const PreparedSession& session, const models::Arm& arm) {
+  const double limit = models::InverseKinematicsConfig{}.singular_m_per_rad;
+  const double smallest = smallest_singular_value(session, arm);
+  if (smallest >= limit) return;
+  char found[160];
+  std::snprintf(found, sizeof found, "a singular pose (smallest singular value %.2g m/rad)", smallest);
+  throw SetupError({.file = session.cell.file.string(),
+                    .key = "start_rad",
+                    .found = found,
+                    .expected = "a pose from which the tool can move in all directions, at least " +
+                                description::number_text(limit) + " m/rad",
+                    .advice = "bend the elbow and the wrist, such as axes 3 and 5"});
+}
+
+// The object that the point is deepest in, as a scene of its own has it.
+const scenes::Object* deepest(const scenes::Scene& scene, const Vec3& point_W) {
+  const scenes::Object* found = nullptr;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (const scenes::Object& object : scene.objects) {
+    scenes::Scene alone;
+    alone.objects.push_back(object);
+    const double clearance_m = scenes::clearance_m(alone, point_W, 0.0);
+    if (clearance_m >= least_m) continue;
+    least_m = clearance_m;
+    found = &object;
+  }
+  return found;
+}
+
+void require_outside(const PreparedSession& session, const Vec3& start_W) {
+  const double clearance_m = scenes::clearance_m(session.scene, start_W, 0.0);
+  if (clearance_m >= -start_tolerance_m) return;
+  const scenes::Object* object = deepest(session.scene, start_W);
+  char depth[32];
+  std::snprintf(depth, sizeof depth, "%.3g m", -clearance_m);
+  throw SetupError({.file = session.scene.file.string(),
+                    .line = object != nullptr ? object->line : 0,
+                    .key = object != nullptr ? object->name : "objects",
+                    .found = "the start of the tool (" + point_text(start_W) + ") " + depth + " inside",
+                    .expected = "a start in free space",
+                    .advice = "move or turn the object, or change start_rad in the cell file"});
+}
+
+template <int N>
+double first_step_m(const scenes::CompiledScene& world, const Vec3& start_W) {
+  const models::Vec<N> start = world.from_W<N>(start_W);
+  return (world.algorithm<N>()(1.0, start, start) - start).norm();
+}
+
+// A guide that is not at the tool would draw the proxy onto it in one step.
+void require_on_guide(const PreparedSession& session, const Vec3& start_W) {
+  if (!session.scene.guide) return;
+  const scenes::CompiledScene world = scenes::compile(session.scene);
+  const double away_m = world.dimensions() == 2 ? first_step_m<2>(world, start_W) : first_step_m<3>(world, start_W);
+  if (away_m <= start_tolerance_m) return;
+  char found[64];
+  std::snprintf(found, sizeof found, ") %.3g m away from it", away_m);
+  throw SetupError({.file = session.scene.file.string(),
+                    .line = session.scene.guide->line_number,
+                    .key = "guide",
+                    .found = "the start of the tool (" + point_text(start_W) + found,
+                    .expected = "a guide that begins where the tool is",
+                    .advice = "move the guide, or change start_rad in the cell file"});
+}
+
+// In a space of fewer dimensions the proxy moves beside the tool by as much as the tool starts beside the space: what
+// the file puts in its way would not be where it is felt.
+void require_in_space(const PreparedSession& session, const Vec3& start_W) {
+  const scenes::Space& space = session.scene.space;
+  const auto axes = space.axes.leftCols(space.dimensions);
+  const Vec3 from_origin = start_W - space.origin_m;
+  const double away_m = (from_origin - axes * (axes.transpose() * from_origin)).norm();
+  if (away_m <= start_tolerance_m) return;
+  char found[64];
+  std::snprintf(found, sizeof found, ") %.3g m beside it", away_m);
+  throw SetupError({.file = session.scene.file.string(),
+                    .key = "space",
+                    .found = "the start of the tool (" + point_text(start_W) + found,
+                    .expected = "a space that the tool starts in",
+                    .advice = "move space.origin_m, or change start_rad in the cell file"});
+}
+
+// Within the workspace, and in no zone to be kept out of.
+void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
+  const description::CellLimits& limits = session.cell.limits;
+  const auto inside = [&](const std::array<double, 3>& min_m, const std::array<double, 3>& max_m) {
+    const models::Vec3 min(min_m.data()), max(max_m.data());
+    return (start_W.array() >= min.array()).all() && (start_W.array() <= max.array()).all();
+  };
+  const auto refuse = [&](const char* key, const char* expected) {
+    throw SetupError({.file = session.cell.file.string(),
+                      .key = key,
+                      .found = "the start of the tool at " + point_text(start_W),
+                      .expected = expected,
+                      .advice = "change the box, or start_rad"});
+  };
+  if (!inside(limits.workspace_min_m, limits.workspace_max_m)) refuse("limits.workspace_m", "a start inside of it");
+  for (const description::BoxDescription& zone : limits.keep_out) {
+    if (inside(zone.min_m, zone.max_m)) refuse("limits.keep_out_m", "a start outside of all of them");
+  }
+}
+
+}  // namespace
+
+void require_usable_start(const PreparedSession& session) {
+  const models::Arm arm(session.cell);
+  require_regular(session, arm);
+  const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
+  require_in_space(session, start_W);
+  require_outside(session, start_W);
+  require_on_guide(session, start_W);
+  require_allowed(session, start_W);
+}
+
+void require_enabling_switch(const PreparedSession& session, const RunOptions& options) {
+  if (options.enabling.empty()) return;
+  const auto refuse = [](const char* found, const char* expected, const char* advice) {
+    throw SetupError({.key = "--enabling", .found = found, .expected = expected, .advice = advice});
+  };
+  if (!session.cell.enabling_input) {
+    refuse("a cell without an enabling input", "one whose file has enabling_input",
+           "in a copy of models/cells/default.yaml: enabling_input: {drive: axis_6, bit: 16} (docs/supervision.md)");
+  }
+  if (session.settings.without_enabling_input) refuse("--without-enabling-input", "one of the two", "");
+}
+
+void require_nodes_apart(const PreparedSession& session, const std::vector<std::string>& interfaces) {
+  const auto interface_of = [&](const description::DriveDescription& drive) {
+    std::size_t i = 0;
+    while (i + 1 < interfaces.size() && session.cell.buses[i].name != drive.bus) ++i;
+    return interfaces[i];
+  };
+  const auto& drives = session.cell.drives;
+  for (std::size_t second = 0; second < drives.size(); ++second) {
+    for (std::size_t first = 0; first < second; ++first) {
+      if (!drives[first].on_can() || !drives[second].on_can()) continue;
+      if (drives[first].node != drives[second].node) continue;
+      if (interface_of(drives[first]) != interface_of(drives[second])) continue;
+      throw SetupError({.bus = interface_of(drives[second]),
+                        .node = drives[second].node,
+                        .key = "--bus",
+                        .found = "the drives of " + drives[first].joint + " and " + drives[second].joint +
+                                 " with one node on one interface",
+                        .expected = "each node once on an interface",
+                        .advice = "set one of them to another node, or give their buses an interface each"});
+    }
+  }
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,18 @@
+// Whether a session can begin where the arm stands: before a bus is opened or a drive enabled.
+#pragma once
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+
+namespace proxarm::command_line {
+
+// Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for a start pose in a
+// singularity, from which the tool can't move in some direction, and for one inside an object of the scene.
+void require_usable_start(const PreparedSession& session);
+
+// Throws SetupError where `--enabling` has no simulated enabling switch that it could press.
+void require_enabling_switch(const PreparedSession& session, const RunOptions& options);
+
+// Which interface carries each bus, checked before any is opened: throws SetupError for two drives with one node.
+void require_nodes_apart(const PreparedSession& session, const std::vector<std::string>& interfaces);
+
+}  // namespace proxarm::command_line

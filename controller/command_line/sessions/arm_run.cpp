@@ -1,0 +1,75 @@
+#include "controller/command_line/sessions/arm_run.hpp"
+
+#include <numbers>
+
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/session/bring_up.hpp"
+#include "controller/session/session.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
+#include "scenes/compiler/compile.hpp"
+#include "sim/cell/simulated_cell.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+PreparedSession session_of(const studies::ArmSetup& setup) {
+  RunOptions options;
+  options.mass_kg = setup.mass_kg;
+  options.period_s = setup.period_s;
+  options.duration_s = setup.settling_s + setup.duration_s;
+  options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
+  PreparedSession session = prepare(options);
+  session.hand.waypoints.clear();
+  session.hand.multisine.clear();
+  if (setup.wall) {
+    // Leans on the wall, which is 0.2 m away, by 30 mm.
+    session.hand.waypoints = {{0.0, {0.0, 0.0, 0.0}}, {2.0, {0.23, 0.0, 0.0}}};
+  }
+  for (std::size_t i = 0; i < setup.sines.size(); ++i) {
+    // By turns with and against each other: at first the hand rests where the tool is.
+    session.hand.multisine.push_back({setup.sines[i].frequency_Hz,
+                                      setup.sines[i].amplitude_m,
+                                      i % 2 == 0 ? 0.0 : std::numbers::pi,
+                                      {1.0, 0.0, 0.0}});
+  }
+  for (description::DriveDescription& drive : session.cell.drives) {
+    drive.position_bandwidth_Hz *= setup.drive_factor;
+    drive.simulation.position_gain_per_s *= setup.drive_factor;
+  }
+  return session;
+}
+
+}  // namespace
+
+std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
+  const PreparedSession session = session_of(setup);
+  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
+  sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
+  scenes::CompiledScene scene = scenes::compile(session.scene);
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
+                                                         buses_in_order(session.cell));
+  far_end.attach_to(network);
+  far_end.power_on();
+  controller::bring_up(parts);
+  controller::Cycle cycle(std::move(parts), session.settings, session.cell.limits, 64);
+  std::vector<studies::ArmSample> samples;
+  double rendered_s = 0.0;
+  sim::Truth truth;
+  const controller::SessionHooks hooks{[&](std::int64_t) { truth = far_end.truth(); },
+                                       [&] {
+                                         controller::CycleRecord record;
+                                         while (cycle.records().pop(record)) {
+                                           if (record.phase != controller::Phase::rendering) continue;
+                                           rendered_s += setup.period_s;
+                                           if (rendered_s > setup.settling_s)
+                                             samples.push_back({truth.hand_force_W, truth.X_WT.translation()});
+                                         }
+                                       }};
+  controller::run_session(cycle, network, {session.duration_s}, hooks);
+  cycle.shut_down();
+  return samples;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,244 @@
+#include "controller/command_line/sessions/interface_run.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <map>
+#include <thread>
+
+#include "controller/command_line/live/hardware_consent.hpp"
+#include "controller/command_line/live/live_parameters.hpp"
+#include "controller/command_line/live/realtime.hpp"
+#include "controller/command_line/live/signal_watch.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/modbus_rates.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sessions/session_output.hpp"
+#include "controller/record/frame_tap.hpp"
+#include "controller/report/latency.hpp"
+#include "controller/session/bring_up.hpp"
+#include "controller/session/session.hpp"
+#include "fieldbus/can/can_timing.hpp"
+#include "fieldbus/can/socket_can_network.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using controller::Cycle;
+using controller::CycleRecord;
+using fieldbus::SocketCanNetwork;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, should a disk take that long
+constexpr std::size_t frame_capacity = 262144;
+constexpr auto drain_interval = std::chrono::milliseconds(5);
+
+controller::BusIndices indices_in(const SocketCanNetwork& network, std::size_t buses) {
+  controller::BusIndices indices;
+  for (std::size_t i = 0; i < buses; ++i) indices.push_back(network.bus_of(i));
+  return indices;
+}
+
+std::vector<std::string> names_in(fieldbus::CanNetwork& network) {
+  std::vector<std::string> names;
+  for (std::size_t bus = 0; bus < network.bus_count(); ++bus) names.push_back(network.bus(bus).name());
+  return names;
+}
+
+void set_filters(SocketCanNetwork& network, const controller::CycleParts& parts) {
+  for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
+    std::vector<fieldbus::CanFilter> filters;
+    for (const std::uint32_t id : controller::wanted_ids(parts, bus)) {
+      const bool extended = (id & fieldbus::extended_id_flag) != 0;
+      const std::uint32_t mask = extended ? 0x1FFFFFFF : 0x7FF;
+      filters.push_back({.id = id & mask, .mask = mask, .extended = extended});
+    }
+    network.set_filters(bus, filters);
+  }
+}
+
+// Without its interfaces the arm can still be simulated in this process.
+SocketCanNetwork open_network(const std::vector<std::string>& interfaces) {
+  try {
+    return SocketCanNetwork(interfaces, {.closed = true});
+  } catch (const description::SetupError& error) {
+    description::SetupProblem problem = error.problem();
+    problem.advice +=
+        std::string(problem.advice.empty() ? "" : "; ") + "without --bus, `proxarm run` simulates the buses too";
+    throw description::SetupError(problem);
+  }
+}
+
+// Whoever has no answer on a virtual interface has most likely no simulated arm there.
+void bring_up_devices(controller::CycleParts& parts) {
+  try {
+    controller::bring_up(parts);
+  } catch (const description::SetupError& error) {
+    if (error.found().find("no answer") == std::string::npos) throw;
+    description::SetupProblem problem = error.problem();
+    problem.advice = "is `proxarm sim` running on the same interfaces?" +
+                     (problem.advice.empty() ? "" : " Or, with devices of your own: " + problem.advice);
+    throw description::SetupError(problem);
+  }
+}
+
+// Bitrates by bus of the network: the slowest of the cell's buses that share an interface.
+std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const controller::BusIndices& indices) {
+  std::vector<fieldbus::BitRates> rates(*std::max_element(indices.begin(), indices.end()) + 1, {0, 0});
+  for (std::size_t i = 0; i < indices.size(); ++i) {
+    fieldbus::BitRates& shared = rates[indices[i]];
+    if (shared.nominal == 0 || cell.buses[i].bitrate < shared.nominal) {
+      shared = {cell.buses[i].bitrate, cell.buses[i].data_bitrate};
+    }
+  }
+  return rates;
+}
+
+// Takes records and frames out of the cycle's rings and hands them on, in a thread of its own. Counts how long the
+// frames would occupy a bus of the cell's bitrates, since a virtual interface takes no time.
+class Drain {
+ public:
+  Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
+        std::vector<fieldbus::BitRates> rates, BlackBoxKeeper& keeper, controller::LatencyMeter& meter,
+        controller::ReplayRecorder* replay, std::function<void()> on_failure)
+      : records_(records),
+        tap_(tap),
+        output_(output),
+        rates_(std::move(rates)),
+        keeper_(keeper),
+        meter_(meter),
+        replay_(replay),
+        on_failure_(std::move(on_failure)),
+        busy_ns_(rates_.size()),
+        begun_ns_(tap.now_ns()),
+        thread_([this] { loop(); }) {}
+  Drain(const Drain&) = delete;
+  Drain& operator=(const Drain&) = delete;
+  ~Drain() { join(); }
+
+  // Throws what kept the record from being written.
+  void finish() {
+    join();
+    if (failure_) std::rethrow_exception(failure_);
+    drain();
+  }
+
+  // After finish(): the load of each interface, by its name.
+  [[nodiscard]] std::map<std::string, double> loads() const {
+    std::map<std::string, double> loads;
+    for (std::size_t bus = 0; bus < busy_ns_.size() && last_ns_ > begun_ns_; ++bus) {
+      loads[tap_.bus(bus).name()] = static_cast<double>(busy_ns_[bus]) / static_cast<double>(last_ns_ - begun_ns_);
+    }
+    return loads;
+  }
+
+ private:
+  void join() {
+    if (!thread_.joinable()) return;
+    ended_.store(true, std::memory_order_release);
+    thread_.join();
+  }
+  // Nothing is thrown out of a thread while the arm moves: the session makes a controlled stop first.
+  void loop() {
+    try {
+      while (!ended_.load(std::memory_order_acquire)) {
+        drain();
+        std::this_thread::sleep_for(drain_interval);
+      }
+    } catch (...) {
+      failure_ = std::current_exception();
+      on_failure_();
+    }
+  }
+  void drain() {
+    CycleRecord record;
+    while (records_.pop(record)) output_.add(record);
+    meter_.drain();
+    if (replay_ != nullptr) replay_->drain(keeper_.head());
+    controller::TappedFrame tapped;
+    while (tap_.frames().pop(tapped)) {
+      output_.add_frame(tap_.bus(tapped.bus).name(), tapped.frame, tapped.time_ns);
+      if (tapped.time_ns < begun_ns_) continue;
+      busy_ns_[tapped.bus] += fieldbus::wire_time_ns(tapped.frame, rates_[tapped.bus]);
+      last_ns_ = std::max(last_ns_, tapped.time_ns);
+    }
+  }
+
+  controller::SpscRing<CycleRecord>& records_;
+  controller::FrameTap& tap_;
+  SessionOutput& output_;
+  std::vector<fieldbus::BitRates> rates_;
+  BlackBoxKeeper& keeper_;
+  controller::LatencyMeter& meter_;
+  controller::ReplayRecorder* replay_;
+  std::function<void()> on_failure_;
+  std::exception_ptr failure_;  // the thread's; read after it has ended
+  std::vector<std::int64_t> busy_ns_;
+  std::int64_t begun_ns_;
+  std::int64_t last_ns_ = 0;
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+int run_on_interfaces(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper) {
+  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
+  require_nodes_apart(session, interfaces);
+  SocketCanNetwork network = open_network(interfaces);
+  require_hardware_consent(session, options, interfaces);
+  require_fd(session.cell, network);
+  const controller::BusIndices indices = indices_in(network, interfaces.size());
+  warn_if_not_carried(session, indices);
+
+  scenes::CompiledScene scene = scenes::compile(session.scene);
+  controller::FrameTap tap(network, frame_capacity);
+  controller::CycleParts parts =
+      controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices,
+                              controller::opener_of(fieldbus::ModbusPeers::any));  // consent was given above
+  set_filters(network, parts);
+  SessionOutput output(session, options, false);
+  std::unique_ptr<controller::ReplayRecorder> replay;
+  if (!options.record_dir.empty()) {
+    replay = std::make_unique<controller::ReplayRecorder>(keeper.box(), options.record_dir, replay_files(session));
+  }
+  keeper.set_head(replay_head(session, names_in(tap), indices));
+  bring_up_devices(parts);
+  report_modbus_rates(session, parts);
+  output.introduce(parts);
+
+  Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
+  cycle.write_to(keeper.box());
+  SignalWatch signals([&] { cycle.request_stop(); });
+  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options);
+  controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
+  Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get(),
+              [&] { cycle.request_stop(); });
+  const SteadyClock::time_point begun = SteadyClock::now();
+  controller::SessionTally tally;
+  {
+    const RealtimeThread realtime;
+    tally = controller::run_session(cycle, tap, session_length(session, options), {});
+  }
+  const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
+  cycle.shut_down();
+  drain.finish();
+  if (replay) replay->finish();
+
+  controller::Summary summary = output.summary(cycle, tally.end, signals.cause());
+  summary.wall_time_s = wall_s;
+  summary.overruns = tally.overruns;
+  summary.page_faults = tally.page_faults;
+  summary.latency_us = {{"wake_up", controller::latency_summary(meter.latencies().wake_up)},
+                        {"compute", controller::latency_summary(meter.latencies().compute)},
+                        {"sensor_to_setpoint", controller::latency_summary(meter.latencies().sensor_to_setpoint)}};
+  summary.bus_load = drain.loads();
+  return output.finish(summary, keeper);
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,358 @@
+#include "controller/command_line/sessions/session_output.hpp"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+
+#include "controller/command_line/live/orders.hpp"
+#include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/command_line/preparation/exit_status.hpp"
+#include "models/base/setup_error.hpp"
+#include "scenes/compiler/compile.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using controller::CycleRecord;
+using controller::Fault;
+using controller::Summary;
+
+constexpr const char* default_plot = "proxarm-run.svg";
+
+}  // namespace
+
+std::vector<std::string> joint_names(const description::Cell& cell) {
+  std::vector<std::string> names;
+  for (const description::DriveDescription& drive : cell.drives) names.push_back(drive.joint);
+  return names;
+}
+
+controller::SummaryConfig summary_config(const PreparedSession& session) {
+  controller::SummaryConfig config;
+  config.period_s = session.settings.period_s;
+  config.wanted_mass_kg = session.settings.mass_kg;
+  if (!session.impedance()) config.handle_mass_kg = session.cell.tool.mass_kg;
+  config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
+  config.spring_N_per_m = session.settings.spring_N_per_m;
+  config.setpoint_filter_s = motion_delay_s(session) - 2.0 * session.settings.period_s;
+  config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
+  config.passivity = session.settings.passivity != controller::Passivity::off;
+  config.axis_names = joint_names(session.cell);
+  return config;
+}
+
+void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
+  const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+  // Order 2's proxy is where it is a period before that of (26): see admittance_proxy.hpp.
+  const std::int64_t later_ns = session.settings.order == 2 ? record.period_ns : 0;
+  const double scene_time_s = static_cast<double>(rendered_ns - later_ns) / 1e9;
+  const auto clearance_m = [&](const controller::Triple& x_W) {
+    return scenes::clearance_m(session.scene, controller::vec3(x_W), scene_time_s, scenes::Driven::left_out);
+  };
+  record.proxy_clearance_m = clearance_m(record.proxy_W_m);
+  record.tool_clearance_m = clearance_m(tool);
+  if (!session.impedance()) return;
+  if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
+    record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
+  }
+}
+
+namespace {
+
+// Which cable, what was wrong with what came through it, and what the sensor says itself.
+std::string sensor_text(const controller::FaultReport& report, const fieldbus::ForceSensor& sensor,
+                        const std::string& bus) {
+  std::string text = "bus " + bus;
+  if (report.fault == Fault::sensor_status) {
+    text += ": " + sensor.describe_status(static_cast<std::uint32_t>(report.value));
+  } else if (report.fault == Fault::sensor_lost || report.fault == Fault::sensor_late) {
+    const std::string losses = sensor.describe_losses();
+    text += losses.empty() ? ": no faulty frame" : ": so far " + losses;
+  }
+  return text;
+}
+
+bool is_of_sensor(Fault fault) noexcept {
+  return fault == Fault::sensor_lost || fault == Fault::sensor_late || fault == Fault::sensor_status ||
+         fault == Fault::sensor_saturated || fault == Fault::sensor_frozen;
+}
+
+std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts,
+                     const description::Cell& cell) {
+  if (is_of_sensor(report.fault)) return sensor_text(report, *parts.sensor, cell.sensor.bus);
+  if (report.where < 0) return "";
+  const auto where = static_cast<std::size_t>(report.where);
+  if (report.fault == Fault::bus_off || report.fault == Fault::error_passive || report.fault == Fault::interface_down ||
+      report.fault == Fault::send_failed || report.fault == Fault::receive_overflow) {
+    return "bus " + parts.network.bus(where).name();
+  }
+  if (report.fault == Fault::second_master) {
+    char id[8];
+    std::snprintf(id, sizeof id, "%03Xh", static_cast<unsigned>(report.value));
+    return "bus " + parts.network.bus(where).name() + ", identifier " + id;
+  }
+  const fieldbus::CyclicDrive& drive = parts.drives[where].drive;
+  std::string place = "drive of " + drive.description().joint + ", bus " + drive.description().bus + ", node " +
+                      std::to_string(drive.description().node);
+  if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled ||
+      report.fault == Fault::modbus_silent) {
+    place += ": " + drive.describe();
+  }
+  return place;
+}
+
+std::string rendered_text(const PreparedSession& session) {
+  const controller::SessionSettings& s = session.settings;
+  char text[96];
+  if (session.impedance()) {
+    std::snprintf(text, sizeof text, "impedance type, K = %.4g N/m, B = %.4g Ns/m", s.coupling_stiffness_N_per_m,
+                  s.coupling_damping_Ns_per_m);
+  } else {
+    std::snprintf(text, sizeof text, "%.4g kg felt", s.mass_kg);
+  }
+  return text;
+}
+
+std::string plot_title(const PreparedSession& session) {
+  char period[32];
+  std::snprintf(period, sizeof period, ", T = %.4g ms", 1e3 * session.settings.period_s);
+  return session.scene.name + ": " + rendered_text(session) + period;
+}
+
+// Where each clock of the scripts began; empty without a script.
+std::string clocks_text(const Summary& summary, const RunOptions& options) {
+  if (options.faults.empty() && options.changes.empty() && options.orders.empty() && options.enabling.empty())
+    return "";
+  std::string text = "  clocks:                   --do and --enabling count from the first cycle";
+  char line[96];
+  if (summary.first_cycle_s) {
+    std::snprintf(line, sizeof line, "; --fault from power on, %.3f s before it", *summary.first_cycle_s);
+    text += line;
+  }
+  if (summary.rendering_from_s) {
+    std::snprintf(line, sizeof line, "; --set from %.3f s after it, rendering time only", *summary.rendering_from_s);
+    text += line;
+  }
+  return text + "\n";
+}
+
+// The session's end, as the summary has it.
+controller::EndSummary end_summary(controller::SessionEnd end, const EndingCause& cause, const PreparedSession& session,
+                                   double rendered_s) {
+  using controller::SessionEnd;
+  const auto text = [&](const char* pattern, double value) {
+    char filled[160];
+    std::snprintf(filled, sizeof filled, pattern, value);
+    char of_wanted[64];
+    std::snprintf(of_wanted, sizeof of_wanted, "; %.4g of %.4g s were rendered", rendered_s, session.duration_s);
+    return filled + std::string(end == SessionEnd::duration ? "" : of_wanted);
+  };
+  switch (end) {
+    case SessionEnd::duration:
+      return {"duration", text("%.4g s were rendered, as asked for", session.duration_s)};
+    case SessionEnd::asked:
+      return {cause.word, text(("stopped: " + cause.text).c_str(), 0.0)};
+    case SessionEnd::hold_expired:
+      return {"hold_expired",
+              text("nobody ended the hold within %.4g s (supervision.hold_s)", session.cell.supervision.hold_s)};
+    case SessionEnd::release_expired:
+      return {"release_expired",
+              text("a release that no order could end any more lasted for %.4g s", session.duration_s)};
+    case SessionEnd::fault:
+      return {"fault", text("stopped by a fault", 0.0)};
+  }
+  return {};
+}
+
+}  // namespace
+
+controller::SessionLength session_length(const PreparedSession& session, const RunOptions& options) {
+  controller::SessionLength length{session.duration_s};
+  const bool somebody_presses =
+      session.cell.enabling_input && !session.settings.without_enabling_input && !options.bus.simulated();
+  if (options.control.empty() && !somebody_presses) length.longest_release_s = session.duration_s;
+  return length;
+}
+
+SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
+    : session_(session), options_(options), builder_(summary_config(session)), progress_(session.duration_s) {
+  refuse_lost_plot();
+  const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
+  if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
+  if (options.record_dir.empty()) return;
+  writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, joint_names(session.cell), with_truth);
+  writer_->write_file("effective.yaml", effective_config(session));
+}
+
+// Better now than after the run that it was to show. By its name nothing but an earlier plot can be overwritten.
+void SessionOutput::refuse_lost_plot() const {
+  const fs::path& file = options_.plot_file;
+  if (file.empty()) return;
+  const auto refuse = [&](const char* expected) {
+    throw description::SetupError(
+        {.key = "--plot", .found = description::in_quotes(file.string()), .expected = expected});
+  };
+  if (file.extension() != ".svg") refuse("a file name that ends in .svg");
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored)) refuse("a file in a folder that is there");
+  if (access(folder.c_str(), W_OK) != 0 || fs::is_directory(file, ignored)) refuse("a file that can be written");
+}
+
+namespace {
+// What of the gears' ringing the stability check, whose arm is rigid, doesn't see.
+void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
+  constexpr double most_modes = 3.0;  // measured: docs/safety.md
+  const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
+  if (!(bandwidth_Hz >= most_modes * mode_Hz)) return;
+  std::fprintf(
+      stderr,
+      "proxarm: warning: limits.setpoint_bandwidth_Hz: found %.4g Hz, expected less than three times the arm's "
+      "first mode (%.3g Hz here): gears ring under the setpoints, which the stability check doesn't see; a "
+      "larger mass is calmer\n",
+      bandwidth_Hz, mode_Hz);
+}
+}  // namespace
+
+void SessionOutput::introduce(const controller::CycleParts& parts) const {
+  const double mode_Hz = parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad());
+  if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
+  if (options_.json) return;  // nothing but the summary goes to standard output then
+  const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad());
+  std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
+              session_.scene.name.c_str(), rendered_text(session_).c_str(), 1e3 * session_.settings.period_s,
+              1e3 * total_delay_s(session_));
+  std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
+  if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+// On standard error, when it matters.
+void SessionOutput::say_how_to_get_free(controller::Phase phase) const {
+  const std::string& brakes = session_.cell.supervision.brake_release;
+  const std::string by_hand = brakes.empty() ? "" : "; brakes: " + brakes;
+  if (phase == controller::Phase::holding) {
+    std::fprintf(stderr,
+                 "proxarm: holding, drives enabled for %.3g s. Somebody pinned: `proxarm release` or `proxarm back-off "
+                 "20mm`, with the enabling input pressed; to go on: press it anew, or `proxarm resume`%s\n",
+                 session_.cell.supervision.hold_s, by_hand.c_str());
+  } else if (phase == controller::Phase::faulted) {
+    std::fprintf(stderr,
+                 "proxarm: stopped by a fault, drives off. `proxarm reset` within %.3g s enables them again, into a "
+                 "hold; somebody pinned: then `proxarm release`%s\n",
+                 session_.settings.wait_after_fault_s, by_hand.c_str());
+  }
+}
+
+// On standard error: who asked for it hears only that it was begun.
+void SessionOutput::say_timestep(const CycleRecord& record) {
+  if (record.refused_period_ns > 0) {
+    std::fprintf(stderr,
+                 "proxarm: timestep %.4g ms: %s; it stays %.4g ms, and changes of mass, damping and "
+                 "spring that were scripted for it are left out (a new session with --timestep has its "
+                 "drives told before they are enabled)\n",
+                 1e-6 * static_cast<double>(record.refused_period_ns),
+                 controller::refusal_text(record.timestep_refusal, joint_names(session_.cell)).c_str(),
+                 1e-6 * static_cast<double>(told_period_ns_));
+  } else if (!record.has(controller::RecordFlag::timestep) && record.period_ns != told_period_ns_) {
+    if (told_period_ns_ > 0) {
+      std::fprintf(stderr, "proxarm: timestep %.4g ms from %.4g s on, all drives have confirmed it\n",
+                   1e-6 * static_cast<double>(record.period_ns), 1e-9 * static_cast<double>(record.time_ns));
+    }
+    told_period_ns_ = record.period_ns;
+  }
+}
+
+void SessionOutput::add(CycleRecord record) {
+  if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
+  // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
+  if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
+    if (record.phase != last_phase_) say_how_to_get_free(record.phase);
+    last_phase_ = record.phase;
+  }
+  complete(record, session_, rendered_ns_);
+  say_timestep(record);
+  builder_.add(record);
+  if (writer_) writer_->add(record);
+  if (plot_) plot_->add(record);
+  if (progress_.enabled()) {
+    const bool rendering = record.phase == controller::Phase::rendering;
+    progress_.update(static_cast<double>(record.time_ns) * 1e-9,
+                     rendering ? controller::contact_phase_name(record.contact) : controller::phase_name(record.phase));
+  }
+}
+
+void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) {
+  if (writer_) writer_->add_frame(bus, frame, time_ns);
+}
+
+Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end, const EndingCause& cause) {
+  Summary summary = builder_.finish();
+  summary.end = end_summary(end, cause, session_, summary.rendered_time_s);
+  // A medium takes its share along the surface, too, which the ratio would count as friction.
+  if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
+  for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
+    if (order.taken && order.refusal == nullptr) continue;
+    summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,
+                                   order.taken ? order.refusal : "the session had ended before"});
+  }
+  for (const controller::FaultReport& report : cycle.past_faults()) {
+    summary.faults.push_back(
+        {report.fault, report.cycle, describe(report, place_of(report, cycle.parts(), session_.cell)), true});
+  }
+  const controller::FaultReport& report = cycle.supervisor().report();
+  if (report.fault != Fault::none) {
+    summary.faults.push_back({report.fault, report.cycle,
+                              describe(report, place_of(report, cycle.parts(), session_.cell), cycle.drives_off())});
+    const std::string& brakes = session_.cell.supervision.brake_release;
+    if (!brakes.empty()) summary.faults.back().text += "; somebody pinned: open the brakes by " + brakes;
+  }
+  for (std::size_t i = 1; i < controller::fault_count; ++i) {
+    const auto fault = static_cast<Fault>(i);
+    const controller::Notice& notice = cycle.supervisor().notice(fault);
+    const controller::Reaction reaction = cycle.supervisor().reaction(fault);
+    if (notice.times == 0 || reaction >= controller::Reaction::stop_1) continue;
+    summary.notices.push_back({fault, reaction, notice.times, notice.cycles});
+  }
+  return summary;
+}
+
+int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
+  progress_.clear();
+  // Faults that were reset come first.
+  const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
+  if (keeper.finish(ended_by_fault ? summary.faults.back().text : "")) summary.black_box = keeper.folder().string();
+  if (options_.json) {
+    std::printf("%s\n", controller::summary_json(summary).c_str());
+  } else {
+    std::printf("%s%s", controller::summary_text(summary).c_str(), clocks_text(summary, options_).c_str());
+  }
+  std::fflush(stdout);
+  const bool drawn = draw_plot();
+  if (writer_) writer_->finish(summary);
+  if (ended_by_fault) {
+    if (!options_.json && !summary.black_box.empty()) {
+      std::printf("  black box:                %s\n", summary.black_box.c_str());
+    }
+    return fault_ended_the_run;
+  }
+  return drawn || options_.plot_file.empty() ? fine : set_up_mistake;
+}
+
+bool SessionOutput::draw_plot() {
+  if (!plot_) return true;
+  fs::path file = options_.plot_file;
+  if (file.empty()) file = options_.record_dir.empty() ? fs::path(default_plot) : options_.record_dir / "plot.svg";
+  const std::string warning = plot_->write(file);
+  if (!warning.empty()) {
+    std::fprintf(stderr, "proxarm: %s\n", warning.c_str());
+  } else if (!options_.json) {
+    std::printf("  plot:                     %s\n", file.c_str());
+  }
+  return warning.empty();
+}
+
+}  // namespace proxarm::command_line

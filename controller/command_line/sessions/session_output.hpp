@@ -1,0 +1,65 @@
+// What a session leaves: summary, plot, record. Fed with every record, in order, outside of the cycle.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "controller/command_line/live/signal_watch.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/sessions/black_box_keeper.hpp"
+#include "controller/cycle/cycle.hpp"
+#include "controller/report/plot.hpp"
+#include "controller/report/progress.hpp"
+#include "controller/report/session_record.hpp"
+#include "controller/report/summary.hpp"
+#include "controller/session/session.hpp"
+
+namespace proxarm::command_line {
+
+std::vector<std::string> joint_names(const description::Cell& cell);
+controller::SummaryConfig summary_config(const PreparedSession& session);
+// Fills in what only the scene knows, distances and friction, after so much rendering.
+void complete(controller::CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns);
+
+// How long the session lasts, and how long a release in it that nobody could end any more.
+controller::SessionLength session_length(const PreparedSession& session, const RunOptions& options);
+
+class SessionOutput {
+ public:
+  // Makes the record's folder where one is wanted; throws SetupError. `with_truth`: records carry the simulation's
+  // truth.
+  SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
+
+  // What the user should know before the arm moves.
+  void introduce(const controller::CycleParts& parts) const;
+  // Adds what only the scene knows (distances, friction), and passes the record on.
+  void add(controller::CycleRecord record);
+  void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
+
+  // Of all that was added and what the cycle found; the caller fills in what only it knows before finish(). `cause`: of
+  // SessionEnd::asked.
+  [[nodiscard]] controller::Summary summary(const controller::Cycle& cycle, controller::SessionEnd end,
+                                            const EndingCause& cause);
+  // Writes files, draws the plot, prints the summary to standard output, has the black box written after a fault.
+  // Returns the exit status.
+  int finish(controller::Summary summary, BlackBoxKeeper& keeper);
+
+ private:
+  void refuse_lost_plot() const;
+  bool draw_plot();
+  void say_timestep(const controller::CycleRecord& record);
+  void say_how_to_get_free(controller::Phase phase) const;
+
+  const PreparedSession& session_;
+  const RunOptions& options_;
+  controller::SummaryBuilder builder_;
+  controller::Progress progress_;
+  std::unique_ptr<controller::PlotBuilder> plot_;
+  std::unique_ptr<controller::SessionWriter> writer_;
+  std::int64_t rendered_ns_ = 0;
+  std::int64_t told_period_ns_ = 0;  // that the user knows of
+  controller::Phase last_phase_ = controller::Phase::idle;
+};
+
+}  // namespace proxarm::command_line

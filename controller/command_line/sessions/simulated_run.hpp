@@ -1,0 +1,37 @@
+// `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
+#pragma once
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/sessions/session_output.hpp"
+#include "controller/session/bring_up.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
+#include "sim/cell/simulated_cell.hpp"
+
+namespace proxarm::command_line {
+
+class SimulatedRun {
+ public:
+  // Throws SetupError. `session` and `options` must outlive the run.
+  SimulatedRun(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper);
+
+  // Returns the exit status; throws SetupError while nothing has moved.
+  int run();
+
+ private:
+  int run_cycles(controller::CycleParts parts);
+  void pump(fieldbus::ModbusLine& line, std::int64_t time_ns);
+  void drain(controller::SpscRing<controller::CycleRecord>& records);
+
+  const PreparedSession& session_;
+  const RunOptions& options_;
+  BlackBoxKeeper& keeper_;
+  fieldbus::SimulatedCanNetwork network_;
+  sim::SimulatedCell far_end_;
+  scenes::CompiledScene scene_;
+  SessionOutput output_;
+  std::unique_ptr<controller::ReplayRecorder> replay_;
+  std::int64_t power_on_ns_ = 0;
+  sim::Truth truth_;  // at the present cycle's SYNC
+};
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,356 @@
+#include "controller/cycle/admittance_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace proxarm::controller {
+
+using models::JointVector;
+using models::Vec3;
+
+namespace {
+
+// The leash is a set that steps are solved for, to 1e-9 m and better.
+constexpr double leash_tolerance_m = 1e-6;
+// By which the tool's speed limit goes down and up, at most a quarter of the acceleration that the cell allows: so that
+// the sets of speed and acceleration always have points in common.
+constexpr double speed_limit_m_per_s2 = 1.0;
+// The hand's force that shows where to back off to, where nothing was touched.
+constexpr double pinning_force_N = 5.0;
+// Of the tool's speed, what is wanted at most: as the proxy's (step_limits.cpp).
+constexpr double commanded_share = 0.9;
+// A two-hundred-and-fiftieth of a step that is cut is some micrometres.
+constexpr int bisections = 8;
+
+Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
+  return Eigen::Quaterniond(X_WT.linear()).normalized();
+}
+
+}  // namespace
+
+AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm,
+                                   std::vector<description::DriveDescription> drives,
+                                   const description::CellLimits& limits,
+                                   const description::SupervisionDescription& supervision,
+                                   const SessionSettings& settings)
+    : parts_(std::move(parts)),
+      arm_(arm),
+      drives_(std::move(drives)),
+      limits_(limits),
+      supervision_(supervision),
+      period_s_(settings.period_s),
+      limiter_(drives_, limits, settings.period_s),
+      guard_(drives_, settings.period_s),
+      tool_guard_(arm, drives_, limits, settings.period_s) {
+  state_.link_rad = solution_.q = arm.start_rad();
+  state_.link_step_rad = state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
+  state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
+  start_guards(arm.start_rad());
+  if (settings.passivity != Passivity::off) {
+    passivity_.emplace(PassivityConfig{}, settings.period_s, settings.passivity == Passivity::on);
+  }
+}
+
+// ---- beginnings and ends
+
+// The first setpoint equals the last one.
+void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noexcept {
+  const JointVector target_rad = guard_.target_rad();
+  state_.freeing = beginning == Beginning::freeing;
+  state_.force_share = 0.0;
+  state_.link_rad = arm_.link_from_motor(target_rad);
+  const models::Pose X_WT = arm_.tool_pose(state_.link_rad);
+  state_.q_k1_W = state_.q_k2_W = X_WT.translation();
+  arm_.kinematics(state_.link_rad, solution_.kinematics);
+  parts_.elastic.start(state_.link_rad);
+  state_.link_step_rad.setZero();
+  start_guards(target_rad);
+  world().start(state_.q_k1_W);
+  if (passivity_) passivity_->start(measured.tool_W);
+  parts_.orientation.start(orientation_of(X_WT));
+  if (beginning == Beginning::resuming) {
+    state_.speed_limit_m_per_s = std::min(state_.speed_limit_m_per_s, supervision_.release_speed_m_per_s);
+  }
+}
+
+void AdmittanceMotion::start_guards(const JointVector& target_rad) noexcept {
+  guard_.start(target_rad);
+  tool_guard_.start(target_rad);
+}
+
+// From each joint's last speed, in the time that the slowest of them needs at its own deceleration.
+void AdmittanceMotion::start_run_out() noexcept {
+  double stop_s = period_s_;
+  for (Eigen::Index i = 0; i < guard_.speed_rad_per_s().size(); ++i) {
+    const double deceleration = drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2;
+    stop_s = std::max(stop_s, std::abs(guard_.speed_rad_per_s()[i]) / deceleration);
+  }
+  guard_.follow_from_here();
+  state_.run_out_rad_per_s = guard_.speed_rad_per_s();
+  state_.run_out_share = 1.0;
+  state_.run_out_per_cycle = period_s_ / stop_s;
+}
+
+void AdmittanceMotion::run_out() noexcept {
+  state_.run_out_share = std::max(0.0, state_.run_out_share - state_.run_out_per_cycle);
+  make_final(guard_.target_rad() + state_.run_out_share * period_s_ * state_.run_out_rad_per_s,
+             limits_.max_tool_speed_m_per_s);
+}
+
+void AdmittanceMotion::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  parts_.inverse.set_max_step(max_steps_rad(drives_, period_s));
+  parts_.elastic.set_period(period_s);
+  parts_.orientation.set_period(period_s);
+  parts_.world->set_period(period_s);
+  parts_.freeing->set_period(period_s);
+  if (passivity_) passivity_->set_period(period_s);
+  limiter_.set_period(period_s);
+  guard_.set_period(period_s);
+  tool_guard_.set_period(period_s);
+}
+
+void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
+  parts_.world->archive(state);
+  parts_.freeing->archive(state);
+  if (passivity_) passivity_->archive(state);
+  state(parts_.elastic, parts_.orientation, guard_, tool_guard_);
+  archive_fields(state, state_);
+  if (state.reading()) arm_.kinematics(state_.link_rad, solution_.kinematics);
+}
+
+// ---- rendering
+
+bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
+  const Measured& measured = cycle.measured;
+  make_limits(cycle);
+  if (passivity_) parts_.world->add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
+  let_force_in(cycle.record);
+  const WorldStep step = parts_.world->step(state_.force_share * measured.hand_W.force, step_limits_);
+  const ProxyFault turned = parts_.orientation.step(state_.force_share * measured.hand_W.torque);
+  if (step.fault != ProxyFault::none || turned != ProxyFault::none) {
+    cycle.alarm.raise(step.fault == ProxyFault::squeezed ? Fault::proxy_squeezed : Fault::proxy_not_finite);
+    return false;
+  }
+  active_.add(step.limits);
+  advance_proxy(step.q_W);
+  record_world(step, cycle.record);
+  if (step.contacts > 0) state_.last_normal_W = step.normal_W;
+  if (passivity_) record_passivity(step, cycle.record);
+  cycle.record.set(RecordFlag::limit_orientation,
+                   parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
+  follow_proxy(cycle);
+  const double distance_m = (measured.tool_W - state_.q_k1_W).norm();
+  if (!(distance_m <= limits_.leash_m + leash_tolerance_m)) {
+    cycle.alarm.raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
+  }
+  return true;
+}
+
+// The sets of this step, around the proxy and what is commanded behind the filter of the setpoints.
+void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
+  limit_speed(cycle);
+  arm_.kinematics(parts_.elastic.link_rad(), filtered_);
+  const StepStart start{.q_k1_W = state_.q_k1_W,
+                        .q_k2_W = state_.q_k2_W,
+                        .filtered_W = filtered_.X_WT.translation(),
+                        .filtered_velocity_W = filtered_.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
+                        .measured_W = cycle.measured.tool_W,
+                        .force_N = cycle.measured.hand_W.force.norm(),
+                        .max_speed_m_per_s = state_.speed_limit_m_per_s};
+  limiter_.make(start, state_.link_rad, guard_.target_rad() - parts_.elastic.link_rad(), solution_.kinematics.J_W,
+                step_limits_);
+}
+
+// The tool's speed limit of this cycle. Where it stands, a lower one holds at once.
+void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
+  const double most = limits_.max_tool_speed_m_per_s;
+  double wanted = cycle.slowed ? std::min(supervision_.slow_speed_m_per_s, most) : most;
+  if (state_.freeing) wanted = std::min(parts_.freeing->speed_m_per_s(), wanted);
+  const double step = period_s_ * std::min(speed_limit_m_per_s2, 0.25 * limits_.max_tool_acceleration_m_per_s2);
+  double& limit = state_.speed_limit_m_per_s;
+  limit = std::clamp(wanted, limit - step, limit + step);
+  if (state_.q_k1_W == state_.q_k2_W && guard_.at_rest()) limit = std::min(limit, wanted);
+  cycle.record.set(RecordFlag::slowed, !state_.freeing && limit < most);
+}
+
+// A larger share of the hand's force from cycle to cycle, over ramp_in_s.
+void AdmittanceMotion::let_force_in(CycleRecord& record) noexcept {
+  if (state_.force_share >= 1.0) return;
+  const double ramp_s = supervision_.ramp_in_s;
+  state_.force_share = ramp_s > 0.0 ? std::min(1.0, state_.force_share + period_s_ / ramp_s) : 1.0;
+  record.set(RecordFlag::ramp_in, state_.force_share < 1.0);
+}
+
+void AdmittanceMotion::advance_proxy(const Vec3& q_W) noexcept {
+  state_.q_k2_W = state_.q_k1_W;
+  state_.q_k1_W = q_W;
+}
+
+void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& record) noexcept {
+  passivity_->observe_proxy(step.v_W, step.f_W + step.limit_force_W, step.mass_kg, step.damping_Ns_per_m);
+  record.energies_J = passivity_->energies_J();
+  record.added_damping_Ns_per_m = passivity_->added_damping_Ns_per_m();
+  record.oscillation_m_per_s = passivity_->oscillation_m_per_s();
+  record.felt_damping_Ns_per_m = passivity_->felt_damping_Ns_per_m();
+  record.set(RecordFlag::oscillation, passivity_->oscillates());
+}
+
+// ---- getting free
+
+// Away from what was touched last; where nothing was, to where the hand pushes.
+bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& measured) noexcept {
+  if (command.order == Order::release) {
+    parts_.freeing->start_release();
+    return true;
+  }
+  const Vec3& force_W = measured.hand_W.force;
+  Vec3 n_W = state_.last_normal_W;
+  if (n_W.isZero(0.0) && force_W.norm() > pinning_force_N) n_W = force_W.normalized();
+  if (n_W.isZero(0.0) || !(command.value > 0.0)) return false;
+  const Vec3 start_W = arm_.tool_pose(arm_.link_from_motor(guard_.target_rad())).translation();
+  parts_.freeing->start_back_off(start_W, n_W, command.value, force_W);
+  return true;
+}
+
+bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
+  const Vec3& hand_W = cycle.measured.hand_W.force;
+  make_limits(cycle);
+  const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
+  const Vec3 h_W = parts_.freeing->force_W(state_.q_k1_W, v_W, hand_W);
+  const WorldStep step = world().step(h_W, step_limits_);
+  if (step.fault != ProxyFault::none) {
+    cycle.alarm.raise(Fault::proxy_not_finite);
+    return false;
+  }
+  active_.add(step.limits);
+  advance_proxy(step.q_W);
+  cycle.record.p_hat_W_m = triple(step.p_hat_W);
+  follow_proxy(cycle);
+  return parts_.freeing->over(state_.q_k1_W, hand_W);
+}
+
+// ---- from the proxy to the setpoints
+
+// Where the arm can't go all the way to the proxy's pose (a singularity, the end of its reach), the proxy stays where
+// the arm is.
+void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
+  models::Pose X_WT = models::Pose::Identity();
+  X_WT.translation() = state_.q_k1_W;
+  X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
+  const Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
+  const JointVector link_k1_rad = state_.link_rad;
+  parts_.inverse.solve(state_.link_rad, X_WT, solution_);
+  if (solution_.status == models::InverseKinematicsResult::Status::invalid) return cycle.alarm.raise(Fault::singular);
+  state_.link_rad = solution_.q;
+  if (solution_.status != models::InverseKinematicsResult::Status::converged) {
+    active_.set(Limit::singularity);
+    shorten_step(link_k1_rad, reached_k1_W);
+    const Vec3& reached_W = solution_.kinematics.X_WT.translation();
+    state_.q_k2_W = state_.q_k1_W = world().resume(reached_W, (reached_W - reached_k1_W) / period_s_);
+  }
+  state_.link_step_rad = state_.link_rad - link_k1_rad;
+  command(parts_.elastic.step(state_.link_rad), cycle.measured);
+}
+
+// Where inverse kinematics stops short, its step is the joints' largest, from one cycle to the next and to any side:
+// the tool would go by millimetres. The step is drawn back, towards what braking all joints together would make of the
+// last one, until joints accelerate no more than half of what they may (the rest is for the gears' twist) and the tool
+// goes no further than the proxy would have gone, and a period's acceleration.
+void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& reached_k1_W) noexcept {
+  const double T = period_s_;
+  const JointVector& step_k1 = state_.link_step_rad;
+  JointVector most_change(step_k1.size());
+  for (Eigen::Index i = 0; i < most_change.size(); ++i) {
+    most_change[i] = 0.5 * drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2 * T * T;
+  }
+  const double cycles = step_k1.cwiseAbs().cwiseQuotient(most_change).maxCoeff();  // until it rests
+  const JointVector brakes = cycles > 1.0 ? JointVector(link_k1_rad + (1.0 - 1.0 / cycles) * step_k1) : link_k1_rad;
+  const JointVector way = solution_.q - brakes;
+  double too_far = 1.0;
+  for (Eigen::Index i = 0; i < way.size(); ++i) {
+    const double coasting = link_k1_rad[i] + step_k1[i] - brakes[i];
+    const double most = coasting + std::copysign(most_change[i], way[i]);
+    if (std::abs(way[i]) > std::abs(most)) too_far = std::min(too_far, std::max(0.0, most / way[i]));
+  }
+  const double most_m =
+      std::min(commanded_share * state_.speed_limit_m_per_s * T,
+               (state_.q_k1_W - reached_k1_W).norm() + limits_.max_tool_acceleration_m_per_s2 * T * T);
+  const auto goes_m = [&](double share) {
+    return (arm_.tool_pose(brakes + share * way).translation() - reached_k1_W).norm();
+  };
+  double kept = too_far;
+  if (goes_m(too_far) > most_m) {
+    kept = 0.0;
+    for (int i = 0; i < bisections; ++i) {
+      const double share = 0.5 * (kept + too_far);
+      (goes_m(share) <= most_m ? kept : too_far) = share;
+    }
+  }
+  if (kept == 1.0) return;
+  state_.link_rad = solution_.q = brakes + kept * way;
+  arm_.kinematics(state_.link_rad, solution_.kinematics);
+}
+
+void AdmittanceMotion::command(const JointVector& motor_rad, const Measured& measured) noexcept {
+  JointVector wanted_rad = motor_rad;
+  const std::uint8_t blocked = find_blocked(motor_rad, measured, wanted_rad);
+  const bool held_back = make_final(wanted_rad, state_.speed_limit_m_per_s);
+  made_setpoints_ = true;
+  if (held_back || blocked != 0 || guard_.lag_rad() > limits_.following_error_rad) wind_back(blocked);
+}
+
+// The joints whose drives are blocked, as bits. Such a drive is told to go a little further than it is, not more, and
+// all the others wait with it: so little is wound up that nothing snaps when it comes free. What a drive that follows
+// is behind grows with its speed: its setpoint is on the way to it and back.
+std::uint8_t AdmittanceMotion::find_blocked(const JointVector& motor_rad, const Measured& measured,
+                                            JointVector& wanted_rad) noexcept {
+  std::uint8_t blocked = 0;
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    if ((measured.fresh & bit) == 0) continue;
+    // On Modbus a setpoint waits for an exchange, and so does the answer.
+    const double lag_s = 5.0 * period_s_ + 2.0 * measured.feedback_period_s[i] +
+                         1.0 / (2.0 * std::numbers::pi * drives_[static_cast<std::size_t>(i)].position_bandwidth_Hz);
+    const double room_rad = limits_.following_error_rad + lag_s / period_s_ * std::abs(measured.moved_rad[i]);
+    const double actual_rad = measured.motor_rad[i];
+    if (std::abs(motor_rad[i] - actual_rad) <= room_rad) continue;
+    blocked |= bit;
+    wanted_rad[i] = std::clamp(motor_rad[i], actual_rad - room_rad, actual_rad + room_rad);
+  }
+  if (blocked == 0) return 0;
+  active_.set(Limit::following_error, blocked);
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    if ((blocked & 1u << i) == 0) wanted_rad[i] = guard_.target_rad()[i];
+  }
+  return blocked;
+}
+
+// The last word on what the drives are told, in whatever phase: each joint's limits, then the tool's and the elbow's.
+// True: the latter held something back.
+bool AdmittanceMotion::make_final(const JointVector& wanted_rad, double max_speed_m_per_s) noexcept {
+  active_.add(guard_.step(wanted_rad));
+  const ActiveLimits held_back = tool_guard_.step(guard_.target_rad(), max_speed_m_per_s);
+  if (held_back.kinds == 0) return false;
+  active_.add(held_back);
+  guard_.settle(tool_guard_.target_rad(), tool_guard_.speed_rad_per_s());
+  return true;
+}
+
+// Filter and proxy go on from what was commanded: nothing of what couldn't be followed is caught up later. A blocked
+// joint's setpoint may have been fast, and comes to rest where it was told to.
+void AdmittanceMotion::wind_back(std::uint8_t blocked) noexcept {
+  const JointVector& speed = guard_.speed_rad_per_s();
+  guard_.follow_from_here(blocked);
+  parts_.elastic.resume(guard_.target_rad(), speed);
+  state_.link_rad = parts_.elastic.link_rad() + parts_.elastic.lead_s() * speed;
+  state_.link_step_rad = period_s_ * speed;
+  arm_.kinematics(state_.link_rad, solution_.kinematics);
+  const Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
+  state_.q_k1_W = world().resume(solution_.kinematics.X_WT.translation(), velocity_W);
+  state_.q_k2_W = state_.q_k1_W - period_s_ * velocity_W;
+  parts_.orientation.start(orientation_of(solution_.kinematics.X_WT));
+}
+
+}  // namespace proxarm::controller

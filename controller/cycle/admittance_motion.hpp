@@ -1,0 +1,105 @@
+// The admittance type: the hand's force moves a proxy, and the arm's motors follow it.
+//
+//   force ─▶ proxy (26) in the scene, within limits ─▶ inverse kinematics ─▶ elastic gears ─▶ guards ─▶ setpoints
+//             ▲                                                                                  │
+//             └────────── wind_back(): from what was commanded, where it couldn't be followed ───┘
+//
+// Each of these has a history of its own; this class alone starts them, winds them back and gives them another T, and
+// always all together. make_final() is the one place where setpoints become final.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "controller/cycle/motion.hpp"
+#include "controller/limits/step_limits.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "controller/setpoints/joint_guard.hpp"
+#include "controller/setpoints/tool_guard.hpp"
+#include "controller/stability/passivity.hpp"
+#include "models/arm/inverse_kinematics.hpp"
+#include "models/base/archive_fields.hpp"
+
+namespace proxarm::controller {
+
+class AdmittanceMotion final : public Motion {
+ public:
+  // `arm` must outlive this.
+  AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm, std::vector<description::DriveDescription> drives,
+                   const description::CellLimits& limits, const description::SupervisionDescription& supervision,
+                   const SessionSettings& settings);
+
+  void wait_for_drives(const Measured& measured) noexcept override { start_guards(measured.drive_target_rad); }
+  void stand(const Measured& /*measured*/) noexcept override {}
+  bool render(const MotionCycle& cycle) noexcept override;
+  bool free(const MotionCycle& cycle) noexcept override;
+  void run_out() noexcept override;
+
+  void start(const Measured& measured, Beginning beginning) noexcept override;
+  void start_run_out() noexcept override;
+  bool prepare_freeing(const Command& command, const Measured& measured) noexcept override;
+  void set(const Change& change) noexcept override { parts_.world->set(change); }
+  void set_period(double period_s) noexcept override;
+
+  [[nodiscard]] Setpoints setpoints() const noexcept override {
+    return {Setpoints::Kind::angles_rad, guard_.target_rad()};
+  }
+  [[nodiscard]] bool can_hold() const noexcept override { return true; }
+  [[nodiscard]] bool stands() const noexcept override { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
+  [[nodiscard]] bool backs_off() const noexcept override { return parts_.freeing->backs_off(); }
+  [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
+
+  void archive(fieldbus::StateArchive& state) noexcept override;
+
+ private:
+  // Between cycles; the history of proxy, filter and guard is in theirs.
+  struct State {
+    models::Vec3 q_k1_W = models::Vec3::Zero();         // the proxy of the last cycle
+    models::Vec3 q_k2_W = models::Vec3::Zero();         // and of the one before
+    models::JointVector link_rad;                       // of the links for q_k1: inverse kinematics goes on from there
+    models::JointVector link_step_rad;                  // by which they went in the last period
+    models::JointVector run_out_rad_per_s;              // of each joint, when the run-out began
+    double run_out_share = 1.0;                         // of it that is left
+    double run_out_per_cycle = 1.0;                     // by which that shrinks
+    double force_share = 1.0;                           // of the hand's force that is let in
+    double speed_limit_m_per_s = 0.0;                   // of the tool
+    models::Vec3 last_normal_W = models::Vec3::Zero();  // of the last contact; zero: there was none
+    bool freeing = false;                               // it moves without the scene
+  };
+
+  [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.freeing->world() : *parts_.world; }
+  void make_limits(const MotionCycle& cycle) noexcept;
+  void limit_speed(const MotionCycle& cycle) noexcept;
+  void let_force_in(CycleRecord& record) noexcept;
+  void advance_proxy(const models::Vec3& q_W) noexcept;
+  void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
+  void follow_proxy(const MotionCycle& cycle) noexcept;
+  void shorten_step(const models::JointVector& link_k1_rad, const models::Vec3& reached_k1_W) noexcept;
+  void command(const models::JointVector& motor_rad, const Measured& measured) noexcept;
+  std::uint8_t find_blocked(const models::JointVector& motor_rad, const Measured& measured,
+                            models::JointVector& wanted_rad) noexcept;
+  bool make_final(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;
+  void start_guards(const models::JointVector& target_rad) noexcept;
+  void wind_back(std::uint8_t blocked) noexcept;
+
+  AdmittanceParts parts_;
+  const models::Arm& arm_;
+  std::vector<description::DriveDescription> drives_;
+  description::CellLimits limits_;
+  description::SupervisionDescription supervision_;
+  double period_s_;
+  std::optional<PassivityObserver> passivity_;  // none: not wanted
+  StepLimiter limiter_;
+  JointGuard guard_;
+  ToolGuard tool_guard_;
+  State state_;
+
+  // Of this cycle.
+  StepLimits step_limits_;
+  models::ToolKinematics filtered_;           // of the links as they are commanded, behind the filter
+  models::InverseKinematicsResult solution_;  // for the proxy
+};
+
+}  // namespace proxarm::controller

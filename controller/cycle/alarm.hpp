@@ -1,0 +1,39 @@
+// Where every part of the cycle says what is wrong: dates it and hands it to the supervisor.
+#pragma once
+
+#include <cstdint>
+
+#include "controller/supervision/supervisor.hpp"
+#include "models/base/archive_fields.hpp"
+
+namespace proxarm::controller {
+
+class Alarm {
+ public:
+  // Both must outlive this.
+  Alarm(Supervisor& supervisor, const std::uint64_t& cycle) noexcept : supervisor_(supervisor), cycle_(cycle) {}
+
+  // `where`: drive index, bus index, or −1 for the sensor and the controller itself (FaultReport).
+  void raise(Fault fault, std::int32_t where = -1, double value = 0.0, double limit = 0.0) noexcept {
+    if (supervisor_.reaction(fault) == Reaction::hold) state_.hold_raised = true;
+    supervisor_.raise({fault, where, cycle_, value, limit});
+  }
+  // Whether a fault that holds the arm was raised since the last call.
+  [[nodiscard]] bool take_hold() noexcept {
+    const bool raised = state_.hold_raised;
+    state_.hold_raised = false;
+    return raised;
+  }
+  void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
+
+ private:
+  struct State {
+    bool hold_raised = false;
+  };
+
+  Supervisor& supervisor_;
+  const std::uint64_t& cycle_;
+  State state_;
+};
+
+}  // namespace proxarm::controller

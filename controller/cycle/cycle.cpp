@@ -1,0 +1,186 @@
+#include "controller/cycle/cycle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "controller/cycle/compute_time.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+bool renders_torques(const CycleParts& parts) noexcept {
+  return std::holds_alternative<std::unique_ptr<TorqueRendering>>(parts.rendering);
+}
+
+// Who drives back a device that takes torques is as fast as he likes.
+std::optional<ToolMonitor> tool_monitor(const CycleParts& parts, const SessionSettings& settings,
+                                        const description::CellLimits& limits) {
+  if (renders_torques(parts)) return {};
+  double feedback_s = 0.0;
+  for (const DriveOnBus& axis : parts.drives) feedback_s = std::max(feedback_s, axis.drive.feedback_period_s());
+  return ToolMonitor(limits, settings.max_missed_feedback, feedback_s);
+}
+
+// What a torque can't do, a stop does: nothing is held or slowed there.
+Reactions reactions_for(const CycleParts& parts) {
+  Reactions reactions = reactions_of(parts.supervision);
+  if (!renders_torques(parts)) return reactions;
+  for (Reaction& reaction : reactions) {
+    if (reaction == Reaction::hold || reaction == Reaction::slow) reaction = Reaction::stop_1;
+  }
+  reactions[static_cast<std::size_t>(Fault::sensor_late)] = Reaction::carry_on;
+  return reactions;
+}
+
+// Why this session keeps its timestep, or nullptr.
+const char* fixed_timestep(const CycleParts& parts) noexcept {
+  if (renders_torques(parts)) return "the impedance type's torques are made for one timestep";
+  if (!parts.modbus_lines.empty()) return "what is on a Modbus line keeps the timestep of the start";
+  return nullptr;
+}
+
+}  // namespace
+
+Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
+             std::size_t record_capacity)
+    : parts_(std::move(parts)),
+      settings_(settings),
+      status_(settings.period_s, fixed_timestep(parts_)),
+      supervisor_(reactions_for(parts_)),
+      alarm_(supervisor_, state_.cycle),
+      recorder_(record_capacity),
+      bus_(parts_, recorder_, alarm_),
+      measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
+      faults_(parts_.drives, settings_, limits.max_force_N, supervisor_, alarm_,
+              tool_monitor(parts_, settings, limits)),
+      motion_(make_motion(parts_, settings, limits)),
+      timestep_(parts_.can_drives) {}
+
+void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
+  begin_cycle(t_k_ns);
+  bus_.receive_until(t_k_ns + std::llround(receive_window * settings_.period_s * 1e9), timestep_);
+  {
+    const ComputeTime timed(recorder_.record().compute_ns);
+    measure();
+    judge(t_k_ns);
+    choose_setpoints(t_k_ns);
+    send_setpoints(t_k_ns);
+  }
+  write_record(t_k_ns);
+  end_cycle();
+}
+
+void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
+  recorder_.begin(t_k_ns, [this](fieldbus::StateArchive& state) noexcept { archive(state); });
+  const ComputeTime timed(recorder_.record().compute_ns);
+  if (state_.cycle == 0) {
+    state_.first_cycle_ns = t_k_ns;
+    if (!parts_.enabling) supervisor_.handle(Event::begin);
+  }
+  motion_->begin_cycle();
+  bus_.begin(t_k_ns);
+}
+
+void Cycle::measure() noexcept {
+  measurement_.take();
+  faults_.judge_encoders(measurement_.now(), state_.entered_phase);
+}
+
+void Cycle::judge(std::int64_t t_k_ns) noexcept {
+  recorder_.entry().stop_requested = status_.stop_requested();
+  if (recorder_.entry().stop_requested) supervisor_.handle(Event::stop);
+  heed_enabling_input(t_k_ns);
+  faults_.judge({.measured = measurement_.now(),
+                 .sample = parts_.sensor->latest(),
+                 .enabling = parts_.enabling ? &*parts_.enabling : nullptr,
+                 .buses = bus_.read_status(),
+                 .overruns_in_a_row = overruns_in_a_row_,
+                 .telling = timestep_.telling(),
+                 .tared = state_.tared,
+                 .backs_off = motion_->backs_off()});
+  take_command(t_k_ns);
+  take_timestep();
+  change_timestep(t_k_ns);
+  supervise_hold(t_k_ns);
+  enter(supervisor_.phase(), t_k_ns);
+}
+
+// A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one; unless
+// the setpoints are made already.
+void Cycle::choose_setpoints(std::int64_t t_k_ns) noexcept {
+  act(t_k_ns);
+  if (supervisor_.phase() == state_.entered_phase) return;
+  enter(supervisor_.phase(), t_k_ns);
+  if (!motion_->made_setpoints()) act(t_k_ns);
+}
+
+void Cycle::send_setpoints(std::int64_t t_k_ns) noexcept {
+  bus_.send_setpoints(motion_->setpoints(), t_k_ns, state_.cycle);
+  fieldbus::CanFrame frame;
+  std::size_t bus = 0;
+  while (timestep_.next_request(t_k_ns, bus, frame)) bus_.send(bus, frame);
+  bus_.hand_over();
+}
+
+void Cycle::write_record(std::int64_t t_k_ns) noexcept {
+  CycleRecord& record = recorder_.record();
+  const Measured& measured = measurement_.now();
+  record.cycle = state_.cycle;
+  record.time_ns = t_k_ns - state_.first_cycle_ns;
+  record.period_ns = period_ns();
+  record.phase = state_.entered_phase;
+  record.set(RecordFlag::sample_held, !measured.sample_is_new);
+  record.set(RecordFlag::overrun, overruns_in_a_row_ > 0);
+  record.set(RecordFlag::timestep, timestep_.under_way());
+  for (const LimitFlag& flag : limit_flags) record.set(flag.flag, motion_->active().has(flag.limit));
+  record.limited_axes = motion_->active().axes;
+  record.force_S_N = triple(measured.reading_S.force);
+  record.torque_S_Nm = triple(measured.reading_S.torque);
+  record.force_W_N = triple(measured.hand_W.force);
+  record.torque_W_Nm = triple(measured.hand_W.torque);
+  record.proxy_W_m = triple(motion_->proxy_W());
+  record.tool_W_m = triple(measured.tool_W);
+  bus_.write_record(record);
+}
+
+void Cycle::end_cycle() noexcept {
+  BoxCycle& entry = recorder_.entry();
+  entry.overruns_in_a_row = overruns_in_a_row_;
+  entry.rendered_ns = state_.rendered_ns;
+  bus_.write_inputs(entry);
+  status_.show({.phase = supervisor_.phase(),
+                .period_s = settings_.period_s,
+                .changes_timestep = timestep_.under_way(),
+                .pressed = !parts_.enabling || parts_.enabling->pressed(),
+                .cause_lasts = !may_move(),
+                .timesteps_answered = timestep_.settled(),
+                .asked_timesteps = requests_.timesteps.taken_from_thread()});
+  recorder_.finish();
+  ++state_.cycle;
+}
+
+// For an arm that stands. What was commanded, measured and rendered stays as it is; what is made of T is made anew, and
+// what is counted in cycles back from now is counted in the new ones.
+void Cycle::apply(const Timestep& timestep) noexcept {
+  const double ratio = settings_.period_s / timestep.period_s;
+  settings_.max_missed_samples = timestep.max_missed_samples;
+  settings_.max_repeated_samples = timestep.max_repeated_samples;
+  settings_.period_s = timestep.period_s;
+  if (ratio != 1.0) supervisor_.rescale(state_.cycle, ratio);
+  measurement_.set_period(timestep.period_s);
+  motion_->set_period(timestep.period_s);
+}
+
+// The timestep comes first, since what follows is of it.
+void Cycle::archive(fieldbus::StateArchive& state) noexcept {
+  Timestep now = timestep_of(settings_);
+  archive_fields(state, now);
+  if (state.reading() && plausible(now)) apply(now);
+  bus_.archive(state);
+  if (parts_.enabling) parts_.enabling->archive(state);
+  archive_fields(state, state_);
+  state(supervisor_, alarm_, measurement_, faults_, *motion_, timestep_);
+}
+
+}  // namespace proxarm::controller

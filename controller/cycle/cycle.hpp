@@ -1,0 +1,168 @@
+// One period of the session, the same lines on hardware, on vcan, in-process and in tests; only bus and clock differ.
+//
+//   t_k        SYNC on every drive bus, then the sensor's poll
+//   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
+//   then       measure, judge, choose the setpoints by the phase, send them (and the heartbeat where one is due),
+//   record
+//
+// The setpoints are latched by the drives at SYNC k+1 and, with their interpolation over the period, reached at k+2.
+//
+// run_cycle() neither allocates, locks, throws nor prints; all that it touches was built before. One thread calls it.
+// Each stage is a part of its own (BusImage, Measurement, FaultMonitor, Motion, TimestepChange, CycleRecorder), and
+// Cycle is what connects them: which phase the session is in, and what a phase does.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "controller/cycle/alarm.hpp"
+#include "controller/cycle/bus_image.hpp"
+#include "controller/cycle/cycle_parts.hpp"
+#include "controller/cycle/cycle_recorder.hpp"
+#include "controller/cycle/cycle_status.hpp"
+#include "controller/cycle/fault_monitor.hpp"
+#include "controller/cycle/measurement.hpp"
+#include "controller/cycle/motion.hpp"
+#include "controller/cycle/past_faults.hpp"
+#include "controller/cycle/requests.hpp"
+#include "controller/cycle/timestep_change.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/command.hpp"
+#include "controller/supervision/supervisor.hpp"
+
+namespace proxarm::controller {
+
+// How long a cycle waits for feedback and samples, as a fraction of T; in what is left the setpoints are computed and
+// sent.
+inline constexpr double receive_window = 0.45;
+
+class Cycle {
+ public:
+  // `record_capacity`: cycles that the ring holds until somebody pops them.
+  Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
+        std::size_t record_capacity);
+  Cycle(const Cycle&) = delete;
+  Cycle& operator=(const Cycle&) = delete;
+
+  // One period, begun at t_k.
+  void run_cycle(std::int64_t t_k_ns) noexcept;
+
+  // ---- any thread
+  [[nodiscard]] const CycleStatus& status() const noexcept { return status_; }
+  void request_stop() noexcept { status_.request_stop(); }
+  [[nodiscard]] bool stop_requested() const noexcept { return status_.stop_requested(); }
+
+  // ---- one thread
+  // Checked parameters for the next cycles of rendering or of a hold, one each.
+  [[nodiscard]] Requests<Change>& changes() noexcept { return requests_.changes; }
+  // Another T; the drives are on CAN and take positions. The arm stops, the drives are told, rendering goes on. It
+  // waits until the arm is rendering or in a hold.
+  [[nodiscard]] Requests<Timestep>& timesteps() noexcept { return requests_.timesteps; }
+  // In any phase. A command that the phase has no use for is dropped; CycleStatus::refusal() says so beforehand.
+  [[nodiscard]] Requests<Command>& commands() noexcept { return requests_.commands; }
+  // The records of the cycles, for whoever writes files.
+  [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return recorder_.records(); }
+
+  // ---- the loop's owner, between cycles
+  // Before the first cycle: what it is given and what it does is also written there.
+  void write_to(CycleBox& box) noexcept { recorder_.write_to(box); }
+  // This many cycles in a row were late.
+  void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
+  // All that a cycle leaves to the next one: with it and what the cycles are given, a replay gives the same setpoints.
+  void archive(fieldbus::StateArchive& state) noexcept;
+  // After the last cycle: drives back to NMT pre-operational. Never fails.
+  void shut_down() noexcept { bus_.shut_down(); }
+
+  [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
+  [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {
+    return requests_.commands.script();
+  }
+  [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return state_.rendered_cycles; }
+  [[nodiscard]] std::int64_t rendered_ns() const noexcept { return state_.rendered_ns; }
+  // From the last cycle to the next one.
+  [[nodiscard]] std::int64_t period_ns() const noexcept { return ns_of(settings_.period_s); }
+  // After the last cycle: whether every drive has said that it doesn't hold its axis any more.
+  [[nodiscard]] bool drives_off() const noexcept { return bus_.drives_off(); }
+  // Faults that were reset, the latest eight, the oldest of them first; and how many there were.
+  [[nodiscard]] std::span<const FaultReport> past_faults() const noexcept { return past_faults_.latest(); }
+  [[nodiscard]] std::uint64_t past_fault_count() const noexcept { return past_faults_.count(); }
+  [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
+
+ private:
+  struct AllRequests {
+    Requests<Change> changes{16};
+    Requests<Timestep> timesteps{4};
+    Requests<Command> commands{16};
+  };
+  // Of the session, between cycles.
+  struct State {
+    Phase entered_phase = Phase::idle;  // that whose begin has been acted on
+    std::int64_t phase_since_ns = 0;
+    std::int64_t first_cycle_ns = 0;
+    std::uint64_t cycle = 0;  // k
+    std::uint64_t rendered_cycles = 0;
+    std::int64_t rendered_ns = 0;
+    bool tared = false;
+    bool wants_resume = false;  // out of this hold: the enabling input was pressed anew, or somebody asked for it
+  };
+
+  // cycle.cpp: the stages
+  void begin_cycle(std::int64_t t_k_ns) noexcept;
+  void measure() noexcept;
+  void judge(std::int64_t t_k_ns) noexcept;
+  void choose_setpoints(std::int64_t t_k_ns) noexcept;
+  void send_setpoints(std::int64_t t_k_ns) noexcept;
+  void write_record(std::int64_t t_k_ns) noexcept;
+  void end_cycle() noexcept;
+  void apply(const Timestep& timestep) noexcept;
+
+  // cycle_phases.cpp: what a phase does
+  void enter(Phase phase, std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] fieldbus::DriveGoal goal_in(Phase phase) const noexcept;
+  void act(std::int64_t t_k_ns) noexcept;
+  void await_begin(std::int64_t t_k_ns) noexcept;
+  void await_enabled(std::int64_t t_k_ns) noexcept;
+  void tare(std::int64_t t_k_ns) noexcept;
+  void render() noexcept;
+  void free() noexcept;
+  void run_out() noexcept;
+  void await_disabled(std::int64_t t_k_ns) noexcept;
+  void await_reset(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] MotionCycle motion_cycle() noexcept;
+
+  // cycle_requests.cpp: what somebody asks for
+  void heed_enabling_input(std::int64_t t_k_ns) noexcept;
+  void take_command(std::int64_t t_k_ns) noexcept;
+  void obey(const Command& command) noexcept;
+  void start_freeing(const Command& command) noexcept;
+  void reset() noexcept;
+  void take_timestep() noexcept;
+  void change_timestep(std::int64_t t_k_ns) noexcept;
+  void take_change() noexcept;
+  void supervise_hold(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] bool may_move() const noexcept;
+  [[nodiscard]] bool stands_in_hold() const noexcept;
+  // For so long, in cycles.
+  [[nodiscard]] std::uint64_t cycles_of(double time_s) const noexcept;
+  [[nodiscard]] double in_phase_s(std::int64_t t_k_ns) const noexcept;
+
+  CycleParts parts_;
+  SessionSettings settings_;
+  AllRequests requests_;
+  CycleStatus status_;
+  Supervisor supervisor_;
+  State state_;
+  Alarm alarm_;
+  CycleRecorder recorder_;
+  BusImage bus_;
+  Measurement measurement_;
+  FaultMonitor faults_;
+  std::unique_ptr<Motion> motion_;
+  TimestepChange timestep_;
+  PastFaults past_faults_;
+  std::uint32_t overruns_in_a_row_ = 0;
+};
+
+}  // namespace proxarm::controller

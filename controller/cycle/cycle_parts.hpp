@@ -1,0 +1,73 @@
+// All that a cycle works on, built and configured before the first one (session/bring_up.hpp).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "controller/cycle/wrench_compensation.hpp"
+#include "controller/rendering/orientation_proxy.hpp"
+#include "controller/rendering/rendered_world.hpp"
+#include "controller/rendering/torque_rendering.hpp"
+#include "controller/setpoints/elastic_setpoint.hpp"
+#include "controller/supervision/enabling_input.hpp"
+#include "controller/supervision/free_motion.hpp"
+#include "fieldbus/can/can_network.hpp"
+#include "fieldbus/canopen/canopen_heartbeat.hpp"
+#include "fieldbus/canopen/canopen_sync.hpp"
+#include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "fieldbus/modbus/modbus_line.hpp"
+#include "fieldbus/sensors/force_sensor.hpp"
+#include "models/arm/arm.hpp"
+#include "models/arm/inverse_kinematics.hpp"
+
+namespace proxarm::controller {
+
+// An axis' drive, on CAN or on a Modbus line.
+struct DriveOnBus {
+  static constexpr std::size_t no_bus = static_cast<std::size_t>(-1);
+
+  std::unique_ptr<fieldbus::CyclicDrive> owned;
+  fieldbus::CyclicDrive& drive;  // *owned
+  std::size_t bus;               // index in the network; no_bus: on a Modbus line
+};
+
+// A bus with drives: they get SYNC and the controller's heartbeat.
+struct DriveBus {
+  std::size_t bus;
+  fieldbus::SyncProducer sync;
+  fieldbus::HeartbeatProducer heartbeat;
+};
+
+// The admittance type: what lies between the hand's force and the setpoints.
+struct AdmittanceParts {
+  models::InverseKinematics inverse;
+  ElasticSetpoint elastic;
+  std::unique_ptr<RenderedWorld> world;
+  OrientationProxy orientation;
+  std::unique_ptr<FreeMotion> freeing;
+};
+
+// Drives stand in the order of the arm's joints.
+struct CycleParts {
+  fieldbus::CanNetwork& network;
+  std::vector<DriveOnBus> drives;
+  std::vector<fieldbus::DriveSlot> can_drives;  // those of the drives that are on CAN; with torques, all of them
+  std::vector<DriveBus> drive_buses;
+  std::unique_ptr<fieldbus::ForceSensor> sensor;
+  std::size_t sensor_bus;                                           // DriveOnBus::no_bus: on a Modbus line
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;  // their workers end before drives and sensor do
+  std::unique_ptr<models::Arm> arm;  // in one place for good: whatever knows the arm refers to it
+  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // and thereby the type
+  WrenchCompensation compensation;
+  std::optional<EnablingInput> enabling;
+  description::SupervisionDescription supervision;
+};
+
+// The largest step of each joint in one cycle, at its drive's highest speed.
+std::array<double, 6> max_steps_rad(const std::vector<description::DriveDescription>& drives, double period_s) noexcept;
+
+}  // namespace proxarm::controller

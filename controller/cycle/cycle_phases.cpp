@@ -1,0 +1,141 @@
+// What each phase of a session does, and what it does when it begins.
+#include <bit>
+
+#include "controller/cycle/cycle.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+// How long the drives may take to switch off before the run ends without them.
+constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
+// For so long after the last fault that slows, the tool stays slow.
+constexpr double clear_of_slow_s = 0.5;
+
+}  // namespace
+
+void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
+  const Phase from = state_.entered_phase;
+  if (phase == from) return;
+  state_.entered_phase = phase;
+  state_.phase_since_ns = t_k_ns;
+  bus_.request(goal_in(phase));
+  switch (phase) {
+    case Phase::rendering:
+      return motion_->start(measurement_.now(), from == Phase::holding ? Beginning::resuming : Beginning::first);
+    case Phase::freeing:
+      return motion_->start(measurement_.now(), Beginning::freeing);
+    case Phase::holding:
+    case Phase::stopping:
+      state_.wants_resume = false;
+      return motion_->start_run_out();
+    default:
+      return;
+  }
+}
+
+// At once: without the drive's own ramp.
+fieldbus::DriveGoal Cycle::goal_in(Phase phase) const noexcept {
+  if (phase < Phase::disabling) return fieldbus::DriveGoal::operation_enabled;
+  const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == Reaction::stop_0;
+  return phase == Phase::disabling && at_once ? fieldbus::DriveGoal::none : fieldbus::DriveGoal::switched_off;
+}
+
+void Cycle::act(std::int64_t t_k_ns) noexcept {
+  switch (supervisor_.phase()) {
+    case Phase::idle:
+      return await_begin(t_k_ns);
+    case Phase::enabling:
+      return await_enabled(t_k_ns);
+    case Phase::taring:
+      return tare(t_k_ns);
+    case Phase::rendering:
+      take_change();
+      return render();
+    case Phase::holding:
+      take_change();
+      return motion_->run_out();
+    case Phase::freeing:
+      return free();
+    case Phase::stopping:
+      return run_out();
+    case Phase::disabling:
+      return await_disabled(t_k_ns);
+    case Phase::faulted:
+      return await_reset(t_k_ns);
+    case Phase::done:
+      return;
+  }
+}
+
+double Cycle::in_phase_s(std::int64_t t_k_ns) const noexcept {
+  return 1e-9 * static_cast<double>(t_k_ns - state_.phase_since_ns);
+}
+
+void Cycle::await_begin(std::int64_t t_k_ns) noexcept {
+  const double waited_s = 1e-9 * static_cast<double>(t_k_ns - state_.first_cycle_ns);
+  if (waited_s > settings_.enabling_timeout_s) alarm_.raise(Fault::enabling_not_pressed);
+}
+
+void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
+  const Measured& measured = measurement_.now();
+  motion_->wait_for_drives(measured);
+  const auto axes = static_cast<int>(measured.axes());
+  const int followed = std::countr_one(measured.following);
+  if (followed >= axes) {
+    supervisor_.handle(state_.tared ? Event::reenabled : Event::enabled);
+  } else if (in_phase_s(t_k_ns) > settings_.enable_timeout_s) {
+    alarm_.raise(Fault::drive_not_enabled, followed, settings_.enable_timeout_s, settings_.enable_timeout_s);
+  }
+}
+
+void Cycle::tare(std::int64_t t_k_ns) noexcept {
+  motion_->stand(measurement_.now());
+  measurement_.add_tare_sample();
+  const double spread_N = measurement_.tare_spread_N();
+  if (spread_N > settings_.tare_spread_N) {
+    alarm_.raise(Fault::force_at_start, -1, spread_N, settings_.tare_spread_N);
+  } else if (in_phase_s(t_k_ns) >= settings_.tare_s) {
+    measurement_.finish_tare();
+    state_.tared = true;
+    supervisor_.handle(Event::tared);
+  }
+}
+
+MotionCycle Cycle::motion_cycle() noexcept {
+  return {.measured = measurement_.now(),
+          .slowed = supervisor_.slowed(state_.cycle, cycles_of(clear_of_slow_s)),
+          .alarm = alarm_,
+          .record = recorder_.record()};
+}
+
+void Cycle::render() noexcept {
+  if (!motion_->render(motion_cycle())) return;
+  ++state_.rendered_cycles;
+  state_.rendered_ns += period_ns();
+}
+
+void Cycle::free() noexcept {
+  if (motion_->free(motion_cycle())) supervisor_.handle(Event::freed);
+}
+
+void Cycle::run_out() noexcept {
+  motion_->run_out();
+  if (motion_->stands()) supervisor_.handle(Event::at_rest);
+}
+
+void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
+  const bool off = bus_.drives_off();
+  if (!off) {
+    if (t_k_ns - state_.phase_since_ns <= disable_timeout_ns) return;
+    alarm_.raise(Fault::drive_not_disabled, bus_.first_drive_on());
+  }
+  const bool waits = supervisor_.faulted() && settings_.wait_after_fault_s > 0.0 && off &&
+                     !recorder_.entry().stop_requested && motion_->can_hold();
+  supervisor_.handle(waits ? Event::wait : Event::disabled);
+}
+
+void Cycle::await_reset(std::int64_t t_k_ns) noexcept {
+  if (in_phase_s(t_k_ns) > settings_.wait_after_fault_s) supervisor_.handle(Event::stop);
+}
+
+}  // namespace proxarm::controller

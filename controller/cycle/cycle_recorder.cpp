@@ -1,0 +1,20 @@
+#include "controller/cycle/cycle_recorder.hpp"
+
+namespace proxarm::controller {
+
+// The box reuses its oldest entry: what that cycle was asked for must not be replayed with this one.
+void CycleRecorder::begin_entry(std::int64_t t_k_ns) noexcept {
+  record_ = {};
+  entry_ = &box_->begin(t_k_ns);
+  entry_->change = {};
+  entry_->command = {};
+  entry_->timestep = {};
+}
+
+void CycleRecorder::finish() noexcept {
+  records_.push(record_);
+  entry_->record = record_;
+  box_->finish();
+}
+
+}  // namespace proxarm::controller

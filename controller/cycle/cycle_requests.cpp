@@ -1,0 +1,139 @@
+// What the cycle is asked for, by the enabling input, by commands, by changes of parameters and of the timestep, and
+// when it may do it.
+#include <cmath>
+
+#include "controller/cycle/cycle.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+// For so long what the arm was held for must be gone before it may move again.
+constexpr double clear_of_cause_s = 0.1;
+
+}  // namespace
+
+// ---- when
+
+std::uint64_t Cycle::cycles_of(double time_s) const noexcept {
+  return static_cast<std::uint64_t>(std::ceil(time_s / settings_.period_s));
+}
+
+bool Cycle::may_move() const noexcept {
+  return (!parts_.enabling || parts_.enabling->pressed()) &&
+         !supervisor_.cause_lasts(state_.cycle, cycles_of(clear_of_cause_s));
+}
+
+bool Cycle::stands_in_hold() const noexcept {
+  return supervisor_.phase() == Phase::holding && state_.entered_phase == Phase::holding && motion_->stands();
+}
+
+void Cycle::supervise_hold(std::int64_t t_k_ns) noexcept {
+  if (supervisor_.phase() != Phase::holding || state_.entered_phase != Phase::holding) return;
+  if (state_.wants_resume && motion_->stands() && may_move() && !timestep_.under_way()) {
+    supervisor_.handle(Event::resume);
+  } else if (in_phase_s(t_k_ns) > parts_.supervision.hold_s) {
+    supervisor_.give_up_hold();
+  }
+}
+
+// ---- the enabling input
+
+void Cycle::heed_enabling_input(std::int64_t t_k_ns) noexcept {
+  if (!parts_.enabling) return;
+  parts_.enabling->on_cycle(t_k_ns);
+  const bool anew = parts_.enabling->take_press();
+  if (!parts_.enabling->pressed()) {
+    state_.wants_resume = false;
+    timestep_.stay_in_hold();
+  }
+  if (!anew) return;
+  if (supervisor_.phase() == Phase::holding) state_.wants_resume = true;
+  if (supervisor_.phase() == Phase::idle) supervisor_.handle(Event::begin);
+}
+
+// ---- commands
+
+// A command of the script that does nothing is told of when the session has ended.
+void Cycle::take_command(std::int64_t t_k_ns) noexcept {
+  Command command;
+  if (!requests_.commands.take(t_k_ns - state_.first_cycle_ns, command)) return;
+  recorder_.entry().command = command;
+  const char* refusal = status_.refusal(command.order);
+  obey(command);
+  if (refusal == nullptr && supervisor_.phase() != Phase::freeing) {
+    if (command.order == Order::release) refusal = "the arm wasn't at rest yet";
+    if (command.order == Order::back_off) refusal = "the arm wasn't at rest yet, or nothing says which way";
+  }
+  requests_.commands.note_refusal(refusal);
+}
+
+void Cycle::obey(const Command& command) noexcept {
+  const Phase phase = supervisor_.phase();
+  switch (command.order) {
+    case Order::hold:
+      if (!motion_->can_hold()) return;
+      if (phase == Phase::rendering) supervisor_.hold();
+      if (phase == Phase::freeing) supervisor_.handle(Event::freed);
+      if (!timestep_.under_way()) return;
+      state_.wants_resume = false;
+      return timestep_.stay_in_hold();
+    case Order::resume:
+      if (phase == Phase::holding && may_move()) state_.wants_resume = true;
+      return;
+    case Order::release:
+    case Order::back_off:
+      return start_freeing(command);
+    case Order::reset:
+      if (phase == Phase::faulted && may_move() && !timestep_.under_way()) reset();
+      return;
+    case Order::none:
+      return;
+  }
+}
+
+void Cycle::start_freeing(const Command& command) noexcept {
+  if (!stands_in_hold() || !may_move() || timestep_.under_way()) return;
+  if (motion_->prepare_freeing(command, measurement_.now())) supervisor_.handle(Event::free);
+}
+
+void Cycle::reset() noexcept {
+  past_faults_.add(supervisor_.report());
+  supervisor_.reset();
+  bus_.forget_faults();
+  faults_.forget(bus_.status());
+}
+
+// ---- parameters and timestep
+
+void Cycle::take_change() noexcept {
+  // The timestep that comes first is the one that it was checked for.
+  const Change* const due = requests_.changes.due(state_.rendered_ns);
+  const bool of_another = due != nullptr && due->period_s != 0.0 && due->period_s != settings_.period_s;
+  if (of_another && (timestep_.under_way() || requests_.timesteps.due(state_.rendered_ns) != nullptr)) return;
+  Change change;
+  if (!requests_.changes.take(state_.rendered_ns, change)) return;
+  recorder_.entry().change = change;
+  timestep_.wait_again();
+  if (change.period_s == 0.0 || change.period_s == settings_.period_s) motion_->set(change);
+}
+
+void Cycle::take_timestep() noexcept {
+  const Phase phase = supervisor_.phase();
+  if ((phase != Phase::rendering && phase != Phase::holding) || timestep_.under_way()) return;
+  Timestep wanted;
+  if (!requests_.timesteps.take(state_.rendered_ns, wanted)) return;
+  recorder_.entry().timestep = wanted;
+  if (wanted.period_s == settings_.period_s || !plausible(wanted) || status_.keeps_timestep()) return;
+  timestep_.begin(timestep_of(settings_), wanted, phase == Phase::rendering || state_.wants_resume, alarm_);
+  if (phase == Phase::rendering) supervisor_.hold();
+}
+
+void Cycle::change_timestep(std::int64_t t_k_ns) noexcept {
+  const TimestepChange::Surroundings surroundings{.held = supervisor_.phase() == Phase::holding,
+                                                  .stands = stands_in_hold()};
+  const TimestepChange::Step step = timestep_.step(t_k_ns, surroundings, alarm_, recorder_.record());
+  if (step.now) apply(*step.now);
+  if (step.resumes) state_.wants_resume = true;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,170 @@
+#include "controller/cycle/fault_monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+constexpr std::uint32_t late_sample = 16, late_limit = 8 * late_sample;
+// How much faster than its joint an encoder may seem to be; gears that ring make it a little faster.
+constexpr double implausible_speeds = 4.0;
+
+}  // namespace
+
+void FaultMonitor::judge_encoders(const Measured& measured, Phase entered) noexcept {
+  judge_joints(measured, entered);
+  judge_tool(measured.tool_W, entered);
+}
+
+void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcept {
+  if (entered < Phase::taring || entered > Phase::stopping) return;
+  for (Eigen::Index i = 0; i < measured.axes(); ++i) {
+    if ((measured.fresh & 1u << i) == 0) continue;
+    const double T = settings_.period_s;
+    const double cycles = 1.0 + measured.unheard_cycles[i] + 2.0 * measured.feedback_period_s[i] / T;
+    const fieldbus::CyclicDrive& drive = drives_[static_cast<std::size_t>(i)].drive;
+    const double most_rad = implausible_speeds * drive.description().max_speed_rad_per_s * T * cycles;
+    const double jump_rad = std::abs(measured.jump_rad[i]);
+    if (jump_rad > most_rad) {
+      alarm_.raise(Fault::position_implausible, static_cast<std::int32_t>(i), jump_rad, most_rad);
+    }
+  }
+}
+
+void FaultMonitor::judge_tool(const models::Vec3& tool_W, Phase entered) noexcept {
+  if (!tool_) return;
+  if (entered < Phase::rendering || entered > Phase::stopping) return tool_->start();
+  const ToolVerdict verdict = tool_->step(tool_W, settings_.period_s);
+  if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, -1, verdict.value, verdict.limit);
+}
+
+void FaultMonitor::judge(const JudgedCycle& cycle) noexcept {
+  // After a gap in time drives and sensor have gone silent or stopped, too: the gap is why, and is latched first.
+  if (cycle.overruns_in_a_row > settings_.max_overruns) {
+    alarm_.raise(Fault::overrun, -1, cycle.overruns_in_a_row, settings_.max_overruns);
+  }
+  judge_enabling(cycle.enabling);
+  judge_buses(cycle.buses);
+  judge_drives(cycle.telling);
+  judge_sensor(cycle);
+}
+
+void FaultMonitor::judge_enabling(const EnablingInput* enabling) noexcept {
+  if (enabling == nullptr || enabling->pressed()) return;
+  const Phase phase = supervisor_.phase();
+  if (supervisor_.live() || phase == Phase::enabling || phase == Phase::taring) {
+    alarm_.raise(Fault::enabling_released);
+  }
+}
+
+void FaultMonitor::judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept {
+  for (std::size_t bus = 0; bus < buses.size(); ++bus) {
+    const fieldbus::BusStatus& status = buses[bus];
+    const auto where = static_cast<std::int32_t>(bus);
+    if (status.state == fieldbus::BusState::down) alarm_.raise(Fault::interface_down, where);
+    if (status.state == fieldbus::BusState::bus_off) alarm_.raise(Fault::bus_off, where);
+    if (status.state == fieldbus::BusState::error_passive) alarm_.raise(Fault::error_passive, where);
+    if (bus >= max_buses || status.receive_overflows <= state_.overflows_before[bus]) continue;
+    const std::uint64_t lost = status.receive_overflows - state_.overflows_before[bus];
+    alarm_.raise(Fault::receive_overflow, where, static_cast<double>(lost));
+    if (supervisor_.reaction(Fault::receive_overflow) < Reaction::stop_1) {
+      state_.overflows_before[bus] = status.receive_overflows;
+    }
+  }
+}
+
+void FaultMonitor::judge_drives(bool telling) noexcept {
+  if (supervisor_.phase() >= Phase::disabling) return;
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    const fieldbus::CyclicDrive& drive = drives_[i].drive;
+    const auto where = static_cast<std::int32_t>(i);
+    if (drive.cycles_without_tpdo() > settings_.max_missed_feedback) {
+      alarm_.raise(Fault::drive_silent, where, drive.cycles_without_tpdo(), settings_.max_missed_feedback);
+    } else if (!drive.fresh() && supervisor_.live() && !telling) {
+      alarm_.raise(Fault::feedback_late, where, drive.cycles_without_tpdo() + 1.0, settings_.max_missed_feedback);
+    }
+    judge_drive_fault(where, drive.fault());
+  }
+}
+
+void FaultMonitor::judge_drive_fault(std::int32_t where, fieldbus::DriveFault fault) noexcept {
+  switch (fault) {
+    case fieldbus::DriveFault::none:
+      return;
+    case fieldbus::DriveFault::left_operation:
+      return alarm_.raise(Fault::drive_disabled, where);
+    case fieldbus::DriveFault::modbus_timeout:
+    case fieldbus::DriveFault::modbus_closed:
+      return alarm_.raise(Fault::modbus_silent, where);
+    case fieldbus::DriveFault::target_out_of_range:
+      return alarm_.raise(Fault::target_out_of_range, where);
+    default:
+      return alarm_.raise(Fault::drive_fault, where);
+  }
+}
+
+void FaultMonitor::judge_sensor(const JudgedCycle& cycle) noexcept {
+  const std::uint32_t most = settings_.max_missed_samples;
+  state_.missed_samples = cycle.measured.sample_is_new ? 0 : state_.missed_samples + 1;
+  judge_lateness(!cycle.telling && state_.missed_samples >= std::max(1u, most / 3));
+  if (state_.missed_samples > most) {
+    // A counter that stands still makes each sample an old one: the sensor is there, and frozen.
+    const bool frozen = cycle.sample.repeats > most;
+    alarm_.raise(frozen ? Fault::sensor_frozen : Fault::sensor_lost, -1, state_.missed_samples, most);
+  }
+  if (cycle.measured.sample_is_new) judge_sample(cycle);
+}
+
+void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
+  const Measured& measured = cycle.measured;
+  const fieldbus::ForceSample& sample = cycle.sample;
+  if (!measured.reading_S.force.allFinite() || !measured.reading_S.torque.allFinite()) {
+    return alarm_.raise(Fault::force_not_finite);
+  }
+  if (!sample.healthy) return alarm_.raise(Fault::sensor_status, -1, sample.status);
+  if (sample.saturated && needs_force(cycle)) return alarm_.raise(Fault::sensor_saturated);
+  if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
+    return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
+  }
+  const double force_N = measured.hand_W.force.norm();
+  if (supervisor_.phase() == Phase::rendering && force_N > max_force_N_) {
+    alarm_.raise(Fault::force_excessive, -1, force_N, max_force_N_);
+  }
+}
+
+// A person who is pinned may press a gauge to its rail: what leads to a hold, a hold and backing off do without force.
+bool FaultMonitor::needs_force(const JudgedCycle& cycle) const noexcept {
+  switch (supervisor_.phase()) {
+    case Phase::holding:
+      return false;
+    case Phase::enabling:
+      return !cycle.tared;
+    case Phase::freeing:
+      return !cycle.backs_off;
+    default:
+      return true;
+  }
+}
+
+void FaultMonitor::judge_lateness(bool late) noexcept {
+  std::uint32_t& score = state_.late_score;
+  if (late) {
+    score += late_sample;
+  } else if (score > 0) {
+    --score;
+  }
+  score = std::min(score, 2 * late_limit);
+  if (!supervisor_.live() || score <= late_limit) return;
+  constexpr double samples = 1.0 / late_sample;
+  alarm_.raise(Fault::sensor_late, -1, samples * score, samples * late_limit);
+}
+
+void FaultMonitor::forget(std::span<const fieldbus::BusStatus> buses) noexcept {
+  state_.missed_samples = state_.late_score = 0;
+  for (std::size_t bus = 0; bus < std::min(max_buses, buses.size()); ++bus) {
+    state_.overflows_before[bus] = buses[bus].receive_overflows;
+  }
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,96 @@
+// Judges, cycle by cycle, what came from the devices and when: buses, drives, sensor, enabling input, the loop itself.
+//
+// What is wrong is raised as a fault (fault.hpp); what the arm then does is the supervisor's. What the motion finds out
+// by itself (a leash that is too long, a proxy that isn't finite) isn't judged here.
+//
+// A sample counts as late from a third of max_missed_samples on. Lateness is a score in sixteenths of a sample: each
+// late cycle adds 16, each in time takes 1, and above eight samples, where more than one in 17 is late, it is a fault.
+//
+// Nothing allocates, locks or throws after construction.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "controller/cycle/alarm.hpp"
+#include "controller/cycle/measurement.hpp"
+#include "controller/record/black_box.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/enabling_input.hpp"
+#include "controller/supervision/supervisor.hpp"
+#include "controller/supervision/tool_monitor.hpp"
+#include "fieldbus/can/can_network.hpp"
+#include "fieldbus/cia402/cyclic_drive.hpp"
+#include "fieldbus/sensors/force_sensor.hpp"
+#include "models/base/archive_fields.hpp"
+
+namespace proxarm::controller {
+
+// What one cycle has to be judged by.
+struct JudgedCycle {
+  const Measured& measured;
+  const fieldbus::ForceSample& sample;           // the sensor's latest
+  const EnablingInput* enabling = nullptr;       // null: there is none
+  std::span<const fieldbus::BusStatus> buses{};  // by their index in the network
+  std::uint32_t overruns_in_a_row = 0;
+  bool telling = false;    // SDO answers are on the buses: a drive's own frame may come later by one of theirs
+  bool tared = false;      // the sensor was, so drives that are enabled are enabled anew
+  bool backs_off = false;  // where the arm is freed, it goes along a direction that is set
+};
+
+class FaultMonitor {
+ public:
+  // `tool`: none where a hand moves the arm as fast as it likes. All but it and `max_force_N` must outlive this; T and
+  // what is counted in cycles may change in `settings`.
+  FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, double max_force_N,
+               const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {}) noexcept
+      : drives_(drives),
+        settings_(settings),
+        max_force_N_(max_force_N),
+        supervisor_(supervisor),
+        alarm_(alarm),
+        tool_(std::move(tool)) {}
+
+  // An encoder can't be where its joint can't have come to since it was last heard. `entered`: the phase of the cycle
+  // before; without drives that hold it the arm may be moved by hand, and isn't judged.
+  void judge_encoders(const Measured& measured, Phase entered) noexcept;
+  void judge(const JudgedCycle& cycle) noexcept;
+
+  // After a reset: what was wrong before no longer counts. `buses` as in judge().
+  void forget(std::span<const fieldbus::BusStatus> buses) noexcept;
+  void archive(fieldbus::StateArchive& state) noexcept {
+    archive_fields(state, state_);
+    if (tool_) tool_->archive(state);
+  }
+
+ private:
+  struct State {
+    std::uint32_t missed_samples = 0;                         // in a row
+    std::uint32_t late_score = 0;                             // see above
+    std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count
+  };
+
+  void judge_joints(const Measured& measured, Phase entered) noexcept;
+  void judge_tool(const models::Vec3& tool_W, Phase entered) noexcept;
+  void judge_enabling(const EnablingInput* enabling) noexcept;
+  void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;
+  void judge_drives(bool telling) noexcept;
+  void judge_drive_fault(std::int32_t where, fieldbus::DriveFault fault) noexcept;
+  void judge_sensor(const JudgedCycle& cycle) noexcept;
+  void judge_sample(const JudgedCycle& cycle) noexcept;
+  void judge_lateness(bool late) noexcept;
+  [[nodiscard]] bool needs_force(const JudgedCycle& cycle) const noexcept;
+
+  std::span<const DriveOnBus> drives_;
+  const SessionSettings& settings_;
+  double max_force_N_;
+  const Supervisor& supervisor_;
+  Alarm& alarm_;
+  std::optional<ToolMonitor> tool_;
+  State state_;
+};
+
+}  // namespace proxarm::controller

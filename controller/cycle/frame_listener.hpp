@@ -1,0 +1,20 @@
+// Whoever is interested in what comes in beside process data.
+#pragma once
+
+#include <cstddef>
+
+#include "fieldbus/can/can_frame.hpp"
+
+namespace proxarm::controller {
+
+// Takes frames that are neither the sensor's nor a drive's process data; true: it was one of its own.
+class FrameListener {
+ public:
+  FrameListener() = default;
+  FrameListener(const FrameListener&) = delete;
+  FrameListener& operator=(const FrameListener&) = delete;
+  virtual ~FrameListener() = default;
+  virtual bool on_frame(std::size_t bus, const fieldbus::CanFrame& frame) noexcept = 0;
+};
+
+}  // namespace proxarm::controller

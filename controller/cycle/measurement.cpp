@@ -1,0 +1,77 @@
+#include "controller/cycle/measurement.hpp"
+
+namespace proxarm::controller {
+
+using models::JointVector;
+using models::Vec3;
+
+Measurement::Measurement(std::span<const DriveOnBus> drives, const fieldbus::ForceSensor& sensor,
+                         const models::Arm& arm, const WrenchCompensation& compensation, double period_s)
+    : drives_(drives), sensor_(sensor), arm_(arm), compensation_(compensation), period_s_(period_s) {
+  const JointVector zero = JointVector::Zero(arm.axes());
+  Measured& now = state_.measured;
+  now.motor_rad = now.link_rad = now.drive_target_rad = arm.start_rad();
+  now.moved_rad = now.jump_rad = now.unheard_cycles = now.feedback_period_s = zero;
+  state_.stale_cycles = zero;
+}
+
+void Measurement::take() noexcept {
+  read_encoders();
+  Measured& now = state_.measured;
+  now.link_rad = now.motor_rad - (arm_.motor_from_link(now.link_rad) - now.link_rad);
+  arm_.kinematics(now.link_rad, kinematics_);
+  now.tool_W = kinematics_.X_WT.translation();
+  now.R_WS = kinematics_.X_WS.linear();
+  read_sensor();
+}
+
+void Measurement::read_encoders() noexcept {
+  Measured& now = state_.measured;
+  now.fresh = now.following = 0;
+  for (Eigen::Index i = 0; i < now.axes(); ++i) {
+    const fieldbus::CyclicDrive& drive = drives_[static_cast<std::size_t>(i)].drive;
+    const double actual_rad = drive.actual_rad();
+    const double T = period_s_, share = T / (T + 2.0 * drive.feedback_period_s());
+    now.jump_rad[i] = actual_rad - now.motor_rad[i];
+    now.moved_rad[i] += share * (now.jump_rad[i] - now.moved_rad[i]);
+    now.motor_rad[i] = actual_rad;
+    now.feedback_period_s[i] = drive.feedback_period_s();
+    now.drive_target_rad[i] = drive.target_rad();
+    now.unheard_cycles[i] = state_.stale_cycles[i];
+    state_.stale_cycles[i] = drive.fresh() ? 0.0 : state_.stale_cycles[i] + 1.0;
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    if (drive.fresh()) now.fresh |= bit;
+    if (drive.following()) now.following |= bit;
+  }
+}
+
+void Measurement::read_sensor() noexcept {
+  Measured& now = state_.measured;
+  now.sample_is_new = sensor_.fresh();
+  if (now.sample_is_new) {
+    const fieldbus::ForceSample& sample = sensor_.latest();
+    now.reading_S.force = Vec3(sample.wrench_S.data());
+    now.reading_S.torque = Vec3(sample.wrench_S.data() + 3);
+  }
+  now.hand_W = compensation_.hand_wrench_W(now.reading_S, now.R_WS);
+}
+
+void Measurement::add_tare_sample() noexcept {
+  const Measured& now = state_.measured;
+  if (now.sample_is_new) compensation_.add_tare_sample(now.reading_S, now.R_WS);
+}
+
+void Measurement::finish_tare() noexcept {
+  Measured& now = state_.measured;
+  compensation_.finish_tare();
+  now.hand_W = compensation_.hand_wrench_W(now.reading_S, now.R_WS);
+}
+
+void Measurement::set_period(double period_s) noexcept {
+  const double ratio = period_s_ / period_s;
+  state_.measured.moved_rad /= ratio;
+  state_.stale_cycles *= ratio;
+  period_s_ = period_s;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,36 @@
+#include "controller/cycle/motion.hpp"
+
+#include "controller/cycle/admittance_motion.hpp"
+#include "controller/cycle/torque_motion.hpp"
+
+namespace proxarm::controller {
+
+void record_world(const WorldStep& step, CycleRecord& record) noexcept {
+  record.p_hat_W_m = triple(step.p_hat_W);
+  record.contact_force_W_N = triple(step.f_W);
+  record.normal_W = triple(step.normal_W);
+  record.contact_object = step.object;
+  record.friction = step.friction;
+  record.proxy_mass_kg = step.mass_kg;
+  record.proxy_damping_Ns_per_m = step.damping_Ns_per_m;
+  record.contact_count = static_cast<std::uint8_t>(step.contacts);
+  record.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
+}
+
+std::vector<description::DriveDescription> descriptions(const std::vector<DriveOnBus>& drives) {
+  std::vector<description::DriveDescription> all;
+  for (const DriveOnBus& axis : drives) all.push_back(axis.drive.description());
+  return all;
+}
+
+std::unique_ptr<Motion> make_motion(CycleParts& parts, const SessionSettings& settings,
+                                    const description::CellLimits& limits) {
+  std::vector<description::DriveDescription> drives = descriptions(parts.drives);
+  if (auto* const torque = std::get_if<std::unique_ptr<TorqueRendering>>(&parts.rendering)) {
+    return std::make_unique<TorqueMotion>(std::move(*torque), *parts.arm, drives, settings.period_s);
+  }
+  return std::make_unique<AdmittanceMotion>(std::move(std::get<AdmittanceParts>(parts.rendering)), *parts.arm,
+                                            std::move(drives), limits, parts.supervision, settings);
+}
+
+}  // namespace proxarm::controller

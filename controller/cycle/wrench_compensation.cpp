@@ -1,0 +1,46 @@
+#include "controller/cycle/wrench_compensation.hpp"
+
+#include <algorithm>
+
+namespace proxarm::controller {
+
+using models::Mat3;
+using models::Vec3;
+using models::Wrench;
+
+WrenchCompensation::WrenchCompensation(const description::Cell& cell)
+    : mass_kg_(cell.tool.mass_kg),
+      centre_of_mass_S_(cell.tool.centre_of_mass_S_m.data()),
+      handle_S_(cell.tool.handle_S.position_m.data()),
+      gravity_W_(cell.gravity_W_m_per_s2.data()) {}
+
+Wrench WrenchCompensation::tool_weight_S(const Mat3& R_WS) const noexcept {
+  const Vec3 weight_S = mass_kg_ * (R_WS.transpose() * gravity_W_);
+  return {weight_S, centre_of_mass_S_.cross(weight_S)};
+}
+
+void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_WS) noexcept {
+  const Wrench weight_S = tool_weight_S(R_WS);
+  const Vec3 force = reading_S.force - weight_S.force;
+  if (tare_count_ > 0) {
+    const Vec3 mean = tare_sum_S_.force / static_cast<double>(tare_count_);
+    tare_spread_N_ = std::max(tare_spread_N_, (force - mean).norm());
+  }
+  tare_sum_S_.force += force;
+  tare_sum_S_.torque += reading_S.torque - weight_S.torque;
+  ++tare_count_;
+}
+
+void WrenchCompensation::finish_tare() noexcept {
+  bias_S_.force = tare_sum_S_.force / static_cast<double>(tare_count_);
+  bias_S_.torque = tare_sum_S_.torque / static_cast<double>(tare_count_);
+}
+
+Wrench WrenchCompensation::hand_wrench_W(const Wrench& reading_S, const Mat3& R_WS) const noexcept {
+  const Wrench weight_S = tool_weight_S(R_WS);
+  const Vec3 force_S = reading_S.force - bias_S_.force - weight_S.force;
+  const Vec3 torque_S = reading_S.torque - bias_S_.torque - weight_S.torque - handle_S_.cross(force_S);
+  return {R_WS * force_S, R_WS * torque_S};
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,357 @@
+// The limits of one step in the N coordinates of a scene, and the projection of a point onto them.
+//
+//   min ½‖x − y‖²   over   n_i·x ≤ b_i,  ‖x − c_j‖ ≤ r_j
+//
+// is decided by at most N of the sets, the active ones:
+//   y − x = Σ λ_i g_i,  λ_i ≥ 0,  g_i: outward unit normal of set i at x
+// They are found by an active-set method, as linear programs of low dimension are solved (Sharir and Welzl 1992). The
+// set that the present point is furthest outside of joins the active ones. Of these at most N + 1 candidates, every
+// choice of at most N that includes the new one is tried (7 in space), and one of them is optimal for all. Each
+// exchange increases the distance from y, so no active set comes twice.
+//
+// All lengths in m. Nothing allocates, locks or throws.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+
+#include "controller/limits/step_limits.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+// The sets of one step in the N coordinates of a scene, and the projection onto them. x is q − q₁.
+template <int N>
+class LimitSets {
+ public:
+  using V = models::Vec<N>;
+
+  void clear() noexcept { soft_count_ = plane_count_ = flat_count_ = hard_count_ = 0; }
+
+  // The intersection of sets in W with a scene's space (basis: 3×N, orthonormal).
+  void set(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis) noexcept {
+    clear();
+    for (std::size_t i = 0; i < limits.soft_count; ++i) soft_[soft_count_++] = cut(limits.soft[i], basis);
+    for (std::size_t i = 0; i < limits.hard_count; ++i) hard_[hard_count_++] = cut(limits.hard[i], basis);
+    for (std::size_t i = 0; i < limits.plane_count; ++i) {
+      const LimitPlane<3>& plane = limits.planes[i];
+      const V normal = basis.transpose() * plane.normal;
+      const double length = normal.norm();
+      if (!(length > 1e-9)) continue;  // parallel to the scene's space: no motion in it comes nearer
+      planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limit, plane.axis_bits};
+    }
+    flat_count_ = plane_count_;
+  }
+
+  // Walls, which nearest() takes for half-spaces as well: −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
+  static constexpr std::size_t most_walls = 6;
+  void clear_walls() noexcept { flat_count_ = plane_count_; }
+  void add_wall(const V& point, const V& normal) noexcept {
+    if (flat_count_ < plane_count_ + most_walls) planes_[flat_count_++] = {-normal, -normal.dot(point)};
+  }
+
+  [[nodiscard]] bool contains(const V& x, double tolerance_m, bool with_soft) const noexcept {
+    for (std::size_t i = 0; with_soft && i < soft_count_; ++i) {
+      if (!inside(soft_[i], x, tolerance_m)) return false;
+    }
+    for (std::size_t i = 0; i < hard_count_; ++i) {
+      if (!inside(hard_[i], x, tolerance_m)) return false;
+    }
+    for (std::size_t i = 0; i < plane_count_; ++i) {
+      if (!(planes_[i].normal.dot(x) <= planes_[i].bound_m + tolerance_m)) return false;
+    }
+    return true;
+  }
+
+  // A point of the sets, and what decides it.
+  struct Nearest {
+    Nearest() noexcept { basis.fill(V::Zero()); }
+
+    V x = V::Zero();
+    std::array<std::size_t, N> members{};  // the active sets: index as in violation()
+    std::array<V, N> basis;                // orthonormal; spans their normals at x
+    std::size_t count = 0;                 // of both
+    double bend = 0.0;                     // Σ λ_j/r_j over the active balls
+    V shift = V::Zero();                   // −Σ λ_i g_i over the limits among them, not the walls
+    bool exact = false;                    // false: what Dykstra's algorithm left, without members
+    ActiveLimits active;
+
+    // ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j), from y − x = Σ λ_i g_i with the active sets kept: along the sets'
+    // common surface each ball's normal turns by 1/r_j.
+    [[nodiscard]] V derivative(const V& v) const noexcept {
+      V along = v;
+      for (std::size_t i = 0; i < count; ++i) along -= basis[i].dot(v) * basis[i];
+      return along / (1.0 + bend);
+    }
+  };
+
+  // The sets' point nearest to y. Where no choice of active sets is found, because the sets have no point in common or
+  // nearly none, Dykstra's algorithm gives the point, in at most `sweeps` sweeps; those that it makes are subtracted.
+  [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) const noexcept {
+    Nearest result;
+    result.exact = decide(y, with_soft, result);
+    if (!result.exact) {
+      result = {};
+      result.x = project(y, with_soft, result.active, sweeps);
+    }
+    return result;
+  }
+
+  // Draws x back into the sets, along the straight line to where braking leads (to q₁, where that is in them). For an x
+  // that the alternation of contacts and limits, or Dykstra's algorithm, left outside.
+  [[nodiscard]] V draw_back(const V& x, bool with_soft) const noexcept {
+    V base = V::Zero();
+    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, acceleration's, decides
+      const double off = (base - hard_[i].centre).norm();
+      if (off > hard_[i].radius_m) base = hard_[i].centre + hard_[i].radius_m / off * (base - hard_[i].centre);
+    }
+    const V d = x - base;
+    double t = 1.0;
+    for (std::size_t i = 0; i < plane_count_; ++i) {
+      const double room = planes_[i].bound_m - planes_[i].normal.dot(base), way = planes_[i].normal.dot(d);
+      if (room >= 0.0 && way > room) t = std::min(t, room / way);
+    }
+    for (std::size_t i = 0; i < hard_count_; ++i) t = std::min(t, way_within(hard_[i], base, d));
+    for (std::size_t i = 0; with_soft && i < soft_count_; ++i) t = std::min(t, way_within(soft_[i], base, d));
+    return base + t * d;
+  }
+
+ private:
+  static constexpr double sweep_tolerance_m = 1e-13;
+  static constexpr int most_exchanges = 60;  // of active sets; some 3 are common
+  static constexpr double parallel = 1e-12;  // sine of the angle between normals that make no corner
+
+  // Sets by number: planes, hard balls, soft balls.
+  [[nodiscard]] std::size_t size(bool with_soft) const noexcept {
+    return flat_count_ + hard_count_ + (with_soft ? soft_count_ : 0);
+  }
+  [[nodiscard]] bool is_ball(std::size_t i) const noexcept { return i >= flat_count_; }
+  [[nodiscard]] bool is_wall(std::size_t i) const noexcept { return i >= plane_count_ && i < flat_count_; }
+  [[nodiscard]] const LimitBall<N>& ball(std::size_t i) const noexcept {
+    return i < flat_count_ + hard_count_ ? hard_[i - flat_count_] : soft_[i - flat_count_ - hard_count_];
+  }
+  // How far x is outside of set i; negative within.
+  [[nodiscard]] double violation(std::size_t i, const V& x) const noexcept {
+    return is_ball(i) ? (x - ball(i).centre).norm() - ball(i).radius_m : planes_[i].normal.dot(x) - planes_[i].bound_m;
+  }
+
+  bool decide(const V& y, bool with_soft, Nearest& result) const noexcept {
+    const std::size_t all = size(with_soft);
+    result.x = y;
+    for (int turn = 0; turn < most_exchanges; ++turn) {
+      std::size_t worst = all;
+      double most = sweep_tolerance_m;
+      for (std::size_t i = 0; i < all; ++i) {
+        const double v = violation(i, result.x);
+        if (v > most) {
+          most = v;
+          worst = i;
+        }
+      }
+      if (worst == all) {
+        for (std::size_t k = 0; k < result.count; ++k) flag(result.members[k], result.active);
+        return true;
+      }
+      const Nearest before = result;
+      if (!exchange(y, before, worst, result)) return false;
+      if (!((result.x - y).squaredNorm() > (before.x - y).squaredNorm())) return false;  // no more than rounding
+    }
+    return false;
+  }
+
+  // The point nearest to y of the sets that were active before and of `added`, which is active now. The smallest
+  // choices are tried first.
+  bool exchange(const V& y, const Nearest& before, std::size_t added, Nearest& result) const noexcept {
+    for (std::size_t others = 0; others < N && others <= before.count; ++others) {
+      for (unsigned choice = 0; choice < 1u << before.count; ++choice) {
+        if (static_cast<std::size_t>(std::popcount(choice)) != others) continue;
+        result = {};
+        for (std::size_t k = 0; k < before.count; ++k) {
+          if ((choice & 1u << k) != 0) result.members[result.count++] = before.members[k];
+        }
+        result.members[result.count++] = added;
+        if (!nearest_of_all(y, result)) continue;
+        bool within = true;
+        for (std::size_t k = 0; within && k < before.count; ++k) {
+          within = (choice & 1u << k) != 0 || violation(before.members[k], result.x) <= sweep_tolerance_m;
+        }
+        if (within) return true;
+      }
+    }
+    return false;
+  }
+
+  // The point nearest to y on the borders of all of result.members. False where there is none, or where it isn't the
+  // nearest point of the sets themselves (some λ < 0).
+  bool nearest_of_all(const V& y, Nearest& result) const noexcept {
+    // Two spheres meet in the plane of a circle: all balls but the first are replaced by such planes.
+    std::array<V, N> e;
+    e.fill(V::Zero());
+    std::array<double, N> offset{};
+    std::size_t flats = 0;
+    const LimitBall<N>* sphere = nullptr;
+    for (std::size_t k = 0; k < result.count; ++k) {
+      const std::size_t i = result.members[k];
+      V normal;
+      double bound;
+      if (!is_ball(i)) {
+        normal = planes_[i].normal;
+        bound = planes_[i].bound_m;
+      } else if (sphere == nullptr) {
+        sphere = &ball(i);
+        continue;
+      } else {
+        const LimitBall<N>& other = ball(i);
+        normal = other.centre - sphere->centre;
+        const double apart = normal.norm();
+        if (!(apart > 0.0)) return false;
+        normal /= apart;
+        const double r0 = sphere->radius_m, r1 = other.radius_m;
+        bound = normal.dot(sphere->centre) + 0.5 * (apart + (r0 - r1) * (r0 + r1) / apart);
+      }
+      if (!orthogonal(normal, bound, e, offset, flats)) return false;
+      e[flats] = normal;
+      offset[flats++] = bound;
+    }
+    const auto onto_flats = [&](V x) {
+      for (std::size_t k = 0; k < flats; ++k) x += (offset[k] - e[k].dot(x)) * e[k];
+      return x;
+    };
+    result.x = onto_flats(y);
+    V outwards = V::Zero();  // of the sphere, for one of no radius
+    if (sphere != nullptr) {
+      const V centre = onto_flats(sphere->centre);
+      const double left2 = sphere->radius_m * sphere->radius_m - (centre - sphere->centre).squaredNorm();
+      outwards = result.x - centre;
+      const double away = outwards.norm();
+      if (!(left2 >= 0.0 && away > 0.0)) return false;
+      outwards /= away;
+      result.x = centre + std::sqrt(left2) * outwards;
+    }
+    return presses(y, outwards, result);
+  }
+
+  // Gram-Schmidt: n·x = b without the part that the equations e_k·x = offset_k before it contain. False where nothing
+  // is left.
+  static bool orthogonal(V& normal, double& bound, const std::array<V, N>& e, const std::array<double, N>& offset,
+                         std::size_t count) noexcept {
+    for (std::size_t k = 0; k < count; ++k) {
+      const double along = e[k].dot(normal);
+      normal -= along * e[k];
+      bound -= along * offset[k];
+    }
+    const double length = normal.norm();
+    if (!(count < N && length > parallel)) return false;
+    normal /= length;
+    bound /= length;
+    return true;
+  }
+
+  // y − x = Σ λ_i g_i by a QR decomposition of the g_i; false where a λ_i is negative.
+  bool presses(const V& y, const V& outwards, Nearest& result) const noexcept {
+    std::array<std::array<double, N>, N> R{};
+    std::array<double, N> lambda{};
+    std::array<V, N> normals;
+    normals.fill(V::Zero());
+    for (std::size_t k = 0; k < result.count; ++k) {
+      const std::size_t i = result.members[k];
+      V g = planes_[is_ball(i) ? 0 : i].normal;
+      if (is_ball(i)) g = ball(i).radius_m > 0.0 ? V((result.x - ball(i).centre).normalized()) : outwards;
+      normals[k] = g;
+      for (std::size_t j = 0; j < k; ++j) {
+        R[j][k] = result.basis[j].dot(g);
+        g -= R[j][k] * result.basis[j];
+      }
+      R[k][k] = g.norm();
+      if (!(R[k][k] > parallel)) return false;
+      result.basis[k] = g / R[k][k];
+    }
+    for (std::size_t k = result.count; k-- > 0;) {
+      double sum = result.basis[k].dot(y - result.x);
+      for (std::size_t j = k + 1; j < result.count; ++j) sum -= R[k][j] * lambda[j];
+      lambda[k] = sum / R[k][k];
+      if (!(lambda[k] >= 0.0)) return false;
+      if (is_ball(result.members[k])) result.bend += lambda[k] / ball(result.members[k]).radius_m;
+      if (!is_wall(result.members[k])) result.shift -= lambda[k] * normals[k];
+    }
+    return true;
+  }
+
+  void flag(std::size_t i, ActiveLimits& active) const noexcept {
+    if (is_ball(i)) {
+      active.set(ball(i).limit);
+    } else if (!is_wall(i)) {
+      active.set(planes_[i].limit, planes_[i].axis_bits);
+    }
+  }
+
+  // The projection by Dykstra's algorithm of alternating projections. The hard balls come last, so that a result which
+  // hasn't converged yet satisfies those. `active`: the sets whose force isn't zero. `sweeps`: how many sweeps may
+  // still be made; those made are subtracted.
+  V project(V x, bool with_soft, ActiveLimits& active, int& sweeps) const noexcept {
+    std::array<V, 2> soft{}, hard{};
+    std::array<double, StepLimits::max_planes> pushed{};  // along the planes' normals, ≥ 0
+    for (auto* corrections : {&soft, &hard}) corrections->fill(V::Zero());
+    for (bool first = true; first || sweeps > 0; first = false, --sweeps) {
+      double change = 0.0;
+      const auto onto_ball = [&](const LimitBall<N>& ball, V& correction) {
+        const V y = x + correction;
+        const double length = (y - ball.centre).norm();
+        const bool outside = length > ball.radius_m;
+        const V z = outside ? V(ball.centre + ball.radius_m / length * (y - ball.centre)) : y;
+        correction = outside ? V(y - z) : V(V::Zero());
+        change = std::max(change, (z - x).norm());
+        x = z;
+      };
+      for (std::size_t i = 0; with_soft && i < soft_count_; ++i) onto_ball(soft_[i], soft[i]);
+      for (std::size_t i = 0; i < plane_count_; ++i) {
+        const double beyond = planes_[i].normal.dot(x) + pushed[i] - planes_[i].bound_m;
+        const double push = std::max(0.0, beyond);
+        if (push == pushed[i]) continue;
+        x += (pushed[i] - push) * planes_[i].normal;
+        change = std::max(change, std::abs(pushed[i] - push));
+        pushed[i] = push;
+      }
+      for (std::size_t i = 0; i < hard_count_; ++i) onto_ball(hard_[i], hard[i]);
+      if (change <= sweep_tolerance_m) break;
+    }
+    active = {};
+    for (std::size_t i = 0; with_soft && i < soft_count_; ++i) note(soft_[i], soft[i], active);
+    for (std::size_t i = 0; i < hard_count_; ++i) note(hard_[i], hard[i], active);
+    for (std::size_t i = 0; i < plane_count_; ++i) {
+      if (pushed[i] > 0.0) active.set(planes_[i].limit, planes_[i].axis_bits);
+    }
+    return x;
+  }
+
+  static bool inside(const LimitBall<N>& ball, const V& x, double tolerance_m) noexcept {
+    return (x - ball.centre).norm() <= ball.radius_m + tolerance_m;
+  }
+  // The largest t ≤ 1 for which base + t d is in the ball, with base in it: ‖base − c + t d‖² = r².
+  static double way_within(const LimitBall<N>& ball, const V& base, const V& d) noexcept {
+    const V from = base - ball.centre;
+    const double a = d.squaredNorm(), b = from.dot(d);
+    const double c = std::min(0.0, from.squaredNorm() - ball.radius_m * ball.radius_m);
+    if (!(a + 2.0 * b + c > 0.0)) return 1.0;
+    return std::clamp((std::sqrt(b * b - a * c) - b) / a, 0.0, 1.0);
+  }
+  static void note(const LimitBall<N>& ball, const V& correction, ActiveLimits& active) noexcept {
+    if (correction != V::Zero()) active.set(ball.limit);
+  }
+  // A ball's intersection with the scene's line or plane through q₁; a point where the ball doesn't reach it.
+  static LimitBall<N> cut(const LimitBall<3>& ball, const Eigen::Matrix<double, 3, N>& basis) noexcept {
+    const V centre = basis.transpose() * ball.centre;
+    const double off2 = (ball.centre - basis * centre).squaredNorm();
+    if constexpr (N == 3) return {centre, ball.radius_m, ball.limit};
+    return {centre, std::sqrt(std::max(0.0, ball.radius_m * ball.radius_m - off2)), ball.limit};
+  }
+
+  std::array<LimitBall<N>, 2> soft_{}, hard_{};
+  std::array<LimitPlane<N>, StepLimits::max_planes + most_walls> planes_{};  // walls last
+  std::size_t soft_count_ = 0, plane_count_ = 0, flat_count_ = 0, hard_count_ = 0;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,126 @@
+// A 𝒢 that keeps within a step's limits: q(k) minimises ‖q − p̂‖ over contacts ∩ limits.
+//
+// Two maps are to agree. The contacts answer a force λ of the limits with their own force, friction included. The
+// limits project the point that the contacts' force leads to (P):
+//   r = 𝒢(κ, p̂ + λ/κ, q₁),   l = P(r − λ/κ),   to be found: λ with r = l
+// λ = κ (l − (r − λ/κ)) is then in the limits' normal cone at r. A normal cone doesn't depend on κ, and neither does 𝒢
+// (Assumption 1), so the whole doesn't. A step counts as solved only where r = l holds within rounding, whichever of
+// these methods finds it:
+//   free      nothing touches: λ/κ = P(p̂) − p̂
+//   joined    contacts as half-spaces among the limits, friction held: exact at once without friction on flat surfaces
+//   Newton    semismooth, on r(λ) − l(λ), with differences of 𝒢 and the active limits as derivative: friction, media
+//   in turn   λ/κ ← l − (r − λ/κ), block Gauss-Seidel, from where the others start again now and then
+// Where contacts and limits have no point in common, the contacts give way: q is the limits' point that is nearest to
+// what the contacts allow. Where the limits alone have none, the soft ones (leash, power) give way.
+//
+// A step that no limit touches is the 𝒢's own to the bit. Neither allocates, locks nor throws.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "controller/limits/limit_sets.hpp"
+#include "models/geometry/geometric_algorithm.hpp"
+
+namespace proxarm::controller {
+
+// Contacts with a limit have this number as their object; whoever counts contacts with the scene skips it.
+inline constexpr std::int32_t limit_object = -2;
+
+template <int N>
+class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
+ public:
+  using V = models::Vec<N>;
+
+  // `inner` must outlive this.
+  explicit LimitedAlgorithm(models::GeometricAlgorithm<N>& inner) : inner_(&inner) {}
+
+  // Called before each step, with the sets around q₁ = q(k−1). That is the true q(k−1), although a step of order 2 may
+  // start from another point.
+  void set_limits(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis, const V& q_k1) noexcept;
+
+  V operator()(double K, const V& p, const V& q) noexcept override;
+
+  void set_time(const models::StepTime& time) noexcept override { inner_->set_time(time); }
+  [[nodiscard]] bool wants_time() const noexcept override { return inner_->wants_time(); }
+  [[nodiscard]] std::span<const models::Contact<N>> contacts() const noexcept override {
+    return {contacts_.data(), count_};
+  }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return inner_->unresolved_steps(); }
+  // True for the contacts' squeezing alone: a proxy that a limit leaves inside of an object shows in active().
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
+
+  // λ/κ of the last call: the limits' force on the proxy is κ times this.
+  [[nodiscard]] const V& limit_shift() const noexcept { return limit_shift_; }
+  [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
+  [[nodiscard]] bool soft_limits_met() const noexcept { return soft_met_; }
+
+ private:
+  static constexpr int most_turns = 300;
+  static constexpr int few_joins = 3, most_joins = 10;  // with friction; without, one is enough
+  static constexpr int most_jumps = 6;                  // where Newton gets there, two or three do
+  static constexpr int most_sweeps = 3000;              // of a step in all, some 50 ns each
+  static constexpr double tolerance_m = 1e-11;          // of r − l: 10 nm/s at 1 kHz
+  static constexpr double nudge_m = 1e-9;  // of p: 𝒢, rounded to some 1e-16 m, differs by that to seven digits
+
+  struct Step {
+    double K;
+    const V &p, &q;
+    bool with_soft = true;
+    int sweeps = most_sweeps;
+  };
+  // Where the limits' shift of p leads.
+  struct Try {
+    V shift, r;
+    typename LimitSets<N>::Nearest l;  // relative to q₁
+    V gap;                             // r − l
+  };
+
+  Try at(Step& step, const V& shift, const V& r) const noexcept {
+    const V relative = r - q_k1_;
+    Try result{shift, r, sets_.nearest(relative - shift, step.with_soft, step.sweeps), {}};
+    result.gap = relative - result.l.x;
+    return result;
+  }
+  Try at(Step& step, const V& shift) noexcept { return at(step, shift, (*inner_)(step.K, step.p + shift, step.q)); }
+
+  V solve(double K, const V& p, const V& q, const V& free) noexcept;
+
+  // A flat contact without friction is a half-space, as limits are: the solution is then the projection onto both.
+  // Friction is held as it was at the last r, and curved surfaces are replaced by their tangent planes there.
+  enum class Joined : std::uint8_t { settled, unsettled, apart };  // apart: the two have no point in common
+  Joined join(Step& step, Try& now, int most) noexcept;
+
+  // The part of a contact force that the contacts' normals don't span: friction.
+  [[nodiscard]] V across_contacts(V force) const noexcept;
+
+  // Semismooth Newton on r = l, with differences of 𝒢 and the projector of the active limits as derivatives:
+  //   F(s) = r(s) − P(r(s) − s) = o,   dF = [(E − P′) R + P′] ds,   R = ∂r/∂s
+  // The active limits and contacts are determined anew at each iterate. False where that doesn't converge.
+  bool jump(Step& step, Try& now) noexcept;
+
+  V take(const Try& solution) noexcept;
+
+  // The result where r = l has no solution. If the free space is convex, the straight way from q₁, which is in both, to
+  // what the contacts allow passes through no object. Where q₁ is outside of the limits, the contacts give way.
+  V give_way(Step& step, const Try& last) noexcept;
+
+  void gather_contacts() noexcept;
+
+  models::GeometricAlgorithm<N>* inner_;
+  LimitSets<N> sets_;
+  V q_k1_ = V::Zero();
+  V limit_shift_ = V::Zero();
+  ActiveLimits active_;
+  bool soft_met_ = true;
+  bool squeezed_ = false;
+  std::array<models::Contact<N>, 8> contacts_{};
+  std::size_t count_ = 0;
+};
+
+// For the dimensions of scenes; anything else isn't needed.
+extern template class LimitedAlgorithm<1>;
+extern template class LimitedAlgorithm<2>;
+extern template class LimitedAlgorithm<3>;
+
+}  // namespace proxarm::controller

@@ -1,0 +1,190 @@
+#include "controller/limits/step_limits.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace proxarm::controller {
+
+using models::JointVector;
+using models::Vec3;
+
+namespace {
+
+// Rotations count with a length, as in the inverse kinematics. The damping keeps G finite: near a singularity a joint
+// is taken to turn by at most 1/(2λ) = 500 rad per metre, and what it turns more than that, the inverse kinematics
+// stops.
+constexpr double length_m = 0.5;
+constexpr double damping_m_per_rad = 1e-3;
+// The share of a joint's speed that the tool's translation may use; the rest is for its rotation and the gears' twist.
+constexpr double speed_share = 0.95;
+// The share of the tool's speed that is commanded: elastic gears add some 7 % where the hand pulls the arm along at the
+// limit.
+constexpr double commanded_share = 0.9;
+
+void add_plane(StepLimits& out, const LimitPlane<3>& plane) noexcept {
+  if (out.plane_count < StepLimits::max_planes) out.planes[out.plane_count++] = plane;
+}
+
+}  // namespace
+
+const char* limit_parameter(Limit limit) noexcept {
+  switch (limit) {
+    case Limit::leash:
+      return "limits.leash_m";
+    case Limit::power:
+      return "limits.max_power_W";
+    case Limit::workspace:
+      return "limits.workspace_m";
+    case Limit::keep_out:
+      return "limits.keep_out_m";
+    case Limit::joint_range:
+      return "drives[].range_rad";
+    case Limit::joint_speed:
+      return "drives[].max_speed_rad_per_s";
+    case Limit::joint_acceleration:
+      return "drives[].max_acceleration_rad_per_s2";
+    case Limit::speed:
+      return "limits.max_tool_speed_m_per_s";
+    case Limit::acceleration:
+      return "limits.max_tool_acceleration_m_per_s2";
+    case Limit::singularity:
+      return "singularity or end of reach";
+    case Limit::following_error:
+      return "limits.following_error_rad";
+    case Limit::joint_torque:
+      return "drives[].max_torque_Nm";
+    case Limit::guard_speed:
+      return "guard of the setpoints: limits.max_tool_speed_m_per_s";
+    case Limit::guard_elbow:
+      return "guard of the setpoints: limits.max_elbow_speed_m_per_s";
+    case Limit::guard_border:
+      return "guard of the setpoints: limits.workspace_m, limits.keep_out_m";
+    case Limit::guard_acceleration:
+      return "guard of the setpoints: limits.max_tool_acceleration_m_per_s2";
+  }
+  return "?";
+}
+
+StepLimiter::StepLimiter(const std::vector<description::DriveDescription>& drives,
+                         const description::CellLimits& limits, double period_s)
+    : limits_(limits), period_s_(period_s), omega_rad_per_s_(2.0 * std::numbers::pi * limits.setpoint_bandwidth_Hz) {
+  for (const description::DriveDescription& drive : drives) {
+    joints_.push_back(
+        {drive.range_rad[0], drive.range_rad[1], drive.max_speed_rad_per_s, drive.max_acceleration_rad_per_s2});
+  }
+}
+
+void StepLimiter::make(const StepStart& start, const JointVector& joint_rad, const JointVector& twist_rad,
+                       const models::Jacobian& J_W, StepLimits& out) const noexcept {
+  out.soft_count = out.plane_count = out.hard_count = 0;
+  add_balls(start, out);
+  add_borders(start.q_k1_W, Borders::slow_down, out);
+  add_joints(joint_rad, twist_rad, J_W, out);
+}
+
+void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, const models::Jacobian& J_W,
+                             StepLimits& out) const noexcept {
+  out.soft_count = out.plane_count = out.hard_count = 0;
+  add_borders(q_W, Borders::walls, out);
+  add_joint_walls(joint_rad, J_W, out);
+}
+
+void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexcept {
+  const double T = period_s_, omega = omega_rad_per_s_;
+  const double v = commanded_share * std::min(limits_.max_tool_speed_m_per_s, start.max_speed_m_per_s);
+  const double a = limits_.max_tool_acceleration_m_per_s2;
+  out.soft[out.soft_count++] = {start.measured_W - start.q_k1_W, limits_.leash_m, Limit::leash};
+  if (limits_.max_power_W > 0.0 && start.force_N * v > limits_.max_power_W) {
+    out.soft[out.soft_count++] = {Vec3::Zero(), limits_.max_power_W / start.force_N * T, Limit::power};
+  }
+  out.hard[out.hard_count++] = {Vec3::Zero(), v * T, Limit::speed};
+  if (omega > 0.0) {
+    out.hard[out.hard_count++] = {start.filtered_W + 2.0 / omega * start.filtered_velocity_W - start.q_k1_W,
+                                  a / (omega * omega), Limit::acceleration};
+  } else {
+    out.hard[out.hard_count++] = {start.q_k1_W - start.q_k2_W, a * T * T, Limit::acceleration};
+  }
+}
+
+void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out) const noexcept {
+  const double T = period_s_;
+  const double share = T / (T + limits_.max_tool_speed_m_per_s / limits_.max_tool_acceleration_m_per_s2);
+  // A point that is outside already may not go further out.
+  const auto room = [&](double d) { return borders == Borders::walls ? d : std::max(0.0, share * d); };
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double to_upper = limits_.workspace_max_m[k] - q_W[i], to_lower = q_W[i] - limits_.workspace_min_m[k];
+    if (std::isfinite(to_upper)) {
+      add_plane(out, {Vec3::Unit(i), room(to_upper), Limit::workspace, 0});
+    }
+    if (std::isfinite(to_lower)) {
+      add_plane(out, {-Vec3::Unit(i), room(to_lower), Limit::workspace, 0});
+    }
+  }
+  for (const description::BoxDescription& zone : limits_.keep_out) {
+    LimitPlane<3> nearest{Vec3::UnitX(), -std::numeric_limits<double>::infinity(), Limit::keep_out, 0};
+    for (int i = 0; i < 3; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double below = zone.min_m[k] - q_W[i], above = q_W[i] - zone.max_m[k];
+      if (below > nearest.bound_m) nearest = {Vec3::Unit(i), below, Limit::keep_out, 0};
+      if (above > nearest.bound_m) nearest = {-Vec3::Unit(i), above, Limit::keep_out, 0};
+    }
+    nearest.bound_m = room(nearest.bound_m);
+    add_plane(out, nearest);
+  }
+}
+
+void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& twist_rad, const models::Jacobian& J_W,
+                             StepLimits& out) const noexcept {
+  // G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0]
+  models::Jacobian J = J_W;
+  J.bottomRows<3>() *= length_m;
+  Eigen::Matrix<double, 6, 6> A;
+  A.noalias() = J * J.transpose();
+  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
+  Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
+  right.topRows<3>().setIdentity();
+  const Eigen::Matrix<double, 6, 3> solved = A.llt().solve(right);
+  const double T = period_s_;
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const Joint& joint = joints_[i];
+    const auto k = static_cast<Eigen::Index>(i);
+    const Vec3 row = solved.transpose() * J.col(k);
+    const double length = row.norm();
+    if (!(length > 1e-9)) continue;
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    const double per_step = speed_share * joint.speed_rad_per_s * T;
+    const double share = T / (T + joint.speed_rad_per_s / joint.acceleration_rad_per_s2);
+    const double to_upper = joint.upper_rad - joint_rad[k] - std::max(0.0, twist_rad[k]);
+    const double to_lower = joint_rad[k] - joint.lower_rad - std::max(0.0, -twist_rad[k]);
+    for (const double sign : {1.0, -1.0}) {
+      const double room = std::max(0.0, share * (sign > 0.0 ? to_upper : to_lower));
+      const bool range = room < per_step;
+      add_plane(out, {sign / length * row, std::min(room, per_step) / length,
+                      range ? Limit::joint_range : Limit::joint_speed, bit});
+    }
+  }
+}
+
+// The same for the tool's translation alone, which is all that torques render: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
+void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
+                                  StepLimits& out) const noexcept {
+  models::Mat3 A;
+  A.noalias() = J_W.topRows<3>() * J_W.topRows<3>().transpose();
+  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
+  const Eigen::LLT<models::Mat3> factors(A);
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    const Vec3 row = factors.solve(J_W.col(k).head<3>());
+    const double length = row.norm();
+    if (!(length > 1e-9)) continue;
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    add_plane(out, {row / length, (joints_[i].upper_rad - joint_rad[k]) / length, Limit::joint_range, bit});
+    add_plane(out, {-row / length, (joint_rad[k] - joints_[i].lower_rad) / length, Limit::joint_range, bit});
+  }
+}
+
+}  // namespace proxarm::controller

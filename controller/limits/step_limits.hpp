@@ -1,0 +1,152 @@
+// What the proxy may do in one step, as convex sets around where it is: safety as geometry.
+//
+//   ball        ‖q − c‖ ≤ r       speed, acceleration, power, leash
+//   half-space  n·(q − q₁) ≤ b    workspace, keep-out zones, joint ranges, joint speeds
+//
+// The proxy's next position is the point of contacts ∩ sets that is nearest to p̂, found in one solve
+// (limited_algorithm.hpp). Where not all can be satisfied, they give way in this order: friction, contact, leash and
+// power. Ranges, speeds and the acceleration never do. The limited q becomes q(k−1), so nothing winds up behind a
+// limit.
+//
+// - Speed: ‖q − q₁‖ ≤ vT, with v the smaller of limits.max_tool_speed_m_per_s and max_power_W/‖h‖. The latter bounds
+//   the power that the arm gives to or takes from the hand.
+// - Acceleration, of the commanded point, that is behind the filter of the setpoints (elastic_setpoint.hpp), whose
+//   state is x, v: ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A wall met slower than a·e/ω (0.34 m/s with the
+//   default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
+// - Borders at distance d: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border falls with the distance, slowly
+//   enough that braking straight along the present velocity satisfies all borders at once: with u ≤ d/(T + v/a) and
+//   deceleration a, (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so what is commanded keeps within convex
+//   borders too.
+// - A keep-out box acts as the half-space of the face that is furthest from being crossed. The commanded point lags
+//   behind by 2v/ω (some millimetres) and may cut the box's corners by that: boxes need that much room around them.
+// - Joints: with G = ∂(joint angles)/∂(tool position), orientation held, joint i moves by G_i·(q − q₁). Near a
+//   singularity G_i grows along the direction that is being lost, and the tool slows down along that direction alone.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "models/arm/arm.hpp"
+#include "models/description/cell.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+// Bits of ActiveLimits::kinds.
+enum class Limit : std::uint16_t {
+  leash = 1u << 0,
+  power = 1u << 1,
+  workspace = 1u << 2,
+  keep_out = 1u << 3,
+  joint_range = 1u << 4,
+  joint_speed = 1u << 5,
+  joint_acceleration = 1u << 6,
+  speed = 1u << 7,
+  acceleration = 1u << 8,
+  singularity = 1u << 9,       // inverse kinematics stopped short
+  following_error = 1u << 10,  // a drive doesn't follow: its setpoint waits for it
+  joint_torque = 1u << 11,     // impedance type: what is rendered is cut
+  // Setpoints that the last guard has changed (controller/setpoints/tool_guard.hpp), whatever was wanted above:
+  guard_speed = 1u << 12,         // of the tool
+  guard_elbow = 1u << 13,         // speed of elbow or wrist
+  guard_border = 1u << 14,        // workspace or keep-out zones
+  guard_acceleration = 1u << 15,  // of the tool or the elbow, while they get faster
+};
+
+inline constexpr std::array all_limits{
+    Limit::leash,        Limit::power,       Limit::workspace,          Limit::keep_out,
+    Limit::joint_range,  Limit::joint_speed, Limit::joint_acceleration, Limit::speed,
+    Limit::acceleration, Limit::singularity, Limit::following_error,    Limit::joint_torque,
+    Limit::guard_speed,  Limit::guard_elbow, Limit::guard_border,       Limit::guard_acceleration};
+
+// The parameter that holds a limit: "limits.leash_m", "drives[].range_rad".
+const char* limit_parameter(Limit limit) noexcept;
+
+// What was active in a cycle.
+struct ActiveLimits {
+  std::uint16_t kinds = 0;  // Limit
+  std::uint8_t axes = 0;    // joints whose own limits were, as bits
+
+  void set(Limit limit, std::uint8_t axis_bits = 0) noexcept {
+    kinds = static_cast<std::uint16_t>(kinds | static_cast<std::uint16_t>(limit));
+    axes = static_cast<std::uint8_t>(axes | axis_bits);
+  }
+  [[nodiscard]] bool has(Limit limit) const noexcept { return (kinds & static_cast<std::uint16_t>(limit)) != 0; }
+  void add(const ActiveLimits& other) noexcept {
+    kinds = static_cast<std::uint16_t>(kinds | other.kinds);
+    axes = static_cast<std::uint8_t>(axes | other.axes);
+  }
+};
+
+// Sets relative to q₁, in n dimensions, in the order in which they give way.
+template <int N>
+struct LimitBall {
+  models::Vec<N> centre = models::Vec<N>::Zero();
+  double radius_m = 0.0;
+  Limit limit = Limit::speed;
+};
+template <int N>
+struct LimitPlane {
+  models::Vec<N> normal = models::Vec<N>::Zero();  // unit, outwards
+  double bound_m = 0.0;
+  Limit limit = Limit::workspace;
+  std::uint8_t axis_bits = 0;
+};
+
+struct StepLimits {
+  static constexpr std::size_t max_planes = 40;
+  std::array<LimitBall<3>, 2> soft{};  // leash, power: may be given up
+  std::size_t soft_count = 0;
+  std::array<LimitPlane<3>, max_planes> planes{};
+  std::size_t plane_count = 0;
+  std::array<LimitBall<3>, 2> hard{};  // speed, acceleration
+  std::size_t hard_count = 0;
+};
+
+// The state that a step begins with, in W.
+struct StepStart {
+  models::Vec3 q_k1_W = models::Vec3::Zero(), q_k2_W = models::Vec3::Zero();
+  models::Vec3 filtered_W = models::Vec3::Zero(), filtered_velocity_W = models::Vec3::Zero();  // x, v above
+  models::Vec3 measured_W = models::Vec3::Zero();
+  double force_N = 0.0;                                                // of the hand
+  double max_speed_m_per_s = std::numeric_limits<double>::infinity();  // of the tool, where lower than the cell's
+};
+
+class StepLimiter {
+ public:
+  StepLimiter(const std::vector<description::DriveDescription>& drives, const description::CellLimits& limits,
+              double period_s);
+
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
+  // The sets of one step. `joint_rad`: angles of the links at q₁; `twist_rad`: by how much each motor is ahead of its
+  // link; `J_W`: of T at joint_rad. Neither allocates nor throws.
+  void make(const StepStart& start, const models::JointVector& joint_rad, const models::JointVector& twist_rad,
+            const models::Jacobian& J_W, StepLimits& out) const noexcept;
+  // For the impedance type: the borders alone, as walls for a proxy whose tool is at q_W. The tool isn't slowed down
+  // ahead of them; one that is pushed through a border is pushed back.
+  void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,
+                  StepLimits& out) const noexcept;
+
+ private:
+  enum class Borders : std::uint8_t { slow_down, walls };
+  struct Joint {
+    double lower_rad, upper_rad, speed_rad_per_s, acceleration_rad_per_s2;
+  };
+  void add_borders(const models::Vec3& q_W, Borders borders, StepLimits& out) const noexcept;
+  void add_joints(const models::JointVector& joint_rad, const models::JointVector& twist_rad,
+                  const models::Jacobian& J_W, StepLimits& out) const noexcept;
+  void add_joint_walls(const models::JointVector& joint_rad, const models::Jacobian& J_W,
+                       StepLimits& out) const noexcept;
+  void add_balls(const StepStart& start, StepLimits& out) const noexcept;
+
+  std::vector<Joint> joints_;
+  description::CellLimits limits_;
+  double period_s_;
+  double omega_rad_per_s_;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,130 @@
+// What one cycle leaves behind: plain data of fixed size, pushed into a ring by the cycle, read by the summary, the
+// files and the plot outside of it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "controller/limits/step_limits.hpp"
+#include "controller/stability/passivity.hpp"
+#include "controller/supervision/supervisor.hpp"
+#include "fieldbus/cia402/cia402_period.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+enum class ContactPhase : std::uint8_t { free, stick, slip };
+
+const char* contact_phase_name(ContactPhase phase) noexcept;
+
+// What was unusual in a cycle. An active limit is no fault.
+enum class RecordFlag : std::uint32_t {
+  sample_held = 1u << 0,       // no new sensor sample: the last force was used again
+  feedback_missing = 1u << 1,  // some drive's TPDO didn't come: its last position was used
+  limit_speed = 1u << 2,
+  limit_acceleration = 1u << 3,
+  limit_workspace = 1u << 4,
+  limit_joint = 1u << 5,
+  limit_leash = 1u << 6,
+  limit_orientation = 1u << 7,
+  truth = 1u << 9,     // the fields of the simulation's truth are filled in
+  overrun = 1u << 10,  // the cycle was late; wall-clock, so it goes to timing.json and not to signals.csv
+  limit_power = 1u << 11,
+  limit_keep_out = 1u << 12,
+  limit_joint_speed = 1u << 13,
+  limit_joint_acceleration = 1u << 14,
+  limit_singularity = 1u << 15,      // inverse kinematics didn't reach the point: end of reach, or nearly singular
+  limit_following_error = 1u << 16,  // setpoints waited for a drive that doesn't follow
+  limit_joint_torque = 1u << 17,     // impedance type: the rendered torques were cut
+  oscillation = 1u << 18,            // motion above the hand's band (passivity.hpp)
+  timestep = 1u << 19,               // it is being changed: the arm stops for it, or stands
+  guard_speed = 1u << 20,            // the last guard changed the setpoints (tool_guard.hpp)
+  guard_elbow = 1u << 21,
+  guard_border = 1u << 22,
+  guard_acceleration = 1u << 23,
+  ramp_in = 1u << 24,  // only a share of the hand's force was let in
+  slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
+};
+
+// The flag of a limit, and the parameter that holds it ("limits.leash_m").
+struct LimitFlag {
+  RecordFlag flag;
+  Limit limit;
+};
+inline constexpr std::array limit_flags{LimitFlag{RecordFlag::limit_speed, Limit::speed},
+                                        LimitFlag{RecordFlag::limit_acceleration, Limit::acceleration},
+                                        LimitFlag{RecordFlag::limit_power, Limit::power},
+                                        LimitFlag{RecordFlag::limit_workspace, Limit::workspace},
+                                        LimitFlag{RecordFlag::limit_keep_out, Limit::keep_out},
+                                        LimitFlag{RecordFlag::limit_joint, Limit::joint_range},
+                                        LimitFlag{RecordFlag::limit_joint_speed, Limit::joint_speed},
+                                        LimitFlag{RecordFlag::limit_joint_acceleration, Limit::joint_acceleration},
+                                        LimitFlag{RecordFlag::limit_leash, Limit::leash},
+                                        LimitFlag{RecordFlag::limit_singularity, Limit::singularity},
+                                        LimitFlag{RecordFlag::limit_following_error, Limit::following_error},
+                                        LimitFlag{RecordFlag::limit_joint_torque, Limit::joint_torque},
+                                        LimitFlag{RecordFlag::guard_speed, Limit::guard_speed},
+                                        LimitFlag{RecordFlag::guard_elbow, Limit::guard_elbow},
+                                        LimitFlag{RecordFlag::guard_border, Limit::guard_border},
+                                        LimitFlag{RecordFlag::guard_acceleration, Limit::guard_acceleration}};
+
+// Three numbers that stay trivially copyable (Eigen's types aren't).
+using Triple = std::array<double, 3>;
+
+inline Triple triple(const models::Vec3& v) noexcept { return {v.x(), v.y(), v.z()}; }
+inline models::Vec3 vec3(const Triple& v) noexcept { return {v[0], v[1], v[2]}; }
+
+inline constexpr std::size_t max_axes = 8;
+
+struct CycleRecord {
+  std::uint64_t cycle = 0;     // k
+  std::int64_t time_ns = 0;    // t_k, as scheduled, from the first cycle of the session
+  std::int64_t period_ns = 0;  // T, from this cycle to the next one
+  Phase phase = Phase::idle;
+  ContactPhase contact = ContactPhase::free;
+  std::uint8_t contact_count = 0;  // how many things press at once
+  std::uint8_t axes = 0;
+  std::uint8_t limited_axes = 0;  // joints whose own limits were active, as bits
+  std::uint32_t flags = 0;        // RecordFlag
+
+  Triple force_S_N{}, torque_S_Nm{};  // the sensor's wrench, as decoded
+  Triple force_W_N{}, torque_W_Nm{};  // h(k): without bias and tool weight, in W, about the rendered point
+  Triple p_hat_W_m{};                 // (26a)
+  Triple proxy_W_m{};                 // q(k)
+  Triple contact_force_W_N{};         // f(k), (25a): on the proxy
+  Triple normal_W{};                  // of the first contact; zero when free
+  std::int32_t contact_object = -1;   // of the first contact, by its index in the scene; −1 when free
+  double friction = 0.0;              // its μ, as it is now
+  Triple tool_W_m{};                  // the rendered point by the encoders, at t_k
+  double proxy_clearance_m = 0.0;     // signed distance of the proxy to the nearest surface; below 0: inside
+  double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders
+  std::array<std::int32_t, max_axes> target_counts{};  // 607A sent in this cycle; in torque mode 6071
+  std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
+
+  double proxy_mass_kg = 0.0, proxy_damping_Ns_per_m = 0.0;  // M and B of this step; impedance type: 0
+
+  // Of PassivityObserver, where it is wanted.
+  PortEnergies energies_J{};
+  double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
+
+  std::int64_t refused_period_ns = 0;          // a timestep that was given up in this cycle; 0: none
+  fieldbus::PeriodRefusal timestep_refusal{};  // by whom
+
+  // The simulation's truth at t_k (flag `truth`).
+  Triple true_tool_W_m{};
+  Triple hand_force_W_N{};  // of the hand on the tool
+
+  std::int64_t compute_ns = 0;  // wall-clock of the cycle, waiting apart; goes to timing.json alone
+
+  [[nodiscard]] bool has(RecordFlag flag) const noexcept { return (flags & static_cast<std::uint32_t>(flag)) != 0; }
+  void set(RecordFlag flag, bool on = true) noexcept {
+    const auto bit = static_cast<std::uint32_t>(flag);
+    flags = on ? flags | bit : flags & ~bit;
+  }
+};
+
+static_assert(std::is_trivially_copyable_v<CycleRecord>);
+
+}  // namespace proxarm::controller

@@ -1,0 +1,102 @@
+// Impedance-type rendering with the same 𝒢: measured tool position in, force for the actuators out.
+//
+// The four laws are those of Kikuuwe and Fujimoto (World Haptics 2007), whose experiment (Fig. 5) compares three of
+// them:
+//   plain          q = 𝒢(K, p, q₁),  f = K(q − p)                                        (1)
+//   damped_motion  q = 𝒢(K, p, q₁),  f = K(q − p) + B(∇q − ∇p)/T                         (5)   can suck at release
+//   damped_tool    q = 𝒢(K, p, q₁),  f = K(q − p) − B∇p/T                                (6)   drags in free space
+//   implicit       p̂ = p + B(q₁ − p₁)/(KT + B),  q = 𝒢(K + B/T, p̂, q₁),  f = (K + B/T)(q − p̂)   (23)   neither
+// with q₁ = q(k−1), p₁ = p(k−1), ∇x = x(k) − x(k−1). p is the tool, f the force on the hand; one frame, metres,
+// newtons.
+//
+// One caller at a time; step() is for the cycle: it neither allocates, locks, throws nor prints.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "controller/rendering/proxy_step.hpp"
+#include "models/base/state_archive.hpp"
+#include "models/geometry/geometric_algorithm.hpp"
+
+namespace proxarm::controller {
+
+enum class ImpedanceLaw : std::uint8_t { plain, damped_motion, damped_tool, implicit };
+
+struct ImpedanceConfig {
+  double stiffness_N_per_m = 750.0;  // K of the virtual coupling, > 0
+  double damping_Ns_per_m = 8.0;     // B ≥ 0; `plain` doesn't look at it
+  double period_s = 1e-3;            // T, > 0
+  ImpedanceLaw law = ImpedanceLaw::implicit;
+
+  // Throws description::SetupError that names the option.
+  void validate() const;
+};
+
+template <int N>
+class ImpedanceProxy {
+ public:
+  using V = models::Vec<N>;
+
+  // Validates `config`. `g` is used by this proxy alone and must outlive it.
+  ImpedanceProxy(const ImpedanceConfig& config, models::GeometricAlgorithm<N>& g) : config_(config), g_(&g) {
+    config_.validate();
+  }
+
+  // Tool and proxy rest at p. Returns false, and changes nothing, where p or the time isn't finite.
+  bool start(const V& p, double time_s = 0.0) noexcept {
+    if (!p.allFinite() || !std::isfinite(time_s)) return false;
+    q_k1_ = p_k1_ = p_hat_ = p;
+    f_.setZero();
+    epoch_s_ = time_s;
+    steps_ = 0;
+    return true;
+  }
+
+  // One period with the tool measured at p(k). On a fault nothing has changed.
+  [[nodiscard]] ProxyFault step(const V& p) noexcept {
+    if (!p.allFinite()) return ProxyFault::input_not_finite;
+    const double K = config_.stiffness_N_per_m, B = config_.damping_Ns_per_m, T = config_.period_s;
+    const bool implicit = config_.law == ImpedanceLaw::implicit;
+    const double kappa = kappa_N_per_m();
+    const V p_hat = implicit ? V(p + B * (q_k1_ - p_k1_) / (K * T + B)) : p;  // (23a)
+    if (!p_hat.allFinite()) return ProxyFault::result_not_finite;
+    g_->set_time({epoch_s_ + static_cast<double>(steps_) * T, T});
+    const V q = (*g_)(kappa, p_hat, q_k1_);                                                    // (1a), (23b)
+    V f = kappa * (q - p_hat);                                                                 // (1b), (23c)
+    if (config_.law == ImpedanceLaw::damped_motion) f += B * ((q - q_k1_) - (p - p_k1_)) / T;  // (5b)
+    if (config_.law == ImpedanceLaw::damped_tool) f -= B * (p - p_k1_) / T;                    // (6b)
+    if (!f.allFinite()) return ProxyFault::result_not_finite;
+    p_hat_ = p_hat;
+    f_ = f;
+    p_k1_ = p;
+    q_k1_ = q;
+    ++steps_;
+    return ProxyFault::none;
+  }
+
+  [[nodiscard]] const V& q() const noexcept { return q_k1_; }
+  [[nodiscard]] const V& f() const noexcept { return f_; }
+  [[nodiscard]] const V& p_hat() const noexcept { return p_hat_; }
+  // κ, the stiffness that 𝒢 is called with.
+  [[nodiscard]] double kappa_N_per_m() const noexcept {
+    const bool implicit = config_.law == ImpedanceLaw::implicit;
+    return config_.stiffness_N_per_m + (implicit ? config_.damping_Ns_per_m / config_.period_s : 0.0);
+  }
+  [[nodiscard]] const ImpedanceConfig& config() const noexcept { return config_; }
+
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(q_k1_, p_k1_, p_hat_, f_, epoch_s_, steps_);
+    // As in AdmittanceProxy::archive().
+    if (steps_ > 0) g_->set_time({epoch_s_ + static_cast<double>(steps_ - 1) * config_.period_s, config_.period_s});
+  }
+
+ private:
+  ImpedanceConfig config_;
+  models::GeometricAlgorithm<N>* g_;
+  V q_k1_ = V::Zero(), p_k1_ = V::Zero(), p_hat_ = V::Zero(), f_ = V::Zero();
+  double epoch_s_ = 0.0;
+  std::uint64_t steps_ = 0;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,85 @@
+// The proxy and its scene as the cycle sees them: a force in W goes in, the tool's next position in W comes out.
+//
+// The scene has n = 1, 2 or 3 dimensions; its space is o + U x with x in n coordinates and U an orthonormal 3×n basis.
+// The part of the start position that lies off that space is kept as it is: nothing jumps, and the proxy moves along
+// the line or plane through the start.
+//
+//   x = Uᵀ(q_W − o),   h = Uᵀ h_W,   q_W = q_start + U (x − x_start)
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "controller/limits/step_limits.hpp"
+#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/rendering/change.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "models/base/state_archive.hpp"
+#include "models/geometry/geometry.hpp"
+#include "scenes/compiler/compile.hpp"
+
+namespace proxarm::controller {
+
+// What one step of the proxy did; all in W.
+struct WorldStep {
+  models::Vec3 q_W = models::Vec3::Zero();      // the new proxy
+  models::Vec3 p_hat_W = models::Vec3::Zero();  // p̂: where it would have gone without a world
+  models::Vec3 f_W = models::Vec3::Zero();      // the world's force on it, (25a)
+  models::Vec3 v_W = models::Vec3::Zero();
+  models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
+  std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
+  double friction = 0.0;                         // its μ
+  int contacts = 0;
+  bool slips = false;
+  ActiveLimits limits;                                // that held the proxy back
+  bool soft_limits_met = true;                        // leash and power
+  models::Vec3 limit_force_W = models::Vec3::Zero();  // of the limits on the proxy; f_W is without it
+  double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // M and B of this step
+  ProxyFault fault = ProxyFault::none;
+};
+
+// The contacts of a step, their normals turned to W by the scene's basis.
+template <int N>
+void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
+                  const Eigen::Matrix<double, 3, N>& basis) noexcept {
+  for (const models::Contact<N>& contact : contacts) {
+    if (step.contacts++ == 0) {
+      step.normal_W = basis * contact.normal;
+      step.object = contact.object;
+    }
+    step.slips = step.slips || contact.slips;
+  }
+}
+
+class RenderedWorld {
+ public:
+  RenderedWorld() = default;
+  RenderedWorld(const RenderedWorld&) = delete;
+  RenderedWorld& operator=(const RenderedWorld&) = delete;
+  virtual ~RenderedWorld() = default;
+
+  // Sets the proxy to rest at q_W; the spring, where there is one, pulls to it.
+  virtual void start(const models::Vec3& q_W) noexcept = 0;
+  // One period under the hand's force, within these limits. q_W of the result is always finite; after a fault it is
+  // that of the step before.
+  virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
+  // The arm couldn't follow: the proxy goes on with this velocity from the place nearest to q_W that the scene's
+  // objects let it reach. Returns that place.
+  virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
+  // Acts from the next step on. Position and velocity stay, so nothing jumps; a value out of range changes nothing.
+  virtual void set(const Change& change) noexcept = 0;
+  // T of the steps to come. Precondition: the proxy is at rest. Moving objects don't jump, but their last step was of
+  // the other period.
+  virtual void set_period(double period_s) noexcept = 0;
+  // Adds damping to the user's, from the next step on (passivity.hpp).
+  virtual void add_damping(double damping_Ns_per_m) noexcept = 0;
+  virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
+};
+
+// `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the
+// result.
+std::unique_ptr<RenderedWorld> make_rendered_world(scenes::CompiledScene& scene, const SessionSettings& settings,
+                                                   double proxy_mass_kg);
+
+}  // namespace proxarm::controller

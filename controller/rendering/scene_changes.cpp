@@ -1,0 +1,107 @@
+#include "controller/rendering/scene_changes.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+
+using models::Vec3;
+
+SceneChanges::SceneChanges(scenes::CompiledScene& scene, double period_s)
+    : scene_(&scene), period_s_(period_s), objects_(scene.frictions.size()) {
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    objects_[i].friction = objects_[i].wanted_friction = scene.frictions[i];
+    objects_[i].rubs = scene.has_friction(i);
+  }
+  for (const auto& [index, part] : scene.driven) objects_[static_cast<std::size_t>(index)].driven = true;
+}
+
+void SceneChanges::set(const Change& change) noexcept {
+  if (change.object < 0 || static_cast<std::size_t>(change.object) >= objects_.size()) return;
+  Object& object = objects_[static_cast<std::size_t>(change.object)];
+  const Vec3 position_m(change.position_m.data());
+  if (change.parameter == Parameter::friction && object.rubs && std::isfinite(change.value) && change.value >= 0.0) {
+    object.wanted_friction = change.value;
+    under_way_ = true;
+  }
+  if (change.parameter == Parameter::position && object.driven && position_m.allFinite()) {
+    object.wanted_m = position_m;
+    under_way_ = true;
+  }
+}
+
+void SceneChanges::step() noexcept {
+  if (!under_way_) return;
+  under_way_ = false;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const bool rubs = rub(i), moves = move(i);
+    under_way_ = under_way_ || rubs || moves;
+  }
+}
+
+// One step of an object's friction. True while it hasn't reached its value.
+bool SceneChanges::rub(std::size_t index) noexcept {
+  Object& object = objects_[index];
+  if (object.friction == object.wanted_friction) return false;
+  const double most = friction_per_s * period_s_, way = object.wanted_friction - object.friction;
+  object.friction = std::abs(way) <= most ? object.wanted_friction : object.friction + std::copysign(most, way);
+  scene_->set_friction(index, object.friction);
+  return object.friction != object.wanted_friction;
+}
+
+// One step of an object's place. True while it hasn't arrived. An obstacle takes its motion from the last two places
+// that it was told, so one that has arrived is told its place a second time: it rests from then on.
+bool SceneChanges::move(std::size_t index) noexcept {
+  Object& object = objects_[index];
+  if (!object.driven) return false;
+  const Vec3 way = object.wanted_m - object.position_m;
+  const double distance_m = way.norm();
+  if (distance_m == 0.0) {
+    object.speed_m_per_s = 0.0;
+    if (object.before_m != object.position_m) drive(index, object.position_m);
+    return false;
+  }
+  const double a = acceleration_m_per_s2;
+  object.speed_m_per_s =
+      std::min({object.speed_m_per_s + a * period_s_, speed_m_per_s, std::sqrt(2.0 * a * distance_m)});
+  const double step_m = object.speed_m_per_s * period_s_;
+  drive(index, step_m >= distance_m ? object.wanted_m : Vec3(object.position_m + (step_m / distance_m) * way));
+  return true;
+}
+
+void SceneChanges::drive(std::size_t index, const Vec3& position_m) noexcept {
+  Object& object = objects_[index];
+  object.before_m = object.position_m;
+  object.position_m = position_m;
+  models::Pose X = models::Pose::Identity();
+  X.translation() = position_m;
+  scene_->drive(index, X);
+}
+
+double SceneChanges::friction(std::int32_t object) const noexcept {
+  const auto i = static_cast<std::size_t>(object);
+  return object >= 0 && i < objects_.size() ? objects_[i].friction : 0.0;
+}
+
+Vec3 SceneChanges::position_m(std::int32_t object) const noexcept {
+  const auto i = static_cast<std::size_t>(object);
+  return object >= 0 && i < objects_.size() ? objects_[i].position_m : Vec3(Vec3::Zero());
+}
+
+void SceneChanges::archive(fieldbus::StateArchive& state) noexcept {
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    Object& object = objects_[i];
+    if (!object.driven && !object.rubs) continue;
+    state(object.friction, object.wanted_friction, object.position_m, object.before_m, object.wanted_m,
+          object.speed_m_per_s);
+    if (!state.reading()) continue;
+    if (object.rubs && object.friction >= 0.0) scene_->set_friction(i, object.friction);
+    if (!object.driven || !object.before_m.allFinite() || !object.position_m.allFinite()) continue;
+    const Vec3 now_m = object.position_m;
+    drive(i, object.before_m);
+    drive(i, now_m);
+  }
+  state(under_way_);
+}
+
+}  // namespace proxarm::controller

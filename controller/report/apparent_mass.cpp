@@ -1,0 +1,126 @@
+#include "controller/report/apparent_mass.hpp"
+
+#include <Eigen/LU>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+using Complex = std::complex<double>;
+using Complex3 = std::array<Complex, 3>;
+
+constexpr double low_Hz = 0.3, high_Hz = 2.0, step_Hz = 0.05;
+constexpr double longest_segment_s = 10.0, shortest_segment_s = 0.5, least_travel_m = 1e-3;
+
+// Tukey's window, flat in the middle half with a cosine at either end. It keeps motion outside of the model (the arm's
+// resonance, say) from leaking into the band when a segment ends in motion.
+double window(std::size_t i, std::size_t count) {
+  const double x = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+  const double edge = std::min(x, 1.0 - x) / 0.25;
+  return edge >= 1.0 ? 1.0 : 0.5 - 0.5 * std::cos(std::numbers::pi * edge);
+}
+
+double travel(const std::vector<Vec3>& positions) {
+  Vec3 low = positions.front(), high = low;
+  for (const Vec3& p : positions) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  return (high - low).norm();
+}
+
+// Re(x* y), the inner product of complex numbers seen as pairs of real ones.
+double inner(const Complex& x, const Complex& y) { return x.real() * y.real() + x.imag() * y.imag(); }
+
+struct Spectrum {
+  Complex window;
+  Complex3 F;
+  std::array<Complex3, 3> x;  // a, v, ȧ
+};
+
+}  // namespace
+
+void ApparentMass::add(const Vec3& force_N, const Vec3& position_m) {
+  force_.push_back(force_N);
+  position_.push_back(position_m);
+  if (static_cast<double>(force_.size()) * period_s_ >= longest_segment_s) end_segment();
+}
+
+void ApparentMass::end_segment() {
+  const std::size_t samples = force_.size();
+  const double T = period_s_;
+  const double length_s = static_cast<double>(samples) * T;
+  // Fewer than 16 samples don't resolve the band, whatever T is.
+  if (samples >= 16 && length_s >= shortest_segment_s && travel(position_) >= least_travel_m) {
+    const std::size_t count = samples - 4;  // central differences lose two at either end
+    std::vector<Spectrum> band;
+    for (int line = 0; low_Hz + line * step_Hz < high_Hz + 0.5 * step_Hz; ++line) {
+      const double omega = 2.0 * std::numbers::pi * (low_Hz + line * step_Hz);
+      const Complex turn = std::polar(1.0, -omega * T);
+      Complex phase = 1.0;
+      Spectrum s{};
+      for (std::size_t i = 0; i < count; ++i) {
+        const Complex weight = window(i, count) * phase;
+        const Vec3* x = &position_[i + 2];
+        const Vec3 acceleration = (x[1] - 2.0 * x[0] + x[-1]) / (T * T), velocity = (x[1] - x[-1]) / (2.0 * T);
+        const Vec3 jerk = (x[2] - 2.0 * x[1] + 2.0 * x[-1] - x[-2]) / (2.0 * T * T * T);
+        s.window += weight;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const auto j = static_cast<Eigen::Index>(axis);
+          s.F[axis] += weight * force_[i + 2][j];
+          s.x[0][axis] += weight * acceleration[j];
+          s.x[1][axis] += weight * velocity[j];
+          s.x[2][axis] += weight * jerk[j];
+        }
+        phase *= turn;
+      }
+      band.push_back(s);
+    }
+    // Removes a constant force: the part of y along the window's own transform.
+    double ww = 0.0;
+    for (const Spectrum& s : band) ww += std::norm(s.window);
+    const auto take_off_constant = [&band, ww](auto&& signal) {
+      double wy = 0.0;
+      for (Spectrum& s : band) wy += inner(s.window, signal(s));
+      for (Spectrum& s : band) signal(s) -= wy / ww * s.window;
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      take_off_constant([axis](Spectrum& s) -> Complex& { return s.F[axis]; });
+      for (std::size_t i = 0; i < 3; ++i) {
+        take_off_constant([axis, i](Spectrum& s) -> Complex& { return s.x[i][axis]; });
+      }
+      for (const Spectrum& s : band) {
+        for (std::size_t i = 0; i < 3; ++i) {
+          const auto row = static_cast<Eigen::Index>(i);
+          with_force_[row] += inner(s.x[i][axis], s.F[axis]);
+          for (std::size_t j = 0; j < 3; ++j) {
+            regressors_(row, static_cast<Eigen::Index>(j)) += inner(s.x[i][axis], s.x[j][axis]);
+          }
+        }
+      }
+    }
+    used_s_ += length_s;
+  }
+  force_.clear();
+  position_.clear();
+}
+
+std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
+  const Eigen::Vector3d size = regressors_.diagonal().cwiseSqrt();
+  if (!(size.minCoeff() > 0.0)) return std::nullopt;
+  // Scaled to ones on the diagonal. Below a part in a million, a and v can't be told apart (a single exponential, say).
+  const Eigen::Matrix3d scaled = size.cwiseInverse().asDiagonal() * regressors_ * size.cwiseInverse().asDiagonal();
+  const Eigen::Vector3d force = with_force_.cwiseQuotient(size);
+  const Eigen::Matrix2d two = scaled.topLeftCorner<2, 2>();
+  if (!(two.determinant() > 1e-6)) return std::nullopt;
+  const Eigen::Vector2d mass_and_damping = two.inverse() * force.head<2>();
+  Estimate estimate{mass_and_damping[0] / size[0], mass_and_damping[1] / size[1], used_s_};
+  if (scaled.determinant() > 1e-6) estimate.mass_kg = (scaled.inverse() * force)[0] / size[0];
+  return estimate;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,52 @@
+// How heavy the tool feels in free motion: Re(F/a) between 0.3 and 2 Hz, from the hand's force F and the tool's
+// acceleration a.
+//
+// F̂, â, v̂, ĵ are the windowed Fourier transforms of force, acceleration, velocity and jerk over a segment of free
+// motion. For F = M a + B v + N ȧ they satisfy F̂(ω) = M â(ω) + B v̂(ω) + N ĵ(ω) at every ω and for any window, so M
+// follows by least squares over the band, all axes and all segments:
+//   [M, B, N] = argmin Σ |F̂ − M â − B v̂ − N ĵ|²,   ω = 2π · (0.3, 0.35, … 2.0 Hz)
+// M is Re(F/a): in a long record a is orthogonal to v and ȧ, and M = Re Σ F̂ â* / Σ |â|². In a short one it isn't, and a
+// tool that lags (F = M a(t + τ), so N = Mτ) would seem lighter without the third term. The damping is Im(F/a) times ω
+// as one number: B of the fit without ĵ. A lag makes it negative, by about Mω²τ. A constant force (an offset of the
+// sensor, a hand that leans) is taken off per segment and axis by projecting out the window's own transform.
+//
+// Works for a short move between two contacts as well as for minutes of a multisine; a segment is cut at 10 s, and one
+// that is shorter than 0.5 s or moves less than 1 mm says nothing and is left out. Memory is bounded by one segment.
+// Not for the cycle.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+class ApparentMass {
+ public:
+  explicit ApparentMass(double period_s) : period_s_(period_s) {}
+
+  // The next sample of free motion, one period after the one before it.
+  void add(const models::Vec3& force_N, const models::Vec3& position_m);
+  // Free motion is interrupted; what follows is another segment.
+  void end_segment();
+
+  struct Estimate {
+    double mass_kg = 0.0;
+    double damping_Ns_per_m = 0.0;
+    double used_s = 0.0;  // length of the segments that were used
+  };
+  // Of all segments that have ended; nothing when none was usable.
+  [[nodiscard]] std::optional<Estimate> estimate() const;
+
+ private:
+  double period_s_;
+  std::vector<models::Vec3> force_, position_;
+  // Normal equations: sums of Re(x* y) over the band, for the regressors a, v, ȧ and for the force.
+  Eigen::Matrix3d regressors_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d with_force_ = Eigen::Vector3d::Zero();
+  double used_s_ = 0.0;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,79 @@
+// How late and how long cycles are, in real time, from the black box's entries. Not for the cycle.
+//
+//   wake_up             from t_k to SYNC having been handed to the first interface with drives
+//   compute             of the cycle, waiting apart
+//   sensor_to_setpoint  from the sensor's last frame on the wire to the last setpoint handed to its interface; cycles
+//                       without a sample of the sensor don't count
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "controller/record/black_box.hpp"
+#include "controller/report/summary.hpp"
+
+namespace proxarm::controller {
+
+// Bins of a microsecond up to 4 ms, and one for all beyond.
+class LatencyHistogram {
+ public:
+  static constexpr std::size_t bins = 4096;
+
+  void add(std::int64_t time_ns) noexcept {
+    const std::int64_t us = std::max<std::int64_t>(time_ns, 0) / 1000;
+    ++counts_[std::min(static_cast<std::size_t>(us), bins - 1)];
+    ++count_;
+    max_ns_ = std::max(max_ns_, time_ns);
+  }
+
+  [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
+  [[nodiscard]] double max_us() const noexcept { return 1e-3 * static_cast<double>(max_ns_); }
+  // This quantile of all times, rounded up to the end of its bin; in the last bin, the largest time.
+  [[nodiscard]] double quantile_us(double share) const noexcept {
+    std::uint64_t below = 0;
+    for (std::size_t bin = 0; bin + 1 < bins; ++bin) {
+      below += counts_[bin];
+      if (static_cast<double>(below) >= share * static_cast<double>(count_)) {
+        return std::min(static_cast<double>(bin + 1), max_us());
+      }
+    }
+    return max_us();
+  }
+  [[nodiscard]] const std::array<std::uint64_t, bins>& counts() const noexcept { return counts_; }
+
+ private:
+  std::array<std::uint64_t, bins> counts_{};
+  std::uint64_t count_ = 0;
+  std::int64_t max_ns_ = 0;
+};
+
+[[nodiscard]] LatencySummary latency_summary(const LatencyHistogram& times);
+
+struct Latencies {
+  LatencyHistogram wake_up, compute, sensor_to_setpoint;
+};
+
+class LatencyMeter {
+ public:
+  // `sensor_ids`: of the sensor's frames, 29-bit ones with fieldbus::extended_id_flag. `box` must outlive it.
+  LatencyMeter(const BlackBox& box, std::size_t sensor_bus, std::vector<std::uint32_t> sensor_ids)
+      : box_(box), sensor_bus_(sensor_bus), sensor_ids_(std::move(sensor_ids)) {}
+
+  // Takes all whole cycles since the last call, without those that the box has overwritten.
+  void drain();
+  [[nodiscard]] const Latencies& latencies() const noexcept { return latencies_; }
+
+ private:
+  void add(const BoxCycle& cycle, const std::vector<BoxFrame>& frames);
+
+  const BlackBox& box_;
+  std::size_t sensor_bus_;
+  std::vector<std::uint32_t> sensor_ids_;
+  std::uint64_t next_ = 0;
+  Latencies latencies_;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,56 @@
+// A session as a picture (SVG, by gnuplot): tool and proxy against the wall and along it, forces, contact phases as
+// bands.
+//
+// With a contact, positions are split along the first contact's normal and along the direction in which the proxy then
+// slid farthest; the surface is at 0. Without one, the panels show x, y and z. Only Phase::rendering is drawn. Long
+// sessions are thinned out to some thousand points; memory is bounded. Curves differ in dash and width as well as in
+// colour, stick and slip in shade and by name.
+//
+// gnuplot is a program of its own and may be absent: then there is no picture but a warning, and nothing else changes.
+// It is started without a shell, in a temporary folder, and no path or name from outside gets into its script unquoted.
+// Not for the cycle.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "controller/record/cycle_record.hpp"
+
+namespace proxarm::controller {
+
+class PlotBuilder {
+ public:
+  // `title` is one line of plain text above the picture. `gnuplot` is looked up in PATH.
+  explicit PlotBuilder(std::string title, std::string gnuplot = "gnuplot");
+
+  void add(const CycleRecord& record);
+
+  // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
+  [[nodiscard]] std::string write(const std::filesystem::path& svg) const;
+
+ private:
+  struct Sample {
+    double time_s = 0.0;
+    ContactPhase contact = ContactPhase::free;
+    Triple tool{}, proxy{}, hand{}, contact_force{}, normal{};
+  };
+  struct Axes;
+  struct Ranges;
+  struct Band;
+
+  [[nodiscard]] Axes axes() const;
+  [[nodiscard]] std::vector<Band> bands() const;
+  [[nodiscard]] std::string data(const Axes& axes) const;
+  [[nodiscard]] Ranges ranges(const Axes& axes) const;
+  [[nodiscard]] std::string script(const Axes& axes) const;
+
+  std::string title_, gnuplot_;
+  std::vector<Sample> samples_;
+  std::uint64_t stride_ = 1, seen_ = 0;
+  bool truth_ = false;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,333 @@
+#include "controller/report/summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <string_view>
+
+#include "controller/record/setpoint_hash.hpp"
+#include "controller/report/apparent_mass.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+
+constexpr double shortest_slide_s = 0.1, shortest_slide_m = 1e-3;
+constexpr double free_force_N = 1e-3;  // far above rounding (κ times an ulp of q), far below what a hand feels
+
+// Durations up to 1 ms in bins of 10 ns, so that a median over hours needs no more memory than one over seconds.
+class Durations {
+ public:
+  void add(std::int64_t ns) {
+    const std::int64_t bin = std::clamp<std::int64_t>(ns / 10, 0, static_cast<std::int64_t>(bins_.size()) - 1);
+    ++bins_[static_cast<std::size_t>(bin)];
+    ++count_;
+    max_ns_ = std::max(max_ns_, ns);
+  }
+
+  // The duration that a fraction of all don't exceed, in µs; past the last bin the longest.
+  [[nodiscard]] double quantile_us(double fraction) const {
+    if (count_ == 0) return 0.0;
+    const auto rank = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
+    std::uint64_t seen = 0;
+    for (std::size_t i = 0; i + 1 < bins_.size(); ++i) {
+      seen += bins_[i];
+      if (seen >= rank) return std::min(0.01 * static_cast<double>(i) + 0.005, max_us());
+    }
+    return max_us();
+  }
+  [[nodiscard]] double max_us() const { return 1e-3 * static_cast<double>(max_ns_); }
+
+ private:
+  std::vector<std::uint32_t> bins_ = std::vector<std::uint32_t>(100'000);
+  std::uint64_t count_ = 0;
+  std::int64_t max_ns_ = 0;
+};
+
+// Root mean square and maximum of a stream.
+struct Spread {
+  double sum_of_squares = 0.0, max = 0.0;
+  std::uint64_t count = 0;
+
+  void add(double value) {
+    sum_of_squares += value * value;
+    max = std::max(max, std::abs(value));
+    ++count;
+  }
+  [[nodiscard]] std::optional<double> rms() const {
+    if (count == 0) return std::nullopt;
+    return std::sqrt(sum_of_squares / static_cast<double>(count));
+  }
+  [[nodiscard]] std::optional<double> largest() const { return count == 0 ? std::nullopt : std::optional(max); }
+};
+
+struct Slide {
+  double tangential = 0.0, limit = 0.0, length_s = 0.0, travel_m = 0.0;
+};
+
+// "limits.leash_m"; joints' own limits with the joints' names: "axis_2, axis_3: max_speed_rad_per_s".
+std::string parameter_name(Limit limit, std::uint8_t axes, const std::vector<std::string>& names) {
+  const std::string parameter = limit_parameter(limit);
+  constexpr std::string_view of_joints = "drives[].";
+  if (parameter.compare(0, of_joints.size(), of_joints) != 0) return parameter;
+  std::string joints;
+  for (std::size_t i = 0; i < 8; ++i) {
+    if ((axes & (1u << i)) == 0) continue;
+    joints += (joints.empty() ? "" : ", ") + (i < names.size() ? names[i] : "axis " + std::to_string(i + 1));
+  }
+  return joints + ": " + parameter.substr(of_joints.size());
+}
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
+
+bool limited(const CycleRecord& record) {
+  return record.has(RecordFlag::limit_orientation) ||
+         std::any_of(limit_flags.begin(), limit_flags.end(),
+                     [&](const LimitFlag& flag) { return record.has(flag.flag); });
+}
+
+}  // namespace
+
+struct SummaryBuilder::State {
+  explicit State(const SummaryConfig& c) : config(c), apparent(c.period_s), period_ns(std::llround(1e9 * c.period_s)) {}
+
+  void count(const CycleRecord& record);
+  void track(const CycleRecord& record);
+  void observe(const CycleRecord& record);
+  void follow_changes(const CycleRecord& record);
+  void follow_timestep(const CycleRecord& record);
+  void take_period(std::int64_t period_ns);
+  void penetrate(const CycleRecord& record);
+  void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
+  void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
+
+  SummaryConfig config;
+  Summary summary;
+  SetpointHash hash;
+  Durations durations;
+  Spread tracking, contact_force;
+  ApparentMass apparent;
+  Slide sliding;
+  double contact_s = 0.0;  // how long the contact has lasted
+  // Whole periods, so that no sum of them rounds.
+  std::int64_t period_ns, all_ns = 0, rendered_ns = 0, touching_ns = 0, slipping_ns = 0;
+  bool changing = false;  // the timestep
+  std::int64_t asked_ns = 0;
+  double mass_kg = 0.0;            // of the proxy, in the record before
+  std::optional<Vec3> start;       // x₀ of the spring
+  std::deque<CycleRecord> recent;  // consecutive cycles of rendering, newest last
+};
+
+SummaryBuilder::SummaryBuilder(const SummaryConfig& config) : state_(std::make_unique<State>(config)) {}
+SummaryBuilder::~SummaryBuilder() = default;
+SummaryBuilder::SummaryBuilder(SummaryBuilder&&) noexcept = default;
+SummaryBuilder& SummaryBuilder::operator=(SummaryBuilder&&) noexcept = default;
+
+void SummaryBuilder::add(const CycleRecord& record) {
+  State& s = *state_;
+  s.follow_timestep(record);
+  s.count(record);
+  const bool follows = !s.recent.empty() && s.recent.back().cycle + 1 == record.cycle;
+  if (record.phase != Phase::rendering || !follows) {
+    s.recent.clear();
+    s.apparent.end_segment();
+    s.contact_s = 0.0;
+  }
+  if (record.phase != Phase::rendering) return;
+  if (!s.start) {
+    s.start = vec3(record.proxy_W_m);
+    s.summary.rendering_from_s = seconds(record.time_ns);
+  }
+  s.follow_changes(record);
+  s.rendered_ns += s.period_ns;
+  s.recent.push_back(record);
+  s.penetrate(record);
+  if (s.config.passivity) s.observe(record);
+  s.track(record);
+  const std::size_t n = s.recent.size();
+  if (n >= 3) s.middle(s.recent[n - 3], s.recent[n - 2], s.recent[n - 1]);
+  const auto kept = static_cast<std::size_t>(std::max(s.config.setpoint_delay_cycles, 2)) + 1;
+  if (n > kept) s.recent.pop_front();
+}
+
+// Figures that are counted in every phase.
+void SummaryBuilder::State::count(const CycleRecord& record) {
+  ++summary.cycles;
+  all_ns += period_ns;
+  hash.add({record.target_counts.data(), std::min<std::size_t>(record.axes, max_axes)});
+  durations.add(record.compute_ns);
+  if (record.has(RecordFlag::overrun)) ++summary.overruns;
+  if (record.phase != Phase::rendering) return;
+  if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
+  if (limited(record)) ++summary.limited_cycles;
+  if (record.has(RecordFlag::limit_orientation)) ++summary.active_limits["orientation"];
+  for (const LimitFlag& flag : limit_flags) {
+    if (record.has(flag.flag)) {
+      ++summary.active_limits[parameter_name(flag.limit, record.limited_axes, config.axis_names)];
+    }
+  }
+  if (record.has(RecordFlag::truth)) summary.from_truth = true;
+}
+
+// A mass, damping or spring set while rendering counts from then on; the wanted mass is the last one.
+void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
+  if (record.proxy_mass_kg != mass_kg) {
+    if (mass_kg > 0.0) {
+      config.wanted_mass_kg = record.proxy_mass_kg + config.handle_mass_kg;
+      apparent = ApparentMass(config.period_s);
+    }
+    mass_kg = record.proxy_mass_kg;
+  }
+  if (mass_kg > 0.0) config.damping_Ns_per_m = record.proxy_damping_Ns_per_m;
+}
+
+// Nothing is rendered while the timestep is being changed, and the figures go on with the new one. The apparent mass is
+// that of the last timestep.
+void SummaryBuilder::State::follow_timestep(const CycleRecord& record) {
+  const bool was_changing = changing;
+  changing = record.has(RecordFlag::timestep);
+  if (changing && !was_changing) {
+    summary.timesteps.push_back({seconds(record.time_ns), config.period_s, config.period_s, 0.0, ""});
+    asked_ns = record.time_ns;
+  }
+  if (changing || was_changing) {
+    TimestepSummary& last = summary.timesteps.back();
+    last.paused_s = seconds(record.time_ns - asked_ns);
+    if (record.refused_period_ns > 0) {
+      last.to_s = seconds(record.refused_period_ns);
+      last.refused = refusal_text(record.timestep_refusal, config.axis_names);
+    } else if (!changing && last.refused.empty()) {
+      last.to_s = seconds(record.period_ns);
+    }
+  }
+  if (record.period_ns > 0 && record.period_ns != period_ns) take_period(record.period_ns);
+}
+
+void SummaryBuilder::State::take_period(std::int64_t ns) {
+  period_ns = ns;
+  config.period_s = seconds(ns);
+  config.setpoint_delay_cycles = 2 + static_cast<int>(std::lround(config.setpoint_filter_s / config.period_s));
+  apparent = ApparentMass(config.period_s);
+}
+
+void SummaryBuilder::State::observe(const CycleRecord& record) {
+  constexpr double noticeable_Ns_per_m = 1.0;
+  if (!summary.passivity) summary.passivity.emplace();
+  PassivitySummary& p = *summary.passivity;
+  p.energies_J = record.energies_J;
+  p.oscillation_max_m_per_s = std::max(p.oscillation_max_m_per_s, record.oscillation_m_per_s);
+  p.added_damping_max_Ns_per_m = std::max(p.added_damping_max_Ns_per_m, record.added_damping_Ns_per_m);
+  if (record.added_damping_Ns_per_m >= noticeable_Ns_per_m) p.added_time_s += config.period_s;
+  if (!record.has(RecordFlag::oscillation)) return;
+  p.oscillating_time_s += config.period_s;
+  p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);
+}
+
+void SummaryBuilder::State::penetrate(const CycleRecord& record) {
+  if (record.contact == ContactPhase::free) {
+    contact_s = 0.0;
+  } else {
+    if (contact_s == 0.0) ++summary.contacts;
+    contact_s += config.period_s;
+    touching_ns += period_ns;
+    if (record.contact == ContactPhase::slip) slipping_ns += period_ns;
+    const double pull = -vec3(record.normal_W).dot(vec3(record.contact_force_W_N));
+    // With several contacts only the sum of their forces is known.
+    if (record.contact_count <= 1) summary.pulling_force_max_N = std::max(summary.pulling_force_max_N, pull);
+  }
+  summary.penetration_max_m = std::max(summary.penetration_max_m, -record.proxy_clearance_m);
+  if (std::isfinite(record.proxy_clearance_m)) {
+    summary.proxy_clearance_min_m =
+        std::min(summary.proxy_clearance_min_m.value_or(record.proxy_clearance_m), record.proxy_clearance_m);
+  }
+  const double depth = -record.tool_clearance_m;
+  summary.tool_penetration_max_m = std::max(summary.tool_penetration_max_m, depth);
+  if (contact_s > 0.0 && contact_s <= config.touch_s) {
+    summary.tool_penetration_touch_max_m = std::max(summary.tool_penetration_touch_max_m, depth);
+  } else if (record.contact == ContactPhase::slip) {
+    summary.tool_penetration_sliding_max_m = std::max(summary.tool_penetration_sliding_max_m, depth);
+  }
+}
+
+void SummaryBuilder::State::track(const CycleRecord& record) {
+  const auto delay = static_cast<std::size_t>(std::max(config.setpoint_delay_cycles, 0));
+  if (recent.size() <= delay) return;
+  const CycleRecord& due = recent[recent.size() - 1 - delay];
+  const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+  tracking.add((vec3(tool) - vec3(due.proxy_W_m)).norm());
+}
+
+// Figures that need derivatives, of the record before the last, by differences with its neighbours.
+void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after) {
+  const double T = config.period_s, m = config.handle_mass_kg, M = config.wanted_mass_kg, B = config.damping_Ns_per_m;
+  const bool truth = before.has(RecordFlag::truth) && now.has(RecordFlag::truth) && after.has(RecordFlag::truth);
+  const auto tool = [truth](const CycleRecord& r) { return vec3(truth ? r.true_tool_W_m : r.tool_W_m); };
+  const Vec3 x = tool(now);
+  const Vec3 a = (tool(after) - 2.0 * x + tool(before)) / (T * T);
+  const Vec3 hand = truth ? vec3(now.hand_force_W_N) : Vec3(vec3(now.force_W_N) + m * a);
+
+  const Vec3 spring = config.spring_N_per_m * (x - *start);
+  if (now.contact == ContactPhase::free) {
+    // A world without contacts may act all the same: a field of friction, a soft layer. Where a limit acts, the motion
+    // isn't the mass's.
+    if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in))
+      return apparent.add(hand - spring, x);
+  }
+  apparent.end_segment();
+  if (now.contact == ContactPhase::free) return;
+  // `contact_s` is that of `after`: one period more than that of `now`, unless the contact ends there.
+  const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
+  if (!established) return;
+  // (24): M_p ∇²q(k)/T² + B ∇q(k)/T = h(k) + f(k), with the differences that end at q(k).
+  const std::size_t i = recent.size() - 2;
+  const Vec3 q = vec3(now.proxy_W_m), q1 = vec3(before.proxy_W_m);
+  const Vec3 q2 = i >= 2 ? vec3(recent[i - 2].proxy_W_m) : q1;
+  const Vec3 n = vec3(now.normal_W);
+  if (i >= 2) {
+    const Vec3 a_q = (q - 2.0 * q1 + q2) / (T * T), v_q = (q - q1) / T;
+    const Vec3 pull_back = config.spring_N_per_m * (q - *start);
+    const Vec3 resistance = hand - m * a - (M - m) * a_q - B * v_q - pull_back;
+    contact_force.add(n.dot(vec3(now.contact_force_W_N)) + n.dot(resistance));
+    if (contact_s - T > config.settle_s) slide(before, now, resistance);
+  }
+}
+
+void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance) {
+  if (now.contact != ContactPhase::slip || !(now.friction > 0.0) || now.contact_count > 1) return;
+  const Vec3 n = vec3(now.normal_W);
+  const Vec3 step = vec3(now.proxy_W_m) - vec3(before.proxy_W_m);
+  const Vec3 along = step - n.dot(step) * n;
+  if (!(along.norm() > 0.0)) return;
+  sliding.tangential += resistance.dot(along.normalized());
+  sliding.limit += -now.friction * n.dot(resistance);
+  sliding.length_s += config.period_s;
+  sliding.travel_m += along.norm();
+}
+
+Summary SummaryBuilder::finish() {
+  State& s = *state_;
+  s.apparent.end_segment();
+  Summary summary = s.summary;
+  summary.simulated_time_s = seconds(s.all_ns);
+  summary.rendered_time_s = seconds(s.rendered_ns);
+  summary.contact_time_s = seconds(s.touching_ns);
+  summary.sliding_time_s = seconds(s.slipping_ns);
+  summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
+  summary.tracking_rms_m = s.tracking.rms();
+  summary.tracking_max_m = s.tracking.largest();
+  if (const auto apparent = s.apparent.estimate()) {
+    summary.apparent_mass_kg = apparent->mass_kg;
+    summary.apparent_damping_Ns_per_m = apparent->damping_Ns_per_m;
+  }
+  summary.contact_force_error_N = s.contact_force.rms();
+  summary.contact_force_error_max_N = s.contact_force.largest();
+  if (s.sliding.length_s >= shortest_slide_s && s.sliding.travel_m >= shortest_slide_m && s.sliding.limit > 0.0) {
+    summary.friction_ratio_error = s.sliding.tangential / s.sliding.limit - 1.0;
+  }
+  summary.setpoint_sha256 = s.hash.hex();
+  summary.wanted_mass_kg = s.config.wanted_mass_kg;
+  return summary;
+}
+
+}  // namespace proxarm::controller

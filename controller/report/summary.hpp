@@ -1,0 +1,183 @@
+// The figures of a session: what was rendered, how well, and how fast it was computed.
+//
+// SummaryBuilder sees every cycle's record once, in order, and keeps little of it; finish() gives the figures. Not for
+// the cycle. Unless it says otherwise, a figure is over cycles of Phase::rendering. Where nothing happened that a
+// figure could be taken from, it is absent (null in JSON).
+//
+// "Hand's force" F_h and "tool" x are the simulation's truth where the records hold it; else F_h is the measured force,
+// compensated, plus the handle's inertia (which the sensor doesn't see: it sits before the handle), and x comes from
+// the encoders. `source` says which. a, v: central differences of x. n: contact normal of the record; f: (25a). m, M_p,
+// M: mass of the handle, of the proxy, and their sum, which is what the hand feels. A virtual spring's force K_v (x −
+// x₀) is taken off F_h beforehand.
+//
+//   penetration_max_m       max(0, −signed distance of the proxy)
+//   tool_penetration_max_m  the same of the tool; …_touch_… within the first touch_s of a contact, …_sliding_… after
+//                           that while the proxy slips
+//   tracking_rms_m, _max_m  ‖x(t_k) − q(k − delay)‖, delay = 2 cycles: a target sent in cycle k is latched at SYNC k+1
+//                           and, interpolated, reached at k+2
+//   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while no limit acts and the world's
+//                           force on the proxy is below 1 mN (apparent_mass.hpp);
+//                           apparent_damping_Ns_per_m is its Im
+//   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
+//                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
+//                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
+//                           Impedance type: push = −n·F_h, so that it has the device's own friction and inertia, too
+//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, t the direction of the slide:
+//                           over all cycles that slip on one thing, from settle_s after the contact began; at least
+//                           0.1 s and 1 mm of it
+//   pulling_force_max_N     max(0, −n·f) over all cycles in contact with one thing
+//   setpoint_sha256         all target counts of all cycles (setpoint_hash.hpp), whatever the phase
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "controller/record/cycle_record.hpp"
+#include "controller/record/page_faults.hpp"
+#include "controller/supervision/fault.hpp"
+
+namespace proxarm::controller {
+
+struct SummaryConfig {
+  double period_s = 1e-3;
+  double wanted_mass_kg = 4.0;    // M: proxy and handle; impedance type: 0, and so is m
+  double handle_mass_kg = 0.0;    // m: what moves after the sensor
+  double damping_Ns_per_m = 0.0;  // B
+  double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
+  int setpoint_delay_cycles = 2;
+  double setpoint_filter_s = 0.0;            // of that delay, what the filter takes: for another period
+  double touch_s = 0.1;                      // how long a contact counts as a touch
+  double settle_s = 0.5;                     // how long the arm may ring from it
+  bool passivity = false;                    // observed
+  std::vector<std::string> axis_names = {};  // for limits of single joints
+};
+
+// Why the session ended: a word for programs, a sentence for people.
+struct EndSummary {
+  std::string reason;
+  std::string text;
+};
+
+// An order of the script that did nothing.
+struct OrderSummary {
+  std::string order;
+  double time_s = 0.0;  // after the first cycle
+  std::string refused;  // why
+};
+
+struct FaultSummary {
+  Fault fault = Fault::none;
+  std::uint64_t cycle = 0;
+  std::string text;  // describe()
+  bool was_reset = false;
+};
+
+// What was there without a stop: carried on, slowed down for, or held for.
+struct NoticeSummary {
+  Fault fault = Fault::none;
+  Reaction reaction = Reaction::carry_on;
+  std::uint64_t times = 0, cycles = 0;
+};
+
+struct ComputeTime {
+  double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns, below 1 ms
+};
+
+// Of a session in real time (latency.hpp), µs.
+struct LatencySummary {
+  double median = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
+  std::vector<std::pair<int, std::uint64_t>> histogram;  // µs and how many, of bins that aren't empty
+};
+
+// A timestep that was asked for while the session ran.
+struct TimestepSummary {
+  double time_s = 0.0;  // when it was
+  double from_s = 0.0, to_s = 0.0;
+  double paused_s = 0.0;  // until rendering went on, or until it was done in a hold
+  std::string refused;    // why it stayed as it was; empty: it didn't
+};
+
+// Why a timestep was given up: "drive of axis_3, 60C2h:01: SDO abort …".
+std::string refusal_text(const fieldbus::PeriodRefusal& refusal, const std::vector<std::string>& axis_names);
+
+// Of a session with --passivity; passivity.hpp has the symbols. Work and energies at the end of the rendering.
+struct PassivitySummary {
+  PortEnergies energies_J;
+  double oscillating_time_s = 0.0;
+  double oscillation_max_m_per_s = 0.0;  // root mean square over 0.1 s
+  double added_time_s = 0.0;             // with at least 1 Ns/m
+  double added_damping_max_Ns_per_m = 0.0;
+  double felt_damping_min_Ns_per_m = 0.0;  // b̂ while it oscillated
+};
+
+struct Summary {
+  double simulated_time_s = 0.0;  // all cycles, whatever the phase
+  double rendered_time_s = 0.0;
+  double wall_time_s = 0.0;  // set by the caller
+  std::uint64_t cycles = 0;
+  std::uint64_t overruns = 0;                        // all phases
+  ComputeTime compute_us;                            // all phases
+  std::map<std::string, LatencySummary> latency_us;  // by name; set by the caller; empty in virtual time
+  std::optional<PageFaults> page_faults;             // of the cycle's thread; set by the caller; absent in virtual time
+  std::map<std::string, double> bus_load;            // set by the caller
+  bool virtual_time = false;                         // no cycle can be late; set by the caller
+  std::optional<double> first_cycle_s;               // after power on, in simulation; set by the caller
+  std::optional<double> rendering_from_s;            // after the first cycle
+  std::optional<double> proxy_clearance_min_m;       // to the nearest surface; absent: there is none
+  double penetration_max_m = 0.0;
+  double tool_penetration_max_m = 0.0;
+  double tool_penetration_touch_max_m = 0.0;
+  double tool_penetration_sliding_max_m = 0.0;
+  std::optional<double> tracking_rms_m, tracking_max_m;
+  std::optional<double> apparent_mass_kg, apparent_damping_Ns_per_m;
+  std::optional<double> contact_force_error_N, contact_force_error_max_N;
+  std::optional<double> friction_ratio_error;
+  double pulling_force_max_N = 0.0;
+  double contact_time_s = 0.0, sliding_time_s = 0.0;
+  std::uint64_t contacts = 0;                          // how often the proxy came to touch
+  std::uint64_t limited_cycles = 0;                    // some limit was active
+  std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
+  std::optional<PassivitySummary> passivity;
+  std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor
+  EndSummary end;                         // set by the caller
+  std::vector<OrderSummary> idle_orders;  // set by the caller
+  std::vector<FaultSummary> faults;       // set by the caller
+  std::string black_box;                  // its folder, after a fault; set by the caller
+  std::vector<NoticeSummary> notices;     // set by the caller
+  std::vector<TimestepSummary> timesteps;
+  bool from_truth = false;
+  std::string setpoint_sha256;
+  double wanted_mass_kg = 0.0;  // as configured or set, for comparison
+};
+
+class SummaryBuilder {
+ public:
+  explicit SummaryBuilder(const SummaryConfig& config);
+  ~SummaryBuilder();
+  SummaryBuilder(SummaryBuilder&&) noexcept;
+  SummaryBuilder& operator=(SummaryBuilder&&) noexcept;
+
+  void add(const CycleRecord& record);
+  // Of all that was added. More may be added afterwards, but segments and slides are cut here.
+  [[nodiscard]] Summary finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// One JSON object on one line, without its end: everything, for `--json`.
+std::string summary_json(const Summary& summary);
+// For files: all that is the same in two runs with the same input, and the wall-clock figures, each on lines of their
+// own.
+std::string repeatable_json(const Summary& summary);
+std::string timing_json(const Summary& summary);
+// For people: a table of some twenty lines.
+std::string summary_text(const Summary& summary);
+
+}  // namespace proxarm::controller

@@ -1,0 +1,263 @@
+// The summary for programs and for people.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "controller/report/summary.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json faults(const Summary& summary) {
+  Json list = Json::array();
+  for (const FaultSummary& fault : summary.faults) {
+    list.push_back({{"fault", fault_name(fault.fault)},
+                    {"cycle", fault.cycle},
+                    {"text", fault.text},
+                    {"was_reset", fault.was_reset}});
+  }
+  return list;
+}
+
+Json timesteps(const Summary& summary) {
+  Json list = Json::array();
+  for (const TimestepSummary& t : summary.timesteps) {
+    list.push_back({{"time_s", t.time_s},
+                    {"from_s", t.from_s},
+                    {"to_s", t.to_s},
+                    {"paused_s", t.paused_s},
+                    {"refused", t.refused}});
+  }
+  return list;
+}
+
+Json idle_orders(const Summary& summary) {
+  Json list = Json::array();
+  for (const OrderSummary& order : summary.idle_orders) {
+    list.push_back({{"order", order.order}, {"time_s", order.time_s}, {"refused", order.refused}});
+  }
+  return list;
+}
+
+void add_timing(Json& json, const Summary& s) {
+  json["wall_time_s"] = s.wall_time_s;
+  json["overruns"] = s.overruns;
+  json["compute_us"] = {{"median", s.compute_us.median}, {"p99", s.compute_us.p99}, {"max", s.compute_us.max}};
+  for (const auto& [name, latency] : s.latency_us) {
+    json["latency_us"][name] = {{"median", latency.median},
+                                {"p99", latency.p99},
+                                {"p999", latency.p999},
+                                {"max", latency.max},
+                                {"histogram", latency.histogram}};
+  }
+  if (s.page_faults) json["page_faults"] = {{"minor", s.page_faults->minor}, {"major", s.page_faults->major}};
+}
+
+Json passivity(const std::optional<PassivitySummary>& summary) {
+  if (!summary) return nullptr;
+  const PortEnergies& e = summary->energies_J;
+  return {{"hand_J", e.hand},
+          {"proxy_J", e.proxy},
+          {"world_J", e.world},
+          {"kinetic_J", e.kinetic},
+          {"damping_J", e.damping},
+          {"added_damping_J", e.added},
+          {"oscillating_time_s", summary->oscillating_time_s},
+          {"oscillation_max_m_per_s", summary->oscillation_max_m_per_s},
+          {"added_time_s", summary->added_time_s},
+          {"added_damping_max_Ns_per_m", summary->added_damping_max_Ns_per_m},
+          {"felt_damping_min_Ns_per_m", summary->felt_damping_min_Ns_per_m}};
+}
+
+void add_repeatable(Json& json, const Summary& s) {
+  json["bus_load"] = Json::object();
+  for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
+  json["first_cycle_s"] = optional_number(s.first_cycle_s);
+  json["rendering_from_s"] = optional_number(s.rendering_from_s);
+  json["proxy_clearance_min_m"] = optional_number(s.proxy_clearance_min_m);
+  json["penetration_max_m"] = s.penetration_max_m;
+  json["tool_penetration_max_m"] = s.tool_penetration_max_m;
+  json["tool_penetration_touch_max_m"] = s.tool_penetration_touch_max_m;
+  json["tool_penetration_sliding_max_m"] = s.tool_penetration_sliding_max_m;
+  json["tracking_rms_m"] = optional_number(s.tracking_rms_m);
+  json["tracking_max_m"] = optional_number(s.tracking_max_m);
+  json["wanted_mass_kg"] = s.wanted_mass_kg > 0.0 ? Json(s.wanted_mass_kg) : Json(nullptr);
+  json["apparent_mass_kg"] = optional_number(s.apparent_mass_kg);
+  json["apparent_damping_Ns_per_m"] = optional_number(s.apparent_damping_Ns_per_m);
+  json["contact_force_error_N"] = optional_number(s.contact_force_error_N);
+  json["contact_force_error_max_N"] = optional_number(s.contact_force_error_max_N);
+  json["friction_ratio_error"] = optional_number(s.friction_ratio_error);
+  json["pulling_force_max_N"] = s.pulling_force_max_N;
+  json["rendered_time_s"] = s.rendered_time_s;
+  json["contact_time_s"] = s.contact_time_s;
+  json["sliding_time_s"] = s.sliding_time_s;
+  json["contacts"] = s.contacts;
+  json["limited_cycles"] = s.limited_cycles;
+  json["active_limits"] = Json::object();
+  for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
+  json["passivity"] = passivity(s.passivity);
+  json["held_samples"] = s.held_samples;
+  json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
+  json["end"] = {{"reason", s.end.reason}, {"text", s.end.text}};
+  json["idle_orders"] = idle_orders(s);
+  json["faults"] = faults(s);
+  json["notices"] = Json::array();
+  for (const NoticeSummary& notice : s.notices) {
+    json["notices"].push_back({{"fault", fault_name(notice.fault)},
+                               {"reaction", reaction_name(notice.reaction)},
+                               {"times", notice.times},
+                               {"cycles", notice.cycles}});
+  }
+  json["timesteps"] = timesteps(s);
+  json["setpoint_sha256"] = s.setpoint_sha256;
+}
+
+std::string format(const char* pattern, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+// A length with the unit that makes it readable: "12.3 µm", "0.45 mm", "0 m".
+std::string length(const std::optional<double>& metres) {
+  if (!metres) return "none";
+  const double size = std::abs(*metres);
+  if (size == 0.0) return "0";
+  if (size < 1e-9) return format("%.2g m", *metres);
+  if (size < 1e-6) return format("%.3g nm", *metres * 1e9);
+  if (size < 1e-3) return format("%.3g µm", *metres * 1e6);
+  if (size < 1.0) return format("%.3g mm", *metres * 1e3);
+  return format("%.3f m", *metres);
+}
+
+std::string number(const std::optional<double>& value, const char* pattern) {
+  return value ? format(pattern, *value) : "none";
+}
+
+}  // namespace
+
+std::string refusal_text(const fieldbus::PeriodRefusal& refusal, const std::vector<std::string>& axis_names) {
+  if (refusal.drive < 0) return "the session left the hold before all drives had confirmed it";
+  const auto axis = static_cast<std::size_t>(refusal.drive);
+  const std::string drive = axis < axis_names.size() ? axis_names[axis] : std::to_string(axis + 1);
+  const std::string object = fieldbus::to_string(fieldbus::ObjectAddress{refusal.index, refusal.sub});
+  return "drive of " + drive + ", " + object + ": " +
+         (refusal.code != 0 ? fieldbus::describe_sdo_abort(refusal.code) : "it kept another value");
+}
+
+std::string summary_json(const Summary& s) {
+  Json json;
+  json["simulated_time_s"] = s.simulated_time_s;
+  json["cycles"] = s.cycles;
+  add_timing(json, s);
+  add_repeatable(json, s);
+  if (!s.black_box.empty()) json["black_box"] = s.black_box;
+  return json.dump();
+}
+
+std::string repeatable_json(const Summary& s) {
+  Json json;
+  json["simulated_time_s"] = s.simulated_time_s;
+  json["cycles"] = s.cycles;
+  add_repeatable(json, s);
+  return json.dump(2) + "\n";
+}
+
+std::string timing_json(const Summary& s) {
+  Json json;
+  add_timing(json, s);
+  return json.dump(2) + "\n";
+}
+
+std::string summary_text(const Summary& s) {
+  std::string text;
+  const auto line = [&text](const char* name, const std::string& value) {
+    text += "  ";
+    text += name;
+    text.append(name[0] == '\0' ? 0 : 1, ':');
+    const std::size_t width = std::char_traits<char>::length(name) + 1;
+    text.append(width < 26 ? 26 - width : 1, ' ');
+    text += value + "\n";
+  };
+  line("time", format("%.3f s in ", s.simulated_time_s) + std::to_string(s.cycles) + " cycles, " +
+                   format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s", s.wall_time_s));
+  line("compute per cycle",
+       format("median %.1f, ", s.compute_us.median) + format("p99 %.1f, ", s.compute_us.p99) +
+           format("max %.1f µs; ", s.compute_us.max) +
+           (s.virtual_time ? "virtual time waits for them" : "overruns " + std::to_string(s.overruns)));
+  for (const auto& [name, latency] : s.latency_us) {
+    std::string words = name;
+    std::replace(words.begin(), words.end(), '_', ' ');
+    line(words.c_str(), format("median %.0f, ", latency.median) + format("p99 %.0f, ", latency.p99) +
+                            format("p99.9 %.0f, ", latency.p999) + format("max %.1f µs", latency.max));
+  }
+  if (s.page_faults) {
+    line("page faults", std::to_string(s.page_faults->minor) + " minor, " + std::to_string(s.page_faults->major) +
+                            " major after the first cycle");
+  }
+  std::string loads;
+  for (const auto& [bus, load] : s.bus_load)
+    loads += (loads.empty() ? "" : ", ") + bus + format(" %.1f %%", 100 * load);
+  if (!loads.empty()) line("bus load", loads);
+  line("apparent mass",
+       number(s.apparent_mass_kg, "%.3f kg") +
+           (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own") +
+           (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : "") +
+           (s.limited_cycles > 0 ? "; where no limit acts" : ""));
+  line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m));
+  if (s.contacts == 0) {
+    line("contact", s.proxy_clearance_min_m
+                        ? "none; the nearest surface was " + length(s.proxy_clearance_min_m) + " away"
+                        : "none");
+  } else {
+    line("contact", std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
+                        format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s));
+  }
+  line("penetration, proxy", length(s.penetration_max_m));
+  line("penetration, tool", length(s.tool_penetration_max_m) + "; at the touch " +
+                                length(s.tool_penetration_touch_max_m) + ", sliding " +
+                                length(s.tool_penetration_sliding_max_m));
+  line("contact force error",
+       "rms " + number(s.contact_force_error_N, "%.3f N") + ", max " + number(s.contact_force_error_max_N, "%.3f N"));
+  line("friction ratio error", s.friction_ratio_error ? format("%+.2f %%", 100 * *s.friction_ratio_error) : "none");
+  line("pulling force", format("%.3g N", s.pulling_force_max_N));
+  if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
+  for (const auto& [parameter, cycles] : s.active_limits)
+    line("", parameter + ": " + std::to_string(cycles) + " cycles");
+  if (s.passivity) {
+    const PortEnergies& e = s.passivity->energies_J;
+    line("energy", format("hand to tool %.3g J, ", e.hand) + format("hand to proxy %.3g J, ", e.proxy) +
+                       format("world to proxy %.3g J, ", e.world) + format("damped %.3g J", e.damping));
+    line("oscillation", format("%.2f s, ", s.passivity->oscillating_time_s) +
+                            format("at most %.3g mm/s", 1e3 * s.passivity->oscillation_max_m_per_s));
+    line("damping added", format("%.2f s, ", s.passivity->added_time_s) +
+                              format("at most %.3g Ns/m", s.passivity->added_damping_max_Ns_per_m));
+  }
+  if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
+  line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
+  line("setpoints (SHA-256)", s.setpoint_sha256);
+  for (const NoticeSummary& notice : s.notices) {
+    const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";
+    line("noticed", fault_name(notice.fault) + (" " + times) + ", " + std::to_string(notice.cycles) +
+                        " cycles; reaction: " + reaction_name(notice.reaction));
+  }
+  for (const TimestepSummary& t : s.timesteps) {
+    line("timestep", format("%.4g to ", 1e3 * t.from_s) + format("%.4g ms ", 1e3 * t.to_s) +
+                         format("at %.3f s, ", t.time_s) + format("%.0f ms without rendering", 1e3 * t.paused_s) +
+                         (t.refused.empty() ? "" : "; not taken: " + t.refused));
+  }
+  for (const OrderSummary& order : s.idle_orders) {
+    line("order without effect", order.order + format(" at %.4g s: ", order.time_s) + order.refused);
+  }
+  if (!s.end.text.empty()) line("ended", s.end.text);
+  if (s.faults.empty()) line("faults", "none");
+  for (const FaultSummary& fault : s.faults) line(fault.was_reset ? "fault, then reset" : "FAULT", fault.text);
+  return text;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,52 @@
+#include "controller/setpoints/elastic_setpoint.hpp"
+
+#include <cmath>
+#include <numbers>
+
+namespace proxarm::controller {
+
+using models::JointVector;
+
+ElasticSetpoint::ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s)
+    : arm_(&arm),
+      omega_rad_per_s_(2.0 * std::numbers::pi * bandwidth_Hz),
+      angle_rad_(arm.start_rad()),
+      speed_rad_per_s_(JointVector::Zero(arm.axes())),
+      inverse_stiffness_(arm.gear_stiffness_Nm_per_rad()) {
+  for (double& compliance : inverse_stiffness_) compliance = compliance > 0.0 ? 1.0 / compliance : 0.0;
+  set_period(period_s);
+}
+
+void ElasticSetpoint::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  decay_ = std::exp(-omega_rad_per_s_ * period_s);
+}
+
+void ElasticSetpoint::start(const JointVector& link_rad) noexcept {
+  angle_rad_ = link_rad;
+  speed_rad_per_s_.setZero();
+}
+
+void ElasticSetpoint::resume(const JointVector& motor_rad, const JointVector& motor_rad_per_s) noexcept {
+  angle_rad_ = arm_->link_from_motor(motor_rad);
+  speed_rad_per_s_ = motor_rad_per_s;
+}
+
+JointVector ElasticSetpoint::step(const JointVector& link_rad) noexcept {
+  if (omega_rad_per_s_ <= 0.0) {
+    angle_rad_ = link_rad;
+    return arm_->motor_from_link(link_rad);
+  }
+  // With e = q_f − q and q constant over the period:  e(T) = (e + (ė + ωe)T) exp(−ωT),
+  //                                                  ė(T) = (ė − ω(ė + ωe)T) exp(−ωT)
+  const double omega = omega_rad_per_s_, T = period_s_;
+  const JointVector e = angle_rad_ - link_rad;
+  const JointVector c = speed_rad_per_s_ + omega * e;
+  angle_rad_ = link_rad + decay_ * (e + T * c);
+  speed_rad_per_s_ = decay_ * (speed_rad_per_s_ - omega * T * c);
+  const JointVector acceleration = omega * omega * (link_rad - angle_rad_) - 2.0 * omega * speed_rad_per_s_;
+  const JointVector torque = arm_->link_mass_matrix(angle_rad_) * acceleration;
+  return arm_->motor_from_link(angle_rad_) + inverse_stiffness_.cwiseProduct(torque);
+}
+
+}  // namespace proxarm::controller

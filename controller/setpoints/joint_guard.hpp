@@ -1,0 +1,61 @@
+// The last check on what drives are told: no setpoint ever exceeds its joint's range, speed or acceleration, whatever
+// is wanted.
+//
+// Per joint, with θ₁ and u₁ the last setpoint and its speed, T the period, a and v the joint's limits:
+//   |u − u₁| ≤ aT,   |u| ≤ v,   u ≤ c(θ_max − θ₁),   −u ≤ c(θ₁ − θ_min),   θ = θ₁ + uT
+//   c(d) = −aT + √(a²T² + 2ad): the fastest approach from which braking at a ends within d
+// These never contradict each other: with Tu + u²/(2a) ≤ d, braking (u' = u − aT) keeps Tu' + u'²/(2a) ≤ d − Tu.
+//
+// A wanted setpoint within all of these passes unchanged. Otherwise the setpoint lags, and catches up time-optimally:
+// with the speed of what is wanted, plus c(lag) towards it. Neither allocates, locks nor throws.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "controller/limits/step_limits.hpp"
+#include "models/arm/arm.hpp"
+#include "models/base/state_archive.hpp"
+#include "models/description/cell.hpp"
+
+namespace proxarm::controller {
+
+class JointGuard {
+ public:
+  JointGuard(const std::vector<description::DriveDescription>& drives, double period_s);
+
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
+  // Starts at rest at these angles.
+  void start(const models::JointVector& target_rad) noexcept;
+  // One period. An angle that isn't finite is replaced by the last setpoint. Returns the limits that held something
+  // back.
+  ActiveLimits step(const models::JointVector& wanted_rad) noexcept;
+  // Another guard's last word on this period's setpoints, within each joint's speed and acceleration.
+  void settle(const models::JointVector& target_rad, const models::JointVector& speed_rad_per_s) noexcept {
+    target_rad_ = target_rad;
+    speed_rad_per_s_ = speed_rad_per_s;
+  }
+  // Forgets what was wanted so far: no lag is left to catch up. Not of the joints in `but_not`, as bits: those are on
+  // their way to somewhere, and brake ahead of it.
+  void follow_from_here(std::uint8_t but_not = 0) noexcept;
+
+  [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
+  [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
+  // The largest distance over all joints between the setpoint and what was wanted.
+  [[nodiscard]] double lag_rad() const noexcept { return (wanted_k1_rad_ - target_rad_).cwiseAbs().maxCoeff(); }
+  [[nodiscard]] bool at_rest() const noexcept { return speed_rad_per_s_.cwiseAbs().maxCoeff() < 1e-9; }
+  void archive(fieldbus::StateArchive& state) noexcept { state(target_rad_, speed_rad_per_s_, wanted_k1_rad_); }
+
+ private:
+  struct Joint {
+    double lower_rad, upper_rad, speed_rad_per_s, acceleration_rad_per_s2;
+  };
+  double choose_speed(const Joint& joint, double wanted_u, double lag, double theta, double u_k1, ActiveLimits& active,
+                      std::uint8_t bit) const noexcept;
+
+  std::vector<Joint> joints_;
+  double period_s_;
+  models::JointVector target_rad_, speed_rad_per_s_, wanted_k1_rad_;
+};
+
+}  // namespace proxarm::controller

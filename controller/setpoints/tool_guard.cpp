@@ -1,0 +1,271 @@
+#include "controller/setpoints/tool_guard.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace proxarm::controller {
+
+using models::ArmPoints;
+using models::JointVector;
+using models::Vec3;
+
+namespace {
+
+// A thousandth of a share of the way is 0.5 µm at 0.5 m/s and 1 ms.
+constexpr int bisections = 10;
+// The gears' twist follows from the links' angles and those from the twist: each round leaves a fiftieth of what it was
+// off. One round from the twist extrapolated is off by 2e-8 rad at most accelerations, three rounds from it at the end
+// of the longest braking way by 1e-6 rad.
+constexpr int quick_rounds = 1, exact_rounds = 3;
+// Of the speed limits, what is let through: drives overshoot by up to 7 % where the guard holds them back, and the arm
+// is to stay within 5 %. The quick judgement leaves what is close to the exact one.
+constexpr double exact_share = 0.97, quick_share = 0.968, quick_way_m = 1e-4;
+// Rounding of positions.
+constexpr double touching_m = 1e-10;
+// A tool that the limits of the proxy stop at a border has gears that twist while it brakes, and so setpoints beyond it
+// by some micrometres: the guard keeps off what keeps itself. A fifth of the 0.1 mm that are promised; more of it would
+// be felt as a border that gives way, less as one that holds twice.
+constexpr double twist_m = 2e-5;
+// Arcs may reach beyond a border that their ends keep to: half of the 0.1 mm that are promised.
+constexpr double bulge_m = 5e-5;
+// Of a speed that the tool is slowed to for now: its motors are faster for a moment, where their gears are bent (by up
+// to 1.42 where an arm that was let go in contact begins to move, and more at order 2).
+constexpr double slowed_share = 1.8;
+// Of the cell's acceleration limit: see the header.
+constexpr double acceleration_share = 2.0;
+
+// The highest speed on the way to rest, from the speed V of the last period; B is its growth (header).
+double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
+
+double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept {
+  double depth = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    depth = std::min({depth, p[i] - box.min_m[k], box.max_m[k] - p[i]});
+  }
+  return depth;
+}
+
+// How deep in a box gears may twist a setpoint: in a thin one no more than a quarter of it.
+double twist_in(const description::BoxDescription& box) noexcept {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3; ++k) thinnest = std::min(thinnest, box.max_m[k] - box.min_m[k]);
+  return std::min(twist_m, 0.25 * thinnest);
+}
+
+// Whether the segment has a point deeper than that in the box made larger by `more`.
+bool crosses(const Vec3& from, const Vec3& to, const description::BoxDescription& box, double more) noexcept {
+  double enters = 0.0, leaves = 1.0;
+  const double twist = twist_in(box);
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double low = box.min_m[k] - more + twist, high = box.max_m[k] + more - twist;
+    const double way = to[i] - from[i];
+    if (way == 0.0) {
+      if (from[i] <= low || from[i] >= high) return false;
+      continue;
+    }
+    const double a = (low - from[i]) / way, b = (high - from[i]) / way;
+    enters = std::max(enters, std::min(a, b));
+    leaves = std::min(leaves, std::max(a, b));
+  }
+  return enters < leaves;
+}
+
+}  // namespace
+
+ToolGuard::ToolGuard(const models::Arm& arm, const std::vector<description::DriveDescription>& drives,
+                     const description::CellLimits& limits, double period_s)
+    : arm_(&arm),
+      lower_rad_(arm.lower_rad()),
+      upper_rad_(arm.upper_rad()),
+      acceleration_(JointVector::Zero(arm.axes())),
+      curvature_(arm.path_curvature()),
+      limits_(limits),
+      has_borders_(!limits.keep_out.empty()),
+      period_s_(period_s) {
+  for (Eigen::Index i = 0; i < acceleration_.size(); ++i) {
+    acceleration_[i] = drives[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    has_borders_ = has_borders_ || std::isfinite(limits.workspace_min_m[i]) || std::isfinite(limits.workspace_max_m[i]);
+  }
+  start(arm.start_rad());
+}
+
+void ToolGuard::start(const JointVector& target_rad) noexcept {
+  target_rad_ = target_rad;
+  speed_rad_per_s_ = JointVector::Zero(target_rad.size());
+  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer, and all are archived
+  arm_->points(arm_->link_from_motor(target_rad), points_);
+  twist_k2_rad_ = points_.twist_rad;
+  steps_.fill(Vec3::Zero());
+}
+
+ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s) noexcept {
+  ActiveLimits active;
+  // Where the tool is slowed, so is the elbow.
+  const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
+  const Speeds limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s};
+  ArmPoints at;
+  evaluate(wanted_rad, quick_rounds, at);
+  if (broken(wanted_rad, at, limit, Care::quick).kinds == 0) {
+    accept(wanted_rad, at);
+  } else {
+    hold_back(wanted_rad, limit, active);
+  }
+  return active;
+}
+
+// The gears' twist goes on as it did in the last period, to begin with.
+void ToolGuard::evaluate(const JointVector& theta, int rounds, ArmPoints& out) const noexcept {
+  JointVector twist = 2.0 * points_.twist_rad - twist_k2_rad_;
+  for (int round = 0; round < rounds; ++round) {
+    arm_->points(theta - twist, out);
+    twist = out.twist_rad;
+  }
+}
+
+double ToolGuard::stop_s(const JointVector& u) const noexcept {
+  return u.cwiseAbs().cwiseQuotient(acceleration_).maxCoeff();
+}
+
+double ToolGuard::bend(const JointVector& d) const noexcept {
+  const JointVector size = d.cwiseAbs();
+  return size.dot(curvature_ * size);
+}
+
+// The sum of (1 − kT/t)uT over the periods k = 1 … t/T.
+JointVector ToolGuard::braking_way(const JointVector& u, double t) const noexcept {
+  const double T = period_s_, steps = std::floor(t / T);
+  if (steps < 1.0) return JointVector::Zero(u.size());
+  return T * (steps - 0.5 * steps * (steps + 1.0) * T / t) * u;
+}
+
+ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, const Speeds& limit,
+                               Care care) const noexcept {
+  ActiveLimits out;
+  const double T = period_s_;
+  const JointVector u = (theta - target_rad_) / T;
+  const double t = stop_s(u), curvature = bend(u);  // of the path, m/s²
+  const JointVector way = braking_way(u, t);
+  judge_ranges(theta + way, out);
+  judge_motion(at, t * curvature, limit, care, out);
+  if (!has_borders_) return out;
+  const double step_m = (at.tool_W - points_.tool_W).norm();
+  const double way_m = fastest(step_m / T, t * curvature) * t;
+  if (far_from_borders(at.tool_W, step_m + way_m + quick_way_m)) return out;
+  if (care == Care::quick) {
+    out.set(Limit::guard_border);
+    return out;
+  }
+  ArmPoints rest;
+  evaluate(theta + way, exact_rounds, rest);
+  judge_borders(at.tool_W, rest.tool_W, 0.125 * T * T * curvature, 0.125 * bend(way), out);
+  return out;
+}
+
+void ToolGuard::judge_ranges(const JointVector& rest, ActiveLimits& out) const noexcept {
+  for (Eigen::Index i = 0; i < rest.size(); ++i) {
+    if (rest[i] > std::max(upper_rad_[i], target_rad_[i]) + touching_m ||
+        rest[i] < std::min(lower_rad_[i], target_rad_[i]) - touching_m) {
+      out.set(Limit::joint_range, static_cast<std::uint8_t>(1u << i));
+    }
+  }
+}
+
+void ToolGuard::judge_motion(const ArmPoints& at, double growth, const Speeds& limit, Care care,
+                             ActiveLimits& out) const noexcept {
+  const double T = period_s_, share = care == Care::quick ? quick_share : exact_share;
+  const double most_change = share * acceleration_share * limits_.max_tool_acceleration_m_per_s2 * T * T;
+  const auto judge = [&](const Vec3& step, const Vec3& step_k1, double most_m_per_s, Limit kind) {
+    const double step_m = step.norm();
+    if (fastest(step_m / T, growth) > share * most_m_per_s) out.set(kind);
+    if (step_m > step_k1.norm() && (step - step_k1).norm() > most_change) out.set(Limit::guard_acceleration);
+  };
+  judge(at.tool_W - points_.tool_W, steps_[0], limit.tool_m_per_s, Limit::guard_speed);
+  for (std::size_t i = first_joint; i < static_cast<std::size_t>(target_rad_.size()); ++i) {
+    judge(at.joint_W[i] - points_.joint_W[i], steps_[i + 1], limit.elbow_m_per_s, Limit::guard_elbow);
+  }
+}
+
+bool ToolGuard::far_from_borders(const Vec3& p, double way_m) const noexcept {
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (p[i] + way_m > limits_.workspace_max_m[k] || p[i] - way_m < limits_.workspace_min_m[k]) return false;
+  }
+  return std::all_of(limits_.keep_out.begin(), limits_.keep_out.end(),
+                     [&](const description::BoxDescription& zone) { return depth_in(p, zone) < -way_m; });
+}
+
+void ToolGuard::judge_borders(const Vec3& p, const Vec3& rest_p, double step_bend, double rest_bend,
+                              ActiveLimits& out) const noexcept {
+  const Vec3& p_k1 = points_.tool_W;
+  const double step_more = std::max(0.0, step_bend - bulge_m), rest_more = std::max(0.0, rest_bend - bulge_m);
+  const double more = std::max(step_more, rest_more);
+  for (int i = 0; i < 3; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double upper = std::max(limits_.workspace_max_m[k] + twist_m, p_k1[i]) + touching_m;
+    const double lower = std::min(limits_.workspace_min_m[k] - twist_m, p_k1[i]) - touching_m;
+    if (std::max(p[i], rest_p[i]) + more > upper || std::min(p[i], rest_p[i]) - more < lower) {
+      out.set(Limit::guard_border);
+    }
+  }
+  for (const description::BoxDescription& zone : limits_.keep_out) {
+    const double depth = depth_in(p_k1, zone);
+    if (depth > twist_in(zone)) {
+      if (std::max(depth_in(p, zone), depth_in(rest_p, zone)) > depth + touching_m) out.set(Limit::guard_border);
+    } else if (crosses(p_k1, p, zone, step_more) || crosses(p, rest_p, zone, rest_more)) {
+      out.set(Limit::guard_border);
+    }
+  }
+}
+
+void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept {
+  ArmPoints at;
+  evaluate(target_rad_, exact_rounds, at);
+  points_.tool_W = at.tool_W;
+  points_.joint_W = at.joint_W;
+  evaluate(wanted, exact_rounds, at);
+  out = broken(wanted, at, limit, Care::exact);
+  if (out.kinds == 0) return accept(wanted, at);
+  const double T = period_s_, t = stop_s(speed_rad_per_s_);
+  const JointVector brakes = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
+  JointVector best = brakes;
+  ArmPoints best_at;
+  evaluate(brakes, exact_rounds, best_at);
+  double kept = 0.0, broke = 1.0;
+  for (int i = 0; i < bisections; ++i) {
+    const double share = 0.5 * (kept + broke);
+    const JointVector theta = brakes + share * (wanted - brakes);
+    evaluate(theta, exact_rounds, at);
+    if (broken(theta, at, limit, Care::exact).kinds != 0) {
+      broke = share;
+      continue;
+    }
+    kept = share;
+    best = theta;
+    best_at = at;
+  }
+  accept(best, best_at);
+}
+
+void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
+  steps_[0] = at.tool_W - points_.tool_W;
+  for (std::size_t i = first_joint; i < static_cast<std::size_t>(theta.size()); ++i) {
+    steps_[i + 1] = at.joint_W[i] - points_.joint_W[i];
+  }
+  speed_rad_per_s_ = (theta - target_rad_) / period_s_;
+  target_rad_ = theta;
+  twist_k2_rad_ = points_.twist_rad;
+  points_ = at;
+}
+
+void ToolGuard::archive(fieldbus::StateArchive& state) noexcept {
+  state(target_rad_, speed_rad_per_s_, twist_k2_rad_, points_.twist_rad, points_.tool_W);
+  for (Vec3& joint_W : points_.joint_W) state(joint_W);
+  for (Vec3& step : steps_) state(step);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,102 @@
+#include "controller/stability/passivity.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace proxarm::controller {
+
+using models::Vec3;
+
+// Bilinear transform, prewarped so that the corner stays in place: Ω = tan(π f T), and per section, of quality Q,
+//   H(z) = (1 − z⁻¹)²/(1 + Ω/Q + Ω²) / (1 + a₁z⁻¹ + a₂z⁻²)
+void PassivityObserver::HighPass::design(double corner_Hz, double period_s) noexcept {
+  const double pi = std::numbers::pi, omega = std::tan(pi * corner_Hz * period_s);
+  const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // of Butterworth's poles
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const double damping = 2.0 * std::cos(angles[i]) * omega;  // Ω/Q
+    const double scale = 1.0 / (1.0 + damping + omega * omega);
+    sections[i].gain = scale;
+    sections[i].a1 = 2.0 * (omega * omega - 1.0) * scale;
+    sections[i].a2 = (1.0 - damping + omega * omega) * scale;
+  }
+}
+
+void PassivityObserver::HighPass::reset() noexcept {
+  for (Section& section : sections) {
+    section.s1.setZero();
+    section.s2.setZero();
+  }
+}
+
+Vec3 PassivityObserver::Section::step(const Vec3& in) noexcept {
+  const Vec3 scaled = gain * in, out = scaled + s1;
+  s1 = s2 - 2.0 * scaled - a1 * out;
+  s2 = scaled - a2 * out;
+  return out;
+}
+
+PassivityObserver::PassivityObserver(const PassivityConfig& config, double period_s, bool acts)
+    : config_(config), acts_(acts) {
+  set_period(period_s);
+}
+
+void PassivityObserver::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  average_ = 1.0 - std::exp(-period_s / config_.average_s);
+  release_ = std::exp(-period_s / config_.release_s);
+  force_.design(config_.low_Hz, period_s);
+  motion_.design(config_.low_Hz, period_s);
+}
+
+void PassivityObserver::start(const Vec3& tool_W) noexcept {
+  force_.reset();
+  motion_.reset();
+  tool_k1_ = tool_W;
+  h_.setZero();
+  h_k1_.setZero();
+  power_ = band_ = all_ = added_ = 0.0;
+  tank_ = config_.tank_J;
+  oscillates_ = false;
+  energies_ = {};
+}
+
+double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noexcept {
+  if (!h_W.allFinite() || !tool_W.allFinite()) return added_;  // a fault follows; the state here stays finite
+  h_k1_ = h_;
+  h_ = h_W;
+  const Vec3 step = tool_W - tool_k1_, velocity = step / period_s_;
+  tool_k1_ = tool_W;
+  energies_.hand += 0.5 * (h_ + h_k1_).dot(step);
+  const Vec3 force = force_.step(h_), motion = motion_.step(velocity);
+  power_ += average_ * (force.dot(motion) - power_);
+  band_ += average_ * (motion.squaredNorm() - band_);
+  all_ += average_ * (velocity.squaredNorm() - all_);
+  tank_ = std::clamp(tank_ + period_s_ * (power_ + config_.refill_W), -config_.tank_J, config_.tank_J);
+  oscillates_ = tank_ < 0.0 && power_ < -config_.refill_W && band_ > config_.share * all_;
+  const double felt = felt_damping_Ns_per_m();
+  if (!acts_) return 0.0;
+  if (oscillates_ && felt < 0.0) {
+    const double growth = std::min(-felt, config_.max_damping_Ns_per_m) * period_s_ / config_.rise_s;
+    added_ = std::min(added_ + growth, config_.max_damping_Ns_per_m);
+  } else {
+    added_ *= release_;
+  }
+  return added_;
+}
+
+void PassivityObserver::observe_proxy(const Vec3& v_W, const Vec3& f_W, double mass_kg,
+                                      double damping_Ns_per_m) noexcept {
+  const double speed_squared = v_W.squaredNorm();
+  energies_.proxy += period_s_ * h_.dot(v_W);
+  energies_.world += period_s_ * f_W.dot(v_W);
+  energies_.kinetic = 0.5 * mass_kg * speed_squared;
+  energies_.damping += period_s_ * damping_Ns_per_m * speed_squared;
+  energies_.added += period_s_ * added_ * speed_squared;
+}
+
+double PassivityObserver::oscillation_m_per_s() const noexcept { return std::sqrt(band_); }
+
+double PassivityObserver::felt_damping_Ns_per_m() const noexcept { return band_ > 0.0 ? power_ / band_ : 0.0; }
+
+}  // namespace proxarm::controller

@@ -1,0 +1,199 @@
+#include "controller/stability/stability.hpp"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "models/base/option_check.hpp"
+#include "models/geometry/eigenvalues.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using Complex = std::complex<double>;
+using Polynomial = std::vector<double>;  // coefficients of w⁰, w¹, …
+
+constexpr double least_mass_kg = 1e-6;
+
+Polynomial operator*(const Polynomial& a, const Polynomial& b) {
+  Polynomial product(a.size() + b.size() - 1, 0.0);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t j = 0; j < b.size(); ++j) product[i + j] += a[i] * b[j];
+  }
+  return product;
+}
+
+Polynomial operator*(double factor, Polynomial a) {
+  for (double& coefficient : a) coefficient *= factor;
+  return a;
+}
+
+Polynomial operator+(Polynomial a, const Polynomial& b) {
+  if (a.size() < b.size()) a.resize(b.size(), 0.0);
+  for (std::size_t i = 0; i < b.size(); ++i) a[i] += b[i];
+  return a;
+}
+
+// w^n for n ≥ 0, which needn't be whole.
+Polynomial delay(double periods) {
+  // L/T is a quotient of decimals: what lies below a whole number by rounding is that number.
+  const double whole = std::floor(periods + 1e-9), rest = std::max(0.0, periods - whole);
+  Polynomial w(static_cast<std::size_t>(whole) + 2, 0.0);
+  w[static_cast<std::size_t>(whole)] = 1.0 - rest;
+  w[static_cast<std::size_t>(whole) + 1] = rest;
+  if (rest == 0.0) w.pop_back();
+  return w;
+}
+
+// C(w) = M X(w) + Y(w), multiplied by T² so that the coefficients are of one size.
+struct Loop {
+  Polynomial X, Y;
+};
+
+Loop make_loop(const HandModel& hand, const LoopModel& loop) {
+  const double T = loop.period_s, B = loop.damping_Ns_per_m;
+  const double beta = loop.drive_time_constant_s > 0.0 ? std::exp(-T / loop.drive_time_constant_s) : 0.0;
+  const Polynomial difference{1.0, -1.0}, lag{1.0, -beta};
+  const Polynomial derivative = loop.order == 2 ? Polynomial{1.5, -2.0, 0.5} : difference;  // times T
+  const Polynomial damper = loop.explicit_damping ? Polynomial{0.0, 1.0} * difference : derivative;
+  const double m = hand.mass_kg + loop.handle_mass_kg;
+  const Polynomial grip = Polynomial{hand.stiffness_N_per_m * T * T} + hand.damping_Ns_per_m * T * difference +
+                          m * (difference * difference);
+  Polynomial force = (1.0 - beta) * (delay(1.0 + loop.delay_s / T) * grip);
+  if (loop.order == 2 && loop.matched_labels) force = Polynomial{2.0, -1.0} * force;
+  return {lag * (derivative * derivative), lag * (B * T * damper + Polynomial{loop.spring_N_per_m * T * T}) + force};
+}
+
+// Written out, since the product of std::complex looks for NaN each time, which would take most of a sweep.
+Complex evaluate(const Polynomial& p, Complex w) {
+  double re = 0.0, im = 0.0;
+  for (std::size_t i = p.size(); i-- > 0;) {
+    const double next = re * w.real() - im * w.imag() + p[i];
+    im = re * w.imag() + im * w.real();
+    re = next;
+  }
+  return {re, im};
+}
+
+// Roots z = 1/w of C, as eigenvalues of the companion matrix of zⁿ C(1/z).
+double spectral_radius(const Loop& loop, double M) {
+  Polynomial c = M * loop.X + loop.Y;
+  while (c.size() > 1 && c.back() == 0.0) c.pop_back();
+  const auto n = static_cast<Eigen::Index>(c.size()) - 1;
+  if (n < 1) return 0.0;
+  Eigen::MatrixXd companion = Eigen::MatrixXd::Zero(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    companion(0, i) = -c[static_cast<std::size_t>(i) + 1] / c[0];
+    if (i > 0) companion(i, i - 1) = 1.0;
+  }
+  return models::spectral_radius(companion);
+}
+
+Complex on_circle(double theta) { return std::polar(1.0, -theta); }
+
+// Im(−Y/X) up to a positive factor: where it changes sign, a real mass puts a root at exp(jθ).
+double imaginary_part(const Loop& loop, double theta) {
+  const Complex w = on_circle(theta);
+  return (-evaluate(loop.Y, w) * std::conj(evaluate(loop.X, w))).imag();
+}
+
+double mass_at(const Loop& loop, double theta) {
+  const Complex w = on_circle(theta);
+  return (-evaluate(loop.Y, w) / evaluate(loop.X, w)).real();
+}
+
+// All masses in (0, max] that put a root on the unit circle, in falling order.
+std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
+  constexpr double pi = std::numbers::pi;
+  // The grid of θ has 200 points a decade at its lower end, since the slow roots of a large mass lie at θ = T√(K/M),
+  // and at its upper end at least 40 points for each turn of w^n over the circle.
+  std::vector<double> grid;
+  for (int i = 0; i <= 1200; ++i) grid.push_back(0.1 * std::pow(10.0, (i - 1200) / 200.0));
+  const std::size_t even = 40 * std::max<std::size_t>(loop.Y.size(), 25);
+  for (std::size_t i = 1; i < even; ++i) {
+    grid.push_back(0.1 + (pi - 0.1) * static_cast<double>(i) / static_cast<double>(even));
+  }
+  grid.push_back(pi * (1.0 - 1e-9));  // at π itself the imaginary part is zero for every mass
+  std::vector<double> masses{mass_at(loop, pi)};
+  double before = imaginary_part(loop, grid.front());
+  for (std::size_t i = 1; i < grid.size(); ++i) {
+    const double now = imaginary_part(loop, grid[i]);
+    if ((before < 0.0) != (now < 0.0)) {
+      double low = grid[i - 1], high = grid[i];
+      for (int halving = 0; halving < 60; ++halving) {
+        const double middle = 0.5 * (low + high);
+        ((imaginary_part(loop, middle) < 0.0) == (before < 0.0) ? low : high) = middle;
+      }
+      masses.push_back(mass_at(loop, 0.5 * (low + high)));
+    }
+    before = now;
+  }
+  std::erase_if(masses, [max_mass_kg](double m) { return !(m > least_mass_kg && m < max_mass_kg); });
+  std::sort(masses.rbegin(), masses.rend());
+  return masses;
+}
+
+// Rounded up to two digits.
+double round_up(double mass_kg) {
+  const double unit = std::pow(10.0, std::floor(std::log10(mass_kg)) - 1.0);
+  return std::ceil(mass_kg / unit * (1.0 + 1e-9)) * unit;
+}
+
+std::string text(const char* pattern, double value) {
+  char buffer[80];
+  std::snprintf(buffer, sizeof buffer, pattern, value);
+  return buffer;
+}
+
+}  // namespace
+
+double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  return spectral_radius(make_loop(hand, loop), proxy_mass_kg);
+}
+
+std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& model, double max_mass_kg) {
+  const Loop loop = make_loop(hand, model);
+  if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
+  // Goes from the top down and ends at the first interval that isn't stable.
+  double smallest = max_mass_kg;
+  std::vector<double> edges = critical_masses(loop, max_mass_kg);
+  edges.push_back(least_mass_kg);
+  double above = max_mass_kg;
+  for (const double edge : edges) {
+    if (above > edge && !(spectral_radius(loop, std::sqrt(above * edge)) < 1.0)) break;
+    smallest = above = edge;
+  }
+  return smallest;
+}
+
+void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable) {
+  const double handle_kg = loop.handle_mass_kg;
+  const auto refuse = [felt_mass_kg](const std::string& expected, const std::string& advice) {
+    throw description::SetupError(
+        {.key = "--mass", .found = text("%.6g kg", felt_mass_kg), .expected = expected, .advice = advice});
+  };
+  if (!std::isfinite(felt_mass_kg) || !(felt_mass_kg > handle_kg)) {
+    refuse(text("more than the handle's own %.3g kg", handle_kg),
+           "the handle sits after the sensor, so no control can make it lighter");
+  }
+  if (force_unstable || spectral_radius(hand, loop, felt_mass_kg - handle_kg) < 1.0) return;
+  const std::string grip = text("with a hand of %.4g N/m", hand.stiffness_N_per_m) +
+                           text(", %.4g Ns/m", hand.damping_Ns_per_m) + text(", %.3g kg", hand.mass_kg) +
+                           text(" and a delay of %.3g ms", 1e3 * (loop.period_s + loop.delay_s)) +
+                           text(" (drives: %.3g ms)", 1e3 * loop.drive_time_constant_s);
+  const auto smallest = smallest_stable_mass(hand, loop);
+  if (!smallest) {
+    // B + D_h > K_h L is what no mass replaces.
+    refuse("a loop that some mass makes stable; " + grip + " none does",
+           "add --damping, or shorten the delay by a smaller --timestep (--force-unstable overrides, in simulation)");
+  }
+  refuse(text("at least %.2g kg, the smallest that is stable ", round_up(*smallest + handle_kg)) + grip,
+         "choose a larger mass (--force-unstable overrides, in simulation)");
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,184 @@
+#include "controller/studies/common/chart.hpp"
+
+#include <array>
+#include <cmath>
+#include <sstream>
+
+#include "controller/report/gnuplot.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using controller::gnuplot_string;
+
+struct Style {
+  const char* colour;
+  double width;
+  const char* dash;
+  int mark;
+};
+
+// Okabe and Ito's colours, told apart by the colour-blind.
+constexpr std::array<Style, 10> styles{{{"#0072b2", 2.6, "solid", 7},
+                                        {"#000000", 1.8, "(9,5)", 6},
+                                        {"#d55e00", 2.4, "(14,5)", 5},
+                                        {"#009e73", 2.6, "(2,4)", 9},
+                                        {"#cc79a7", 2.4, "(12,4,2,4)", 8},
+                                        {"#e69f00", 2.4, "(6,3)", 13},
+                                        {"#56b4e9", 2.0, "(4,4)", 11},
+                                        {"#7f7f7f", 1.6, "solid", 4},
+                                        {"#7a0177", 2.0, "(16,4,2,4,2,4)", 12},
+                                        {"#8c510a", 2.0, "(3,2)", 10}}};
+
+void define_styles(std::ostream& gp) {
+  for (std::size_t i = 0; i < styles.size(); ++i) {
+    const Style& s = styles[i];
+    gp << "set style line " << i + 1 << " lc rgb '" << s.colour << "' lw " << s.width << " pt " << s.mark
+       << " ps 0.9 dt " << s.dash << "\n";
+  }
+}
+
+void range(std::ostream& gp, char axis, double low, double high, bool log) {
+  gp << (log ? "set" : "unset") << " logscale " << axis << "\n";
+  if (log) {
+    gp << "set format " << axis << " '10^{%L}'\n";
+  } else {
+    gp << "set format " << axis << " '%g'\n";
+  }
+  if (low < high) {
+    gp << "set " << axis << "range [" << low << ":" << high << "]\n";
+  } else {
+    gp << "set " << axis << "range [*:*]\n";
+  }
+}
+
+// Escapes the characters that gnuplot's enhanced text would interpret.
+std::string plain(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '_' || c == '^' || c == '{' || c == '}' || c == '@' || c == '&' || c == '~') result += '\\';
+    result += c;
+  }
+  return gnuplot_string(result);
+}
+
+void place(std::ostream& gp, std::size_t index, int columns, std::size_t count, double top_margin,
+           double bottom_margin) {
+  const std::size_t wide = static_cast<std::size_t>(columns);
+  const std::size_t rows = (count + wide - 1) / wide;
+  const double width = 1.0 / static_cast<double>(wide);
+  const double height = (1.0 - top_margin - bottom_margin) / static_cast<double>(rows);
+  const double left = static_cast<double>(index % wide) * width;
+  const std::size_t row = index / wide;
+  const double bottom = 1.0 - top_margin - height * static_cast<double>(row + 1);
+  gp << "set origin " << left << "," << bottom << "\nset size " << width << "," << height << "\n";
+}
+
+}  // namespace
+
+std::string draw(const Chart& chart, const std::filesystem::path& svg) {
+  std::ostringstream gp, data;
+  data.precision(8);
+  const auto columns = static_cast<std::size_t>(chart.columns);
+  const std::size_t rows = (chart.panels.size() + columns - 1) / columns;
+  const int extra = 70 + (chart.common_key ? 80 : 0);
+  const int height = static_cast<int>(rows) * chart.panel_height + extra;
+  gp << "set terminal svg size " << chart.columns * chart.panel_width << "," << height
+     << " font 'sans,19' background 'white' enhanced\nset output 'plot.svg'\nset encoding utf8\n";
+  define_styles(gp);
+  gp << "set grid lc rgb '#c0c0c0' lw 0.6\nset tics scale 0.7\nset multiplot\n"
+     << "set label 1000 " << plain(chart.title) << " at screen 0.5, screen " << 1.0 - 26.0 / height
+     << " center font 'sans,22'\n";
+  std::size_t block = 0;
+  for (std::size_t i = 0; i < chart.panels.size(); ++i) {
+    const Panel& panel = chart.panels[i];
+    place(gp, i, chart.columns, chart.panels.size(), 50.0 / height, (chart.common_key ? 100.0 : 20.0) / height);
+    range(gp, 'x', panel.x_low, panel.x_high, panel.log_x);
+    range(gp, 'y', panel.y_low, panel.y_high, panel.log_y);
+    // Many decades: every other one is labelled.
+    gp << (panel.log_y && panel.y_low > 0.0 && panel.y_high / panel.y_low > 1e6 ? "set ytics 100\n"
+                                                                                : "set ytics auto\n");
+    gp << "set title " << plain(panel.title) << "\nset xlabel " << plain(panel.x_label) << "\nset ylabel "
+       << plain(panel.y_label) << "\n";
+    if (chart.common_key && i == 0) {
+      gp << "set key at screen 0.5, screen " << 50.0 / height << " center vertical maxrows 3 samplen 4 width 3\n";
+    } else if (chart.common_key || !panel.key) {
+      gp << "unset key\n";
+    } else {
+      gp << "set key outside right top vertical maxcols 1 samplen 3 spacing 1.1 font ',16'\n";
+    }
+    std::string plot = "plot ";
+    for (const Curve& curve : panel.curves) {
+      if (curve.x.empty()) continue;
+      for (std::size_t k = 0; k < curve.x.size(); ++k) {
+        if (std::isfinite(curve.y[k])) {
+          data << curve.x[k] << " " << curve.y[k] << "\n";
+        } else {
+          data << "\n";  // a gap
+        }
+      }
+      data << "\n\n";
+      const std::size_t style = static_cast<std::size_t>(curve.style) % styles.size() + 1;
+      if (plot.size() > 5) plot += ", ";
+      plot += "'data' index " + std::to_string(block++) + " using 1:2 with " +
+              (curve.line ? (curve.marks ? "linespoints" : "lines") : "points") + " ls " + std::to_string(style) +
+              (curve.name.empty() ? " notitle" : " title " + plain(curve.name));
+    }
+    if (plot.size() > 5) gp << plot << "\n";
+    gp << "unset label 1000\n";
+  }
+  gp << "unset multiplot\n";
+  return controller::draw_svg("gnuplot", gp.str(), data.str(), svg);
+}
+
+std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
+  std::ostringstream gp, data;
+  data.precision(8);
+  const auto columns = static_cast<std::size_t>(chart.columns);
+  const std::size_t rows = (chart.maps.size() + columns - 1) / columns;
+  const int height = static_cast<int>(rows) * 430 + 90;
+  gp << "set terminal svg size " << chart.columns * 620 << "," << height
+     << " font 'sans,19' background 'white' enhanced\nset output 'plot.svg'\nset encoding utf8\n"
+     << "set palette defined (0 '#fff7bc', 0.35 '#fe9929', 0.7 '#8c2d04', 1 '#1a0a30')\nset tics scale 0.7 front\n"
+     << "set multiplot\nset label 1000 " << plain(chart.title) << " at screen 0.5, screen " << 1.0 - 26.0 / height
+     << " center font 'sans,22'\nset label 1001 " << plain(chart.note) << " at screen 0.5, screen " << 18.0 / height
+     << " center\nunset key\n";
+  for (std::size_t i = 0; i < chart.maps.size(); ++i) {
+    const Map& map = chart.maps[i];
+    place(gp, i, chart.columns, chart.maps.size(), 50.0 / height, 40.0 / height);
+    range(gp, 'x', map.x.front(), map.x.back(), map.log_x);
+    range(gp, 'y', map.y.front(), map.y.back(), map.log_y);
+    gp << "set format x '%g'\nset format y '%g'\n";
+    if (map.log_x && map.x.back() < 100.0 * map.x.front()) gp << "set logscale x 2\n";  // else one label only
+    gp << (map.log_z ? "set" : "unset") << " logscale cb\n";
+    if (chart.z_low < chart.z_high) gp << "set cbrange [" << chart.z_low << ":" << chart.z_high << "]\n";
+    gp << "set title " << plain(map.title) << "\nset xlabel " << plain(map.x_label) << "\nset ylabel "
+       << plain(map.y_label) << "\n";
+    // Cells as quadrangles between the middles of the grid's lines.
+    const auto edge = [](const std::vector<double>& grid, std::size_t k, double side, bool log) {
+      const auto f = [log](double v) { return log ? std::log(v) : v; };
+      const std::size_t other = side < 0.0 ? (k == 0 ? 0 : k - 1) : std::min(k + 1, grid.size() - 1);
+      const double middle = 0.5 * (f(grid[k]) + f(grid[other]));
+      return log ? std::exp(middle) : middle;
+    };
+    std::size_t drawn = 0;
+    std::ostringstream cells;
+    for (std::size_t row = 0; row < map.y.size(); ++row) {
+      for (std::size_t column = 0; column < map.x.size(); ++column) {
+        const double z = map.z[row * map.x.size() + column];
+        if (!std::isfinite(z)) continue;
+        ++drawn;
+        cells << map.x[column] << " " << map.y[row] << " " << edge(map.x, column, -1.0, map.log_x) << " "
+              << edge(map.x, column, 1.0, map.log_x) << " " << edge(map.y, row, -1.0, map.log_y) << " "
+              << edge(map.y, row, 1.0, map.log_y) << " " << z << "\n";
+      }
+    }
+    data << (drawn > 0 ? cells.str() : "1 1 1 1 1 1 nan\n") << "\n\n";
+    gp << "plot 'data' index " << i << " using 1:2:3:4:5:6:7 with boxxyerror fillstyle solid 1.0 noborder lc palette\n"
+       << "unset label 1000\nunset label 1001\n";
+  }
+  gp << "unset multiplot\n";
+  return controller::draw_svg("gnuplot", gp.str(), data.str(), svg);
+}
+
+}  // namespace proxarm::studies

@@ -1,0 +1,27 @@
+// What a person may ask of a session that runs, besides its end. Commands go from any thread into the cycle, or come
+// from a script.
+#pragma once
+
+#include <cstdint>
+
+#include "models/base/scheduled.hpp"
+
+namespace proxarm::controller {
+
+enum class Order : std::uint8_t {
+  none,
+  hold,      // rendering: a controlled stop, drives stay enabled. Freeing: ends it
+  resume,    // out of a hold: rendering goes on, the force let in over ramp_in_s
+  release,   // out of a hold: the arm follows the hand slowly, without the scene
+  back_off,  // out of a hold: the tool moves `value` metres along the last contact's normal
+  reset,     // after a fault: the drives are enabled again, into a hold
+};
+
+struct Command {
+  Order order = Order::none;
+  double value = 0.0;
+};
+
+using ScheduledCommand = Scheduled<Command>;  // by the time since the first cycle
+
+}  // namespace proxarm::controller

@@ -1,0 +1,57 @@
+#include "controller/supervision/enabling_input.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/sensors/force_sensor.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+std::uint8_t node_of(const description::Cell& cell, const std::string& joint) {
+  const auto found = std::find_if(cell.drives.begin(), cell.drives.end(),
+                                  [&](const description::DriveDescription& drive) { return drive.joint == joint; });
+  return found != cell.drives.end() ? found->node : std::uint8_t{0};
+}
+
+}  // namespace
+
+EnablingInput::EnablingInput(const description::EnablingInputDescription& input, const description::Cell& cell,
+                             std::size_t bus)
+    : bus_(bus),
+      id_(input.drive.empty() ? input.identifier
+                              : fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 2, node_of(cell, input.drive))),
+      extended_(input.drive.empty() && input.extended),
+      byte_(static_cast<std::size_t>(input.drive.empty() ? input.byte : input.bit / 8)),
+      mask_(static_cast<std::uint8_t>(1u << (input.bit % 8))),
+      pressed_is_(input.pressed_is),
+      timeout_ns_(std::llround(1e9 * input.timeout_s)) {}
+
+std::uint32_t EnablingInput::wanted_id() const noexcept { return extended_ ? id_ | fieldbus::extended_id_flag : id_; }
+
+bool EnablingInput::on_frame(std::size_t bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
+  if (bus != bus_ || frame.id != id_ || frame.extended != extended_ || frame.remote || frame.error) return false;
+  on_cycle(time_ns);
+  const bool says = byte_ < frame.length && ((frame.data[byte_] & mask_) != 0) == pressed_is_;
+  if (says && released_before_) pressed_anew_ = true;
+  released_before_ = !says && byte_ < frame.length;
+  if (!says) pressed_anew_ = false;
+  pressed_ = says;
+  heard_ = true;
+  last_ns_ = time_ns;
+  return true;
+}
+
+void EnablingInput::on_cycle(std::int64_t t_k_ns) noexcept {
+  if (heard_ && t_k_ns - last_ns_ <= timeout_ns_) return;
+  pressed_ = released_before_ = pressed_anew_ = false;
+}
+
+bool EnablingInput::take_press() noexcept {
+  const bool anew = pressed_ && pressed_anew_;
+  pressed_anew_ = false;
+  return anew;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,52 @@
+// The person's enabling switch (dead man) as a bit that comes on a CAN bus, in a TPDO of a drive or a message of its
+// own.
+//
+// The switch counts as released whenever its state isn't known: before the first message, when the last message is
+// older than the timeout, or when it is too short to hold the bit. To start or go on, the person must press it anew: a
+// message says released and the next one says pressed, without a gap beyond the timeout. A switch that is held, tied
+// down or stuck at "pressed" never starts anything.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "fieldbus/can/can_frame.hpp"
+#include "models/base/state_archive.hpp"
+#include "models/description/cell.hpp"
+
+namespace proxarm::controller {
+
+class EnablingInput {
+ public:
+  // `bus`: index in the network. Precondition: the cell has the drive that is named.
+  EnablingInput(const description::EnablingInputDescription& input, const description::Cell& cell, std::size_t bus);
+
+  [[nodiscard]] std::size_t bus() const noexcept { return bus_; }
+  // The identifier as fieldbus::CanFilter's lists have it: with extended_id_flag where it has 29 bits.
+  [[nodiscard]] std::uint32_t wanted_id() const noexcept;
+
+  // True where the frame was the message. This and all below is called from the cycle's thread alone.
+  bool on_frame(std::size_t bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
+  // Called in each cycle before the others: forgets a message that is too old by now.
+  void on_cycle(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] bool pressed() const noexcept { return pressed_; }
+  // True once for each press after a release, while it is still pressed.
+  [[nodiscard]] bool take_press() noexcept;
+
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(last_ns_, heard_, pressed_, released_before_, pressed_anew_);
+  }
+
+ private:
+  std::size_t bus_;
+  std::uint32_t id_;
+  bool extended_;
+  std::size_t byte_;
+  std::uint8_t mask_;
+  bool pressed_is_;
+  std::int64_t timeout_ns_;
+  std::int64_t last_ns_ = 0;
+  bool heard_ = false, pressed_ = false, released_before_ = false, pressed_anew_ = false;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,172 @@
+#include "controller/supervision/fault.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+namespace proxarm::controller {
+namespace {
+
+constexpr const char* stopped = "the arm made a controlled stop and the drives were switched off";
+constexpr const char* at_once = "the drives were switched off at once, and the brakes have stopped the arm";
+constexpr const char* held =
+    "the arm made a controlled stop, was held there for supervision.hold_s, and the drives were switched off";
+constexpr const char* still = "the arm had not begun to move, and the drives were switched off";
+constexpr const char* unconfirmed =
+    "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
+    "off";
+
+// One row per fault: the reaction, what was seen, and what to do. The text of what was seen may hold a %s for the place
+// and %.4g for value and limit. Faults that only a start can have say that nothing has moved.
+struct FaultText {
+  Fault fault;
+  const char* name;
+  Reaction reaction;  // unless the cell chooses another (description::reaction_choices())
+  const char* cause;
+  const char* unit;  // of value and limit; nullptr: no figures
+  const char* advice;
+  const char* did = nullptr;  // nullptr: by the reaction
+};
+
+constexpr std::array texts{
+    FaultText{Fault::none, "none", Reaction::stop_1, "no fault", nullptr, ""},
+    FaultText{Fault::sensor_lost, "sensor_lost", Reaction::stop_1, "no complete sample of the force sensor in time",
+              "cycles",
+              "check the sensor's cable, power and identifiers; `proxarm plan` tells whether its bus can carry it"},
+    FaultText{Fault::sensor_late, "sensor_late", Reaction::slow,
+              "samples of the force sensor are missing again and again", "of them lately",
+              "check the sensor's cable and the load of its bus: `proxarm plan`"},
+    FaultText{Fault::sensor_status, "sensor_status", Reaction::stop_1,
+              "the force sensor's status word reports an error", nullptr,
+              "power-cycle the sensor; look up the status bits in its manual"},
+    FaultText{Fault::sensor_saturated, "sensor_saturated", Reaction::stop_1,
+              "a gauge of the force sensor is at its rail", nullptr, "push less, or use a sensor with a larger range"},
+    FaultText{Fault::sensor_frozen, "sensor_frozen", Reaction::stop_1,
+              "the force sensor repeats one reading to the last digit", "samples",
+              "power-cycle the sensor; if it is that quiet, set sensor.noise_N to 0 in the cell file"},
+    FaultText{Fault::force_not_finite, "force_not_finite", Reaction::stop_1, "the decoded force isn't a finite number",
+              nullptr, "check the sensor's calibration matrix"},
+    FaultText{Fault::force_excessive, "force_excessive", Reaction::stop_1, "force beyond limits.max_force_N", "N",
+              "push less, or raise the limit in the cell file"},
+    FaultText{Fault::force_at_start, "force_at_start", Reaction::stop_1,
+              "the handle was touched while the sensor was tared", "N",
+              "take the hand off the handle until rendering starts", still},
+    FaultText{Fault::feedback_late, "feedback_late", Reaction::carry_on, "a drive's feedback was missing", "cycles",
+              "check the drive's cable and the load of its bus: `proxarm plan`"},
+    FaultText{Fault::drive_silent, "drive_silent", Reaction::stop_1, "no feedback from a drive", "cycles",
+              "check the drive's power, cable and node number"},
+    FaultText{Fault::drive_fault, "drive_fault", Reaction::stop_1, "a drive reports a fault", nullptr,
+              "read the drive's error code in the record, mend its cause, start again"},
+    FaultText{Fault::modbus_silent, "modbus_silent", Reaction::stop_1, "no complete answer on a Modbus line in time",
+              nullptr, "check the drive's power, the line's cable or network, and the unit's number"},
+    FaultText{Fault::drive_disabled, "drive_disabled", Reaction::stop_1, "a drive left operation enabled by itself",
+              nullptr, "check the drive's enable input, its supply and STO"},
+    FaultText{Fault::drive_not_enabled, "drive_not_enabled", Reaction::stop_1, "a drive didn't reach operation enabled",
+              "s", "check the drive's power stage, STO and enable input", still},
+    FaultText{Fault::drive_not_disabled, "drive_not_disabled", Reaction::stop_0,
+              "a drive didn't confirm that it is switched off", nullptr,
+              "switch the drives' power off; then check the drive's cable and supply"},
+    FaultText{Fault::timestep_unknown, "timestep_unknown", Reaction::stop_1,
+              "a drive confirms neither the new timestep nor the one before (60C2h)", nullptr,
+              "check the drive's cable, then start anew: that configures it; a reset doesn't"},
+    FaultText{Fault::position_implausible, "position_implausible", Reaction::stop_0,
+              "an encoder jumped further than its joint can move", "rad in a cycle",
+              "check the encoder, its cable and the drive before anybody comes near"},
+    FaultText{Fault::target_out_of_range, "target_out_of_range", Reaction::stop_1,
+              "the motion would leave a joint's range", "rad",
+              "keep away from that end of the range, or move the scene"},
+    FaultText{Fault::target_too_fast, "target_too_fast", Reaction::stop_1, "the motion would exceed a joint's speed",
+              "rad/s", "move slower, raise mass or damping, or move the scene away from the singularity"},
+    FaultText{Fault::singular, "singular", Reaction::stop_1, "the arm is too close to a singularity to follow", nullptr,
+              "move the scene or the start pose"},
+    FaultText{Fault::leash_exceeded, "leash_exceeded", Reaction::stop_1, "the tool doesn't follow the proxy", "m",
+              "look for an obstacle or a jammed joint; limits.leash_m holds the limit"},
+    FaultText{
+        Fault::tool_too_fast, "tool_too_fast", Reaction::stop_0,
+        "the tool is faster than it was told to be, by the encoders", "m/s",
+        "look for a drive that runs off, a slipping brake, a wrong gear ratio or encoder before anybody comes near"},
+    FaultText{Fault::tool_off_limits, "tool_off_limits", Reaction::stop_1,
+              "the tool has left its workspace, or is in a keep-out zone, by the encoders", "mm",
+              "look for a drive that doesn't follow, or creeps; no setpoint was there"},
+    FaultText{Fault::proxy_not_finite, "proxy_not_finite", Reaction::stop_1, "the proxy's step isn't finite", nullptr,
+              "check the scene with `proxarm check`"},
+    FaultText{Fault::proxy_squeezed, "proxy_squeezed", Reaction::stop_1,
+              "objects of the scene close on the proxy from both sides", nullptr,
+              "change their motion so that they leave it room"},
+    FaultText{Fault::bus_off, "bus_off", Reaction::stop_1, "the CAN controller went off the bus", nullptr,
+              "check termination, bitrate and cable; an interface without restart-ms comes back by `ip link set IFACE "
+              "type can restart`"},
+    FaultText{Fault::send_failed, "send_failed", Reaction::stop_1,
+              "a frame couldn't be sent: the interface's queue is full", nullptr,
+              "check cable, termination and bitrate, for nobody acknowledges, or who else floods the bus"},
+    FaultText{Fault::receive_overflow, "receive_overflow", Reaction::stop_1,
+              "received frames were dropped by the kernel", "frames",
+              "another program floods the bus, or the machine is too slow"},
+    FaultText{Fault::overrun, "overrun", Reaction::stop_1, "cycles in a row were late or left out", "cycles",
+              "was the process suspended? Else use a longer --timestep, or a faster or less loaded machine"},
+    FaultText{Fault::second_master, "second_master", Reaction::stop_1, "another master commands this bus", nullptr,
+              "end the other controller or configuration tool, or unplug it, before the next start"},
+    FaultText{Fault::error_passive, "error_passive", Reaction::slow,
+              "the CAN controller is error passive: 128 errors or more", nullptr,
+              "check termination, bitrate and cable of this bus before it goes off altogether"},
+    FaultText{Fault::interface_down, "interface_down", Reaction::stop_1, "the CAN interface is down or was removed",
+              nullptr, "find out who took it down (`dmesg`, `ip link`) and check its plug, then set it up again"},
+    FaultText{Fault::enabling_released, "enabling_released", Reaction::hold, "the enabling input isn't pressed",
+              nullptr, "press it to go on; if it is pressed, check its wiring and its message"},
+    FaultText{Fault::enabling_not_pressed, "enabling_not_pressed", Reaction::stop_1,
+              "the enabling input wasn't pressed in time", nullptr,
+              "let go of it and press it: one that is pressed already could be tied down", still},
+};
+
+const FaultText& text_of(Fault fault) noexcept {
+  for (const FaultText& text : texts) {
+    if (text.fault == fault) return text;
+  }
+  return texts.front();
+}
+
+const char* did(const FaultText& text, Reaction reaction) noexcept {
+  if (text.did != nullptr) return text.did;
+  return reaction == Reaction::stop_0 ? at_once : reaction == Reaction::hold ? held : stopped;
+}
+
+constexpr std::array reaction_names{"continue", "slow", "hold", "stop_1", "stop_0"};
+
+}  // namespace
+
+const char* fault_name(Fault fault) noexcept { return text_of(fault).name; }
+
+const char* reaction_name(Reaction reaction) noexcept { return reaction_names[static_cast<std::size_t>(reaction)]; }
+
+Reaction default_reaction(Fault fault) noexcept { return text_of(fault).reaction; }
+
+Reactions reactions_of(const description::SupervisionDescription& supervision) {
+  Reactions reactions{};
+  for (std::size_t i = 0; i < fault_count; ++i) {
+    const auto fault = static_cast<Fault>(i);
+    reactions[i] = default_reaction(fault);
+    const auto chosen = supervision.reactions.find(fault_name(fault));
+    if (chosen == supervision.reactions.end()) continue;
+    const auto found = std::find(reaction_names.begin(), reaction_names.end(), chosen->second);
+    if (found != reaction_names.end()) reactions[i] = static_cast<Reaction>(found - reaction_names.begin());
+  }
+  return reactions;
+}
+
+std::string describe(const FaultReport& report, const std::string& where, bool drives_off) {
+  const FaultText& text = text_of(report.fault);
+  std::string line = text.name;
+  if (!where.empty()) line += " (" + where + ")";
+  line += ": ";
+  line += text.cause;
+  if (text.unit != nullptr) {
+    std::array<char, 96> figures{};
+    std::snprintf(figures.data(), figures.size(), " (%.4g %s, limit %.4g)", report.value, text.unit, report.limit);
+    line += figures.data();
+  }
+  line += " at cycle " + std::to_string(report.cycle) + "; " + (drives_off ? did(text, report.reaction) : unconfirmed) +
+          "; " + text.advice;
+  return line;
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,132 @@
+// Which phase a session is in, and what moves it on: one table, transitions(), which docs/supervision.md shows.
+//
+//   idle ─▶ enabling ─▶ taring ─▶ rendering ─▶ stopping ─▶ disabling ─▶ done
+//                                 ▲       │                    │
+//                          resume │       ▼ hold               ▼
+//                                  holding ◀─ enabling ◀── faulted
+//                                  ▲     │            reset
+//                                  └─────▼
+//                                  freeing
+//
+// A fault acts by its reaction (fault.hpp). A stop latches the fault: the first one is kept and reported, and only a
+// reset leads back, into a hold. Faults that are carried on, slow the arm down or hold it are counted.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "controller/supervision/fault.hpp"
+#include "models/base/state_archive.hpp"
+
+namespace proxarm::controller {
+
+enum class Phase : std::uint8_t {
+  idle,       // drives configured, nothing sent but SYNC and heartbeat; waits for the enabling input
+  enabling,   // the CiA 402 state machines are led to operation enabled; targets follow the actual positions
+  taring,     // targets stand still; the sensor's bias is averaged
+  rendering,  // the proxy moves, the arm follows
+  holding,    // every joint decelerates at its own limit along its last direction, and stands; drives stay enabled
+  freeing,    // out of a hold, slowly: the arm follows the hand's force, or backs off, without the scene
+  stopping,   // every joint decelerates at its own limit along its last direction
+  disabling,  // targets stand still; the drives are led to switched off
+  faulted,    // drives off; waits for a reset
+  done,
+};
+inline constexpr std::size_t phase_count = static_cast<std::size_t>(Phase::done) + 1;
+
+enum class Event : std::uint8_t {
+  begin,      // first cycle; with an enabling input: it was let go and pressed
+  enabled,    // all drives follow
+  reenabled,  // the same after a reset: the sensor is tared already, and somebody may be pinned
+  tared,      //
+  hold,       // a fault with this reaction, or a command
+  resume,     // the cause is gone and the enabling input pressed, or a command
+  free,       // a command: release, or back off
+  freed,      // a command, the way backed off, or a fault that holds
+  stop,       // asked for: end of the duration, signal
+  fault,      // stop category 1
+  fault_off,  // stop category 0
+  at_rest,    //
+  disabled,   // all drives off, or they don't say so
+  wait,       // the same with a fault that may be reset
+  reset,      // a command
+};
+inline constexpr std::size_t event_count = static_cast<std::size_t>(Event::reset) + 1;
+
+const char* phase_name(Phase phase) noexcept;
+const char* event_name(Event event) noexcept;
+
+struct Transition {
+  Phase from;
+  Event event;
+  Phase to;
+};
+[[nodiscard]] std::span<const Transition> transitions() noexcept;
+
+// How often a fault that didn't stop the arm occurred.
+struct Notice {
+  std::uint32_t times = 0;   // begun anew, after a cycle without it
+  std::uint64_t cycles = 0;  // with it
+  std::uint64_t last = 0;    // one more than the last of them; 0: none
+};
+
+class Supervisor {
+ public:
+  Supervisor() : Supervisor(reactions_of({})) {}
+  explicit Supervisor(const Reactions& reactions) noexcept : reactions_(reactions) {}
+
+  [[nodiscard]] Phase phase() const noexcept { return phase_; }
+  // The drives may move in this phase, so the enabling input must be pressed.
+  [[nodiscard]] bool live() const noexcept {
+    return phase_ == Phase::rendering || phase_ == Phase::holding || phase_ == Phase::freeing;
+  }
+  [[nodiscard]] bool faulted() const noexcept { return report_.fault != Fault::none; }
+  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }      // of the stop
+  [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // of the last hold; none: asked for
+  [[nodiscard]] Reaction reaction(Fault fault) const noexcept { return reactions_[static_cast<std::size_t>(fault)]; }
+  [[nodiscard]] const Notice& notice(Fault fault) const noexcept { return notices_[static_cast<std::size_t>(fault)]; }
+  // Whether a fault that slows the arm down occurred in one of the last `cycles`.
+  [[nodiscard]] bool slowed(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
+    return slow_end_ > 0 && cycle < slow_end_ + cycles;
+  }
+  // Whether the fault that the arm was held for lasts still, or occurred in one of the last `cycles`.
+  [[nodiscard]] bool cause_lasts(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
+    return held_for_.fault != Fault::none && cycle < notice(held_for_.fault).last + cycles;
+  }
+
+  // Changes the phase where transitions() has a row for this event, and ignores it otherwise. True if the phase
+  // changed.
+  bool handle(Event event) noexcept;
+  // Takes the fault's reaction.
+  void raise(FaultReport report) noexcept;
+  // A hold lasted too long: the arm stops for the fault that it was held for.
+  void give_up_hold() noexcept;
+  // A hold that a person asked for: held_for() is none.
+  void hold() noexcept;
+  // Leaves the phase faulted and forgets the fault: whoever wants report() takes it before. False in any other phase.
+  bool reset() noexcept;
+
+  // Another timestep, of which `ratio` times as many cycles fit into the same time. What is counted back from this
+  // cycle is converted, so that the times stay.
+  void rescale(std::uint64_t cycle, double ratio) noexcept;
+
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(phase_, slow_end_);
+    for (FaultReport* report : {&report_, &held_for_}) {
+      state(report->fault, report->where, report->cycle, report->value, report->limit, report->reaction);
+    }
+    for (Notice& notice : notices_) state(notice.times, notice.cycles, notice.last);
+  }
+
+ private:
+  void note(const FaultReport& report) noexcept;
+
+  Reactions reactions_;
+  Phase phase_ = Phase::idle;
+  FaultReport report_, held_for_;
+  std::uint64_t slow_end_ = 0;  // one more than the last cycle with a fault that slows; 0: none
+  std::array<Notice, fault_count> notices_{};
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,319 @@
+#include "fieldbus/budget/response_time.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace proxarm::fieldbus {
+namespace {
+
+constexpr std::int64_t no_bound = std::numeric_limits<std::int64_t>::max();
+constexpr int cycles_back = 2;  // a busy period that is looked at may have begun that many cycles before
+
+std::int64_t floor_divide(std::int64_t a, std::int64_t b) noexcept {
+  const std::int64_t quotient = a / b;
+  return quotient * b > a ? quotient - 1 : quotient;
+}
+
+// One frame's view of its bus: which frames are in its busy period, and when they can be released.
+struct Competitor {
+  std::size_t frame = 0;
+  bool ahead = false;           // of the same sender: counts only if queued before
+  bool not_this_cycle = false;  // what m itself brings about, or what is queued behind it
+  bool held_back = false;       // can stand behind a weaker frame of its own sender
+  std::int64_t jitter_ns = 0;   // of its release, or of its getting to the head of its queue
+};
+
+struct Level {
+  std::uint64_t weakest = 0;  // priority that counts as "weaker" for the rest of the bus
+  std::vector<Competitor> competitors;
+};
+
+class Analysis {
+ public:
+  Analysis(const PlannedBus& bus, const std::vector<int>& triggers, std::int64_t period_ns)
+      : frames_(bus.frames), triggers_(triggers), period_ns_(period_ns), windows_(frames_.size()) {
+    const BitRates rates{bus.bitrate, bus.data_bitrate};
+    for (const PlannedFrame& frame : frames_) {
+      worst_ns_.push_back(wire_time_ns(worst_wire_bits(frame.shape), rates));
+      least_ns_.push_back(wire_time_ns(minimum_wire_bits(frame.shape), rates));
+      priority_.push_back(planned_priority(frame));
+    }
+    interframe_ns_ = wire_time_ns(WireBits{can_interframe_bits, 0}, rates);
+    inherit_phase();
+  }
+
+  std::vector<FrameWindow> run() {
+    // Start from an empty bus; frames can come after ones that are listed later, hence as many passes as frames.
+    for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
+      for (std::size_t m = 0; m < frames_.size(); ++m) {
+        windows_[m] = release_of(m);
+        windows_[m].response_ns = worst_ns_[m];
+        windows_[m].finish_ns = windows_[m].release_ns + windows_[m].jitter_ns + worst_ns_[m];
+      }
+    }
+    for (bool changed = true; changed;) {
+      changed = false;
+      for (std::size_t m = 0; m < frames_.size(); ++m) changed = update(m) || changed;
+    }
+    return windows_;
+  }
+
+ private:
+  [[nodiscard]] std::size_t trigger(std::size_t m) const { return static_cast<std::size_t>(triggers_[m]); }
+
+  // What comes after a frame that is out of step is out of step, too, and as rare.
+  void inherit_phase() {
+    for (std::size_t pass = 0; pass < frames_.size(); ++pass) {
+      for (std::size_t m = 0; m < frames_.size(); ++m) {
+        if (triggers_[m] < 0) continue;
+        frames_[m].any_time = frames_[m].any_time || frames_[trigger(m)].any_time;
+        frames_[m].every_cycles = std::max(frames_[m].every_cycles, frames_[trigger(m)].every_cycles);
+      }
+    }
+  }
+
+  // Its place in the cycle is known, though it may not come in each.
+  [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time; }
+  [[nodiscard]] std::int64_t every_ns(std::size_t k) const { return period_ns_ * frames_[k].every_cycles; }
+
+  [[nodiscard]] FrameWindow release_of(std::size_t m) const {
+    const PlannedFrame& frame = frames_[m];
+    FrameWindow window;
+    const std::int64_t latest_delay_ns = std::max(frame.delay_ns, frame.latest_delay_ns);
+    window.any_time = frame.any_time;
+    if (triggers_[m] >= 0) {
+      const FrameWindow& before = windows_[trigger(m)];
+      window.release_ns = before.release_ns + least_ns_[trigger(m)] - interframe_ns_ + frame.delay_ns;
+      window.jitter_ns = std::max(before.finish_ns + latest_delay_ns - window.release_ns, std::int64_t{0});
+      window.bounded = before.bounded;
+    } else if (!frame.any_time) {
+      window.release_ns = std::llround(frame.release * static_cast<double>(period_ns_)) + frame.delay_ns;
+      window.jitter_ns = latest_delay_ns - frame.delay_ns;
+    }
+    return window;
+  }
+
+  // Windows only ever grow, and stop beyond a limit, so this ends. True if it grew.
+  bool update(std::size_t m) {
+    const FrameWindow old = windows_[m];
+    if (!old.bounded) return false;
+    FrameWindow next = release_of(m);
+    next.response_ns = old.response_ns;
+    next.finish_ns = std::max(old.finish_ns, next.release_ns + next.jitter_ns + worst_ns_[m]);
+    windows_[m] = next;
+    const Level level = level_of(m);
+    if (in_step(m)) {
+      examine_in_step(m, level);
+    } else {
+      examine_any_phase(m, level);
+    }
+    const FrameWindow& now = windows_[m];
+    return now.finish_ns != old.finish_ns || now.jitter_ns != old.jitter_ns || now.response_ns != old.response_ns ||
+           now.bounded != old.bounded;
+  }
+
+  // Whether frame k of some cycle is what makes m be queued in the same cycle, by way of others or not.
+  [[nodiscard]] bool leads_to(std::size_t k, std::size_t m) const {
+    for (int at = triggers_[m]; at >= 0; at = triggers_[static_cast<std::size_t>(at)]) {
+      if (at == static_cast<int>(k)) return true;
+    }
+    return false;
+  }
+
+  // Queued by the same sender at one moment: the order of the list decides.
+  [[nodiscard]] bool queued_together(std::size_t a, std::size_t b) const {
+    return frames_[a].sender == frames_[b].sender && triggers_[a] == triggers_[b] && in_step(a) && in_step(b) &&
+           frames_[a].release == frames_[b].release && frames_[a].delay_ns == frames_[b].delay_ns &&
+           frames_[a].latest_delay_ns == frames_[b].latest_delay_ns;
+  }
+
+  // Whether frame k can be pending at some time in [from, to]; out of step, it always can.
+  [[nodiscard]] bool can_be_pending(std::size_t k, std::int64_t from_ns, std::int64_t to_ns) const {
+    if (!in_step(k)) return true;
+    const FrameWindow& window = windows_[k];
+    const std::int64_t last = floor_divide(to_ns - window.release_ns, period_ns_);
+    return window.finish_ns + last * period_ns_ > from_ns;
+  }
+
+  // Whether frame a of the same sender can stand before m in its queue.
+  [[nodiscard]] bool can_precede(std::size_t a, std::size_t m) const {
+    if (a == m || frames_[a].sender != frames_[m].sender) return false;
+    if (!in_step(a) || !in_step(m)) return true;
+    const FrameWindow& window = windows_[m];
+    if (!can_be_pending(a, window.release_ns, window.release_ns + window.jitter_ns)) return false;
+    return !queued_together(a, m) || a < m || windows_[a].finish_ns - windows_[a].release_ns >= period_ns_;
+  }
+
+  [[nodiscard]] Level level_of(std::size_t m) const {
+    Level level{priority_[m], {}};
+    for (std::size_t a = 0; a < frames_.size(); ++a) {
+      if (can_precede(a, m)) level.weakest = std::max(level.weakest, priority_[a]);
+    }
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      const bool same_sender = frames_[k].sender == frames_[m].sender;
+      // (What can precede m is no weaker than the weakest.) One of the same sender that is gone before m is queued can
+      // still have made others wait, and so is in the busy period.
+      if (k == m || priority_[k] > level.weakest) continue;
+      Competitor competitor{k, same_sender, leads_to(m, k) || (queued_together(k, m) && k > m), false, 0};
+      for (std::size_t l = 0; l < frames_.size(); ++l) {
+        competitor.held_back = competitor.held_back || (priority_[l] > level.weakest && can_precede(l, k));
+      }
+      const FrameWindow& window = windows_[k];
+      competitor.jitter_ns = window.jitter_ns;
+      if (competitor.held_back) {
+        competitor.jitter_ns = std::max(window.jitter_ns, window.finish_ns - window.release_ns - worst_ns_[k]);
+      }
+      level.competitors.push_back(competitor);
+    }
+    // Its own instances of earlier cycles.
+    level.competitors.push_back({m, true, true, false, windows_[m].jitter_ns});
+    return level;
+  }
+
+  // How many instances of the competitor can be released in [start, end]. phase_known: start is a time in m's cycle.
+  [[nodiscard]] std::int64_t releases(const Competitor& k, std::int64_t start_ns, std::int64_t end_ns,
+                                      bool phase_known) const {
+    if (end_ns < start_ns) return 0;
+    const std::int64_t at_any_phase = 1 + (end_ns - start_ns + k.jitter_ns) / every_ns(k.frame);
+    if (!phase_known || !in_step(k.frame)) return at_any_phase;
+    const std::int64_t release_ns = windows_[k.frame].release_ns;
+    const std::int64_t last = last_cycle(k, end_ns);
+    const std::int64_t before = floor_divide(start_ns - release_ns - k.jitter_ns - 1, period_ns_);
+    return std::clamp<std::int64_t>(last - before, 0, at_any_phase);
+  }
+
+  // Start of m's transmission at worst, in a busy period that begins at start_ns; or no_bound.
+  [[nodiscard]] std::int64_t begin_of(std::size_t m, const Level& level, std::int64_t start_ns,
+                                      std::int64_t blocking_ns, std::int64_t latest_release_ns,
+                                      bool phase_known) const {
+    std::int64_t begin_ns = start_ns + blocking_ns;
+    for (;;) {
+      std::int64_t next_ns = start_ns + blocking_ns;
+      for (const Competitor& k : level.competitors) {
+        if (k.frame == m && !phase_known) continue;  // its response is at most its own distance, or there is no bound
+        const std::int64_t end_ns = k.ahead ? std::min(begin_ns, latest_release_ns) : begin_ns;
+        next_ns += worst_ns_[k.frame] * releases(k, start_ns, end_ns, phase_known);
+      }
+      if (next_ns - start_ns > 2 * every_ns(m)) return no_bound;
+      if (next_ns <= begin_ns) return begin_ns;
+      begin_ns = next_ns;
+    }
+  }
+
+  // The longest weaker frame that can be on the wire at some time in [from, to].
+  [[nodiscard]] std::int64_t blocking(std::size_t m, const Level& level, std::int64_t from_ns, std::int64_t to_ns,
+                                      bool anything) const {
+    std::int64_t longest_ns = 0;
+    for (std::size_t k = 0; k < frames_.size(); ++k) {
+      if (k == m || priority_[k] <= level.weakest) continue;
+      if (anything || can_be_pending(k, from_ns, to_ns - 1)) longest_ns = std::max(longest_ns, worst_ns_[k]);
+    }
+    return longest_ns;
+  }
+
+  void grow(std::size_t m, std::int64_t begin_ns, std::int64_t earliest_release_ns) {
+    FrameWindow& window = windows_[m];
+    if (begin_ns == no_bound) {
+      window.bounded = false;
+      return;
+    }
+    const std::int64_t finish_ns = begin_ns + worst_ns_[m];
+    window.response_ns = std::max(window.response_ns, finish_ns - earliest_release_ns);
+    window.finish_ns = std::max(window.finish_ns, finish_ns);
+    if (window.response_ns > every_ns(m)) window.bounded = false;
+  }
+
+  // Any frame may be released at the same moment as m.
+  void examine_any_phase(std::size_t m, const Level& level) {
+    const std::int64_t blocking_ns = blocking(m, level, 0, 0, true);
+    const std::int64_t begin_ns = begin_of(m, level, 0, blocking_ns, 0, false);
+    const FrameWindow window = windows_[m];
+    grow(m, begin_ns, 0);
+    if (begin_ns != no_bound) {
+      windows_[m].finish_ns =
+          std::max(window.finish_ns, window.release_ns + window.jitter_ns + windows_[m].response_ns);
+    }
+  }
+
+  // All busy periods in which m can be: each begins with the release of one of its frames. While it begins later, but
+  // with the same frames in it, it also ends later; so the last moments at which a frame can still be in it are enough.
+  void examine_in_step(std::size_t m, const Level& level) {
+    const FrameWindow own = windows_[m];
+    const std::int64_t latest_ns = own.release_ns + own.jitter_ns;
+    std::vector<std::int64_t> lasts{latest_ns};
+    for (const Competitor& k : level.competitors) {
+      for (std::int64_t n = -cycles_back; in_step(k.frame) && n <= last_cycle(k, latest_ns); ++n) {
+        lasts.push_back(windows_[k.frame].release_ns + k.jitter_ns + n * period_ns_);
+      }
+    }
+    examine_start(m, level, {m, false, false, false, own.jitter_ns}, 0, lasts);
+    for (const Competitor& k : level.competitors) {
+      if (!in_step(k.frame)) {
+        // It can begin one at any moment up to m's release.
+        for (const std::int64_t start_ns : lasts) examine_start_at(m, level, start_ns, blocking(m, level, 0, 0, true));
+        continue;
+      }
+      for (std::int64_t n = -cycles_back; n <= last_cycle(k, latest_ns); ++n) examine_start(m, level, k, n, lasts);
+    }
+  }
+
+  // Of the competitor's instances, the last that can be released up to a time in m's cycle.
+  [[nodiscard]] std::int64_t last_cycle(const Competitor& k, std::int64_t time_ns) const {
+    const std::int64_t last = floor_divide(time_ns - windows_[k.frame].release_ns, period_ns_);
+    return k.not_this_cycle ? std::min<std::int64_t>(last, -1) : last;
+  }
+
+  // Busy periods that begin with the release of frame `first` in cycle n.
+  void examine_start(std::size_t m, const Level& level, const Competitor& first, std::int64_t n,
+                     const std::vector<std::int64_t>& lasts) {
+    const std::int64_t from_ns = windows_[first.frame].release_ns + n * period_ns_;
+    const std::int64_t to_ns = from_ns + first.jitter_ns;
+    const PlannedFrame& frame = frames_[first.frame];
+    // Queued at the very end of another frame, it takes part in the next arbitration: nothing is on the wire.
+    const bool at_end = triggers_[first.frame] >= 0 && frame.delay_ns == 0 && frame.latest_delay_ns <= 0;
+    std::int64_t blocking_ns = 0;
+    if (first.held_back) {
+      blocking_ns = blocking(m, level, 0, 0, true);
+    } else if (!at_end) {
+      blocking_ns = blocking(m, level, from_ns, to_ns, false);
+    }
+    for (const std::int64_t start_ns : lasts) {
+      if (start_ns >= from_ns && start_ns <= to_ns) examine_start_at(m, level, start_ns, blocking_ns);
+    }
+  }
+
+  void examine_start_at(std::size_t m, const Level& level, std::int64_t start_ns, std::int64_t blocking_ns) {
+    const FrameWindow& window = windows_[m];
+    if (!window.bounded) return;
+    const std::int64_t latest_ns = window.release_ns + window.jitter_ns;
+    if (start_ns > latest_ns) return;
+    const std::int64_t begin_ns = begin_of(m, level, start_ns, blocking_ns, latest_ns, true);
+    if (begin_ns < window.release_ns) return;  // over before m is released
+    grow(m, begin_ns, std::max(start_ns, window.release_ns));
+  }
+
+  std::vector<PlannedFrame> frames_;
+  const std::vector<int>& triggers_;
+  std::int64_t period_ns_;
+  std::int64_t interframe_ns_ = 0;
+  std::vector<std::int64_t> worst_ns_;
+  std::vector<std::int64_t> least_ns_;
+  std::vector<std::uint64_t> priority_;
+  std::vector<FrameWindow> windows_;
+};
+
+}  // namespace
+
+std::vector<FrameWindow> response_windows(const PlannedBus& bus, const std::vector<int>& triggers,
+                                          std::int64_t period_ns) {
+  return Analysis(bus, triggers, period_ns).run();
+}
+
+std::uint64_t planned_priority(const PlannedFrame& frame) noexcept {
+  const std::uint64_t fd = frame.shape.fd ? 1 : 0;
+  if (!frame.shape.extended) return (std::uint64_t{frame.id} << 22) | (fd << 19);
+  return (std::uint64_t{frame.id >> 18} << 22) | (3ull << 20) | (std::uint64_t{frame.id & 0x3ffff} << 2) | fd;
+}
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,82 @@
+// Frames as text in the format of can-utils (`candump -L`), so that canplayer, python-can and others read our records
+// and we read theirs. One frame a line:
+//
+//   (1436509052.249713) vcan0 044#2A366C2BBA          11-bit identifier: 3 hex digits, then the data
+//   (1436509052.449847) vcan0 1FFFFFFF#               29-bit: 8 hex digits
+//   (1436509052.649713) vcan0 123#R4                  remote, with its length where that isn't 0
+//   (1436509052.849713) vcan0 213##1112233445566778   CAN FD: one digit of flags (1 bit rate switch, 2 error state)
+//   (1436509052.949713) vcan0 20000040#0000000000000000   error frame: bit 29 of the identifier set
+//
+// The reader also takes nanoseconds (nine digits), lower case, dots between bytes, a raw DLC ("_9" .. "_F" after eight
+// bytes), the direction that candump -x appends (R or T), and blank lines and lines that start with '#' as comments.
+// Anything else is a SetupError that names the line.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <istream>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fieldbus/can/can_frame.hpp"
+
+namespace proxarm::fieldbus {
+
+// Longest line with its newline: time 22 + 2, name 15 + 1, identifier 8, "##" and flags 3, 64 bytes, newline.
+inline constexpr std::size_t max_candump_line = 192;
+using CandumpLine = std::array<char, max_candump_line>;
+
+// Writes one line, newline included, and returns its length. The name is cut at 15 characters, as interfaces' names
+// are, and blanks in it become '_'; an empty one becomes "can". Times before 0 become 0. No allocation; any thread.
+std::size_t format_candump_line(CandumpLine& out, std::int64_t time_ns, std::string_view interface,
+                                const CanFrame& frame) noexcept;
+
+struct CandumpEntry {
+  std::int64_t time_ns = 0;  // since the epoch, or whatever zero the log has
+  std::string interface;
+  CanFrame frame;
+};
+
+// Writes a log file through a buffer of its own. Not for the cycle's thread: the buffer is flushed to the file.
+class CandumpLogWriter {
+ public:
+  // epoch_ns is added to every time: 0 for virtual time. Throws SetupError if the file can't be made.
+  explicit CandumpLogWriter(const std::string& path, std::int64_t epoch_ns = 0);
+  void write(std::int64_t time_ns, std::string_view interface, const CanFrame& frame) noexcept;
+  // Flushes and closes; throws SetupError if anything couldn't be written. A log that is destroyed without it is
+  // closed, too, but silently.
+  void finish();
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+  };
+  std::string path_;
+  std::int64_t epoch_ns_;
+  std::unique_ptr<std::FILE, Close> file_;
+  bool failed_ = false;
+};
+
+class CandumpLogReader {
+ public:
+  // `name` is for messages. The stream outlives the reader.
+  CandumpLogReader(std::istream& stream, std::string name);
+  // The next frame; false at the end. Throws SetupError for a line that is none.
+  bool next(CandumpEntry& out);
+  [[nodiscard]] int line() const noexcept { return line_; }
+
+ private:
+  std::istream& stream_;
+  std::string name_;
+  std::string text_;
+  int line_ = 0;
+};
+
+// All of a file. Throws SetupError if it can't be read.
+[[nodiscard]] std::vector<CandumpEntry> read_candump_log(const std::string& path);
+
+}  // namespace proxarm::fieldbus

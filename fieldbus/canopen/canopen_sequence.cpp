@@ -1,0 +1,218 @@
+#include "fieldbus/canopen/canopen_sequence.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "fieldbus/can/byte_order.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+std::uint32_t size_mask(std::uint8_t bytes) noexcept { return bytes >= 4 ? 0xFFFFFFFFU : (1U << 8 * bytes) - 1U; }
+
+std::string value_text(std::uint32_t value, std::uint8_t bytes) {
+  return hex_text(value, 2 * bytes) + " (" + std::to_string(value) + ")";
+}
+
+constexpr const char* check_wiring =
+    "is it powered, is its node number right, and do bitrate, wiring and both terminations (120 ohm) fit?";
+
+}  // namespace
+
+SdoStep sdo_read(ObjectAddress object, std::uint8_t bytes, const char* name) {
+  SdoStep step;
+  step.kind = SdoStep::Kind::read;
+  step.object = object;
+  step.bytes = bytes;
+  step.name = name;
+  return step;
+}
+
+SdoStep sdo_expect(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name, const char* advice,
+                   std::uint32_t mask) {
+  SdoStep step = sdo_read(object, bytes, name);
+  step.kind = SdoStep::Kind::expect;
+  step.value = value;
+  step.mask = mask;
+  step.advice = advice;
+  return step;
+}
+
+SdoStep sdo_write(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name) {
+  SdoStep step = sdo_read(object, bytes, name);
+  step.kind = SdoStep::Kind::write;
+  step.value = value & size_mask(bytes);
+  return step;
+}
+
+SdoStep if_present(SdoStep step) {
+  step.is_optional = true;
+  return step;
+}
+
+SdoSequence::SdoSequence(CanBus& bus, std::uint8_t node, std::string bus_name, std::string device,
+                         std::vector<SdoStep> steps, const SdoSequenceConfig& config)
+    : client_(bus, node, config.client),
+      bus_name_(std::move(bus_name)),
+      device_(std::move(device)),
+      steps_(std::move(steps)),
+      config_(config) {}
+
+void SdoSequence::start(std::int64_t now_ns) {
+  started_ = true;
+  begun_ns_ = now_ns;
+  if (!finished()) begin_step(now_ns);
+}
+
+void SdoSequence::begin_step(std::int64_t now_ns) {
+  step_begun_ns_ = now_ns;
+  attempt_ = 0;
+  ask(steps_[next_].kind == SdoStep::Kind::write, now_ns);
+}
+
+void SdoSequence::ask(bool write, std::int64_t now_ns) {
+  const SdoStep& step = steps_[next_];
+  writing_ = write;
+  again_at_ns_ = -1;
+  if (write) {
+    std::array<std::uint8_t, 4> bytes{};
+    write_u32_le(bytes.data(), step.value);
+    client_.start_download(step.object, std::span(bytes).first(std::min<std::size_t>(step.bytes, 4)), now_ns);
+  } else {
+    client_.start_upload(step.object, now_ns);
+  }
+  if (client_.finished()) on_answer(now_ns);  // bus off or down
+}
+
+void SdoSequence::advance(std::int64_t now_ns) {
+  ++next_;
+  if (!finished()) begin_step(now_ns);
+}
+
+bool SdoSequence::on_frame(const CanFrame& frame, std::int64_t now_ns) {
+  const bool running = started_ && !finished() && !client_.finished();
+  if (!client_.on_frame(frame, now_ns)) return false;
+  if (running && client_.finished()) on_answer(now_ns);
+  return true;
+}
+
+void SdoSequence::poll(std::int64_t now_ns) {
+  if (!started_ || finished()) return;
+  if (again_at_ns_ >= 0) {
+    if (now_ns >= again_at_ns_) ask(writing_, now_ns);
+    return;
+  }
+  client_.poll(now_ns);
+  if (client_.finished()) on_answer(now_ns);
+}
+
+std::int64_t SdoSequence::wake_ns(std::int64_t now_ns) const noexcept {
+  return again_at_ns_ >= 0 ? again_at_ns_ : client_.wake_ns(now_ns);
+}
+
+void SdoSequence::on_answer(std::int64_t now_ns) {
+  if (client_.outcome() != SdoOutcome::done) {
+    on_failure(now_ns);
+    return;
+  }
+  answered_ever_ = true;
+  if (writing_) {
+    attempt_ = 0;
+    ask(false, now_ns);  // read back
+    return;
+  }
+  on_value(now_ns);
+}
+
+void SdoSequence::on_value(std::int64_t now_ns) {
+  const SdoStep& step = steps_[next_];
+  const auto data = client_.data();
+  // A node that doesn't give a size sends four bytes, of which the object's own count.
+  if (data.size() < step.bytes || data.size() > 4) {
+    fail(std::to_string(data.size()) + " bytes", std::to_string(step.bytes) + " bytes",
+         "the object has another type than the profile gives it; is the device of the expected make?");
+    return;
+  }
+  std::array<std::uint8_t, 4> bytes{};
+  std::copy(data.begin(), data.end(), bytes.begin());
+  const std::uint32_t value = read_u32_le(bytes.data()) & size_mask(step.bytes);
+  const bool fits = step.kind == SdoStep::Kind::read || (value & step.mask) == (step.value & step.mask);
+  if (!fits && step.kind == SdoStep::Kind::expect && now_ns - step_begun_ns_ < step.patience_ns) {
+    again_at_ns_ = now_ns + config_.pause_ns;
+    return;
+  }
+  if (!fits) {
+    const std::uint32_t shown_mask = step.mask & size_mask(step.bytes);
+    std::string expected = value_text(step.value, step.bytes);
+    if (shown_mask != size_mask(step.bytes)) expected += " in the bits " + hex_text(shown_mask, 2 * step.bytes);
+    std::string advice = step.advice;
+    if (advice.empty() && step.kind == SdoStep::Kind::write) {
+      advice =
+          "the drive took the value without an error but kept another; is it limited or locked by the maker's tool?";
+    }
+    fail(value_text(value, step.bytes), std::move(expected), std::move(advice));
+    return;
+  }
+  values_.push_back({step, value, true});
+  advance(now_ns);
+}
+
+void SdoSequence::on_failure(std::int64_t now_ns) {
+  const SdoStep& step = steps_[next_];
+  const std::uint32_t code = client_.abort_code();
+  switch (client_.outcome()) {
+    case SdoOutcome::not_sent:
+      fail("the frame could not be sent", "an interface that is up",
+           "is the interface up, and is another node on the bus to acknowledge frames?");
+      return;
+    case SdoOutcome::timed_out:
+      if (!answered_ever_ ? now_ns - begun_ns_ < config_.first_answer_ns : ++attempt_ < config_.attempts) {
+        ask(writing_, now_ns);
+        return;
+      }
+      fail("no answer", answered_ever_ ? "an answer" : "a CANopen node that answers",
+           answered_ever_ ? "it answered before: was it switched off or reset?" : check_wiring);
+      return;
+    case SdoOutcome::aborted_by_server:
+      answered_ever_ = true;
+      if (step.is_optional && (code == sdo_abort::object_missing || code == sdo_abort::sub_index_missing)) {
+        missing_.push_back(to_string(step.object) + " " + step.name);
+        values_.push_back({step, 0, false});
+        advance(now_ns);
+        return;
+      }
+      fail(describe_sdo_abort(code),
+           writing_ ? "to write " + value_text(step.value, step.bytes) : std::string("to read the object"),
+           step.advice);
+      return;
+    default:
+      if (++attempt_ < config_.attempts) {
+        ask(writing_, now_ns);
+        return;
+      }
+      fail("an answer that breaks the protocol (" + describe_sdo_abort(code) + ")", "an SDO answer",
+           "do two devices share this node number?");
+      return;
+  }
+}
+
+void SdoSequence::fail(std::string found, std::string expected, std::string advice) {
+  const SdoStep& step = steps_[next_];
+  problem_ = description::SetupProblem{.bus = bus_name_,
+                                       .node = client_.node(),
+                                       .object = to_string(step.object) + " " + step.name,
+                                       .message = device_,
+                                       .found = std::move(found),
+                                       .expected = std::move(expected),
+                                       .advice = std::move(advice)};
+}
+
+std::optional<std::uint32_t> SdoSequence::value_of(ObjectAddress object) const noexcept {
+  const auto last = std::find_if(values_.rbegin(), values_.rend(),
+                                 [object](const Value& value) { return value.present && value.step.object == object; });
+  if (last == values_.rend()) return std::nullopt;
+  return last->value;
+}
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,189 @@
+#include "fieldbus/cia402/cia402_bring_up.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+using description::SetupError;
+using description::SetupProblem;
+using Slots = std::span<const DriveSlot>;
+
+void refuse_shared_nodes(Slots drives) {
+  for (auto a = drives.begin(); a != drives.end(); ++a) {
+    for (auto b = std::next(a); b != drives.end(); ++b) {
+      if (a->bus != b->bus || a->drive->node() != b->drive->node()) continue;
+      throw SetupError(
+          {.bus = b->drive->description().bus,
+           .node = b->drive->node(),
+           .message = "two drives have this node on one bus",
+           .found = a->drive->description().joint + " and " + b->drive->description().joint,
+           .expected = "one node number each",
+           .advice =
+               "set another node at one of the drives, or give each of the cell's buses an interface of its own"});
+    }
+  }
+}
+
+void send_nmt(CanNetwork& network, Slots drives, NmtCommand command, const char* name) {
+  for (const DriveSlot& slot : drives) {
+    const SendResult result = network.bus(slot.bus).send(nmt_frame(command, slot.drive->node()));
+    if (result == SendResult::sent) continue;
+    const char* found = result == SendResult::queue_full ? "a full queue"
+                        : result == SendResult::bus_off  ? "bus-off"
+                        : result == SendResult::refused  ? "a frame that the interface can't carry"
+                                                         : "an interface that is down";
+    throw SetupError({.bus = slot.drive->description().bus,
+                      .node = slot.drive->node(),
+                      .message = std::string("the NMT command ") + name + " could not be sent",
+                      .found = found,
+                      .advice = "is the interface up, and is another node on the bus to acknowledge frames?"});
+  }
+}
+
+void throw_problems(Slots drives, const std::vector<SdoSequence>& sequences) {
+  std::optional<SetupProblem> first;
+  std::string others;
+  for (std::size_t i = 0; i < sequences.size(); ++i) {
+    if (!sequences[i].problem()) continue;
+    if (!first) {
+      first = sequences[i].problem();
+    } else {
+      others += others.empty() ? "also at fault: " : ", ";
+      others += "bus " + drives[i].drive->description().bus + " node " + std::to_string(drives[i].drive->node());
+    }
+  }
+  if (!first) return;
+  for (const DriveSlot& slot : drives) {
+    if (slot.drive->node() != first->node || slot.drive->emergencies() == 0) continue;
+    if (slot.drive->description().bus != first->bus) continue;
+    first->advice += (first->advice.empty() ? "" : "; ") + std::string("the drive also sent ") +
+                     describe(slot.drive->latest_emergency());
+  }
+  if (!others.empty()) first->advice += (first->advice.empty() ? "" : "; ") + others;
+  throw SetupError(*first);
+}
+
+void refuse_restart(const ServoDrive& drive, std::uint64_t boot_ups) {
+  if (drive.boot_ups() == boot_ups) return;
+  throw SetupError({.bus = drive.description().bus,
+                    .node = drive.node(),
+                    .message = "drive of " + drive.description().joint,
+                    .found = "a restart while it was configured",
+                    .expected = "a drive that stays on",
+                    .advice = "look at its supply; is another master on the bus?"});
+}
+
+DriveIdentity identity_of(const SdoSequence& sequence) {
+  const auto value = [&](std::uint16_t index, std::uint8_t sub) { return sequence.value_of({index, sub}).value_or(0); };
+  return {value(0x1000, 0), value(0x1018, 1), value(0x1018, 2),  value(0x1018, 3),
+          value(0x1018, 4), value(0x6502, 0), sequence.missing()};
+}
+
+// The same exchange with every drive, side by side.
+template <class StepsOf>
+std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler, StepsOf steps_of) {
+  std::vector<SdoSequence> sequences;
+  sequences.reserve(drives.size());
+  for (const DriveSlot& slot : drives) {
+    const ServoDrive& drive = *slot.drive;
+    sequences.emplace_back(network.bus(slot.bus), drive.node(), drive.description().bus,
+                           "drive of " + drive.description().joint, steps_of(drive), drive.settings().sdo);
+  }
+  for (SdoSequence& sequence : sequences) sequence.start(network.now_ns());
+  std::vector<std::uint64_t> boot_ups;  // at its first answer: one that restarts later forgets it all
+  for (const DriveSlot& slot : drives) boot_ups.push_back(slot.drive->boot_ups());
+  const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
+    bool taken = false;
+    for (std::size_t i = 0; i < sequences.size() && !taken; ++i) {
+      if (drives[i].bus != bus) continue;
+      const bool answered = sequences[i].answered();
+      taken = sequences[i].on_frame(received.frame, received.time_ns);
+      if (!answered && sequences[i].answered()) boot_ups[i] = drives[i].drive->boot_ups();
+    }
+    if (!taken) handler(bus, received);
+  };
+  // Each exchange has its own deadline, so the whole ends by itself.
+  constexpr std::int64_t forever = std::numeric_limits<std::int64_t>::max();
+  pump_frames(network, forever, on_frame, [&](std::int64_t now_ns) {
+    std::int64_t wake_ns = forever;
+    bool done = true;
+    for (SdoSequence& sequence : sequences) {
+      sequence.poll(now_ns);
+      if (sequence.finished()) continue;
+      done = false;
+      wake_ns = std::min(wake_ns, sequence.wake_ns(now_ns));
+    }
+    return done ? pump_done : wake_ns;
+  });
+  throw_problems(drives, sequences);
+  for (std::size_t i = 0; i < drives.size(); ++i) refuse_restart(*drives[i].drive, boot_ups[i]);
+  std::vector<DriveIdentity> identities;
+  for (const SdoSequence& sequence : sequences) identities.push_back(identity_of(sequence));
+  return identities;
+}
+
+void wait_for_state(CanNetwork& network, Slots drives, const FrameHandler& handler, NmtState state,
+                    const char* advice) {
+  const auto in_state = [state](const DriveSlot& slot) { return slot.drive->nmt_state() == state; };
+  std::int64_t timeout_ns = 0;
+  for (const DriveSlot& slot : drives) timeout_ns = std::max(timeout_ns, slot.drive->settings().nmt_timeout_ns);
+  const std::int64_t deadline_ns = network.now_ns() + timeout_ns;
+  const bool all = pump_frames(network, deadline_ns, handler, [&](std::int64_t) {
+    return std::all_of(drives.begin(), drives.end(), in_state) ? pump_done : deadline_ns;
+  });
+  if (all) return;
+  const ServoDrive& drive = *std::find_if_not(drives.begin(), drives.end(), in_state)->drive;
+  throw SetupError({.bus = drive.description().bus,
+                    .node = drive.node(),
+                    .message = "drive of " + drive.description().joint + ", NMT state in its heartbeat",
+                    .found = std::string(to_string(drive.nmt_state())),
+                    .expected = std::string(to_string(state)),
+                    .advice = advice});
+}
+
+}  // namespace
+
+std::string describe(const DriveIdentity& identity) {
+  std::string text = "device type " + hex_text(identity.device_type, 8) + ", vendor " + hex_text(identity.vendor, 8) +
+                     ", product " + hex_text(identity.product, 8) + ", revision " + hex_text(identity.revision, 8) +
+                     ", serial number " + std::to_string(identity.serial) + ", supported modes " +
+                     hex_text(identity.supported_modes, 8);
+  const char* separator = "; hasn't: ";
+  for (const std::string& object : identity.missing) {
+    text += separator + object;
+    separator = ", ";
+  }
+  return text;
+}
+
+std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, const FrameHandler& other) {
+  refuse_shared_nodes(drives);
+  const FrameHandler handler = [&](std::size_t bus, const TimedFrame& received) {
+    for (const DriveSlot& slot : drives) {
+      if (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns)) return;
+    }
+    if (other) other(bus, received);
+  };
+  send_nmt(network, drives, NmtCommand::enter_pre_operational, "enter pre-operational");
+  std::vector<DriveIdentity> identities =
+      configure(network, drives, handler, [](const ServoDrive& drive) { return drive.configuration_steps(); });
+  wait_for_state(network, drives, handler, NmtState::pre_operational,
+                 "it took its configuration but doesn't stay in pre-operational: is another master on the bus?");
+  send_nmt(network, drives, NmtCommand::start, "start");
+  wait_for_state(network, drives, handler, NmtState::operational,
+                 "it took its configuration but doesn't start: look at its display or its error list (1003h)");
+  configure(network, drives, handler, [](const ServoDrive& drive) { return drive.operation_steps(); });
+  for (const DriveSlot& slot : drives) slot.drive->start_cycle(network.now_ns());
+  return identities;
+}
+
+void shut_down_drives(CanNetwork& network, Slots drives) noexcept {
+  shut_down_drives(drives, [&](std::size_t bus, const CanFrame& frame) { (void)network.bus(bus).send(frame); });
+}
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,56 @@
+// From silent drives to a running process image: all drives of a cell are configured side by side, or none is started.
+//
+//   std::vector<ServoDrive> drives;  ...
+//   bring_up_drives(network, slots);      // NMT pre-operational, identity, SDO written and read back, NMT start
+//   ... the cycle: SYNC, heartbeat, PDOs; the power state machine runs in it ...
+//   shut_down_drives(network, slots);     // NMT pre-operational, once the drives are switched off
+//
+// Blocks until done, at most a few seconds; throws SetupError that names bus, node, object, what was found and
+// expected. Nothing is enabled here: that takes controlwords, which only the cycle sends.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fieldbus/can/can_network.hpp"
+#include "fieldbus/can/frame_pump.hpp"
+#include "fieldbus/canopen/canopen_nmt.hpp"
+#include "fieldbus/cia402/cia402_drive.hpp"
+
+namespace proxarm::fieldbus {
+
+struct DriveSlot {
+  ServoDrive* drive = nullptr;
+  std::size_t bus = 0;  // index in the network
+};
+
+// What was learned of a drive; for the log.
+struct DriveIdentity {
+  std::uint32_t device_type = 0;
+  std::uint32_t vendor = 0;
+  std::uint32_t product = 0;  // 0 where the drive doesn't say, as the next three
+  std::uint32_t revision = 0;
+  std::uint32_t serial = 0;
+  std::uint32_t supported_modes = 0;
+  std::vector<std::string> missing;  // optional objects it hasn't: "1006h:00 communication cycle period"
+};
+
+[[nodiscard]] std::string describe(const DriveIdentity& identity);
+
+// Frames that aren't the drives' go to `other`. Two drives with one node on one bus are refused (one interface may
+// carry several of the cell's buses). The drives' start_cycle() is called at the end.
+std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const DriveSlot> drives,
+                                           const FrameHandler& other = {});
+// Doesn't wait and doesn't fail: there is nothing left to do if it can't be sent. `send(bus, frame)`, noexcept.
+template <typename Send>
+void shut_down_drives(std::span<const DriveSlot> drives, Send&& send) noexcept {
+  for (const DriveSlot& slot : drives) {
+    send(slot.bus, nmt_frame(NmtCommand::enter_pre_operational, slot.drive->node()));
+  }
+}
+void shut_down_drives(CanNetwork& network, std::span<const DriveSlot> drives) noexcept;
+
+}  // namespace proxarm::fieldbus

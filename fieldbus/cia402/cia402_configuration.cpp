@@ -1,0 +1,273 @@
+// What a CiA 402 drive is told before the cycle, and what is said of it in words.
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/canopen/canopen_sync.hpp"
+#include "fieldbus/cia402/cia402_drive.hpp"
+#include "fieldbus/cia402/eds_check.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+using description::number_text;
+using description::SetupError;
+
+constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
+
+constexpr const char* period_advice =
+    "take a period of one to three digits of microseconds or milliseconds, such as 0.5ms, 1ms, 2ms, 4ms";
+
+const DriveSettings& checked(const DriveSettings& settings) {
+  settings.validate();
+  return settings;
+}
+
+std::string period_text(std::int64_t period_ns) { return number_text(static_cast<double>(period_ns) * 1e-6) + " ms"; }
+
+[[noreturn]] void refuse(const description::DriveDescription& drive, const std::string& key, std::string found,
+                         std::string expected) {
+  throw SetupError({.bus = drive.bus,
+                    .node = drive.node,
+                    .key = "drive of " + drive.joint + ": " + key,
+                    .found = std::move(found),
+                    .expected = std::move(expected)});
+}
+
+std::uint16_t rpdo_timeout_ms(const DriveSettings& settings, std::int64_t period_ns, bool torque) noexcept {
+  if (torque) return static_cast<std::uint16_t>(period_ns * settings.torque_timeout_periods / 1'000'000);
+  const std::int64_t timeout_ns = period_ns * settings.rpdo_timeout_periods;
+  return static_cast<std::uint16_t>((timeout_ns + 999'999) / 1'000'000);
+}
+
+std::uint32_t as_u8(std::int8_t value) noexcept { return static_cast<std::uint8_t>(value); }
+
+void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
+  steps.insert(steps.end(), more.begin(), more.end());
+}
+
+void append_identity(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
+  // The first step is also the one that finds out whether the node is there at all.
+  steps.push_back(
+      sdo_expect({0x1000, 0}, 4, drive.device_type, "device type",
+                 "is another device set to this node, or is device_type in the cell's file not this drive's?"));
+  steps.push_back(sdo_read({0x1018, 1}, 4, "vendor-ID"));
+  steps.push_back(if_present(sdo_read({0x1018, 2}, 4, "product code")));
+  steps.push_back(if_present(sdo_read({0x1018, 3}, 4, "revision number")));
+  steps.push_back(if_present(sdo_read({0x1018, 4}, 4, "serial number")));
+  const CyclicMode& mode = mode_of(drive);
+  const std::uint32_t supported = 1U << (mode.number - 1);
+  steps.push_back(sdo_expect(object_address(drive.objects.supported_modes), 4, supported, "supported drive modes",
+                             mode.unsupported, supported));
+}
+
+// Quiet first: nothing but what the cycle needs may be on the bus.
+void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms,
+                 std::uint32_t inputs_object) {
+  const std::uint8_t node = drive.node;
+  for (std::uint8_t number = 2; number <= 4; ++number) {
+    steps.push_back(disable_pdo_step(PdoDirection::receive, number, node));
+    steps.push_back(disable_pdo_step(PdoDirection::transmit, number, node));
+  }
+  append(steps, pdo_steps({.direction = PdoDirection::receive,
+                           .number = 1,
+                           .id = pdo_id(PdoDirection::receive, 1, node),
+                           .transmission_type = every_sync,
+                           .event_timer_ms = timeout_ms,
+                           .fd = drive.fd,
+                           .mapping = rpdo_mapping(drive)}));
+  append(steps, pdo_steps({.direction = PdoDirection::transmit,
+                           .number = 1,
+                           .id = pdo_id(PdoDirection::transmit, 1, node),
+                           .transmission_type = every_sync,
+                           .event_timer_ms = 0,
+                           .fd = drive.fd,
+                           .mapping = tpdo_mapping(drive)}));
+  if (inputs_object == 0) return;
+  append(steps, pdo_steps({.direction = PdoDirection::transmit,
+                           .number = 2,
+                           .id = pdo_id(PdoDirection::transmit, 2, node),
+                           .transmission_type = every_sync,
+                           .event_timer_ms = 0,
+                           .mapping = {{object_address(inputs_object), 32}}}));
+}
+
+// The drive itself keeps to the torque and the speed that the cell allows. 6076h is the motor's, before the gear, in
+// mNm.
+void append_torque(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
+  const auto rated_mNm = static_cast<std::uint32_t>(std::llround(1e3 * drive.rated_torque_Nm / drive.gear_ratio));
+  const auto most = static_cast<std::uint32_t>(std::llround(1e3 * drive.max_torque_Nm / drive.rated_torque_Nm));
+  const double rpm = 60.0 / (2.0 * std::numbers::pi) * drive.max_speed_rad_per_s * drive.gear_ratio;
+  steps.push_back(if_present(sdo_expect({0x6076, 0}, 4, rated_mNm, "motor rated torque (mNm)",
+                                        "is rated_torque_Nm in the cell's file this motor's, times its gear_ratio?")));
+  steps.push_back(sdo_write({0x6072, 0}, 2, most, "max torque"));
+  steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
+}
+
+// What the drive does when we are gone or when it is told to stop. 1016h and 6007h are a must, since they are what
+// stops the arm when the controller dies; the others have defaults in the standard that stop it too.
+void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings) {
+  const std::uint32_t consumer =
+      static_cast<std::uint32_t>(settings.master_node) << 16 | settings.master_heartbeat_timeout_ms;
+  // Off first: a drive that still watches for the last session's controller would trip in the middle of this set-up.
+  steps.push_back(sdo_write({0x1016, 1}, 4, 0, "consumer heartbeat time (of the controller)"));
+  steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
+  steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
+  steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
+  steps.push_back(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"));
+  steps.push_back(if_present(sdo_write({0x605A, 0}, 2, 2, "quick stop option code (quick-stop ramp, then disabled)")));
+  steps.push_back(if_present(sdo_write({0x605B, 0}, 2, 1, "shutdown option code (slow down, then disable)")));
+  steps.push_back(if_present(sdo_write({0x605C, 0}, 2, 1, "disable operation option code (slow down, then disable)")));
+  steps.push_back(if_present(sdo_write({0x605D, 0}, 2, 1, "halt option code (slow down on ramp)")));
+  steps.push_back(if_present(sdo_write({0x605E, 0}, 2, 2, "fault reaction option code (quick-stop ramp)")));
+}
+
+}  // namespace
+
+std::vector<SdoStep> ServoDrive::operation_steps() const {
+  if (settings_.heartbeat_in_operation) return {};
+  return {sdo_write({0x1017, 0}, 2, 0, "producer heartbeat time")};
+}
+
+PeriodSteps ServoDrive::period_steps(std::int64_t from_ns, std::int64_t to_ns) const noexcept {
+  const auto from = interpolation_period(from_ns).value_or(InterpolationPeriod{}),
+             to = interpolation_period(to_ns).value_or(InterpolationPeriod{});
+  PeriodStep value{object_address(description_.objects.interpolation_value), 1, to.units, from.units};
+  PeriodStep index{object_address(description_.objects.interpolation_index), 1, as_u8(to.exponent),
+                   as_u8(from.exponent)};
+  // In between the period is to.units · 10^from.exponent, or the other way round.
+  const bool value_first = to.units * std::pow(10.0, from.exponent) >= from.units * std::pow(10.0, to.exponent);
+  const PeriodStep sync{{0x1006, 0}, 4, sync_period_us(to_ns).value_or(0), sync_period_us(from_ns).value_or(0), true};
+  const PeriodStep timer{{0x1400, 5},
+                         2,
+                         rpdo_timeout_ms(settings_, to_ns, mode_.torque),
+                         rpdo_timeout_ms(settings_, from_ns, mode_.torque),
+                         true};
+  return {value_first ? value : index, value_first ? index : value, sync, timer};
+}
+
+void DriveSettings::validate() const {
+  const auto refuse_setting = [](const char* key, std::string found, std::string expected, std::string advice = "") {
+    throw SetupError(
+        {.key = key, .found = std::move(found), .expected = std::move(expected), .advice = std::move(advice)});
+  };
+  if (!interpolation_period(period_ns) || !sync_period_us(period_ns)) {
+    refuse_setting(
+        "timestep", period_text(period_ns),
+        "a period that the drives can hold exactly: 1..255 times a power of ten of seconds (60C2h) and whole "
+        "microseconds (1006h)",
+        period_advice);
+  }
+  if (master_node < 1 || master_node > 127) refuse_setting("master_node", std::to_string(master_node), "1 to 127");
+  if (master_heartbeat_ms < 1 || master_heartbeat_timeout_ms <= master_heartbeat_ms) {
+    refuse_setting("master_heartbeat_timeout_ms", std::to_string(master_heartbeat_timeout_ms),
+                   "more than the heartbeat's own " + std::to_string(master_heartbeat_ms) + " ms");
+  }
+  if (drive_heartbeat_ms < 1 || drive_heartbeat_timeout_ms <= drive_heartbeat_ms) {
+    refuse_setting("drive_heartbeat_timeout_ms", std::to_string(drive_heartbeat_timeout_ms),
+                   "more than the heartbeat's own " + std::to_string(drive_heartbeat_ms) + " ms");
+  }
+  if (rpdo_timeout_periods < 2 || period_ns * rpdo_timeout_periods > 65'535'000'000) {
+    refuse_setting("rpdo_timeout_periods", std::to_string(rpdo_timeout_periods),
+                   "2 or more, and at most 65.535 s in all");
+  }
+  if (!(following_error_window_rad > 0.0)) {
+    refuse_setting("following_error_window_rad", number_text(following_error_window_rad), "more than 0 rad");
+  }
+}
+
+ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings)
+    : description_(drive),
+      settings_(checked(settings)),
+      mode_(mode_of(drive)),
+      tpdo_bytes_(pdo_bytes(tpdo_mapping(drive))),
+      rpdo_bytes_(pdo_bytes(rpdo_mapping(drive))),
+      scale_(drive),
+      heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
+  if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
+  if (drive.node == settings.master_node) {
+    refuse(drive, "node", std::to_string(drive.node), "a number other than the controller's own");
+  }
+  if (drive.profile != "cia402") refuse(drive, "profile", description::in_quotes(drive.profile), "cia402");
+  if (drive.mode != mode_.name) refuse(drive, "mode", description::in_quotes(drive.mode), "csp, ip or cst");
+  if (mode_.torque) set_up_torque();
+  if (!scale_.size_counts(settings.following_error_window_rad)) {
+    refuse(drive, "following_error_window_rad", number_text(settings.following_error_window_rad),
+           "a window whose counts fit 32 bits");
+  }
+  if (drive.eds.empty()) return;
+  eds_ = std::make_shared<description::EdsFile>(description::load_eds(drive.eds));
+  (void)configuration_steps();  // says what doesn't fit
+}
+
+// 6071h holds thousandths of the rated torque, in 16 bits.
+void ServoDrive::set_up_torque() {
+  if (!(description_.rated_torque_Nm > 0.0)) {
+    refuse(description_, "rated_torque_Nm", number_text(description_.rated_torque_Nm), "more than 0 Nm");
+  }
+  constexpr double most = 32.767;
+  if (!(description_.max_torque_Nm > 0.0 && description_.max_torque_Nm <= most * description_.rated_torque_Nm)) {
+    refuse(description_, "max_torque_Nm", number_text(description_.max_torque_Nm),
+           "more than 0 and at most 32.767 times rated_torque_Nm");
+  }
+  torque_per_Nm_ = description_.direction * 1e3 / description_.rated_torque_Nm;
+  if (rpdo_timeout_ms(settings_, settings_.period_ns, true) < 1) {
+    throw SetupError({.key = "timestep",
+                      .found = period_text(settings_.period_ns),
+                      .expected =
+                          "at least 0.334 ms in torque mode: the drive must give up the last torque within three "
+                          "periods, and counts them in whole milliseconds (1400h:05)"});
+  }
+}
+
+std::vector<SdoStep> ServoDrive::configuration_steps() const {
+  return eds_ ? steps_by_eds(profile_steps(), *eds_, description_) : profile_steps();
+}
+
+std::vector<SdoStep> ServoDrive::profile_steps() const {
+  const auto period = *interpolation_period(settings_.period_ns);
+  std::vector<SdoStep> steps;
+  append_identity(steps, description_);
+  append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
+              settings_.inputs_object);
+  steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
+                            "interpolation time period value"));
+  steps.push_back(sdo_write(object_address(description_.objects.interpolation_index), 1, as_u8(period.exponent),
+                            "interpolation time index"));
+  steps.push_back(
+      if_present(sdo_write({0x1006, 0}, 4, *sync_period_us(settings_.period_ns), "communication cycle period")));
+  append_reactions(steps, settings_);
+  // Ramps of the stops above, in counts/s² (the profile's default unit).
+  if (const auto ramp = scale_.size_counts(description_.max_acceleration_rad_per_s2); ramp && *ramp > 0) {
+    steps.push_back(if_present(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
+    steps.push_back(if_present(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
+  }
+  steps.push_back(
+      sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"));
+  steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
+  if (mode_.torque) append_torque(steps, description_);
+  steps.push_back(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"));
+  SdoStep display = sdo_expect(object_address(description_.objects.mode_display), 1, mode_.number,
+                               "modes of operation display", mode_.not_taken);
+  display.patience_ns = mode_patience_ns;
+  steps.push_back(display);
+  return steps;
+}
+
+std::string ServoDrive::describe() const {
+  std::string text = "drive of " + description_.joint + " (bus " + description_.bus + ", node " +
+                     std::to_string(description_.node) + "): ";
+  if (!heard_) {
+    text += "no TPDO yet";
+  } else {
+    text += std::string(to_string(state_)) + " (statusword " + hex_text(statusword_, 4) + ")";
+  }
+  if (following_error()) text += ", following error";
+  if (internal_limit()) text += ", internal limit active";
+  if (fault_ != DriveFault::none) text += std::string("; ") + to_string(fault_);
+  if (emergencies_ > 0) text += "; last " + fieldbus::describe(emergency_);
+  return text;
+}
+
+}  // namespace proxarm::fieldbus

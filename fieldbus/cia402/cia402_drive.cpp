@@ -1,0 +1,154 @@
+#include "fieldbus/cia402/cia402_drive.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "fieldbus/can/byte_order.hpp"
+#include "fieldbus/canopen/canopen_pdo.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+constexpr int syncs_before_enable = 3;  // that must have latched target = actual before 0F
+
+}  // namespace
+
+std::array<std::uint32_t, 4> ServoDrive::wanted_ids() const noexcept {
+  return {pdo_id(PdoDirection::transmit, 1, node()), emcy_id(node()), SdoClient::answer_id(node()),
+          heartbeat_id(node())};
+}
+
+std::array<std::uint32_t, 6> ServoDrive::used_ids() const noexcept {
+  const auto [tpdo, emcy, sdo, heartbeat] = wanted_ids();
+  return {tpdo, emcy, sdo, heartbeat, pdo_id(PdoDirection::receive, 1, node()), SdoClient::request_id(node())};
+}
+
+void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
+  cycling_ = true;
+  if (settings_.heartbeat_in_operation) {
+    heartbeat_.restart(now_ns);
+  } else {
+    heartbeat_.stop_watching();
+  }
+  boot_ups_at_start_ = heartbeat_.boot_ups();
+  cycles_without_tpdo_ = 0;
+  fresh_ = true;  // nothing was due before the first SYNC
+}
+
+void ServoDrive::raise(DriveFault fault) noexcept {
+  if (fault_ == DriveFault::none) fault_ = fault;
+}
+
+void ServoDrive::on_sync(std::int64_t now_ns) noexcept {
+  // The drive latches the RPDO sent before this SYNC.
+  if (held_pending_) ++held_;
+  held_pending_ = false;
+  if (!fresh_ && cycles_without_tpdo_ < UINT32_MAX) ++cycles_without_tpdo_;
+  fresh_ = false;
+  if (cycling_ && heartbeat_.lost(now_ns)) raise(DriveFault::heartbeat_lost);
+}
+
+bool ServoDrive::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept {
+  if (frame.extended || frame.remote || frame.error) return false;
+  if (frame.id == pdo_id(PdoDirection::transmit, 1, node())) return decode_tpdo(frame);
+  if (Emergency emergency; decode_emcy(frame, time_ns, node(), emergency)) {
+    if (emergency.code == 0) return true;  // an error is over; the latest one stays readable
+    emergency_ = emergency;
+    ++emergencies_;
+    if (cycling_ && goal_ == DriveGoal::operation_enabled && !old_fault_) raise(DriveFault::emergency);
+    return true;
+  }
+  if (heartbeat_.on_frame(frame, time_ns)) {
+    if (!cycling_) return true;
+    if (heartbeat_.boot_ups() != boot_ups_at_start_) {
+      raise(DriveFault::restarted);
+    } else if (heartbeat_.state() != NmtState::operational) {
+      raise(DriveFault::not_operational);
+    }
+    return true;
+  }
+  return false;
+}
+
+bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
+  if (frame.length < tpdo_bytes_) {
+    raise(DriveFault::pdo_short);
+    return true;
+  }
+  if (fresh_) ++repeated_tpdos_;
+  statusword_ = read_u16_le(&frame.data[0]);
+  actual_counts_ = read_i32_le(&frame.data[2]);
+  if (mode_.torque) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
+  cycles_without_tpdo_ = 0;
+  fresh_ = heard_ = true;
+
+  const bool was_enabled = state_ == DriveState::operation_enabled;
+  state_ = decode_state(statusword_);
+  const bool enabled = state_ == DriveState::operation_enabled;
+  if (state_ != DriveState::switched_on) held_ = 0;
+  // Once it follows, it is commanded until it leaves operation enabled: bit 12 may drop at a limit.
+  following_ = enabled && (following_ || follows_command());
+  if (goal_ == DriveGoal::operation_enabled) judge_state(was_enabled);
+  return true;
+}
+
+void ServoDrive::judge_state(bool was_enabled) noexcept {
+  const bool enabled = state_ == DriveState::operation_enabled;
+  const bool faulty = state_ == DriveState::fault || state_ == DriveState::fault_reaction_active;
+  if (!faulty) old_fault_ = false;
+  if (faulty && !old_fault_) {
+    raise(DriveFault::state_fault);
+  } else if (was_enabled && !enabled) {
+    raise(DriveFault::left_operation);
+  } else if (enabled && (statusword_ & statusword::remote) == 0) {
+    raise(DriveFault::not_remote);
+  }
+}
+
+bool ServoDrive::set_target_rad(double angle_rad) noexcept {
+  if (!following_) return false;
+  const auto counts = scale_.counts(angle_rad);
+  if (!counts) {
+    raise(DriveFault::target_out_of_range);
+    return false;
+  }
+  target_counts_ = *counts;
+  return true;
+}
+
+bool ServoDrive::set_target_torque_Nm(double torque_Nm) noexcept {
+  const double exact = std::round(torque_Nm * torque_per_Nm_);
+  constexpr double most = std::numeric_limits<std::int16_t>::max();
+  if (!(std::abs(exact) <= most)) {
+    raise(DriveFault::target_out_of_range);
+    return false;
+  }
+  target_torque_ = static_cast<std::int16_t>(exact);
+  return true;
+}
+
+bool ServoDrive::encode_rpdo(CanFrame& frame) noexcept {
+  if (!heard_) return false;
+  if (!following_) target_counts_ = actual_counts_;
+  const bool reset_first = goal_ == DriveGoal::operation_enabled && old_fault_ && state_ == DriveState::fault;
+  ControlStep step = next_controlword(state_, reset_first ? DriveGoal::fault_reset : goal_, controlword_);
+  if (step.transition == 4 && held_ < syncs_before_enable) step = {controlword::switch_on, -1};
+  controlword_ = step.controlword;
+  held_pending_ = state_ == DriveState::switched_on;
+
+  frame = CanFrame{};
+  frame.id = pdo_id(PdoDirection::receive, 1, node());
+  frame.fd = frame.bit_rate_switch = description_.fd;
+  frame.length = rpdo_bytes_;  // 4 or 6: a length that CAN FD has as well
+  // Interpolated position: bit 4 says that its targets are valid; cyclic synchronous position has no such bit.
+  const bool interpolates = description_.mode == "ip" && controlword_ == controlword::enable_operation;
+  write_u16_le(&frame.data[0], static_cast<std::uint16_t>(controlword_ | (interpolates ? 0x0010U : 0U)));
+  if (mode_.torque) {
+    write_u16_le(&frame.data[2], static_cast<std::uint16_t>(target_torque_));
+  } else {
+    write_u32_le(&frame.data[2], static_cast<std::uint32_t>(target_counts_));
+  }
+  return true;
+}
+
+}  // namespace proxarm::fieldbus

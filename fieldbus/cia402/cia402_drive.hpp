@@ -1,0 +1,185 @@
+// One CiA 402 servo drive in a cyclic mode (positions or torques), as the master's cycle sees it.
+//
+// Wire, every SYNC (identifiers of the predefined connection set): TPDO1 180 + node and RPDO1 200 + node, what they
+// carry by mode in cia402_mode.hpp; plus EMCY 080 + node and heartbeat 700 + node, as they come.
+//
+// A cycle: on_sync(); on_frame() for what comes in; set_target_rad() where following(); encode_rpdo(), send. All of
+// that is noexcept and allocates nothing. The target follows the actual position until the drive itself says that it
+// follows (operation enabled and statusword bit 12: the brake is open), and at least three SYNCs have latched such a
+// target before 0F (enable operation) is sent: otherwise the axis would jump. A torque may be set at any time: the
+// drive applies it once its brake is open, and the axis falls where it isn't what holds it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fieldbus/can/can_frame.hpp"
+#include "fieldbus/canopen/canopen_emcy.hpp"
+#include "fieldbus/canopen/canopen_heartbeat.hpp"
+#include "fieldbus/canopen/canopen_sequence.hpp"
+#include "fieldbus/cia402/cia402_mode.hpp"
+#include "fieldbus/cia402/cia402_state.hpp"
+#include "fieldbus/cia402/cia402_units.hpp"
+#include "fieldbus/cia402/cyclic_drive.hpp"
+#include "models/description/cell.hpp"
+#include "models/files/eds_file.hpp"
+
+namespace proxarm::fieldbus {
+
+// What all drives of a session share. Times that go on the wire as milliseconds have that unit.
+struct DriveSettings {
+  std::int64_t period_ns = 1'000'000;              // of SYNC; must fit 60C2h and 1006h exactly
+  std::uint8_t master_node = 127;                  // whose heartbeat the drives consume
+  std::uint16_t master_heartbeat_ms = 20;          // how often the cycle sends it
+  std::uint16_t master_heartbeat_timeout_ms = 60;  // 1016h:01: without it the drives stop by themselves
+  std::uint16_t drive_heartbeat_ms = 50;           // 1017h
+  std::uint16_t drive_heartbeat_timeout_ms = 150;  // of the master for the drives
+  // false: the drives' heartbeats end with the set-up. A TPDO at every SYNC, which ends with NMT operational as well,
+  // says the same fifty times as often, and heartbeats that coincide would cost a full bus its setpoints' deadline.
+  bool heartbeat_in_operation = true;
+  std::uint16_t rpdo_timeout_periods = 5;  // 1400h:05, rounded up to whole milliseconds
+  // The same in torque mode, rounded down: the last torque acts until then, and a third one missed must be the last.
+  std::uint16_t torque_timeout_periods = 3;
+  double following_error_window_rad = 0.05;    // 6065h, at the joint
+  std::uint16_t following_error_time_ms = 10;  // 6066h
+  // An object of 32 bits (index << 8 | sub-index), such as the digital inputs, 60FDh, that this drive sends in TPDO2 at
+  // every SYNC; 0: none. Not for decoding here.
+  std::uint32_t inputs_object = 0;
+  SdoSequenceConfig sdo{};
+  std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
+
+  void validate() const;  // throws SetupError
+};
+
+// An object that depends on the period: what it is to be, and what it was.
+struct PeriodStep {
+  ObjectAddress object{};
+  std::uint8_t bytes = 4;
+  std::uint32_t value = 0, old_value = 0;
+  bool is_optional = false;  // left to the maker
+};
+using PeriodSteps = std::array<PeriodStep, 4>;
+
+class ServoDrive final : public CyclicDrive {
+ public:
+  // Throws SetupError where the description or the settings can't be what a drive is given, by the profile or its EDS.
+  ServoDrive(const description::DriveDescription& drive, const DriveSettings& settings);
+
+  // ---- set-up ----
+  // By the profile, and by the drive's EDS where it has one (eds_check.hpp).
+  [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
+  // What is left to write once it is in operational.
+  [[nodiscard]] std::vector<SdoStep> operation_steps() const;
+  // From one period to another, in the order in which they are written; of 60C2h the part comes first with which the
+  // period is the longer one until the other part follows. Both periods are such that a drive can hold them.
+  [[nodiscard]] PeriodSteps period_steps(std::int64_t from_ns, std::int64_t to_ns) const noexcept;
+  // What the master must receive from this node: TPDO1, EMCY, SDO answers, heartbeat.
+  [[nodiscard]] std::array<std::uint32_t, 4> wanted_ids() const noexcept;
+  // All identifiers that the drive and the master use between them: those, RPDO1 and SDO requests.
+  [[nodiscard]] std::array<std::uint32_t, 6> used_ids() const noexcept;
+  [[nodiscard]] std::uint8_t node() const noexcept { return description_.node; }
+  [[nodiscard]] const description::DriveDescription& description() const noexcept override { return description_; }
+  [[nodiscard]] const DriveSettings& settings() const noexcept { return settings_; }
+  [[nodiscard]] const CountScale& scale() const noexcept { return scale_; }
+  // Watching for faults of the wire starts here, once the drive is in operational.
+  void start_cycle(std::int64_t now_ns) noexcept;
+
+  // ---- cycle ----
+  // A fault that the drive is found in when operation is first wanted (its last controller died, say) is reset on the
+  // way; any later one is raised as a fault, and only fault_reset leaves it.
+  void request(DriveGoal goal) noexcept override { goal_ = goal; }
+  // A SYNC is going out: what was received before it is no longer fresh. Also notices a lost heartbeat.
+  void on_sync(std::int64_t now_ns) noexcept override;
+  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;  // true when it was this drive's
+  // Takes a new target; false where none is taken: not following() yet, or fault target_out_of_range.
+  bool set_target_rad(double angle_rad) noexcept override;
+  // In torque mode, at the joint. False, and the torque stays as it was: fault target_out_of_range.
+  bool set_target_torque_Nm(double torque_Nm) noexcept;
+  // The RPDO of this cycle; false while no position is known yet, and then nothing may be sent.
+  bool encode_rpdo(CanFrame& frame) noexcept override;
+
+  // ---- what is known of the drive ----
+  [[nodiscard]] bool fresh() const noexcept override { return fresh_; }  // a TPDO came since the last SYNC
+  [[nodiscard]] bool heard() const noexcept { return heard_; }           // a TPDO came ever
+  [[nodiscard]] std::uint32_t cycles_without_tpdo() const noexcept override { return cycles_without_tpdo_; }
+  [[nodiscard]] DriveState state() const noexcept override { return state_; }
+  [[nodiscard]] DriveGoal goal() const noexcept { return goal_; }
+  [[nodiscard]] bool following() const noexcept override { return following_; }  // takes targets
+  [[nodiscard]] bool torque_mode() const noexcept { return mode_.torque; }
+  // 6071h and 6077h, thousandths of the rated torque; the latter as torque at the joint, too.
+  [[nodiscard]] std::int16_t target_torque() const noexcept { return target_torque_; }
+  [[nodiscard]] std::int16_t actual_torque() const noexcept { return actual_torque_; }
+  [[nodiscard]] double actual_torque_Nm() const noexcept { return actual_torque_ / torque_per_Nm_; }
+  [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
+  [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
+  [[nodiscard]] double actual_rad() const noexcept override { return scale_.angle_rad(actual_counts_); }
+  [[nodiscard]] std::int32_t target_counts() const noexcept override { return target_counts_; }
+  [[nodiscard]] double target_rad() const noexcept override { return scale_.angle_rad(target_counts_); }
+  [[nodiscard]] bool follows_command() const noexcept { return (statusword_ & statusword::follows_command) != 0; }
+  [[nodiscard]] bool following_error() const noexcept { return (statusword_ & statusword::following_error) != 0; }
+  [[nodiscard]] bool internal_limit() const noexcept { return (statusword_ & statusword::internal_limit_active) != 0; }
+  [[nodiscard]] bool warning() const noexcept { return (statusword_ & statusword::warning) != 0; }
+  [[nodiscard]] NmtState nmt_state() const noexcept { return heartbeat_.state(); }
+  [[nodiscard]] std::uint64_t boot_ups() const noexcept { return heartbeat_.boot_ups(); }
+
+  [[nodiscard]] DriveFault fault() const noexcept override {
+    return fault_;
+  }  // the first one, kept until clear_fault()
+  void clear_fault() noexcept { fault_ = DriveFault::none; }
+  void forget_fault() noexcept override {
+    clear_fault();
+    old_fault_ = true;
+  }
+  [[nodiscard]] const Emergency& latest_emergency() const noexcept { return emergency_; }
+  [[nodiscard]] std::uint64_t emergencies() const noexcept { return emergencies_; }
+  [[nodiscard]] std::uint64_t repeated_tpdos() const noexcept { return repeated_tpdos_; }
+  // State, fault and latest EMCY in words; not for the cycle.
+  [[nodiscard]] std::string describe() const override;
+
+  void archive(StateArchive& state) noexcept override {
+    state(heartbeat_, goal_, state_, fault_, statusword_, controlword_, actual_counts_, target_counts_,
+          boot_ups_at_start_, cycles_without_tpdo_, held_, held_pending_, cycling_, old_fault_, fresh_, heard_,
+          following_, emergency_, emergencies_, repeated_tpdos_, target_torque_, actual_torque_, torque_per_Nm_);
+  }
+
+ private:
+  void set_up_torque();
+  [[nodiscard]] std::vector<SdoStep> profile_steps() const;
+  bool decode_tpdo(const CanFrame& frame) noexcept;
+  void judge_state(bool was_enabled) noexcept;
+  void raise(DriveFault fault) noexcept;
+
+  description::DriveDescription description_;
+  DriveSettings settings_;
+  std::shared_ptr<const description::EdsFile> eds_;  // may be none
+  CyclicMode mode_;
+  std::uint8_t tpdo_bytes_, rpdo_bytes_;
+  CountScale scale_;
+  double torque_per_Nm_ = 1.0;  // signed
+  HeartbeatConsumer heartbeat_;
+  DriveGoal goal_ = DriveGoal::none;
+  DriveState state_ = DriveState::unknown;
+  DriveFault fault_ = DriveFault::none;
+  std::uint16_t statusword_ = 0;
+  std::uint16_t controlword_ = 0;
+  std::int32_t actual_counts_ = 0;
+  std::int32_t target_counts_ = 0;
+  std::int16_t target_torque_ = 0, actual_torque_ = 0;
+  std::uint64_t boot_ups_at_start_ = 0;
+  std::uint32_t cycles_without_tpdo_ = 0;
+  int held_ = 0;  // SYNCs that latched a target equal to the actual position, in the state switched on
+  bool held_pending_ = false;
+  bool cycling_ = false;
+  bool old_fault_ = true;  // no state other than fault has been seen since operation was first wanted
+  bool fresh_ = false;
+  bool heard_ = false;
+  bool following_ = false;
+  Emergency emergency_{};
+  std::uint64_t emergencies_ = 0;
+  std::uint64_t repeated_tpdos_ = 0;
+};
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,40 @@
+// The modes of operation (CiA 402, 6060h) that drives are led in, and what travels in their PDOs then, every SYNC,
+// numbers little-endian:
+//
+//   csp, ip   RPDO1  controlword (u16), target position (i32)          TPDO1  statusword (u16), position (i32)
+//   cst       RPDO1  controlword (u16), target torque (i16, 0.1 %)     TPDO1  the same, torque (i16, 0.1 %)
+//
+// A drive may have any of these in an object of its own (the cell's `objects`).
+//
+// Torques are thousandths of the motor's rated torque (6076h), by the sense of the counts.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fieldbus/canopen/canopen_pdo.hpp"
+#include "models/description/cell.hpp"
+
+namespace proxarm::fieldbus {
+
+struct CyclicMode {
+  const char* name;      // in a cell's file
+  std::uint8_t number;   // 6060h; 6502h has it as bit number − 1
+  std::uint32_t target;  // as in description::DriveObjects
+  bool torque;
+  const char* unsupported;  // what the user is told of a drive that hasn't got it, or that doesn't change to it
+  const char* not_taken;
+};
+
+[[nodiscard]] constexpr ObjectAddress object_address(std::uint32_t object) noexcept {
+  return {static_cast<std::uint16_t>(object >> 8), static_cast<std::uint8_t>(object)};
+}
+
+// Of a drive whose mode is one of these; any other is taken as csp.
+[[nodiscard]] const CyclicMode& mode_of(const description::DriveDescription& drive) noexcept;
+
+[[nodiscard]] std::vector<MappedObject> rpdo_mapping(const description::DriveDescription& drive);
+[[nodiscard]] std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& drive);
+[[nodiscard]] std::uint8_t pdo_bytes(const std::vector<MappedObject>& mapping) noexcept;
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,65 @@
+// A force sensor on a Modbus line, known by its file alone: the registers that hold a sample are read by function 3 at
+// the file's rate, and decoded as any described sensor's sample is (described_sensor.hpp), two bytes a register, high
+// byte first.
+//
+// Two threads: the line's worker, which exchanges, and the cycle, which uses ForceSensor's functions. The cycle never
+// waits. An exchange that fails is a sample that is missing.
+#pragma once
+
+#include <atomic>
+
+#include "fieldbus/modbus/modbus_client.hpp"
+#include "fieldbus/sensors/described_sensor.hpp"
+#include "models/base/triple_buffer.hpp"
+
+namespace proxarm::fieldbus {
+
+class ModbusSensor final : public ForceSensor {
+ public:
+  // Throws SetupError where the file isn't of such a sensor, or the unit isn't 1 to 247.
+  ModbusSensor(const description::SensorDescription& sensor, std::uint32_t unit, const std::string& line);
+
+  // ---- the worker's ----
+  // Before the cycle: is it there? Throws SetupError.
+  void start_up(ModbusClient& client, std::int64_t now_ns);
+  void exchange(ModbusClient& client, std::int64_t now_ns) noexcept;
+  [[nodiscard]] double rate_Hz() const noexcept { return protocol_.rate_Hz; }
+  [[nodiscard]] int register_count() const noexcept { return protocol_.registers->count; }
+  [[nodiscard]] double response_timeout_s() const noexcept { return protocol_.registers->response_timeout_s; }
+
+  // ---- the cycle's ----
+  [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const override { return {}; }
+  void start(CanNetwork&, std::size_t, const FrameHandler&) override {}  // start_up() does it
+  [[nodiscard]] std::string identity() const override;
+  bool poll(std::int64_t now_ns, CanFrame& frame) noexcept override;
+  bool on_frame(const CanFrame&, std::int64_t) noexcept override { return false; }
+  [[nodiscard]] bool fresh() const noexcept override { return decoder_.fresh(); }
+  [[nodiscard]] const ForceSample& latest() const noexcept override { return decoder_.latest(); }
+  void archive(StateArchive& state) noexcept override { decoder_.archive(state); }
+  void archive_input(StateArchive& state) noexcept override;
+  [[nodiscard]] std::string describe_status(std::uint32_t status) const override {
+    return decoder_.describe_status(status);
+  }
+  [[nodiscard]] std::string describe_losses() const override;
+
+ private:
+  struct Sample {
+    CanFrame frame;
+    std::int64_t time_ns = 0;
+
+    void archive(StateArchive& state) noexcept { state(frame.data, time_ns); }
+  };
+
+  description::SensorProtocol protocol_;
+  std::string line_;
+  std::uint8_t unit_;
+  DescribedSensor decoder_;
+  TripleBuffer<Sample> samples_;
+  std::atomic<std::uint64_t> failures_{0};
+  std::atomic<ModbusResult> last_failure_{ModbusResult::ok};
+  Sample read_;   // the worker's
+  Sample taken_;  // the cycle's
+  bool took_ = false;
+};
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,136 @@
+// A force/torque sensor that is known by its file alone (models/description/sensor_protocol.hpp): what the file says is
+// turned into tables once, and the cycle looks nothing up, allocates nothing and takes any bytes.
+//
+// A sample is complete when all of its frames have come in their order, within `together_s` of the first; its checksum
+// must be right, and its counter must have gone up. Halves of two samples are never mixed: where the sensor has neither
+// counter nor checksum, the sample after one that was torn apart is dropped too, since the order isn't certain there. A
+// polled sensor's frames must have been received after the poll, and one sample answers it.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "fieldbus/sensors/force_sensor.hpp"
+#include "models/description/sensor.hpp"
+
+namespace proxarm::fieldbus {
+
+struct DescribedSensorSettings {
+  std::string bus_name;       // for messages
+  std::uint32_t base_id = 0;  // the cell's
+  std::int64_t answer_timeout_ns = 100'000'000;
+  int attempts = 10;                           // at start: a second in all for a sensor that is booting
+  std::int64_t pause_ns = 2'000'000;           // after each command
+  std::int64_t oldest_sample_ns = 20'000'000;  // streaming: what was on the wire that long before its cycle is dropped
+};
+
+// What has been wrong since the start; counts frames unless it says samples.
+struct DescribedSensorCounts {
+  std::uint64_t wrong_lengths = 0;
+  std::uint64_t dropped = 0;        // repeated, out of order, too late, or before the poll
+  std::uint64_t incomplete = 0;     // samples that lack a frame, or whose order isn't certain
+  std::uint64_t bad_checksums = 0;  // samples
+  std::uint64_t repeated = 0;       // samples with the counter of the one before, or an older one
+  std::uint64_t lost = 0;           // samples, by the gaps of the counter
+};
+
+class DescribedSensor final : public ForceSensor {
+ public:
+  // Throws SetupError: a base id that the description doesn't allow, identifiers that are NMT's or SYNC's.
+  DescribedSensor(const description::SensorDescription& sensor, DescribedSensorSettings settings);
+
+  [[nodiscard]] std::vector<std::uint32_t> wanted_ids() const override;
+  [[nodiscard]] std::vector<std::uint32_t> used_ids() const override;
+  void start(CanNetwork& network, std::size_t bus, const FrameHandler& other = {}) override;
+  [[nodiscard]] std::string identity() const override;
+
+  bool poll(std::int64_t now_ns, CanFrame& frame) noexcept override;
+  bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;
+  [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
+  [[nodiscard]] const ForceSample& latest() const noexcept override { return latest_; }
+  [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
+  [[nodiscard]] std::string describe_losses() const override;
+  void archive(StateArchive& state) noexcept override {
+    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, values_,
+          latest_, counts_);
+    if (next_ >= slots_.size()) next_ = 0;
+  }
+
+  [[nodiscard]] const DescribedSensorCounts& counts() const noexcept { return counts_; }
+
+ private:
+  static constexpr std::size_t max_signals = description::max_sensor_signals;
+
+  // A number of the sample, ready to be cut out of it.
+  struct Slice {
+    std::uint16_t byte = 0;
+    std::uint8_t bytes = 0, shift = 0;
+    bool big_endian = true, is_signed = false, real = false;
+    std::uint64_t mask = 0, sign = 0;
+  };
+  struct Slot {  // a frame of the sample
+    std::uint32_t id = 0;
+    std::uint8_t bytes = 0, head_bytes = 0;
+    std::uint16_t at = 0;  // where its data go
+    bool own_head = false;
+    std::array<std::uint8_t, 64> head{};
+  };
+  struct Channel {
+    Slice slice;
+    double scale = 1.0, offset = 0.0, lowest = 0.0, highest = 0.0;
+    Wrench column{};  // of the matrix
+  };
+
+  [[nodiscard]] static Slice slice_of(const description::NumberField& number) noexcept;
+  [[nodiscard]] std::uint64_t bits_of(const Slice& slice) const noexcept;
+  [[nodiscard]] double number_of(const Slice& slice) const noexcept;
+  [[nodiscard]] bool fits(std::size_t slot, const CanFrame& frame) const noexcept;
+  [[nodiscard]] bool repeats_last(const CanFrame& frame) const noexcept;
+  [[nodiscard]] bool in_time(std::int64_t time_ns) const noexcept;
+  void take(std::size_t slot, const CanFrame& frame, std::int64_t time_ns) noexcept;
+  void refuse_frame(const CanFrame& frame) noexcept;
+  void tear() noexcept;
+  void complete(std::int64_t time_ns) noexcept;
+  [[nodiscard]] bool checksum_is_right() const noexcept;
+  [[nodiscard]] bool counter_moved() noexcept;
+  void decode(std::int64_t time_ns) noexcept;
+
+  [[nodiscard]] std::vector<CanFrame> command_frames(const description::SensorCommand& command) const;
+  void send_commands(CanNetwork& network, std::size_t bus, const FrameHandler& other);
+  [[nodiscard]] bool await_sample(CanNetwork& network, std::size_t bus, const FrameHandler& other);
+  [[noreturn]] void refuse_start() const;
+
+  // Set-up.
+  description::SensorProtocol protocol_;
+  std::string name_;
+  std::string file_;
+  DescribedSensorSettings settings_;
+  std::vector<Slot> slots_;
+  std::vector<Channel> channels_;
+  Slice counter_{}, status_{}, checksum_{};
+  Wrench range_{};
+  bool identity_matrix_ = true;
+  bool order_is_certain_ = false;
+  bool streams_ = true;
+  std::int64_t together_ns_ = 0;
+  CanFrame poll_frame_{};
+
+  // Cycle.
+  std::array<std::uint8_t, description::max_sample_bytes + 8> sample_{};  // a slice may be read past the end
+  std::size_t next_ = 0;                                                  // slot that is awaited; 0: the first
+  std::int64_t begun_ns_ = 0;
+  bool torn_ = false;  // the order of what comes now isn't certain
+  std::int64_t poll_ns_ = 0;
+  bool polled_ = false;
+  bool fresh_ = false;
+  bool counted_ = false;  // a counter has been seen
+  std::uint64_t last_count_ = 0;
+  std::array<double, max_signals> numbers_{}, values_{};
+  ForceSample latest_{};
+  DescribedSensorCounts counts_{};
+  DescribedSensorCounts counts_before_{};  // the end of start(): what came until then is no loss
+};
+
+}  // namespace proxarm::fieldbus

@@ -1,0 +1,137 @@
+// The arm's kinematics, statics and dynamics for given joint angles: poses, Jacobian, gravity, masses, elastic gears.
+//
+// Built from a cell: the URDF between its root and the sensor's link must be a chain of revolute or prismatic joints,
+// one per drive of the cell. All joint vectors are in the order of the cell's drives, in rad, Nm and kg m² at the joint
+// (after the gear).
+//   W ─X_WB─ B ─ joints ─ L (link that carries the sensor) ─X_LS─ S ─X_ST─ T
+// MuJoCo reads the URDF; the recursions below are our own, since a fixed serial chain needs no more.
+//
+// Const functions neither allocate, lock nor throw and may be called each cycle by several threads at once. They take
+// vectors of size axes(); finite angles give finite results (but see effective_mass_range). NaN in is NaN out here: the
+// caller checks its angles, as InverseKinematics does.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "models/description/cell.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::models {
+
+constexpr int max_axes = 8;
+
+// Their size is set at run time; they are stored in place.
+using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, max_axes, 1>;
+using JointMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, max_axes, max_axes>;
+// Column i is the motion of T for 1 rad/s of axis i, in W: rows 0..2 velocity (m/s), rows 3..5 angular velocity
+// (rad/s).
+using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, max_axes>;
+
+struct ToolKinematics {
+  Pose X_WT = Pose::Identity();
+  Pose X_WS = Pose::Identity();
+  Jacobian J_W;  // geometric, of T
+};
+
+// Where the arm is: T, and the places of its joints. And what gravity makes of it there.
+struct ArmPoints {
+  Vec3 tool_W = Vec3::Zero();
+  std::array<Vec3, max_axes> joint_W{};  // origins of the joints as the URDF has them, outwards from the base
+  JointVector twist_rad;                 // by which each motor is ahead of its link: τ_g/k, in the order of the drives
+};
+
+// The mass that someone who pushes the tip feels, with idle motors. In direction n it is (nᵀ J M⁻¹ Jᵀ n)⁻¹.
+struct TipMass {
+  double min_kg = 0.0, max_kg = 0.0;  // max is infinite where T can't move along max_direction_W (a singularity)
+  Vec3 min_direction_W = Vec3::UnitX(), max_direction_W = Vec3::UnitX();
+};
+
+class Arm {
+ public:
+  // Throws description::SetupError: unreadable URDF, a drive's joint that isn't there or can't be driven or isn't
+  // between root and sensor, a joint without a drive, a link without inertia.
+  explicit Arm(const description::Cell& cell);
+
+  [[nodiscard]] int axes() const noexcept { return axes_; }
+  [[nodiscard]] const std::vector<std::string>& joint_names() const noexcept { return joint_names_; }
+  [[nodiscard]] const JointVector& lower_rad() const noexcept { return lower_rad_; }
+  [[nodiscard]] const JointVector& upper_rad() const noexcept { return upper_rad_; }
+  [[nodiscard]] const JointVector& start_rad() const noexcept { return start_rad_; }
+  [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept { return gear_stiffness_; }  // 0: rigid
+
+  // Poses and Jacobian of T and S.
+  void kinematics(const JointVector& q, ToolKinematics& out) const noexcept;
+  [[nodiscard]] Pose tool_pose(const JointVector& q) const noexcept;    // X_WT
+  [[nodiscard]] Pose sensor_pose(const JointVector& q) const noexcept;  // X_WS
+
+  // One pass outwards and one back, without Jacobian.
+  void points(const JointVector& q, ArmPoints& out) const noexcept;
+  // How much paths of constant joint speeds bend: with C this matrix and p any of the points above,
+  //   |d²p/dt²| ≤ |q̇|ᵀ C |q̇|   where q̈ = 0, at any angles, slides within their ranges.
+  // C_ij = R_j for the outer of both, j, with R_j the farthest that T can get from axis j; 1 where j slides, 0 where
+  // the inner one does.
+  [[nodiscard]] JointMatrix path_curvature() const;
+
+  // Torques that hold the arm at rest against gravity, tool included: τ_g = ∂U/∂q.
+  [[nodiscard]] JointVector gravity_torque(const JointVector& q) const noexcept;
+  // The same while `wrench_W` (force, and torque about T, axes of W) acts on the tool from outside: τ_g − Jᵀ w.
+  [[nodiscard]] JointVector holding_torque(const JointVector& q, const Wrench& wrench_W) const noexcept;
+  // Potential energy in J, zero at W's origin.
+  [[nodiscard]] double potential_energy(const JointVector& q) const noexcept;
+
+  // Joint-space mass matrix, tool included; with or without the rotors.
+  [[nodiscard]] JointMatrix mass_matrix(const JointVector& q) const noexcept;
+  [[nodiscard]] JointMatrix link_mass_matrix(const JointVector& q) const noexcept;
+  // (nᵀ J M⁻¹ Jᵀ n)⁻¹ in kg; infinite where T can't move along the unit vector n.
+  [[nodiscard]] double effective_mass(const JointVector& q, const Vec3& n_W) const noexcept;
+  [[nodiscard]] TipMass effective_mass_range(const JointVector& q) const noexcept;
+
+  // Encoders sit on the motors. Gravity twists gear i by τ_i/k_i, so at rest
+  //   q_motor = q + τ_g(q)/k   (motor angles as angles at the joint; k = 0 is a rigid gear)
+  [[nodiscard]] JointVector motor_from_link(const JointVector& q) const noexcept;
+  [[nodiscard]] JointVector motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept;
+  // Its inverse, by fixed-point iteration: it contracts by about |∂τ_g/∂q|/k, 0.02 for stiff gears; stops when the step
+  // is below 1e-15 rad or after 60 iterations (gears too soft to hold the arm up at all don't converge).
+  [[nodiscard]] JointVector link_from_motor(const JointVector& q_motor) const noexcept;
+
+  // First natural frequency with locked motors: the smallest ω of K v = ω² M_link v, over axes whose gear isn't rigid.
+  // Infinite if all are.
+  [[nodiscard]] double first_elastic_frequency_Hz(const JointVector& q) const noexcept;
+
+ private:
+  // Link i with its joint's axis as z; fixed is its pose in link i−1 at angle zero (in W for i = 0).
+  struct Link {
+    Pose fixed = Pose::Identity();
+    double mass_kg = 0.0;
+    Vec3 centre_of_mass = Vec3::Zero();  // in the link
+    Mat3 inertia = Mat3::Zero();         // about the centre of mass, axes of the link
+    int drive = 0;                       // index in the cell's drives
+    bool slides = false;                 // along z, by q in m; else it turns about z
+  };
+  struct Frames {
+    std::array<Mat3, max_axes> R_W;
+    std::array<Vec3, max_axes> p_W;
+  };
+  void forward(const JointVector& q, Frames& frames) const noexcept;
+  [[nodiscard]] JointVector gravity_torque(const Frames& frames) const noexcept;
+  [[nodiscard]] JointVector twisted(const JointVector& q, const JointVector& torque) const noexcept;  // q + τ/k
+  [[nodiscard]] Eigen::Matrix3d mobility(const JointVector& q) const noexcept;  // J M⁻¹ Jᵀ, translations
+  void add_to_link(Link& link, double mass_kg, const Vec3& centre, const Mat3& inertia) const noexcept;
+  void read_chain(const description::Cell& cell);
+  void read_tool(const description::Cell& cell, const Pose& X_nL);
+
+  int axes_ = 0;
+  std::vector<std::string> joint_names_;
+  std::array<Link, max_axes> links_;  // along the chain
+  Pose X_nS_ = Pose::Identity();      // of S and T in the last link
+  Pose X_nT_ = Pose::Identity();
+  Vec3 gravity_W_ = Vec3::Zero();
+  JointVector lower_rad_, upper_rad_, start_rad_, rotor_inertia_, gear_stiffness_;
+};
+
+// X of a description: Rz(yaw) Ry(pitch) Rx(roll) and the position.
+Pose to_pose(const description::PoseDescription& description) noexcept;
+
+}  // namespace proxarm::models

@@ -1,0 +1,97 @@
+#include "models/base/quantity.hpp"
+
+#include <cmath>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
+
+namespace proxarm::description {
+namespace {
+
+// SI value = number · multiply / divide. Powers of ten are exact in a double, and dividing by one rounds once, so "1ms"
+// is the same double as 1e-3.
+struct Unit {
+  std::string_view name;
+  double multiply, divide;
+};
+
+struct Kind {
+  std::string_view what, example;
+  std::span<const Unit> units;
+  bool needs_unit, allows_zero;
+};
+
+constexpr Unit durations[] = {{"s", 1, 1},    {"ms", 1, 1e3}, {"us", 1, 1e6},   {"µs", 1, 1e6},
+                              {"μs", 1, 1e6}, {"ns", 1, 1e9}, {"min", 60, 1.0}, {"h", 3600, 1}};
+constexpr Unit masses[] = {{"kg", 1, 1}, {"g", 1, 1e3}};
+constexpr Unit dampings[] = {{"Ns/m", 1, 1}, {"N*s/m", 1, 1}, {"N·s/m", 1, 1}};
+constexpr Unit lengths[] = {{"m", 1, 1}, {"mm", 1, 1e3}, {"cm", 1, 1e2}};
+constexpr Unit forces[] = {{"N", 1, 1}};
+constexpr Unit stiffnesses[] = {{"N/m", 1, 1}, {"N/mm", 1e3, 1}};
+
+std::string expected(const Kind& kind) {
+  return std::string(kind.what) + (kind.allows_zero ? ", zero or more" : " above zero") +
+         (kind.needs_unit ? ", with its unit" : "") + ", such as " + std::string(kind.example);
+}
+
+double parse(std::string_view text, std::string_view option, const Kind& kind) {
+  const auto fail = [&](std::string advice = {}) {
+    return SetupError({.key = std::string(option),
+                       .found = in_quotes(text),
+                       .expected = expected(kind),
+                       .advice = std::move(advice)});
+  };
+  std::string_view rest = text;
+  while (rest.starts_with(' ')) rest.remove_prefix(1);
+  while (rest.ends_with(' ')) rest.remove_suffix(1);
+  // The longest beginning that is a number; what follows is the unit. ("1e3s" is 1000 s; no unit begins with e.)
+  std::size_t length = std::min<std::size_t>(rest.size(), 64);
+  std::optional<double> number;
+  while (length > 0 && !(number = strict_number(rest.substr(0, length)))) --length;
+  if (!number) throw fail();
+  std::string_view unit = rest.substr(length);
+  while (unit.starts_with(' ')) unit.remove_prefix(1);
+  if (unit.empty()) {
+    if (kind.needs_unit) {
+      const std::string written(rest.substr(0, length));
+      const bool time = kind.units.front().name == "s";
+      throw fail("the unit is missing: " + written + (time ? "ms? " : "mm? ") + written + (time ? "s?" : "m?"));
+    }
+    unit = kind.units.front().name;
+  }
+  for (const Unit& u : kind.units) {
+    if (u.name != unit) continue;
+    const double value = *number * u.multiply / u.divide;
+    if (!std::isfinite(value) || value < 0.0 || (!kind.allows_zero && value == 0.0)) throw fail();
+    return value;
+  }
+  std::string names;
+  for (const Unit& u : kind.units) names += (names.empty() ? "" : ", ") + std::string(u.name);
+  throw fail(in_quotes(unit) + " is no unit of it; known: " + names);
+}
+
+}  // namespace
+
+double parse_duration(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a duration", "1ms", durations, true, false});
+}
+double parse_mass(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a mass", "3kg", masses, false, false});
+}
+double parse_damping(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a damping", "20Ns/m", dampings, false, true});
+}
+double parse_stiffness(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a stiffness", "500N/m", stiffnesses, false, true});
+}
+double parse_length(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a length", "20mm", lengths, true, false});
+}
+double parse_force(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a force", "20N", forces, false, false});
+}
+
+}  // namespace proxarm::description

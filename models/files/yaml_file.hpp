@@ -1,0 +1,144 @@
+// Strict reading of the YAML files that users write: every mistake is reported with file, line, key, found and
+// expected.
+//
+//   const YamlNode root = YamlNode::load("scenes/wall.yaml");
+//   const double mass = root.number("mass_kg", above(0.0, 100.0));       // required; the unit is read off the key
+//   const double friction = root.number_or("friction", 0.0, between(0.0, 10.0));
+//   for (const YamlNode& object : root.list("objects", 1, 1000)) read_object(object);
+//   root.finish();                                                       // unknown keys anywhere below are mistakes
+//
+// Stricter than YAML, since files come from strangers and silence is worse than a message: refused are duplicate keys,
+// numbers with leading zeros (010), non-finite and hexadecimal reals, quoted numbers, anchors, aliases and tags, tabs
+// in the indentation, several documents, text that isn't UTF-8, control characters, files above 16 MiB, nesting above
+// 32 levels. All functions throw SetupError on what the user did wrong. A node is a cheap handle that keeps its file
+// alive.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::description {
+
+// Which numbers are allowed; bounds in the unit of the key.
+struct Range {
+  double min = std::numeric_limits<double>::lowest();
+  double max = std::numeric_limits<double>::max();
+  bool above_min = false;  // min itself is not allowed
+
+  [[nodiscard]] bool contains(double value) const noexcept {
+    return (above_min ? value > min : value >= min) && value <= max;
+  }
+};
+
+constexpr Range between(double min, double max) { return {min, max, false}; }
+constexpr Range above(double min, double max = std::numeric_limits<double>::max()) { return {min, max, true}; }
+constexpr Range any_number() { return {}; }
+
+// The unit that a key's name states, as people write it: mass_kg → "kg", damping_Ns_per_m → "Ns/m"; empty if none.
+std::string unit_of_key(std::string_view key);
+
+class YamlNode {
+ public:
+  // Reads a file. Messages name the file as given here; its relative paths are resolved against its own folder.
+  static YamlNode load(const std::filesystem::path& file);
+  // The same from text that is already in memory; `file` is for messages and relative paths.
+  static YamlNode parse(std::string_view text, const std::filesystem::path& file);
+
+  // Where this is. `path` is dotted from the root, such as objects[0].friction; empty for the root.
+  [[nodiscard]] std::string path() const;
+  [[nodiscard]] int line() const noexcept;
+  [[nodiscard]] int column() const noexcept;
+  [[nodiscard]] const std::filesystem::path& file() const noexcept;
+  // The key by which this is called in its map; empty for elements of lists and for the root.
+  [[nodiscard]] const std::string& name() const noexcept;
+
+  [[nodiscard]] bool is_map() const noexcept;
+  [[nodiscard]] bool is_list() const noexcept;
+  [[nodiscard]] bool is_scalar() const noexcept;
+
+  // A map's entries. Each call makes the key known to finish(); asking for a key of what isn't a map is a mistake
+  // of the file. An entry without a value (`key:`) counts as a mistake, not as absent.
+  [[nodiscard]] bool has(std::string_view key) const;
+  [[nodiscard]] YamlNode at(std::string_view key) const;  // required
+  [[nodiscard]] std::optional<YamlNode> find(std::string_view key) const;
+  [[nodiscard]] YamlNode map(std::string_view key) const;  // required, and a map
+  [[nodiscard]] std::optional<YamlNode> find_map(std::string_view key) const;
+  [[nodiscard]] std::vector<YamlNode> list(std::string_view key, std::size_t min_size = 0,
+                                           std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
+  // Keys in the order of the file, for maps whose keys are names that the user chooses; makes all of them known.
+  [[nodiscard]] std::vector<std::string> keys() const;
+
+  [[nodiscard]] double number(std::string_view key, Range range) const;
+  [[nodiscard]] double number(std::string_view key, double min, double max) const;
+  [[nodiscard]] double number_or(std::string_view key, double otherwise, Range range) const;
+  [[nodiscard]] double number_or(std::string_view key, double otherwise, double min, double max) const;
+  [[nodiscard]] std::int64_t integer(std::string_view key, std::int64_t min, std::int64_t max) const;
+  [[nodiscard]] std::int64_t integer_or(std::string_view key, std::int64_t otherwise, std::int64_t min,
+                                        std::int64_t max) const;
+  [[nodiscard]] bool boolean(std::string_view key) const;
+  [[nodiscard]] bool boolean_or(std::string_view key, bool otherwise) const;
+  [[nodiscard]] std::string string(std::string_view key) const;  // not empty
+  [[nodiscard]] std::string string_or(std::string_view key, std::string_view otherwise) const;
+  [[nodiscard]] std::string choice(std::string_view key, std::span<const std::string> allowed) const;
+  [[nodiscard]] std::string choice(std::string_view key, std::initializer_list<std::string> allowed) const;
+  [[nodiscard]] std::string choice_or(std::string_view key, std::string_view otherwise,
+                                      std::initializer_list<std::string> allowed) const;
+  [[nodiscard]] std::array<double, 3> vec3(std::string_view key, Range range = any_number()) const;
+  [[nodiscard]] std::array<double, 3> vec3_or(std::string_view key, const std::array<double, 3>& otherwise,
+                                              Range range = any_number()) const;
+  [[nodiscard]] std::vector<double> numbers(std::string_view key, std::size_t min_size, std::size_t max_size,
+                                            Range range = any_number()) const;
+  // A path, absolute or relative to the file's folder, made absolute. Whether it exists is not looked at...
+  [[nodiscard]] std::filesystem::path path_of(std::string_view key) const;
+  // ... or must be a readable file.
+  [[nodiscard]] std::filesystem::path existing_file(std::string_view key) const;
+
+  // This node itself, for elements of lists.
+  [[nodiscard]] double as_number(Range range = any_number()) const;
+  [[nodiscard]] std::int64_t as_integer(std::int64_t min, std::int64_t max) const;
+  [[nodiscard]] bool as_boolean() const;
+  [[nodiscard]] std::string as_string() const;
+  [[nodiscard]] std::string as_choice(std::span<const std::string> allowed) const;
+  [[nodiscard]] std::array<double, 3> as_vec3(Range range = any_number()) const;
+  [[nodiscard]] std::vector<double> as_numbers(std::size_t min_size, std::size_t max_size,
+                                               Range range = any_number()) const;
+  [[nodiscard]] std::vector<YamlNode> as_list(std::size_t min_size = 0,
+                                              std::size_t max_size = std::numeric_limits<std::size_t>::max()) const;
+
+  // Throws on the first key, here or anywhere below, that nobody has asked for; names the nearest known key.
+  // Call it on the root when all has been read.
+  void finish() const;
+
+  // For a check of one's own: the error for this node. `found` defaults to the node's own text.
+  [[nodiscard]] SetupError error(std::string expected, std::string found = {}, std::string advice = {}) const;
+  // The same for an entry of this map, present or not.
+  [[nodiscard]] SetupError error_at(std::string_view key, std::string expected, std::string found = {},
+                                    std::string advice = {}) const;
+
+ private:
+  struct Item;
+  struct Document;
+  class Builder;
+
+  YamlNode(std::shared_ptr<const Document> document, const Item& item) : document_(std::move(document)), item_(&item) {}
+  [[nodiscard]] const Item* child(std::string_view key) const;  // null if there is none
+  [[nodiscard]] std::string found() const;
+  [[nodiscard]] SetupError missing(std::string_view key, std::string expected) const;
+  [[nodiscard]] YamlNode required(std::string_view key, const std::string& expected) const;
+  void require_map() const;
+
+  std::shared_ptr<const Document> document_;
+  const Item* item_;
+};
+
+}  // namespace proxarm::description

@@ -1,0 +1,15 @@
+#include "models/geometry/eigenvalues.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace proxarm::models {
+
+double spectral_radius(const Eigen::MatrixXd& A) {
+  return Eigen::EigenSolver<Eigen::MatrixXd>(A, false).eigenvalues().cwiseAbs().maxCoeff();
+}
+
+Eigen::VectorXd generalized_eigenvalues(const Eigen::MatrixXd& K, const Eigen::MatrixXd& M) {
+  return Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(K, M, Eigen::EigenvaluesOnly).eigenvalues();
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,172 @@
+#include "models/obstacles/cylinder_obstacle.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::models {
+
+CylinderObstacle::CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction,
+                                   const Layer& layer)
+    : middle_(0.5 * (from_m + to_m)),
+      e_(unit<3>(to_m - from_m)),
+      half_(0.5 * (to_m - from_m).norm()),
+      R_(radius_m),
+      depth_(layer.thickness_m),
+      side_({middle_, e_}, radius_m, friction, false, layer),
+      end_{{to_m, e_, friction, layer}, {from_m, -e_, friction, layer}} {}
+
+double CylinderObstacle::rounding(const Vec3& x) const noexcept {
+  constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+  return 16.0 * u * (x.lpNorm<1>() + middle_.lpNorm<1>() + half_ + R_);
+}
+
+// Where the way from q to p is inside: from `enter` (through `feature`) to `leave`.
+struct CylinderObstacle::Crossing {
+  double enter = -std::numeric_limits<double>::infinity();
+  double leave = std::numeric_limits<double>::infinity();
+  std::int32_t feature = -1;  // -1: q is inside
+  std::int32_t exit = -1;
+  double enters[3] = {-1.0, -1.0, -1.0};  // by feature; negative where q isn't outside of it or on it
+
+  [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
+  void enter_at(double t, std::int32_t by) noexcept {
+    enters[by] = t;
+    if (t > enter) {
+      enter = t;
+      feature = by;
+    }
+  }
+  void leave_at(double t, std::int32_t by) noexcept {
+    if (t < leave) {
+      leave = t;
+      exit = by;
+    }
+  }
+};
+
+CylinderObstacle::Crossing CylinderObstacle::cross(const Vec3& q, const Vec3& p) const noexcept {
+  Crossing c;
+  const double tolerance = rounding(q), infinity = std::numeric_limits<double>::infinity();
+  const double z_q = along(q), z_p = along(p);
+  for (const std::int32_t end : {far_end, near_end}) {
+    const double sign = end == far_end ? 1.0 : -1.0, from = sign * z_q - half_, to = sign * z_p - half_;
+    if (from >= -tolerance) {
+      if (!(to < 0.0)) {
+        c.enter = infinity;
+        return c;
+      }
+      c.enter_at(from > tolerance ? from / (from - to) : 0.0, end);
+    } else if (to > 0.0) {
+      c.leave_at(from / (from - to), end);
+    }
+  }
+  // ‖u + t d‖ = R across the axis.
+  const Vec3 u = radial(q), d = radial(p) - u;
+  const double a = d.squaredNorm(), b = u.dot(d), from = u.norm() - R_;
+  const double discriminant = b * b - a * (u.norm() + R_) * from;
+  if (from >= -tolerance) {
+    if (!(b < 0.0) || !(discriminant > 0.0)) {
+      c.enter = infinity;
+      return c;
+    }
+    const double root = std::sqrt(discriminant);
+    c.enter_at(from > tolerance ? (u.norm() + R_) * from / (root - b) : 0.0, side);
+    c.leave_at((root - b) / a, side);
+  } else if (a > 0.0) {
+    c.leave_at((std::sqrt(std::max(0.0, discriminant)) - b) / a, side);
+  }
+  return c;
+}
+
+Obstacle::Step CylinderObstacle::step(double K, const Vec3& p, const Vec3& q) const noexcept {
+  Crossing c = cross(q, p);
+  if (!c.any()) return {p, e_, 0, false, false};
+  if (c.feature < 0) {
+    const double to_end = half_ - std::abs(along(q)), to_side = R_ - radial(q).norm();
+    c.feature = to_side < to_end ? side : along(q) > 0.0 ? far_end : near_end;
+    c.enters[c.feature] = 0.0;
+  }
+  const double tolerance = rounding(q);
+  const auto alone = [&](std::int32_t feature) {
+    Step s = feature == side ? side_.step(K, p, q) : end_[feature - 1].step(K, p, q);
+    s.feature = feature;
+    return s;
+  };
+  Step best;
+  double best_t = -1.0, best_distance = 0.0;
+  for (const std::int32_t feature : {side, far_end, near_end}) {
+    const double t = c.enters[feature];
+    if (t < 0.0) continue;
+    const Step s = alone(feature);
+    if (!s.touches) continue;
+    const bool on = feature == side ? std::abs(along(s.r)) <= half_ + tolerance : radial(s.r).norm() <= R_ + tolerance;
+    const double distance = s.slips ? (s.r - p).norm() : 0.0;  // one that sticks is preferred
+    if (on && (t > best_t || (t == best_t && distance < best_distance))) {
+      best = s;
+      best_t = t;
+      best_distance = distance;
+    }
+  }
+  if (best.touches) return best;
+
+  Step s = alone(c.feature);
+  if (!s.touches) return {p, s.normal, 0, false, false};
+  if (c.feature == side) {
+    const double z = along(s.r), z_p = along(p);
+    if (std::abs(z_p) > half_ && (z_p > 0.0) == (z > 0.0)) return {p, s.normal, 0, false, false};
+    s.r -= (z - std::copysign(half_, z)) * e_;
+  } else {
+    const Vec3 u = radial(s.r);
+    if (radial(p).norm() > R_ && radial(p).dot(u) > 0.0) return {p, s.normal, 0, false, false};
+    s.r -= (1.0 - R_ / u.norm()) * u;
+  }
+  s.slips = false;
+  return s;
+}
+
+bool CylinderObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
+  if (std::min(half_ - std::abs(along(r)), R_ - radial(r).norm()) > 2.0 * rounding(r) + depth_) return true;
+  const Crossing c = cross(q, r);
+  return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;
+}
+
+// By convexity, the midpoint of the way's part inside has at least half the depth of its deepest point.
+bool CylinderObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
+  const Crossing c = cross(x, y);
+  if (!c.any()) return false;
+  const Vec3 middle = x + 0.5 * (std::max(c.enter, 0.0) + std::min(c.leave, 1.0)) * (y - x);
+  return distance(middle) < -2.0 * rounding(middle);
+}
+
+// The proxy slides along the side or the end that it entered through, from where the straight way enters to the rim.
+Vec3 CylinderObstacle::detour(const Vec3& p, const Vec3& q) const noexcept {
+  const Crossing c = cross(q, p);
+  if (!c.any() || c.feature < 0 || step(1.0, p, q).touches) return q;
+  const Vec3 from = q + std::max(c.enter, 0.0) * (p - q);
+  const Vec3 d = (c.feature == side ? side_.step(1.0, p, q) : end_[c.feature - 1].step(1.0, p, q)).r - from;
+  if (c.feature == side) {
+    const double z = along(from), rise = e_.dot(d), share = (std::copysign(half_, rise) - z) / rise;
+    const Vec3 on_rim = from + (rise != 0.0 ? std::clamp(share, 0.0, 1.0) : 0.0) * d, u = radial(on_rim);
+    return on_rim + (R_ / u.norm() - 1.0) * u;
+  }
+  // ‖u + t v‖ = R on the end.
+  const Vec3 u = radial(from), v = radial(d);
+  const double a = v.squaredNorm(), b = u.dot(v), inside = std::max(0.0, R_ * R_ - u.squaredNorm());
+  return a > 0.0 ? Vec3(from + std::min(1.0, (std::sqrt(b * b + a * inside) - b) / a) * d) : from;
+}
+
+Obstacle::Tangent CylinderObstacle::tangent(const Vec3& r, std::int32_t feature) const noexcept {
+  return feature == side ? side_.tangent(r, 0) : end_[feature - 1].tangent(r, 0);
+}
+
+double CylinderObstacle::distance(const Vec3& x) const noexcept {
+  const double z = std::abs(along(x)) - half_, across = radial(x).norm() - R_;
+  return std::hypot(std::max(z, 0.0), std::max(across, 0.0)) + std::min(0.0, std::max(z, across));
+}
+
+Bounds CylinderObstacle::bounds() const noexcept {
+  const Vec3 reach = half_ * e_.cwiseAbs() + R_ * (Vec3::Ones() - e_.cwiseAbs2()).cwiseMax(0.0).cwiseSqrt();
+  return {middle_ - reach, middle_ + reach};
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,52 @@
+// A solid cylinder with flat ends.
+//
+// It works as a box does: the proxy is held by the side or the end through which it enters, slides there exactly, and
+// is free past the rim. A proxy that would be held by friction beside that face is held at the rim.
+#pragma once
+
+#include "models/obstacles/plane_obstacle.hpp"
+#include "models/obstacles/round_obstacle.hpp"
+
+namespace proxarm::models {
+
+class CylinderObstacle final : public Obstacle {
+ public:
+  // From the middle of one end to that of the other. Throws std::invalid_argument for ends that coincide, and for a
+  // radius or a friction that isn't finite or negative.
+  CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction, const Layer& layer = {});
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override;
+  [[nodiscard]] Layer layer() const noexcept override { return end_[0].layer(); }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return depth_ > 0.0 && distance(r) < -2.0 * rounding(r);
+  }
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override;
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override;
+  [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override;
+  [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override;
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override;
+  [[nodiscard]] Bounds bounds() const noexcept override;
+  void set_friction(double friction) noexcept override {
+    side_.set_friction(friction);
+    for (PlaneObstacle& end : end_) end.set_friction(friction);
+  }
+
+ private:
+  enum Feature : std::int32_t { side = 0, far_end = 1, near_end = 2 };
+  struct Crossing;
+
+  [[nodiscard]] Crossing cross(const Vec3& q, const Vec3& p) const noexcept;
+  [[nodiscard]] double along(const Vec3& x) const noexcept { return e_.dot(x - middle_); }
+  [[nodiscard]] Vec3 radial(const Vec3& x) const noexcept { return (x - middle_) - e_ * along(x); }
+  [[nodiscard]] double rounding(const Vec3& x) const noexcept;
+
+  Vec3 middle_;
+  Vec3 e_;
+  double half_;
+  double R_;
+  double depth_;  // of the layer
+  RoundBar side_;
+  PlaneObstacle end_[2];  // far, near
+};
+
+}  // namespace proxarm::models

@@ -1,0 +1,130 @@
+// An obstacle that moves: by a script, or driven from outside.
+//
+// The object's own motion carries the previous proxy along before it is used as q(k−1): in the object's frame q is
+// X(t − T)⁻¹ q, and p is X(t)⁻¹ p. Everything else happens in that frame, where the object stands still. So friction
+// acts against the relative motion, and the object can sweep onto a resting proxy; this holds for rigid surfaces and
+// for elastic layers.
+//
+// A mesh has no inside from which it could bring a proxy back, so rounding between its frame and W must never take the
+// proxy through a face. Three things see to that: the surface that the proxy touches is in front of the faces by more
+// than this rounding (Obstacle::set_rounding_size); a point in W is returned only after it has been taken back to the
+// object's frame and tested; and each step starts, bit for bit, from the pose to which the step before it went.
+#pragma once
+
+#include <memory>
+#include <numbers>
+
+#include "models/obstacles/obstacle.hpp"
+
+namespace proxarm::models {
+
+// A scripted motion, relative to where the object was described: a turn about a point, a shift and a swing.
+//   x(t) = c + R(ω t) (x − c) + v t + a sin(2π f t + φ)
+struct ScriptedMotion {
+  Vec3 velocity_m_per_s = Vec3::Zero();
+  Vec3 amplitude_m = Vec3::Zero();
+  double frequency_Hz = 0.0;
+  double phase_rad = 0.0;
+  Vec3 axis = Vec3::UnitZ();  // unit
+  Vec3 centre_m = Vec3::Zero();
+  double turn_rad_per_s = 0.0;
+
+  [[nodiscard]] Pose at(double time_s) const noexcept {
+    Pose X = Pose::Identity();
+    X.linear() = Eigen::AngleAxisd(turn_rad_per_s * time_s, axis).toRotationMatrix();
+    X.translation() = centre_m - X.linear() * centre_m + velocity_m_per_s * time_s +
+                      amplitude_m * std::sin(2.0 * std::numbers::pi * frequency_Hz * time_s + phase_rad);
+    return X;
+  }
+};
+
+class MovingObstacle final : public Obstacle {
+ public:
+  // `still`: the object at rest, where it was described.
+  MovingObstacle(std::unique_ptr<Obstacle> still, const ScriptedMotion& motion)
+      : still_(std::move(still)), motion_(motion), scripted_(true) {
+    last_ = now_ = motion_.at(0.0);
+    go_from(now_);
+  }
+  // A driven object, which stands at `start` until drive() is called.
+  MovingObstacle(std::unique_ptr<Obstacle> still, const Pose& start)
+      : still_(std::move(still)), now_(rigid(start)), driven_from_(now_) {
+    go_from(now_);
+  }
+
+  // Sets the pose for the next step; the object moves there from the pose of the last call. To be called once before
+  // each step. A rotation that isn't orthonormal to within rounding is made so.
+  void drive(const Pose& X) noexcept {
+    driven_from_ = now_;
+    now_ = rigid(X);
+    go_from(driven_from_);
+  }
+
+  // Order 2 asks a second time for the same time, from q̃ and over a shorter period: see from().
+  void set_time(double time_s, double period_s) noexcept override;
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
+    const Vec3 q_O = from(q);
+    Step s = still_->step(K, now_inverse_ * p, q_O);
+    s.r = s.touches ? to_W(s.r, q_O, q) : p;
+    s.normal = now_.linear() * s.normal;
+    return s;
+  }
+  [[nodiscard]] std::size_t contacts(double K, const Vec3& p, const Vec3& q, const Step& s,
+                                     std::array<Contact<3>, 3>& out) const noexcept override;
+
+  // Precondition: q has been carried along already, as World does.
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
+    return still_->excludes(now_inverse_ * q, now_inverse_ * r);
+  }
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
+    return still_->bars(now_inverse_ * x, now_inverse_ * y);
+  }
+  [[nodiscard]] Vec3 detour(const Vec3& p, const Vec3& q) const noexcept override {
+    const Vec3 q_O = from(q), w = still_->detour(now_inverse_ * p, q_O);
+    return w == q_O ? q : Vec3(now_ * w);
+  }
+  [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t feature) const noexcept override {
+    const Tangent t = still_->tangent(now_inverse_ * r, feature);
+    return {FlatSurface<3>::of_unit(now_ * t.surface.point(), now_.linear() * t.surface.normal()), t.mu};
+  }
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return still_->distance(now_inverse_ * x); }
+  [[nodiscard]] bool comes_within(const Vec3& x, double reach) const noexcept override {
+    return still_->comes_within(now_inverse_ * x, reach);
+  }
+  bool parts(const Vec3& x, const Vec3& y, Vec3& normal) const noexcept override {
+    if (!still_->parts(now_inverse_ * x, now_inverse_ * y, normal)) return false;
+    normal = now_.linear() * normal;
+    return true;
+  }
+  [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
+  [[nodiscard]] Vec3 carry(const Vec3& q) const noexcept override {
+    const Vec3 q_O = from(q);
+    return rests_ && (!shortened_ || q_O == before_inverse_ * q) ? q : Vec3(now_ * q_O);
+  }
+  [[nodiscard]] bool moves() const noexcept override { return true; }
+  void set_friction(double friction) noexcept override { still_->set_friction(friction); }
+  [[nodiscard]] Layer layer() const noexcept override { return still_->layer(); }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override { return still_->presses_at(now_inverse_ * r); }
+
+ private:
+  static Pose rigid(Pose X) noexcept;
+  void go_from(const Pose& before) noexcept;
+  [[nodiscard]] Vec3 from(const Vec3& q) const noexcept;
+  [[nodiscard]] Vec3 to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept;
+
+  std::unique_ptr<Obstacle> still_;
+  ScriptedMotion motion_;
+  bool scripted_ = false;
+  Pose now_ = Pose::Identity();
+  Pose now_inverse_ = Pose::Identity(), before_inverse_ = Pose::Identity();
+  bool rests_ = true;  // both poses are the same
+  // The poses at the time before (scripted) and at the call of drive() before (driven).
+  Pose last_ = Pose::Identity(), driven_from_ = Pose::Identity();
+  double time_s_ = 0.0, last_time_s_ = 0.0;
+  double whole_period_s_ = 0.0;
+  bool shortened_ = false;
+  mutable Vec3 whole_from_ = Vec3::Zero();  // the last result of from() for a whole period
+};
+
+}  // namespace proxarm::models

@@ -1,0 +1,56 @@
+// A half-space among other obstacles: (2) and (4), with an elastic layer if there is one.
+#pragma once
+
+#include <cmath>
+#include <stdexcept>
+
+#include "models/obstacles/obstacle.hpp"
+#include "models/obstacles/round_obstacle.hpp"
+#include "models/surfaces/layer.hpp"
+
+namespace proxarm::models {
+
+class PlaneObstacle final : public Obstacle {
+ public:
+  // Throws std::invalid_argument as FrictionPlane does.
+  PlaneObstacle(const Vec3& point_m, const Vec3& normal, double friction, const Layer& layer = {})
+      : surface_(point_m, normal), mu_(friction), layer_(layer) {
+    if (!std::isfinite(friction) || !(friction >= 0.0)) {
+      throw std::invalid_argument("a friction coefficient must be finite and not negative");
+    }
+  }
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
+    const FaceStep<3> s = step_on_layer(surface_, mu_, layer_, K, p, q);
+    return {s.r, surface_.normal(), 0, s.touches, s.slips};
+  }
+
+  [[nodiscard]] Layer layer() const noexcept override { return layer_; }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return layer_.soft() && surface_.height(r) < -surface_.rounding(r);
+  }
+  [[nodiscard]] bool excludes(const Vec3& /*q*/, const Vec3& r) const noexcept override {
+    return surface_.height(r) < -slack_ * surface_.rounding(r) - (layer_.soft() ? layer_.thickness_m : 0.0);
+  }
+
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override { return excludes(x, y); }
+
+  [[nodiscard]] Tangent tangent(const Vec3& /*r*/, std::int32_t /*feature*/) const noexcept override {
+    return {surface_, mu_};
+  }
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return surface_.height(x); }
+  void set_friction(double friction) noexcept override { mu_ = friction; }
+  // How many units of rounding a point may be behind the surface and still be allowed. One is right for a surface by
+  // itself. Two half-spaces back to back (a plane guide) need more, about 8: a point on the one is behind the other by
+  // the rounding of both. Beyond 500 (1e-12 m within a metre) the contract's "never inside" would not hold.
+  void set_slack(double roundings) noexcept { slack_ = roundings; }
+  [[nodiscard]] Bounds bounds() const noexcept override { return {}; }
+
+ private:
+  FlatSurface<3> surface_;
+  double mu_;
+  Layer layer_;
+  double slack_ = 1.0;
+};
+
+}  // namespace proxarm::models

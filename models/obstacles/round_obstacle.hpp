@@ -1,0 +1,297 @@
+// Spheres, capsules and round bars, solid or seen from inside: all points at a distance R from a core, which is a
+// point, a segment or a line. R may be zero.
+//
+// The normal at r points along the line from the core through r. In units where K = 1, friction is −λ N Nᵀ (r − q) with
+// an unknown λ ≥ 0. The tangential balance N Nᵀ [(r − p) + λ (r − q)] = 0 says that r is the point of the surface
+// nearest to the mix p' = (p + λ q)/(1 + λ), as it would be nearest to p without friction. With s = 1/(1 + λ), friction
+// in three dimensions thus becomes one scalar equation, that of the friction cone:
+//   r(s) = nearest to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1,
+// where s = 1 is frictionless and s = 0 is stick (r nearest to q). On a plane this is (4), and linear in s. It is
+// solved by the secant method, safeguarded by bisection.
+//
+// Where the way from q to p passes close to the core, at o = q + s₀ (p − q), r turns around within a part of about
+// σ = ‖o − core‖/‖p − q‖ of the way, which may be tiny. So coordinates are taken relative to o, the unknown is
+// t = s − s₀, and bisection halves asinh(t/σ). A way through the core itself lets r jump over to p's side, where the
+// proxy sticks: N(r − q) = 0.
+//
+// The space around a solid body isn't convex: if p is past the body, the proxy sticks if it can, and otherwise goes
+// around.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "models/obstacles/obstacle.hpp"
+#include "models/surfaces/layer.hpp"
+
+namespace proxarm::models {
+
+// The t, 0 ≤ t ≤ 1, at which the way q + t d is closest to a point.
+inline double closest_to_point(const Vec3& q, const Vec3& d, const Vec3& x) noexcept {
+  const double length2 = d.squaredNorm();
+  return length2 > 0.0 ? std::clamp(d.dot(x - q) / length2, 0.0, 1.0) : 0.0;
+}
+
+// The same for the endless line through a along e (unit). Where they are parallel, every t is as good: 0.
+inline double closest_to_line(const Vec3& q, const Vec3& d, const Vec3& a, const Vec3& e) noexcept {
+  const Vec3 across = d - e * e.dot(d);
+  return closest_to_point(q, across, q + (a - q) - e * e.dot(a - q));
+}
+
+struct PointCore {
+  Vec3 centre = Vec3::Zero();
+
+  [[nodiscard]] Vec3 nearest(const Vec3& /*x*/) const noexcept { return centre; }
+  [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
+    return closest_to_point(q, d, centre);
+  }
+  [[nodiscard]] double size() const noexcept { return centre.lpNorm<1>(); }
+  [[nodiscard]] Vec3 any_normal() const noexcept { return Vec3::UnitZ(); }
+  [[nodiscard]] Bounds bounds() const noexcept { return {centre, centre}; }
+  [[nodiscard]] PointCore seen_from(const Vec3& origin) const noexcept { return {centre - origin}; }
+};
+
+struct SegmentCore {
+  SegmentCore(const Vec3& from, const Vec3& to) noexcept
+      : a(from), end((to - from).norm()), e(end > 0.0 ? Vec3((to - from) / end) : Vec3(Vec3::UnitZ())) {}
+
+  [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + std::clamp(e.dot(x - a), begin, end) * e; }
+  // The distance from a segment is that from its line or from one of its ends. Each of the three has a single minimum
+  // along the way, and the least of them is the answer.
+  [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
+    double best = 0.0, least = std::numeric_limits<double>::infinity();
+    for (const double t :
+         {closest_to_line(q, d, a, e), closest_to_point(q, d, a + begin * e), closest_to_point(q, d, a + end * e)}) {
+      const Vec3 x = q + t * d;
+      const double distance = (x - nearest(x)).squaredNorm();
+      if (distance < least) {
+        least = distance;
+        best = t;
+      }
+    }
+    return best;
+  }
+  [[nodiscard]] double size() const noexcept { return a.lpNorm<1>() + end; }
+  [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
+  [[nodiscard]] Bounds bounds() const noexcept {
+    const Vec3 b = a + end * e;
+    return {a.cwiseMin(b), a.cwiseMax(b)};
+  }
+  // Relative to `origin`. The segment's reference point is moved next to it, so that a far reference point brings no
+  // rounding into what is near.
+  [[nodiscard]] SegmentCore seen_from(const Vec3& origin) const noexcept {
+    SegmentCore core = *this;
+    const double ahead = e.dot(origin - a);
+    core.a = a - origin + ahead * e;
+    core.begin -= ahead;
+    core.end -= ahead;
+    return core;
+  }
+
+  Vec3 a;
+  double begin = 0.0, end;  // along e, from a
+  Vec3 e;
+};
+
+// A line that is endless along e. A cylinder's side has this core; its ends cut it off.
+struct LineCore {
+  Vec3 a = Vec3::Zero();
+  Vec3 e = Vec3::UnitZ();  // unit
+
+  [[nodiscard]] Vec3 nearest(const Vec3& x) const noexcept { return a + e.dot(x - a) * e; }
+  [[nodiscard]] double closest_on_way(const Vec3& q, const Vec3& d) const noexcept {
+    return closest_to_line(q, d, a, e);
+  }
+  [[nodiscard]] double size() const noexcept { return a.lpNorm<1>(); }
+  [[nodiscard]] Vec3 any_normal() const noexcept { return e.unitOrthogonal(); }
+  [[nodiscard]] Bounds bounds() const noexcept { return {}; }
+  [[nodiscard]] LineCore seen_from(const Vec3& origin) const noexcept {
+    return {a - origin + e.dot(origin - a) * e, e};
+  }
+};
+
+template <typename Core>
+class RoundObstacle final : public Obstacle {
+ public:
+  // inside: the free side is towards the core. With R = 0 the proxy is then held on the core itself, as on a guide.
+  // Throws std::invalid_argument for a radius or a friction that isn't finite and ≥ 0.
+  RoundObstacle(const Core& core, double radius_m, double friction, bool inside, const Layer& layer = {})
+      : core_(core), R_(radius_m), mu_(friction), sign_(inside ? -1.0 : 1.0), layer_(layer) {
+    if (!std::isfinite(radius_m) || !(radius_m >= 0.0)) {
+      throw std::invalid_argument("a radius must be finite and not negative");
+    }
+    if (!std::isfinite(friction) || !(friction >= 0.0)) {
+      throw std::invalid_argument("a friction coefficient must be finite and not negative");
+    }
+  }
+
+  [[nodiscard]] Step step(double K, const Vec3& p, const Vec3& q) const noexcept override {
+    const At at_p = at(core_, p, q);
+    if (!(at_p.height < 0.0) && !(sign_ > 0.0 && passes(q, p))) return {p, at_p.normal, 0, false, false};
+
+    if (!(mu_ > 0.0) && at_p.height < 0.0) {
+      const Trial trial = place(K, p, at_p);
+      return {trial.r, trial.normal, 0, true, false};
+    }
+    const At at_q = at(core_, q, p);
+    const double q_rounding = rounding(q);
+    // s = 0: the proxy sticks where it is, or at the point of the surface below it.
+    Trial trial = stick(K, p, q, at_q, q_rounding);
+    if (!(trial.excess > 0.0) && trial.f_n >= 0.0) return {trial.r, trial.normal, 0, true, false};
+    if (!(at_p.height < 0.0)) return {p, at_p.normal, 0, false, false};  // goes around a solid one
+    return slide(K, p, q, trial.excess);
+  }
+
+  [[nodiscard]] Layer layer() const noexcept override { return layer_; }
+  [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override {
+    return layer_.soft() && at(core_, r, r).height < -4.0 * rounding(r);
+  }
+  [[nodiscard]] bool excludes(const Vec3& q, const Vec3& r) const noexcept override {
+    const double hard = at(core_, r, q).height + (layer_.soft() ? layer_.thickness_m : 0.0);
+    if (hard < -4.0 * rounding(r)) return true;
+    return sign_ > 0.0 && passes(q, r) && step(1.0, r, q).touches;  // beyond it, and it would have held the proxy
+  }
+
+  [[nodiscard]] bool bars(const Vec3& x, const Vec3& y) const noexcept override {
+    return sign_ > 0.0 ? passes(x, y) : at(core_, y, x).height < -4.0 * rounding(y);
+  }
+
+  [[nodiscard]] Tangent tangent(const Vec3& r, std::int32_t /*feature*/) const noexcept override {
+    const At here = at(core_, r, r);
+    return {FlatSurface<3>::of_unit(here.foot + sign_ * R_ * here.normal, here.normal), mu_};
+  }
+
+  [[nodiscard]] double distance(const Vec3& x) const noexcept override { return at(core_, x, x).height; }
+
+  void set_friction(double friction) noexcept override { mu_ = friction; }
+  [[nodiscard]] Bounds bounds() const noexcept override {
+    if (sign_ < 0.0) return {};
+    const Bounds core = core_.bounds();
+    return {core.low - Vec3::Constant(R_), core.high + Vec3::Constant(R_)};
+  }
+
+  [[nodiscard]] double friction() const noexcept { return mu_; }
+
+ private:
+  // A point, seen from the core.
+  struct At {
+    Vec3 foot;      // the point of the core next to it
+    Vec3 normal;    // of the surface next to it
+    double height;  // above the surface, positive on the free side
+  };
+
+  struct Trial {
+    Vec3 r;
+    Vec3 normal;
+    double f_n = 0.0;     // over K
+    double excess = 0.0;  // ‖f_t‖ − μ f_n, over K
+  };
+
+  // On the core itself every direction is a normal: the one towards `other` is taken.
+  [[nodiscard]] At at(const Core& core, const Vec3& x, const Vec3& other) const noexcept {
+    const Vec3 foot = core.nearest(x);
+    Vec3 d = x - foot;
+    double distance = d.norm();
+    const double measured = distance;
+    if (!(distance > 0.0)) {
+      d = other - core.nearest(other);
+      distance = d.norm();
+      if (!(distance > 0.0)) {
+        d = core.any_normal();
+        distance = 1.0;
+      }
+    }
+    return {foot, (sign_ / distance) * d, sign_ * (measured - R_)};
+  }
+
+  // As FlatSurface::rounding, with the core in the place of the point. Its reserve also pays for the square root here.
+  [[nodiscard]] double rounding(const Vec3& x) const noexcept {
+    constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+    return 16.0 * u * (x.lpNorm<1>() + core_.size() + R_);
+  }
+
+  // The proxy placed on the normal through `line`: on the surface, or within a layer where its normal force is
+  // balanced.
+  [[nodiscard]] Trial place(double K, const Vec3& p, const At& line) const noexcept {
+    const Vec3& n = line.normal;
+    const double along_p = n.dot(p - line.foot);  // of p, from the core along the normal
+    double along = sign_ * R_;
+    if (layer_.soft()) {
+      // K (along − along_p) = k (surface − along), no deeper than the layer.
+      const double k = layer_.stiffness_N_per_m;
+      along = std::max((K * along_p + k * along) / (K + k), along - layer_.thickness_m);
+    }
+    return judge(p, line.foot + along * n, n);
+  }
+
+  [[nodiscard]] Trial stick(double K, const Vec3& p, const Vec3& q, const At& at_q, double q_rounding) const noexcept {
+    if (!layer_.soft() && std::abs(at_q.height) <= q_rounding) return judge(p, q, at_q.normal);  // bit for bit
+    Trial trial = place(K, p, at_q);
+    if (layer_.soft() && (trial.r - q).norm() <= q_rounding) trial.r = q;
+    return trial;
+  }
+
+  // Solves ‖f_t‖ = μ f_n for t = s − s₀. The excess ‖f_t‖ − μ f_n is −μ f_n at s = 1, where no tangential force is
+  // left, and `excess_at_q` > 0 at s = 0; these bracket the root. In between it is nearly linear (on a plane exactly),
+  // so the secant method takes a few steps.
+  [[nodiscard]] Step slide(double K, const Vec3& p, const Vec3& q, double excess_at_q) const noexcept {
+    const Vec3 way = p - q;
+    const double s_0 = core_.closest_on_way(q, way);
+    const Vec3 o = q + s_0 * way, q_o = q - o, p_o = p - o;
+    const Core core = core_.seen_from(o);
+    // If the way passes the core by less than a sixteenth of a unit in the last place, rounding would choose the side
+    // on which r turns around, anew for each t. It is chosen once here.
+    const double length = way.norm(), closest = core.nearest(Vec3::Zero()).norm(), least = rounding(q) / 256.0;
+    const Vec3 across = way.cross(at(core, p_o, q_o).normal);
+    const Vec3 aside = closest < least && across.norm() > 0.0 ? Vec3(least * across.normalized()) : Vec3(Vec3::Zero());
+    const auto try_at = [&](double t) { return place(K, p_o, at(core, t * way + aside, q_o)); };
+    const double sigma = std::max(closest, least) / length, small = 0.25 * rounding(p);
+    double low = -s_0, high = 1.0 - s_0, last = low, last_excess = excess_at_q, t = high;
+    Trial trial = try_at(t);
+    for (int k = 0; k < 100; ++k) {
+      double next = t - trial.excess * (t - last) / (trial.excess - last_excess);
+      if ((k > 4 && k % 2 == 1) || !(next > low && next < high)) {
+        next = sigma * std::sinh(0.5 * (std::asinh(low / sigma) + std::asinh(high / sigma)));
+      }
+      if (!(next > low && next < high)) next = 0.5 * (low + high);
+      if (!(next > low && next < high)) break;
+      last = t;
+      last_excess = trial.excess;
+      t = next;
+      trial = try_at(t);
+      if (std::abs(trial.excess) <= small) break;
+      (trial.excess < 0.0 ? high : low) = t;
+    }
+    if (trial.excess > small) trial = try_at(high);
+    const Vec3 motion = trial.r - q_o;
+    const bool slips = (motion - trial.normal * trial.normal.dot(motion)).norm() > rounding(q);
+    return {o + trial.r, trial.normal, 0, true, slips};
+  }
+
+  [[nodiscard]] Trial judge(const Vec3& p, const Vec3& r, const Vec3& n) const noexcept {
+    Trial trial{r, n};
+    const Vec3 f = r - p;
+    trial.f_n = n.dot(f);
+    trial.excess = (f - trial.f_n * n).norm() - mu_ * trial.f_n;
+    return trial;
+  }
+
+  // Whether the straight way from q to p passes through the inside.
+  [[nodiscard]] bool passes(const Vec3& q, const Vec3& p) const noexcept {
+    const Vec3 x = q + core_.closest_on_way(q, p - q) * (p - q);
+    return (x - core_.nearest(x)).norm() < R_ - rounding(x);
+  }
+
+  Core core_;
+  double R_;
+  double mu_;
+  double sign_;
+  Layer layer_;
+};
+
+using Sphere = RoundObstacle<PointCore>;
+using Capsule = RoundObstacle<SegmentCore>;
+using RoundBar = RoundObstacle<LineCore>;
+
+}  // namespace proxarm::models

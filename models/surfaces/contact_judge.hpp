@@ -1,0 +1,69 @@
+// Can the contacts that a 𝒢 reports bear its force? What `proxarm check`, the stress study and the contract tests judge
+// forces by. Nothing in the cycle needs it.
+//
+// By (17), the force f = K (r − p) must be a sum of one force for each contact: of its friction cone if the contact
+// sticks, of the cone's edge against N Nᵀ (r − q) if it slips. So these are the cones to pass to in_sum_of_cones
+// (cone_sum.hpp); how much rounding to forgive is up to the caller, who knows its world.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "models/geometry/geometric_algorithm.hpp"
+#include "models/surfaces/cone_sum.hpp"
+
+namespace proxarm::models {
+
+// The factor by which contacts amplify rounding: nearly parallel ones by one over the sine of their angle. 4 for a
+// single contact, at most 4e8.
+template <int N>
+double rounding_amplification(std::span<const Contact<N>> contacts) {
+  double least = 1.0;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double cos = contacts[i].normal.dot(contacts[j].normal);
+      least = std::min(least, std::sqrt(std::max(0.0, 1.0 - cos * cos)));
+    }
+  }
+  return 4.0 / std::max(least, 1e-8);
+}
+
+// The cone of forces that each contact can bear.
+//   size_m                the size of the coordinates that r and q are rounded by
+//   friction(contact)     μ; nullopt if it isn't known: then any force will do that doesn't pull
+//   motion(contact)       r − q as the contact's object sees it (q carried along where the object moves), in 3D
+//   slipping(μ, angle)    is called for each slipping contact: the direction of its slip, and so of its force, is only
+//                         known to `angle` (rad), the rounding of r and q over the slip's length
+// Where the direction is known less well than to 1e-3 rad, the contact counts as sticking: its whole cone.
+template <int N, typename Friction, typename Motion, typename Slipping>
+std::vector<ForceCone> cones_of_contacts(std::span<const Contact<N>> contacts, double size_m, Friction friction,
+                                         Motion motion, Slipping slipping) {
+  constexpr double epsilon = std::numeric_limits<double>::epsilon();
+  constexpr double nearly_a_half_space = 1e6;
+  std::vector<ForceCone> cones;
+  for (const Contact<N>& contact : contacts) {
+    const Vec3 n = lift<N>(contact.normal);
+    const std::optional<double> known = friction(contact);
+    if (!known) {
+      cones.push_back({n, nearly_a_half_space});
+      continue;
+    }
+    const double mu = *known;
+    const Vec3 moved = motion(contact);
+    const Vec3 v = moved - n * n.dot(moved);
+    const double angle = 16.0 * epsilon * size_m / v.norm();
+    if (contact.slips && angle < 1e-3) {
+      cones.push_back({(n - mu * v.normalized()).normalized(), 0.0});
+      slipping(mu, angle);
+    } else {
+      cones.push_back({n, mu});
+    }
+  }
+  return cones;
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,90 @@
+// Which of a few contacts hold the proxy? The active-set search of all worlds.
+//
+// A step that meets several surfaces ends at a point that one, two or three of them hold together; the others let it
+// pass. Sets of contacts are tried by size, single ones first, until one is complete: nothing pulls, nothing is
+// penetrated, and friction is as (17) says for each contact. A trial that runs into a surface nobody has thought of
+// makes that a candidate, and the search starts again. Three contacts determine a point, so larger sets add nothing
+// where all are rigid; elastic layers share their force by another method (models/world/shared_hold.hpp).
+//
+// What a trial solves differs from world to world (planes, tangent planes of curved surfaces, faces of a mesh); that is
+// the caller's. Of the sets that are tried, the order is the same everywhere: candidates by their numbers, the greatest
+// in the outermost loop, so that results don't depend on anything but the order of the candidates.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::models {
+
+// What a stage of the search has achieved.
+enum class StepResult {
+  no_progress,  // no set of this size will do: larger ones are next
+  progress,     // there is one more candidate, or the proxy is somewhere else: single contacts are next
+  arrived,      // a complete set is found
+};
+
+// Runs the stages (singles, pairs, triples, …; each returns a StepResult) until one arrives or none makes progress.
+// `begin_round` is called before the first stage of each round; the search ends without a result where it returns
+// false.
+template <typename BeginRound, typename... Stages>
+bool search_contacts(BeginRound begin_round, Stages... stages) noexcept {
+  StepResult result = StepResult::progress;
+  while (result == StepResult::progress && begin_round()) {
+    result = StepResult::no_progress;
+    ((result == StepResult::no_progress ? void(result = stages()) : void()), ...);
+  }
+  return result == StepResult::arrived;
+}
+
+// Calls attempt(i, j), i < j < count, for all pairs of candidates, until it returns something else than no_progress.
+// `count` may grow meanwhile: pairs with a new candidate come last.
+template <typename Attempt>
+StepResult try_each_pair(const std::size_t& count, Attempt attempt) noexcept {
+  for (std::size_t j = 1; j < count; ++j) {
+    for (std::size_t i = 0; i < j; ++i) {
+      const StepResult result = attempt(i, j);
+      if (result != StepResult::no_progress) return result;
+    }
+  }
+  return StepResult::no_progress;
+}
+
+// The same for all triples i < j < k < count.
+template <typename Attempt>
+StepResult try_each_triple(const std::size_t& count, Attempt attempt) noexcept {
+  for (std::size_t k = 2; k < count; ++k) {
+    for (std::size_t j = 1; j < k; ++j) {
+      for (std::size_t i = 0; i < j; ++i) {
+        const StepResult result = attempt(i, j, k);
+        if (result != StepResult::no_progress) return result;
+      }
+    }
+  }
+  return StepResult::no_progress;
+}
+
+// The best of several complete sets of one size: the one that leaves the proxy nearest to p. Where Coulomb's law has
+// several solutions this is the choice that depends least on K.
+struct NearestSet {
+  double distance2 = std::numeric_limits<double>::infinity();  // ‖r − p‖²
+  Vec3 r = Vec3::Zero();
+
+  [[nodiscard]] bool found() const noexcept { return distance2 < std::numeric_limits<double>::infinity(); }
+  // True if `at` is better than what was there; the caller then notes its contacts.
+  bool improve(const Vec3& p, const Vec3& at) noexcept {
+    const double d2 = (at - p).squaredNorm();
+    if (!(d2 < distance2)) return false;
+    distance2 = d2;
+    r = at;
+    return true;
+  }
+  // The result of a stage that has tried all sets of its size.
+  [[nodiscard]] StepResult result(bool grew) const noexcept {
+    return found() ? StepResult::arrived : grew ? StepResult::progress : StepResult::no_progress;
+  }
+};
+
+}  // namespace proxarm::models

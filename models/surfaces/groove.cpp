@@ -1,0 +1,230 @@
+#include "models/surfaces/groove.hpp"
+
+#include <array>
+#include <limits>
+
+namespace proxarm::models {
+namespace {
+
+// The 2 × 2 system across e, in coordinates (n₁, t₁), as a function of s.
+struct CrossSection {
+  double cos, sin;  // n₂ = (cos, sin), t₂ = (−sin, cos)
+  double F_n, F_t;  // x₀ − p
+  double s_p;
+  double mu[2], s_q[2], w[2];
+
+  struct Shares {
+    double f[2];  // normal forces over K
+    double g;     // the balance of forces along e: zero at the solution
+  };
+
+  // f and g at s, with friction only of the contacts in `mask` (bit i). A contact at rest (v_i = 0) has no friction
+  // here.
+  Shares at(double s, int mask = 3) const noexcept {
+    double A[2][2] = {{1.0, 0.0}, {cos, sin}};
+    double along[2] = {0.0, 0.0};
+    for (int i = 0; i < 2; ++i) {
+      const double v_e = s - s_q[i], v = std::sqrt(v_e * v_e + w[i] * w[i]);
+      if (((mask >> i) & 1) == 0 || !(v > 0.0)) continue;
+      const double across = mu[i] * (w[i] / v);
+      along[i] = mu[i] * (v_e / v);
+      A[i][0] -= across * (i == 0 ? 0.0 : -sin);
+      A[i][1] -= across * (i == 0 ? 1.0 : cos);
+    }
+    const double det = A[0][0] * A[1][1] - A[0][1] * A[1][0];
+    Shares out{};
+    out.f[0] = (F_n * A[1][1] - F_t * A[1][0]) / det;
+    out.f[1] = (A[0][0] * F_t - A[0][1] * F_n) / det;
+    out.g = (s - s_p) + along[0] * out.f[0] + along[1] * out.f[1];
+    return out;
+  }
+
+  // The root for w = 0, by the closed form: the first guess.
+  [[nodiscard]] double guess() const noexcept {
+    const double f_2 = F_t / sin, f_1 = F_n - cos * f_2;
+    return s_p - std::copysign(mu[0] * f_1 + mu[1] * f_2, s_p - s_q[0]);
+  }
+
+  // Whether g vanishes at s within rounding. A sign change may also be a pole of g; beside a pole g is large.
+  [[nodiscard]] bool is_root(double s, const Shares& shares) const noexcept {
+    constexpr double eps = std::numeric_limits<double>::epsilon();
+    return std::abs(shares.g) <= 1e-9 * (std::abs(F_n) + std::abs(F_t) + std::abs(s - s_p)) +
+                                     16.0 * eps * (std::abs(s) + std::abs(s_p) + std::abs(s_q[0]));
+  }
+};
+
+// The root of g between lo and hi. Precondition: g(lo) ≤ 0 ≤ g(hi). Usually q is in the line, up to the surfaces'
+// curvature, and g is nearly linear around the closed form's solution: the secant method then takes a few steps. Where
+// it fails, false position (the Illinois variant) follows, with a bisection every fourth step.
+double root(const CrossSection& c, double lo, double hi) noexcept {
+  const double small = 2.0 * std::numeric_limits<double>::epsilon() * (std::abs(c.s_p) + std::abs(c.s_q[0]));
+  double at = std::clamp(c.guess(), lo, hi), g_at = c.at(at).g, next = std::clamp(at - g_at, lo, hi);
+  if (std::abs(g_at) <= small) return at;
+  for (int k = 0; k < 8 && next != at; ++k) {
+    const double g_next = c.at(next).g;
+    if (std::abs(g_next) <= small) return next;
+    if (!(std::abs(g_next) < std::abs(g_at))) break;
+    const double step = (next - at) * g_next / (g_at - g_next);
+    at = next;
+    g_at = g_next;
+    next = at + step;
+    if (!(next >= lo && next <= hi)) break;
+    if (next == at) return at;
+  }
+
+  double g_lo = c.at(lo).g, g_hi = c.at(hi).g;
+  if (!(g_lo < 0.0)) return lo;
+  if (!(g_hi > 0.0)) return hi;
+  int side = 0;
+  for (int k = 0; k < 200; ++k) {
+    double s = (k % 4 == 3) ? 0.5 * (lo + hi) : (lo * g_hi - hi * g_lo) / (g_hi - g_lo);
+    if (!(s > lo && s < hi)) s = 0.5 * (lo + hi);
+    if (!(s > lo && s < hi)) return s;  // neighbours among doubles
+    const double g = c.at(s).g;
+    if (g == 0.0) return s;
+    if (g < 0.0) {
+      lo = s;
+      g_lo = g;
+      if (side == -1) g_hi *= 0.5;
+      side = -1;
+    } else {
+      hi = s;
+      g_hi = g;
+      if (side == 1) g_lo *= 0.5;
+      side = 1;
+    }
+  }
+  return 0.5 * (lo + hi);
+}
+
+// One call of solve_groove: both contacts in coordinates along e (s) and across it (w), relative to x₀.
+class Groove {
+ public:
+  Groove(const PlaneContact& a, const PlaneContact& b, const GrooveLine& line, const Vec3& p,
+         GrooveSearch search) noexcept
+      : a_(a), b_(b), line_(line), search_(search) {
+    const Vec3 d_p = p - line.x0, d_1 = a.q - line.x0, d_2 = b.q - line.x0;
+    rounding_ = a.surface.rounding(a.q) + b.surface.rounding(b.q) + a.surface.rounding(p);
+    w_rounding_ = rounding_ / line.sin;
+    s_p_ = line.e.dot(d_p);
+    F_n_ = -a.surface.normal().dot(d_p);
+    F_t_ = -line.t1.dot(d_p);
+    s_q_ = {line.e.dot(d_1), line.e.dot(d_2)};
+    w_ = {-line.t1.dot(d_1), -line.t2.dot(d_2)};
+    for (double& w : w_) w = std::abs(w) <= w_rounding_ ? 0.0 : w;
+    // The normal forces (over K) may miss zero by the rounding of p: such a contact touches.
+    least_ = may_pull() ? -std::numeric_limits<double>::infinity() : -w_rounding_;
+    f_2_ = F_t_ / line.sin;
+    f_1_ = F_n_ - line.cos * f_2_;
+  }
+
+  [[nodiscard]] GrooveSolution solve() noexcept {
+    if (w_[0] == 0.0 && w_[1] == 0.0 && s_q_[0] == s_q_[1]) {
+      from_within();
+    } else if (may_pull() && (f_1_ < 0.0 || f_2_ < 0.0)) {
+      // Friction of a contact that pulls would lead nowhere.
+      out_.found = true;
+      out_.r = place(s_p_);
+    } else {
+      from_beside();
+    }
+    return out_;
+  }
+
+ private:
+  [[nodiscard]] bool may_pull() const noexcept { return search_ == GrooveSearch::may_pull; }
+  [[nodiscard]] Vec3 place(double s) const noexcept {
+    return line_.settle(a_.surface, b_.surface, line_.x0 + s * line_.e);
+  }
+
+  // The proxy was in the line already: the closed form.
+  void from_within() noexcept {
+    if (f_1_ < least_ || f_2_ < least_) return;
+    out_.found = true;
+    const double reach = a_.mu * std::max(0.0, f_1_) + b_.mu * std::max(0.0, f_2_), d = s_p_ - s_q_[0];
+    if (std::abs(d) <= reach) {
+      out_.r = a_.surface.holds(a_.q) && b_.surface.holds(a_.q) ? a_.q : place(s_q_[0]);  // sticks: bit for bit
+      return;
+    }
+    out_.slips1 = a_.mu > 0.0;
+    out_.slips2 = b_.mu > 0.0;
+    out_.r = place(s_p_ - std::copysign(reach, d));
+  }
+
+  // The proxy arrives in the line: the root of g.
+  void from_beside() noexcept {
+    const CrossSection c{line_.cos, line_.sin, F_n_, F_t_, s_p_, {a_.mu, b_.mu}, {s_q_[0], s_q_[1]}, {w_[0], w_[1]}};
+    double lo = std::min({s_p_, s_q_[0], s_q_[1]}), hi = std::max({s_p_, s_q_[0], s_q_[1]});
+    if (one_sticks(c, lo, hi)) return;
+    const double s = root(c, lo, hi);
+    const CrossSection::Shares shares = c.at(s);
+    const bool is_root = c.is_root(s, shares);
+    if ((is_root || may_pull()) && accept(s, shares, true, true)) return;
+    if (is_root && search_ == GrooveSearch::first_root) return;
+    look_for_another_root(c, is_root);
+  }
+
+  // A contact that came straight down onto the line may stick there while the other slips. True: it does, whatever
+  // comes of that. Else lo and hi have moved to the side of such a contact to which it is pushed, where the root is.
+  bool one_sticks(const CrossSection& c, double& lo, double& hi) noexcept {
+    for (int i = 0; i < 2; ++i) {
+      if (c.w[i] != 0.0 || !(c.mu[i] > 0.0) || c.s_q[i] < lo || c.s_q[i] > hi) continue;
+      const CrossSection::Shares others = c.at(c.s_q[i], 3 & ~(1 << i));
+      const double reach = c.mu[i] * std::max(0.0, others.f[i]);
+      if (std::abs(others.g) <= reach) {
+        accept(c.s_q[i], others, i != 0, i != 1);
+        return true;
+      }
+      if (others.g > 0.0) {
+        hi = std::min(hi, std::nextafter(c.s_q[i], lo));
+      } else {
+        lo = std::max(lo, std::nextafter(c.s_q[i], hi));
+      }
+    }
+    return false;
+  }
+
+  // Where p is far deeper than q was away, friction on arrival can outweigh the faces' own directions: g then has
+  // several roots, or jumps through infinity between them. They are looked for from p towards rest, in intervals that
+  // shrink by 0.7 towards s_1. Where the first root was one, but of a contact that pulls, only the intervals count in
+  // which both parts of a slip matter (within 1000 w of s_1): beyond, g has no other root.
+  void look_for_another_root(const CrossSection& c, bool first_was_root) noexcept {
+    const double widest = std::max(std::abs(c.w[0]), std::abs(c.w[1])), way = std::abs(s_p_ - s_q_[0]);
+    double at = first_was_root ? std::min(1.0, 1e3 * widest / way) : 1.0;
+    for (double s_far = s_q_[0] + at * (s_p_ - s_q_[0]); at > 1e-15 && at * way > 1e-3 * rounding_; at *= 0.7) {
+      const double s_near = s_q_[0] + 0.7 * at * (s_p_ - s_q_[0]);
+      const double from = std::min(s_near, s_far), to = std::max(s_near, s_far), g_from = c.at(from).g;
+      const double end = g_from < 0.0 && c.at(to).g >= 0.0 ? root(c, from, to) : s_near;
+      const CrossSection::Shares here = c.at(end);
+      if (c.is_root(end, here) && accept(end, here, true, true)) break;
+      s_far = s_near;
+    }
+  }
+
+  bool accept(double s, const CrossSection::Shares& shares, bool slips1, bool slips2) noexcept {
+    if (!(shares.f[0] >= least_ && shares.f[1] >= least_)) return false;
+    out_.found = true;
+    out_.slips1 = slips1 && a_.mu > 0.0;
+    out_.slips2 = slips2 && b_.mu > 0.0;
+    out_.r = place(s);
+    return true;
+  }
+
+  const PlaneContact &a_, &b_;
+  const GrooveLine& line_;
+  GrooveSearch search_;
+  double rounding_, w_rounding_;   // w_rounding: what w may be for a proxy that is in the line
+  double s_p_, F_n_, F_t_;         // p along e, and x₀ − p across it
+  std::array<double, 2> s_q_, w_;  // q of each contact along e and across it; w = 0 exactly within rounding
+  double least_, f_1_, f_2_;       // least normal force; those without friction
+  GrooveSolution out_;
+};
+
+}  // namespace
+
+GrooveSolution solve_groove(const PlaneContact& a, const PlaneContact& b, const GrooveLine& line, const Vec3& p,
+                            GrooveSearch search) noexcept {
+  return line.exists ? Groove(a, b, line, p, search).solve() : GrooveSolution{};
+}
+
+}  // namespace proxarm::models

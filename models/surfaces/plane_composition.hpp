@@ -1,0 +1,66 @@
+// Several flat surfaces at once: corners, grooves, wedges, boxes seen from inside, with friction on each side.
+//
+// The free space in front of all of them is convex. A step's solution is a set of at most three contacts and the point
+// that they hold. Sets are tried until one is complete (contact_search.hpp): nothing pulls, nothing is penetrated, and
+// friction is as (17) says for each contact. Fewer contacts come first, then the smallest ‖r − p‖. Where Coulomb's law
+// has several solutions (grooves sharper than 2 atan μ can jam), this rule chooses one.
+//   one contact     (4), exactly
+//   two             solve_groove
+//   three           the corner itself, if the three friction cones together can bear the force
+// Nothing here depends on K, and the result doesn't depend on earlier steps.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "models/geometry/geometric_algorithm.hpp"
+#include "models/surfaces/contact_search.hpp"
+#include "models/surfaces/corner.hpp"
+#include "models/surfaces/friction_plane.hpp"
+#include "models/surfaces/groove.hpp"
+
+namespace proxarm::models {
+
+class PlaneComposition final : public GeometricAlgorithm<3> {
+ public:
+  // Faces as objects 0, 1, … in this order. Throws std::invalid_argument for a μ that isn't finite and ≥ 0.
+  explicit PlaneComposition(std::vector<Face> faces);
+
+  Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
+
+  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
+
+  // Steps so far in which no set of contacts was complete and friction was left out. Zero unless faces meet at less
+  // than 2 atan μ.
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return without_friction_; }
+
+  // Of all faces of an object, from the next step on; finite and not negative.
+  void set_friction(std::int32_t object, double friction) noexcept {
+    for (Face& face : faces_) {
+      if (face.object == object) face.mu = friction;
+    }
+  }
+
+ private:
+  struct Candidates;
+  struct Choice;
+
+  [[nodiscard]] double friction(std::size_t face, const Candidates& candidates) const noexcept;
+  bool fits(const Vec3& q, const Vec3& r, const std::array<std::size_t, 3>& contacts, bool creeps,
+            Candidates& candidates) const noexcept;
+  StepResult try_singles(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  StepResult try_pairs(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  StepResult try_corners(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+  bool search(const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
+
+  std::vector<Face> faces_;
+  std::vector<GrooveLine> lines_;     // of all pairs, at i · n + j; empty where there are many faces: made when needed
+  std::vector<CornerPoint> corners_;  // of all triples, at (i · n + j) · n + k; likewise
+  std::array<Contact<3>, 3> contacts_{};
+  std::size_t count_ = 0;
+  std::uint64_t without_friction_ = 0;
+};
+
+}  // namespace proxarm::models

@@ -1,0 +1,326 @@
+#include "models/world/guides.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "models/obstacles/sweep.hpp"
+#include "models/surfaces/friction_plane.hpp"
+
+namespace proxarm::models {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
+// Longest push, in parts of what the object has moved at q. The push along the guide is that motion over the sine of
+// the angle between surface and guide, so ten allows angles down to about 6°; an object that leans less comes across
+// the guide and would throw the proxy far along it.
+constexpr double longest_push = 10.0;
+
+// Whether a proxy that the object has carried to `carried` may end at x, outside of the object.
+bool is_clear(const Obstacle& object, const Vec3& carried, const Vec3& x) noexcept {
+  return !object.excludes(carried, x) && object.distance(x) >= 0.0;
+}
+
+void check_friction(double friction) {
+  if (!std::isfinite(friction) || !(friction >= 0.0)) {
+    throw std::invalid_argument("a friction coefficient must be finite and not negative");
+  }
+}
+
+}  // namespace
+
+PlaneGuide::PlaneGuide(const Vec3& point_m, const Vec3& normal, double friction)
+    : surface_(point_m, normal), mu_(friction) {
+  check_friction(friction);
+}
+
+Vec3 PlaneGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept {
+  // (4) for the half-space that p is behind: the plane holds from both sides.
+  const bool above = surface_.height(p) > 0.0;
+  const FlatSurface<3> side = above ? FlatSurface<3>::of_unit(surface_.point(), Vec3(-surface_.normal())) : surface_;
+  const FaceStep<3> s = step_on_face(side, mu_, p, q);
+  contact_.normal = side.normal();
+  contact_.slips = s.slips;
+  return s.r;
+}
+
+PolylineGuide::PolylineGuide(const std::vector<Vec3>& points_m, bool closed, double friction)
+    : closed_(closed), mu_(friction) {
+  check_friction(friction);
+  if (points_m.size() < 2) throw std::invalid_argument("a polyline needs two points or more");
+  const std::size_t pieces = points_m.size() - (closed ? 0 : 1);
+  for (std::size_t i = 0; i < pieces; ++i) {
+    const Vec3 &a = points_m[i], &b = points_m[(i + 1) % points_m.size()];
+    if (!a.allFinite() || !b.allFinite()) throw std::invalid_argument("a polyline needs finite points");
+    pieces_.push_back({a, unit<3>(b - a), (b - a).norm(), 0.0});
+  }
+}
+
+PolylineGuide PolylineGuide::line(const Vec3& point_m, const Vec3& direction, double friction) {
+  check_friction(friction);
+  PolylineGuide guide;
+  guide.mu_ = friction;
+  guide.pieces_.push_back({point_m, unit<3>(direction), infinity, -infinity});
+  return guide;
+}
+
+// The first one, if several are equally near (at a corner).
+std::size_t PolylineGuide::nearest_piece(const Vec3& q) const noexcept {
+  std::size_t best = 0;
+  double least = infinity;
+  for (std::size_t i = 0; i < pieces_.size(); ++i) {
+    const Piece& piece = pieces_[i];
+    const double s = std::clamp(piece.e.dot(q - piece.a), piece.begin, piece.length);
+    const double distance = (q - piece.a - s * piece.e).squaredNorm();
+    if (distance < least) {
+      least = distance;
+      best = i;
+    }
+  }
+  return best;
+}
+
+Vec3 PolylineGuide::report(const Vec3& r, const Vec3& p, std::size_t piece, bool slips) noexcept {
+  last_ = piece;
+  const Vec3 f = r - p;
+  const double size = f.norm();
+  contacts_[0].normal = size > 0.0 ? Vec3(f / size) : pieces_[piece].e.unitOrthogonal();
+  contacts_[0].feature = static_cast<std::int32_t>(piece);
+  contacts_[0].slips = slips;
+  return r;
+}
+
+// Whether the straight way between two points is free. If not, `to` becomes the point where an object stops it, or
+// `from` itself if that point is nearer to `from` than rounding can tell.
+bool PolylineGuide::leads(const Vec3& from, Vec3& to, bool past_pushing) noexcept {
+  if (from == to) return true;
+  bool free = true;
+  Vec3 end = to;
+  if (objects_) {
+    const World::Sweep swept = objects_->sweep(from, to);
+    if (swept.stopped) {
+      free = false;
+      end = swept.end;
+      contacts_[1] = swept.contact;
+    }
+  }
+  for (std::size_t i = 0; movers_ && i < movers_->size(); ++i) {
+    const World::Entry& mover = (*movers_)[i];
+    if ((past_pushing && pushes_[i] != 0) || !mover.obstacle->bars(from, end)) continue;
+    free = false;
+    end = models::sweep(*mover.obstacle, from, end);
+    // The contact is that of a step which leads a nanometre into the object.
+    const Vec3 back = (from - to).normalized();
+    const Obstacle::Step s = mover.obstacle->step(1.0, end - 1e-9 * back, end);
+    contacts_[1] = {mover.object, mover.feature < 0 ? s.feature : mover.feature, false, s.touches ? s.normal : back};
+  }
+  if (free) return true;
+  to = (end - from).lpNorm<1>() <= 64.0 * u * (from.lpNorm<1>() + 1.0) ? from : end;
+  count_ = 2;
+  return false;
+}
+
+void PolylineGuide::set_time(const StepTime& time) noexcept {
+  if (!movers_) return;
+  for (const World::Entry& mover : *movers_) mover.obstacle->set_time(time.time_s, time.period_s);
+}
+
+// Steps to the neighbouring piece; false at an end of the guide.
+bool PolylineGuide::next_piece(std::size_t& piece, bool forward) const noexcept {
+  if (!closed_ && (forward ? piece + 1 == pieces_.size() : piece == 0)) return false;
+  piece = forward ? (piece + 1) % pieces_.size() : (piece + pieces_.size() - 1) % pieces_.size();
+  return true;
+}
+
+// Moves a place by a length along the guide, to the guide's end at most.
+PolylineGuide::Place PolylineGuide::advance(Place at, double by) const noexcept {
+  const bool forward = by > 0.0;
+  for (std::size_t visited = 0; visited <= pieces_.size(); ++visited) {
+    const Piece& piece = pieces_[at.piece];
+    const double end = forward ? piece.length : piece.begin, left = std::abs(end - at.s);
+    if (std::abs(by) <= left) {
+      at.s += by;
+      break;
+    }
+    by -= std::copysign(left, by);
+    at.s = end;
+    std::size_t next = at.piece;
+    if (!next_piece(next, forward)) break;
+    at.piece = next;
+    at.s = forward ? pieces_[next].begin : pieces_[next].length;
+  }
+  at.x = pieces_[at.piece].a + at.s * pieces_[at.piece].e;
+  return at;
+}
+
+// Moves a place that the object has come over to the next one on that side that is free of it: by doubling steps until
+// one is free, then by bisection. False if there is none within `most`.
+bool PolylineGuide::clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
+                             Place& place) const noexcept {
+  if (!(most > 0.0)) return false;
+  double held = 0.0, free = most / 1024.0;
+  Place end = advance(place, side * free);
+  while (!is_clear(object, carried, end.x)) {
+    if (!(free < most)) return false;
+    held = free;
+    free = std::min(2.0 * free, most);
+    end = advance(place, side * free);
+  }
+  const double least = u * (place.x.lpNorm<1>() + most);
+  while (free - held > least) {
+    const double middle = 0.5 * (held + free);
+    if (middle == held || middle == free) break;
+    const Place between = advance(place, side * middle);
+    if (is_clear(object, carried, between.x)) {
+      free = middle;
+      end = between;
+    } else {
+      held = middle;
+    }
+  }
+  place = end;
+  return true;
+}
+
+// The side along the piece to which an object that has come over q pushes; 0: neither, it pushes across.
+int PolylineGuide::pushed_to(const Obstacle& object, const Vec3& carried, const Vec3& q, std::size_t piece,
+                             Contact<3>& contact) const noexcept {
+  const Obstacle::Step s = object.step(1.0, q, q);
+  contact.normal = s.touches ? s.normal : Vec3((carried - q).normalized());
+  contact.feature = s.feature;
+  contact.slips = false;
+  const double lean = contact.normal.dot(pieces_[piece].e);
+  return lean > 0.0 ? 1 : lean < 0.0 ? -1 : 0;
+}
+
+// Whether the way along the guide between two places is free of all objects but those that push.
+bool PolylineGuide::reaches(Place from, const Place& to, int side) noexcept {
+  for (std::size_t visited = 0; visited <= pieces_.size() && from.piece != to.piece; ++visited) {
+    const Piece& piece = pieces_[from.piece];
+    Vec3 corner = piece.a + (side > 0 ? piece.length : piece.begin) * piece.e;
+    if (!leads(from.x, corner, true)) return false;
+    from.x = corner;
+    if (!next_piece(from.piece, side > 0)) return false;
+  }
+  Vec3 end = to.x;
+  return leads(from.x, end, true);
+}
+
+// Moves the place of q along with the objects that have come over it. False if there is no room: the proxy is squeezed,
+// and the place stays as it was.
+bool PolylineGuide::carry(const Vec3& q, Place& place) noexcept {
+  if (!movers_) return true;
+  const Place begin = place;
+  int side = 0;
+  bool fits = true, any = false;
+  for (std::size_t i = 0; i < movers_->size(); ++i) {
+    const Obstacle& object = *(*movers_)[i].obstacle;
+    const Vec3 carried = object.carry(q);
+    pushes_[i] = object.excludes(carried, begin.x) ? 1 : 0;
+    if (pushes_[i] == 0) continue;
+    any = true;
+    contacts_[1].object = (*movers_)[i].object;
+    const int pushed = pushed_to(object, carried, q, begin.piece, contacts_[1]);
+    if ((*movers_)[i].feature >= 0) contacts_[1].feature = (*movers_)[i].feature;
+    count_ = 2;
+    fits = fits && pushed != 0 && (side == 0 || pushed == side);
+    side = pushed;
+    const double most = longest_push * (carried - q).norm();
+    // Another object may have pushed the place far enough already.
+    if (!fits || is_clear(object, carried, place.x)) continue;
+    Place pushed_place = begin;
+    fits = clear_of(object, carried, side, most, pushed_place);
+    if (fits && (pushed_place.x - begin.x).squaredNorm() > (place.x - begin.x).squaredNorm()) place = pushed_place;
+  }
+  if (!any) return true;
+  const Contact<3> pusher = contacts_[1];
+  if (fits && reaches(begin, place, side)) {
+    contacts_[1] = pusher;
+    return true;
+  }
+  place = begin;
+  return false;
+}
+
+Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexcept {
+  count_ = 1;
+  squeezed_ = false;
+  Place place{nearest_piece(q), 0.0, q};
+  const Piece& nearest = pieces_[place.piece];
+  place.s = std::clamp(nearest.e.dot(q - nearest.a), nearest.begin, nearest.length);
+  const Vec3 foot = nearest.a + place.s * nearest.e;
+  // A proxy on the guide within rounding (as FlatSurface::rounding) sticks bit for bit.
+  if (!((q - foot).lpNorm<1>() <= 16.0 * u * (q.lpNorm<1>() + nearest.a.lpNorm<1>() + std::abs(place.s)))) {
+    place.x = foot;
+  }
+  if (!carry(q, place)) {
+    squeezed_ = true;
+    ++unresolved_;
+    return report(place.x, p, place.piece, false);
+  }
+  const bool pushed = count_ == 2;
+  const Contact<3> pusher = contacts_[1];
+  count_ = 1;
+  const Vec3 r = slide(p, place);
+  if (pushed && count_ == 1 && r == place.x) {
+    contacts_[1] = pusher;
+    count_ = 2;
+  }
+  return r;
+}
+
+// The step by (4) from a place on, around corners where the next piece leads on.
+Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
+  std::size_t i = place.piece;
+  const Piece& first = pieces_[i];
+  const double s_q = place.s;
+
+  // Where (4) takes the proxy along a piece, and to which side; 0: it sticks.
+  const auto lead = [&](const Piece& piece, double from, double& to) {
+    const Vec3 d = p - piece.a;
+    const double s_p = piece.e.dot(d), reach = mu_ * (d - s_p * piece.e).norm();
+    if (std::abs(s_p - from) <= reach) {
+      to = from;
+      return 0;
+    }
+    to = s_p - std::copysign(reach, s_p - from);
+    return s_p > from ? 1 : -1;
+  };
+  double s = s_q, to = s_q;
+  int direction = lead(first, s_q, to);
+  const bool corner = pieces_.size() > 1 && (s_q <= 0.0 || s_q >= first.length);
+  if (direction == 0 && !corner) return report(place.x, p, i, false);
+  Vec3 here = place.x;
+  for (std::size_t visited = 0; visited <= 2 * pieces_.size(); ++visited) {
+    const Piece& piece = pieces_[i];
+    if (to >= piece.begin && to <= piece.length && direction != 0) {
+      Vec3 r = piece.a + to * piece.e;
+      const bool free = leads(here, r);
+      return report(r, p, i, free && mu_ > 0.0);
+    }
+    // The proxy has reached the end of the piece, or sticks there: does the next piece lead on?
+    const bool forward = direction > 0 || (direction == 0 && s >= piece.length);
+    const double end = forward ? piece.length : piece.begin;
+    const bool at_end = direction != 0 || s == end;
+    const bool last_piece = forward ? i + 1 == pieces_.size() : i == 0;
+    const Vec3 corner_point = piece.a + end * piece.e;
+    if (!at_end) return report(place.x, p, i, false);
+    Vec3 held = place.s == end && place.piece == i ? place.x : corner_point;
+    if (!leads(here, held)) return report(held, p, i, false);
+    here = held;
+    if (last_piece && !closed_) return report(held, p, i, false);
+    std::size_t next = i;
+    static_cast<void>(next_piece(next, forward));
+    const double enter = forward ? 0.0 : pieces_[next].length;
+    double on_next = enter;
+    const int next_direction = lead(pieces_[next], enter, on_next);
+    if (next_direction != (forward ? 1 : -1)) return report(held, p, i, false);  // held in the corner
+    i = next;
+    s = enter;
+    to = on_next;
+    direction = next_direction;
+  }
+  return report(place.x, p, i, false);
+}
+
+}  // namespace proxarm::models

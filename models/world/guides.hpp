@@ -1,0 +1,117 @@
+// Guides (virtual fixtures): the proxy is held on a line, a plane or a polyline, from both sides, with friction along
+// it.
+//
+// On a line with direction e, in units where K = 1, the guide bears any force across e. Along e it bears friction:
+//   r = q if |eᵀ(p − q)| ≤ μ ‖f_⟂‖,  else eᵀ(r − p) = ∓ μ ‖f_⟂‖,   f = r − p.
+// This is (4) with the distance from the line in the place of the penetration. A q beside the guide is first moved to
+// the nearest point of the guide.
+//
+// An object that moves onto the proxy pushes it along a line or a polyline before anything else happens: from q, which
+// the object has come over, to the next point q' of the guide that is free of the object, on the side to which its
+// surface leans. Then q' takes the place of q, and (4) and the stops are those of objects at rest. This is the solution
+// in which the object exerts a force F ≥ 0 along the guide, zero unless they touch: r = q' where eᵀ(p − q') ≤ μ ‖f_⟂‖,
+// with e towards the side pushed to. q' depends neither on p nor on K, so Assumption 1 holds. The proxy is squeezed()
+// if there is no such q' within ten times what the object has moved at q: it comes across the guide, the guide ends, or
+// another object is in the way.
+//
+// A plane among objects is two half-spaces back to back (scenes/compiler/compile.cpp): a World solves it with them.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "models/geometry/geometric_algorithm.hpp"
+#include "models/surfaces/flat_surface.hpp"
+#include "models/world/world.hpp"
+
+namespace proxarm::models {
+
+// Both sides of a plane.
+class PlaneGuide final : public GeometricAlgorithm<3> {
+ public:
+  PlaneGuide(const Vec3& point_m, const Vec3& normal, double friction);
+  Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
+  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {&contact_, 1}; }
+
+ private:
+  FlatSurface<3> surface_;
+  double mu_;
+  Contact<3> contact_;
+};
+
+// A chain of straight pieces, open or closed; one piece with endless ends is a line. At a corner the proxy stays while
+// neither piece leads it away.
+class PolylineGuide final : public GeometricAlgorithm<3> {
+ public:
+  // At least two points, neighbours apart from each other. Throws std::invalid_argument otherwise, and for a friction
+  // that isn't finite and ≥ 0.
+  PolylineGuide(const std::vector<Vec3>& points_m, bool closed, double friction);
+  // An endless line.
+  static PolylineGuide line(const Vec3& point_m, const Vec3& direction, double friction);
+
+  // Objects that stand still stop the proxy on its way along the guide. Their friction and their slope don't matter:
+  // the guide leaves only one way to go, and together with the guide they can bear any force along it. `index` is the
+  // object number under which contacts report the guide.
+  void stop_at(std::shared_ptr<World> objects, std::int32_t index) noexcept {
+    objects_ = std::move(objects);
+    contacts_[0].object = index;
+  }
+  // Objects that move stop the proxy, too, and push it along. Precondition: they have no friction and are no meshes.
+  void be_pushed_by(std::vector<World::Entry> movers) {
+    movers_ = std::make_shared<std::vector<World::Entry>>(std::move(movers));
+    pushes_.assign(movers_->size(), 0);
+  }
+
+  Vec3 operator()(double K, const Vec3& p, const Vec3& q) noexcept override;
+  void set_time(const StepTime& time) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return movers_ != nullptr; }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return unresolved_; }
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
+  // The contact with the guide, and the one with the object that stops the proxy, if there is one.
+  [[nodiscard]] std::span<const Contact<3>> contacts() const noexcept override { return {contacts_.data(), count_}; }
+
+ private:
+  struct Piece {
+    Vec3 a;         // its beginning
+    Vec3 e;         // unit
+    double length;  // infinite for a line
+    double begin;   // 0, or minus infinity
+  };
+  // A point of the guide.
+  struct Place {
+    std::size_t piece = 0;
+    double s = 0.0;  // from the piece's beginning
+    Vec3 x = Vec3::Zero();
+  };
+  PolylineGuide() = default;
+  [[nodiscard]] std::size_t nearest_piece(const Vec3& q) const noexcept;
+  [[nodiscard]] bool next_piece(std::size_t& piece, bool forward) const noexcept;
+  [[nodiscard]] Place advance(Place at, double by) const noexcept;
+  [[nodiscard]] bool clear_of(const Obstacle& object, const Vec3& carried, int side, double most,
+                              Place& place) const noexcept;
+  [[nodiscard]] int pushed_to(const Obstacle& object, const Vec3& carried, const Vec3& q, std::size_t piece,
+                              Contact<3>& contact) const noexcept;
+  [[nodiscard]] bool reaches(Place from, const Place& to, int side) noexcept;
+  bool carry(const Vec3& q, Place& place) noexcept;
+  Vec3 slide(const Vec3& p, const Place& place) noexcept;
+  Vec3 report(const Vec3& r, const Vec3& p, std::size_t piece, bool slips) noexcept;
+  bool leads(const Vec3& from, Vec3& to, bool past_pushing = false) noexcept;
+
+  std::vector<Piece> pieces_;
+  bool closed_ = false;
+  double mu_ = 0.0;
+  std::size_t last_ = 0;            // the piece on which the last step ended
+  std::shared_ptr<World> objects_;  // that stand still; null: none
+  std::shared_ptr<std::vector<World::Entry>> movers_;
+  std::vector<char> pushes_;  // by mover: 1 if it pushes in this step
+  std::uint64_t unresolved_ = 0;
+  bool squeezed_ = false;
+  std::array<Contact<3>, 2> contacts_;
+  std::size_t count_ = 1;
+};
+
+}  // namespace proxarm::models

@@ -1,0 +1,78 @@
+// Media act on the proxy without a surface: viscous and Coulomb media, everywhere or within a shape, over any 𝒢.
+//
+// A viscous medium of b (Ns/m) adds −(b/T)(r − q) to ℳ. With 𝒢' for the rest of the world, the balance of forces is
+//   f'(r) = K (r − p) + (b/T)(r − q) = (K + b/T)(r − p'),   p' = (K p + (b/T) q)/(K + b/T),
+// so that the medium acts as a stiffer coupling to a nearer point: 𝒢(K, p, q) = 𝒢'(K + b/T, p', q). In free space that
+// is q(k) = p'. A step in a Coulomb medium: coulomb_step.hpp. Whether a medium acts is decided at q. T is the step's
+// period (at order 2 the effective one). Precondition: set_time() is called before each step.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "models/geometry/geometric_algorithm.hpp"
+#include "models/obstacles/obstacle.hpp"
+#include "models/surfaces/coulomb_step.hpp"
+
+namespace proxarm::models {
+
+struct Medium {
+  double damping_Ns_per_m = 0.0;
+  double force_N = 0.0;             // Coulomb
+  std::unique_ptr<Obstacle> shape;  // the medium acts where its distance isn't positive; null: everywhere
+};
+
+template <int N>
+class Media final : public GeometricAlgorithm<N> {
+ public:
+  static constexpr double first_period_s = 1e-3;  // T until set_time() gives another
+
+  // `X_WS`: of the space whose first N coordinates the proxy has; shapes are in W.
+  Media(std::unique_ptr<GeometricAlgorithm<N>> rest, std::vector<Medium> media, double period_s = first_period_s,
+        const Pose& X_WS = Pose::Identity())
+      : rest_(std::move(rest)), media_(std::move(media)), X_WS_(X_WS), T_(period_s) {}
+
+  Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
+    double c = 0.0, F = 0.0;
+    for (const Medium& medium : media_) {
+      if (medium.shape != nullptr && medium.shape->distance(in_W(q)) > 0.0) continue;
+      c += medium.damping_Ns_per_m / T_;
+      F += medium.force_N;
+    }
+    const double kappa = K + c;
+    const Vec<N> p_v = c > 0.0 ? Vec<N>(q + (K / kappa) * (p - q)) : p;
+    return F > 0.0 ? coulomb(kappa, F, p_v, q) : (*rest_)(kappa, p_v, q);
+  }
+
+  void set_time(const StepTime& time) noexcept override {
+    if (time.period_s > 0.0) T_ = time.period_s;
+    rest_->set_time(time);
+  }
+  [[nodiscard]] std::span<const Contact<N>> contacts() const noexcept override { return rest_->contacts(); }
+  [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override {
+    return rest_->unresolved_steps() + unresolved_;
+  }
+  [[nodiscard]] bool squeezed() const noexcept override { return rest_->squeezed(); }
+
+ private:
+  [[nodiscard]] Vec3 in_W(const Vec<N>& q) const noexcept {
+    if constexpr (N == 3) return q;
+    return X_WS_ * lift<N>(q);
+  }
+  Vec<N> coulomb(double kappa, double F, const Vec<N>& p, const Vec<N>& q) noexcept {
+    bool found = true;
+    const Vec<N> r = CoulombStep<N>(*rest_, kappa, F, p, q).solve(found);
+    unresolved_ += found ? 0 : 1;
+    return r;
+  }
+
+  std::unique_ptr<GeometricAlgorithm<N>> rest_;
+  std::vector<Medium> media_;
+  Pose X_WS_;
+  double T_;
+  std::uint64_t unresolved_ = 0;
+};
+
+}  // namespace proxarm::models

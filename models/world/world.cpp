@@ -1,0 +1,448 @@
+#include "models/world/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "models/obstacles/sweep.hpp"
+#include "models/surfaces/contact_search.hpp"
+#include "models/surfaces/corner.hpp"
+#include "models/surfaces/groove.hpp"
+#include "models/world/settling.hpp"
+#include "models/world/shared_hold.hpp"
+
+namespace proxarm::models {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// Two objects that hold the proxy between them, each by one of its features.
+struct PairOfSurfaces {
+  const Obstacle &a, &b;
+  std::int32_t feature_a, feature_b;
+};
+
+struct SettledPair {
+  bool settled = false;
+  GrooveSolution groove;  // found: the iteration has settled, and both contacts press
+  Vec3 r = Vec3::Zero();
+  Obstacle::Tangent t_a, t_b;
+};
+
+SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, const Vec3& from,
+                   GrooveSearch search) noexcept {
+  const Vec3 q_a = pair.a.carry(q), q_b = pair.b.carry(q);
+  Settling settling(from);
+  SettledPair out{.groove = {},
+                  .r = from,
+                  .t_a = pair.a.tangent(from, pair.feature_a),
+                  .t_b = pair.b.tangent(from, pair.feature_b)};
+  for (int k = 0; k < most_settling; ++k) {
+    const GrooveLine line(out.t_a.surface, out.t_b.surface, settling.at());
+    const auto solve_by = [&](GrooveSearch by) {
+      return solve_groove({out.t_a.surface, out.t_a.mu, q_a}, {out.t_b.surface, out.t_b.mu, q_b}, line, p, by);
+    };
+    out.groove = solve_by(search);
+    const bool presses = out.groove.found;
+    if (!presses) out.groove = solve_by(GrooveSearch::may_pull);
+    out.r = out.groove.r;
+    if (!out.groove.found || !out.r.allFinite()) break;
+    out.groove.found = presses;
+    out.settled = settling.take(out.r);
+    if (out.settled) return out;
+    const Obstacle::Tangent n_a = pair.a.tangent(settling.at(), pair.feature_a),
+                            n_b = pair.b.tangent(settling.at(), pair.feature_b);
+    out.settled = n_a.surface.normal() == out.t_a.surface.normal() && n_b.surface.normal() == out.t_b.surface.normal();
+    if (out.settled) return out;  // flat
+    out.t_a = n_a;
+    out.t_b = n_b;
+  }
+  out.groove.found = false;
+  return out;
+}
+
+}  // namespace
+
+struct World::Choice : NearestSet {
+  std::array<Contact<3>, 3> contacts{};  // in shared_ where they share the force
+  std::size_t count = 0;
+  bool shared = false;
+  bool free = false;  // nothing in the way of p
+  bool resolved = true;
+
+  // True if this set is better than what was there; the caller then fills in its contacts.
+  bool better(const Vec3& p, const Vec3& at, std::size_t contact_count) noexcept {
+    if (!improve(p, at)) return false;
+    count = contact_count;
+    return true;
+  }
+};
+
+bool World::Candidates::has(std::size_t i) const noexcept {
+  const auto end = index.begin() + static_cast<std::ptrdiff_t>(count);
+  return std::find(index.begin(), end, i) != end;
+}
+
+void World::Candidates::add(std::size_t i, const Obstacle::Step& step) noexcept {
+  if (count == most || has(i)) return;
+  index[count] = i;
+  alone[count++] = step;
+  grew = true;
+}
+
+// Adds another face of a mesh that is a candidate already. It counts only together with other candidates: alone, the
+// mesh has found its step itself.
+void World::add_face(std::size_t i, const Obstacle::Step& step, Candidates& candidates) noexcept {
+  if (candidates.count == Candidates::most || !step.touches) return;
+  for (std::size_t c = 0; c < candidates.count; ++c) {
+    if (candidates.index[c] == i && candidates.alone[c].feature == step.feature) return;
+  }
+  candidates.index[candidates.count] = i;
+  candidates.alone[candidates.count] = step;
+  candidates.alone[candidates.count++].touches = false;
+  candidates.grew = true;
+}
+
+World::World(std::vector<Entry> entries) : entries_(std::move(entries)) {
+  std::vector<BoundsTree::Leaf> leaves;
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    const Bounds bounds = obstacle.bounds();
+    elastic_.push_back(obstacle.layer().soft());
+    soft_ = soft_ || elastic_.back();
+    if (obstacle.moves()) {
+      moving_.push_back(i);
+    } else if (bounds.finite()) {
+      leaves.push_back({bounds, i});
+    } else {
+      unbounded_.push_back(i);
+    }
+  }
+  tree_ = BoundsTree(std::move(leaves));
+  near_.reserve(entries_.size());
+}
+
+void World::set_time(const StepTime& time) noexcept {
+  for (const std::size_t i : moving_) entries_[i].obstacle->set_time(time.time_s, time.period_s);
+}
+
+// Gathers all obstacles that the step can meet, into near_; returns the radius that they were looked for in. The force
+// on the proxy never does work, (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball whose diameter is the way from q to p.
+// Around convex bodies of radius R it may leave that ball by ‖r − q‖²/2R; a ball of twice the radius covers this.
+// `reach` is the least radius to look in.
+double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
+  const Vec3 middle = 0.5 * (p + q);
+  const double radius = std::max(reach, (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>()));
+  near_.resize(near_fixed_);
+  if (!((middle - near_centre_).norm() + radius <= near_radius_)) {
+    // Twice the radius and a millimetre more than needed, so that a proxy in contact, which moves by micrometres, asks
+    // the tree once in many steps. A larger margin would make each step look at more obstacles.
+    near_radius_ = 2.0 * radius + 1e-3;
+    near_centre_ = middle;
+    near_.clear();
+    for (const std::size_t i : unbounded_) {
+      if (entries_[i].obstacle->distance(middle) <= near_radius_) near_.push_back(i);
+    }
+    tree_.within(middle, near_radius_, [&](std::size_t i) { near_.push_back(i); });
+    std::sort(near_.begin(), near_.end());  // so that results don't depend on the order in which the tree finds them
+    near_fixed_ = near_.size();
+  }
+  for (const std::size_t i : moving_) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    if (obstacle.comes_within(middle, radius + (obstacle.carry(q) - q).norm())) near_.push_back(i);
+  }
+  return radius;
+}
+
+void World::add_candidates(double K, const Vec3& p, const Vec3& q, Candidates& candidates) const noexcept {
+  for (const std::size_t i : near_) {
+    const Obstacle::Step s = entries_[i].obstacle->step(K, p, q);
+    if (s.touches) candidates.add(i, s);
+  }
+}
+
+// Whether the proxy gets from q to r around an obstacle that is in the straight way: over the edge where the obstacle
+// lets go of it. All other obstacles must let it pass there, too.
+bool World::gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept {
+  const Vec3 edge = obstacle.detour(p, q);
+  if (edge == q || obstacle.excludes(edge, r)) return false;
+  return std::all_of(near_.begin(), near_.end(), [&](std::size_t i) {
+    const Obstacle& other = *entries_[i].obstacle;
+    return &other == &obstacle || (!other.excludes(other.carry(q), edge) && !other.excludes(edge, r));
+  });
+}
+
+bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
+                 const Vec3& p) const noexcept {
+  bool all = true;
+  for (const std::size_t i : near_) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    const bool member = std::find(contacts.begin(), contacts.end(), i) != contacts.end();
+    // A mesh that holds the proxy with one face may be in its way with another. Alone, the mesh has taken care of that
+    // itself, so only sets of two and more are checked.
+    Vec3 normal;
+    if (member && (contacts.size() < 2 || !obstacle.parts(obstacle.carry(q), r, normal))) continue;
+    const bool presses = !member && soft_ && obstacle.presses_at(r);
+    if (!member && !presses && !obstacle.excludes(obstacle.carry(q), r)) continue;
+    if (!member && !presses && candidates.around && gets_around(obstacle, p, q, r)) continue;
+    all = false;
+    const bool known = candidates.has(i);
+    if (known && !member && !obstacle.parts(obstacle.carry(q), r, normal)) continue;
+    // The obstacle isn't in the way to p, but in the way to the trial point: the step to that point tells which of its
+    // features is.
+    Obstacle::Step s = obstacle.step(K, r, q);
+    if (known) {
+      add_face(i, s, candidates);
+    } else {
+      s.touches = s.touches && obstacle.step(K, p, q).touches;
+      candidates.add(i, s);
+    }
+  }
+  return all;
+}
+
+StepResult World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates,
+                              Choice& choice) const noexcept {
+  for (std::size_t c = 0; c < candidates.count; ++c) {
+    const Obstacle::Step& s = candidates.alone[c];
+    const std::size_t i[1] = {candidates.index[c]};
+    if (!s.touches || !fits(q, s.r, i, candidates, K, p) || !choice.better(p, s.r, 1)) continue;
+    const Entry& entry = entries_[i[0]];
+    choice.resolved = s.resolved;
+    choice.count = entry.obstacle->contacts(K, p, q, s, choice.contacts);
+    for (std::size_t j = 0; j < choice.count; ++j) {
+      choice.contacts[j].object = entry.object;
+      if (entry.feature >= 0) choice.contacts[j].feature = entry.feature;
+    }
+  }
+  return choice.result(candidates.grew);
+}
+
+// What a candidate's obstacle reports where it presses together with others.
+Contact<3> World::contact_of(const Candidates& candidates, std::size_t candidate, bool slips,
+                             const Vec3& normal) const noexcept {
+  const Entry& entry = entries_[candidates.index[candidate]];
+  return {entry.object, entry.feature < 0 ? candidates.alone[candidate].feature : entry.feature, slips, normal};
+}
+
+void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::size_t, 2> own, Candidates& candidates,
+                     Choice& choice) const noexcept {
+  if (candidates.index[own[0]] > candidates.index[own[1]]) std::swap(own[0], own[1]);
+  const std::size_t m[2] = {candidates.index[own[0]], candidates.index[own[1]]};
+  if (elastic_[m[0]] || elastic_[m[1]]) return;
+  const PairOfSurfaces pair{*entries_[m[0]].obstacle, *entries_[m[1]].obstacle, candidates.alone[own[0]].feature,
+                            candidates.alone[own[1]].feature};
+  SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);
+  if (s.settled && !s.groove.found) s = settle(pair, p, q, s.r, GrooveSearch::all_roots);
+  if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !choice.better(p, s.r, 2)) return;
+  choice.contacts[0] = contact_of(candidates, own[0], s.groove.slips1, s.t_a.surface.normal());
+  choice.contacts[1] = contact_of(candidates, own[1], s.groove.slips2, s.t_b.surface.normal());
+}
+
+// On tangent planes at the corner itself, taken again at each new corner until it stays.
+void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<std::size_t, 3>& own,
+                       Candidates& candidates, Choice& choice) const noexcept {
+  const std::size_t m[3] = {candidates.index[own[0]], candidates.index[own[1]], candidates.index[own[2]]};
+  if (elastic_[m[0]] || elastic_[m[1]] || elastic_[m[2]]) return;
+  Vec3 r = q, carried[3];
+  for (std::size_t j = 0; j < 3; ++j) carried[j] = entries_[m[j]].obstacle->carry(q);
+  const auto tangent = [&](std::size_t j) {
+    return entries_[m[j]].obstacle->tangent(r, candidates.alone[own[j]].feature);
+  };
+  std::array<Obstacle::Tangent, 3> t{tangent(0), tangent(1), tangent(2)};
+  CornerSolution s;
+  double last_move = infinity;
+  for (int k = 0; k < most_settling; ++k) {
+    const CornerPoint point(t[0].surface, t[1].surface, t[2].surface);
+    s = solve_corner({PlaneContact{t[0].surface, t[0].mu, carried[0]}, PlaneContact{t[1].surface, t[1].mu, carried[1]},
+                      PlaneContact{t[2].surface, t[2].mu, carried[2]}},
+                     point, p);
+    if (!point.exists || !s.r.allFinite()) {
+      s.found = false;
+      break;
+    }
+    const double move = (s.r - r).norm();
+    r = s.r;
+    const std::array<Obstacle::Tangent, 3> next{tangent(0), tangent(1), tangent(2)};
+    bool flat = true;
+    for (std::size_t j = 0; j < 3; ++j) flat = flat && next[j].surface.normal() == t[j].surface.normal();
+    const double contraction = last_move < infinity ? move / last_move : infinity;
+    if (flat || has_settled(move, move <= 0.5 * last_move, contraction, r)) break;
+    s.found = false;
+    last_move = move;
+    t = next;
+  }
+  if (!s.found || !fits(q, r, m, candidates, K, p) || !choice.better(p, r, 3)) return;
+  for (std::size_t j = 0; j < 3; ++j) {
+    choice.contacts[j] = contact_of(candidates, own[j], s.slips[j], t[j].surface.normal());
+  }
+}
+
+// Tries all candidates at once if one of them has an elastic layer: those that press share the force.
+void World::try_together(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
+  const std::span<const std::size_t> all{candidates.index.data(), candidates.count};
+  if (std::none_of(all.begin(), all.end(), [this](std::size_t i) { return elastic_[i]; })) return;
+  SharedHold hold;
+  hold.count = candidates.count;
+  hold.budget = hold_budget_;
+  for (std::size_t c = 0; c < hold.count; ++c) {
+    hold.obstacle[c] = entries_[candidates.index[c]].obstacle.get();
+    hold.step[c] = candidates.alone[c];
+  }
+  const bool found = hold.solve(K, p, q);
+  hold_budget_ = hold.budget;
+  if (!found || !fits(q, hold.r, all, candidates, K, p)) return;
+  choice.better(p, hold.r, 0);
+  choice.shared = true;
+  for (std::size_t c = 0; c < hold.count; ++c) {
+    const Obstacle::Step& s = hold.step[c];
+    if (!s.touches) continue;
+    const Entry& entry = entries_[candidates.index[c]];
+    shared_[choice.count++] = {entry.object, entry.feature < 0 ? s.feature : entry.feature, s.slips, s.normal};
+    choice.resolved = choice.resolved && s.resolved;
+  }
+}
+
+bool World::search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
+  const auto try_pairs = [&] {
+    try_each_pair(candidates.count, [&](std::size_t i, std::size_t j) {
+      try_pair(K, p, q, {i, j}, candidates, choice);
+      return StepResult::no_progress;
+    });
+    return choice.result(candidates.grew);
+  };
+  const auto try_triples = [&] {
+    try_each_triple(candidates.count, [&](std::size_t i, std::size_t j, std::size_t k) {
+      try_triple(K, p, q, {i, j, k}, candidates, choice);
+      return StepResult::no_progress;
+    });
+    return choice.result(candidates.grew);
+  };
+  return search_contacts(
+      [&] {
+        candidates.grew = false;
+        return true;
+      },
+      [&] { return try_singles(K, p, q, candidates, choice); }, try_pairs, try_triples,
+      [&] {
+        if (soft_) try_together(K, p, q, candidates, choice);
+        return choice.result(candidates.grew);
+      });
+}
+
+// Whether all obstacles that are near allow a proxy from q to end at r.
+bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
+  return std::none_of(near_.begin(), near_.end(), [&](std::size_t i) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    return obstacle.excludes(obstacle.carry(q), r);
+  });
+}
+
+// The fallback where no set is complete: the proxy stays where it is if it may be there; otherwise the obstacle that
+// takes it nearest to p brings it out.
+void World::hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
+  const bool allowed = is_free(q, q);
+  for (std::size_t c = 0; c < candidates.count; ++c) {
+    const Obstacle::Step& s = candidates.alone[c];
+    if (!s.touches) continue;
+    const Entry& entry = entries_[candidates.index[c]];
+    const Contact<3> contact{entry.object, entry.feature < 0 ? s.feature : entry.feature, false, s.normal};
+    if (allowed) {
+      if (choice.count < choice.contacts.size()) choice.contacts[choice.count++] = contact;
+    } else if (choice.better(p, s.r, 1)) {
+      choice.contacts[0] = contact;
+    }
+  }
+  if (allowed || choice.count == 0) choice.r = q;
+}
+
+double World::distance(const Vec3& x) const noexcept {
+  double least = infinity;
+  for (const std::size_t i : unbounded_) least = std::min(least, entries_[i].obstacle->distance(x));
+  for (const std::size_t i : moving_) least = std::min(least, entries_[i].obstacle->distance(x));
+  return tree_.nearest(x, least, [&](std::size_t i) { return entries_[i].obstacle->distance(x); });
+}
+
+// Finds the step's end and its contacts. False if no set of contacts was complete.
+bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept {
+  Candidates& candidates = candidates_;
+  candidates.clear();
+  add_candidates(K, p, q, candidates);
+  choice.free = candidates.count == 0;
+  if (choice.free) {
+    choice.r = p;
+    return true;
+  }
+  if (search(K, p, q, candidates, choice)) return choice.resolved;
+  candidates.around = true;
+  if (search(K, p, q, candidates, choice)) return choice.resolved;
+  // The tool may be so deep, beyond the radius of a curved surface, that the iteration on tangent planes finds nothing.
+  // The proxy then goes as far as a shorter step leads: the way to p is halved up to six times.
+  Vec3 nearer = p;
+  for (int k = 0; k < 6 && !choice.found(); ++k) {
+    nearer = 0.5 * (nearer + q);
+    Candidates fewer;
+    add_candidates(K, nearer, q, fewer);
+    if (fewer.count > 0) search(K, nearer, q, fewer, choice);
+  }
+  if (!choice.found()) hold(p, q, candidates, choice);
+  return false;
+}
+
+World::Sweep World::sweep(const Vec3& x, const Vec3& y) noexcept {
+  Sweep out{y, false, {}};
+  gather(y, x, 0.0);
+  for (const std::size_t i : near_) {
+    const Obstacle& obstacle = *entries_[i].obstacle;
+    if (!obstacle.bars(x, out.end)) continue;
+    const Obstacle::Step s = obstacle.step(1.0, out.end, x);
+    out.contact = {entries_[i].object, entries_[i].feature < 0 ? s.feature : entries_[i].feature, false,
+                   s.touches ? s.normal : Vec3((x - y).normalized())};
+    out.stopped = true;
+    out.end = models::sweep(obstacle, x, out.end);
+  }
+  return out;
+}
+
+Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
+  count_ = 0;
+  squeezed_ = false;
+  if ((p - clear_at_).squaredNorm() < clearance_ * clearance_ &&
+      (q - clear_at_).squaredNorm() < clearance_ * clearance_ && clearance_ > 0.0) {
+    return p;
+  }
+  double radius = gather(p, q, 0.0);
+  hold_budget_ = SharedHold::whole_budget;
+  Choice choice;
+  bool found = solve(K, p, q, choice);
+  // An object that moves may carry the proxy far, or one that it was squeezed into may bring it out far away. The step
+  // may then end where obstacles haven't been looked for, so it is repeated with all that are near its end.
+  for (std::size_t known = 0; known != near_.size() && !choice.free;) {
+    known = near_.size();
+    const double away = (choice.r - 0.5 * (p + q)).norm();
+    if (away <= radius) break;
+    radius = gather(p, q, 2.0 * away);
+    choice = {};
+    found = solve(K, p, q, choice);
+  }
+  if (!found) {
+    ++unresolved_;
+    squeezed_ = !moving_.empty() && !is_free(q, choice.r);
+  }
+  contacts_ = choice.contacts;
+  count_ = choice.count;
+  are_shared_ = choice.shared;
+  if (choice.free && moving_.empty()) {
+    // Nothing is in the way: the clearance at p lets later steps be free without a look. With moving objects it would
+    // not stay valid.
+    double room = infinity;
+    for (const std::size_t i : unbounded_) room = std::min(room, entries_[i].obstacle->distance(p));
+    clearance_ = tree_.nearest(p, room, [&](std::size_t i) { return entries_[i].obstacle->distance(p); });
+    clearance_ -= 1e-12 * (1.0 + p.lpNorm<1>());  // rounding of distances
+    clear_at_ = p;
+  }
+  return choice.r;
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,85 @@
+// Samples random states of a 𝒢 and checks Assumption 1 and the laws that its forces obey.
+//
+//   independent of K   if r = 𝒢(K, r − f/K, q), then r = 𝒢(κ, r − f/κ, q) for other κ too (Assumption 1)
+//   within its laws    f is a sum of forces that the reported contacts can bear, as (17) says for each
+//   rests where it is  𝒢(K, r, r) = r: r isn't inside of anything, and nothing pulls it
+//   repeatable         the same arguments give the same point, whatever the steps before
+//   finite             no NaN, no infinity
+//
+//   MyWorld g;                                                        // your own 𝒢, in three dimensions
+//   const CheckReport report = check_algorithm<3>(g, {.centre = {0, 0, 0}, .size_m = 0.5}, {});
+//   if (!report.passed()) std::puts(report.text().c_str());
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "models/geometry/geometric_algorithm.hpp"
+#include "scenes/format/scene.hpp"
+
+namespace proxarm::scenes {
+
+struct CheckOptions {
+  std::uint64_t seed = 1;
+  std::int64_t states = 20'000;  // for each object, and for the whole
+  double kappa_decades = 6.0;    // on either side of K
+  // Largest depth of p below q, for any κ. check_scene() limits it to a tenth of the least radius: deeper, curved
+  // worlds have several solutions.
+  double deepest_m = 0.02;
+  double several_allowed = 0.02;  // largest share of states in which another κ may find another of several solutions
+};
+
+// Where states are sampled, and what is known of the world there.
+template <int N>
+struct CheckRegion {
+  models::Vec<N> centre = models::Vec<N>::Zero();
+  double size_m = 0.5;                            // half-width
+  std::vector<models::Vec<N>> places{};           // points of the free space to start from; none: anywhere in the box
+  std::optional<std::vector<double>> friction{};  // μ by object; unknown: forces are only checked not to pull
+  bool acts_without_contact = false;              // a field, a Coulomb medium or a guide
+  // The stiffness that viscous media add to the coupling at q: b/T, N/m. Their force isn't one of the contacts'.
+  std::function<double(const models::Vec<N>& q)> viscous_N_per_m{};
+  // There is a Coulomb medium. Whether and how little a proxy slips in it is extrapolated from a few thousandths of its
+  // way (models/surfaces/coulomb_step.hpp), which amplifies rounding by the inverse of that share.
+  bool has_coulomb_medium = false;
+  bool bends = false;  // there is a chain of pieces: near a corner, a place on the other piece may be a solution too
+  bool soft = false;   // there is an elastic layer: nothing rests within it without a force
+};
+
+struct CheckFigure {
+  std::string what;
+  double worst = 0.0;  // the largest error over what rounding explains: up to 1 is fine
+  std::int64_t failures = 0;
+  std::string state;  // the state with the largest error
+};
+
+struct CheckReport {
+  std::string subject;
+  std::int64_t states = 0, in_contact = 0, slipping = 0;
+  std::int64_t several = 0;      // states with several solutions: Coulomb's law leaves them open, so they don't fail
+  std::int64_t unresolved = 0;   // states in which elastic layers share a force and no shares were found
+  double several_allowed = 0.0;  // largest share of either among all states
+  std::vector<CheckFigure> figures;
+
+  [[nodiscard]] bool passed() const noexcept;
+  [[nodiscard]] std::string text() const;  // a few lines for a person
+};
+
+template <int N>
+CheckReport check_algorithm(models::GeometricAlgorithm<N>& g, const CheckRegion<N>& region,
+                            const CheckOptions& options);
+extern template CheckReport check_algorithm<1>(models::GeometricAlgorithm<1>&, const CheckRegion<1>&,
+                                               const CheckOptions&);
+extern template CheckReport check_algorithm<2>(models::GeometricAlgorithm<2>&, const CheckRegion<2>&,
+                                               const CheckOptions&);
+extern template CheckReport check_algorithm<3>(models::GeometricAlgorithm<3>&, const CheckRegion<3>&,
+                                               const CheckOptions&);
+
+// Checks each object alone, if there are several, and then all together. Objects that move are checked at rest, where
+// they stand at time 0.
+std::vector<CheckReport> check_scene(const Scene& scene, const CheckOptions& options = {});
+
+}  // namespace proxarm::scenes

@@ -1,0 +1,82 @@
+// Compiles a scene to the smallest 𝒢 that renders it. A scene without friction gets no friction code, a single wall is
+// just (2) or (4), and an empty scene is 𝒢(K, p, q) = p.
+//
+//   CompiledScene world = compile(load_scene("scenes/wall.yaml"));
+//   GeometricAlgorithm<3>& g = world.algorithm<3>();
+//   const Vec3 q = g(M / (T * T), p_hat, q_k1);                    // (26b)
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "models/geometry/geometric_algorithm.hpp"
+#include "models/obstacles/moving_obstacle.hpp"
+#include "scenes/format/scene.hpp"
+
+namespace proxarm::scenes {
+
+// One line of what was compiled in or left out, for `proxarm explain`.
+struct Stage {
+  std::string what;
+  std::string why;
+};
+
+struct CompiledScene {
+  template <int N>
+  using Algorithm = std::unique_ptr<models::GeometricAlgorithm<N>>;
+
+  std::string name;
+  Space space;
+  std::vector<Stage> stages;   // in the order in which a step goes through them
+  std::vector<Stage> skipped;  // what this scene doesn't need
+  std::variant<Algorithm<1>, Algorithm<2>, Algorithm<3>> any_algorithm;
+
+  [[nodiscard]] int dimensions() const noexcept { return space.dimensions; }
+
+  // The scene's 𝒢. Precondition: N is the scene's number of dimensions (throws std::bad_variant_access otherwise). Each
+  // proxy needs a CompiledScene of its own, since 𝒢 remembers contacts.
+  template <int N>
+  [[nodiscard]] models::GeometricAlgorithm<N>& algorithm() const {
+    return *std::get<Algorithm<N>>(any_algorithm);
+  }
+
+  // Moves an object whose motion is `driven` (given by its index in the scene) to X, relative to where it was
+  // described. To be called once before each step: the proxy feels the motion from the last call to this one. In a
+  // scene of fewer dimensions, only the part of X along its space counts.
+  void drive(std::size_t object, const models::Pose& X) noexcept;
+  std::vector<std::pair<std::int32_t, models::MovingObstacle*>> driven;  // parts of any_algorithm
+
+  // Sets an object's friction from the next step on, if has_friction(). Precondition: finite and not negative.
+  void set_friction(std::size_t object, double friction) noexcept;
+  [[nodiscard]] bool has_friction(std::size_t object) const noexcept;
+  std::vector<double> frictions;                                                       // of all objects, as described
+  std::vector<std::pair<std::int32_t, std::function<void(double)>>> friction_setters;  // parts of any_algorithm
+
+  // Coordinates of the space ↔ points of W.
+  template <int N>
+  [[nodiscard]] models::Vec3 to_W(const models::Vec<N>& x) const noexcept {
+    return space.origin_m + space.axes.leftCols<N>() * x;
+  }
+  template <int N>
+  [[nodiscard]] models::Vec<N> from_W(const models::Vec3& x_W) const noexcept {
+    return space.axes.leftCols<N>().transpose() * (x_W - space.origin_m);
+  }
+};
+
+// Throws description::SetupError for a scene that can't be rendered, such as a space of fewer dimensions that lies
+// inside an object.
+CompiledScene compile(const Scene& scene);
+
+// The distance from x_W to the nearest object, in metres: negative inside one, infinite in an empty scene. Objects that
+// move count where they are described; elastic layers count as used up. For summaries and tests, not for the cycle.
+double clearance_m(const Scene& scene, const models::Vec3& x_W);
+// The same with scripted objects where they are at time_s; the k-th step of a proxy (counted from 1) is at k T. Driven
+// objects count where they are described, or, if their places aren't known, not at all.
+enum class Driven { as_described, left_out };
+double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s, Driven driven = Driven::as_described);
+
+}  // namespace proxarm::scenes

@@ -1,0 +1,177 @@
+// A CANopen device as its bus sees it (CiA 301): NMT state machine, SDO server, PDOs, SYNC, EMCY, heartbeat both ways.
+//
+// What the device is for comes from a CanopenApplication (a drive). Written from the standard and independent of the
+// master in fieldbus, so that each of the two tests the other.
+//
+// Frames (identifier: data):
+//   000: command, node            NMT: 01 start, 02 stop, 80 pre-operational, 81 reset node, 82 reset communication
+//   080: (empty)                  SYNC (identifier from 1005h)
+//   080 + node: code u16, error register u8, 5 bytes of the maker's       EMCY
+//   580 + node, 600 + node        SDO answers and requests
+//   700 + node: state             boot-up 00; heartbeat 04 stopped, 05 operational, 7F pre-operational
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sim/bus/device_port.hpp"
+#include "sim/canopen/object_dictionary.hpp"
+#include "sim/canopen/sdo_server.hpp"
+#include "sim/canopen/slave_pdo.hpp"
+
+namespace proxarm::sim {
+
+enum class NmtState : std::uint8_t { initialising = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
+
+// EMCY error codes used here (CiA 301, table 26; CiA 402-2 for the drive's own).
+namespace emcy {
+constexpr std::uint16_t no_error = 0x0000;
+constexpr std::uint16_t communication = 0x8100;
+constexpr std::uint16_t heartbeat_lost = 0x8130;
+constexpr std::uint16_t pdo_too_short = 0x8210;
+constexpr std::uint16_t pdo_too_long = 0x8220;
+constexpr std::uint16_t sync_length = 0x8240;
+constexpr std::uint16_t rpdo_timeout = 0x8250;
+constexpr std::uint16_t following_error = 0x8611;
+constexpr std::uint16_t sync_controller = 0x8700;
+}  // namespace emcy
+
+// Bits of the error register, 1001h.
+namespace error_register {
+constexpr std::uint8_t generic = 0x01;
+constexpr std::uint8_t communication = 0x10;
+constexpr std::uint8_t profile_specific = 0x20;
+}  // namespace error_register
+
+// The part of a device that knows what the device does.
+class CanopenApplication {
+ public:
+  virtual ~CanopenApplication() = default;
+
+  // SYNC came: synchronous receive PDOs have been written to the dictionary, transmit PDOs will be read from it next.
+  virtual void on_sync(std::int64_t time_ns) = 0;
+  // The NMT state changed, by command, by reset or by the reaction to an error.
+  virtual void on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns) = 0;
+  // Heartbeat lost (8130h) or receive PDO overdue (8250h); the EMCY is out, 1029h comes next.
+  virtual void on_communication_lost(std::uint16_t code, std::int64_t time_ns) = 0;
+  // Reset of the whole device (not just of its communication), dictionary back at its defaults.
+  virtual void on_reset(std::int64_t time_ns) = 0;
+};
+
+struct CanopenSlaveConfig {
+  std::uint8_t node = 1;
+  std::uint32_t device_type = 0;
+  std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;  // 1018h
+  std::string device_name;
+  bool fd = false;                            // its PDOs are CAN FD frames at the data bitrate
+  std::int64_t boot_time_ns = 20'000'000;     // from power or reset to the boot-up frame
+  std::int64_t sdo_answer_time_ns = 100'000;  // the firmware's time from a request to its answer
+  std::int64_t pdo_answer_time_ns = 20'000;   // from SYNC to the transmit PDO at the controller
+};
+
+class CanopenSlave final : public BusDevice {
+ public:
+  CanopenSlave(const CanopenSlaveConfig& config, CanopenApplication& application, DevicePort& port);
+
+  void power_on(std::int64_t time_ns) noexcept override;
+  void on_frame(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
+  void on_time(std::int64_t time_ns) noexcept override;
+
+  [[nodiscard]] ObjectDictionary& dictionary() noexcept { return dictionary_; }
+  [[nodiscard]] const ObjectDictionary& dictionary() const noexcept { return dictionary_; }
+  [[nodiscard]] SlavePdo& receive_pdo(int number) { return receive_.at(number - 1)->pdo; }
+  [[nodiscard]] SlavePdo& transmit_pdo(int number) { return transmit_.at(number - 1)->pdo; }
+  [[nodiscard]] NmtState state() const noexcept { return state_; }
+  [[nodiscard]] const CanopenSlaveConfig& config() const noexcept { return config_; }
+
+  // An error appears or goes. A new one is told by EMCY, kept in 1003h and shown in 1001h; when the last one has gone,
+  // EMCY 0000h says so. Raising one that is there already does nothing.
+  void raise_error(std::uint16_t code, std::uint8_t register_bits, std::int64_t time_ns) noexcept;
+  void clear_error(std::uint16_t code, std::int64_t time_ns) noexcept;
+  [[nodiscard]] bool has_error(std::uint16_t code) const noexcept;
+
+  // Faults for tests: no heartbeat leaves any more; SDO requests stay unanswered.
+  void mute_heartbeat(bool mute) noexcept { heartbeat_muted_ = mute; }
+  void mute_sdo(bool mute) noexcept { sdo_muted_ = mute; }
+
+ private:
+  static constexpr int pdos = 4;
+  static constexpr int consumers = 4;
+  static constexpr std::int64_t never = INT64_MIN;
+
+  struct Receive {
+    Receive(ObjectDictionary& dictionary, int number, std::uint8_t node, bool fd)
+        : pdo(dictionary, SlavePdo::Direction::receive, number, node, number == 1, fd) {}
+    SlavePdo pdo;
+    std::array<std::uint8_t, 64> data{};  // waiting for SYNC
+    bool waiting = false;
+    std::int64_t last_ns = never;  // supervised by the event timer once the first one has come
+    bool overdue = false;
+  };
+  struct Transmit {
+    Transmit(ObjectDictionary& dictionary, int number, std::uint8_t node, bool fd)
+        : pdo(dictionary, SlavePdo::Direction::transmit, number, node, number == 1, fd) {}
+    SlavePdo pdo;
+    std::array<std::uint8_t, 64> last{};
+    std::int64_t last_ns = never;
+    int syncs = 0;  // since the last one was sent
+  };
+  struct Consumer {
+    std::uint8_t node = 0;
+    std::int64_t limit_ns = 0;
+    std::int64_t last_ns = never;  // monitored once the first heartbeat has come
+    bool lost = false;
+  };
+  struct Error {
+    std::uint16_t code = 0;
+    std::uint8_t register_bits = 0;
+  };
+
+  void add_communication_objects();
+  void enter(NmtState to, std::int64_t time_ns);
+  void start_over(bool whole_device, std::int64_t time_ns);
+  void on_nmt_command(const fieldbus::CanFrame& frame, std::int64_t time_ns);
+  void on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns);
+  void on_sdo(const fieldbus::CanFrame& frame, std::int64_t time_ns);
+  [[nodiscard]] bool is_pdo(std::uint32_t id) const noexcept;  // one that it receives
+  void on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns);
+  void on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
+  void check_heartbeats(std::int64_t time_ns);
+  void check_receive_pdos(std::int64_t time_ns);
+  void transmit_events(std::int64_t time_ns) noexcept;
+  void transmit_on_sync(std::int64_t time_ns) noexcept;
+  void transmit(Transmit& transmit, const std::array<std::uint8_t, 64>& data, std::int64_t time_ns) noexcept;
+  void configure_consumers() noexcept;
+  [[nodiscard]] SdoAbort check_consumer(std::uint8_t subindex, std::int64_t value) const noexcept;
+  void error_behaviour(std::int64_t time_ns);
+  void send_emergency(std::uint16_t code, std::int64_t time_ns) noexcept;
+  void send_state(NmtState state, std::int64_t time_ns) noexcept;
+  [[nodiscard]] bool talks() const noexcept {
+    return state_ == NmtState::pre_operational || state_ == NmtState::operational;
+  }
+
+  CanopenSlaveConfig config_;
+  CanopenApplication& application_;
+  DevicePort& port_;
+  ObjectDictionary dictionary_;
+  SdoServer sdo_{dictionary_};
+  ObjectEntry *sync_id_ = nullptr, *sync_window_ = nullptr;  // 1005h, 1007h
+  std::vector<std::unique_ptr<Receive>> receive_;
+  std::vector<std::unique_ptr<Transmit>> transmit_;
+  std::array<Consumer, consumers> consumers_{};
+  std::vector<Error> errors_;
+
+  NmtState state_ = NmtState::initialising;
+  std::int64_t boot_ns_ = never;   // when initialising ends
+  std::int64_t heartbeat_ns_ = 0;  // when the next one is due
+  std::int64_t heartbeat_period_ns_ = 0;
+  std::int64_t last_sync_ns_ = never;
+  std::int64_t last_sdo_ns_ = 0;
+  bool heartbeat_muted_ = false;
+  bool sdo_muted_ = false;
+};
+
+}  // namespace proxarm::sim

@@ -1,0 +1,78 @@
+// The SDO server of a simulated CANopen device (CiA 301, 7.2.4): expedited, segmented and block transfers, both ways.
+//
+// Written from the standard, apart from the client in fieldbus, so that each of the two tests the other.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sim/canopen/object_dictionary.hpp"
+
+namespace proxarm::sim {
+
+// CRC of block transfers: x¹⁶ + x¹² + x⁵ + 1, start value 0, no reflection (CiA 301, 7.2.4.3.16).
+[[nodiscard]] std::uint16_t sdo_block_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc = 0) noexcept;
+
+class SdoServer {
+ public:
+  using Message = std::array<std::uint8_t, 8>;
+
+  explicit SdoServer(ObjectDictionary& dictionary) : dictionary_(dictionary) {}
+
+  // Takes the eight bytes of a request and gives the messages to be sent in answer, in order: none, one, or a whole
+  // sub-block of a block upload. Valid until the next call. Whatever the bytes are, the state stays sound; a request
+  // that begins a transfer abandons the one before it.
+  [[nodiscard]] std::span<const Message> on_request(const Message& request);
+
+  // Communication reset: a transfer under way is forgotten.
+  void reset() noexcept { phase_ = Phase::idle; }
+
+ private:
+  enum class Phase : std::uint8_t {
+    idle,
+    segmented_download,
+    segmented_upload,
+    block_download,      // receiving segments
+    block_download_end,  // all segments in, waiting for the end request with the CRC
+    block_upload_start,  // answered the initiate request, waiting for the start
+    block_upload,        // a sub-block is out, waiting for its acknowledgement
+    block_upload_end,    // end request is out, waiting for its confirmation
+  };
+
+  void on_abort() noexcept { phase_ = Phase::idle; }
+  void begin_download(const Message& request);
+  void download_segment(const Message& request);
+  void begin_upload(const Message& request);
+  void upload_segment(const Message& request);
+  void begin_block_download(const Message& request);
+  void block_download_segment(const Message& request);
+  void end_block_download(const Message& request);
+  void begin_block_upload(const Message& request);
+  void acknowledge_block_upload(const Message& request);
+  void send_sub_block();
+  void initiate_upload_answer();
+
+  void finish_download(const Message& answer);
+  void answer(const Message& message) { answers_.push_back(message); }
+  void abort(SdoAbort code);
+  void remember_object(const Message& request) noexcept;
+  [[nodiscard]] Message object_message(std::uint8_t command) const noexcept;
+
+  ObjectDictionary& dictionary_;
+  std::vector<Message> answers_;
+
+  Phase phase_ = Phase::idle;
+  std::uint16_t index_ = 0;
+  std::uint8_t subindex_ = 0;
+  std::vector<std::uint8_t> data_;  // collected so far, or to be sent
+  std::size_t expected_ = 0;        // bytes that the client announced; 0: it didn't
+  std::size_t sent_ = 0;            // bytes of data_ confirmed to have been sent
+  std::uint8_t toggle_ = 0;
+  std::uint8_t block_size_ = 0;  // segments per sub-block
+  std::uint8_t sequence_ = 0;    // of the last segment received in order, or of the last one sent
+  bool with_crc_ = false;
+};
+
+}  // namespace proxarm::sim

@@ -1,0 +1,140 @@
+// The far end of all wires of a cell: arm, hand and physics, with a drive per joint and the force sensor on their
+// buses.
+//
+//   SimulatedCell far_end(cell, sensor, hand, network.events());
+//   far_end.attach_to(network);   // in-process; or connect() each node to a port of a real interface
+//   far_end.power_on();
+// From then on it lives by events and frames alone. It knows nothing of the controller.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fieldbus/modbus/modbus_client.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
+#include "models/description/cell.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+#include "sim/bus/device_node.hpp"
+#include "sim/devices/ati_device.hpp"
+#include "sim/devices/described_device.hpp"
+#include "sim/devices/device_fault.hpp"
+#include "sim/devices/drive_device.hpp"
+#include "sim/devices/enabling_switch.hpp"
+#include "sim/devices/modbus_device.hpp"
+#include "sim/devices/modbus_sensor_device.hpp"
+#include "sim/physics/plant.hpp"
+
+namespace proxarm::sim {
+
+struct SimulatedCellConfig {
+  PlantConfig plant;
+  std::vector<DeviceFault> faults;
+  std::vector<PressedSpan> enabling;  // of the cell's enabling input; none: pressed from 0.1 s on
+  std::int64_t tick_ns = 1'000'000;   // how often devices look at the clock; physics has its own step
+  std::int64_t drive_boot_time_ns = 20'000'000;
+  std::int64_t brake_release_ns = 30'000'000;
+};
+
+// What is really so, in W; the controller never sees it.
+struct Truth {
+  std::int64_t time_ns = 0;
+  models::Pose X_WT = models::Pose::Identity();        // rendered point of the handle
+  models::Vec3 velocity_W = models::Vec3::Zero();      // m/s
+  models::Vec3 acceleration_W = models::Vec3::Zero();  // m/s²
+  models::Vec3 hand_force_W = models::Vec3::Zero();    // N, of the hand on the handle at T
+  models::Wrench sensor_wrench_S;                      // load on the sensor, handle's weight and inertia included
+  bool hand_started = false;                           // all drives have been enabled once
+  std::int64_t hand_start_ns = 0;
+};
+
+// The cell's buses, for a network in this process.
+std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell);
+
+class SimulatedCell final : private Clockwork {
+ public:
+  // Throws SetupError: what Plant refuses, a bus that the cell doesn't have, a fault for a device that isn't there.
+  SimulatedCell(const description::Cell& cell, const description::SensorDescription& sensor,
+                const description::HandDescription& hand, fieldbus::EventQueue& events,
+                const SimulatedCellConfig& config = {});
+  SimulatedCell(const SimulatedCell&) = delete;
+  SimulatedCell& operator=(const SimulatedCell&) = delete;
+  ~SimulatedCell() override;
+
+  // Nodes, one per drive on CAN in the cell's order, then the enabling switch where it has a message and the sensor, if
+  // it is on CAN: to be connected to their
+  // buses before power_on().
+  [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
+  [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
+
+  // What is on the cell's Modbus lines: for a server on a real line, or as a master's end of a line without any wire,
+  // whose requests are answered at once. The cell must outlive both.
+  [[nodiscard]] std::vector<ModbusUnit*> modbus_devices(const std::string& line);
+  [[nodiscard]] std::unique_ptr<fieldbus::ModbusClient> modbus_client(const std::string& line);
+
+  // Connects all nodes to the buses of these names.
+  void attach_to(fieldbus::SimulatedCanNetwork& network);
+
+  // Everything starts at the event queue's present time, and the physics and the devices' clocks with it.
+  void power_on();
+
+  // At the event queue's present time, up to one step of the physics before it.
+  [[nodiscard]] Truth truth() noexcept;
+  // Called after each step of the physics, in order of time; may allocate nothing where the run mustn't. Empty: none.
+  void set_observer(std::function<void(const Truth&)> observer) { observer_ = std::move(observer); }
+
+  [[nodiscard]] Plant& plant() noexcept { return plant_; }
+  [[nodiscard]] DriveDevice& drive(std::size_t axis) noexcept { return *drives_[axis]; }                 // on CAN
+  [[nodiscard]] ModbusDevice& modbus_drive(std::size_t axis) noexcept { return *modbus_drives_[axis]; }  // on Modbus
+  [[nodiscard]] SensorFaults& sensor_faults() noexcept;
+  [[nodiscard]] const description::Cell& cell() const noexcept { return cell_; }
+
+ private:
+  class PlantAxis;
+  class PlantGauges;
+  class WirelessModbus;
+  class PlantWrench;
+
+  void advance_to(std::int64_t time_ns) noexcept override;
+  void seen(const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept override;
+  void add_enabling(const std::vector<PressedSpan>& spans);
+  void press(std::int64_t time_ns) noexcept;
+  [[nodiscard]] Truth present_truth() const noexcept;
+  void add_drive(std::size_t axis, const SimulatedCellConfig& config);
+  void add_modbus_drive(std::size_t axis);
+  void add_sensor(const description::SensorDescription& sensor);
+  void convert(std::int64_t time_ns) noexcept;
+  void check_faults(const description::SensorDescription& sensor) const;
+  void schedule_faults();
+  void set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept;
+  void set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
+  void set_modbus_fault(std::size_t axis, const DeviceFault& fault, bool on) noexcept;
+  void set_sensor_fault(const DeviceFault& fault, bool on) noexcept;
+  void tick(std::int64_t time_ns) noexcept;
+  [[nodiscard]] std::size_t bus_index(const std::string& name, const std::string& key) const;
+  [[nodiscard]] std::size_t axis_of(const std::string& joint) const noexcept;  // drives_.size(): none
+
+  description::Cell cell_;
+  fieldbus::EventQueue& events_;
+  std::int64_t tick_ns_;
+  std::vector<DeviceFault> faults_;
+  Plant plant_;
+  std::vector<std::unique_ptr<DeviceNode>> nodes_;
+  std::vector<std::unique_ptr<PlantAxis>> axes_;
+  std::unique_ptr<PlantGauges> gauges_;
+  std::vector<std::unique_ptr<DriveDevice>> drives_;          // per axis; null: on Modbus
+  std::vector<std::unique_ptr<ModbusDevice>> modbus_drives_;  // per axis; null: on CAN
+  std::vector<std::size_t> node_of_axis_;
+  std::unique_ptr<PlantWrench> wrench_;
+  std::unique_ptr<AtiDevice> sensor_;                     // one of these two
+  std::unique_ptr<ModbusSensorDevice> sensor_registers_;  // of the latter, where it is on Modbus
+  std::unique_ptr<DescribedDevice> described_sensor_;
+  std::unique_ptr<EnablingSwitch> enabling_;
+  std::size_t enabling_axis_ = 0;  // that it is wired to
+  std::function<void(const Truth&)> observer_;
+};
+
+}  // namespace proxarm::sim

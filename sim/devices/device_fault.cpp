@@ -1,0 +1,128 @@
+#include "sim/devices/device_fault.hpp"
+
+#include <charconv>
+#include <cmath>
+
+#include "models/base/quantity.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::sim {
+
+namespace {
+
+using description::SetupError;
+
+constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
+constexpr std::uint64_t none = 0, u16 = 0xFFFF, u32 = 0xFFFFFFFF;
+
+struct KindName {
+  const char* name;
+  unsigned devices;  // that know it
+  DeviceFaultKind kind;
+  std::uint64_t most;  // of its value; none: it has no value
+};
+
+constexpr KindName kinds[] = {
+    {"silent", drives, DeviceFaultKind::drive_silent, none},
+    {"fault", can, DeviceFaultKind::drive_fault, u16},
+    {"device_type", can, DeviceFaultKind::device_type, u32},
+    {"heartbeat", can, DeviceFaultKind::heartbeat_lost, none},
+    {"sdo", can, DeviceFaultKind::sdo_silent, none},
+    {"period", can, DeviceFaultKind::period_fixed, none},
+    {"power", drives, DeviceFaultKind::power_loss, none},
+    {"jammed", drives, DeviceFaultKind::jammed, none},
+    {"exception", modbus, DeviceFaultKind::modbus_exception, none},
+    {"closed", modbus, DeviceFaultKind::modbus_closed, none},
+    {"wrong_unit", modbus, DeviceFaultKind::modbus_wrong_unit, none},
+    {"half_answer", modbus, DeviceFaultKind::modbus_half, none},
+    {"silent", sensor, DeviceFaultKind::sensor_silent, none},
+    {"samples", sensor, DeviceFaultKind::samples_missing, none},
+    {"frozen", sensor, DeviceFaultKind::frozen, none},
+    {"half", sensor, DeviceFaultKind::half_sample, none},
+    {"swapped", sensor, DeviceFaultKind::swapped, none},
+    {"duplicated", sensor, DeviceFaultKind::duplicated, none},
+    {"short", sensor, DeviceFaultKind::short_frames, none},
+    {"checksum", sensor, DeviceFaultKind::bad_checksum, none},
+    {"saturated", sensor, DeviceFaultKind::saturated, none},
+    {"lost", sensor, DeviceFaultKind::lost, u32},
+    {"status", sensor, DeviceFaultKind::status, u32},
+    {"delay", sensor, DeviceFaultKind::delay, u32},
+};
+
+[[noreturn]] void refuse(std::string_view text, std::string expected) {
+  throw SetupError({.key = "device fault", .found = description::in_quotes(text), .expected = std::move(expected)});
+}
+
+std::string names_for(unsigned devices) {
+  std::string names;
+  for (const KindName& kind : kinds) {
+    if ((kind.devices & devices) != 0) names += (names.empty() ? "" : ", ") + std::string(kind.name);
+  }
+  const char* whose = devices == sensor   ? "for the sensor: "
+                      : devices == can    ? "for a drive on CAN: "
+                      : devices == modbus ? "for a drive on Modbus: "
+                                          : "for a drive: ";
+  return whose + names;
+}
+
+std::uint32_t parse_value(std::string_view all, std::string_view text, std::uint64_t most) {
+  const bool hex = text.substr(0, 2) == "0x";
+  const std::string_view digits = hex ? text.substr(2) : text;
+  std::uint32_t value = 0;
+  const auto result = std::from_chars(digits.data(), digits.data() + digits.size(), value, hex ? 16 : 10);
+  if (digits.empty() || result.ec != std::errc{} || result.ptr != digits.data() + digits.size() || value > most) {
+    refuse(all, "after '=' a number from 0 to " + std::to_string(most) + ", or 0x...");
+  }
+  return value;
+}
+
+std::int64_t parse_time_ns(std::string_view text) {
+  if (text == "0" || text == "0s") return 0;
+  return std::llround(description::parse_duration(text, "time of a device fault") * 1e9);
+}
+
+}  // namespace
+
+void require_known_fault(const DeviceFault& fault, FaultyDevice device) {
+  const auto devices = static_cast<unsigned>(device);
+  for (const KindName& kind : kinds) {
+    if (kind.kind != fault.kind || (kind.devices & devices) != 0) continue;
+    throw SetupError({.key = "device fault",
+                      .found = std::string(kind.name) + " for " + fault.device,
+                      .expected = names_for(devices)});
+  }
+}
+
+DeviceFault parse_device_fault(std::string_view text) {
+  const std::string_view all = text;
+  const std::size_t colon = text.find(':');
+  if (colon == std::string_view::npos || colon == 0) refuse(all, "DEVICE:KIND[=VALUE][@FROM[..UNTIL]]");
+  DeviceFault fault;
+  fault.device = std::string(text.substr(0, colon));
+  text.remove_prefix(colon + 1);
+  const std::size_t at = text.find('@');
+  const std::string_view times = at == std::string_view::npos ? std::string_view{} : text.substr(at + 1);
+  const std::string_view what = text.substr(0, at);
+  const std::size_t equals = what.find('=');
+  const bool has_value = equals != std::string_view::npos;
+  const unsigned devices = fault.device == "sensor" ? sensor : drives;
+  const KindName* found = nullptr;
+  for (const KindName& kind : kinds) {
+    if ((kind.devices & devices) != 0 && what.substr(0, equals) == kind.name) found = &kind;
+  }
+  if (found == nullptr) refuse(all, names_for(devices));
+  if (has_value != (found->most != none)) {
+    refuse(all, has_value ? "no value for this kind of fault" : "a value, KIND=VALUE");
+  }
+  fault.kind = found->kind;
+  if (has_value) fault.value = parse_value(all, what.substr(equals + 1), found->most);
+  if (at == std::string_view::npos) return fault;
+  if (fault.kind == DeviceFaultKind::device_type) refuse(all, "no time: a device is what it is from the start");
+  const std::size_t dots = times.find("..");
+  fault.from_ns = parse_time_ns(times.substr(0, dots));
+  if (dots != std::string_view::npos) fault.until_ns = parse_time_ns(times.substr(dots + 2));
+  if (fault.until_ns <= fault.from_ns) refuse(all, "an end after the beginning");
+  return fault;
+}
+
+}  // namespace proxarm::sim

@@ -1,0 +1,42 @@
+// Simulated Modbus drives on a real line: a TCP port of the loopback interface, or a pseudo-terminal for RTU. Framing,
+// checksums and the wait for requests are libmodbus'; one thread serves one master.
+#pragma once
+
+#include <atomic>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "models/description/cell.hpp"
+#include "sim/devices/modbus_device.hpp"
+
+namespace proxarm::sim {
+
+class ModbusServer {
+ public:
+  // Opens the line and serves until it is destroyed. `line.host` must be a loopback address (port 0: any that is free);
+  // for a serial line a pseudo-terminal is made and `line.device` becomes a symbolic link to it, if it isn't empty.
+  // Throws SetupError. The devices must outlive the server.
+  ModbusServer(const description::ModbusLineDescription& line, std::vector<ModbusUnit*> devices);
+  ModbusServer(const ModbusServer&) = delete;
+  ModbusServer& operator=(const ModbusServer&) = delete;
+  ~ModbusServer();
+
+  [[nodiscard]] int port() const noexcept { return port_; }                       // TCP
+  [[nodiscard]] const std::string& device() const noexcept { return terminal_; }  // RTU: the master's end, /dev/pts/N
+
+ private:
+  void open_tcp(const description::ModbusLineDescription& line);
+  void open_terminal(const description::ModbusLineDescription& line);
+  void serve_tcp() noexcept;
+  void serve_terminal() noexcept;
+  [[nodiscard]] bool serve_connection(int socket) noexcept;
+
+  std::vector<ModbusUnit*> devices_;
+  int listener_ = -1, terminal_fd_ = -1, port_ = 0;
+  std::string terminal_, link_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace proxarm::sim

@@ -1,0 +1,333 @@
+#include "sim/physics/arm_dynamics.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "models/base/setup_error.hpp"
+#include "models/geometry/eigenvalues.hpp"
+#include "sim/physics/arm_model.hpp"
+#include "sim/physics/pose.hpp"
+
+namespace proxarm::sim {
+namespace {
+
+using description::SetupError;
+using models::Mat3;
+using models::Pose;
+using models::Vec3;
+using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using RowMatX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Mechanical end stops sit this far past the URDF's limits (software limits come first): 3 degrees.
+constexpr double end_stop_margin_rad = 0.05;
+// A gear given as rigid (stiffness 0) is as stiff as the step allows: 200 Hz against its own link's inertia.
+constexpr double rigid_gear_rad_per_s = 2.0 * M_PI * 200.0;
+// Symplectic Euler is unstable from ωh = 2 on; damping and rotors bring that down a little.
+constexpr double largest_phase_step = 1.5;
+
+Mat3 inertia_matrix(const std::array<double, 6>& i) {
+  Mat3 m;
+  m << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
+  return m;
+}
+
+}  // namespace
+
+struct ArmDynamics::Links {
+  ModelPointer model;
+  DataPointer data;
+  int body = 0;     // the sensor's link
+  Pose X_LS, X_LT;  // L: the sensor's link
+  RowMat3 R_BL = RowMat3::Identity();
+  Vec3 p_BL = Vec3::Zero();
+  Vec3 arm_B = Vec3::Zero();                   // from L's origin to T's, in B
+  std::vector<double> lower_stop, upper_stop;  // per axis
+  RowMatX jacobian;                            // 3 × nv, scratch
+};
+
+ArmDynamics::~ArmDynamics() = default;
+
+ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, double step_s)
+    : links_(std::make_unique<Links>()), handle_(cell.tool), hand_mass_kg_(hand_mass_kg), step_s_(step_s) {
+  Links& l = *links_;
+  l.model = load_links(cell, hand_mass_kg);
+  l.data.reset(mj_makeData(l.model.get()));
+  const mjModel& m = *l.model;
+  l.body = mj_name2id(&m, mjOBJ_BODY, cell.sensor.link.c_str());
+  l.jacobian.resize(3, m.nv);
+  X_WB_ = to_pose(cell.base_W);
+  X_ST_ = to_pose(cell.tool.handle_S);
+  l.X_LS = to_pose(cell.sensor.pose_link);
+  l.X_LT = l.X_LS * X_ST_;
+  gravity_W_ = Vec3(cell.gravity_W_m_per_s2.data());
+  handle_inertia_S_ = inertia_matrix(cell.tool.inertia_kg_m2);
+
+  for (std::size_t i = 0; i < cell.drives.size(); ++i) {
+    const auto& drive = cell.drives[i];
+    const std::string key = "drives[" + std::to_string(i) + "]";
+    const int joint = mj_name2id(&m, mjOBJ_JOINT, drive.joint.c_str());
+    if (joint < 0 || (m.jnt_type[joint] != mjJNT_HINGE && m.jnt_type[joint] != mjJNT_SLIDE)) {
+      throw SetupError({.file = cell.file.string(),
+                        .key = key + ".joint",
+                        .found = drive.joint,
+                        .expected = "a revolute or prismatic joint of " + cell.urdf.string()});
+    }
+    if (!(drive.rotor_inertia_kg_m2 > 0.0)) {
+      throw SetupError({.file = cell.file.string(),
+                        .key = key + ".rotor_inertia_kg_m2",
+                        .found = description::number_text(drive.rotor_inertia_kg_m2),
+                        .expected = "above 0 for the simulated arm"});
+    }
+    Axis axis;
+    axis.dof = m.jnt_dofadr[joint];
+    axis.rotor_inertia_kg_m2 = drive.rotor_inertia_kg_m2;
+    axis.coulomb_Nm = drive.simulation.coulomb_friction_Nm;
+    axis.viscous_Nms_per_rad = drive.simulation.viscous_friction_Nms_per_rad;
+    axis.stiffness_Nm_per_rad = drive.gear_stiffness_Nm_per_rad * drive.simulation.gear_stiffness_ratio;
+    axis.damping_Nms_per_rad = drive.simulation.gear_damping_Nms_per_rad;
+    axis.half_backlash_rad = 0.5 * drive.simulation.backlash_rad;
+    axes_.push_back(axis);
+    const bool limited = m.jnt_limited[joint] != 0;
+    l.lower_stop.push_back(limited ? m.jnt_range[2 * joint] - end_stop_margin_rad : -mjMAXVAL);
+    l.upper_stop.push_back(limited ? m.jnt_range[2 * joint + 1] + end_stop_margin_rad : mjMAXVAL);
+  }
+  if (m.nv != static_cast<int>(axes_.size())) {
+    throw SetupError(
+        {.file = cell.file.string(),
+         .key = "drives",
+         .found = std::to_string(axes_.size()) + " drives",
+         .expected = "one for each of the " + std::to_string(m.nv) + " moving joints of " + cell.urdf.string()});
+  }
+  reset(cell.start_rad);
+}
+
+void ArmDynamics::reset(std::span<const double> joint_rad) {
+  Links& l = *links_;
+  mj_resetData(l.model.get(), l.data.get());
+  for (std::size_t i = 0; i < axes_.size(); ++i) l.data->qpos[axes_[i].dof] = i < joint_rad.size() ? joint_rad[i] : 0.0;
+  update_kinematics();
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    Axis& axis = axes_[i];
+    if (!(axis.stiffness_Nm_per_rad > 0.0)) {
+      const double inertia = l.data->qM[l.model->dof_Madr[axis.dof]];  // the diagonal of M comes first in its row
+      axis.stiffness_Nm_per_rad = inertia * rigid_gear_rad_per_s * rigid_gear_rad_per_s;
+      axis.damping_Nms_per_rad = 0.1 * inertia * rigid_gear_rad_per_s;
+    }
+    const double torque = static_torque_Nm(i);
+    const double flank = torque == 0.0 ? 0.0 : std::copysign(axis.half_backlash_rad, torque);
+    axis.angle_rad = l.data->qpos[axis.dof] + flank + torque / axis.stiffness_Nm_per_rad;
+    axis.speed_rad_per_s = 0.0;
+    axis.torque_Nm = torque;
+    axis.braked = true;
+    axis.jammed = false;
+  }
+  const double highest = 2.0 * M_PI * locked_modes_Hz().back();
+  if (!(highest * step_s_ < largest_phase_step)) {
+    throw SetupError(
+        {.key = "gear_stiffness_Nm_per_rad",
+         .message = "the arm's highest mode is too fast for the simulation's step",
+         .found = description::number_text(highest / (2.0 * M_PI)) + " Hz",
+         .expected = "at most " + description::number_text(largest_phase_step / (2.0 * M_PI * step_s_)) + " Hz",
+         .advice = "raise servo_rate_Hz, or lower the stiffness"});
+  }
+  std::vector<double> torque(axes_.size());
+  for (std::size_t i = 0; i < axes_.size(); ++i) torque[i] = axes_[i].torque_Nm;
+  apply(torque, Vec3::Zero());
+}
+
+// Symplectic Euler: v(t+h) = v(t) + h a(t), then q(t+h) = q(t) + h v(t+h). The rotor, by (b), with its friction taken
+// at t+h: it stops within the step, and stays stopped, if friction can do that.
+void ArmDynamics::advance() noexcept {
+  mjData& d = *links_->data;
+  const double h = step_s_;
+  for (Axis& axis : axes_) {
+    d.qvel[axis.dof] += h * d.qacc[axis.dof];
+    d.qpos[axis.dof] += h * d.qvel[axis.dof];
+
+    const double J = axis.rotor_inertia_kg_m2;
+    const double free_speed = (axis.speed_rad_per_s + h / J * (axis.torque_Nm - axis.gear_torque_Nm)) /
+                              (1.0 + h / J * axis.viscous_Nms_per_rad);
+    const double friction = h / J * axis.coulomb_Nm;
+    if (axis.braked || axis.jammed || std::abs(free_speed) <= friction) {
+      axis.speed_rad_per_s = 0.0;
+    } else {
+      axis.speed_rad_per_s = free_speed - std::copysign(friction, free_speed);
+      axis.angle_rad += h * axis.speed_rad_per_s;
+    }
+  }
+  update_kinematics();
+}
+
+void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W) noexcept {
+  for (std::size_t i = 0; i < axes_.size(); ++i) axes_[i].torque_Nm = motor_torque_Nm[i];
+  hand_force_W_ = hand_force_W;
+  update_accelerations();
+}
+
+// (c): each flank can only push.
+double ArmDynamics::gear_torque(const Axis& axis) const noexcept {
+  const mjData& d = *links_->data;
+  const double windup = axis.angle_rad - d.qpos[axis.dof];
+  const double rate = axis.speed_rad_per_s - d.qvel[axis.dof];
+  const double k = axis.stiffness_Nm_per_rad, c = axis.damping_Nms_per_rad, half = axis.half_backlash_rad;
+  if (half <= 0.0) return k * windup + c * rate;
+  if (windup > half) return std::max(0.0, k * (windup - half) + c * rate);
+  if (windup < -half) return std::min(0.0, k * (windup + half) + c * rate);
+  return 0.0;
+}
+
+void ArmDynamics::update_kinematics() noexcept {
+  Links& l = *links_;
+  const mjModel* m = l.model.get();
+  mjData* d = l.data.get();
+  mj_kinematics(m, d);
+  mj_comPos(m, d);
+  mj_crb(m, d);
+  mj_factorM(m, d);
+  mj_comVel(m, d);
+  mj_rne(m, d, 0, d->qfrc_bias);
+
+  l.R_BL = Eigen::Map<const RowMat3>(d->xmat + 9 * l.body);
+  l.p_BL = Eigen::Map<const Vec3>(d->xpos + 3 * l.body);
+  l.arm_B = l.R_BL * l.X_LT.translation();
+  std::array<double, 6> twist{};  // rotation first
+  mj_objectVelocity(m, d, mjOBJ_XBODY, l.body, twist.data(), 0);
+  const Vec3 omega_B(twist.data()), v_B(twist.data() + 3);
+  const Mat3 R_WB = X_WB_.linear();
+  tool_.X_WT.linear() = R_WB * l.R_BL * l.X_LT.linear();
+  tool_.X_WT.translation() = X_WB_ * Vec3(l.p_BL + l.arm_B);
+  tool_.velocity_W = R_WB * (v_B + omega_B.cross(l.arm_B));
+  tool_.angular_velocity_W = R_WB * omega_B;
+}
+
+// (a). The hand's weight is carried by the person: what MuJoCo lets gravity do to it is taken back.
+void ArmDynamics::update_accelerations() noexcept {
+  Links& l = *links_;
+  const mjModel* m = l.model.get();
+  mjData* d = l.data.get();
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    Axis& axis = axes_[i];
+    axis.gear_torque_Nm = gear_torque(axis);
+    double stop = 0.0;
+    const double angle = d->qpos[axis.dof], k = axis.stiffness_Nm_per_rad, c = axis.damping_Nms_per_rad;
+    if (angle > l.upper_stop[i]) stop = std::min(0.0, k * (l.upper_stop[i] - angle) - c * d->qvel[axis.dof]);
+    if (angle < l.lower_stop[i]) stop = std::max(0.0, k * (l.lower_stop[i] - angle) - c * d->qvel[axis.dof]);
+    d->qfrc_applied[axis.dof] = axis.gear_torque_Nm + stop - d->qfrc_bias[axis.dof];
+  }
+  const Vec3 force_B = X_WB_.linear().transpose() * (hand_force_W_ - hand_mass_kg_ * gravity_W_);
+  const Vec3 point_B = l.p_BL + l.arm_B, no_torque = Vec3::Zero();
+  mj_applyFT(m, d, force_B.data(), no_torque.data(), point_B.data(), l.body, d->qfrc_applied);
+  mj_solveM(m, d, d->qacc, d->qfrc_applied, 1);
+  update_tool_acceleration();
+}
+
+// The sensor, about S's origin: handle (mass m, centre of mass C) and hand (m_h at T) follow the arm, so the load they
+// put on it is what acts on them less what they need to move:
+//   F = F_hand − m_h a_T + m (g − a_C)
+//   τ = r_T × (F_hand − m_h a_T) + r_C × m (g − a_C) − (I α + ω × I ω)
+void ArmDynamics::update_tool_acceleration() noexcept {
+  const Links& l = *links_;
+  mj_rnePostConstraint(l.model.get(), l.data.get());
+  std::array<double, 6> a{};  // rotation first; of L's origin, less gravity
+  mj_objectAcceleration(l.model.get(), l.data.get(), mjOBJ_XBODY, l.body, a.data(), 0);
+  const Mat3 R_WB = X_WB_.linear();
+  const Vec3 alpha_W = R_WB * Vec3(a.data());
+  const Vec3 free_W = R_WB * Vec3(a.data() + 3);  // a_L − g
+  const Vec3 omega_W = tool_.angular_velocity_W;
+  const auto at = [&](const Vec3& r_W) -> Vec3 {
+    return free_W + alpha_W.cross(r_W) + omega_W.cross(omega_W.cross(r_W));
+  };
+  const Mat3 R_WL = R_WB * l.R_BL;
+  const Mat3 R_WS = R_WL * l.X_LS.linear();
+  const Vec3 p_LT_W = R_WL * l.X_LT.translation();
+  const Vec3 p_LC_W = R_WL * (l.X_LS * Vec3(handle_.centre_of_mass_S_m.data()));
+
+  tool_.acceleration_W = at(p_LT_W) + gravity_W_;
+  handle_force_W_ = hand_force_W_ - hand_mass_kg_ * tool_.acceleration_W;
+  const Vec3 handle_S = R_WS.transpose() * (-handle_.mass_kg * at(p_LC_W));  // m (g − a_C)
+  const Vec3 hand_S = R_WS.transpose() * handle_force_W_;
+  const Vec3 omega_S = R_WS.transpose() * omega_W, alpha_S = R_WS.transpose() * alpha_W;
+  const Mat3& I = handle_inertia_S_;
+  sensor_S_.force = hand_S + handle_S;
+  sensor_S_.torque = X_ST_.translation().cross(hand_S) + Vec3(handle_.centre_of_mass_S_m.data()).cross(handle_S) -
+                     (I * alpha_S + omega_S.cross(Vec3(I * omega_S)));
+}
+
+double ArmDynamics::joint_angle_rad(std::size_t axis) const noexcept { return links_->data->qpos[axes_[axis].dof]; }
+
+double ArmDynamics::joint_speed_rad_per_s(std::size_t axis) const noexcept {
+  return links_->data->qvel[axes_[axis].dof];
+}
+
+// −∂/∂φ of the work of gravity: Σ over bodies behind the joint of (axis × lever) · (−m g); of a joint that slides,
+// axis · (−m g).
+double ArmDynamics::static_torque_Nm(std::size_t axis) const noexcept {
+  const mjModel* m = links_->model.get();
+  const mjData* d = links_->data.get();
+  const int dof = axes_[axis].dof, joint = m->dof_jntid[dof];
+  const Vec3 axis_B(d->xaxis + 3 * joint), anchor_B(d->xanchor + 3 * joint), gravity_B(m->opt.gravity);
+  const bool slides = m->jnt_type[joint] == mjJNT_SLIDE;
+  const auto moved = [&](const Vec3& lever) { return slides ? axis_B : Vec3(axis_B.cross(lever)); };
+  double torque = 0.0;
+  for (int body = 1; body < m->nbody; ++body) {
+    int ancestor = body;
+    while (ancestor != 0 && ancestor != m->jnt_bodyid[joint]) ancestor = m->body_parentid[ancestor];
+    if (ancestor == 0) continue;
+    const Vec3 lever = Vec3(d->xipos + 3 * body) - anchor_B;
+    torque -= moved(lever).dot(m->body_mass[body] * gravity_B);
+  }
+  const Vec3 lever_T = links_->p_BL + links_->arm_B - anchor_B;
+  return torque + moved(lever_T).dot(hand_mass_kg_ * gravity_B);
+}
+
+Energy ArmDynamics::energy() const {
+  const mjModel* m = links_->model.get();
+  mjData* d = links_->data.get();
+  Energy energy;
+  std::vector<double> momentum(static_cast<std::size_t>(m->nv));
+  mj_mulM(m, d, momentum.data(), d->qvel);
+  for (int i = 0; i < m->nv; ++i) energy.kinetic_J += 0.5 * momentum[static_cast<std::size_t>(i)] * d->qvel[i];
+  const Vec3 gravity_B(m->opt.gravity);
+  for (int body = 1; body < m->nbody; ++body)
+    energy.potential_J -= m->body_mass[body] * gravity_B.dot(Vec3(d->xipos + 3 * body));
+  energy.potential_J += hand_mass_kg_ * gravity_B.dot(links_->p_BL + links_->arm_B);
+  for (const Axis& axis : axes_) {
+    energy.kinetic_J += 0.5 * axis.rotor_inertia_kg_m2 * axis.speed_rad_per_s * axis.speed_rad_per_s;
+    const double windup = axis.angle_rad - d->qpos[axis.dof];
+    const double stretch = std::max(0.0, std::abs(windup) - axis.half_backlash_rad);
+    energy.elastic_J += 0.5 * axis.stiffness_Nm_per_rad * stretch * stretch;
+  }
+  return energy;
+}
+
+Mat3 ArmDynamics::effective_mass_kg() const {
+  Links& l = *links_;
+  const mjModel* m = l.model.get();
+  RowMatX M(m->nv, m->nv);
+  mj_fullM(m, M.data(), l.data->qM);
+  const Vec3 point_B = l.p_BL + l.arm_B;
+  mj_jac(m, l.data.get(), l.jacobian.data(), nullptr, point_B.data(), l.body);
+  M -= hand_mass_kg_ * l.jacobian.transpose() * l.jacobian;
+  for (const Axis& axis : axes_) M(axis.dof, axis.dof) += axis.rotor_inertia_kg_m2;
+  const Mat3 inverse_B = l.jacobian * M.ldlt().solve(Eigen::MatrixXd(l.jacobian.transpose()));
+  const Mat3 R_WB = X_WB_.linear();
+  return R_WB * inverse_B.inverse() * R_WB.transpose();
+}
+
+std::vector<double> ArmDynamics::locked_modes_Hz() const {
+  const mjModel* m = links_->model.get();
+  RowMatX M(m->nv, m->nv);
+  mj_fullM(m, M.data(), links_->data->qM);
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(m->nv, m->nv);
+  for (const Axis& axis : axes_) K(axis.dof, axis.dof) = axis.stiffness_Nm_per_rad;
+  const Eigen::VectorXd squares = models::generalized_eigenvalues(K, M);
+  std::vector<double> modes;
+  for (int i = 0; i < m->nv; ++i) modes.push_back(std::sqrt(squares[i]) / (2.0 * M_PI));
+  return modes;
+}
+
+}  // namespace proxarm::sim

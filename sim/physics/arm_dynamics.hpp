@@ -1,0 +1,123 @@
+// The mechanics of the simulated arm: links, gears, rotors, friction, brakes, handle and hand, stepped in time.
+//
+// Links by MuJoCo from the same URDF that the controller uses; the rotors are scalar equations beside it (Spong's
+// reduced model of elastic joints: a rotor's spin about its own axis counts, its gyroscopic torque doesn't). With φ the
+// link's angle and θ the motor's, as an angle at the joint:
+//   M(φ) φ̈ + c(φ, φ̇) + g(φ) = τ_gear + Jᵀ F_hand                                                 (a)
+//   J_r θ̈ = τ − τ_gear − b θ̇ − τ_friction,   |τ_friction| ≤ F_c                                   (b)
+//   τ_gear = k δ + d δ̇,  δ = θ − φ; with backlash, δ less the dead band, and never against the flank in contact   (c)
+// In this form rotors are coupled to nothing but their own gear, so that Coulomb friction has an exact solution per
+// axis: a stuck, braked or jammed rotor stays at its angle bit for bit (a friction constraint in MuJoCo creeps).
+//
+// Step: symplectic Euler with the rotor's friction implicit. Order 1 in time, but it conserves the energy of free
+// oscillation on average, and the frequency of a mode ω is off by (ωh)²/24 only: 0.3 ppm at 16 Hz and h = 0.25 ms.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "models/description/cell.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::sim {
+
+// The true state of the rendered point T of the handle.
+struct ToolState {
+  models::Pose X_WT = models::Pose::Identity();
+  models::Vec3 velocity_W = models::Vec3::Zero();          // of T's origin, m/s
+  models::Vec3 acceleration_W = models::Vec3::Zero();      // of T's origin, m/s²
+  models::Vec3 angular_velocity_W = models::Vec3::Zero();  // rad/s
+};
+
+struct Energy {
+  double kinetic_J = 0.0;    // links, rotors, handle, hand
+  double potential_J = 0.0;  // gravity on links and handle
+  double elastic_J = 0.0;    // gears
+};
+
+// The arm of a cell, its handle, and the mass of the hand that holds it (a point mass at T, rigid with the handle; its
+// weight is carried by the person, so gravity doesn't act on it).
+//
+// A step is advance(), then apply(): advance() goes to t + h with the accelerations found by the last apply();
+// apply() takes the torques and the force that act from now on and finds accelerations and the sensor's wrench.
+// Everything but the constructor and reset() is noexcept and allocates nothing.
+class ArmDynamics {
+ public:
+  // Throws description::SetupError: unreadable or bad URDF, <mimic>, missing joint or link, joint without a drive.
+  ArmDynamics(const description::Cell& cell, double hand_mass_kg, double step_s = 0.25e-3);
+  ArmDynamics(const ArmDynamics&) = delete;
+  ArmDynamics& operator=(const ArmDynamics&) = delete;
+  ~ArmDynamics();
+
+  // At rest with the links at these angles (one per drive, in the cell's order), gears wound up by gravity, motors
+  // carrying it (static_torque_Nm), brakes closed.
+  void reset(std::span<const double> joint_rad);
+
+  void advance() noexcept;
+  // Motor torques, as torques at the joint, and the force of the hand's muscles on hand and handle at T, in W.
+  void apply(std::span<const double> motor_torque_Nm, const models::Vec3& hand_force_W) noexcept;
+
+  // A closed brake or a jam hold the rotor where it is, at once and without limit; the gear stays elastic.
+  void brake(std::size_t axis, bool closed) noexcept { axes_[axis].braked = closed; }
+  void jam(std::size_t axis, bool jammed) noexcept { axes_[axis].jammed = jammed; }
+  [[nodiscard]] bool braked(std::size_t axis) const noexcept { return axes_[axis].braked; }
+
+  [[nodiscard]] std::size_t axis_count() const noexcept { return axes_.size(); }
+  [[nodiscard]] double step_s() const noexcept { return step_s_; }
+  [[nodiscard]] double motor_angle_rad(std::size_t axis) const noexcept { return axes_[axis].angle_rad; }
+  [[nodiscard]] double motor_speed_rad_per_s(std::size_t axis) const noexcept { return axes_[axis].speed_rad_per_s; }
+  [[nodiscard]] double joint_angle_rad(std::size_t axis) const noexcept;  // link side of the gear
+  [[nodiscard]] double joint_speed_rad_per_s(std::size_t axis) const noexcept;
+  [[nodiscard]] double gear_torque_Nm(std::size_t axis) const noexcept { return axes_[axis].gear_torque_Nm; }
+  // Motor torque that holds the links against gravity as they stand.
+  [[nodiscard]] double static_torque_Nm(std::size_t axis) const noexcept;
+
+  [[nodiscard]] const ToolState& tool() const noexcept { return tool_; }
+  // What an ideal sensor between flange and handle reads: the load that handle and hand put on it, about S's origin.
+  // At rest that is the handle's weight; a push along +x of S reads +x.
+  [[nodiscard]] const models::Wrench& sensor_wrench_S() const noexcept { return sensor_S_; }
+  // What the hand feels: force of the hand on the handle at T, the hand's own inertia taken off, in W.
+  [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return handle_force_W_; }
+
+  // For tests and for what is printed about an arm. These may allocate.
+  [[nodiscard]] Energy energy() const;
+  // (J M⁻¹ Jᵀ)⁻¹ at T with rotors, without the hand: what a hand moves when nothing controls the arm. Along W's axes.
+  [[nodiscard]] models::Mat3 effective_mass_kg() const;
+  // Undamped natural frequencies of the arm with its motors locked, rising; handle and hand included.
+  [[nodiscard]] std::vector<double> locked_modes_Hz() const;
+
+ private:
+  struct Axis {
+    int dof = 0;  // of the link in MuJoCo's model; hinges only, so also the index in qpos
+    double rotor_inertia_kg_m2 = 0.0, coulomb_Nm = 0.0, viscous_Nms_per_rad = 0.0;
+    double stiffness_Nm_per_rad = 0.0, damping_Nms_per_rad = 0.0, half_backlash_rad = 0.0;
+    double angle_rad = 0.0, speed_rad_per_s = 0.0;  // of the motor, as at the joint
+    double torque_Nm = 0.0, gear_torque_Nm = 0.0;
+    bool braked = true, jammed = false;
+  };
+  struct Links;  // MuJoCo's model and data
+
+  void update_kinematics() noexcept;
+  void update_accelerations() noexcept;
+  void update_tool_acceleration() noexcept;
+  [[nodiscard]] double gear_torque(const Axis& axis) const noexcept;
+
+  std::unique_ptr<Links> links_;
+  std::vector<Axis> axes_;
+  description::ToolDescription handle_;
+  models::Pose X_WB_ = models::Pose::Identity();
+  models::Pose X_ST_ = models::Pose::Identity();
+  models::Vec3 gravity_W_ = models::Vec3::Zero();
+  models::Mat3 handle_inertia_S_ = models::Mat3::Zero();  // about its centre of mass
+  double hand_mass_kg_ = 0.0;
+  double step_s_ = 0.0;
+  models::Vec3 hand_force_W_ = models::Vec3::Zero();
+  models::Vec3 handle_force_W_ = models::Vec3::Zero();
+  ToolState tool_;
+  models::Wrench sensor_S_;
+};
+
+}  // namespace proxarm::sim

@@ -1,0 +1,38 @@
+// The person's hand in a simulation: it holds the handle through stiffness and damping and follows an intention.
+//
+//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ)
+// acts on hand and handle at T; x_int is the intention of description::HandDescription from where the tool was at the
+// start. The hand's mass belongs to ArmDynamics. Translation only: the hand doesn't twist the handle.
+#pragma once
+
+#include <vector>
+
+#include "models/description/hand.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::sim {
+
+struct Intention {
+  models::Vec3 position_W = models::Vec3::Zero();
+  models::Vec3 velocity_W = models::Vec3::Zero();
+};
+
+class Hand {
+ public:
+  Hand(const description::HandDescription& description, const models::Vec3& start_W);
+
+  // What the hand wants at this time, in seconds of its own clock; before 0 it rests at its first waypoint.
+  [[nodiscard]] Intention intention(double time_s) const noexcept;
+  [[nodiscard]] models::Vec3 force_W(double time_s, const models::Vec3& position_W,
+                                     const models::Vec3& velocity_W) const noexcept;
+  [[nodiscard]] double mass_kg() const noexcept { return description_.mass_kg; }
+  [[nodiscard]] const description::HandDescription& description() const noexcept { return description_; }
+
+ private:
+  [[nodiscard]] description::Grip grip(double time_s) const noexcept;
+
+  description::HandDescription description_;
+  models::Vec3 start_W_;
+};
+
+}  // namespace proxarm::sim

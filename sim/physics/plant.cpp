@@ -1,0 +1,95 @@
+#include "sim/physics/plant.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::sim {
+namespace {
+
+using description::Cell;
+using description::SetupError;
+
+std::int64_t servo_period_ns(const Cell& cell, std::size_t drive) {
+  const double rate_Hz = cell.drives[drive].simulation.servo_rate_Hz, period_ns = 1e9 / rate_Hz;
+  const auto whole = static_cast<std::int64_t>(std::nearbyint(period_ns));
+  // 1e-3 ns: far above rounding in the division, far below what any clock resolves.
+  if (rate_Hz > 0.0 && whole > 0 && std::abs(period_ns - static_cast<double>(whole)) < 1e-3) return whole;
+  throw SetupError({.file = cell.file.string(),
+                    .key = "drives[" + std::to_string(drive) + "].simulation.servo_rate_Hz",
+                    .found = description::number_text(rate_Hz),
+                    .expected = "a rate whose period is a whole number of nanoseconds, such as 4000"});
+}
+
+std::int64_t shortest_servo_period_ns(const Cell& cell) {
+  if (cell.drives.empty()) throw SetupError({.file = cell.file.string(), .key = "drives", .found = "none"});
+  std::int64_t shortest = servo_period_ns(cell, 0);
+  for (std::size_t i = 1; i < cell.drives.size(); ++i) shortest = std::min(shortest, servo_period_ns(cell, i));
+  for (std::size_t i = 0; i < cell.drives.size(); ++i) {
+    if (servo_period_ns(cell, i) % shortest == 0) continue;
+    throw SetupError({.file = cell.file.string(),
+                      .key = "drives[" + std::to_string(i) + "].simulation.servo_rate_Hz",
+                      .found = description::number_text(cell.drives[i].simulation.servo_rate_Hz),
+                      .expected = "a whole fraction of the fastest drive's rate"});
+  }
+  return shortest;
+}
+
+}  // namespace
+
+Plant::Plant(const Cell& cell, const description::SensorDescription& sensor, const description::HandDescription& hand,
+             std::int64_t start_ns, const PlantConfig& config)
+    : step_ns_(shortest_servo_period_ns(cell) / config.finer),
+      arm_(cell, hand.mass_kg, 1e-9 * static_cast<double>(step_ns_)),
+      hand_(hand, arm_.tool().X_WT.translation()),
+      force_sensor_(cell.sensor, sensor.simulation, config.noise_seed),
+      start_ns_(start_ns),
+      time_ns_(start_ns) {
+  for (std::size_t i = 0; i < cell.drives.size(); ++i) {
+    servo_period_ns_.push_back(servo_period_ns(cell, i));
+    servos_.emplace_back(cell.drives[i], servo_period_ns_.back());
+    servos_.back().reset(arm_.motor_angle_rad(i), arm_.static_torque_Nm(i));
+  }
+  torque_Nm_.assign(servos_.size(), 0.0);
+  force_sensor_.reset(time_ns_, arm_.sensor_wrench_S());
+  const auto steps = static_cast<std::size_t>(std::llround(1e9 * cell.sensor.delay_s / static_cast<double>(step_ns_)));
+  sensed_.assign(steps, arm_.sensor_wrench_S());
+}
+
+void Plant::start_hand(std::int64_t time_ns) noexcept {
+  hand_started_ = true;
+  hand_start_ns_ = time_ns;
+}
+
+void Plant::advance_to(std::int64_t time_ns) noexcept {
+  while (time_ns_ + step_ns_ <= time_ns) step();
+}
+
+void Plant::step() noexcept {
+  arm_.advance();
+  time_ns_ += step_ns_;
+  bool all_powered = true;
+  for (std::size_t i = 0; i < servos_.size(); ++i) {
+    ServoLoop& servo = servos_[i];
+    if ((time_ns_ - start_ns_) % servo_period_ns_[i] == 0) {
+      torque_Nm_[i] = servo.update(arm_.motor_angle_rad(i), time_ns_);
+      arm_.brake(i, !servo.powered());
+    }
+    all_powered = all_powered && servo.powered();
+  }
+  // The person waits for the arm to be live.
+  if (all_powered && !hand_started_) start_hand(time_ns_);
+  const double hand_time_s = hand_started_ ? 1e-9 * static_cast<double>(time_ns_ - hand_start_ns_) : 0.0;
+  const ToolState& tool = arm_.tool();
+  arm_.apply(torque_Nm_, hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W));
+  models::Wrench wrench_S = arm_.sensor_wrench_S();
+  if (!sensed_.empty()) {
+    std::swap(wrench_S, sensed_[next_sensed_]);
+    next_sensed_ = (next_sensed_ + 1) % sensed_.size();
+  }
+  force_sensor_.set_wrench(time_ns_, wrench_S);
+}
+
+}  // namespace proxarm::sim

@@ -1,0 +1,105 @@
+"""Commands and YAML blocks of the README and of docs/ do what they say."""
+import re
+import unittest
+
+from harness import SOURCE, ProgramTest
+
+PAGES = [SOURCE / "README.md", *sorted((SOURCE / "docs").glob("*.md"))]
+# What can't run here, and why. Of each kind at least one is expected to stand in the docs.
+ELSEWHERE = {
+    "--bus vcan": "needs a kernel with CAN: tests/vcan runs it",
+    "proxarm set ": "needs a session that runs: change_test.py asks one",
+    "proxarm replay DIR": "needs a record: replay_test.py makes some",
+    "proxarm study ": "takes minutes: study_test.py runs each with --quick",
+}
+REFUSED, FAULT = "refused", "a device fails"  # as the docs say behind a command
+PARTS = (" …", "…}", "enabling_input: {drive: axis_3")  # YAML that shows one line of a file
+
+
+def blocks(language):
+    for page in PAGES:
+        for found in re.finditer(rf"^```{language}\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL):
+            yield page.name, found[1]
+
+
+def commands():
+    """Page, arguments of proxarm, and what is said behind them."""
+    for page, text in blocks(""):
+        for line in text.splitlines():
+            if found := re.match(r"(?:\./dev (?=run)|proxarm )(.*)", line):
+                words, _, said = found[1].partition("   ")
+                yield page, words.split("  ")[0], said.strip()
+
+
+class Docs(ProgramTest):
+    def test_every_command_runs(self):
+        met, ran = set(), 0
+        for page, words, said in commands():
+            with self.subTest(page=page, command=words):
+                exception = next((key for key in ELSEWHERE if key in f"proxarm {words} "), None)
+                if exception:
+                    met.add(exception)
+                    if words.startswith("study "):
+                        self.assertEqual(self.call("study", words.split()[1], "--help").status, 0)
+                    continue
+                outcome = self.call(*words.split())
+                self.assertEqual(outcome.status, 2 if REFUSED in said else 1 if FAULT in said else 0, outcome.err)
+                ran += 1
+        self.assertEqual(met, set(ELSEWHERE), "an exception that isn't needed any more")
+        self.assertGreaterEqual(ran, 8)
+
+    def test_every_scene_and_hand_is_fine(self):
+        # The only complete scene of scenes.md was refused.
+        checked = 0
+        for page, text in blocks("yaml"):
+            if not re.search(r"^(objects|waypoints):( *#.*)?$", text, re.MULTILINE) or any(part in text for part in PARTS):
+                continue
+            with self.subTest(page=page, begins=text.splitlines()[0]):
+                outcome = self.call("check", self.written("block.yaml", text))
+                self.assertEqual((outcome.status, outcome.err), (0, ""))
+                checked += 1
+        self.assertGreaterEqual(checked, 3)
+
+    def test_every_part_of_a_cell_is_read(self):
+        cell = (SOURCE / "models/cells/default.yaml").read_text()
+        parts = [text for _, text in blocks("yaml") if text.startswith(("supervision:", "enabling_input:"))]
+        self.assertEqual(len(parts), 2)
+        for text in parts:
+            lines = text.splitlines() if text.startswith("enabling_input") else [text]
+            for part in lines:
+                with self.subTest(part.split("#")[0].strip()):
+                    self.changed("models/cells/default.yaml", (cell, cell + "\n" + part + "\n"))
+                    outcome = self.call("check", self.copies() / "models/cells/default.yaml")
+                    self.assertEqual((outcome.status, outcome.err), (0, ""))
+                    (self.copies() / "models/cells/default.yaml").write_text(cell)
+
+    def test_every_key_of_the_summary_and_column_of_the_signals_is_described(self):
+        text = (SOURCE / "docs/files.md").read_text()
+        summary = self.summary("--duration", "0.5s", "--record", self.folder / "record")
+        named = set(re.findall(r"`([a-z_A-Z0-9]+)`", text))
+        ellipsis = {"tool_penetration_touch_max_m", "tool_penetration_sliding_max_m", "contact_force_error_max_N"}
+        self.assertEqual(set(summary) - named - ellipsis, set())
+        columns = (self.folder / "record" / "signals.csv").read_text().splitlines()[0].split(",")
+        patterns = [pattern.replace("…", "[xyz]").replace("AXIS", r"axis_\d") for pattern in
+                    re.findall(r"`([^`]+)`", text[text.index("## What `--record"):text.index("## The summary")])]
+        for column in columns:
+            self.assertTrue(any(re.fullmatch(pattern, column) for pattern in patterns), column)
+
+    def test_the_screen_of_the_readme_is_the_programs(self):
+        # All but what depends on the machine; "..." stands for lines that are left out.
+        [shown] = [text for page, text in blocks("") if text.startswith("arm150 default cell, scene wall")
+                   and page == "README.md"]
+        printed = self.call("run").out
+        for line in shown.splitlines():
+            if not re.match(r"  (\.\.\.|time|compute)", line):
+                self.assertIn(line + "\n", printed)
+
+    def test_links_lead_somewhere(self):
+        for page in PAGES:
+            for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)\s]*)?\)", page.read_text()):
+                if not link.startswith("http"):
+                    self.assertTrue((page.parent / link).exists(), f"{page.name}: {link}")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,33 @@
+#!/usr/bin/python3
+"""docs/tour.md and the README's links lead somewhere: every linked file is there, and every name of the tour's first two
+tables stands in its file."""
+import re
+import unittest
+
+import harness
+
+LINK = re.compile(r"\]\(((?!https?:|#)[^)#]+)(?:#[^)]*)?\)")
+DOCUMENTS = [harness.SOURCE / "README.md", harness.SOURCE / "CHANGELOG.md", *sorted((harness.SOURCE / "docs").glob("*.md"))]
+
+
+class Tour(unittest.TestCase):
+    def test_every_link_of_the_documents_leads_to_a_file_or_folder(self):
+        for document in DOCUMENTS:
+            prose = re.sub(r"^```.*?^```", "", document.read_text(), flags=re.MULTILINE | re.DOTALL)
+            for target in LINK.findall(prose):
+                with self.subTest(document=document.name, target=target):
+                    self.assertTrue((document.parent / target).exists())
+
+    def test_every_name_on_the_tour_stands_in_its_file(self):
+        tour = harness.SOURCE / "docs" / "tour.md"
+        rows = re.findall(r"^\| (?:&nbsp;)*\[[^\]]+\]\(([^)]+)\) \| (`[^|]+`) \|", tour.read_text(), re.MULTILINE)
+        self.assertGreater(len(rows), 15)
+        for target, names in rows:
+            source = (tour.parent / target).read_text()
+            for name in re.findall(r"`([^`]+)`", names):
+                with self.subTest(file=target, name=name):
+                    self.assertIn(name, source)
+
+
+if __name__ == "__main__":
+    unittest.main()

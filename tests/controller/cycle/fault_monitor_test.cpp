@@ -1,0 +1,199 @@
+#include "controller/cycle/fault_monitor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <vector>
+
+#include "tests/controller/cycle/fake_devices.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using testing::FakeDrives;
+using testing::FakeSensor;
+using testing::Watched;
+
+struct FaultMonitorTest : ::testing::Test {
+  FaultMonitorTest() {
+    watched.bring_to_rendering();
+    measurement.take();
+  }
+  // One cycle, as it is now.
+  void judge(bool telling = false) {
+    ++watched.cycle;
+    measurement.take();
+    monitor.judge_encoders(measurement.now(), Phase::rendering);
+    monitor.judge({.measured = measurement.now(),
+                   .sample = sensor.sample,
+                   .buses = buses,
+                   .overruns_in_a_row = overruns,
+                   .telling = telling});
+  }
+  [[nodiscard]] Fault stopped_for() const { return watched.supervisor.report().fault; }
+
+  description::Cell cell = testing::default_cell();
+  models::Arm arm{cell};
+  FakeDrives drives{cell, arm};
+  FakeSensor sensor;
+  SessionSettings settings;
+  Watched watched;
+  std::vector<fieldbus::BusStatus> buses = std::vector<fieldbus::BusStatus>(3);
+  std::uint32_t overruns = 0;
+  Measurement measurement{drives.on_bus, sensor, arm, WrenchCompensation(cell), settings.period_s};
+  FaultMonitor monitor{drives.on_bus, settings, 200.0, watched.supervisor, watched.alarm};
+};
+
+TEST_F(FaultMonitorTest, FindsNothingWrongWithDevicesThatAreWell) {
+  for (int k = 0; k < 100; ++k) judge();
+  EXPECT_EQ(watched.supervisor.phase(), Phase::rendering);
+  EXPECT_EQ(stopped_for(), Fault::none);
+}
+
+TEST_F(FaultMonitorTest, MissesASampleForAsLongAsItMayBe) {
+  sensor.is_fresh = false;
+  for (std::uint32_t k = 0; k < settings.max_missed_samples; ++k) judge();
+  EXPECT_EQ(stopped_for(), Fault::none);
+  judge();
+  EXPECT_EQ(watched.times(Fault::sensor_lost), 1u);
+}
+
+TEST_F(FaultMonitorTest, FindsSamplesLateThatAreMissedAgainAndAgain) {
+  for (int k = 0; k < 200 && watched.times(Fault::sensor_late) == 0; ++k) {
+    sensor.is_fresh = k % 10 != 0;
+    judge();
+  }
+  EXPECT_EQ(watched.times(Fault::sensor_late), 1u);
+}
+
+TEST_F(FaultMonitorTest, LetsOneSampleIn17BeLate) {
+  for (int k = 0; k < 1700; ++k) {
+    sensor.is_fresh = k % 17 != 0;
+    judge();
+  }
+  EXPECT_EQ(watched.times(Fault::sensor_late), 0u);
+}
+
+TEST_F(FaultMonitorTest, ReadsTheSensorsOwnWords) {
+  sensor.sample.healthy = false;
+  judge();
+  EXPECT_EQ(watched.times(Fault::sensor_status), 1u);
+}
+
+TEST_F(FaultMonitorTest, RefusesAForceThatIsNone) {
+  sensor.sample.wrench_S[4] = std::numeric_limits<double>::quiet_NaN();
+  judge();
+  EXPECT_EQ(watched.times(Fault::force_not_finite), 1u);
+}
+
+TEST_F(FaultMonitorTest, RefusesAForceBeyondTheCells) {
+  sensor.sample.wrench_S[0] = 300.0;
+  judge();
+  EXPECT_EQ(watched.times(Fault::force_excessive), 1u);
+}
+
+TEST_F(FaultMonitorTest, NeedsNoForceInAHold) {
+  watched.supervisor.hold();
+  sensor.sample.saturated = true;
+  judge();
+  EXPECT_EQ(watched.times(Fault::sensor_saturated), 0u);
+  watched.supervisor.handle(Event::resume);
+  judge();
+  EXPECT_EQ(watched.times(Fault::sensor_saturated), 1u);
+}
+
+TEST_F(FaultMonitorTest, FindsAFrozenSensor) {
+  sensor.sample.repeats = settings.max_repeated_samples;
+  judge();
+  EXPECT_EQ(watched.times(Fault::sensor_frozen), 0u);
+  sensor.sample.repeats++;
+  judge();
+  EXPECT_EQ(watched.times(Fault::sensor_frozen), 1u);
+}
+
+TEST_F(FaultMonitorTest, TellsALateDriveFromASilentOne) {
+  drives[1].is_fresh = false;
+  judge(true);
+  EXPECT_EQ(watched.times(Fault::feedback_late), 0u) << "an SDO answer may hold it up";
+  judge();
+  EXPECT_EQ(watched.times(Fault::feedback_late), 1u);
+  drives[1].silent_cycles = settings.max_missed_feedback + 1;
+  judge();
+  EXPECT_EQ(watched.times(Fault::drive_silent), 1u);
+  EXPECT_EQ(watched.supervisor.report().where, 1);
+}
+
+TEST_F(FaultMonitorTest, NamesWhatADriveReports) {
+  const std::pair<fieldbus::DriveFault, Fault> table[]{
+      {fieldbus::DriveFault::left_operation, Fault::drive_disabled},
+      {fieldbus::DriveFault::modbus_closed, Fault::modbus_silent},
+      {fieldbus::DriveFault::target_out_of_range, Fault::target_out_of_range},
+      {fieldbus::DriveFault::emergency, Fault::drive_fault}};
+  for (const auto& [of_drive, fault] : table) {
+    watched.supervisor = Supervisor();
+    watched.bring_to_rendering();
+    drives[4].its_fault = of_drive;
+    judge();
+    EXPECT_EQ(watched.times(fault), 1u) << fault_name(fault);
+  }
+}
+
+TEST_F(FaultMonitorTest, FindsAnEncoderThatJumpsFurtherThanItsJointCan) {
+  const double per_cycle_rad = drives[0].own.max_speed_rad_per_s * settings.period_s;
+  drives[0].angle_rad += 3.9 * per_cycle_rad;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::none);
+  drives[0].angle_rad += 4.1 * per_cycle_rad;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::position_implausible);
+}
+
+TEST_F(FaultMonitorTest, LetsAnEncoderThatWasSilentCatchUp) {
+  const double per_cycle_rad = drives[0].own.max_speed_rad_per_s * settings.period_s;
+  drives[0].is_fresh = false;
+  judge();
+  drives[0].is_fresh = true;
+  drives[0].angle_rad += 7.9 * per_cycle_rad;
+  judge();
+  EXPECT_EQ(watched.times(Fault::position_implausible), 0u);
+}
+
+TEST_F(FaultMonitorTest, JudgesNoEncoderOfAnArmThatIsFree) {
+  drives[0].angle_rad += 1.0;
+  measurement.take();
+  monitor.judge_encoders(measurement.now(), Phase::enabling);
+  EXPECT_EQ(stopped_for(), Fault::none);
+}
+
+TEST_F(FaultMonitorTest, FindsABusThatIsGone) {
+  const std::pair<fieldbus::BusState, Fault> table[]{{fieldbus::BusState::error_passive, Fault::error_passive},
+                                                     {fieldbus::BusState::down, Fault::interface_down},
+                                                     {fieldbus::BusState::bus_off, Fault::bus_off}};
+  for (const auto& [state, fault] : table) {
+    buses[2].state = state;
+    judge();
+    EXPECT_EQ(watched.times(fault), 1u) << fault_name(fault);
+  }
+}
+
+TEST_F(FaultMonitorTest, CountsLostFramesFromTheResetOn) {
+  buses[1].receive_overflows = 3;
+  monitor.forget(buses);
+  judge();
+  EXPECT_EQ(watched.times(Fault::receive_overflow), 0u);
+  buses[1].receive_overflows = 5;
+  judge();
+  EXPECT_EQ(watched.times(Fault::receive_overflow), 1u);
+}
+
+TEST_F(FaultMonitorTest, StopsForALoopThatIsLateTooOften) {
+  overruns = settings.max_overruns;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::none);
+  ++overruns;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::overrun);
+}
+
+}  // namespace
+}  // namespace proxarm::controller

@@ -1,0 +1,203 @@
+// Energies at the proxy's and the hand's port, and damping that is added where the loop makes energy.
+#include "controller/stability/passivity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <numbers>
+
+#include "controller/rendering/admittance_proxy.hpp"
+#include "models/surfaces/friction_plane.hpp"
+#include "tests/controller/closed_loop/closed_loop_rig.hpp"
+#include "tests/models/surfaces/random_states.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+using testing::ClosedLoopRig;
+using testing::RigOptions;
+using tests::Random;
+
+// The equation of motion times T v, order 1: what comes in is stored, damped, or lost by the step itself.
+TEST(Passivity, TheProxysBalanceIsExact) {
+  models::FrictionPlane<3> wall(Vec3(0.01, 0.0, 0.0), Vec3(-1.0, 0.0, 0.0), 0.3);
+  const AdmittanceConfig config{.mass_kg = 2.5, .damping_Ns_per_m = 7.0};
+  AdmittanceProxy<3> proxy(config, wall);
+  PassivityObserver observer({}, config.period_s, false);
+  observer.start(Vec3::Zero());
+  Random random(5);
+  double lost_J = 0.0, gross_J = 0.0;
+  Vec3 v_k1 = Vec3::Zero();
+  for (int k = 0; k < 5000; ++k) {
+    const Vec3 h(random.uniform(-10.0, 12.0), random.uniform(-8.0, 8.0), random.uniform(-8.0, 8.0));
+    observer.observe_hand(h, Vec3::Zero());
+    ASSERT_EQ(proxy.step(h), ProxyFault::none);
+    observer.observe_proxy(proxy.velocity(), proxy.f(), config.mass_kg, config.damping_Ns_per_m);
+    lost_J += 0.5 * config.mass_kg * (proxy.velocity() - v_k1).squaredNorm();
+    gross_J += std::abs(config.period_s * h.dot(proxy.velocity()));
+    v_k1 = proxy.velocity();
+  }
+  const PortEnergies& e = observer.energies_J();
+  EXPECT_LT(e.world, 0.0);
+  EXPECT_GT(e.damping, 0.0);
+  EXPECT_EQ(e.hand, 0.0);  // the tool stood still
+  // κ times an ulp of q, 2.5e6 N/m · 1e-18 m, in f; 5000 steps of it.
+  EXPECT_NEAR(e.proxy + e.world, e.kinetic + e.damping + lost_J, 1e-10 * gross_J);
+}
+
+struct Felt {
+  double damping_Ns_per_m;
+  bool oscillates;
+};
+
+// A hand that swings a mass with this damping, some of it negative, to and fro; more and more for a second.
+Felt felt(double frequency_Hz, double mass_kg, double damping_Ns_per_m, double amplitude_m) {
+  const double T = 1e-3, omega = 2.0 * std::numbers::pi * frequency_Hz;
+  PassivityObserver observer({}, T, false);
+  observer.start(Vec3::Zero());
+  Felt result{0.0, false};
+  int averaged = 0;
+  for (int k = 1; k < 6000; ++k) {
+    // The mean velocity over a period is that in its middle; force where the observer puts it: at its end.
+    const double t = k * T, size = amplitude_m * std::min(1.0, t), phase = omega * (t - T / 2);
+    const double x = size * std::sin(omega * t);
+    const double v = size * omega * std::cos(phase), a = -size * omega * omega * std::sin(phase);
+    const Vec3 along(0.6, 0.0, 0.8);
+    observer.observe_hand((mass_kg * a + damping_Ns_per_m * v) * along, x * along);
+    result.oscillates = result.oscillates || observer.oscillates();
+    if (k < 3000) continue;
+    result.damping_Ns_per_m += observer.felt_damping_Ns_per_m();
+    ++averaged;
+  }
+  result.damping_Ns_per_m /= averaged;
+  return result;
+}
+
+TEST(Passivity, FindsTheDampingThatTheHandFinds) {
+  for (const double frequency_Hz : {3.5, 5.0, 9.0, 20.0}) {
+    for (const double damping : {-40.0, -5.0, 30.0}) {
+      SCOPED_TRACE(std::to_string(frequency_Hz) + " Hz, " + std::to_string(damping) + " Ns/m");
+      const Felt found = felt(frequency_Hz, 4.0, damping, 0.002);
+      EXPECT_NEAR(found.damping_Ns_per_m, damping, 0.02 * std::abs(damping) + 0.2);  // 2 %: the average's own ripple
+      EXPECT_EQ(found.oscillates, damping < 0.0);
+    }
+  }
+}
+
+TEST(Passivity, LetsHandsMoveByWillAndTheSmallestBe) {
+  EXPECT_FALSE(felt(1.0, 4.0, -10.0, 0.1).oscillates);
+  EXPECT_FALSE(felt(2.0, 4.0, -20.0, 0.02).oscillates);
+  EXPECT_FALSE(felt(4.0, 4.0, -40.0, 0.00015).oscillates);
+  EXPECT_TRUE(felt(4.0, 4.0, -40.0, 0.0005).oscillates);
+}
+
+TEST(Passivity, OutlivesWhatIsNotFinite) {
+  PassivityObserver observer({}, 1e-3, true);
+  observer.start(Vec3::Zero());
+  observer.observe_hand(Vec3(std::nan(""), 0.0, 0.0), Vec3::Zero());
+  observer.observe_hand(Vec3(1.0, 0.0, 0.0), Vec3(0.0, INFINITY, 0.0));
+  EXPECT_EQ(observer.observe_hand(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 0.0, 1e-5)), 0.0);
+  EXPECT_TRUE(std::isfinite(observer.energies_J().hand));
+}
+
+// ---- in the loop: a hand that tightens its grip while it holds still, and the readings 8 ms late
+
+struct Grip {
+  double mass_kg;
+  double damping_Ns_per_m;  // of the hand
+};
+
+constexpr double grip_at_s = 1.5, loose_at_s = 6.0;
+
+RigOptions stiff_grip(const Grip& grip, Passivity passivity) {
+  RigOptions options;
+  options.hand = ::testing::TempDir() + "stiff_grip.yaml";
+  std::ofstream(options.hand) << "name: stiff\nmass_kg: 1\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
+                              << "grips:\n  - {time_s: " << grip_at_s
+                              << ", stiffness_N_per_m: 3000, damping_Ns_per_m: " << grip.damping_Ns_per_m << "}\n"
+                              << "  - {time_s: " << loose_at_s << ", stiffness_N_per_m: 500, damping_Ns_per_m: 20}\n"
+                              << "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n"
+                              << "  - {time_s: 1.2, offset_m: [0.02, 0.03, 0]}\n";
+  options.scene = "scenes/free.yaml";
+  options.sensor_delay_s = 0.008;
+  options.duration_s = 10.0;
+  options.settings.mass_kg = grip.mass_kg;
+  options.settings.passivity = passivity;
+  return options;
+}
+
+// Half of what the tool moves from peak to peak, the axis that moves most, in the quarter of a second from this time of
+// rendering on: the longest period there is, 2.6 Hz, has its peaks in there within 10 %.
+double amplitude_m(const ClosedLoopRig& rig, double from_s) {
+  const auto first = static_cast<std::size_t>(
+      std::find_if(rig.records.begin(), rig.records.end(), [](const auto& r) { return r.phase == Phase::rendering; }) -
+      rig.records.begin());
+  Vec3 low = Vec3::Constant(1e9), high = -low;
+  for (std::size_t k = 0; k < 250; ++k) {
+    const Vec3 x = rig.truths.at(first + k + static_cast<std::size_t>(1e3 * from_s)).X_WT.translation();
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  return 0.5 * (high - low).maxCoeff();
+}
+
+class StiffGrip : public ::testing::TestWithParam<Grip> {};
+
+// 0.5 mm: 1.5 N on the hand at 3000 N/m. Without the observer the amplitude ends at millimetres, where the limits hold
+// it; with it, half a second after that amplitude is reached it isn't reached again.
+TEST_P(StiffGrip, IsQuietedWithinHalfASecond) {
+  constexpr double level_m = 0.5e-3;
+  ClosedLoopRig off(stiff_grip(GetParam(), Passivity::observe));
+  off.run();
+  EXPECT_GT(amplitude_m(off, loose_at_s - 0.3), 2e-3);
+  for (const CycleRecord& r : off.records) ASSERT_EQ(r.added_damping_Ns_per_m, 0.0);
+
+  ClosedLoopRig on(stiff_grip(GetParam(), Passivity::on));
+  on.run();
+  double begun_s = grip_at_s;
+  while (begun_s < loose_at_s && amplitude_m(on, begun_s) < level_m) begun_s += 0.01;
+  double last_s = begun_s;  // it may never be reached
+  for (double t = begun_s; t < 9.5; t += 0.01) {
+    if (amplitude_m(on, t) >= level_m) last_s = t;
+  }
+  double most = 0.0, steepest = 0.0;
+  for (std::size_t k = 1; k < on.records.size(); ++k) {
+    most = std::max(most, on.records[k].added_damping_Ns_per_m);
+    if (on.records[k].phase != Phase::rendering) continue;
+    steepest = std::max(steepest, on.records[k].added_damping_Ns_per_m - on.records[k - 1].added_damping_Ns_per_m);
+  }
+  std::printf("%g kg: without %.2f mm; with, above 0.5 mm for %.2f s, then %.3f mm; at most %.0f Ns/m\n",
+              GetParam().mass_kg, 1e3 * amplitude_m(off, loose_at_s - 0.3), last_s - begun_s,
+              1e3 * amplitude_m(on, loose_at_s - 0.3), most);
+  EXPECT_LE(last_s - begun_s, 0.5);
+  EXPECT_LT(amplitude_m(on, loose_at_s - 0.3), 0.1e-3);
+  EXPECT_LE(steepest, 4.0 + 1e-9);  // 200 Ns/m · 1 ms / 50 ms: no bump
+  EXPECT_EQ(on.fault().fault, Fault::none);
+  if (GetParam().mass_kg < 2.0) return;  // the loose grip isn't stable either
+  // Lets go: 5 s for a factor of e.
+  const CycleRecord& late =
+      *std::find_if(on.records.rbegin(), on.records.rend(), [](const auto& r) { return r.phase == Phase::rendering; });
+  EXPECT_LT(late.added_damping_Ns_per_m, 0.5 * most);
+}
+
+// The first: no mass from 3 kg on is stable with that hand. The second: 1.6 kg and more are.
+INSTANTIATE_TEST_SUITE_P(Passivity, StiffGrip, ::testing::Values(Grip{4.0, 50.0}, Grip{6.0, 50.0}, Grip{1.25, 80.0}));
+
+// Touch, slide and leave: nothing is added, and so nothing is other than without.
+TEST(Passivity, LeavesASessionThatIsStableAsItIs) {
+  RigOptions options;
+  options.duration_s = 9.0;
+  ClosedLoopRig off(options);
+  off.run();
+  options.settings.passivity = Passivity::on;
+  ClosedLoopRig on(options);
+  on.run();
+  ASSERT_EQ(on.records.size(), off.records.size());
+  for (std::size_t k = 0; k < on.records.size(); ++k) {
+    ASSERT_EQ(on.records[k].target_counts, off.records[k].target_counts) << k;
+  }
+}
+
+}  // namespace
+}  // namespace proxarm::controller

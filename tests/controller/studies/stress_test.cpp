@@ -1,0 +1,44 @@
+#include "controller/studies/stress.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/models/surfaces/random_states.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+// Always the same worlds, so that a change of the code is what a failure shows; it names the run's own seed.
+// `proxarm study stress --seed N` is for others.
+void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds = Stress::Worlds::all) {
+  const Stress study(worlds);
+  const Options options{.seed = seed};
+  Table table(study.columns());
+  const auto count = static_cast<std::size_t>(tests::scaled(runs));
+  for (std::size_t job = 0; job < count; ++job) {
+    for (const Row& row : study.run(job, options)) table.add(job, row);
+  }
+  const nlohmann::json headline = study.headline(table, options);
+  EXPECT_FALSE(study.failed(headline)) << study.text(headline);
+  EXPECT_GT(headline.at("contact_steps").get<double>(), 0.05 * headline.at("steps").get<double>());
+}
+
+TEST(Stress, HoldsInRandomWorlds) { expect_no_violation(2, 10'000); }
+
+TEST(Stress, HoldsAmongMeshes) { expect_no_violation(2, 1'000, Stress::Worlds::meshes); }
+
+TEST(Stress, HoldsAmongLayers) { expect_no_violation(2, 400, Stress::Worlds::layers); }
+
+TEST(Stress, ARunIsTheSameAgainByItsSeed) {
+  const Stress study;
+  const Options options{.seed = 5};
+  EXPECT_EQ(study.run(3, options), study.run(3, options));
+  std::string one, two;
+  EXPECT_FALSE(Stress::replay(job_seed(1, 0), one));
+  EXPECT_FALSE(Stress::replay(job_seed(1, 0), two));
+  EXPECT_EQ(one, two);
+}
+
+}  // namespace
+}  // namespace proxarm::studies

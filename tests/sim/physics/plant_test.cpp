@@ -1,0 +1,281 @@
+#include "sim/physics/plant.hpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <complex>
+#include <iostream>
+#include <memory>
+
+#include "models/base/setup_error.hpp"
+#include "tests/sim/cell/default_cell.hpp"
+
+namespace proxarm::sim {
+namespace {
+
+using models::Vec3;
+constexpr std::int64_t ms = 1'000'000;
+
+// A hand that pulls with a constant force: soft and far away.
+description::HandDescription pull(const Vec3& force_N, double mass_kg = 1.0) {
+  description::HandDescription hand;
+  hand.mass_kg = mass_kg;
+  hand.stiffness_N_per_m = 1e-3;
+  hand.damping_Ns_per_m = 0.0;
+  const Vec3 away = force_N / hand.stiffness_N_per_m;
+  hand.waypoints = {{0.0, {0.0, 0.0, 0.0}}, {0.2, {away.x(), away.y(), away.z()}}};
+  return hand;
+}
+
+struct DefaultPlant : Plant {
+  explicit DefaultPlant(const description::HandDescription& hand = no_hand(),
+                        const description::Cell& cell = default_cell(), const PlantConfig& config = {})
+      : Plant(cell, default_sensor(), hand, 0, config) {}
+  void enable_all() {
+    for (std::size_t i = 0; i < axis_count(); ++i) servo(i).enable(time_ns());
+  }
+  [[nodiscard]] Vec3 position() const { return tool().X_WT.translation(); }
+};
+
+TEST(Plant, StandsStillWithClosedBrakesBitForBit) {
+  DefaultPlant plant;
+  std::vector<double> start;
+  for (std::size_t i = 0; i < 6; ++i) start.push_back(plant.arm().motor_angle_rad(i));
+  plant.advance_to(1000 * ms);
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(plant.arm().motor_angle_rad(i), start[i]);
+}
+
+// Brakes open onto a torque that carries the arm: no drop, no jump.
+TEST(Plant, DoesNotJumpWhenTheDrivesAreEnabled) {
+  DefaultPlant plant;
+  plant.advance_to(100 * ms);
+  const Vec3 start = plant.position();
+  plant.enable_all();
+  double worst = 0.0;
+  for (int k = 101; k < 1000; ++k) {
+    plant.advance_to(k * ms);
+    worst = std::max(worst, (plant.position() - start).norm());
+  }
+  std::cout << "the tool moves by " << worst * 1e6 << " um when the drives are enabled\n";
+  EXPECT_LT(worst, 1e-6);  // some counts of 40 nrad, at 0.7 m
+}
+
+TEST(Plant, DoesNotJumpWhenAnEnabledDriveIsDisabledAndEnabledAgain) {
+  DefaultPlant plant;
+  plant.enable_all();
+  plant.advance_to(100 * ms);
+  const Vec3 start = plant.position();
+  for (std::size_t i = 0; i < 6; ++i) plant.servo(i).disable();
+  plant.advance_to(200 * ms);
+  plant.enable_all();
+  plant.advance_to(600 * ms);
+  EXPECT_LT((plant.position() - start).norm(), 1e-6);
+}
+
+// 10 N at the handle bend the gears; the drives hold. This is the floor of what the tool enters a wall.
+TEST(Plant, YieldsLessThanATenthOfAMillimetreTo10N) {
+  for (int direction = 0; direction < 3; ++direction) {
+    DefaultPlant plant(pull(10.0 * Vec3::Unit(direction)));
+    const Vec3 start = plant.position();
+    plant.enable_all();
+    plant.advance_to(3000 * ms);
+    const Vec3 moved = plant.position() - start;
+    std::cout << "10 N along axis " << direction << " of W: " << moved.transpose() * 1e6 << " um\n";
+    EXPECT_GT(moved[direction], 10e-6);
+    EXPECT_LT(moved.norm(), 100e-6);
+  }
+}
+
+// A step of 0.1 mrad on each axis: there within 20 ms, little overshoot, no error left.
+TEST(Plant, FollowsAStepOnEveryAxis) {
+  for (std::size_t axis = 0; axis < 6; ++axis) {
+    DefaultPlant plant;
+    const auto cell = default_cell();
+    plant.enable_all();
+    plant.advance_to(10 * ms);
+    const double step = 1e-4, start = plant.arm().motor_angle_rad(axis);
+    const std::int32_t target =
+        plant.servo(axis).position_counts() + static_cast<std::int32_t>(step * cell.drives[axis].counts_per_rad());
+    double highest = 0.0;
+    for (int k = 10; k < 400; ++k) {
+      plant.servo(axis).set_target(target, k * ms);
+      plant.advance_to((k + 1) * ms);
+      const double way = plant.arm().motor_angle_rad(axis) - start;
+      highest = std::max(highest, way);
+      if (k > 40) {
+        EXPECT_NEAR(way, step, 0.1 * step) << "axis " << axis + 1 << " at " << k << " ms";
+      }
+    }
+    EXPECT_LT(highest, 1.4 * step) << "axis " << axis + 1;
+    EXPECT_NEAR(plant.arm().motor_angle_rad(axis) - start, step, 2e-7) << "axis " << axis + 1;  // a few counts
+  }
+}
+
+// Bandwidth of motor against interpolated setpoint, by sines of one axis; friction included.
+TEST(Plant, FollowsSinesUpTo100HzWithALagBelow2Ms) {
+  const auto cell = default_cell();
+  for (const std::size_t axis : {0u, 1u, 4u}) {
+    for (const double frequency : {5.0, 20.0, 50.0, 100.0}) {
+      DefaultPlant plant;
+      plant.enable_all();
+      plant.advance_to(1 * ms);
+      const double amplitude = 20e-6 + 2e-3 / frequency / frequency, start = plant.arm().motor_angle_rad(axis);
+      const std::int32_t origin = plant.servo(axis).position_counts();
+      std::complex<double> in = 0.0, out = 0.0;
+      for (int k = 1; k <= 1000; ++k) {
+        const double reached_s = 1e-3 * (k + 1);
+        const double target = amplitude * std::sin(2.0 * M_PI * frequency * reached_s);
+        plant.servo(axis).set_target(
+            origin + static_cast<std::int32_t>(std::lround(target * cell.drives[axis].counts_per_rad())), k * ms);
+        plant.advance_to((k + 1) * ms);
+        if (k < 600) continue;  // 400 ms are whole periods of all frequencies
+        const auto turn = std::polar(1.0, -2.0 * M_PI * frequency * reached_s);
+        in += target * turn;
+        out += (plant.arm().motor_angle_rad(axis) - start) * turn;
+      }
+      const std::complex<double> response = out / in;
+      const double lag_s = -std::arg(response) / (2.0 * M_PI * frequency);
+      std::cout << "axis " << axis + 1 << ", " << frequency << " Hz: gain " << std::abs(response) << ", lag "
+                << lag_s * 1e3 << " ms\n";
+      EXPECT_GT(std::abs(response), std::sqrt(0.5));
+      EXPECT_LT(std::abs(response), 1.2);
+      EXPECT_LT(std::abs(lag_s), 2e-3);
+    }
+  }
+}
+
+// The servo loops must not stir up the arm's elastic modes: a knock dies away with at least 3 % of critical damping.
+TEST(Plant, DampsTheArmsModesByAtLeastThreePercent) {
+  for (int direction = 0; direction < 3; ++direction) {
+    DefaultPlant plant;
+    plant.enable_all();
+    plant.advance_to(100 * ms);
+    const Vec3 start = plant.position();
+    ArmDynamics& arm = plant.arm();
+    std::int64_t time_ns = plant.time_ns();
+    std::vector<double> torque(6), peaks;
+    double before = 0.0, before2 = 0.0;
+    for (int k = 0; k < 3200; ++k) {  // 0.8 s
+      arm.advance();
+      time_ns += 250'000;
+      for (std::size_t i = 0; i < 6; ++i) torque[i] = plant.servo(i).update(arm.motor_angle_rad(i), time_ns);
+      arm.apply(torque, k < 40 ? Vec3(100.0 * Vec3::Unit(direction)) : Vec3(Vec3::Zero()));
+      const double way = arm.tool().X_WT.translation()[direction] - start[direction];
+      if (k > 60 && before > before2 && before > way) peaks.push_back(before);
+      before2 = before;
+      before = way;
+    }
+    ASSERT_GE(peaks.size(), 6u);
+    // ln(x₁/x_{n+1}) = 2π n ζ/√(1 − ζ²)
+    const double n = static_cast<double>(peaks.size() - 1), decrement = std::log(peaks.front() / peaks.back()) / n;
+    const double damping = decrement / std::hypot(2.0 * M_PI, decrement);
+    std::cout << "a knock along axis " << direction << " of W: damping " << 100.0 * damping << " % over " << n
+              << " periods\n";
+    EXPECT_GT(damping, 0.03);
+  }
+}
+
+TEST(Plant, StaysQuietAtRest) {
+  DefaultPlant plant;
+  plant.enable_all();
+  plant.advance_to(500 * ms);
+  const Vec3 start = plant.position();
+  double worst = 0.0, fastest = 0.0;
+  for (int k = 500; k < 2500; ++k) {
+    plant.advance_to(k * ms);
+    worst = std::max(worst, (plant.position() - start).norm());
+    fastest = std::max(fastest, plant.tool().velocity_W.norm());
+  }
+  std::cout << "at rest the tool wanders by " << worst * 1e9 << " nm, at up to " << fastest * 1e6 << " um/s\n";
+  EXPECT_LT(worst, 1e-6);
+}
+
+TEST(Plant, HoldsAJammedAxisStillWhileItsServoPushes) {
+  DefaultPlant plant;
+  plant.enable_all();
+  plant.advance_to(10 * ms);
+  plant.arm().jam(0, true);
+  const double start = plant.arm().motor_angle_rad(0);
+  const std::int32_t origin = plant.servo(0).position_counts();
+  for (int k = 10; k < 500; ++k) {
+    plant.servo(0).set_target(origin + 10000 * (k - 9), k * ms);
+    plant.advance_to((k + 1) * ms);
+    ASSERT_EQ(plant.arm().motor_angle_rad(0), start);
+  }
+  EXPECT_GT(std::abs(plant.servo(0).following_error_rad()), 0.1);
+  EXPECT_TRUE(plant.servo(0).limited());
+}
+
+TEST(Plant, StartsTheHandWhenAllDrivesAreEnabled) {
+  DefaultPlant plant(pull(Vec3(5.0, 0.0, 0.0)));
+  plant.advance_to(300 * ms);
+  EXPECT_FALSE(plant.hand_started());
+  EXPECT_LT(plant.handle_force_W().norm(), 1e-6);
+  plant.servo(0).enable(300 * ms);
+  plant.advance_to(400 * ms);
+  EXPECT_FALSE(plant.hand_started());
+  plant.enable_all();
+  plant.advance_to(401 * ms);
+  EXPECT_TRUE(plant.hand_started());
+  EXPECT_GE(plant.hand_start_ns(), 400 * ms);
+  plant.advance_to(1500 * ms);
+  EXPECT_NEAR(plant.handle_force_W().x(), 5.0, 0.05);
+}
+
+TEST(Plant, LivesByAnyClocksZero) {
+  const std::int64_t zero = 123'456'789'012'345;
+  Plant plant(default_cell(), default_sensor(), no_hand(), zero);
+  plant.advance_to(zero + 249'999);
+  EXPECT_EQ(plant.time_ns(), zero);
+  plant.advance_to(zero + 250'000);
+  EXPECT_EQ(plant.time_ns(), zero + 250'000);
+  plant.advance_to(zero);  // never back
+  EXPECT_EQ(plant.time_ns(), zero + 250'000);
+  const GaugeSample sample = plant.force_sensor().sample(zero + 300'000);
+  EXPECT_LE(sample.time_ns, zero + 300'000);
+  EXPECT_GT(sample.time_ns, zero + 150'000);
+}
+
+TEST(Plant, RefusesServoRatesThatDoNotFitTogether) {
+  auto cell = default_cell();
+  cell.drives[3].simulation.servo_rate_Hz = 3000.0;
+  EXPECT_THROW(Plant(cell, default_sensor(), no_hand()), description::SetupError);
+  cell.drives[3].simulation.servo_rate_Hz = 8000.0;
+  const Plant plant(cell, default_sensor(), no_hand());
+  EXPECT_EQ(plant.step_ns(), 125'000);
+}
+
+// A whole second of touch.yaml's motion on held axes; every number twice the same.
+std::vector<double> fingerprint() {
+  DefaultPlant plant(description::load_hand(source_file("sim/hands/touch.yaml")));
+  plant.enable_all();
+  std::vector<double> all;
+  for (int k = 1; k <= 3000; ++k) {
+    for (std::size_t i = 0; i < 6; ++i)
+      plant.servo(i).set_target(plant.servo(i).demand_counts() + (k % 50) - 25, k * ms);
+    plant.advance_to((k + 1) * ms);
+    for (int i = 0; i < 3; ++i) all.push_back(plant.position()[i]);
+    for (const auto gauge : plant.force_sensor().sample(plant.time_ns()).gauges) all.push_back(gauge);
+  }
+  return all;
+}
+
+TEST(Plant, GivesTheSameBitsTwice) { EXPECT_EQ(fingerprint(), fingerprint()); }
+
+TEST(Plant, ReportsHowLong10SecondsTake) {
+  DefaultPlant plant(description::load_hand(source_file("sim/hands/touch.yaml")));
+  plant.enable_all();
+  const auto start = std::chrono::steady_clock::now();
+  for (int k = 1; k <= 10000; ++k) {
+    for (std::size_t i = 0; i < 6; ++i) plant.servo(i).set_target(plant.servo(i).demand_counts(), k * ms);
+    plant.advance_to((k + 1) * ms);
+    EXPECT_FALSE(plant.force_sensor().sample(plant.time_ns()).saturated);
+  }
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  std::cout << "10 s of mechanics, servo loops, sensor and hand: " << taken.count() << " s, "
+            << taken.count() * 1e6 / 40000 << " us per step\n";
+}
+
+}  // namespace
+}  // namespace proxarm::sim
