@@ -15,11 +15,11 @@
 #include <span>
 #include <vector>
 
-#include "controller/cycle/alarm.hpp"
-#include "controller/cycle/cycle_parts.hpp"
 #include "controller/cycle/cycle_recorder.hpp"
 #include "controller/cycle/frame_listener.hpp"
-#include "controller/cycle/setpoints.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "controller/motion/setpoints.hpp"
+#include "controller/supervision/alarm.hpp"
 
 namespace proxarm::controller {
 

@@ -17,18 +17,18 @@
 #include <memory>
 #include <span>
 
-#include "controller/cycle/alarm.hpp"
 #include "controller/cycle/bus_image.hpp"
-#include "controller/cycle/cycle_parts.hpp"
 #include "controller/cycle/cycle_recorder.hpp"
 #include "controller/cycle/cycle_status.hpp"
 #include "controller/cycle/fault_monitor.hpp"
-#include "controller/cycle/measurement.hpp"
-#include "controller/cycle/motion.hpp"
 #include "controller/cycle/past_faults.hpp"
 #include "controller/cycle/requests.hpp"
 #include "controller/cycle/timestep_change.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "controller/motion/measurement.hpp"
+#include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/alarm.hpp"
 #include "controller/supervision/command.hpp"
 #include "controller/supervision/supervisor.hpp"
 

@@ -15,10 +15,10 @@
 #include <span>
 #include <utility>
 
-#include "controller/cycle/alarm.hpp"
-#include "controller/cycle/measurement.hpp"
+#include "controller/motion/measurement.hpp"
 #include "controller/record/black_box.hpp"
 #include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/alarm.hpp"
 #include "controller/supervision/enabling_input.hpp"
 #include "controller/supervision/supervisor.hpp"
 #include "controller/supervision/tool_monitor.hpp"

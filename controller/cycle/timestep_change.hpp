@@ -18,11 +18,11 @@
 #include <optional>
 #include <span>
 
-#include "controller/cycle/alarm.hpp"
 #include "controller/cycle/frame_listener.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/rendering/change.hpp"
 #include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/alarm.hpp"
 #include "fieldbus/cia402/cia402_period.hpp"
 #include "models/base/archive_fields.hpp"
 

@@ -171,7 +171,7 @@ decltype(CycleParts::rendering) build_rendering(const description::Cell& cell, s
                          .elastic = ElasticSetpoint(arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s),
                          .world = make_rendered_world(scene, settings, proxy_mass(cell, settings)),
                          .orientation = OrientationProxy(orientation_config(settings)),
-                         .freeing = std::make_unique<FreeMotion>(settings, cell.supervision.release_speed_m_per_s)};
+                         .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
 }
 
 std::optional<EnablingInput> make_enabling_input(const description::Cell& cell, const SessionSettings& settings,

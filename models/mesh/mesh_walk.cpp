@@ -360,7 +360,7 @@ void MeshSurface::Walk::report(std::size_t contacts, const std::array<std::size_
 }
 
 // Whether these faces, all sticking, can bear the force: it lies in the sum of their friction cones.
-bool MeshSurface::Walk::can_hold(std::size_t contacts, const std::array<std::size_t, 3>& of) const noexcept {
+bool MeshSurface::Walk::can_support(std::size_t contacts, const std::array<std::size_t, 3>& of) const noexcept {
   std::array<ForceCone, 3> cones;
   for (std::size_t k = 0; k < contacts; ++k) cones[k] = {touched[of[k]].normal, s.friction(touched[of[k]].face)};
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
@@ -374,10 +374,10 @@ void MeshSurface::Walk::hold() noexcept {
   const std::size_t n = std::min(count, std::size_t{16});
   constexpr std::array<bool, 3> at_rest{false, false, false};
   for (std::size_t i = 0; i < n; ++i) {
-    if (can_hold(1, {i, 0, 0})) return report(1, {i, 0, 0}, at_rest);
+    if (can_support(1, {i, 0, 0})) return report(1, {i, 0, 0}, at_rest);
   }
   const auto hold_by = [&](std::size_t contacts, const std::array<std::size_t, 3>& of) {
-    if (!can_hold(contacts, of)) return StepResult::no_progress;
+    if (!can_support(contacts, of)) return StepResult::no_progress;
     report(contacts, of, at_rest);
     return StepResult::arrived;
   };

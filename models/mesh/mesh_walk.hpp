@@ -53,7 +53,7 @@ struct MeshSurface::Walk {
   StepResult try_pair(std::size_t i, std::size_t j) noexcept;
   StepResult try_triple(const std::array<std::size_t, 3>& of) noexcept;
   void hold() noexcept;
-  [[nodiscard]] bool can_hold(std::size_t count, const std::array<std::size_t, 3>& of) const noexcept;
+  [[nodiscard]] bool can_support(std::size_t count, const std::array<std::size_t, 3>& of) const noexcept;
   void report(std::size_t count, const std::array<std::size_t, 3>& of, const std::array<bool, 3>& slips) noexcept;
 
   [[nodiscard]] double share_on(std::uint32_t face, const Vec3& to, std::size_t& exit) const noexcept;

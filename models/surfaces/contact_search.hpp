@@ -4,7 +4,7 @@
 // pass. Sets of contacts are tried by size, single ones first, until one is complete: nothing pulls, nothing is
 // penetrated, and friction is as (17) says for each contact. A trial that runs into a surface nobody has thought of
 // makes that a candidate, and the search starts again. Three contacts determine a point, so larger sets add nothing
-// where all are rigid; elastic layers share their force by another method (models/world/shared_hold.hpp).
+// where all are rigid; elastic layers share their force by another method (models/world/shared_support.hpp).
 //
 // What a trial solves differs from world to world (planes, tangent planes of curved surfaces, faces of a mesh); that is
 // the caller's. Of the sets that are tried, the order is the same everywhere: candidates by their numbers, the greatest

@@ -10,7 +10,7 @@
 #include "models/surfaces/corner.hpp"
 #include "models/surfaces/groove.hpp"
 #include "models/world/settling.hpp"
-#include "models/world/shared_hold.hpp"
+#include "models/world/shared_support.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -283,20 +283,20 @@ void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<
 void World::try_together(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept {
   const std::span<const std::size_t> all{candidates.index.data(), candidates.count};
   if (std::none_of(all.begin(), all.end(), [this](std::size_t i) { return elastic_[i]; })) return;
-  SharedHold hold;
-  hold.count = candidates.count;
-  hold.budget = hold_budget_;
-  for (std::size_t c = 0; c < hold.count; ++c) {
-    hold.obstacle[c] = entries_[candidates.index[c]].obstacle.get();
-    hold.step[c] = candidates.alone[c];
+  SharedSupport support;
+  support.count = candidates.count;
+  support.budget = support_budget_;
+  for (std::size_t c = 0; c < support.count; ++c) {
+    support.obstacle[c] = entries_[candidates.index[c]].obstacle.get();
+    support.step[c] = candidates.alone[c];
   }
-  const bool found = hold.solve(K, p, q);
-  hold_budget_ = hold.budget;
-  if (!found || !fits(q, hold.r, all, candidates, K, p)) return;
-  choice.better(p, hold.r, 0);
+  const bool found = support.solve(K, p, q);
+  support_budget_ = support.budget;
+  if (!found || !fits(q, support.r, all, candidates, K, p)) return;
+  choice.better(p, support.r, 0);
   choice.shared = true;
-  for (std::size_t c = 0; c < hold.count; ++c) {
-    const Obstacle::Step& s = hold.step[c];
+  for (std::size_t c = 0; c < support.count; ++c) {
+    const Obstacle::Step& s = support.step[c];
     if (!s.touches) continue;
     const Entry& entry = entries_[candidates.index[c]];
     shared_[choice.count++] = {entry.object, entry.feature < 0 ? s.feature : entry.feature, s.slips, s.normal};
@@ -341,7 +341,7 @@ bool World::is_free(const Vec3& q, const Vec3& r) const noexcept {
 
 // The fallback where no set is complete: the proxy stays where it is if it may be there; otherwise the obstacle that
 // takes it nearest to p brings it out.
-void World::hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
+void World::stay(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept {
   const bool allowed = is_free(q, q);
   for (std::size_t c = 0; c < candidates.count; ++c) {
     const Obstacle::Step& s = candidates.alone[c];
@@ -386,7 +386,7 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
     add_candidates(K, nearer, q, fewer);
     if (fewer.count > 0) search(K, nearer, q, fewer, choice);
   }
-  if (!choice.found()) hold(p, q, candidates, choice);
+  if (!choice.found()) stay(p, q, candidates, choice);
   return false;
 }
 
@@ -413,7 +413,7 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
     return p;
   }
   double radius = gather(p, q, 0.0);
-  hold_budget_ = SharedHold::whole_budget;
+  support_budget_ = SharedSupport::whole_budget;
   Choice choice;
   bool found = solve(K, p, q, choice);
   // An object that moves may carry the proxy far, or one that it was squeezed into may bring it out far away. The step

@@ -6,7 +6,7 @@
 // (settling.hpp); the error shrinks by penetration over radius each time. Among complete sets, fewer contacts come
 // first, then the smallest ‖r − p‖.
 //
-// Where an elastic layer presses together with other obstacles, all that press share the force (shared_hold.hpp).
+// Where an elastic layer presses together with other obstacles, all that press share the force (shared_support.hpp).
 //
 // A step is first compared with the last known clearance: if both q and p are within it, the step touches nothing.
 #pragma once
@@ -97,7 +97,7 @@ class World final : public GeometricAlgorithm<3> {
   bool search(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) noexcept;
 
   bool solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexcept;
-  void hold(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept;
+  void stay(const Vec3& p, const Vec3& q, const Candidates& candidates, Choice& choice) const noexcept;
 
   std::vector<Entry> entries_;
   std::vector<std::size_t> unbounded_;  // obstacles without finite bounds
@@ -116,7 +116,7 @@ class World final : public GeometricAlgorithm<3> {
   std::array<Contact<3>, 3> contacts_{};
   std::array<Contact<3>, Candidates::most> shared_{};  // instead of those, where elastic ones share the force
   bool are_shared_ = false;
-  int hold_budget_ = 0;  // what SharedHold may still spend in this step
+  int support_budget_ = 0;  // what SharedSupport may still spend in this step
   std::size_t count_ = 0;
   std::uint64_t unresolved_ = 0;
   bool squeezed_ = false;

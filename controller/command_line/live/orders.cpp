@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/supervision/free_motion.hpp"
+#include "controller/motion/release.hpp"
 #include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
@@ -41,7 +41,7 @@ std::optional<controller::Command> parse_order(const std::string& text) {
     controller::Command command{known.order, 0.0};
     if (command.order == Order::back_off) {
       command.value = description::parse_length(value, "back-off");
-      if (command.value <= controller::FreeMotion::longest_back_off_m) return command;
+      if (command.value <= controller::Release::longest_back_off_m) return command;
       throw SetupError({.key = "back-off", .found = description::in_quotes(value), .expected = "at most 200mm"});
     }
     if (value.empty()) return command;

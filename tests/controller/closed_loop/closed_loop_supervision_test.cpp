@@ -402,7 +402,7 @@ TEST(ClosedLoopSupervision, StopsBackingOffIntoAHandThatResists) {
   const Freed f = freed(rig);
   // 15 N at the start, 50 N more at 3000 N/m, and what it moves on while it stops.
   EXPECT_NEAR(f.distance_m, 50.0 / 3000.0, 4e-3);
-  EXPECT_LT(f.force_max_N, f.force_before_N + FreeMotion::resisted_N + 10.0);
+  EXPECT_LT(f.force_max_N, f.force_before_N + Release::resisted_N + 10.0);
 }
 
 TEST(ClosedLoopSupervision, ReplaysNothingItWasNotAskedFor) {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "tests/controller/cycle/fake_devices.hpp"
+#include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "tests/controller/cycle/fake_devices.hpp"
+#include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/controller/cycle/fake_devices.hpp"
+#include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
 namespace {

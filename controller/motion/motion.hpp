@@ -12,13 +12,13 @@
 #include <memory>
 #include <vector>
 
-#include "controller/cycle/alarm.hpp"
-#include "controller/cycle/measurement.hpp"
-#include "controller/cycle/setpoints.hpp"
 #include "controller/limits/step_limits.hpp"
+#include "controller/motion/measurement.hpp"
+#include "controller/motion/setpoints.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/rendering/change.hpp"
 #include "controller/rendering/rendered_world.hpp"
+#include "controller/supervision/alarm.hpp"
 #include "controller/supervision/command.hpp"
 #include "models/base/state_archive.hpp"
 

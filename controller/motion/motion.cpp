@@ -1,7 +1,7 @@
-#include "controller/cycle/motion.hpp"
+#include "controller/motion/motion.hpp"
 
-#include "controller/cycle/admittance_motion.hpp"
-#include "controller/cycle/torque_motion.hpp"
+#include "controller/motion/admittance_motion.hpp"
+#include "controller/motion/torque_motion.hpp"
 
 namespace proxarm::controller {
 

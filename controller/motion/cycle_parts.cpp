@@ -1,4 +1,4 @@
-#include "controller/cycle/cycle_parts.hpp"
+#include "controller/motion/cycle_parts.hpp"
 
 namespace proxarm::controller {
 

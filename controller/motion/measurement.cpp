@@ -1,4 +1,4 @@
-#include "controller/cycle/measurement.hpp"
+#include "controller/motion/measurement.hpp"
 
 namespace proxarm::controller {
 

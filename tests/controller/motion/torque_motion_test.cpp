@@ -1,10 +1,10 @@
-#include "controller/cycle/torque_motion.hpp"
+#include "controller/motion/torque_motion.hpp"
 
 #include <gtest/gtest.h>
 
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
-#include "tests/controller/cycle/fake_devices.hpp"
+#include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
 namespace {

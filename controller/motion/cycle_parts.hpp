@@ -8,13 +8,13 @@
 #include <variant>
 #include <vector>
 
-#include "controller/cycle/wrench_compensation.hpp"
+#include "controller/motion/release.hpp"
+#include "controller/motion/wrench_compensation.hpp"
 #include "controller/rendering/orientation_proxy.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/torque_rendering.hpp"
 #include "controller/setpoints/elastic_setpoint.hpp"
 #include "controller/supervision/enabling_input.hpp"
-#include "controller/supervision/free_motion.hpp"
 #include "fieldbus/can/can_network.hpp"
 #include "fieldbus/canopen/canopen_heartbeat.hpp"
 #include "fieldbus/canopen/canopen_sync.hpp"
@@ -48,7 +48,7 @@ struct AdmittanceParts {
   ElasticSetpoint elastic;
   std::unique_ptr<RenderedWorld> world;
   OrientationProxy orientation;
-  std::unique_ptr<FreeMotion> freeing;
+  std::unique_ptr<Release> release;
 };
 
 // Drives stand in the order of the arm's joints.

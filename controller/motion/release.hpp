@@ -17,7 +17,7 @@
 
 namespace proxarm::controller {
 
-class FreeMotion {
+class Release {
  public:
   static constexpr double mass_kg = 10.0;               // M; with b a time constant of 50 ms
   static constexpr double damping_Ns_per_m = 200.0;     // b
@@ -25,7 +25,7 @@ class FreeMotion {
   static constexpr double resisted_N = 50.0;            // backing off ends when the hand resists by this much more
   static constexpr double longest_back_off_m = 0.2;
 
-  FreeMotion(const SessionSettings& settings, double speed_m_per_s);
+  Release(const SessionSettings& settings, double speed_m_per_s);
 
   void set_period(double period_s) noexcept {
     period_s_ = period_s;

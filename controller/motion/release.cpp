@@ -1,4 +1,4 @@
-#include "controller/supervision/free_motion.hpp"
+#include "controller/motion/release.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,20 +19,20 @@ SessionSettings plain(SessionSettings settings) {
 
 }  // namespace
 
-FreeMotion::FreeMotion(const SessionSettings& settings, double speed_m_per_s)
+Release::Release(const SessionSettings& settings, double speed_m_per_s)
     : scene_(scenes::compile(scenes::Scene{})),
       world_(make_rendered_world(scene_, plain(settings), mass_kg)),
       period_s_(settings.period_s),
       speed_m_per_s_(speed_m_per_s) {}
 
-void FreeMotion::start_back_off(const Vec3& start_W, const Vec3& n_W, double distance_m, const Vec3& force_W) noexcept {
+void Release::start_back_off(const Vec3& start_W, const Vec3& n_W, double distance_m, const Vec3& force_W) noexcept {
   start_W_ = start_W;
   n_W_ = n_W;
   distance_m_ = std::clamp(distance_m, 2.0 * arrived_m, longest_back_off_m);
   against_N_ = std::max(0.0, -n_W.dot(force_W));
 }
 
-Vec3 FreeMotion::force_W(const Vec3& q_W, const Vec3& v_W, const Vec3& hand_W) const noexcept {
+Vec3 Release::force_W(const Vec3& q_W, const Vec3& v_W, const Vec3& hand_W) const noexcept {
   const double M = mass_kg, b = damping_Ns_per_m, T = period_s_;
   Vec3 v = (v_W + T / M * hand_W) / (1.0 + b * T / M);
   if (backs_off()) {
@@ -44,7 +44,7 @@ Vec3 FreeMotion::force_W(const Vec3& q_W, const Vec3& v_W, const Vec3& hand_W) c
   return M / T * (v - v_W);
 }
 
-bool FreeMotion::over(const Vec3& q_W, const Vec3& hand_W) const noexcept {
+bool Release::over(const Vec3& q_W, const Vec3& hand_W) const noexcept {
   return backs_off() && (left_m(q_W) <= arrived_m || -n_W_.dot(hand_W) > against_N_ + resisted_N);
 }
 

@@ -1,8 +1,8 @@
-#include "controller/cycle/measurement.hpp"
+#include "controller/motion/measurement.hpp"
 
 #include <gtest/gtest.h>
 
-#include "tests/controller/cycle/fake_devices.hpp"
+#include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
 namespace {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "controller/cycle/motion.hpp"
+#include "controller/motion/motion.hpp"
 #include "controller/rendering/torque_rendering.hpp"
 #include "models/base/archive_fields.hpp"
 

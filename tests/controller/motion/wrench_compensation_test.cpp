@@ -1,4 +1,4 @@
-#include "controller/cycle/wrench_compensation.hpp"
+#include "controller/motion/wrench_compensation.hpp"
 
 #include <gtest/gtest.h>
 

@@ -13,8 +13,8 @@
 #include <optional>
 #include <vector>
 
-#include "controller/cycle/motion.hpp"
 #include "controller/limits/step_limits.hpp"
+#include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/setpoints/joint_guard.hpp"
 #include "controller/setpoints/tool_guard.hpp"
@@ -48,7 +48,7 @@ class AdmittanceMotion final : public Motion {
   }
   [[nodiscard]] bool can_hold() const noexcept override { return true; }
   [[nodiscard]] bool stands() const noexcept override { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
-  [[nodiscard]] bool backs_off() const noexcept override { return parts_.freeing->backs_off(); }
+  [[nodiscard]] bool backs_off() const noexcept override { return parts_.release->backs_off(); }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
 
   void archive(fieldbus::StateArchive& state) noexcept override;
@@ -69,7 +69,7 @@ class AdmittanceMotion final : public Motion {
     bool freeing = false;                               // it moves without the scene
   };
 
-  [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.freeing->world() : *parts_.world; }
+  [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
   void make_limits(const MotionCycle& cycle) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
   void let_force_in(CycleRecord& record) noexcept;
@@ -77,7 +77,7 @@ class AdmittanceMotion final : public Motion {
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;
   void shorten_step(const models::JointVector& link_k1_rad, const models::Vec3& reached_k1_W) noexcept;
-  void command(const models::JointVector& motor_rad, const Measured& measured) noexcept;
+  void move_motors(const models::JointVector& motor_rad, const Measured& measured) noexcept;
   std::uint8_t find_blocked(const models::JointVector& motor_rad, const Measured& measured,
                             models::JointVector& wanted_rad) noexcept;
   bool make_final(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;

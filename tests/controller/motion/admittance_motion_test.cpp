@@ -1,4 +1,4 @@
-#include "controller/cycle/admittance_motion.hpp"
+#include "controller/motion/admittance_motion.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "tests/allocation_count.hpp"
-#include "tests/controller/cycle/fake_devices.hpp"
+#include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -31,7 +31,7 @@ struct AdmittanceMotionTest : ::testing::Test {
         .elastic = ElasticSetpoint(arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s),
         .world = make_rendered_world(scene, settings, settings.mass_kg),
         .orientation = OrientationProxy({}),
-        .freeing = std::make_unique<FreeMotion>(settings, cell.supervision.release_speed_m_per_s)};
+        .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
     return std::make_unique<AdmittanceMotion>(std::move(parts), arm, cell.drives, cell.limits, cell.supervision,
                                               settings);
   }

@@ -1,4 +1,4 @@
-#include "models/world/shared_hold.hpp"
+#include "models/world/shared_support.hpp"
 
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -12,7 +12,7 @@ namespace proxarm::models {
 namespace {
 
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-constexpr std::size_t most = SharedHold::most;
+constexpr std::size_t most = SharedSupport::most;
 constexpr int most_rounds = 4;
 // Largest ‖p − q‖, and largest sum of forces over K, that is solved. Typical steps are micrometres. Forces settle to 64
 // u of this, which is 0.1 nm; beyond, rounding would be as large as thin layers are thick.
@@ -61,7 +61,7 @@ Response respond(const FlatContact& c, double K, const Vec3& p) noexcept {
 }
 
 // The forces of all contacts over K, on given tangent planes.
-class FlatHold {
+class FlatSupport {
  public:
   std::array<FlatContact, most> contact;
   std::array<Vec3, most> x;  // f_i / K
@@ -211,12 +211,12 @@ class FlatHold {
 };
 
 // Solves on tangent planes, which are taken again at each solution until r settles.
-bool settle(SharedHold& hold, FlatHold& flat, double K, const Vec3& p, const Vec3& q) noexcept {
+bool settle(SharedSupport& support, FlatSupport& flat, double K, const Vec3& p, const Vec3& q) noexcept {
   Settling settling(q);
   for (int k = 0; k < most_settling; ++k) {
     bool same = k > 0;
     for (std::size_t i = 0; i < flat.count; ++i) {
-      const Obstacle::Tangent t = hold.obstacle[i]->tangent(settling.at(), hold.step[i].feature);
+      const Obstacle::Tangent t = support.obstacle[i]->tangent(settling.at(), support.step[i].feature);
       same = same && t.surface.normal() == flat.contact[i].surface.normal();
       flat.contact[i].surface = t.surface;
       flat.contact[i].mu = t.mu;
@@ -231,23 +231,23 @@ bool settle(SharedHold& hold, FlatHold& flat, double K, const Vec3& p, const Vec
 // The final r. The sum p + Σ f_i/K is known only to its own rounding, but a surface that can't give way (rigid, or a
 // layer pressed through to its core) says exactly where r is. A proxy that sticks to one of the contacts stays where it
 // was, bit for bit.
-Vec3 placed(const SharedHold& hold, const FlatHold& flat, const Vec3& q) noexcept {
+Vec3 placed(const SharedSupport& support, const FlatSupport& flat, const Vec3& q) noexcept {
   Vec3 r = flat.r;
   std::size_t hard = 0, hardest = 0;
   for (int turn = 0; turn < 4; ++turn) {
     hard = 0;
-    for (std::size_t i = 0; i < hold.count; ++i) {
+    for (std::size_t i = 0; i < support.count; ++i) {
       const FlatContact& c = flat.contact[i];
       const double core = c.layer.soft() ? -c.layer.thickness_m : 0.0, height = c.surface.height(r) - core;
-      if (!hold.step[i].touches || std::abs(height) > flat.rounding_m()) continue;
+      if (!support.step[i].touches || std::abs(height) > flat.rounding_m()) continue;
       r -= height * c.surface.normal();
       ++hard;
       if (!c.layer.soft()) hardest = i;
     }
   }
-  if (hard == 1 && !flat.contact[hardest].layer.soft()) r = hold.step[hardest].r;
-  for (std::size_t i = 0; i < hold.count; ++i) {
-    if (hold.step[i].touches && hold.step[i].r == q) r = q;
+  if (hard == 1 && !flat.contact[hardest].layer.soft()) r = support.step[hardest].r;
+  for (std::size_t i = 0; i < support.count; ++i) {
+    if (support.step[i].touches && support.step[i].r == q) r = q;
   }
   return r;
 }
@@ -255,15 +255,15 @@ Vec3 placed(const SharedHold& hold, const FlatHold& flat, const Vec3& q) noexcep
 enum class Confirmed : std::uint8_t { yes, no, other_features };
 
 // Asks each obstacle itself, with its edges and its curvature, while the forces of the others are held.
-Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& p, const Vec3& q) noexcept {
+Confirmed confirm(SharedSupport& support, const FlatSupport& flat, double K, const Vec3& p, const Vec3& q) noexcept {
   // A tolerance between two scales: where an edge or curvature makes a difference, it is far larger; rounding is
   // smaller for objects of up to a hundred metres.
   const double nothing = 1e-12 * (1.0 + p.lpNorm<1>() + q.lpNorm<1>());
   bool agree = true, others = false;
   for (std::size_t i = 0; i < flat.count; ++i) {
-    Obstacle::Step& s = hold.step[i];
+    Obstacle::Step& s = support.step[i];
     const std::int32_t feature = s.feature;
-    const Obstacle::Step own = hold.obstacle[i]->step(K, flat.r - flat.x[i], q);
+    const Obstacle::Step own = support.obstacle[i]->step(K, flat.r - flat.x[i], q);
     const bool here = (own.r - flat.r).lpNorm<Eigen::Infinity>() <= nothing;
     agree = agree && here;
     others = others || (own.touches && own.feature != feature);
@@ -271,7 +271,7 @@ Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& 
     if (!own.touches) s.feature = feature;
   }
   if (agree) {
-    hold.r = placed(hold, flat, q);
+    support.r = placed(support, flat, q);
     return Confirmed::yes;
   }
   return others ? Confirmed::other_features : Confirmed::no;
@@ -279,10 +279,10 @@ Confirmed confirm(SharedHold& hold, const FlatHold& flat, double K, const Vec3& 
 
 }  // namespace
 
-bool SharedHold::solve(double K, const Vec3& p, const Vec3& q) noexcept {
+bool SharedSupport::solve(double K, const Vec3& p, const Vec3& q) noexcept {
   // Beyond this, rounding is as large as layers are thin.
   if (!((p - q).norm() <= farthest_m)) return false;
-  FlatHold flat;
+  FlatSupport flat;
   flat.count = count;
   flat.budget = budget;
   for (std::size_t i = 0; i < count; ++i) {

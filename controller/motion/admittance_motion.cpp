@@ -1,4 +1,4 @@
-#include "controller/cycle/admittance_motion.hpp"
+#include "controller/motion/admittance_motion.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -104,7 +104,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   parts_.elastic.set_period(period_s);
   parts_.orientation.set_period(period_s);
   parts_.world->set_period(period_s);
-  parts_.freeing->set_period(period_s);
+  parts_.release->set_period(period_s);
   if (passivity_) passivity_->set_period(period_s);
   limiter_.set_period(period_s);
   guard_.set_period(period_s);
@@ -113,7 +113,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
 
 void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   parts_.world->archive(state);
-  parts_.freeing->archive(state);
+  parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
   state(parts_.elastic, parts_.orientation, guard_, tool_guard_);
   archive_fields(state, state_);
@@ -167,7 +167,7 @@ void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
 void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   const double most = limits_.max_tool_speed_m_per_s;
   double wanted = cycle.slowed ? std::min(supervision_.slow_speed_m_per_s, most) : most;
-  if (state_.freeing) wanted = std::min(parts_.freeing->speed_m_per_s(), wanted);
+  if (state_.freeing) wanted = std::min(parts_.release->speed_m_per_s(), wanted);
   const double step = period_s_ * std::min(speed_limit_m_per_s2, 0.25 * limits_.max_tool_acceleration_m_per_s2);
   double& limit = state_.speed_limit_m_per_s;
   limit = std::clamp(wanted, limit - step, limit + step);
@@ -202,7 +202,7 @@ void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& reco
 // Away from what was touched last; where nothing was, to where the hand pushes.
 bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& measured) noexcept {
   if (command.order == Order::release) {
-    parts_.freeing->start_release();
+    parts_.release->start_release();
     return true;
   }
   const Vec3& force_W = measured.hand_W.force;
@@ -210,7 +210,7 @@ bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& m
   if (n_W.isZero(0.0) && force_W.norm() > pinning_force_N) n_W = force_W.normalized();
   if (n_W.isZero(0.0) || !(command.value > 0.0)) return false;
   const Vec3 start_W = arm_.tool_pose(arm_.link_from_motor(guard_.target_rad())).translation();
-  parts_.freeing->start_back_off(start_W, n_W, command.value, force_W);
+  parts_.release->start_back_off(start_W, n_W, command.value, force_W);
   return true;
 }
 
@@ -218,7 +218,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   const Vec3& hand_W = cycle.measured.hand_W.force;
   make_limits(cycle);
   const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
-  const Vec3 h_W = parts_.freeing->force_W(state_.q_k1_W, v_W, hand_W);
+  const Vec3 h_W = parts_.release->force_W(state_.q_k1_W, v_W, hand_W);
   const WorldStep step = world().step(h_W, step_limits_);
   if (step.fault != ProxyFault::none) {
     cycle.alarm.raise(Fault::proxy_not_finite);
@@ -228,7 +228,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   advance_proxy(step.q_W);
   cycle.record.p_hat_W_m = triple(step.p_hat_W);
   follow_proxy(cycle);
-  return parts_.freeing->over(state_.q_k1_W, hand_W);
+  return parts_.release->over(state_.q_k1_W, hand_W);
 }
 
 // ---- from the proxy to the setpoints
@@ -251,7 +251,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     state_.q_k2_W = state_.q_k1_W = world().resume(reached_W, (reached_W - reached_k1_W) / period_s_);
   }
   state_.link_step_rad = state_.link_rad - link_k1_rad;
-  command(parts_.elastic.step(state_.link_rad), cycle.measured);
+  move_motors(parts_.elastic.step(state_.link_rad), cycle.measured);
 }
 
 // Where inverse kinematics stops short, its step is the joints' largest, from one cycle to the next and to any side:
@@ -293,7 +293,7 @@ void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& 
   arm_.kinematics(state_.link_rad, solution_.kinematics);
 }
 
-void AdmittanceMotion::command(const JointVector& motor_rad, const Measured& measured) noexcept {
+void AdmittanceMotion::move_motors(const JointVector& motor_rad, const Measured& measured) noexcept {
   JointVector wanted_rad = motor_rad;
   const std::uint8_t blocked = find_blocked(motor_rad, measured, wanted_rad);
   const bool held_back = make_final(wanted_rad, state_.speed_limit_m_per_s);

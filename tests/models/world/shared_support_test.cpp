@@ -34,7 +34,7 @@ World world(const std::vector<Wall>& walls) {
 }
 
 // Without friction, at right angles, each direction is by itself.
-TEST(SharedHold, SoftFloorBesideAHardWall) {
+TEST(SharedSupport, SoftFloorBesideAHardWall) {
   World g = world({{Vec3::Zero(), Vec3::UnitZ(), 0.0, soft}, {Vec3::Zero(), Vec3::UnitX()}});
   for (const double K : {1e2, 1e4, 1e6}) {
     // 30 N down and 20 N against the wall: 1.5 mm deep.
@@ -49,7 +49,7 @@ TEST(SharedHold, SoftFloorBesideAHardWall) {
 }
 
 // Two pads that share a load: r from the linear system (K + Σ k n nᵀ) r = K p.
-TEST(SharedHold, TwoPadsShareALoad) {
+TEST(SharedSupport, TwoPadsShareALoad) {
   Random random(831);
   std::int64_t shared = 0;
   for (std::int64_t i = 0; i < scaled(5'000); ++i) {
@@ -72,7 +72,7 @@ TEST(SharedHold, TwoPadsShareALoad) {
 
 // Four pads press at once, where only three rigid contacts ever do: 4 N/√2 (1 + μ) carries what comes straight down,
 // with N = k h/√2 of each and friction μN up each slope.
-TEST(SharedHold, AsManyPadsAsThereAre) {
+TEST(SharedSupport, AsManyPadsAsThereAre) {
   const Layer pad{1e4, 0.02};
   for (const double mu : {0.0, 0.3, 0.8}) {
     World g = world({{Vec3::Zero(), {1, 0, 1}, mu, pad},
@@ -87,7 +87,7 @@ TEST(SharedHold, AsManyPadsAsThereAre) {
 }
 
 // A pad and a wall at an angle, both sliding down the line where they meet: forces of each by its own law, to rounding.
-TEST(SharedHold, EachForceIsItsLawsOwn) {
+TEST(SharedSupport, EachForceIsItsLawsOwn) {
   Random random(833);
   const Vec3 n1 = Vec3(0.1, 0, 1).normalized(), n2 = Vec3(1, 0.2, 0.1).normalized();
   const double mu1 = 0.3, mu2 = 0.4, k = 2e4;
@@ -151,7 +151,7 @@ TEST(Contract, SoftRoundThings) {
 }
 
 // Steps of a millimetre at 1 N/mm and more ((26): 4 kg at 60 ms): three in 100,000 are left without forces.
-TEST(SharedHold, FindsForcesInSmallSteps) {
+TEST(SharedSupport, FindsForcesInSmallSteps) {
   Random random(834);
   World g = world({{Vec3::Zero(), {0.1, 0, 1}, 0.3, soft},
                    {Vec3::Zero(), {1, 0.2, 0.1}, 0.2, {1e5, 0.005}},
@@ -168,7 +168,7 @@ TEST(SharedHold, FindsForcesInSmallSteps) {
 }
 
 // A press of pads never lets the proxy deeper than they are thick.
-TEST(SharedHold, KeepsTheCores) {
+TEST(SharedSupport, KeepsTheCores) {
   Random random(832);
   std::vector<World::Entry> entries;
   entries.push_back({std::make_unique<BoxObstacle>(Pose::Identity(), Vec3(0.2, 0.2, 0.2), 0.3, soft), 0, -1});
@@ -191,7 +191,7 @@ TEST(SharedHold, KeepsTheCores) {
   std::cout << "  " << several << " steps with several contacts, " << g.unresolved_steps() << " unresolved\n";
 }
 
-TEST(SharedHold, AllocatesNothing) {
+TEST(SharedSupport, AllocatesNothing) {
   if (!allocations_are_counted()) GTEST_SKIP() << "a sanitizer's malloc can't be counted";
   World g = world(
       {{Vec3::Zero(), {0.1, 0, 1}, 0.3, soft}, {Vec3::Zero(), {1, 0.2, 0.1}, 0.2}, {Vec3::Zero(), {0, 1, 0.1}, 0.4}});

@@ -12,8 +12,8 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/cycle/cycle_parts.hpp"
-#include "controller/cycle/wrench_compensation.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "controller/motion/wrench_compensation.hpp"
 #include "fieldbus/sensors/force_sensor.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/archive_fields.hpp"

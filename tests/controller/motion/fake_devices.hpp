@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "controller/cycle/alarm.hpp"
-#include "controller/cycle/cycle_parts.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "controller/supervision/alarm.hpp"
 #include "fieldbus/can/can_network.hpp"
 #include "fieldbus/cia402/cyclic_drive.hpp"
 #include "fieldbus/sensors/force_sensor.hpp"

@@ -1,4 +1,4 @@
-#include "controller/cycle/torque_motion.hpp"
+#include "controller/motion/torque_motion.hpp"
 
 #include <cmath>
 

@@ -22,7 +22,7 @@
 
 namespace proxarm::models {
 
-struct SharedHold {
+struct SharedSupport {
   static constexpr std::size_t most = 12;
   std::array<const Obstacle*, most> obstacle{};
   std::array<Obstacle::Step, most> step{};  // in: of each obstacle alone; out: with its share (touches: it presses)

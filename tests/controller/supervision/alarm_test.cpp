@@ -1,4 +1,4 @@
-#include "controller/cycle/alarm.hpp"
+#include "controller/supervision/alarm.hpp"
 
 #include <gtest/gtest.h>
 
