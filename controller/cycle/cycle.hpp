@@ -2,8 +2,7 @@
 //
 //   t_k        SYNC on every drive bus, then the sensor's poll
 //   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
-//   then       measure, judge, choose the setpoints by the phase, send them (and the heartbeat where one is due),
-//   record
+//   then       measure, judge, choose the setpoints by the phase, send them (and a heartbeat that is due), record
 //
 // The setpoints are latched by the drives at SYNC k+1 and, with their interpolation over the period, reached at k+2.
 //
@@ -54,19 +53,20 @@ class Cycle {
   void request_stop() noexcept { status_.request_stop(); }
   [[nodiscard]] bool stop_requested() const noexcept { return status_.stop_requested(); }
 
-  // ---- one thread
-  // Checked parameters for the next cycles of rendering or of a hold, one each.
+  // ---- one thread each: who asks, and who takes the records
+  // Changes that have been checked; one is taken per cycle of rendering or of a hold.
   [[nodiscard]] Requests<Change>& changes() noexcept { return requests_.changes; }
-  // Another T; the drives are on CAN and take positions. The arm stops, the drives are told, rendering goes on. It
-  // waits until the arm is rendering or in a hold.
+  // Another T, only where all drives are on CAN and take positions: the arm stops, the drives are told, rendering goes
+  // on. A request waits until the arm is rendering or in a hold.
   [[nodiscard]] Requests<Timestep>& timesteps() noexcept { return requests_.timesteps; }
-  // In any phase. A command that the phase has no use for is dropped; CycleStatus::refusal() says so beforehand.
+  // In any phase. A command that the phase has no use for is dropped; CycleStatus::refusal() tells before asking
+  // whether it would be.
   [[nodiscard]] Requests<Command>& commands() noexcept { return requests_.commands; }
   // The records of the cycles, for whoever writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return recorder_.records(); }
 
   // ---- the loop's owner, between cycles
-  // Before the first cycle: what it is given and what it does is also written there.
+  // Before the first cycle. From then on each cycle's inputs and outputs are also written to `box`.
   void write_to(CycleBox& box) noexcept { recorder_.write_to(box); }
   // This many cycles in a row were late.
   void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
@@ -98,7 +98,7 @@ class Cycle {
   };
   // Of the session, between cycles.
   struct State {
-    Phase entered_phase = Phase::idle;  // that whose begin has been acted on
+    Phase entered_phase = Phase::idle;  // the phase that enter() was last called for
     std::int64_t phase_since_ns = 0;
     std::int64_t first_cycle_ns = 0;
     std::uint64_t cycle = 0;  // k
@@ -131,6 +131,7 @@ class Cycle {
   void await_disabled(std::int64_t t_k_ns) noexcept;
   void await_reset(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] MotionCycle motion_cycle() noexcept;
+  [[nodiscard]] double in_phase_s(std::int64_t t_k_ns) const noexcept;
 
   // cycle_requests.cpp: what somebody asks for
   void heed_enabling_input(std::int64_t t_k_ns) noexcept;
@@ -144,9 +145,8 @@ class Cycle {
   void supervise_hold(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool may_move() const noexcept;
   [[nodiscard]] bool stands_in_hold() const noexcept;
-  // For so long, in cycles.
+  // How many cycles last for `time_s`.
   [[nodiscard]] std::uint64_t cycles_of(double time_s) const noexcept;
-  [[nodiscard]] double in_phase_s(std::int64_t t_k_ns) const noexcept;
 
   CycleParts parts_;
   SessionSettings settings_;

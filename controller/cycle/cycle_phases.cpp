@@ -6,7 +6,7 @@
 namespace proxarm::controller {
 namespace {
 
-// How long the drives may take to switch off before the run ends without them.
+// How long the drives may take to switch off before the session ends with Fault::drive_not_disabled.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
 // For so long after the last fault that slows, the tool stays slow.
 constexpr double clear_of_slow_s = 0.5;
@@ -33,7 +33,7 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
   }
 }
 
-// At once: without the drive's own ramp.
+// After stop_0 the power goes at once (goal `none`); otherwise the drives ramp down by themselves.
 fieldbus::DriveGoal Cycle::goal_in(Phase phase) const noexcept {
   if (phase < Phase::disabling) return fieldbus::DriveGoal::operation_enabled;
   const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == Reaction::stop_0;
@@ -80,11 +80,11 @@ void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
   const Measured& measured = measurement_.now();
   motion_->wait_for_drives(measured);
   const auto axes = static_cast<int>(measured.axes());
-  const int followed = std::countr_one(measured.following);
-  if (followed >= axes) {
+  const int first_not_following = std::countr_one(measured.following);
+  if (first_not_following >= axes) {
     supervisor_.handle(state_.tared ? Event::reenabled : Event::enabled);
   } else if (in_phase_s(t_k_ns) > settings_.enable_timeout_s) {
-    alarm_.raise(Fault::drive_not_enabled, followed, settings_.enable_timeout_s, settings_.enable_timeout_s);
+    alarm_.raise(Fault::drive_not_enabled, first_not_following, in_phase_s(t_k_ns), settings_.enable_timeout_s);
   }
 }
 

@@ -1,8 +1,8 @@
 // What the drives are told, and all of its history: the one class that starts, moves, stops and winds back whatever
 // lies between the hand's force and the setpoints. It knows no bus.
 //
-//   AdmittanceMotion   force in, motor angles out: proxy (26), limits, inverse kinematics, elastic gears, joint guard
-//   TorqueMotion       position in, joint torques out: (23)
+//   AdmittanceMotion   force in, motor angles out: proxy (26), limits, inverse kinematics, elastic gears, guards of
+//   joints and tool TorqueMotion       position in, joint torques out: (23)
 //
 // The cycle calls one of "each cycle" by its phase, and those of "between" when a phase begins or somebody asks for
 // something. All of it is noexcept and allocates, locks and prints nothing.

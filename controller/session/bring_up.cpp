@@ -17,6 +17,7 @@ using description::SetupError;
 
 constexpr std::int64_t rate_measurement_ns = 250'000'000;
 
+// cell.buses.size() if it is none of them: a Modbus line.
 std::size_t index_of(const description::Cell& cell, const std::string& bus) {
   const auto found = std::find_if(cell.buses.begin(), cell.buses.end(),
                                   [&](const description::BusDescription& b) { return b.name == bus; });
@@ -26,11 +27,11 @@ std::size_t index_of(const description::Cell& cell, const std::string& bus) {
 fieldbus::DriveSettings drive_settings(const SessionSettings& settings) {
   fieldbus::DriveSettings drive;
   drive.period_ns = std::llround(settings.period_s * 1e9);
-  drive.heartbeat_in_operation = false;
+  drive.heartbeat_in_operation = false;  // it could cost the last setpoint of a bus its deadline: docs/design.md
   return drive;
 }
 
-// A bus with drives is there once, whatever number of them it has.
+// Each bus that has drives, once.
 std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives) {
   const fieldbus::DriveSettings defaults;
   std::vector<DriveBus> buses;
@@ -44,7 +45,7 @@ std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives
   return buses;
 }
 
-// All drives in the order of the joints, and each once more among those of its kind.
+// All drives in the order of the joints; `can` and `modbus` point into `all`.
 struct Drives {
   std::vector<DriveOnBus> all;
   std::vector<fieldbus::DriveSlot> can;
@@ -267,7 +268,7 @@ std::vector<std::uint32_t> wanted_ids(const CycleParts& parts, std::size_t bus) 
   for (const fieldbus::DriveSlot& slot : parts.can_drives) {
     if (slot.bus != bus) continue;
     for (const std::uint32_t id : slot.drive->wanted_ids()) ids.push_back(id);
-    // Of another master.
+    // Setpoints: those that come in are another master's (Fault::second_master).
     ids.push_back(fieldbus::pdo_id(fieldbus::PdoDirection::receive, 1, slot.drive->node()));
   }
   if (!ids.empty()) {

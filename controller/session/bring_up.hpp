@@ -19,20 +19,21 @@ namespace proxarm::controller {
 // Where each bus of the cell is in the network; two buses on one interface have one index.
 using BusIndices = std::vector<std::size_t>;
 
-// Opens a Modbus line; the response timeout is that of its slowest drive.
+// Opens a Modbus line; the response timeout is that of the slowest device on it.
 using ModbusOpener = std::function<std::unique_ptr<fieldbus::ModbusClient>(const description::ModbusLineDescription&,
                                                                            double response_timeout_s)>;
 // Through fieldbus::open_modbus().
 ModbusOpener opener_of(fieldbus::ModbusPeers peers);
 
-// Throws SetupError where the cell's base_id isn't one of the sensor's.
+// Throws SetupError where the cell's base_id isn't one of the sensor's, or its bus is of the wrong kind.
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor);
 
 // Throws SetupError where the drives' modes can't render that way. build_parts() asks, too.
 void require_scheme(const description::Cell& cell, const SessionSettings& settings);
 
-// Throws SetupError where the cell can't have settings.period_s; build_parts() finds the same in its parts.
+// Throws SetupError where the drives on CAN, their buses' bit rates or the orientation can't have these settings;
+// build_parts() finds the same in its parts.
 void require_timestep(const description::Cell& cell, const SessionSettings& settings);
 
 // `scene` must outlive the parts.

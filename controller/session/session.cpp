@@ -42,7 +42,7 @@ class Ending {
   std::int64_t wanted_ns_;
   double longest_release_s_;
   std::int64_t released_since_ns_ = 0;
-  SessionEnd stopped_for_ = SessionEnd::asked;  // where it isn't stop() that stops
+  SessionEnd stopped_for_ = SessionEnd::asked;  // unless stop() set another reason
 };
 
 }  // namespace

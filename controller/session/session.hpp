@@ -1,6 +1,6 @@
 // The loop around the cycle: wakes at t_k, runs it, looks after lateness, ends after the stop.
 //
-// On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k has begun is an overrun; the periods that it missed
+// On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun; the periods that it missed
 // are skipped, never caught up in a burst, and the drives see a longer step instead. So are periods that the loop slept
 // through, as a suspended process does. Late and skipped cycles in a row are counted together: Fault::overrun.
 #pragma once
@@ -23,7 +23,7 @@ struct SessionHooks {
 enum class SessionEnd : std::uint8_t {
   duration,         // it rendered for as long as was wanted
   asked,            // request_stop() from outside the loop: a signal
-  hold_expired,     // a hold by order lasted for hold_s, and nobody ended it
+  hold_expired,     // a hold that no fault caused lasted for hold_s, and nobody ended it
   release_expired,  // the arm followed the hand for `longest_release_s`, and nobody was left to end it
   fault,            // the supervisor's report says which
 };
@@ -31,15 +31,15 @@ enum class SessionEnd : std::uint8_t {
 // How long a session lasts.
 struct SessionLength {
   double duration_s;  // of rendering
-  // Of a release (Phase::freeing) after the last order of the script. Only an order or the enabling input ends a
-  // release, so a session that takes orders from nowhere else would go on for good.
+  // How long a release (Phase::freeing) may last once the script has no order left. Only an order or the enabling
+  // input ends a release, so a session that takes orders from nowhere else would go on for good.
   double longest_release_s = std::numeric_limits<double>::infinity();
 };
 
 struct SessionTally {
   SessionEnd end = SessionEnd::fault;
   std::uint64_t cycles = 0;
-  std::uint64_t overruns = 0;  // cycles that ended late
+  std::uint64_t overruns = 0;  // cycles that ended late, and gaps that were slept through
   std::uint64_t skipped = 0;   // periods without a cycle
   PageFaults page_faults;      // of the loop's thread, after the first cycle
 };

@@ -1,5 +1,5 @@
-// The last check on what drives are told: no setpoint ever exceeds its joint's range, speed or acceleration, whatever
-// is wanted.
+// No setpoint ever exceeds its joint's range, speed or acceleration, whatever is wanted. The tool's guard
+// (tool_guard.hpp) comes after it, keeps the same bounds of the joints, and has the last word.
 //
 // Per joint, with θ₁ and u₁ the last setpoint and its speed, T the period, a and v the joint's limits:
 //   |u − u₁| ≤ aT,   |u| ≤ v,   u ≤ c(θ_max − θ₁),   −u ≤ c(θ₁ − θ_min),   θ = θ₁ + uT

@@ -4,8 +4,10 @@
 // A setpoint θ stands for where the arm is when it rests there, its gears twisted by gravity alone: θ = q + K⁻¹τ_g(q).
 // With p(θ) the place of T, or of one of the joints from the third on (elbow and wrist), by exact kinematics of each
 // setpoint, never by a Jacobian:
-//   speed         |p(θ) − p(θ₁)| ≤ vT           limits.max_tool_speed_m_per_s of T, max_elbow_speed_m_per_s of the
-//   joints acceleration  |p(θ) − 2p(θ₁) + p(θ₂)| ≤ 2aT²  where it gets faster; limits.max_tool_acceleration_m_per_s2
+//   speed         |p(θ) − p(θ₁)| ≤ vT, v = limits.max_tool_speed_m_per_s of T, max_elbow_speed_m_per_s of the joints
+//
+//   acceleration  |p(θ) − 2p(θ₁) + p(θ₂)| ≤ 2aT² where it gets faster, a = limits.max_tool_acceleration_m_per_s2
+//
 //   borders       T within limits.workspace_m and out of limits.keep_out_m, and on the way between two setpoints
 //   ranges        of the joints
 // and all of it (but the acceleration) on the way to rest, too: from θ, with the speed u = (θ − θ₁)/T, all joints brake

@@ -43,7 +43,7 @@ constexpr std::array texts{
               "a gauge of the force sensor is at its rail", nullptr, "push less, or use a sensor with a larger range"},
     FaultText{Fault::sensor_frozen, "sensor_frozen", Reaction::stop_1,
               "the force sensor repeats one reading to the last digit", "samples",
-              "power-cycle the sensor; if it is that quiet, set sensor.noise_N to 0 in the cell file"},
+              "power-cycle the sensor; of a simulated one without noise, sensor.noise_N is 0 in the cell file"},
     FaultText{Fault::force_not_finite, "force_not_finite", Reaction::stop_1, "the decoded force isn't a finite number",
               nullptr, "check the sensor's calibration matrix"},
     FaultText{Fault::force_excessive, "force_excessive", Reaction::stop_1, "force beyond limits.max_force_N", "N",

@@ -19,7 +19,7 @@ enum class Fault : std::uint8_t {
   sensor_late,           // samples missing again and again, never so many in a row
   sensor_status,         // the sensor's status word reports an error
   sensor_saturated,      // a gauge at its rail, so the force is unknown
-  sensor_frozen,         // one reading for more than max_repeated_samples cycles
+  sensor_frozen,         // one reading for more than max_repeated_samples samples
   force_not_finite,      // decoded force is NaN or infinite
   force_excessive,       // beyond the cell's max_force_N
   force_at_start,        // the handle was pushed while the sensor was tared: nothing moves

@@ -4,8 +4,8 @@
 //                                 ▲       │                    │
 //                          resume │       ▼ hold               ▼
 //                                  holding ◀─ enabling ◀── faulted
-//                                  ▲     │            reset
-//                                  └─────▼
+//                           freed, ▲     │            reset
+//                            hold  │     ▼ free
 //                                  freeing
 //
 // A fault acts by its reaction (fault.hpp). A stop latches the fault: the first one is kept and reported, and only a
@@ -26,9 +26,9 @@ enum class Phase : std::uint8_t {
   enabling,   // the CiA 402 state machines are led to operation enabled; targets follow the actual positions
   taring,     // targets stand still; the sensor's bias is averaged
   rendering,  // the proxy moves, the arm follows
-  holding,    // every joint decelerates at its own limit along its last direction, and stands; drives stay enabled
+  holding,    // all joints brake together along their last motion, and stand; drives stay enabled
   freeing,    // out of a hold, slowly: the arm follows the hand's force, or backs off, without the scene
-  stopping,   // every joint decelerates at its own limit along its last direction
+  stopping,   // all joints brake together along their last motion, the slowest to stop at its own deceleration
   disabling,  // targets stand still; the drives are led to switched off
   faulted,    // drives off; waits for a reset
   done,
@@ -43,7 +43,7 @@ enum class Event : std::uint8_t {
   hold,       // a fault with this reaction, or a command
   resume,     // the cause is gone and the enabling input pressed, or a command
   free,       // a command: release, or back off
-  freed,      // a command, the way backed off, or a fault that holds
+  freed,      // the order hold, or the way backed off
   stop,       // asked for: end of the duration, signal
   fault,      // stop category 1
   fault_off,  // stop category 0

@@ -29,7 +29,7 @@ inline constexpr double monitored_s = 0.02, off_limits_m = 2e-3;
 
 struct ToolVerdict {
   Fault fault = Fault::none;
-  double value = 0.0, limit = 0.0;  // m/s, or m out of bounds
+  double value = 0.0, limit = 0.0;  // m/s, or mm out of bounds
 };
 
 class ToolMonitor {

@@ -16,9 +16,8 @@
 //
 // in the busy period that begins at s, and the worst s counts.
 //   B       the longest weaker frame that can be on the wire at s: one, as none weaker starts while m waits
-//   C_k N_k the wire time of those stronger frames, and of those before m in its sender's queue, that can be released
-//   in
-//           [s, b]
+//   C_k N_k the wire time of those stronger frames, and of those before m in its sender's queue, that can be
+//           released in [s, b]
 // "Weaker" is weaker than the weakest frame that can stand before m in its queue. What can be pending when, and J of a
 // frame that comes after another, depend on the others' results: all grow together until none changes. No run of the
 // in-process bus may exceed it (a test holds it to that).

@@ -32,7 +32,8 @@ struct BusDescription {
   std::int64_t data_bitrate = 0;     // bit/s, CAN FD data phase; 0 for a classic bus
 };
 
-// A line with Modbus drives: a TCP connection to each of them, or one serial line for all. A CAN bus it is not: SYNC,
+// A line with Modbus drives, a Modbus sensor, or both: a TCP connection to each of them, or one serial line for all. A
+// CAN bus it is not: SYNC,
 // `--bus` and the bus budget know nothing of it.
 struct ModbusLineDescription {
   std::string name;
@@ -119,9 +120,9 @@ struct SensorPlacement {
   std::uint32_t base_id = 0;  // meaning is the sensor's own; some have none
   std::string link;           // link of the URDF that carries it (the flange)
   PoseDescription pose_link;  // X_LS
-  // Simulated sensor only:
-  double noise_N = 0.0;  // standard deviation per axis
+  double noise_N = 0.0;       // simulated sensor only: standard deviation per axis
   double noise_Nm = 0.0;
+  // The stability check counts on these three.
   double sample_rate_Hz = 0.0;  // of its converter, not synchronised with anything
   double bandwidth_Hz = 0.0;    // its own low-pass; 0: none
   double delay_s = 0.0;         // by which its readings are older than that
@@ -176,7 +177,8 @@ struct Cell {
 };
 
 // Reads and checks a cell: all that can be checked without its URDF. The file's keys are the names of the fields above,
-// nested as the structs are; fields with a default may be left out. Throws SetupError, with file, line and key.
+// nested as the structs are, but for limits.workspace_m {min, max} and limits.keep_out_m [{min, max}, …]; docs/files.md
+// says what may be left out. Throws SetupError, with file, line and key.
 Cell load_cell(const std::filesystem::path& file);
 // The same of a file that has been read already.
 Cell read_cell(const YamlNode& root);

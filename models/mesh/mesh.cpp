@@ -334,7 +334,7 @@ void TriangleMesh::along(const Vec3& x, const Vec3& y, Share share, Visit visit)
       enter = std::max(enter, std::min(a, b));
       leave = std::min(leave, std::max(a, b));
     }
-    constexpr double slack = 1e-14;  // two roundings of shares of about one, many times over
+    constexpr double slack = 1e-14;  // well above the rounding of shares, which are about 1 in size
     return !(enter > leave + slack || enter > share() + slack);
   };
   std::uint32_t stack[kDepth];

@@ -71,10 +71,10 @@ class TriangleMesh {
     bool closed = false;
   };
 
-  // Vertices with the same coordinates become one; triangles without an area are left out (as sets of points they are
-  // part of their neighbours' sides). The others are put in the order of a tree of boxes, so that what is near in space
-  // is near in memory. Throws std::invalid_argument: no triangle (left), an index out of range, a coordinate that isn't
-  // finite or beyond 1e9 m.
+  // Vertices with the same coordinates become one. Triangles without an area are left out, since they have no sides; in
+  // a mesh without gaps their neighbours cover them. The others are put in the order of a tree of boxes, so that what
+  // is near in space is near in memory. Throws std::invalid_argument: no triangle (left), an index out of range, a
+  // coordinate that isn't finite or beyond 1e9 m.
   explicit TriangleMesh(TriangleSoup soup);
 
   // Restores a mesh from structure() of another one. Throws std::invalid_argument for a structure that would lead out
@@ -101,10 +101,10 @@ class TriangleMesh {
   // How far the surface that a proxy touches is in front of the triangles, metres, so that rounding can't take a proxy
   // in contact through them.
   //
-  // A proxy's height over the touched surface is rounded by FlatSurface::rounding, at most 16 u S with S the largest
-  // ‖vertex‖₁. The surface's corner is rounded by 3 u S, and its normal (2 u) tilts it by 4 u S over the mesh: together
-  // 23 u S. To prove a side, a computed height takes 32 u S more (doubt()). So 64 u S are taken, which is 2e-14 m for a
-  // mesh within one metre.
+  // Let S be the largest ‖vertex‖₁. A computed height over the touched surface is off by at most 16 u S (derived at
+  // FlatSurface::rounding: less than 8 u (‖x‖₁ + ‖point‖₁)). The surface's point is rounded by 3 u S, and the error of
+  // its normal (2 u) adds 4 u S over the mesh: 23 u S. A computed height proves a side only beyond doubt(), 32 u S.
+  // Their sum, 55 u S, is rounded up to 64 u S: 2e-14 m for a mesh within one metre.
   [[nodiscard]] double lift_m() const noexcept { return lift_; }
 
   // The height nᵀ(x − corner), and the size that it must exceed to prove on which side x is.
@@ -180,7 +180,7 @@ class TriangleMesh {
   [[nodiscard]] double winding(const Vec3& x) const noexcept;
 
  private:
-  static constexpr int kDepth = 64;  // halving by number of faces: 33 levels at most, one node of each waits
+  static constexpr int kDepth = 64;  // each level halves the number of faces: 33 at most, and one node of each waits
 
   template <typename Share, typename Visit>
   void along(const Vec3& x, const Vec3& y, Share share, Visit visit) const noexcept;

@@ -82,10 +82,10 @@ class MeshObstacle final : public Obstacle {
   bool parts(const Vec3& x, const Vec3& y, Vec3& normal) const noexcept override {
     return surface_.parts(x, y, normal);
   }
-  // Carried by a pose with a translation t of ‖t‖₁ ≤ `size`, a touched point has coordinates of ‖x‖₁ ≤ √3 S + size in
-  // W, S as in TriangleMesh::lift_m. On its way to W and back each coordinate is rounded by 8 u (‖x‖₁ + ‖t‖₁) and,
-  // where a rotation is one within rounding only, 10 u √3 S; World takes it there and back twice. Together less than 32
-  // u (2 S + 2 size); as much again keeps computed heights off the faces.
+  // Let the pose have a translation t, ‖t‖₁ ≤ `size`, and S be as in TriangleMesh::lift_m. A touched point has ‖x‖₁ ≤
+  // √3 S + size in W. On the way to W and back it is rounded by 8 u (‖x‖₁ + ‖t‖₁), and by 10 u √3 S because a rotation
+  // is orthonormal only within rounding. World does this twice: together less than 64 u (S + size). As much again keeps
+  // computed heights off the faces.
   void set_rounding_size(double size_m) noexcept override {
     constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
     surface_.set_lift(3.0 * mesh().lift_m() + 128.0 * u * size_m);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
 
-// x + y and the error that rounding makes in it.
+// The rounded result of a sum or product and its rounding error: high + low is exact.
 struct Pair {
   double high, low;
 };

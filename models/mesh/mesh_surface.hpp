@@ -5,14 +5,14 @@
 // the mesh is. The pieces lead:
 //   1. towards p. If nothing is in the way, the step ends there.
 //   2. Otherwise, from where the way is blocked, towards the point at which the faces that the proxy touches hold it:
-//        one face     (4), with q projected onto the face's plane; also when the step has crossed an edge, as (17) says
-//                     with v = (q(k) − q(k−1))/T
+//        one face     (4), with q projected onto the face's plane even if q lies over another face: v in (17) is that
+//                     of the whole step, (q(k) − q(k−1))/T
 //        two faces    solve_groove, in a groove as on a convex edge
 //        three faces  solve_corner
 //      The first set that is complete counts (contact_search.hpp): nothing pulls and nothing else is in the way; fewer
 //      faces come first, then the point nearest to p.
-//   3. Where a piece leads past a face's side, the walk goes on from there with the faces around. Where it runs into
-//      another face, that one joins the faces that are touched.
+//   3. Where a piece leads over an edge of its face, the walk goes on from there with the faces around. Where it meets
+//      another face, that face joins the touched ones.
 // If no set of faces is complete, the proxy is held where it is (a vertex can do that).
 //
 // The surface on which the proxy glides is a little in front of the triangles: by the lift (TriangleMesh::lift_m),

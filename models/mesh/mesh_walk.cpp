@@ -18,9 +18,9 @@ constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 // costs kLook, or kFarLook beyond the faces that are remembered; solving for two or three faces costs kSolve.
 constexpr int kBudget = 24'000, kLook = 20, kFarLook = 100, kSolve = 20;
 
-// Lengths in lifts. A face holds the proxy until it is kPast past the face's side. Where the next face turns away by an
-// angle φ, the proxy's height above that face is then cos φ + kPast sin φ, which is positive up to φ = 165°. On the
-// line of an edge the proxy is past the sides of both faces by tan(φ/2): kAround covers angles up to 172°.
+// Lengths, in lifts. A proxy on a face is held by it until it is kPast beyond the face's edge. If the next face turns
+// away by the angle φ, the proxy is then at the height cos φ + kPast sin φ over that face, which is positive up to φ =
+// 165°. On the line of an edge the proxy is tan(φ/2) beyond the edges of both faces: kAround covers angles up to 172°.
 constexpr double kPast = 4.0;
 constexpr double kAround = 16.0;
 // A face counts as touched by a proxy between these heights over its touched surface. The face itself is at −1; going
@@ -140,9 +140,9 @@ bool MeshSurface::Walk::crosses(const Vec3& x) const noexcept {
                      [&](const Side& face) { return face.side != 0 && mesh.touched_by(face.face, c, x); });
 }
 
-// Moves a q that lies exactly in planes of triangles out of them, by a lift. It counts as in front of them, unless
-// other faces are in the way there: then it lies beside a triangle, next to one of its corners, and behind it. False if
-// there is no such direction.
+// Moves a q that lies exactly in the planes of touched triangles out of them, by one lift along the sum of their
+// normals; backwards if another touched face blocks that way and none the opposite one. Repeated where this ends in
+// further planes. False if the normals cancel, or after four rounds.
 bool MeshSurface::Walk::leave_planes() noexcept {
   for (int round = 0; round < 4; ++round) {
     Vec3 out = Vec3::Zero();

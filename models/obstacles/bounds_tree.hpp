@@ -21,7 +21,6 @@ class BoundsTree {
 
   BoundsTree() = default;
   // Precondition: all bounds are finite, with low ≤ high. Boxes may be points, overlap or coincide.
-  // Precondition: all bounds are finite, with low ≤ high. Boxes may be points, overlap or coincide.
   explicit BoundsTree(std::vector<Leaf> leaves);
 
   // Calls visit(index) once for each leaf whose box comes within `radius` of x, in no particular order.

@@ -103,9 +103,9 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
     }
     return true;
   };
-  // The way comes into the box where it passes the last of the planes that it enters by (the slab method), so of the
-  // faces that hold the proxy, the one with the largest t counts; of several at once (from an edge), the one on which
-  // the proxy ends nearest to p.
+  // The segment enters the box through the last plane that it crosses (slab method). So among the faces that hold the
+  // proxy, the one with the largest t counts; of several with the same t (q on an edge), the one on which the proxy
+  // ends nearest to p.
   Step best;
   double best_t = -1.0, best_distance = 0.0;
   for (int face = 0; face < 6; ++face) {
@@ -144,7 +144,8 @@ bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;  // r is beyond, and the box doesn't let the proxy around
 }
 
-// By convexity, the midpoint of the way's part inside has at least half the depth of its deepest point.
+// In a convex solid the depth is a concave function, so at the middle of a chord it is at least half of the greatest
+// depth on the chord.
 bool BoxObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   const Crossing c = cross(x, y);
   if (!c.any()) return false;

@@ -1,8 +1,8 @@
 // A solid box.
 //
-// The proxy is held by the face through which its straight way enters, and slides on it by (4). Past the face's edge it
-// is free again: the space around a box isn't convex, so the proxy goes around the box. A proxy that comes from beside
-// a face and would be held by friction beside it is held at the face's edge.
+// The proxy is held by the face through which its straight way enters, and slides on it by (4). Beyond the face's edge
+// it is free again: the space around a box isn't convex, so the proxy goes around the box. Where friction would hold a
+// proxy beside the entered face, beyond an edge that p isn't beyond, it is held at that edge.
 #pragma once
 
 #include <array>

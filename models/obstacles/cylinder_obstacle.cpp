@@ -130,7 +130,8 @@ bool CylinderObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {
   return c.any() && c.leave < 1.0 && step(1.0, r, q).touches;
 }
 
-// By convexity, the midpoint of the way's part inside has at least half the depth of its deepest point.
+// In a convex solid the depth is a concave function, so at the middle of a chord it is at least half of the greatest
+// depth on the chord.
 bool CylinderObstacle::bars(const Vec3& x, const Vec3& y) const noexcept {
   const Crossing c = cross(x, y);
   if (!c.any()) return false;

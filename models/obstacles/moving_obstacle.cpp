@@ -39,7 +39,7 @@ void MovingObstacle::set_time(double time_s, double period_s) noexcept {
   const bool shorter = period_s < whole_period_s_;
   if (!shorter) whole_period_s_ = period_s;
   if (scripted_) {
-    // Where t − T is the time of the step before, but for rounding, that step's pose is taken.
+    // If t − T is the previous step's time within rounding, that step's pose is taken, bit for bit.
     const double begin_s = time_s - period_s;
     const double rounding_s = 4.0 * std::numeric_limits<double>::epsilon() * (std::abs(time_s) + period_s);
     const bool as_before = std::abs(begin_s - last_time_s_) <= rounding_s;
@@ -76,9 +76,9 @@ Vec3 MovingObstacle::from(const Vec3& q) const noexcept {
 Vec3 MovingObstacle::to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept {
   if (rests_ && r_O == q_O) return q;
   Vec3 r = now_ * r_O, moved = r_O, normal;
-  // A mesh may lie between the point and what the next step will take for it, if the point is within rounding of a face
-  // that it doesn't touch: beside a vertex, or deep in a spike. The point is then moved away from the face in between,
-  // farther with each try; 24 tries add up to 8190 times the first.
+  // The next step takes r back to the object's frame, with rounding. A face may lie between r_O and that image if r_O
+  // is within rounding of a face that it doesn't touch (beside a vertex, deep in a spike). r is then moved away from
+  // that face, farther with each try; 24 tries add up to 8190 times the first.
   double away = 16.0 * std::numeric_limits<double>::epsilon() * (r.lpNorm<1>() + now_.translation().lpNorm<1>());
   for (int k = 0; k < 24 && still_->parts(r_O, now_inverse_ * r, normal); ++k) {
     moved += away * normal;

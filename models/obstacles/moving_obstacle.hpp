@@ -119,7 +119,7 @@ class MovingObstacle final : public Obstacle {
   Pose now_ = Pose::Identity();
   Pose now_inverse_ = Pose::Identity(), before_inverse_ = Pose::Identity();
   bool rests_ = true;  // both poses are the same
-  // The poses at the time before (scripted) and at the call of drive() before (driven).
+  // The pose before: of a scripted object at the previous time, of a driven one at the previous call of drive().
   Pose last_ = Pose::Identity(), driven_from_ = Pose::Identity();
   double time_s_ = 0.0, last_time_s_ = 0.0;
   double whole_period_s_ = 0.0;

@@ -62,7 +62,7 @@ class Obstacle {
   [[nodiscard]] virtual Layer layer() const noexcept { return {}; }
   [[nodiscard]] virtual bool presses_at(const Vec3& /*r*/) const noexcept { return false; }
 
-  // True if r can't be where a proxy from q ends: inside by more than rounding, or on the far side of a thin object.
+  // True if a proxy from q can't end at r: r is inside by more than rounding, or on the far side of a thin object.
   [[nodiscard]] virtual bool excludes(const Vec3& q, const Vec3& r) const noexcept = 0;
 
   // Whether the straight way from x to y leads into the object or through it, by more than rounding. Precondition: the
@@ -94,7 +94,8 @@ class Obstacle {
   // `normal` becomes that of the surface there, towards x.
   virtual bool parts(const Vec3& /*x*/, const Vec3& /*y*/, Vec3& /*normal*/) const noexcept { return false; }
 
-  // Tells an object within a moving one that the coordinates it is asked with are rounded as those of this size are.
+  // For an object that a MovingObstacle carries: the size (metres) of the coordinates in W that points are rounded by
+  // on their way to its frame.
   virtual void set_rounding_size(double /*size_m*/) noexcept {}
 
   // Takes effect from the next step on. Precondition: finite and not negative.

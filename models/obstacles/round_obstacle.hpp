@@ -1,13 +1,14 @@
 // Spheres, capsules and round bars, solid or seen from inside: all points at a distance R from a core, which is a
 // point, a segment or a line. R may be zero.
 //
-// The normal at r points along the line from the core through r. In units where K = 1, friction is −λ N Nᵀ (r − q) with
-// an unknown λ ≥ 0. The tangential balance N Nᵀ [(r − p) + λ (r − q)] = 0 says that r is the point of the surface
-// nearest to the mix p' = (p + λ q)/(1 + λ), as it would be nearest to p without friction. With s = 1/(1 + λ), friction
-// in three dimensions thus becomes one scalar equation, that of the friction cone:
+// The normal at r lies along the line from the core through r. In units where K = 1, friction is −λ N Nᵀ (r − q) with
+// an unknown λ ≥ 0, so the tangential balance is
+//   N Nᵀ [(r − p) + λ (r − q)] = (1 + λ) N Nᵀ (r − p') = 0   with p' = (p + λ q)/(1 + λ):
+// r is the point of the surface nearest to p', as it is nearest to p without friction. With s = 1/(1 + λ), p' = q + s
+// (p − q), and the friction cone leaves one scalar equation for s:
 //   r(s) = nearest to q + s (p − q),   ‖f_t(r(s))‖ = μ f_n(r(s)),   0 ≤ s ≤ 1,
-// where s = 1 is frictionless and s = 0 is stick (r nearest to q). On a plane this is (4), and linear in s. It is
-// solved by the secant method, safeguarded by bisection.
+// where s = 1 is frictionless and s = 0 is stick (r nearest to q). On a plane the equation is linear in s and gives
+// (4). It is solved by the secant method, safeguarded by bisection.
 //
 // Where the way from q to p passes close to the core, at o = q + s₀ (p − q), r turns around within a part of about
 // σ = ‖o − core‖/‖p − q‖ of the way, which may be tiny. So coordinates are taken relative to o, the unknown is
@@ -78,8 +79,8 @@ struct SegmentCore {
     const Vec3 b = a + end * e;
     return {a.cwiseMin(b), a.cwiseMax(b)};
   }
-  // Relative to `origin`. The segment's reference point is moved next to it, so that a far reference point brings no
-  // rounding into what is near.
+  // The core relative to `origin`. The reference point is moved along the line to the point nearest to `origin`, so
+  // that a far end brings no rounding into coordinates near it.
   [[nodiscard]] SegmentCore seen_from(const Vec3& origin) const noexcept {
     SegmentCore core = *this;
     const double ahead = e.dot(origin - a);
@@ -211,8 +212,8 @@ class RoundObstacle final : public Obstacle {
     return 16.0 * u * (x.lpNorm<1>() + core_.size() + R_);
   }
 
-  // The proxy placed on the normal through `line`: on the surface, or within a layer where its normal force is
-  // balanced.
+  // The proxy on the line through `line.foot` along `line.normal`: on the surface, or within a layer where the forces
+  // along the normal balance.
   [[nodiscard]] Trial place(double K, const Vec3& p, const At& line) const noexcept {
     const Vec3& n = line.normal;
     const double along_p = n.dot(p - line.foot);  // of p, from the core along the normal

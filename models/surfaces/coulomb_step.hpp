@@ -1,10 +1,11 @@
 // One step in a Coulomb medium of force F, over any 𝒢' that renders the rest of the world.
 //
-// The medium adds −F (r − q)/‖r − q‖ (16) to ℳ. That is the force of a viscous medium of λ = F/‖r − q‖ in the place of
-// b/T (media.hpp), with λ unknown. With τ = λ/(κ + λ) for λ, one equation is left for 0 ≤ τ < 1:
+// The medium adds −F (r − q)/‖r − q‖ (16) to ℳ. While the proxy moves, that is a viscous medium with the unknown λ =
+// F/‖r − q‖ in the place of b/T (media.hpp). With τ = λ/(κ + λ), 0 ≤ τ < 1, the step and the condition for τ are
 //   r(τ) = 𝒢'(κ/(1 − τ), p + τ (q − p), q),   κ τ/(1 − τ) ‖r(τ) − q‖ = F.
-// The left side is linear in τ where 𝒢' is free or slides on a plane, and (3) is the solution there. In general it is
-// solved by the secant method near rest and by false position (the Illinois variant) elsewhere.
+// The condition's left side is linear in τ where 𝒢' is free or slides on a plane, and (3) is the solution there. The
+// proxy sticks if κ ‖R‖ ≤ F, R = lim (r(τ) − q)/(1 − τ) for τ → 1, which is extrapolated. Otherwise the condition is
+// solved by the secant method for short slips and by false position (the Illinois variant) for others.
 #pragma once
 
 #include <algorithm>
@@ -128,7 +129,8 @@ class CoulombStep {
     return false;
   }
 
-  // A slip so short that r(τ) is nearly q + (1 − τ) R: the secant method, from the τ at which that form gives F.
+  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R: the secant method, from the τ at which this form gives F. False if
+  // it doesn't converge.
   bool slip(double tau, double pull, Vec<N>& r) noexcept {
     Sample sample = at(tau);
     double slope = pull;

@@ -79,8 +79,9 @@ bool PlaneComposition::fits(const Vec3& q, const Vec3& r, const std::array<std::
     if (m == contacts[0] || m == contacts[1] || m == contacts[2]) continue;
     const FlatSurface<3>& surface = faces_[m].surface;
     const double height = surface.height(r);
-    // Within rounding, r counts as on the face. But a slipping proxy must not enter a face that q was on, even by so
-    // little: held by two faces, it would otherwise creep along one that alone can't quite hold it.
+    // A height within rounding counts as on the face. But a proxy that slips on a single face must not end lower over
+    // another face than q was: where both faces together hold it at rest, it would creep along the first by less than
+    // rounding in each step.
     if (height < 0.0 && (height < -surface.rounding(r) || (creeps && height < surface.height(q)))) {
       if (candidates.count == faces_.size()) return false;  // all faces are candidates already
       candidates.add(m);

@@ -1,6 +1,6 @@
 // Media act on the proxy without a surface: viscous and Coulomb media, everywhere or within a shape, over any 𝒢.
 //
-// A viscous medium of b (Ns/m) adds −(b/T)(r − q) to ℳ. With 𝒢' for the rest of the world, the balance of forces is
+// A viscous medium of b (Ns/m) adds −(b/T)(r − q) to ℳ. Let 𝒢' be the rest of the world and f' its force, which is
 //   f'(r) = K (r − p) + (b/T)(r − q) = (K + b/T)(r − p'),   p' = (K p + (b/T) q)/(K + b/T),
 // so that the medium acts as a stiffer coupling to a nearer point: 𝒢(K, p, q) = 𝒢'(K + b/T, p', q). In free space that
 // is q(k) = p'. A step in a Coulomb medium: coulomb_step.hpp. Whether a medium acts is decided at q. T is the step's

@@ -146,7 +146,7 @@ class FlatSupport {
     }
   }
 
-  // The residuals R_i = 𝒢_i(K, r − x_i) − r with r = p + Σ x_j; returns the largest component.
+  // The residuals R_i = 𝒢_i(σK, r − x_i/σ) − r with r = p + Σ x_j and σ = stiffer_; returns the largest component.
   double evaluate(double K, const Vec3& p) noexcept {
     r = p;
     size_ = p.lpNorm<1>();
@@ -171,9 +171,9 @@ class FlatSupport {
     return A.colPivHouseholderQr().solve(b);
   }
 
-  // One Newton step with backtracking. Its linear system: (D_i − I) Σ dx_j − D_i dx_i = −R_i for all i. Returns true if
-  // the residual `apart` went down by at least a quarter of the step's share; with `bold`, the full step is taken and
-  // true returned in any case. Otherwise the forces are as before.
+  // One Newton step with backtracking. Its linear system: (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for all i, σ = stiffer_.
+  // Returns true if the residual `apart` went down by at least a quarter of the step's share; with `bold`, the full
+  // step is taken and true returned in any case. Otherwise the forces are as before.
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
     budget -= static_cast<int>(count * count * count);
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);

@@ -30,6 +30,8 @@ struct SettledPair {
   Obstacle::Tangent t_a, t_b;
 };
 
+// Solves the groove of two tangent planes, which are taken again at each solution until it settles. Until then a
+// contact may pull, so that the iteration can go on; `found` is true only if both press in the end.
 SettledPair settle(const PairOfSurfaces& pair, const Vec3& p, const Vec3& q, const Vec3& from,
                    GrooveSearch search) noexcept {
   const Vec3 q_a = pair.a.carry(q), q_b = pair.b.carry(q);
@@ -127,10 +129,10 @@ void World::set_time(const StepTime& time) noexcept {
   for (const std::size_t i : moving_) entries_[i].obstacle->set_time(time.time_s, time.period_s);
 }
 
-// Gathers all obstacles that the step can meet, into near_; returns the radius that they were looked for in. The force
-// on the proxy never does work, (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball whose diameter is the way from q to p.
-// Around convex bodies of radius R it may leave that ball by ‖r − q‖²/2R; a ball of twice the radius covers this.
-// `reach` is the least radius to look in.
+// Gathers into near_ all obstacles that the step can meet; returns the radius of the ball around (p + q)/2 that was
+// searched, at least `reach`. Where the free space is convex, (r − p)ᵀ(r − q) ≤ 0, so r lies in the ball with the
+// diameter qp (Thales). Around a convex solid of radius R it may lie outside by ‖r − q‖²/2R; twice the radius covers
+// this. Layers that spring back and moving objects can take r farther: operator() then gathers again.
 double World::gather(const Vec3& p, const Vec3& q, double reach) noexcept {
   const Vec3 middle = 0.5 * (p + q);
   const double radius = std::max(reach, (p - q).norm() * (1.0 + 1e-9) + 1e-12 * (1.0 + p.lpNorm<1>()));
@@ -189,8 +191,7 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
     all = false;
     const bool known = candidates.has(i);
     if (known && !member && !obstacle.parts(obstacle.carry(q), r, normal)) continue;
-    // The obstacle isn't in the way to p, but in the way to the trial point: the step to that point tells which of its
-    // features is.
+    // The obstacle isn't in the way to p, but in the way to r. Its step towards r tells by which of its features.
     Obstacle::Step s = obstacle.step(K, r, q);
     if (known) {
       add_face(i, s, candidates);
@@ -234,13 +235,14 @@ void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::siz
   const PairOfSurfaces pair{*entries_[m[0]].obstacle, *entries_[m[1]].obstacle, candidates.alone[own[0]].feature,
                             candidates.alone[own[1]].feature};
   SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);
+  // A contact that pulls at the first root may press at another one.
   if (s.settled && !s.groove.found) s = settle(pair, p, q, s.r, GrooveSearch::all_roots);
   if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !choice.better(p, s.r, 2)) return;
   choice.contacts[0] = contact_of(candidates, own[0], s.groove.slips1, s.t_a.surface.normal());
   choice.contacts[1] = contact_of(candidates, own[1], s.groove.slips2, s.t_b.surface.normal());
 }
 
-// On tangent planes at the corner itself, taken again at each new corner until it stays.
+// Solves the corner of three tangent planes, which are taken again at each new corner until it settles.
 void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<std::size_t, 3>& own,
                        Candidates& candidates, Choice& choice) const noexcept {
   const std::size_t m[3] = {candidates.index[own[0]], candidates.index[own[1]], candidates.index[own[2]]};
@@ -416,8 +418,8 @@ Vec3 World::operator()(double K, const Vec3& p, const Vec3& q) noexcept {
   support_budget_ = SharedSupport::whole_budget;
   Choice choice;
   bool found = solve(K, p, q, choice);
-  // An object that moves may carry the proxy far, or one that it was squeezed into may bring it out far away. The step
-  // may then end where obstacles haven't been looked for, so it is repeated with all that are near its end.
+  // A moving object, a layer that springs back, or an obstacle that the proxy has to leave may take r out of the ball
+  // that was searched. The step is then repeated with all obstacles near its end.
   for (std::size_t known = 0; known != near_.size() && !choice.free;) {
     known = near_.size();
     const double away = (choice.r - 0.5 * (p + q)).norm();

@@ -18,6 +18,15 @@ class Tour(unittest.TestCase):
                 with self.subTest(document=document.name, target=target):
                     self.assertTrue((document.parent / target).exists())
 
+    def test_every_link_to_a_heading_leads_to_one(self):
+        for document in DOCUMENTS:
+            for target, anchor in re.findall(r"\]\(((?!https?:)[^)#]*)#([^)]+)\)", document.read_text()):
+                page = document.parent / target if target else document
+                headings = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+                            for heading in re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)}
+                with self.subTest(document=document.name, target=target, anchor=anchor):
+                    self.assertIn(anchor, headings)
+
     def test_every_name_on_the_tour_stands_in_its_file(self):
         tour = harness.SOURCE / "docs" / "tour.md"
         rows = re.findall(r"^\| (?:&nbsp;)*\[[^\]]+\]\(([^)]+)\) \| (`[^|]+`) \|", tour.read_text(), re.MULTILINE)
@@ -26,7 +35,7 @@ class Tour(unittest.TestCase):
             source = (tour.parent / target).read_text()
             for name in re.findall(r"`([^`]+)`", names):
                 with self.subTest(file=target, name=name):
-                    self.assertIn(name, source)
+                    self.assertRegex(source, rf"(?<!\w){re.escape(name)}(?!\w)")
 
 
 if __name__ == "__main__":

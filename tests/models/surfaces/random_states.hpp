@@ -1,4 +1,4 @@
-// Random numbers for tests: a fixed, printed seed, and a count that the environment scales.
+// Random numbers for tests: a seed that stands in the test, and a count that the environment scales.
 #pragma once
 
 #include <gtest/gtest.h>
