@@ -37,8 +37,7 @@ double BoxObstacle::rounding(const Vec3& x) const noexcept {
 struct BoxObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
-  int face = -1;  // the face that the way enters through; -1: q is inside
-  int exit = -1;
+  int face = -1;                   // the face that the way enters through; -1: q is inside
   std::array<double, 6> enters{};  // of each face that q is outside of or on; negative where it isn't
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
@@ -65,11 +64,7 @@ BoxObstacle::Crossing BoxObstacle::cross(const Vec3& q, const Vec3& p) const noe
           c.face = face;
         }
       } else if (to > 0.0) {
-        const double t = from / (from - to);
-        if (t < c.leave) {
-          c.leave = t;
-          c.exit = face;
-        }
+        c.leave = std::min(c.leave, from / (from - to));
       }
     }
   }

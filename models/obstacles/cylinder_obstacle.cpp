@@ -24,8 +24,7 @@ double CylinderObstacle::rounding(const Vec3& x) const noexcept {
 struct CylinderObstacle::Crossing {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();
-  std::int32_t feature = -1;  // -1: q is inside
-  std::int32_t exit = -1;
+  std::int32_t feature = -1;              // -1: q is inside
   double enters[3] = {-1.0, -1.0, -1.0};  // by feature; negative where q isn't outside of it or on it
 
   [[nodiscard]] bool any() const noexcept { return enter < leave && enter < 1.0 && leave > 0.0; }
@@ -34,12 +33,6 @@ struct CylinderObstacle::Crossing {
     if (t > enter) {
       enter = t;
       feature = by;
-    }
-  }
-  void leave_at(double t, std::int32_t by) noexcept {
-    if (t < leave) {
-      leave = t;
-      exit = by;
     }
   }
 };
@@ -57,7 +50,7 @@ CylinderObstacle::Crossing CylinderObstacle::cross(const Vec3& q, const Vec3& p)
       }
       c.enter_at(from > tolerance ? from / (from - to) : 0.0, end);
     } else if (to > 0.0) {
-      c.leave_at(from / (from - to), end);
+      c.leave = std::min(c.leave, from / (from - to));
     }
   }
   // ‖u + t d‖ = R across the axis.
@@ -71,9 +64,9 @@ CylinderObstacle::Crossing CylinderObstacle::cross(const Vec3& q, const Vec3& p)
     }
     const double root = std::sqrt(discriminant);
     c.enter_at(from > tolerance ? (u.norm() + R_) * from / (root - b) : 0.0, side);
-    c.leave_at((root - b) / a, side);
+    c.leave = std::min(c.leave, (root - b) / a);
   } else if (a > 0.0) {
-    c.leave_at((std::sqrt(std::max(0.0, discriminant)) - b) / a, side);
+    c.leave = std::min(c.leave, (std::sqrt(std::max(0.0, discriminant)) - b) / a);
   }
   return c;
 }

@@ -233,19 +233,20 @@ bool settle(SharedSupport& support, FlatSupport& flat, double K, const Vec3& p, 
 // was, bit for bit.
 Vec3 placed(const SharedSupport& support, const FlatSupport& flat, const Vec3& q) noexcept {
   Vec3 r = flat.r;
-  std::size_t hard = 0, hardest = 0;
+  std::size_t hard = 0, rigid = most;
   for (int turn = 0; turn < 4; ++turn) {
     hard = 0;
+    rigid = most;
     for (std::size_t i = 0; i < support.count; ++i) {
       const FlatContact& c = flat.contact[i];
       const double core = c.layer.soft() ? -c.layer.thickness_m : 0.0, height = c.surface.height(r) - core;
       if (!support.step[i].touches || std::abs(height) > flat.rounding_m()) continue;
       r -= height * c.surface.normal();
       ++hard;
-      if (!c.layer.soft()) hardest = i;
+      if (!c.layer.soft()) rigid = i;
     }
   }
-  if (hard == 1 && !flat.contact[hardest].layer.soft()) r = support.step[hardest].r;
+  if (hard == 1 && rigid != most) r = support.step[rigid].r;
   for (std::size_t i = 0; i < support.count; ++i) {
     if (support.step[i].touches && support.step[i].r == q) r = q;
   }
