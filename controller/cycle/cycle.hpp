@@ -106,6 +106,7 @@ class Cycle {
     std::int64_t rendered_ns = 0;
     bool tared = false;
     bool wants_resume = false;  // out of this hold: the enabling input was pressed anew, or somebody asked for it
+    Command awaits_rest;        // release or back_off, in a hold in which the arm still moves
   };
 
   // cycle.cpp: the stages
@@ -138,6 +139,7 @@ class Cycle {
   void take_command(std::int64_t t_k_ns) noexcept;
   void obey(const Command& command) noexcept;
   void start_freeing(const Command& command) noexcept;
+  [[nodiscard]] bool awaits_rest() const noexcept { return state_.awaits_rest.order != Order::none; }
   void reset() noexcept;
   void take_timestep() noexcept;
   void change_timestep(std::int64_t t_k_ns) noexcept;

@@ -27,6 +27,7 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
     case Phase::holding:
     case Phase::stopping:
       state_.wants_resume = false;
+      state_.awaits_rest = {};
       return motion_->start_run_out();
     default:
       return;

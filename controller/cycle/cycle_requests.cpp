@@ -1,6 +1,7 @@
 // What the cycle is asked for, by the enabling input, by commands, by changes of parameters and of the timestep, and
 // when it may do it.
 #include <cmath>
+#include <utility>
 
 #include "controller/cycle/cycle.hpp"
 
@@ -29,6 +30,7 @@ bool Cycle::stands_in_hold() const noexcept {
 
 void Cycle::supervise_hold(std::int64_t t_k_ns) noexcept {
   if (supervisor_.phase() != Phase::holding || state_.entered_phase != Phase::holding) return;
+  if (awaits_rest() && motion_->stands()) start_freeing(std::exchange(state_.awaits_rest, {}));
   if (state_.wants_resume && motion_->stands() && may_move() && !timestep_.under_way()) {
     supervisor_.handle(Event::resume);
   } else if (in_phase_s(t_k_ns) > parts_.supervision.hold_s) {
@@ -44,6 +46,7 @@ void Cycle::heed_enabling_input(std::int64_t t_k_ns) noexcept {
   const bool anew = parts_.enabling->take_press();
   if (!parts_.enabling->pressed()) {
     state_.wants_resume = false;
+    state_.awaits_rest = {};
     timestep_.stay_in_hold();
   }
   if (!anew) return;
@@ -59,10 +62,11 @@ void Cycle::take_command(std::int64_t t_k_ns) noexcept {
   if (!requests_.commands.take(t_k_ns - state_.first_cycle_ns, command)) return;
   recorder_.entry().command = command;
   const char* refusal = status_.refusal(command.order);
+  state_.awaits_rest = {};  // an order takes back the one before
   obey(command);
-  if (refusal == nullptr && supervisor_.phase() != Phase::freeing) {
-    if (command.order == Order::release) refusal = "the arm wasn't at rest yet";
-    if (command.order == Order::back_off) refusal = "the arm wasn't at rest yet, or nothing says which way";
+  if (refusal == nullptr && command.order == Order::back_off && supervisor_.phase() != Phase::freeing &&
+      !awaits_rest()) {
+    refusal = "nothing says which way";
   }
   requests_.commands.note_refusal(refusal);
 }
@@ -91,8 +95,14 @@ void Cycle::obey(const Command& command) noexcept {
   }
 }
 
+// Whoever is pinned doesn't wait for the arm to stand before he is to be released: the order does.
 void Cycle::start_freeing(const Command& command) noexcept {
-  if (!stands_in_hold() || !may_move() || timestep_.under_way()) return;
+  if (supervisor_.phase() != Phase::holding || !may_move() || timestep_.under_way()) return;
+  state_.wants_resume = false;
+  if (!stands_in_hold()) {
+    state_.awaits_rest = command;
+    return;
+  }
   if (motion_->prepare_freeing(command, measurement_.now())) supervisor_.handle(Event::free);
 }
 

@@ -1,7 +1,8 @@
 """Every session ends by itself, and says why: on the screen and in the summary for programs."""
+import csv
 import unittest
 
-from harness import ProgramTest
+from harness import AXES, ProgramTest
 
 
 def scripted(*orders):
@@ -77,10 +78,22 @@ class SessionEnd(ProgramTest):
                          [{"order": "resume", "time_s": 1.0, "refused": "the arm isn't in a hold"},
                           {"order": "hold", "time_s": 20.0, "refused": "the session had ended before"}])
 
-    def test_a_release_before_the_arm_stands_is_told(self):
-        summary = self.ended(*scripted("hold@2s", "release@2001ms"))
-        self.assertEqual(summary["idle_orders"],
-                         [{"order": "release", "time_s": 2.001, "refused": "the arm wasn't at rest yet"}])
+    def test_a_release_waits_until_the_arm_stands(self):
+        """It was answered with ok and dropped."""
+        summary = self.ended("--record", "session", *scripted("hold@2s", "release@2001ms"))
+        self.assertEqual(summary["idle_orders"], [])
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.assertEqual(summary["end"]["reason"], "release_expired")
+        first = next(k for k, row in enumerate(rows) if row["phase"] == "freeing")
+        counts = [[int(row[f"{axis}_target_counts"]) for axis in AXES] for row in rows[first - 3:first]]
+        self.assertEqual(counts[0], counts[1])
+        self.assertEqual(counts[1], counts[2])
+
+    def test_an_order_takes_back_a_release_that_waits(self):
+        summary = self.ended("--duration", "4s", *scripted("hold@2s", "release@2001ms", "resume@2002ms"))
+        self.assertEqual(summary["idle_orders"], [])
+        self.assertEqual(summary["end"]["reason"], "duration")
 
     def test_people_read_it(self):
         outcome = self.call("run", "--no-plot", *scripted("hold@5s", "release@6s", "resume@8s"), timeout=60)
