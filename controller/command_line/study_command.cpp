@@ -3,7 +3,7 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/sessions/arm_run.hpp"
-#include "controller/studies/stress.hpp"
+#include "controller/studies/stress/stress.hpp"
 #include "controller/studies/studies.hpp"
 #include "models/base/setup_error.hpp"
 

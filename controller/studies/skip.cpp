@@ -10,7 +10,7 @@
 #include <sstream>
 
 #include "controller/studies/common/chart.hpp"
-#include "controller/studies/globe_mesh.hpp"
+#include "controller/studies/stress/globe_mesh.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/compiler/obstacles.hpp"
 

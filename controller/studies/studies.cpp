@@ -1,10 +1,10 @@
 #include "controller/studies/studies.hpp"
 
-#include "controller/studies/error.hpp"
+#include "controller/studies/error/error.hpp"
 #include "controller/studies/figure5.hpp"
 #include "controller/studies/skip.hpp"
 #include "controller/studies/stability_map.hpp"
-#include "controller/studies/stress.hpp"
+#include "controller/studies/stress/stress.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
 

@@ -269,56 +269,44 @@ Vec3 PolylineGuide::operator()(double /*K*/, const Vec3& p, const Vec3& q) noexc
   return r;
 }
 
+// Where (4) takes a proxy along a piece.
+PolylineGuide::Lead PolylineGuide::lead(const Piece& piece, const Vec3& p, double from) const noexcept {
+  const Vec3 d = p - piece.a;
+  const double s_p = piece.e.dot(d), reach = mu_ * (d - s_p * piece.e).norm();
+  if (std::abs(s_p - from) <= reach) return {from, 0};
+  return {s_p - std::copysign(reach, s_p - from), s_p > from ? 1 : -1};
+}
+
 // The step by (4) from a place on, around corners where the next piece leads on.
 Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
   std::size_t i = place.piece;
-  const Piece& first = pieces_[i];
-  const double s_q = place.s;
-
-  // Where (4) takes the proxy along a piece, and to which side; 0: it sticks.
-  const auto lead = [&](const Piece& piece, double from, double& to) {
-    const Vec3 d = p - piece.a;
-    const double s_p = piece.e.dot(d), reach = mu_ * (d - s_p * piece.e).norm();
-    if (std::abs(s_p - from) <= reach) {
-      to = from;
-      return 0;
-    }
-    to = s_p - std::copysign(reach, s_p - from);
-    return s_p > from ? 1 : -1;
-  };
-  double s = s_q, to = s_q;
-  int direction = lead(first, s_q, to);
-  const bool corner = pieces_.size() > 1 && (s_q <= 0.0 || s_q >= first.length);
-  if (direction == 0 && !corner) return report(place.x, p, i, false);
+  const double begin = pieces_[i].begin, length = pieces_[i].length;
+  Lead way = lead(pieces_[i], p, place.s);
+  if (way.side == 0) {
+    // The piece doesn't lead it away. In a corner the neighbouring one may.
+    const bool in_corner = pieces_.size() > 1 && (place.s == begin || place.s == length);
+    if (!in_corner) return report(place.x, p, i, false);
+    way = place.s == length ? Lead{infinity, 1} : Lead{-infinity, -1};
+  }
   Vec3 here = place.x;
   for (std::size_t visited = 0; visited <= 2 * pieces_.size(); ++visited) {
     const Piece& piece = pieces_[i];
-    if (to >= piece.begin && to <= piece.length && direction != 0) {
-      Vec3 r = piece.a + to * piece.e;
+    if (way.to >= piece.begin && way.to <= piece.length) {
+      Vec3 r = piece.a + way.to * piece.e;
       const bool free = leads(here, r);
       return report(r, p, i, free && mu_ > 0.0);
     }
-    // The proxy has reached the end of the piece, or sticks there: does the next piece lead on?
-    const bool forward = direction > 0 || (direction == 0 && s >= piece.length);
+    const bool forward = way.side > 0;
     const double end = forward ? piece.length : piece.begin;
-    const bool at_end = direction != 0 || s == end;
-    const bool last_piece = forward ? i + 1 == pieces_.size() : i == 0;
-    const Vec3 corner_point = piece.a + end * piece.e;
-    if (!at_end) return report(place.x, p, i, false);
-    Vec3 held = place.s == end && place.piece == i ? place.x : corner_point;
-    if (!leads(here, held)) return report(held, p, i, false);
-    here = held;
-    if (last_piece && !closed_) return report(held, p, i, false);
+    Vec3 corner = place.piece == i && place.s == end ? place.x : Vec3(piece.a + end * piece.e);
+    if (!leads(here, corner)) return report(corner, p, i, false);
+    here = corner;
     std::size_t next = i;
-    static_cast<void>(next_piece(next, forward));
-    const double enter = forward ? 0.0 : pieces_[next].length;
-    double on_next = enter;
-    const int next_direction = lead(pieces_[next], enter, on_next);
-    if (next_direction != (forward ? 1 : -1)) return report(held, p, i, false);  // held in the corner
+    if (!next_piece(next, forward)) return report(corner, p, i, false);
+    const Lead on = lead(pieces_[next], p, forward ? pieces_[next].begin : pieces_[next].length);
+    if (on.side != way.side) return report(corner, p, i, false);  // held in the corner
     i = next;
-    s = enter;
-    to = on_next;
-    direction = next_direction;
+    way = on;
   }
   return report(place.x, p, i, false);
 }

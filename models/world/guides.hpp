@@ -87,6 +87,10 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
     double s = 0.0;  // from the piece's beginning
     Vec3 x = Vec3::Zero();
   };
+  struct Lead {
+    double to = 0.0;  // from the piece's beginning; may be past its ends
+    int side = 0;     // 1: forward, −1: backward, 0: the proxy sticks
+  };
   PolylineGuide() = default;
   [[nodiscard]] std::size_t nearest_piece(const Vec3& q) const noexcept;
   [[nodiscard]] bool next_piece(std::size_t& piece, bool forward) const noexcept;
@@ -97,6 +101,7 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
                               Contact<3>& contact) const noexcept;
   [[nodiscard]] bool reaches(Place from, const Place& to, int side) noexcept;
   bool carry(const Vec3& q, Place& place) noexcept;
+  [[nodiscard]] Lead lead(const Piece& piece, const Vec3& p, double from) const noexcept;
   Vec3 slide(const Vec3& p, const Place& place) noexcept;
   Vec3 report(const Vec3& r, const Vec3& p, std::size_t piece, bool slips) noexcept;
   bool leads(const Vec3& from, Vec3& to, bool past_pushing = false) noexcept;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <sstream>
 
+#include "models/base/random.hpp"
 #include "models/surfaces/contact_judge.hpp"
 #include "models/surfaces/mechanistic_map.hpp"
 #include "models/world/media.hpp"
@@ -17,36 +17,12 @@ namespace proxarm::scenes {
 namespace {
 
 using models::lift;
+using models::Random;
 using models::Vec;
 using models::Vec3;
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double infinity = std::numeric_limits<double>::infinity();
-
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : engine_(seed) {}
-  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
-  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
-  template <int N>
-  Vec<N> in_box(double half) {
-    Vec<N> v;
-    for (int i = 0; i < N; ++i) v[i] = uniform(-half, half);
-    return v;
-  }
-  template <int N>
-  Vec<N> direction() {
-    std::normal_distribution<double> normal;
-    Vec<N> v;
-    do {
-      for (int i = 0; i < N; ++i) v[i] = normal(engine_);
-    } while (!(v.norm() > 1e-3));
-    return v.normalized();
-  }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 // One state and what came of it.
 template <int N>

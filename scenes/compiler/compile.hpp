@@ -15,15 +15,10 @@
 
 #include "models/geometry/geometric_algorithm.hpp"
 #include "models/obstacles/moving_obstacle.hpp"
+#include "scenes/compiler/plan.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::scenes {
-
-// One line of what was compiled in or left out, for `proxarm explain`.
-struct Stage {
-  std::string what;
-  std::string why;
-};
 
 struct CompiledScene {
   template <int N>
@@ -31,8 +26,7 @@ struct CompiledScene {
 
   std::string name;
   Space space;
-  std::vector<Stage> stages;   // in the order in which a step goes through them
-  std::vector<Stage> skipped;  // what this scene doesn't need
+  Plan plan;  // what it was built from
   std::variant<Algorithm<1>, Algorithm<2>, Algorithm<3>> any_algorithm;
 
   [[nodiscard]] int dimensions() const noexcept { return space.dimensions; }

@@ -86,14 +86,15 @@ StepCost measure_step(const Scene& scene) {
 
 std::string explain(const Scene& scene) {
   const CompiledScene compiled = compile(scene);
+  const Narration narration = narrate(scene, compiled.plan);
   std::ostringstream out;
   out.precision(3);
   out << compiled.name << ", " << compiled.dimensions() << (compiled.dimensions() == 1 ? " dimension" : " dimensions")
       << "\n";
   out << "a step goes through\n";
-  for (const Stage& stage : compiled.stages) out << "  " << stage.what << ": " << stage.why << "\n";
+  for (const Stage& stage : narration.stages) out << "  " << stage.what << ": " << stage.why << "\n";
   out << "skipped\n";
-  for (const Stage& stage : compiled.skipped) out << "  " << stage.what << ": " << stage.why << "\n";
+  for (const Stage& stage : narration.skipped) out << "  " << stage.what << ": " << stage.why << "\n";
   const StepCost cost = measure_step(scene);
   out << "cost of a step here\n";
   if (cost.free_ns > 0.0) out << "  free: " << cost.free_ns << " ns\n";

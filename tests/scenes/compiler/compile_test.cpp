@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "models/base/setup_error.hpp"
 #include "models/surfaces/coulomb_field.hpp"
@@ -44,12 +46,51 @@ TEST(Compile, EveryShippedSceneLoads) {
 }
 
 TEST(Compile, SaysWhatIsSkippedAndWhy) {
-  const CompiledScene scene = compile(load_scene(scenes_folder / "frictionless_wall.yaml"));
-  ASSERT_EQ(scene.stages.size(), 1u);
-  EXPECT_EQ(scene.stages[0].what, "wall, equation (2)");
+  const scenes::Scene scene = load_scene(scenes_folder / "frictionless_wall.yaml");
+  const scenes::Plan plan = compile(scene).plan;
+  EXPECT_EQ(plan.contacts, scenes::Plan::Contacts::plane);
+  EXPECT_EQ(plan.friction, scenes::Plan::Friction::none);
+  EXPECT_EQ(plan.only_object, 0);
+  const scenes::Narration told = narrate(scene, plan);
+  ASSERT_EQ(told.stages.size(), 1u);
+  EXPECT_EQ(told.stages[0].what, "wall, equation (2)");
   bool friction = false;
-  for (const auto& stage : scene.skipped) friction = friction || (stage.what == "friction" && stage.why == "μ = 0");
+  for (const auto& stage : told.skipped) friction = friction || (stage.what == "friction" && stage.why == "μ = 0");
   EXPECT_TRUE(friction);
+}
+
+TEST(Compile, PlansNoMoreThanASceneNeeds) {
+  using Contacts = scenes::Plan::Contacts;
+  const std::vector<std::pair<const char*, Contacts>> plans{
+      {"free", Contacts::none},       {"coulomb", Contacts::none},
+      {"line", Contacts::plane},      {"plane_2d", Contacts::friction_plane},
+      {"groove", Contacts::planes},   {"guide", Contacts::guide},
+      {"soft_wall", Contacts::world}, {"guided_insertion", Contacts::guide_among_objects}};
+  for (const auto& [name, contacts] : plans) {
+    EXPECT_EQ(compile(load_scene(scenes_folder / (std::string(name) + ".yaml"))).plan.contacts, contacts) << name;
+  }
+  const std::string star = source_file("scenes/meshes/star.obj").string();
+  EXPECT_EQ(compile(parse_scene("objects:\n  - mesh: {file: " + star + "}\n", "star.yaml")).plan.contacts,
+            Contacts::mesh);
+}
+
+// The words once counted all objects of the file, and called friction on a line what has no tangent to slip along.
+TEST(Compile, PlansForWhatTheProxysSpaceMeetsAlone) {
+  const scenes::Scene scene = parse_scene(
+      "dimensions: 1\nspace: {axes: [[1, 0, 0]]}\nobjects:\n"
+      "  - box: {name: far, centre_m: [0, 0, 9], size_m: [1, 1, 1], friction: 0.5, "
+      "layer: {thickness_m: 0.1, stiffness_N_per_m: 1}, motion: {velocity_m_per_s: [1, 0, 0]}}\n"
+      "  - box: {name: near, centre_m: [2, 0, 0], size_m: [1, 1, 1], friction: 0.3}\n"
+      "  - box: {name: room, centre_m: [0, 0, 0], size_m: [8, 8, 8], inside_out: true}\n",
+      "one.yaml");
+  const scenes::Plan plan = compile(scene).plan;
+  EXPECT_EQ(plan.contacts, scenes::Plan::Contacts::world);
+  EXPECT_EQ(plan.missed, std::vector<std::int32_t>{0}) << "a room's walls along the line don't make it a miss";
+  EXPECT_EQ(plan.surfaces, 3u) << "a box and the ends of the room";
+  EXPECT_EQ(plan.moving, 0u);
+  EXPECT_EQ(plan.layers, 0u);
+  EXPECT_EQ(plan.friction, scenes::Plan::Friction::no_tangent);
+  for (const auto& stage : narrate(scene, plan).stages) EXPECT_EQ(stage.what.find("friction"), std::string::npos);
 }
 
 TEST(Compile, CutsAPlaneWithTheSpaceOfTheProxy) {

@@ -74,6 +74,20 @@ TEST(GuideAmongObjects, TurnsACornerAndStops) {
   EXPECT_LE((g(1e6, Vec3(0.9, 0.45, 0), Vec3(1, 0.9, 0)) - Vec3(1, 0.6, 0)).norm(), 1e-12) << "from beyond";
 }
 
+// In a plane of two dimensions a guide on a plane is one on the line in which they meet, and nothing else: the plane's
+// two half-spaces once stood in that proxy's way, taken in W for places in its own coordinates.
+TEST(GuideAmongObjects, RunsAlongAPlaneGuideInTwoDimensions) {
+  const auto world =
+      compile(parse_scene("dimensions: 2\nspace: {origin_m: [0, 0, 0], axes: [[1, 0, 0], [0, 0, 1]]}\n"
+                          "objects:\n  - sphere: {centre_m: [0.5, 0, 0.1], radius_m: 0.1}\n"
+                          "guide: {plane: {point_m: [0, 0, 0.1], normal: [0, 0, 1], friction: 0.1}}\n",
+                          "guide.yaml"));
+  auto& g = world.algorithm<2>();
+  const models::Vec<2> begin(0.0, 0.1);
+  EXPECT_LE((g(1e6, {0.3, 0.1}, begin) - models::Vec<2>(0.3, 0.1)).norm(), 1e-15);
+  EXPECT_LE((g(1e6, {0.9, 0.1}, begin) - models::Vec<2>(0.4, 0.1)).norm(), 1e-12) << "at the sphere";
+}
+
 // On a plane it has a way around: it slides along objects, with the friction of both.
 TEST(GuideAmongObjects, SlidesAlongAWallOnAPlane) {
   const auto world = compile(parse_scene(

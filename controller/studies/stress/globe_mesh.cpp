@@ -1,4 +1,4 @@
-#include "controller/studies/globe_mesh.hpp"
+#include "controller/studies/stress/globe_mesh.hpp"
 
 #include <cmath>
 #include <memory>

@@ -1,4 +1,4 @@
-#include "controller/studies/stress.hpp"
+#include "controller/studies/stress/stress.hpp"
 
 #include <gtest/gtest.h>
 

@@ -22,16 +22,13 @@
 #include <string_view>
 
 #include "controller/studies/common/study.hpp"
+#include "controller/studies/stress/stress_run.hpp"
 
 namespace proxarm::studies {
 
 class Stress final : public Study {
  public:
-  static constexpr int steps_per_run = 1000;
-
-  // Which worlds: those of random_scene(), random_mesh_scene() or random_layer_scene(), each a study of its own, so
-  // that what a seed gives in the one stays what it was.
-  enum class Worlds { all, meshes, layers };
+  using Worlds = StressWorlds;
   static constexpr std::array<std::string_view, 3> worlds_names{"stress", "stress_meshes", "stress_layers"};
   explicit Stress(Worlds worlds = Worlds::all) : worlds_(worlds) {}
 

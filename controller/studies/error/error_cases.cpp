@@ -1,4 +1,4 @@
-#include "controller/studies/error_cases.hpp"
+#include "controller/studies/error/error_cases.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,9 +1,9 @@
-#include "controller/studies/random_scene.hpp"
+#include "controller/studies/stress/random_scene.hpp"
 
 #include <array>
 #include <numbers>
 
-#include "controller/studies/globe_mesh.hpp"
+#include "controller/studies/stress/globe_mesh.hpp"
 
 namespace proxarm::studies {
 namespace {

@@ -1,0 +1,61 @@
+// What the error study's table says: run times for an error, orders of convergence, and which penalty method is best.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "controller/studies/common/table.hpp"
+#include "controller/studies/error/error_methods.hpp"
+
+namespace proxarm::studies {
+
+// The runs of one method with one tuning, from coarse to fine.
+struct Runs {
+  std::string method;
+  Tuning tuning;
+  std::vector<double> T, steps, error, cost_ns;
+
+  // The largest error among this timestep and those up to twofold finer.
+  [[nodiscard]] double envelope(std::size_t i) const;
+  // Run time for an error of at most `target`; infinite where none is that good.
+  [[nodiscard]] double cost(double target) const;
+};
+
+using RunsByCase = std::map<std::string, std::vector<Runs>>;
+
+RunsByCase collect(const Table& table);
+
+inline bool is_penalty(const Runs& runs) { return runs.method != "1" && runs.method != "2"; }
+
+// The first runs of a method. Throws std::out_of_range where there are none.
+const Runs& runs_of(const std::vector<Runs>& list, const std::string& method);
+
+// A penalty method with one tuning for all cases.
+struct Fixed {
+  std::string method;
+  Tuning tuning;
+};
+
+// The method and tuning that is best over all cases together at 0.1 mm: the one with the least geometric mean of run
+// times. A case in which it doesn't reach 0.1 mm counts as a thousand times the best-tuned one's time.
+Fixed best_fixed(const RunsByCase& all);
+
+// Its runs among those of a case, which may have less to tune; nullptr where there are none.
+const Runs* fixed_runs(const std::vector<Runs>& list, const Fixed& fixed);
+
+// The best of the penalty methods at 0.1 mm.
+const Runs& best_tuned(const std::vector<Runs>& list);
+
+// The other methods' run time over ours at equal error, median over the errors that both reach: whatever is best for
+// that error, or one method alone.
+double speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
+double speedup_over(const Runs& ours, const Runs& rival);
+
+// Slope of log error over log T, where the error is above rounding, and the rms of what is left, in decades.
+struct Fit {
+  double order = 0.0, residual = 0.0;
+};
+Fit fit_order(const Runs& runs);
+
+}  // namespace proxarm::studies

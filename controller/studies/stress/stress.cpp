@@ -1,0 +1,216 @@
+#include "controller/studies/stress/stress.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "controller/studies/common/chart.hpp"
+#include "controller/studies/stress/stress_run.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using nlohmann::json;
+
+double number(std::int64_t value) { return static_cast<double>(value); }
+
+// Of a column, over all runs or those in worlds of one kind.
+std::int64_t sum(const Table& table, const char* name, const std::string& kind = {}) {
+  const std::size_t column = table.column(name), kinds = table.column("kind");
+  double total = 0.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (kind.empty() || table.text(row, kinds) == kind) total += table.number(row, column);
+  }
+  return static_cast<std::int64_t>(total);
+}
+
+json by_kind(const Table& table) {
+  std::set<std::string> kinds;
+  for (std::size_t row = 0; row < table.rows(); ++row) kinds.insert(table.text(row, table.column("kind")));
+  json all;
+  for (const std::string& kind : kinds) {
+    json& one = all[kind];
+    for (const char* name :
+         {"steps", "contact_steps", "slipping_steps", "several", "unresolved", "edge", "not_judged"}) {
+      one[name] = sum(table, name, kind);
+    }
+    std::int64_t count = 0;
+    for (const char* name : invariant_names) count += sum(table, name, kind);
+    one["violations"] = count;
+  }
+  return all;
+}
+
+// Up to 50 runs with a violation.
+json failing(const Table& table) {
+  json runs = json::array();
+  const std::size_t first_step = table.column("first_step"), run_seed = table.column("run_seed");
+  for (std::size_t row = 0; row < table.rows() && runs.size() < 50; ++row) {
+    if (!(table.number(row, first_step) >= 0.0)) continue;
+    runs.push_back({{"run_seed", static_cast<std::uint64_t>(table.number(row, run_seed))},
+                    {"kind", table.text(row, table.column("kind"))},
+                    {"first", table.text(row, table.column("first"))},
+                    {"step", table.number(row, first_step)}});
+  }
+  return runs;
+}
+
+// What the headline's figures mean.
+json keys(const std::string& study) {
+  return {
+      {"runs", "worlds, each with a proxy of its own; a run that found no free place has no steps"},
+      {"steps", "steps of all runs, each judged"},
+      {"violations", "steps in which an invariant didn't hold; by invariant below"},
+      {"several", "steps where another stiffness gave another point that obeys (17) as well"},
+      {"unresolved", "steps in which the algorithm itself reported that it found no complete set of contacts"},
+      {"edge", "steps in which an edge of a box, cylinder or mesh did work on the proxy"},
+      {"not_judged",
+       "steps in contact whose work isn't judged: moving objects, layers (they give back what they took), order 2 "
+       "(its q is no place of the proxy), several contacts with a convex one"},
+      {"deepest_m", "the deepest that any proxy was inside of anything in a resolved step, per metre of coordinates"},
+      {"failing", "up to 50 runs with a violation: proxarm study " + study + " --replay RUN_SEED shows one"},
+      {"seed", "of the study; run seeds follow from it"}};
+}
+
+}  // namespace
+
+std::vector<Column> Stress::columns() const {
+  std::vector<Column> columns{{"run_seed"},   {"kind", true},    {"dimensions"},     {"objects"},
+                              {"order"},      {"mass_kg"},       {"period_s"},       {"force_N"},
+                              {"steps"},      {"contact_steps"}, {"slipping_steps"}, {"several"},
+                              {"unresolved"}, {"edge"},          {"not_judged"},     {"deepest"}};
+  for (const char* name : invariant_names) columns.push_back({name});
+  columns.push_back({"first", true});
+  columns.push_back({"first_step"});
+  return columns;
+}
+
+std::size_t Stress::jobs(const Options& options) const {
+  return static_cast<std::size_t>(options.runs.value_or(options.quick ? 1000.0 : 1e6));
+}
+
+std::vector<Row> Stress::run(std::size_t job, const Options& options) const {
+  const std::uint64_t seed = job_seed(options.seed, job);
+  const Tally t = run_seed(seed, worlds_, nullptr);
+  Row row{static_cast<double>(seed),
+          t.kind,
+          static_cast<double>(t.dimensions),
+          number(static_cast<std::int64_t>(t.objects)),
+          static_cast<double>(t.order),
+          t.mass_kg,
+          t.period_s,
+          t.force_N,
+          number(t.steps),
+          number(t.contact),
+          number(t.slipping),
+          number(t.several),
+          number(t.unresolved),
+          number(t.edge),
+          number(t.not_judged),
+          t.deepest_m};
+  for (const std::int64_t count : t.violations) row.emplace_back(number(count));
+  row.emplace_back(t.first);
+  row.emplace_back(number(t.first_step));
+  return {row};
+}
+
+json Stress::headline(const Table& table, const Options& options) const {
+  std::int64_t violations = 0;
+  json by_invariant;
+  for (const char* name : invariant_names) {
+    by_invariant[name] = sum(table, name);
+    violations += sum(table, name);
+  }
+  double deepest = 0.0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    deepest = std::max(deepest, table.number(row, table.column("deepest")));
+  }
+  return {{"runs", table.rows()},
+          {"steps", sum(table, "steps")},
+          {"contact_steps", sum(table, "contact_steps")},
+          {"violations", violations},
+          {"violations_by_invariant", by_invariant},
+          {"several", sum(table, "several")},
+          {"unresolved", sum(table, "unresolved")},
+          {"edge", sum(table, "edge")},
+          {"not_judged", sum(table, "not_judged")},
+          {"deepest_m", deepest},
+          {"by_kind", by_kind(table)},
+          {"failing", failing(table)},
+          {"seed", options.seed},
+          {"keys", keys(name())}};
+}
+
+std::vector<std::string> Stress::plot(const Table& table, const Options& /*options*/,
+                                      const std::filesystem::path& out) const {
+  // Shares of steps over the push per step, T²F/M: how far the tool is ahead of the proxy.
+  constexpr int bins = 24;
+  constexpr double low = -16.0, high = 8.0;
+  std::array<std::array<double, 5>, bins> sums{};
+  const std::array<const char*, 5> names{"steps", "contact_steps", "slipping_steps", "several", "unresolved"};
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double T = table.number(row, table.column("period_s"));
+    const double push = T * T * table.number(row, table.column("force_N")) / table.number(row, table.column("mass_kg"));
+    const int bin = std::clamp(static_cast<int>((std::log10(push) - low) / (high - low) * bins), 0, bins - 1);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      sums[static_cast<std::size_t>(bin)][i] += table.number(row, table.column(names[i]));
+    }
+  }
+  Chart chart{.title = "Stress: what the steps met, by how far a step pushes", .panels = {}};
+  Panel panel{.title = "",
+              .x_label = "T²F/M (m)",
+              .y_label = "share of steps",
+              .log_x = true,
+              .log_y = true,
+              .curves = {},
+              .y_low = 1e-7,
+              .y_high = 1.5};
+  const std::array<const char*, 5> labels{"", "in contact", "slipping", "several solutions", "unresolved"};
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    Curve curve{.name = labels[i], .x = {}, .y = {}, .style = static_cast<int>(i - 1), .marks = true};
+    for (int bin = 0; bin < bins; ++bin) {
+      const auto& sum = sums[static_cast<std::size_t>(bin)];
+      if (!(sum[i] > 0.0)) continue;
+      curve.x.push_back(std::pow(10.0, low + (high - low) * (bin + 0.5) / bins));
+      curve.y.push_back(sum[i] / sum[0]);
+    }
+    panel.curves.push_back(curve);
+  }
+  chart.panels.push_back(panel);
+  const std::string warning = draw(chart, out / (name() + ".svg"));
+  return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
+}
+
+std::string Stress::text(const json& headline) const {
+  std::ostringstream text;
+  text << headline.at("runs") << " runs, " << headline.at("steps") << " steps, " << headline.at("contact_steps")
+       << " in contact, seed " << headline.at("seed") << ": " << headline.at("violations") << " violations\n"
+       << "counted apart: unresolved " << headline.at("unresolved") << ", several solutions " << headline.at("several")
+       << ", edges " << headline.at("edge") << ", work not judged " << headline.at("not_judged") << "\n";
+  for (const json& run : headline.at("failing")) {
+    text << "run seed " << run.at("run_seed") << ": " << run.at("first").get<std::string>() << " at step "
+         << run.at("step") << " (" << run.at("kind").get<std::string>() << "); proxarm study " << name() << " --replay "
+         << run.at("run_seed") << "\n";
+  }
+  return text.str();
+}
+
+bool Stress::failed(const json& headline) const { return headline.at("violations").get<std::int64_t>() > 0; }
+
+bool Stress::replay(std::uint64_t seed, std::string& text, Worlds worlds) {
+  std::string report;
+  const Tally t = run_seed(seed, worlds, &report);
+  std::ostringstream out;
+  out << "run seed " << seed << ": " << t.kind << ", " << t.dimensions << " dimensions, " << t.objects << " objects, "
+      << t.mass_kg << " kg, T = " << 1e3 * t.period_s << " ms, order " << t.order << ", " << t.force_N << " N; "
+      << t.steps << " steps, " << t.contact << " in contact, " << t.unresolved << " unresolved, " << t.several
+      << " with several solutions\n"
+      << (report.empty() ? "no violation\n" : report);
+  text = out.str();
+  return !report.empty();
+}
+
+}  // namespace proxarm::studies
