@@ -61,7 +61,8 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
          "simulated devices only, may be repeated: let one fail, as DEVICE:KIND[=VALUE][@FROM[..UNTIL]], times "
          "counted from power on, some 0.2 s before the first cycle. DEVICE is a joint (KIND: silent, fault=EMCY code, "
          "device_type=VALUE, heartbeat, sdo, "
-         "period, power, jammed) or sensor (KIND: silent, samples, frozen, half, swapped, duplicated, short, checksum, "
+         "period, power, jammed, ignored, reversed, runaway=rad/s, weak=Nm, offset=rad, stuck) or sensor (KIND: "
+         "silent, samples, frozen, half, swapped, duplicated, short, checksum, "
          "saturated, lost=N, status=BITS, "
          "delay=US). Such as axis_2:silent@2s, axis_3:fault=0x4210@2s, sensor:frozen@1s..1.5s")
       ->type_name("TEXT")

@@ -22,6 +22,13 @@ std::optional<ToolMonitor> tool_monitor(const CycleParts& parts, const SessionSe
   return ToolMonitor(limits, settings.max_missed_feedback, feedback_s);
 }
 
+std::optional<DriveMonitor> drive_monitor(const CycleParts& parts, const description::CellLimits& limits) {
+  if (renders_torques(parts)) return {};
+  std::vector<description::DriveDescription> drives;
+  for (const DriveOnBus& axis : parts.drives) drives.push_back(axis.drive.description());
+  return DriveMonitor(*parts.arm, std::move(drives), limits.following_error_rad);
+}
+
 // What a torque can't do, a stop does: nothing is held or slowed there.
 Reactions reactions_for(const CycleParts& parts) {
   Reactions reactions = reactions_of(parts.supervision);
@@ -52,8 +59,8 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       recorder_(record_capacity),
       bus_(parts_, recorder_, alarm_),
       measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
-      faults_(parts_.drives, settings_, limits.max_force_N, supervisor_, alarm_,
-              tool_monitor(parts_, settings, limits)),
+      faults_(parts_.drives, settings_, limits.max_force_N, supervisor_, alarm_, tool_monitor(parts_, settings, limits),
+              drive_monitor(parts_, limits)),
       motion_(make_motion(parts_, settings, limits)),
       timestep_(parts_.can_drives) {}
 

@@ -14,6 +14,7 @@ constexpr double implausible_speeds = 4.0;
 
 void FaultMonitor::judge_encoders(const Measured& measured, Phase entered) noexcept {
   judge_joints(measured, entered);
+  judge_following(measured, entered);
   judge_tool(measured.tool_W, entered);
 }
 
@@ -30,6 +31,22 @@ void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcep
       alarm_.raise(Fault::position_implausible, static_cast<std::int32_t>(i), jump_rad, most_rad);
     }
   }
+}
+
+// From when each drive takes setpoints.
+void FaultMonitor::judge_following(const Measured& measured, Phase entered) noexcept {
+  if (!drives_follow_) return;
+  const bool judged = entered >= Phase::enabling && entered <= Phase::stopping;
+  const DriveReports now{.reported_rad = measured.motor_rad,
+                         .link_rad = measured.link_rad,
+                         .setpoint_rad = measured.drive_target_rad,
+                         .feedback_period_s = measured.feedback_period_s,
+                         .fresh = measured.fresh,
+                         .following = judged ? measured.following : std::uint8_t{0},
+                         .hand_W = measured.hand_W};
+  const bool waits = entered == Phase::rendering || entered == Phase::freeing;
+  const DriveVerdict verdict = drives_follow_->step(now, waits, settings_.period_s);
+  if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, verdict.joint, verdict.value_rad, verdict.limit_rad);
 }
 
 void FaultMonitor::judge_tool(const models::Vec3& tool_W, Phase entered) noexcept {

@@ -19,6 +19,7 @@
 #include "controller/record/black_box.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/supervision/alarm.hpp"
+#include "controller/supervision/drive_monitor.hpp"
 #include "controller/supervision/enabling_input.hpp"
 #include "controller/supervision/supervisor.hpp"
 #include "controller/supervision/tool_monitor.hpp"
@@ -43,19 +44,22 @@ struct JudgedCycle {
 
 class FaultMonitor {
  public:
-  // `tool`: none where a hand moves the arm as fast as it likes. All but it and `max_force_N` must outlive this; T and
-  // what is counted in cycles may change in `settings`.
+  // `drives_follow` and `tool`: none where drives take torques, so that a hand moves the arm as it likes. All but these
+  // and `max_force_N` must outlive this; T and what is counted in cycles may change in `settings`.
   FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, double max_force_N,
-               const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {}) noexcept
+               const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
+               std::optional<DriveMonitor> drives_follow = {}) noexcept
       : drives_(drives),
         settings_(settings),
         max_force_N_(max_force_N),
         supervisor_(supervisor),
         alarm_(alarm),
-        tool_(std::move(tool)) {}
+        tool_(std::move(tool)),
+        drives_follow_(std::move(drives_follow)) {}
 
-  // An encoder can't be where its joint can't have come to since it was last heard. `entered`: the phase of the cycle
-  // before; without drives that hold it the arm may be moved by hand, and isn't judged.
+  // An encoder can't be where its joint can't have come to since it was last heard, nor a drive far from what it was
+  // told. `entered`: the phase of the cycle before; without drives that hold it the arm may be moved by hand, and isn't
+  // judged.
   void judge_encoders(const Measured& measured, Phase entered) noexcept;
   void judge(const JudgedCycle& cycle) noexcept;
 
@@ -64,6 +68,7 @@ class FaultMonitor {
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
     if (tool_) tool_->archive(state);
+    if (drives_follow_) drives_follow_->archive(state);
   }
 
  private:
@@ -74,6 +79,7 @@ class FaultMonitor {
   };
 
   void judge_joints(const Measured& measured, Phase entered) noexcept;
+  void judge_following(const Measured& measured, Phase entered) noexcept;
   void judge_tool(const models::Vec3& tool_W, Phase entered) noexcept;
   void judge_enabling(const EnablingInput* enabling) noexcept;
   void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;
@@ -90,6 +96,7 @@ class FaultMonitor {
   const Supervisor& supervisor_;
   Alarm& alarm_;
   std::optional<ToolMonitor> tool_;
+  std::optional<DriveMonitor> drives_follow_;
   State state_;
 };
 

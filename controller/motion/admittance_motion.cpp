@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace proxarm::controller {
 
@@ -77,6 +76,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
 void AdmittanceMotion::start_guards(const JointVector& target_rad) noexcept {
   guard_.start(target_rad);
   tool_guard_.start(target_rad);
+  envelope_.start(target_rad);
 }
 
 // From each joint's last speed, in the time that the slowest of them needs at its own deceleration.
@@ -115,7 +115,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   parts_.world->archive(state);
   parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
-  state(parts_.elastic, parts_.orientation, guard_, tool_guard_);
+  state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_);
   archive_fields(state, state_);
   if (state.reading()) arm_.kinematics(state_.link_rad, solution_.kinematics);
 }
@@ -297,6 +297,7 @@ void AdmittanceMotion::move_motors(const JointVector& motor_rad, const Measured&
   JointVector wanted_rad = motor_rad;
   const std::uint8_t blocked = find_blocked(motor_rad, measured, wanted_rad);
   const bool held_back = make_final(wanted_rad, state_.speed_limit_m_per_s);
+  follow_setpoints(measured, blocked);
   made_setpoints_ = true;
   if (held_back || blocked != 0 || guard_.lag_rad() > limits_.following_error_rad) wind_back(blocked);
 }
@@ -304,20 +305,30 @@ void AdmittanceMotion::move_motors(const JointVector& motor_rad, const Measured&
 // The joints whose drives are blocked, as bits. Such a drive is told to go a little further than it is, not more, and
 // all the others wait with it: so little is wound up that nothing snaps when it comes free. What a drive that follows
 // is behind grows with its speed: its setpoint is on the way to it and back.
+//
+// What a drive reports never leads its setpoint anywhere. With θ the report, r the room around it, w what is wanted and
+// [l, h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp), it is told
+//   c = clamp(w, θ − r, θ + r), but within [min(l, w), max(h, w)]
+// θ is between l and h for a joint that has jammed, so that its setpoint brakes and comes back to it: c = θ ± r. Where
+// θ is anywhere else, since the encoder or the drive lies, c is w or a place where the joint has been sent before.
+// Nobody at the handle: w is the last setpoint, for proxy and filter go on from that, and so l = h = w = c stands,
+// whatever θ does. Somebody at the handle: c goes no further than w, which the hand made. So no sequence of reports
+// moves the arm by more than it has come within the lag, and without a hand by nothing.
 std::uint8_t AdmittanceMotion::find_blocked(const JointVector& motor_rad, const Measured& measured,
                                             JointVector& wanted_rad) noexcept {
   std::uint8_t blocked = 0;
   for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
     const auto bit = static_cast<std::uint8_t>(1u << i);
     if ((measured.fresh & bit) == 0) continue;
-    // On Modbus a setpoint waits for an exchange, and so does the answer.
-    const double lag_s = 5.0 * period_s_ + 2.0 * measured.feedback_period_s[i] +
-                         1.0 / (2.0 * std::numbers::pi * drives_[static_cast<std::size_t>(i)].position_bandwidth_Hz);
+    const double lag_s =
+        following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.feedback_period_s[i]);
     const double room_rad = limits_.following_error_rad + lag_s / period_s_ * std::abs(measured.moved_rad[i]);
     const double actual_rad = measured.motor_rad[i];
     if (std::abs(motor_rad[i] - actual_rad) <= room_rad) continue;
     blocked |= bit;
-    wanted_rad[i] = std::clamp(motor_rad[i], actual_rad - room_rad, actual_rad + room_rad);
+    wanted_rad[i] =
+        std::clamp(std::clamp(motor_rad[i], actual_rad - room_rad, actual_rad + room_rad),
+                   std::min(envelope_.low_rad(i), motor_rad[i]), std::max(envelope_.high_rad(i), motor_rad[i]));
   }
   if (blocked == 0) return 0;
   active_.set(Limit::following_error, blocked);
@@ -325,6 +336,15 @@ std::uint8_t AdmittanceMotion::find_blocked(const JointVector& motor_rad, const 
     if ((blocked & 1u << i) == 0) wanted_rad[i] = guard_.target_rad()[i];
   }
   return blocked;
+}
+
+// Of a blocked joint the envelope stays what it was.
+void AdmittanceMotion::follow_setpoints(const Measured& measured, std::uint8_t blocked) noexcept {
+  for (Eigen::Index i = 0; i < measured.axes(); ++i) {
+    if ((blocked & 1u << i) != 0) continue;
+    envelope_.step(i, guard_.target_rad()[i], period_s_,
+                   following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.feedback_period_s[i]));
+  }
 }
 
 // The last word on what the drives are told, in whatever phase: each joint's limits, then the tool's and the elbow's.

@@ -17,6 +17,7 @@
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/setpoints/joint_guard.hpp"
+#include "controller/setpoints/setpoint_envelope.hpp"
 #include "controller/setpoints/tool_guard.hpp"
 #include "controller/stability/passivity.hpp"
 #include "models/arm/inverse_kinematics.hpp"
@@ -81,6 +82,7 @@ class AdmittanceMotion final : public Motion {
   std::uint8_t find_blocked(const models::JointVector& motor_rad, const Measured& measured,
                             models::JointVector& wanted_rad) noexcept;
   bool make_final(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;
+  void follow_setpoints(const Measured& measured, std::uint8_t blocked) noexcept;
   void start_guards(const models::JointVector& target_rad) noexcept;
   void wind_back(std::uint8_t blocked) noexcept;
 
@@ -94,6 +96,7 @@ class AdmittanceMotion final : public Motion {
   StepLimiter limiter_;
   JointGuard guard_;
   ToolGuard tool_guard_;
+  SetpointEnvelope envelope_;  // of a blocked joint: as it was before
   State state_;
 
   // Of this cycle.

@@ -72,6 +72,14 @@ constexpr std::array texts{
     FaultText{Fault::position_implausible, "position_implausible", Reaction::stop_0,
               "an encoder jumped further than its joint can move", "rad in a cycle",
               "check the encoder, its cable and the drive before anybody comes near"},
+    FaultText{Fault::drive_deviates, "drive_deviates", Reaction::stop_0,
+              "a drive goes where no setpoint sent it, by its encoder", "rad away",
+              "look for a drive that runs off, turns the wrong way or is too weak for the arm's weight, and for an "
+              "encoder that is off, before anybody comes near"},
+    FaultText{Fault::drive_blocked, "drive_blocked", Reaction::hold, "a drive doesn't come to its setpoint",
+              "rad behind",
+              "look for an obstacle, a jammed joint or a closed brake; `proxarm back-off` gets somebody free, `proxarm "
+              "resume` goes on"},
     FaultText{Fault::target_out_of_range, "target_out_of_range", Reaction::stop_1,
               "the motion would leave a joint's range", "rad",
               "keep away from that end of the range, or move the scene"},

@@ -32,6 +32,8 @@ enum class Fault : std::uint8_t {
   drive_not_disabled,    // a drive didn't confirm within a second that it is switched off
   timestep_unknown,      // a drive confirms neither the timestep that it was to take nor the one before
   position_implausible,  // an encoder that jumps further than its joint can move
+  drive_deviates,        // a drive goes where no setpoint sent it, by its encoder
+  drive_blocked,         // a drive doesn't come to its setpoint, which waits for it, and no hand holds it
   target_out_of_range,   // a setpoint would leave a joint's range or its counts
   target_too_fast,       // a setpoint would exceed a joint's speed
   singular,              // inverse kinematics found no bounded step

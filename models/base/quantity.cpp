@@ -30,6 +30,9 @@ constexpr Unit masses[] = {{"kg", 1, 1}, {"g", 1, 1e3}};
 constexpr Unit dampings[] = {{"Ns/m", 1, 1}, {"N*s/m", 1, 1}, {"N·s/m", 1, 1}};
 constexpr Unit lengths[] = {{"m", 1, 1}, {"mm", 1, 1e3}, {"cm", 1, 1e2}};
 constexpr Unit forces[] = {{"N", 1, 1}};
+constexpr Unit torques[] = {{"Nm", 1, 1}, {"N*m", 1, 1}};
+constexpr Unit angles[] = {{"rad", 1, 1}, {"mrad", 1, 1e3}};
+constexpr Unit angular_speeds[] = {{"rad/s", 1, 1}, {"mrad/s", 1, 1e3}};
 constexpr Unit stiffnesses[] = {{"N/m", 1, 1}, {"N/mm", 1e3, 1}};
 
 std::string expected(const Kind& kind) {
@@ -92,6 +95,18 @@ double parse_length(std::string_view text, std::string_view option) {
 }
 double parse_force(std::string_view text, std::string_view option) {
   return parse(text, option, {"a force", "20N", forces, false, false});
+}
+
+double parse_torque(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a torque", "100Nm", torques, false, true});
+}
+
+double parse_angle(std::string_view text, std::string_view option) {
+  return parse(text, option, {"an angle", "5mrad", angles, false, false});
+}
+
+double parse_angular_speed(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a speed", "0.5rad/s", angular_speeds, false, false});
 }
 
 }  // namespace proxarm::description

@@ -26,4 +26,13 @@ double parse_length(std::string_view text, std::string_view option = "length");
 // "20", "20N" → N, above zero.
 double parse_force(std::string_view text, std::string_view option = "force");
 
+// "100", "100Nm" → Nm, zero or more.
+double parse_torque(std::string_view text, std::string_view option = "torque");
+
+// "0.005", "5mrad", "0.005rad" → rad, above zero.
+double parse_angle(std::string_view text, std::string_view option = "angle");
+
+// "0.5", "0.5rad/s" → rad/s, above zero.
+double parse_angular_speed(std::string_view text, std::string_view option = "speed");
+
 }  // namespace proxarm::description

@@ -13,6 +13,8 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"force_excessive", {"stop_1", "hold"}},
       {"feedback_late", {"continue", "slow"}},
       {"position_implausible", {"stop_0", "stop_1"}},
+      {"drive_deviates", {"stop_0", "stop_1"}},
+      {"drive_blocked", {"hold", "stop_1", "stop_0"}},
       {"leash_exceeded", {"stop_1", "hold"}},
       {"tool_too_fast", {"stop_0", "stop_1"}},
       {"tool_off_limits", {"stop_1", "stop_0"}},

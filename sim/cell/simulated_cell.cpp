@@ -68,7 +68,8 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
   PlantAxis(ServoLoop& servo, const description::DriveDescription& drive)
       : servo_(servo),
         counts_per_rad_(drive.counts_per_rad()),
-        rated_torque_Nm_(drive.rated_torque_Nm > 0.0 ? drive.rated_torque_Nm : drive.simulation.max_torque_Nm) {}
+        rated_torque_Nm_(drive.rated_torque_Nm > 0.0 ? drive.rated_torque_Nm : drive.simulation.max_torque_Nm),
+        max_torque_Nm_(drive.simulation.max_torque_Nm) {}
 
   void enable(std::int64_t time_ns) noexcept override { servo_.enable(time_ns); }
   void disable() noexcept override { servo_.disable(); }
@@ -76,7 +77,7 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
     servo_.set_interpolation_period_ns(period_ns);
   }
   void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept override {
-    servo_.set_target(target_counts, time_ns);
+    servo_.set_target(spoilt(target_counts, time_ns), time_ns);
   }
   void set_torque(double ratio) noexcept override {
     servo_.set_torque_Nm(std::copysign(1.0, counts_per_rad_) * ratio * rated_torque_Nm_);
@@ -84,7 +85,9 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
   void stop(double deceleration_counts_per_s2, std::int64_t time_ns) noexcept override {
     servo_.stop(deceleration_counts_per_s2 / std::abs(counts_per_rad_), time_ns);
   }
-  [[nodiscard]] std::int32_t position_counts() const noexcept override { return servo_.position_counts(); }
+  [[nodiscard]] std::int32_t position_counts() const noexcept override {
+    return stuck_ ? stuck_at_counts_ : servo_.position_counts() + offset_counts_;
+  }
   [[nodiscard]] std::int32_t demand_counts() const noexcept override { return servo_.demand_counts(); }
   [[nodiscard]] double speed_counts_per_s() const noexcept override {
     return servo_.speed_rad_per_s() * counts_per_rad_;
@@ -95,9 +98,51 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
   [[nodiscard]] bool limited() const noexcept override { return servo_.limited(); }
   [[nodiscard]] bool at_rest() const noexcept override { return servo_.at_rest(); }
 
+  // What the drive makes of its targets, what its motor can, and what it says of where it is; false: not one of these.
+  bool set_fault(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept {
+    switch (fault.kind) {
+      case DeviceFaultKind::runaway:
+        runaway_counts_per_s_ = on ? fault.amount * counts_per_rad_ : 0.0;
+        break;
+      case DeviceFaultKind::reversed:
+        target_share_ = on ? -1 : 1;
+        break;
+      case DeviceFaultKind::ignored:
+        target_share_ = on ? 0 : 1;
+        break;
+      case DeviceFaultKind::weak:
+        servo_.set_max_torque_Nm(on ? fault.amount : max_torque_Nm_);
+        return true;
+      case DeviceFaultKind::offset:
+        offset_counts_ = on ? static_cast<std::int32_t>(std::lround(fault.amount * counts_per_rad_)) : 0;
+        return true;
+      case DeviceFaultKind::stuck:
+        stuck_at_counts_ = servo_.position_counts();
+        stuck_ = on;
+        return true;
+      default:
+        return false;
+    }
+    since_ns_ = time_ns;
+    since_counts_ = servo_.demand_counts();
+    return true;
+  }
+
  private:
+  [[nodiscard]] std::int32_t spoilt(std::int32_t target_counts, std::int64_t time_ns) const noexcept {
+    if (target_share_ == 1 && runaway_counts_per_s_ == 0.0) return target_counts;
+    const double off = runaway_counts_per_s_ * 1e-9 * static_cast<double>(time_ns - since_ns_);
+    return since_counts_ + target_share_ * (target_counts - since_counts_) +
+           static_cast<std::int32_t>(std::lround(off));
+  }
+
   ServoLoop& servo_;
-  double counts_per_rad_, rated_torque_Nm_;
+  double counts_per_rad_, rated_torque_Nm_, max_torque_Nm_;
+  double runaway_counts_per_s_ = 0.0;
+  std::int32_t target_share_ = 1;  // of the way from since_counts_ to a target
+  std::int32_t since_counts_ = 0, offset_counts_ = 0, stuck_at_counts_ = 0;
+  std::int64_t since_ns_ = 0;
+  bool stuck_ = false;
 };
 
 class SimulatedCell::PlantGauges final : public GaugeSource {
@@ -424,6 +469,7 @@ void SimulatedCell::set_fault(std::size_t index, bool on, std::int64_t time_ns) 
   const DeviceFault& fault = faults_[index];
   advance_to(time_ns);
   const std::size_t axis = axis_of(fault.device);
+  if (axis < drives_.size() && axes_[axis]->set_fault(fault, on, time_ns)) return;
   if (axis < drives_.size() && modbus_drives_[axis]) {
     set_modbus_fault(axis, fault, on);
   } else if (axis < drives_.size()) {

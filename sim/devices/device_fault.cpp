@@ -14,12 +14,15 @@ using description::SetupError;
 
 constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
 constexpr std::uint64_t none = 0, u16 = 0xFFFF, u32 = 0xFFFFFFFF;
+using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
   const char* name;
   unsigned devices;  // that know it
   DeviceFaultKind kind;
-  std::uint64_t most;  // of its value; none: it has no value
+  std::uint64_t most;                  // of its value; none: it has no value
+  ParseAmount parse_amount = nullptr;  // of one that has a quantity instead
+  bool is_signed = false;
 };
 
 constexpr KindName kinds[] = {
@@ -31,6 +34,12 @@ constexpr KindName kinds[] = {
     {"period", can, DeviceFaultKind::period_fixed, none},
     {"power", drives, DeviceFaultKind::power_loss, none},
     {"jammed", drives, DeviceFaultKind::jammed, none},
+    {"runaway", drives, DeviceFaultKind::runaway, none, description::parse_angular_speed, true},
+    {"reversed", drives, DeviceFaultKind::reversed, none},
+    {"ignored", drives, DeviceFaultKind::ignored, none},
+    {"weak", drives, DeviceFaultKind::weak, none, description::parse_torque},
+    {"offset", drives, DeviceFaultKind::offset, none, description::parse_angle, true},
+    {"stuck", drives, DeviceFaultKind::stuck, none},
     {"exception", modbus, DeviceFaultKind::modbus_exception, none},
     {"closed", modbus, DeviceFaultKind::modbus_closed, none},
     {"wrong_unit", modbus, DeviceFaultKind::modbus_wrong_unit, none},
@@ -76,6 +85,12 @@ std::uint32_t parse_value(std::string_view all, std::string_view text, std::uint
   return value;
 }
 
+double parse_amount(const KindName& kind, std::string_view text) {
+  const bool negative = kind.is_signed && text.substr(0, 1) == "-";
+  const double amount = kind.parse_amount(negative ? text.substr(1) : text, "device fault");
+  return negative ? -amount : amount;
+}
+
 std::int64_t parse_time_ns(std::string_view text) {
   if (text == "0" || text == "0s") return 0;
   return std::llround(description::parse_duration(text, "time of a device fault") * 1e9);
@@ -111,11 +126,15 @@ DeviceFault parse_device_fault(std::string_view text) {
     if ((kind.devices & devices) != 0 && what.substr(0, equals) == kind.name) found = &kind;
   }
   if (found == nullptr) refuse(all, names_for(devices));
-  if (has_value != (found->most != none)) {
+  if (has_value != (found->most != none || found->parse_amount != nullptr)) {
     refuse(all, has_value ? "no value for this kind of fault" : "a value, KIND=VALUE");
   }
   fault.kind = found->kind;
-  if (has_value) fault.value = parse_value(all, what.substr(equals + 1), found->most);
+  if (found->parse_amount != nullptr) {
+    fault.amount = parse_amount(*found, what.substr(equals + 1));
+  } else if (has_value) {
+    fault.value = parse_value(all, what.substr(equals + 1), found->most);
+  }
   if (at == std::string_view::npos) return fault;
   if (fault.kind == DeviceFaultKind::device_type) refuse(all, "no time: a device is what it is from the start");
   const std::size_t dots = times.find("..");

@@ -3,6 +3,7 @@
 // As text, for the command line:  DEVICE:KIND[=VALUE][@FROM[..UNTIL]]
 //   axis_3:silent                     drive of axis_3 says nothing, from the start
 //   axis_2:fault=0x4210@2s            drive reports EMCY 4210h (temperature) two seconds after power on
+//   axis_3:runaway=-0.5rad/s@2s       drive goes off by itself
 //   sensor:frozen@1.5s..1.6s          repeats one sample for a tenth of a second
 //   sensor:status=0x4000@3s
 // DEVICE is a joint's name in the cell, or "sensor". Times count from power on and have a unit.
@@ -26,7 +27,13 @@ enum class DeviceFaultKind : std::uint8_t {
   period_fixed,    // "period": refuses another 60C2h while operation is enabled
   power_loss,      // "power": off, and on again at the end
   jammed,          // "jammed": the motor can't turn
-  // Drives on a Modbus line, which know "silent", "power" and "jammed" as well
+  runaway,         // "runaway": goes off from its setpoints at AMOUNT rad/s
+  reversed,        // "reversed": goes from where it is as far to the other side as it is told
+  ignored,         // "ignored": stays where it is, whatever it is told
+  weak,            // "weak": its motor gives no more than AMOUNT Nm, at the joint
+  offset,          // "offset": the position that it reports is AMOUNT rad too large
+  stuck,           // "stuck": it reports one position whatever it does
+  // Drives on a Modbus line, which know "silent", "power", "jammed" and what follows that as well
   modbus_exception,   // "exception": each request is answered by exception 04
   modbus_closed,      // "closed": the connection is closed
   modbus_wrong_unit,  // "wrong_unit": its answers bear the next unit's number
@@ -50,6 +57,7 @@ struct DeviceFault {
   std::string device;
   DeviceFaultKind kind = DeviceFaultKind::drive_silent;
   std::uint32_t value = 0;
+  double amount = 0.0;       // of a linear axis, read m for rad and N for Nm
   std::int64_t from_ns = 0;  // since power on
   std::int64_t until_ns = std::numeric_limits<std::int64_t>::max();
 };

@@ -32,6 +32,9 @@ class ServoLoop {
   // 60C2h. Takes effect with the next target.
   void set_interpolation_period_ns(std::int64_t period_ns) noexcept { period_ns_ = period_ns; }
 
+  // The motor gives no more than this, as a torque at the joint.
+  void set_max_torque_Nm(double torque_Nm) noexcept { max_torque_Nm_ = torque_Nm; }
+
   // At SYNC, with the latched 607Ah. Ignored when not powered. A setpoint faster than the drive's top speed lags behind
   // its target (limited() says so).
   void set_target(std::int32_t target_counts, std::int64_t time_ns) noexcept;

@@ -131,6 +131,7 @@ TEST(CycleAllocation, IsNoneInAFaultAndTheStopAfterIt) {
   expect_no_allocation({.device_faults = {"axis_3:fault=0x4210@1.9s"}}, Fault::drive_fault);
   expect_no_allocation({.device_faults = {"axis_2:silent@1.9s"}}, Fault::drive_silent);
   expect_no_allocation({.device_faults = {"sensor:frozen@1.9s"}}, Fault::sensor_frozen);
+  expect_no_allocation({.device_faults = {"axis_2:runaway=0.5@1.9s"}}, Fault::drive_deviates);
 }
 
 TEST(CycleAllocation, IsNoneInAChangeOfTheTimestep) {

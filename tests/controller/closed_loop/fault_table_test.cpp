@@ -264,6 +264,13 @@ RigOptions creeping_out() {
   return options;
 }
 
+// A joint that comes free after 0.7 s, in the hold: 0.3 s later the session goes on.
+RigOptions jammed_for_a_while() {
+  RigOptions options{.device_faults = {"axis_2:jammed@1.9s..2.6s"}};
+  options.commands = {{2'700'000'000, {Order::resume}}};
+  return options;
+}
+
 RigOptions rail_fault() {
   RigOptions options = failing_device("rail:silent");
   options.cell = "models/cells/rail.yaml";
@@ -411,6 +418,10 @@ std::vector<Row> rows() {
                              .receiver = "controller",
                              .flips = {{.byte = 4, .bit = 5}}});
        }},
+      // 1 rad/s, until 5 mrad and some lag are between them.
+      {drive_deviates, Reaction::stop_0, 20, way_m, [] { return failing_device("axis_1:runaway=1"); }},
+      // Half a second in which it is behind; and what the setpoint takes to be half a milliradian ahead.
+      {drive_blocked, Reaction::hold, 520, way_m, jammed_for_a_while},
       {target_out_of_range, Reaction::stop_1, 2, way_m,
        [] {
          RigOptions options;

@@ -65,10 +65,10 @@ TEST(ModbusAxis, FollowsASidewaysMotion) {
   EXPECT_LT(worst_m, 0.022 * fastest_m_per_s);
 }
 
-// The rail jams in the middle of that motion, is pushed on for a second and comes free: it snapped by 0.84 m/s when
-// only the leash held it.
+// The rail jams in the middle of that motion, is pushed on for 0.4 s and comes free: it snapped by 0.84 m/s when only
+// the leash held it.
 TEST(ModbusAxis, WindsNothingUpBehindAJammedRail) {
-  RigOptions options = rail({"rail:jammed@1.3s..2.3s"});
+  RigOptions options = rail({"rail:jammed@1.3s..1.7s"});
   options.scene = "scenes/free.yaml";
   options.hand = sideways_hand();
   options.duration_s = 3.5;
@@ -86,7 +86,7 @@ TEST(ModbusAxis, WindsNothingUpBehindAJammedRail) {
   std::printf("tip %.3f m/s, proxy to tool %.2f mm, waited %zu cycles\n", fastest_m_per_s, 1e3 * furthest_m, waited);
   EXPECT_LT(fastest_m_per_s, rig.cell.limits.max_tool_speed_m_per_s);
   EXPECT_LE(furthest_m, rig.cell.limits.leash_m + 1e-6);
-  EXPECT_GT(waited, 300u);
+  EXPECT_GT(waited, 150u);
   EXPECT_GT(rail_m(rig.records.back(), rig), 0.1) << "m: it went on";
 }
 

@@ -158,6 +158,59 @@ TEST_F(FaultMonitorTest, LetsAnEncoderThatWasSilentCatchUp) {
   EXPECT_EQ(watched.times(Fault::position_implausible), 0u);
 }
 
+struct FollowingTest : FaultMonitorTest {
+  FollowingTest() {
+    for (std::size_t i = 0; i < 6; ++i) drives[i].angle_rad = drives[i].told_rad;
+    measurement.take();
+    for (int k = 0; k < 50; ++k) judge_following(Phase::rendering);
+  }
+  void judge_following(Phase entered) {
+    ++watched.cycle;
+    measurement.take();
+    following.judge_encoders(measurement.now(), entered);
+  }
+  FaultMonitor following{drives.on_bus,
+                         settings,
+                         200.0,
+                         watched.supervisor,
+                         watched.alarm,
+                         std::nullopt,
+                         DriveMonitor(arm, cell.drives, cell.limits.following_error_rad)};
+};
+
+TEST_F(FollowingTest, SwitchesADriveOffThatGoesWhereNobodySentIt) {
+  for (int k = 0; k < 40; ++k) {
+    drives[2].angle_rad += 1e-4;
+    judge_following(Phase::holding);
+  }
+  EXPECT_EQ(stopped_for(), Fault::drive_deviates);
+  EXPECT_EQ(watched.supervisor.report().where, 2);
+  EXPECT_EQ(watched.supervisor.report().reaction, Reaction::stop_0);
+  EXPECT_EQ(watched.supervisor.phase(), Phase::disabling);
+}
+
+TEST_F(FollowingTest, HoldsTheArmForADriveThatDoesNotComeToItsSetpoint) {
+  drives[3].told_rad += 1e-3;
+  for (int k = 0; k < 480; ++k) judge_following(Phase::rendering);
+  EXPECT_EQ(watched.supervisor.phase(), Phase::rendering);
+  for (int k = 0; k < 40; ++k) judge_following(Phase::rendering);
+  EXPECT_EQ(watched.supervisor.phase(), Phase::holding);
+  EXPECT_EQ(watched.times(Fault::drive_blocked), 1u);
+  for (int k = 0; k < 2'000; ++k) judge_following(Phase::holding);
+  EXPECT_EQ(watched.times(Fault::drive_blocked), 1u) << "in the hold no setpoint waits";
+}
+
+TEST_F(FollowingTest, LetsAnArmThatIsOffBeMoved) {
+  for (const Phase phase : {Phase::idle, Phase::disabling, Phase::faulted}) {
+    drives[2].angle_rad += 0.01;
+    judge_following(phase);
+  }
+  drives[2].follows = false;
+  drives[2].angle_rad += 0.01;
+  judge_following(Phase::enabling);
+  EXPECT_EQ(stopped_for(), Fault::none);
+}
+
 TEST_F(FaultMonitorTest, JudgesNoEncoderOfAnArmThatIsFree) {
   drives[0].angle_rad += 1.0;
   measurement.take();

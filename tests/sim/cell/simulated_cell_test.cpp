@@ -252,13 +252,43 @@ TEST(DeviceFault, IsReadFromText) {
   EXPECT_EQ(fault.from_ns, 1'500'000'000);
   EXPECT_EQ(fault.until_ns, 2'000'000'000);
   EXPECT_EQ(parse_device_fault("sensor:silent").kind, DeviceFaultKind::sensor_silent);
+  const DeviceFault runaway = parse_device_fault("axis_3:runaway=-0.5rad/s@1s");
+  EXPECT_EQ(runaway.kind, DeviceFaultKind::runaway);
+  EXPECT_EQ(runaway.amount, -0.5);
+  EXPECT_EQ(parse_device_fault("axis_3:runaway=0.5").amount, 0.5);
+  EXPECT_EQ(parse_device_fault("axis_3:offset=-5mrad").amount, -5e-3);
+  EXPECT_EQ(parse_device_fault("axis_2:weak=100Nm").amount, 100.0);
+  EXPECT_EQ(parse_device_fault("axis_2:weak=0").amount, 0.0);
+  EXPECT_EQ(parse_device_fault("axis_2:ignored@1s").kind, DeviceFaultKind::ignored);
 }
 
 TEST(DeviceFault, RefusesWhatItCannotBe) {
-  for (const char* text :
-       {"", "axis_2", ":silent", "axis_2:", "axis_2:nonsense", "axis_2:frozen", "sensor:fault=1", "axis_2:fault",
-        "axis_2:silent=3", "axis_2:fault=", "axis_2:fault=0x", "axis_2:fault=99999999999", "axis_2:fault=1@",
-        "axis_2:fault=1@3", "axis_2:silent@2s..1s", "axis_2:silent@2s..2s", "axis_2:device_type=1@2s"}) {
+  for (const char* text : {"",
+                           "axis_2",
+                           ":silent",
+                           "axis_2:",
+                           "axis_2:nonsense",
+                           "axis_2:frozen",
+                           "sensor:fault=1",
+                           "axis_2:fault",
+                           "axis_2:silent=3",
+                           "axis_2:fault=",
+                           "axis_2:fault=0x",
+                           "axis_2:fault=99999999999",
+                           "axis_2:fault=1@",
+                           "axis_2:fault=1@3",
+                           "axis_2:silent@2s..1s",
+                           "axis_2:silent@2s..2s",
+                           "axis_2:device_type=1@2s",
+                           "axis_2:runaway",
+                           "axis_2:runaway=",
+                           "axis_2:runaway=0",
+                           "axis_2:runaway=--1",
+                           "axis_2:runaway=5mrad",
+                           "axis_2:offset=5mm",
+                           "axis_2:weak=-1",
+                           "axis_2:stuck=1",
+                           "sensor:offset=1mrad"}) {
     EXPECT_THROW((void)parse_device_fault(text), description::SetupError) << text;
   }
 }

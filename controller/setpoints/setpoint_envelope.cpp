@@ -1,0 +1,23 @@
+#include "controller/setpoints/setpoint_envelope.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+namespace proxarm::controller {
+
+double following_lag_s(const description::DriveDescription& drive, double period_s, double feedback_period_s) noexcept {
+  return 5.0 * period_s + 2.0 * feedback_period_s + 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz);
+}
+
+void SetpointEnvelope::step(Eigen::Index joint, double setpoint_rad, double period_s, double lag_s) noexcept {
+  const double s = setpoint_rad, kept = 1.0 - period_s / lag_s;
+  double &low = low_rad_[joint], &high = high_rad_[joint];
+  low = std::min(s, s + kept * (low - s));
+  high = std::max(s, s + kept * (high - s));
+}
+
+double SetpointEnvelope::outside_rad(Eigen::Index joint, double angle_rad) const noexcept {
+  return angle_rad - std::clamp(angle_rad, low_rad_[joint], high_rad_[joint]);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,158 @@
+#!/usr/bin/python3
+"""Drives that go where nobody sent them, and encoders that lie: what the steel does, by the record alone.
+
+The story: setpoints waited for a drive that didn't follow by going to where it said that it was. An encoder that said
+5 mrad too much drove an arm that nobody touched by 1.05 m at 0.6 m/s, without a fault; a drive that was too weak let it
+fall by 0.9 m at 2.3 m/s; one that ran off at 0.5 rad/s was chased. Jams and drives that heeded nothing were waited for
+without end.
+
+Judged by the columns true_tool_W of signals.csv: the simulated steel, which the controller never sees. What a deviation
+does is told by another session with the same hand and no deviation.
+"""
+import csv
+import math
+import unittest
+
+import harness
+
+# From power on; the first cycle is 0.2 s later, to a cycle or two.
+FAULT_S = 1.9
+BEFORE_FIRST_CYCLE_S = 0.2
+SLACK_S = 0.003
+# What the deviation may last, and how far the tool may go by it.
+MOST_S, MOST_M = 0.2, 0.05
+# An empty handle drifts by the sensor's bias and noise: 0.5 mm/s here.
+DRIFT_M = 0.005
+# What shows, as against a session without it.
+SHOWS_M = 1e-3
+# For as long a joint may be behind; where the hand makes its setpoint swing about it, twice as long.
+BLOCKED_S, SWINGS_S = 0.5, 1.0
+
+NOBODY = """name: nobody
+mass_kg: 0
+stiffness_N_per_m: 0
+damping_Ns_per_m: 0
+waypoints:
+  - {time_s: 0, offset_m: [0, 0, 0]}
+"""
+# To all sides, so that every joint has to move.
+SOMEBODY = """name: somebody
+mass_kg: 1.0
+stiffness_N_per_m: 500
+damping_Ns_per_m: 20
+waypoints:
+  - {time_s: 0.4, offset_m: [0, 0, 0]}
+  - {time_s: 2.6, offset_m: [0.16, 0.12, -0.1]}
+"""
+
+DEVIATES = {"drive_deviates", "position_implausible"}
+
+
+class Track:
+    """A session's phases and places of the steel, by its record."""
+
+    def __init__(self, folder):
+        with open(folder / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        self.time_s = [float(row["time_s"]) for row in rows]
+        self.phase = [row["phase"] for row in rows]
+        self.place = [tuple(float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz") for row in rows]
+
+    def at(self, time_s):
+        return next(k for k, t in enumerate(self.time_s) if t >= time_s)
+
+    def leaves_rendering(self, start):
+        """The first cycle from `start` on that doesn't render; None: there is none before the session's end."""
+        return next((k for k in range(start, len(self.phase)) if self.phase[k] != "rendering"), None)
+
+
+class Deviations(harness.ProgramTest):
+    references = {}  # by the hand: sessions in which nothing deviates
+
+    def session(self, hand, *arguments):
+        # For a hand that holds nothing no mass is said to be stable.
+        outcome = self.call("run", "--scene", harness.SOURCE / "scenes/free.yaml", "--hand",
+                            self.written(f"{hand}.yaml", {"nobody": NOBODY, "somebody": SOMEBODY}[hand]), "--duration",
+                            "2.6s", "--force-unstable", "--no-plot", "--record", "record", "--json", *arguments)
+        return outcome.summary, Track(self.folder / "record")
+
+    def reference(self, hand):
+        if hand not in self.references:
+            summary, track = self.session(hand)
+            self.assertEqual(summary["faults"], [])
+            self.references[hand] = track
+        return self.references[hand]
+
+    def judged(self, hand, fault):
+        """A session with this fault: what ended it, how long after the fault and after it showed, how far off the steel
+        went until it came to rest, and how far it went in all."""
+        reference = self.reference(hand)
+        summary, track = self.session(hand, "--fault", f"{fault}@{FAULT_S}s")
+        began = track.at(FAULT_S - BEFORE_FIRST_CYCLE_S - SLACK_S)
+        ended = track.leaves_rendering(began)
+        until = min(ended, len(reference.place))
+        apart = [math.dist(track.place[k], reference.place[k]) for k in range(began, until)]
+        shown = next((began + i for i, m in enumerate(apart) if m > SHOWS_M), ended)
+        off = max(apart)
+        coasting = max(math.dist(place, track.place[ended]) for place in track.place[ended:])
+        names = {f["fault"] for f in summary["faults"]} | {n["fault"] for n in summary["notices"]}
+        after = track.time_s[ended] - track.time_s[began]
+        went = max(math.dist(place, track.place[began]) for place in track.place[began:])
+        print(f"{fault:22s} {hand:8s} {', '.join(sorted(names)) or 'nothing':22s} {1e3 * after:5.0f} ms, "
+              f"{1e3 * (off + coasting):5.1f} mm off, {1e3 * went:5.1f} mm in all")
+        return names, after, track.time_s[ended] - track.time_s[shown], off + coasting, went
+
+    def test_a_drive_or_an_encoder_that_deviates_is_stopped_at_once(self):
+        for fault in ("axis_1:runaway=0.1", "axis_2:runaway=0.5", "axis_2:runaway=-0.5", "axis_3:runaway=1",
+                      "axis_5:runaway=0.5", "axis_2:offset=1.5mrad", "axis_2:offset=5mrad", "axis_3:offset=-5mrad",
+                      "axis_1:offset=20mrad", "axis_2:offset=100mrad", "axis_2:weak=100Nm", "axis_3:weak=20Nm"):
+            for hand in ("nobody", "somebody"):
+                with self.subTest(f"{fault}, {hand}"):
+                    names, after, _, off, _ = self.judged(hand, fault)
+                    self.assertTrue(names and names <= DEVIATES, names)
+                    self.assertLessEqual(after, MOST_S + SLACK_S)
+                    self.assertLessEqual(off, MOST_M)
+
+    def test_one_that_can_not_carry_or_turns_the_wrong_way_is_stopped_when_it_shows(self):
+        """The hand moves it, or nothing does: then there is nothing to stop."""
+        for fault in ("axis_1:reversed", "axis_2:reversed", "axis_3:reversed", "axis_2:weak=150Nm"):
+            with self.subTest(f"{fault}, somebody"):
+                names, _, after, off, _ = self.judged("somebody", fault)
+                self.assertEqual(names, {"drive_deviates"})
+                self.assertLessEqual(after, MOST_S)
+                self.assertLessEqual(off, MOST_M)
+            with self.subTest(f"{fault}, nobody"):
+                self.assertLessEqual(self.judged("nobody", fault)[-1], 2 * DRIFT_M)
+
+    def test_one_that_does_not_come_is_held_after_half_a_second(self):
+        for fault in ("axis_1:jammed", "axis_2:jammed", "axis_2:ignored", "axis_3:ignored", "axis_1:stuck",
+                      "axis_3:stuck"):
+            with self.subTest(f"{fault}, somebody"):
+                names, after, _, _, _ = self.judged("somebody", fault)
+                # A drive that stops dead at speed goes back by more than it may.
+                self.assertEqual(names, {"drive_deviates" if fault == "axis_2:ignored" else "drive_blocked"})
+                self.assertLessEqual(after, SWINGS_S if fault == "axis_3:ignored" else BLOCKED_S + 0.1)
+            with self.subTest(f"{fault}, nobody"):
+                names, _, _, _, went = self.judged("nobody", fault)
+                self.assertLessEqual(names, {"drive_blocked"})
+                self.assertLessEqual(went, DRIFT_M)
+
+    def test_a_joint_that_comes_free_goes_on_without_a_snap(self):
+        reference = self.reference("somebody")
+        summary, track = self.session("somebody", "--fault", "axis_2:jammed@1.9s..2.2s")
+        self.assertEqual(summary["faults"], [])
+        began = track.at(1.6)
+        fastest = max(math.dist(a, b) / 1e-3 for a, b in zip(track.place[began:], track.place[began + 1:]))
+        self.assertLess(fastest, 0.5)
+        last = track.leaves_rendering(began) - 1
+        self.assertLess(math.dist(track.place[last], reference.place[last]), 0.01)
+
+    def test_what_a_deviation_did_is_replayed_to_the_bit(self):
+        for fault in ("axis_3:offset=1.5mrad", "axis_3:jammed"):
+            self.session("somebody", "--fault", f"{fault}@{FAULT_S}s")
+            outcome = self.call("replay", "record")
+            self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+
+if __name__ == "__main__":
+    unittest.main()
