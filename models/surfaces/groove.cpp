@@ -164,8 +164,9 @@ class Groove {
     look_for_another_root(c, is_root);
   }
 
-  // A contact that came straight down onto the line may stick there while the other slips. True: it does, whatever
-  // comes of that. Else lo and hi have moved to the side of such a contact to which it is pushed, where the root is.
+  // A contact with w = 0 need not slip across the line, so it may stick while the other slips. Returns true if one
+  // sticks: the solution is then accepted, or there is none because a contact pulls. Otherwise lo and hi are narrowed
+  // to the side to which that contact is pushed, where the root is.
   bool one_sticks(const CrossSection& c, double& lo, double& hi) noexcept {
     for (int i = 0; i < 2; ++i) {
       if (c.w[i] != 0.0 || !(c.mu[i] > 0.0) || c.s_q[i] < lo || c.s_q[i] > hi) continue;
@@ -184,10 +185,10 @@ class Groove {
     return false;
   }
 
-  // Where p is far deeper than q was away, friction on arrival can outweigh the faces' own directions: g then has
-  // several roots, or jumps through infinity between them. They are looked for from p towards rest, in intervals that
-  // shrink by 0.7 towards s_1. Where the first root was one, but of a contact that pulls, only the intervals count in
-  // which both parts of a slip matter (within 1000 w of s_1): beyond, g has no other root.
+  // Where p is far deeper than q was away, friction across the line can make the 2 × 2 system singular: g then has
+  // several roots, or poles between them. Roots are looked for from s_p towards s_1, in intervals that end 0.7 times as
+  // far from s_1 as they begin. If the first root was refused because a contact pulls, the search begins 1000 w from
+  // s_1: farther away all slips are practically along e, and g has no further root.
   void look_for_another_root(const CrossSection& c, bool first_was_root) noexcept {
     const double widest = std::max(std::abs(c.w[0]), std::abs(c.w[1])), way = std::abs(s_p_ - s_q_[0]);
     double at = first_was_root ? std::min(1.0, 1e3 * widest / way) : 1.0;

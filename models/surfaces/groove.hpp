@@ -1,11 +1,13 @@
 // Two flat surfaces at once: the proxy in the line where they meet, with friction on each side.
 //
-// The proxy at r = x₀ + s e is held by both. In units where K = 1 they share the force f = r − p:
+// The proxy at r = x₀ + s e is held by both contacts. In units where K = 1 they share the force f = r − p:
 //   Σ f_i (n_i − μ_i v_i/‖v_i‖) = r − p,   f_i ≥ 0.
-// Contact i slips along its own v_i = N_i N_iᵀ (r − q_i) = (s − s_i) e + w_i t_i, t_i = e × n_i, as (17) says for each
-// surface with v = (r − q)/T. (On arrival from beside the line v_i isn't along e; taking it to be so would be wrong by
-// up to 18 % of the force.) The components across e are a 2 × 2 linear system for f₁ and f₂, given s. The component
-// along e then is one scalar equation g(s) = 0, solved by the secant method and, where that fails, by false position.
+// As (17) says for each surface, contact i slips along v_i = N_i N_iᵀ (r − q_i) = (s − s_i) e + w_i t_i, where t_i = e
+// × n_i, s_i = eᵀ(q_i − x₀), w_i = −t_iᵀ(q_i − x₀). (On arrival from beside the line w_i ≠ 0; leaving it out would be
+// wrong by up to 18 % of the force.) Given s, the components across e are a 2 × 2 linear system for f₁ and f₂. With s_p
+// = eᵀ(p − x₀), the component along e is one scalar equation,
+//   g(s) = s − s_p + Σ f_i μ_i (s − s_i)/‖v_i‖ = 0,
+// solved by the secant method and, where that fails, by false position.
 //
 // If the proxy was in the line already (w_i = 0), there is a closed form: f_i are those without friction, and
 //   s = s_q if |s_p − s_q| ≤ μ₁f₁ + μ₂f₂,  else s_p ∓ (μ₁f₁ + μ₂f₂).

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-// Longest push, in parts of what the object has moved at q. The push along the guide is that motion over the sine of
+// The longest push, as a multiple of the object's motion at q. The push along the guide is that motion over the sine of
 // the angle between surface and guide, so ten allows angles down to about 6°; an object that leans less comes across
 // the guide and would throw the proxy far along it.
 constexpr double longest_push = 10.0;

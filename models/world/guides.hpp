@@ -6,13 +6,12 @@
 // This is (4) with the distance from the line in the place of the penetration. A q beside the guide is first moved to
 // the nearest point of the guide.
 //
-// An object that moves onto the proxy pushes it along a line or a polyline before anything else happens: from q, which
-// the object has come over, to the next point q' of the guide that is free of the object, on the side to which its
-// surface leans. Then q' takes the place of q, and (4) and the stops are those of objects at rest. This is the solution
-// in which the object exerts a force F ≥ 0 along the guide, zero unless they touch: r = q' where eᵀ(p − q') ≤ μ ‖f_⟂‖,
-// with e towards the side pushed to. q' depends neither on p nor on K, so Assumption 1 holds. The proxy is squeezed()
-// if there is no such q' within ten times what the object has moved at q: it comes across the guide, the guide ends, or
-// another object is in the way.
+// An object that has moved over q first pushes the proxy along a line or a polyline, to q': the next point of the guide
+// outside the object, in the direction d = ±e with nᵀd > 0, n the object's normal there. Then q' takes the place of q,
+// and (4) and the stops are those of objects at rest. The object thus exerts a force F ≥ 0 along d, zero unless they
+// touch: r = q' where dᵀ(p − q') ≤ μ ‖f_⟂‖. q' depends neither on p nor on K, so Assumption 1 holds. The proxy is
+// squeezed() if there is no q' within ten times the object's motion at q: the object moves nearly across the guide, the
+// guide ends, or another object is in the way.
 //
 // A plane among objects is two half-spaces back to back (scenes/compiler/compile.cpp): a World solves it with them.
 #pragma once

@@ -42,8 +42,9 @@ struct CheckRegion {
   bool acts_without_contact = false;              // a field, a Coulomb medium or a guide
   // The stiffness that viscous media add to the coupling at q: b/T, N/m. Their force isn't one of the contacts'.
   std::function<double(const models::Vec<N>& q)> viscous_N_per_m{};
-  // There is a Coulomb medium. Whether and how little a proxy slips in it is extrapolated from a few thousandths of its
-  // way (models/surfaces/coulomb_step.hpp), which amplifies rounding by the inverse of that share.
+  // There is a Coulomb medium. Whether the proxy sticks in it, and how far a short slip goes, is extrapolated from
+  // samples at 4 % of the way to p and less (models/surfaces/coulomb_step.hpp), which amplifies rounding by the inverse
+  // of that share.
   bool has_coulomb_medium = false;
   bool bends = false;  // there is a chain of pieces: near a corner, a place on the other piece may be a solution too
   bool soft = false;   // there is an elastic layer: nothing rests within it without a force

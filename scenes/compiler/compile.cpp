@@ -204,7 +204,7 @@ void add_plane_guide(const GuideDescription& guide, std::int32_t index, Entries&
   for (const double side : {1.0, -1.0}) {
     auto half =
         std::make_unique<models::PlaneObstacle>(guide.points_m.front(), Vec3(side * guide.direction), guide.friction);
-    half->set_slack(8.0);  // a point of the one mustn't be behind the other for its rounding
+    half->set_slack(8.0);  // a point on either surface is behind the other by the rounding of both
     entries.push_back({std::move(half), index, side > 0.0 ? 0 : 1});
   }
 }
