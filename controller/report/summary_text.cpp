@@ -174,16 +174,27 @@ std::string timing_json(const Summary& s) {
   return json.dump(2) + "\n";
 }
 
-std::string summary_text(const Summary& s) {
-  std::string text;
-  const auto line = [&text](const char* name, const std::string& value) {
-    text += "  ";
-    text += name;
-    text.append(name[0] == '\0' ? 0 : 1, ':');
+namespace {
+
+// The summary's lines: names on the left, in a column of their own.
+class Lines {
+ public:
+  void operator()(const char* name, const std::string& value) {
+    text_ += "  ";
+    text_ += name;
+    text_.append(name[0] == '\0' ? 0 : 1, ':');
     const std::size_t width = std::char_traits<char>::length(name) + 1;
-    text.append(width < 26 ? 26 - width : 1, ' ');
-    text += value + "\n";
-  };
+    text_.append(width < 26 ? 26 - width : 1, ' ');
+    text_ += value + "\n";
+  }
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+
+ private:
+  std::string text_;
+};
+
+// What it took: time, processor, buses.
+void tell_time(const Summary& s, Lines& line) {
   line("time", format("%.3f s in ", s.simulated_time_s) + std::to_string(s.cycles) + " cycles, " +
                    format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s", s.wall_time_s));
   line("compute per cycle",
@@ -204,6 +215,10 @@ std::string summary_text(const Summary& s) {
   for (const auto& [bus, load] : s.bus_load)
     loads += (loads.empty() ? "" : ", ") + bus + format(" %.1f %%", 100 * load);
   if (!loads.empty()) line("bus load", loads);
+}
+
+// What was felt, and how true it was.
+void tell_motion(const Summary& s, Lines& line) {
   line("apparent mass",
        number(s.apparent_mass_kg, "%.3f kg") +
            (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own") +
@@ -226,6 +241,10 @@ std::string summary_text(const Summary& s) {
        "rms " + number(s.contact_force_error_N, "%.3f N") + ", max " + number(s.contact_force_error_max_N, "%.3f N"));
   line("friction ratio error", s.friction_ratio_error ? format("%+.2f %%", 100 * *s.friction_ratio_error) : "none");
   line("pulling force", format("%.3g N", s.pulling_force_max_N));
+}
+
+// What kept the motion back, and the energy that went through it.
+void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
   for (const auto& [parameter, cycles] : s.active_limits)
     line("", parameter + ": " + std::to_string(cycles) + " cycles");
@@ -238,9 +257,10 @@ std::string summary_text(const Summary& s) {
     line("damping added", format("%.2f s, ", s.passivity->added_time_s) +
                               format("at most %.3g Ns/m", s.passivity->added_damping_max_Ns_per_m));
   }
-  if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
-  line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
-  line("setpoints (SHA-256)", s.setpoint_sha256);
+}
+
+// What happened.
+void tell_events(const Summary& s, Lines& line) {
   for (const NoticeSummary& notice : s.notices) {
     const std::string times = notice.times == 1 ? "once" : std::to_string(notice.times) + " times";
     line("noticed", fault_name(notice.fault) + (" " + times) + ", " + std::to_string(notice.cycles) +
@@ -257,7 +277,20 @@ std::string summary_text(const Summary& s) {
   if (!s.end.text.empty()) line("ended", s.end.text);
   if (s.faults.empty()) line("faults", "none");
   for (const FaultSummary& fault : s.faults) line(fault.was_reset ? "fault, then reset" : "FAULT", fault.text);
-  return text;
+}
+
+}  // namespace
+
+std::string summary_text(const Summary& s) {
+  Lines line;
+  tell_time(s, line);
+  tell_motion(s, line);
+  tell_limits(s, line);
+  if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
+  line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
+  line("setpoints (SHA-256)", s.setpoint_sha256);
+  tell_events(s, line);
+  return line.text();
 }
 
 }  // namespace proxarm::controller

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -204,18 +205,19 @@ void TriangleMesh::check_closed() {
   structure_.closed = forth == back;
 }
 
-// Builds the tree by median splits: triangles are halved by the centres of their boxes, along the longest side of the
-// box around those centres, until a leaf's worth is left. Triangles and vertices are then put in that order.
-void TriangleMesh::build() {
-  const auto count = static_cast<std::uint32_t>(size());
-  struct Item {
-    std::array<float, 3> low, high, middle;
-    std::uint32_t triangle;
-  };
-  std::vector<Item> items(count);
-  for (std::uint32_t t = 0; t < count; ++t) {
-    const Vec3 low = corner(t, 0).cwiseMin(corner(t, 1)).cwiseMin(corner(t, 2));
-    const Vec3 high = corner(t, 0).cwiseMax(corner(t, 1)).cwiseMax(corner(t, 2));
+namespace {
+
+// A triangle on its way into the tree: its box, rounded outwards, and the box's middle.
+struct Item {
+  std::array<float, 3> low, high, middle;
+  std::uint32_t triangle;
+};
+
+std::vector<Item> items_of(const TriangleMesh& mesh) {
+  std::vector<Item> items(mesh.size());
+  for (std::uint32_t t = 0; t < items.size(); ++t) {
+    const Vec3 low = mesh.corner(t, 0).cwiseMin(mesh.corner(t, 1)).cwiseMin(mesh.corner(t, 2));
+    const Vec3 high = mesh.corner(t, 0).cwiseMax(mesh.corner(t, 1)).cwiseMax(mesh.corner(t, 2));
     Item& item = items[t];
     item.triangle = t;
     for (Eigen::Index k = 0; k < 3; ++k) {
@@ -225,6 +227,46 @@ void TriangleMesh::build() {
       item.middle[i] = 0.5f * (item.low[i] + item.high[i]);
     }
   }
+  return items;
+}
+
+// Puts the items' lower half by their middles before the upper one, along the longest side of the middles' box.
+void halve(std::span<Item> items, const std::array<float, 3>& low, const std::array<float, 3>& high) {
+  std::size_t axis = 0;
+  for (std::size_t k = 1; k < 3; ++k) axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
+  const auto half = items.begin() + static_cast<std::ptrdiff_t>(items.size() / 2);
+  std::nth_element(items.begin(), half, items.end(), [axis](const Item& a, const Item& b) {
+    return a.middle[axis] < b.middle[axis] || (a.middle[axis] == b.middle[axis] && a.triangle < b.triangle);
+  });
+}
+
+// Triangles in the order of the items, vertices in that of their first use.
+void put_in_order(const std::vector<Item>& items, TriangleMesh::Structure& structure) {
+  std::vector<std::array<std::uint32_t, 3>> triangles(items.size());
+  for (std::size_t t = 0; t < items.size(); ++t) triangles[t] = structure.triangles[items[t].triangle];
+  structure.triangles = std::move(triangles);
+  std::vector<Vec3> vertices;
+  vertices.reserve(structure.vertices.size());
+  std::vector<std::uint32_t> place(structure.vertices.size(), kUnused);
+  for (auto& triangle : structure.triangles) {
+    for (std::uint32_t& index : triangle) {
+      if (place[index] == kUnused) {
+        place[index] = static_cast<std::uint32_t>(vertices.size());
+        vertices.push_back(structure.vertices[index]);
+      }
+      index = place[index];
+    }
+  }
+  structure.vertices = std::move(vertices);
+}
+
+}  // namespace
+
+// Builds the tree by median splits: triangles are halved by the centres of their boxes, along the longest side of the
+// box around those centres, until a leaf's worth is left. Triangles and vertices are then put in that order.
+void TriangleMesh::build() {
+  const auto count = static_cast<std::uint32_t>(size());
+  std::vector<Item> items = items_of(*this);
   struct Part {
     std::uint32_t begin, end, pair, of;  // `of`: which of the pair it is
   };
@@ -254,13 +296,8 @@ void TriangleMesh::build() {
       pair.first[part.of] = part.begin;
       pair.count[part.of] = part.end - part.begin;
     } else {
-      std::size_t axis = 0;
-      for (std::size_t k = 1; k < 3; ++k) axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
       const std::uint32_t half = part.begin + (part.end - part.begin) / 2;
-      const auto at = [&items](std::uint32_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
-      std::nth_element(at(part.begin), at(half), at(part.end), [axis](const Item& a, const Item& b) {
-        return a.middle[axis] < b.middle[axis] || (a.middle[axis] == b.middle[axis] && a.triangle < b.triangle);
-      });
+      halve(std::span(items).subspan(part.begin, part.end - part.begin), low, high);
       const auto within = static_cast<std::uint32_t>(structure_.nodes.size());
       pair.first[part.of] = within;
       structure_.nodes.emplace_back();
@@ -268,23 +305,7 @@ void TriangleMesh::build() {
       parts.push_back({part.begin, half, within, 0});
     }
   }
-
-  std::vector<std::array<std::uint32_t, 3>> triangles(count);
-  for (std::uint32_t t = 0; t < count; ++t) triangles[t] = structure_.triangles[items[t].triangle];
-  structure_.triangles = std::move(triangles);
-  std::vector<Vec3> vertices;
-  vertices.reserve(structure_.vertices.size());
-  std::vector<std::uint32_t> place(structure_.vertices.size(), kUnused);
-  for (auto& triangle : structure_.triangles) {
-    for (std::uint32_t& index : triangle) {
-      if (place[index] == kUnused) {
-        place[index] = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(structure_.vertices[index]);
-      }
-      index = place[index];
-    }
-  }
-  structure_.vertices = std::move(vertices);
+  put_in_order(items, structure_);
 }
 
 std::size_t TriangleMesh::bytes() const noexcept {

@@ -7,35 +7,17 @@
 #include <cstdio>
 
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
+#include "tests/controller/closed_loop/joint_limits.hpp"
 
 namespace proxarm::controller {
 namespace {
 
 using models::Vec3;
 using testing::ClosedLoopRig;
-using testing::expect_step_within_limits;
+using testing::expect_within_joint_limits;
 using testing::RigOptions;
 
 constexpr std::int64_t ms = 1'000'000;
-
-bool live(Phase phase) { return phase >= Phase::rendering && phase <= Phase::stopping; }
-
-// Nothing that the drives were sent goes beyond their joints' speed and acceleration by more than rounding to counts,
-// whatever the phases were.
-void expect_within_joint_limits(const ClosedLoopRig& rig) {
-  for (std::size_t axis = 0; axis < 6; ++axis) {
-    for (std::size_t k = 2; k < rig.records.size(); ++k) {
-      if (!live(rig.records[k].phase) || !live(rig.records[k - 1].phase) || !live(rig.records[k - 2].phase)) continue;
-      // The setpoint of a drive that is off by itself follows it.
-      const auto follows = [&](std::size_t i) {
-        return rig.records[i].target_counts[axis] == rig.records[i].actual_counts[axis];
-      };
-      if (follows(k) || follows(k - 1) || follows(k - 2)) continue;
-      expect_step_within_limits(rig, axis, k);
-      if (::testing::Test::HasFatalFailure()) return;
-    }
-  }
-}
 
 std::size_t first_in(const ClosedLoopRig& rig, Phase phase, std::size_t from = 0) {
   std::size_t k = from;

@@ -8,35 +8,19 @@
 
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
+#include "tests/controller/closed_loop/joint_limits.hpp"
 
 namespace proxarm::controller {
 namespace {
 
 using testing::ClosedLoopRig;
-using testing::expect_step_within_limits;
+using testing::expect_within_joint_limits;
 using testing::RigOptions;
 
 constexpr std::int64_t ms = 1'000'000;
 
 Timestep timestep(double period_ms) {
   return {.period_s = 1e-3 * period_ms, .max_missed_samples = 3, .max_repeated_samples = 20};
-}
-
-bool live(Phase phase) { return phase >= Phase::rendering && phase <= Phase::stopping; }
-
-void expect_within_joint_limits(const ClosedLoopRig& rig) {
-  for (std::size_t axis = 0; axis < 6; ++axis) {
-    for (std::size_t k = 2; k < rig.records.size(); ++k) {
-      if (!live(rig.records[k].phase) || !live(rig.records[k - 1].phase) || !live(rig.records[k - 2].phase)) continue;
-      // The setpoint of a drive that is off by itself follows it.
-      const auto follows = [&](std::size_t i) {
-        return rig.records[i].target_counts[axis] == rig.records[i].actual_counts[axis];
-      };
-      if (follows(k) || follows(k - 1) || follows(k - 2)) continue;
-      expect_step_within_limits(rig, axis, k);
-      if (::testing::Test::HasFatalFailure()) return;
-    }
-  }
 }
 
 // Each cycle begins where the one before said, but for those that were late.
