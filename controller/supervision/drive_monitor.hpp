@@ -35,6 +35,7 @@
 
 namespace proxarm::controller {
 
+inline constexpr double away_at_once = 5.0;  // of following_error_rad
 inline constexpr double deviates_m = 5e-3, deviates_s = 0.02, blocked_s = 0.5, held_by_hand_s = 5.0;
 
 // Of one cycle; joint vectors and bits in the order of the drives.
