@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "controller/supervision/drive_monitor.hpp"
 #include "fieldbus/budget/identifier_check.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
 #include "fieldbus/sensors/ati_net_can_oem.hpp"
@@ -52,12 +54,25 @@ struct Drives {
   std::vector<fieldbus::ModbusDrive*> modbus;
 };
 
+// 6065h and 6066h, the drive's own judgement of what the controller judges as well (drive_monitor.hpp), a little later:
+// a deviation beyond what it lags at its highest speed and what is a fault at once; for longer than the setpoint of a
+// joint that has jammed at that speed takes to brake and to come back.
+void watch_following(fieldbus::DriveSettings& settings, const description::DriveDescription& drive,
+                     double following_error_rad) {
+  const double v = drive.max_speed_rad_per_s, a = drive.max_acceleration_rad_per_s2;
+  settings.following_error_window_rad =
+      away_at_once * following_error_rad + v / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz);
+  const double time_ms = 1e3 * (2.5 * v / a + deviates_s);
+  settings.following_error_time_ms = static_cast<std::uint16_t>(std::clamp(std::ceil(time_ms), 1.0, 65535.0));
+}
+
 std::unique_ptr<fieldbus::ServoDrive> make_can_drive(const description::Cell& cell,
                                                      const description::DriveDescription& drive,
                                                      const SessionSettings& settings) {
   fieldbus::DriveSettings own = drive_settings(settings);
   const bool has_inputs = cell.enabling_input && cell.enabling_input->drive == drive.joint;
   if (has_inputs && !settings.without_enabling_input) own.inputs_object = cell.enabling_input->object;
+  watch_following(own, drive, cell.limits.following_error_rad);
   auto servo = std::make_unique<fieldbus::ServoDrive>(drive, own);
   if (!drive.eds.empty()) {
     description::require_bitrate(drive.eds, cell.buses[index_of(cell, drive.bus)].bitrate);

@@ -10,8 +10,7 @@ using models::JointVector;
 
 namespace {
 
-// Of following_error_rad.
-constexpr double away_at_once = 5.0, behind_share = 0.5;
+constexpr double behind_share = 0.5;  // of following_error_rad
 constexpr double forgetting = 0.05;
 constexpr int fewest_cycles = 5;  // in which a drive is away: one of them may be a frame that came late
 // Of the torque that accelerates a drive's rotor as it must be able to.

@@ -243,8 +243,8 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
     steps.push_back(if_present(sdo_write({0x6084, 0}, 4, *ramp, "profile deceleration")));
     steps.push_back(if_present(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
   }
-  steps.push_back(
-      sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"));
+  steps.push_back(if_present(
+      sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window")));
   steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
   if (mode_.torque) append_torque(steps, description_);
   steps.push_back(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"));

@@ -11,9 +11,11 @@ does is told by another session with the same hand and no deviation.
 """
 import csv
 import math
+import re
 import unittest
 
 import harness
+import tool_motion
 
 # From power on; the first cycle is 0.2 s later, to a cycle or two.
 FAULT_S = 1.9
@@ -53,10 +55,11 @@ class Track:
 
     def __init__(self, folder):
         with open(folder / "signals.csv", newline="") as file:
-            rows = list(csv.DictReader(file))
-        self.time_s = [float(row["time_s"]) for row in rows]
-        self.phase = [row["phase"] for row in rows]
-        self.place = [tuple(float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz") for row in rows]
+            header, *rows = csv.reader(file)
+        time, phase, *place = map(header.index, ("time_s", "phase", *(f"true_tool_W_{axis}_m" for axis in "xyz")))
+        self.time_s = [float(row[time]) for row in rows]
+        self.phase = [row[phase] for row in rows]
+        self.place = [tuple(float(row[i]) for i in place) for row in rows]
 
     def at(self, time_s):
         return next(k for k, t in enumerate(self.time_s) if t >= time_s)
@@ -70,8 +73,11 @@ class Deviations(harness.ProgramTest):
     references = {}  # by the hand: sessions in which nothing deviates
 
     def session(self, hand, *arguments):
+        cell = self.changed("models/cells/default.yaml")
+        if "hold_s" not in cell.read_text():
+            cell.write_text(cell.read_text() + "supervision: {hold_s: 0.2}\n")
         # For a hand that holds nothing no mass is said to be stable.
-        outcome = self.call("run", "--scene", harness.SOURCE / "scenes/free.yaml", "--hand",
+        outcome = self.call("run", cell, "--scene", harness.SOURCE / "scenes/free.yaml", "--hand",
                             self.written(f"{hand}.yaml", {"nobody": NOBODY, "somebody": SOMEBODY}[hand]), "--duration",
                             "2.6s", "--force-unstable", "--no-plot", "--record", "record", "--json", *arguments)
         return outcome.summary, Track(self.folder / "record")
@@ -146,6 +152,30 @@ class Deviations(harness.ProgramTest):
         self.assertLess(fastest, 0.5)
         last = track.leaves_rendering(began) - 1
         self.assertLess(math.dist(track.place[last], reference.place[last]), 0.01)
+
+    def test_each_drive_is_told_what_it_may_be_off_and_for_how_long(self):
+        """6065h and 6066h, written and read back by SDO, in counts and milliseconds."""
+        self.session("nobody")
+        log = (self.folder / "record" / "frames.log").read_text()
+        cell = tool_motion.Cell(harness.SOURCE / "models/cells/default.yaml")
+        for axis, drive in enumerate(cell.drives):
+            speed, acceleration = float(drive["max_speed_rad_per_s"]), float(drive["max_acceleration_rad_per_s2"])
+            window_rad = 5 * 1e-3 + speed / (2 * math.pi * float(drive["position_bandwidth_Hz"]))
+            counts = (window_rad * float(drive["counts_per_motor_revolution"]) * float(drive["gear_ratio"])
+                      / (2 * math.pi))
+            node = int(drive["node"])
+            milliseconds = math.ceil(1e3 * (2.5 * speed / acceleration + 0.02))
+            # To a count, which is how far rounding goes.
+            for request, answer, wanted in (("23656000", "43656000", counts), ("2B666000", "4B666000", milliseconds)):
+                for identifier, start in ((0x600 + node, request), (0x580 + node, answer)):
+                    told = re.findall(f" {identifier:03X}#{start}([0-9A-F]+)\n", log)
+                    self.assertEqual(len(told), 1, drive["joint"])
+                    value = int.from_bytes(bytes.fromhex(told[0]), "little")
+                    self.assertLessEqual(abs(value - wanted), 1, drive["joint"])
+
+    def test_a_drive_that_finds_it_first_is_believed(self):
+        summary, _ = self.session("nobody", "--fault", "axis_3:fault=0x8611@1.9s")
+        self.assertEqual([f["fault"] for f in summary["faults"]], ["drive_fault"])
 
     def test_what_a_deviation_did_is_replayed_to_the_bit(self):
         for fault in ("axis_3:offset=1.5mrad", "axis_3:jammed"):

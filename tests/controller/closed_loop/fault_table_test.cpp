@@ -418,8 +418,8 @@ std::vector<Row> rows() {
                              .receiver = "controller",
                              .flips = {{.byte = 4, .bit = 5}}});
        }},
-      // 1 rad/s, until 5 mrad and some lag are between them.
-      {drive_deviates, Reaction::stop_0, 20, way_m, [] { return failing_device("axis_1:runaway=1"); }},
+      // 1 rad/s at 0.8 m, until 5 mrad and some lag are between them.
+      {drive_deviates, Reaction::stop_0, 20, 0.01, [] { return failing_device("axis_1:runaway=1"); }},
       // Half a second in which it is behind; and what the setpoint takes to be half a milliradian ahead.
       {drive_blocked, Reaction::hold, 520, way_m, jammed_for_a_while},
       {target_out_of_range, Reaction::stop_1, 2, way_m,

@@ -157,9 +157,13 @@ TEST_F(Cia402BringUpTest, ToleratesALostFrameOnTheWay) {
 TEST_F(Cia402BringUpTest, NotesOptionalObjectsThatADriveHasnt) {
   three.objects.erase({0x1006, 0});
   three.objects.erase({0x605D, 0});
+  three.objects.erase({0x6065, 0});
+  three.objects.erase({0x6066, 0});
   const auto identities = bring_up();
-  EXPECT_EQ(identities[2].missing, (std::vector<std::string>{"1006h:00 communication cycle period",
-                                                             "605Dh:00 halt option code (slow down on ramp)"}));
+  EXPECT_EQ(
+      identities[2].missing,
+      (std::vector<std::string>{"1006h:00 communication cycle period", "605Dh:00 halt option code (slow down on ramp)",
+                                "6065h:00 following error window", "6066h:00 following error time out"}));
 }
 
 TEST_F(Cia402BringUpTest, NamesADriveThatDoesNotAnswer) {
@@ -238,11 +242,13 @@ TEST_F(Cia402BringUpTest, SaysEachAbortInTheStandardsWords) {
       {0x08000024, "no data available"},
       {0x0BADC0DE, "unknown abort code"}};
   for (const auto& [code, wording] : rows) {
-    three.aborts[{0x6065, 0}] = code;
+    three.aborts[{0x6007, 0}] = code;
     char head[32];
     std::snprintf(head, sizeof head, "SDO abort %08X: ", code);
-    has(refusal(), "bus axes_3, node 3, object 6065h:00 following error window: drive of axis_3: found " +
-                       std::string(head) + wording);
+    has(refusal(),
+        "bus axes_3, node 3, object 6007h:00 abort connection option code (quick stop): drive of axis_3: "
+        "found " +
+            std::string(head) + wording);
     EXPECT_EQ(three.state, 0x7F) << "nothing is enabled";
   }
 }

@@ -66,6 +66,19 @@ TEST(Mass, IsInKilogramsUnlessItSaysGrams) {
   }
 }
 
+TEST(Angle, IsInRadiansUnlessItSaysMilliradians) {
+  EXPECT_EQ(parse_angle("0.005"), 5e-3);
+  EXPECT_EQ(parse_angle("5mrad"), 5e-3);
+  EXPECT_EQ(parse_angle("0.005rad"), 5e-3);
+  EXPECT_EQ(parse_angular_speed("0.5rad/s"), 0.5);
+  EXPECT_EQ(parse_angular_speed("500mrad/s"), 0.5);
+  EXPECT_EQ(parse_torque("100Nm"), 100.0);
+  EXPECT_EQ(parse_torque("0"), 0.0);
+  EXPECT_THAT(told(parse_angle, "5mm"), HasSubstr("\"mm\" is no unit of it; known: rad, mrad"));
+  EXPECT_THAT(told(parse_angular_speed, "0"), HasSubstr("expected a speed above zero"));
+  EXPECT_THAT(told(parse_torque, "-1"), HasSubstr("expected a torque, zero or more"));
+}
+
 TEST(Damping, MayBeZeroButNotNegative) {
   EXPECT_EQ(parse_damping("0"), 0.0);
   EXPECT_EQ(parse_damping("20"), 20.0);
