@@ -15,6 +15,9 @@ SLOW_MACHINE = 2.0
 # What slowness() measures with CPython 3.11 on the machine whose p99 with 328 thousand triangles is 5.3 µs alone on a
 # processor and 7.4 to 8.2 among others.
 REFERENCE_US = 8.5
+# The default session's there. A machine whose caches others fill is slow at what arithmetic doesn't show: with the same
+# program it has been 15 to 25 µs where arithmetic took 1.4 times as long.
+REFERENCE_P99_US = 5.3
 
 
 def bumpy_ball(file, rows=405, columns=406, radius_m=0.15, centre_m=(1.05, 0.0, 0.6)):
@@ -80,9 +83,11 @@ class Timing(ProgramTest):
         measured = []
         for _ in range(5):
             before = slowness()
+            among_none = self.summary("--duration", "9s")["compute_us"]["p99"]
             figures = self.summary("--scene", scene, "--duration", "9s")
             self.assertGreater(figures["sliding_time_s"], 0.5)
-            measured.append((figures["compute_us"]["p99"], min(before, slowness())))
+            slow = max(min(before, slowness()), among_none / REFERENCE_P99_US)
+            measured.append((figures["compute_us"]["p99"], slow))
         self.assertLessEqual(min(p99_us / slow for p99_us, slow in measured), 10.0, measured)
 
 

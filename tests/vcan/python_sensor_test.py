@@ -189,7 +189,7 @@ class PythonSensors(two.VcanTestCase):
         """12.34 N, -5.00 N, 0, 0.4 Nm, -0.6 Nm, 0.25 Nm."""
         text = self.cell_with(Aidin).read_text().replace("/aidin_aft200.yaml", "/robotiq_ft300.yaml")
         record, cell = self.folder / "ft300", self.folder / "ft300.yaml"
-        peer_program = Path(__file__).resolve().parents[1] / "fieldbus/modbus_peer.py"
+        peer_program = Path(__file__).resolve().parents[1] / "fieldbus/modbus/modbus_peer.py"
         with subprocess.Popen(["/usr/bin/python3", peer_program, "ft300"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                               text=True) as peer:
             terminal = peer.stdout.readline().strip()
