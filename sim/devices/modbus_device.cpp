@@ -9,8 +9,6 @@ namespace {
 
 using description::ModbusValue;
 
-constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3, device_failure = 4;
-
 unsigned word(std::span<const std::uint8_t> bytes, std::size_t at) noexcept {
   return static_cast<unsigned>(bytes[at] << 8 | bytes[at + 1]);
 }

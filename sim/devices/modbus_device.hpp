@@ -19,6 +19,9 @@
 
 namespace proxarm::sim {
 
+// Exception codes of a Modbus server.
+inline constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3, device_failure = 4;
+
 // What may be wrong with its answers.
 enum class ModbusFault : std::uint8_t {
   none,

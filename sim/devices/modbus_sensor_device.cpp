@@ -1,5 +1,7 @@
 #include "sim/devices/modbus_sensor_device.hpp"
 
+#include "sim/devices/modbus_device.hpp"
+
 namespace proxarm::sim {
 
 void ModbusSensorDevice::send(const fieldbus::CanFrame& frame, std::int64_t) noexcept {
@@ -19,7 +21,6 @@ std::vector<std::uint8_t> ModbusSensorDevice::serve(std::span<const std::uint8_t
   const auto exception = [&](std::uint8_t code) {
     return std::vector<std::uint8_t>{request[0], static_cast<std::uint8_t>(request[1] | 0x80U), code};
   };
-  constexpr std::uint8_t illegal_function = 1, illegal_address = 2, illegal_value = 3;
   if (request[1] != 3) return exception(illegal_function);
   if (request.size() != 6) return exception(illegal_value);
   const int first = request[2] << 8 | request[3], count = request[4] << 8 | request[5];
