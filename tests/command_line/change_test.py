@@ -399,6 +399,7 @@ except ConnectionError:
         self.assertEqual(self.ask_raw(b"resume")[0], b"ok: resume\n")
         self.stop()
 
+    @unittest.skipIf(SLOWER > 1, "a sanitizer opens a pipe to look at an object, and takes one that it can't open for a fault")
     def test_survives_without_file_descriptors(self):
         """EMFILE: one accept that failed was the last one."""
         self.start()
