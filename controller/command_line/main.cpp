@@ -197,8 +197,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                  choice<Passivity>("--passivity",
                                    {{"off", Passivity::off}, {"observe", Passivity::observe}, {"on", Passivity::on}},
                                    [&](Passivity value) { options.passivity = value; }),
-                 "observe: energies at the hand's and the proxy's port, and oscillations; on: add damping against "
-                 "them (default: the cell's, or off)")
+                 "on: add damping while the loop makes the hand swing (default: the cell's, or this); observe: only "
+                 "find it, and count energies at the hand's and the proxy's port")
       ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,

@@ -47,7 +47,8 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
   start_guards(arm.start_rad());
   if (settings.passivity != Passivity::off) {
-    passivity_.emplace(PassivityConfig{}, settings.period_s, settings.passivity == Passivity::on);
+    passivity_.emplace(PassivityConfig{.force_age_s = settings.force_age_s}, settings.period_s,
+                       settings.passivity == Passivity::on);
   }
 }
 

@@ -32,6 +32,7 @@ struct SessionSettings {
   int order = 1;                  // 1: (26); 2: BDF2 (bdf2.hpp)
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
+  double force_age_s = 0.0;  // how old the sensor's readings are when they come, for the passivity
   double rotational_inertia_kg_m2 = 0.05;
   double rotational_damping_Nms_per_rad = 0.5;
 

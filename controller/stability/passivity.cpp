@@ -8,6 +8,24 @@ namespace proxarm::controller {
 
 using models::Vec3;
 
+// s = (2/T)(1 − z⁻¹)/(1 + z⁻¹) in the all-pass, with c = 2τ/T:
+//   a₀ = c² + 6c + 12,   a₁ = (24 − 2c²)/a₀,   a₂ = (c² − 6c + 12)/a₀
+void PassivityObserver::Delay::design(double delay_s, double period_s) noexcept {
+  const double c = 2.0 * delay_s / period_s;
+  acts = c >= 1.0;
+  const double a0 = c * c + 6.0 * c + 12.0;
+  a1 = (24.0 - 2.0 * c * c) / a0;
+  a2 = (c * c - 6.0 * c + 12.0) / a0;
+}
+
+Vec3 PassivityObserver::Delay::step(const Vec3& in) noexcept {
+  if (!acts) return in;
+  const Vec3 out = a2 * in + s1;
+  s1 = s2 + a1 * (in - out);
+  s2 = in - a2 * out;
+  return out;
+}
+
 // Bilinear transform, prewarped so that the corner stays in place: Ω = tan(π f T), and per section, of quality Q,
 //   H(z) = (1 − z⁻¹)²/(1 + Ω/Q + Ω²) / (1 + a₁z⁻¹ + a₂z⁻²)
 void PassivityObserver::HighPass::design(double corner_Hz, double period_s) noexcept {
@@ -44,12 +62,14 @@ PassivityObserver::PassivityObserver(const PassivityConfig& config, double perio
 void PassivityObserver::set_period(double period_s) noexcept {
   period_s_ = period_s;
   average_ = 1.0 - std::exp(-period_s / config_.average_s);
-  release_ = std::exp(-period_s / config_.release_s);
+  delay_.design(config_.force_age_s, period_s);
   force_.design(config_.low_Hz, period_s);
   motion_.design(config_.low_Hz, period_s);
 }
 
 void PassivityObserver::start(const Vec3& tool_W) noexcept {
+  delay_.s1.setZero();
+  delay_.s2.setZero();
   force_.reset();
   motion_.reset();
   tool_k1_ = tool_W;
@@ -57,6 +77,7 @@ void PassivityObserver::start(const Vec3& tool_W) noexcept {
   h_k1_.setZero();
   power_ = band_ = all_ = added_ = 0.0;
   tank_ = config_.tank_J;
+  release_s_ = config_.release_s;
   oscillates_ = false;
   energies_ = {};
 }
@@ -65,7 +86,7 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
   if (!h_W.allFinite() || !tool_W.allFinite()) return added_;  // a fault follows; the state here stays finite
   h_k1_ = h_;
   h_ = h_W;
-  const Vec3 step = tool_W - tool_k1_, velocity = step / period_s_;
+  const Vec3 step = delay_.step(tool_W - tool_k1_), velocity = step / period_s_;
   tool_k1_ = tool_W;
   energies_.hand += 0.5 * (h_ + h_k1_).dot(step);
   const Vec3 force = force_.step(h_), motion = motion_.step(velocity);
@@ -73,14 +94,20 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
   band_ += average_ * (motion.squaredNorm() - band_);
   all_ += average_ * (velocity.squaredNorm() - all_);
   tank_ = std::clamp(tank_ + period_s_ * (power_ + config_.refill_W), -config_.tank_J, config_.tank_J);
+  const bool did = oscillates_;
   oscillates_ = tank_ < 0.0 && power_ < -config_.refill_W && band_ > config_.share * all_;
   const double felt = felt_damping_Ns_per_m();
   if (!acts_) return 0.0;
+  if (oscillates_ && !did && added_ > 0.0) release_s_ = std::min(2.0 * release_s_, config_.longest_release_s);
   if (oscillates_ && felt < 0.0) {
-    const double growth = std::min(-felt, config_.max_damping_Ns_per_m) * period_s_ / config_.rise_s;
+    const double growth = std::min(-felt, config_.most_felt_Ns_per_m) * period_s_ / config_.rise_s;
     added_ = std::min(added_ + growth, config_.max_damping_Ns_per_m);
   } else {
-    added_ *= release_;
+    added_ -= added_ * period_s_ / release_s_;
+    if (added_ < config_.gone_Ns_per_m) {
+      added_ = 0.0;
+      release_s_ = config_.release_s;
+    }
   }
   return added_;
 }

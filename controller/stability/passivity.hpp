@@ -18,6 +18,12 @@
 // which is negative at every frequency where B < M ω tan ωL. The hand's own damping must outweigh it, or the loop
 // oscillates.
 //
+// A reading of the force that is τ old belongs to the motion of τ ago: at 3 Hz and 50 ms they are 54° apart, enough to
+// take a hand that is shaken for one that shakes. So the motion is delayed by τ, too, by the all-pass of Padé's
+// approximation of order 2,
+//   e^(−sτ) ≈ (s²τ² − 6sτ + 12)/(s²τ² + 6sτ + 12)      phase within 0.1° up to ωτ = 1.5, 2° up to 2.5; magnitude 1
+// in the bilinear transform. Below, x is that motion.
+//
 // Oscillation is judged at the hand's port, above the band in which hands move by will (low_Hz). A Butterworth
 // high-pass of order 4 filters force and motion alike, which keeps the phase between them; averages are over average_s:
 //   P̂ = ⟨h̃·ẋ̃⟩,   b̂ = P̂/⟨ẋ̃²⟩        power that the hand gives, and the damping that it finds, there
@@ -26,8 +32,10 @@
 // The tank is the energy that a touch may cost: a proxy that a wall stops moves energy from the hand's own band into
 // this one for a moment. While the device oscillates, added damping grows,
 //   Ḃ_a = −b̂/rise_s, up to max_damping,
-// which ends where the hand's port is passive (b̂ ≥ 0): with any passive hand the loop is stable then. Else it decays
-// with release_s. B_a is part of (26)'s B, implicit, so it changes neither position nor velocity by itself.
+// which ends where the hand's port is passive (b̂ ≥ 0): with any passive hand the loop is stable then. Else it decays:
+// with release_s after the first oscillation, which may have been a blow and no more, and twice as slowly after each
+// further one that begins before B_a has gone, up to longest_release_s: a grip that the loop can't stand oscillates
+// again as soon as it is let. B_a is part of (26)'s B, implicit, so it changes neither position nor velocity by itself.
 //
 // Vectors in W. Neither allocates, locks nor throws; a session without it has none of it.
 #pragma once
@@ -48,8 +56,13 @@ struct PassivityConfig {
   double tank_J = 1e-3;      // of a grip of 3000 N/m: an amplitude of 0.8 mm
   double refill_W = 0.5e-3;  // what 0.2 mm at 4 Hz get from a damping of −40 Ns/m: hardly felt, and let be
   double rise_s = 0.05;
-  double release_s = 5.0;
-  double max_damping_Ns_per_m = 200.0;
+  double most_felt_Ns_per_m = 200.0;  // of −b̂: B_a grows by no more than 4 Ns/m in a millisecond, which nobody feels
+  double release_s = 0.5;
+  double longest_release_s = 16.0;
+  double gone_Ns_per_m = 0.1;  // of B_a; far below what any grip needs
+  // A grip of K N/m is calm with about K L, L the loop's delay: 670 for 10,000 N/m and 67 ms.
+  double max_damping_Ns_per_m = 1000.0;
+  double force_age_s = 0.0;  // τ, of a reading when it is used; below half a period it counts as 0
 };
 
 // J, since rendering began.
@@ -87,6 +100,7 @@ class PassivityObserver {
     for (HighPass* filter : {&force_, &motion_}) {
       for (Section& section : filter->sections) state(section.s1, section.s2);
     }
+    state(delay_.s1, delay_.s2, release_s_);
     state(h_k1_, h_, tool_k1_, power_, band_, all_, tank_, added_, oscillates_, energies_.hand, energies_.proxy,
           energies_.world, energies_.kinetic, energies_.damping, energies_.added);
   }
@@ -95,6 +109,13 @@ class PassivityObserver {
   struct Section {  // of order 2, transposed direct form II
     double gain = 1.0, a1 = 0.0, a2 = 0.0;
     models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();
+    models::Vec3 step(const models::Vec3& in) noexcept;
+  };
+  struct Delay {  // the all-pass, transposed direct form II: (a₂ + a₁z⁻¹ + z⁻²)/(1 + a₁z⁻¹ + a₂z⁻²)
+    bool acts = false;
+    double a1 = 0.0, a2 = 0.0;
+    models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();
+    void design(double delay_s, double period_s) noexcept;
     models::Vec3 step(const models::Vec3& in) noexcept;
   };
   struct HighPass {
@@ -107,7 +128,9 @@ class PassivityObserver {
   PassivityConfig config_;
   double period_s_ = 0.0;
   bool acts_;
-  double average_ = 0.0, release_ = 0.0;  // shares of a period: of a new value in an average, kept of B_a
+  double average_ = 0.0;    // share of a new value in an average
+  double release_s_ = 0.0;  // with which B_a decays now
+  Delay delay_;             // of the motion, to the force's age
   HighPass force_, motion_;
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();
   double power_ = 0.0, band_ = 0.0, all_ = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩

@@ -167,7 +167,7 @@ struct Cell {
   std::vector<DriveDescription> drives;
   SensorPlacement sensor;
   CellLimits limits;
-  std::string passivity = "off";  // "off", "observe", "on" (--passivity)
+  std::string passivity;  // "off", "observe", "on" (--passivity); empty: on, where there is a proxy with a mass
   SupervisionDescription supervision;
   std::optional<EnablingInputDescription> enabling_input;
   double default_period_s = 1e-3;

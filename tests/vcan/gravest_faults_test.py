@@ -1,7 +1,8 @@
-"""The ten gravest faults one after the other on a real vcan, the simulated arm as its own process: the message, how many
+"""The gravest faults one after the other on a real vcan, the simulated arm as its own process: the message, how many
 cycles until the reaction, how far the tool moves until it stands. Prints a table for docs/buses.md."""
 import csv
 import json
+import math
 import re
 import socket
 import struct
@@ -111,6 +112,27 @@ class GravestFaults(two.VcanTestCase):
         self.stop("drive_fault", 3, 5, device="axis_3:fault=0x4210",
                   begin=lambda seen: two.of_node([f for f in seen if f.interface == "vcan0"], two.EMCY, 3)[0].time_us,
                   words=["drive of axis_3", "excess temperature"])
+
+    def first_astray(self, seen):
+        """When axis 1, which the hand doesn't turn, first says that it is 0.2 mrad from what it was told."""
+        counts = 2e-4 * 1048576 * 150 / (2 * math.pi)
+        target = None
+        for frame in seen:
+            if frame.interface != "vcan0" or len(frame.data) < 6:
+                continue
+            if frame.id == two.RPDO + 1 and frame.data[0] & 0x0F == 0x0F:
+                target, = struct.unpack("<i", frame.data[2:6])
+            elif frame.id == two.TPDO + 1 and target is not None:
+                if abs(struct.unpack("<i", frame.data[2:6])[0] - target) > counts:
+                    return frame.time_us
+        self.fail("axis 1 never was astray")
+
+    def test_drive_runs_off(self):
+        """At 0.1 rad/s; found where it is a millirad and 20 ms off, and what the brake needs to close."""
+        self.stop("drive_deviates", 50, 10, device="axis_1:runaway=0.1", begin=self.first_astray, words=["axis_1"])
+
+    def test_encoder_that_is_off(self):
+        self.stop("drive_deviates", 25, 2, device="axis_1:offset=5mrad", begin=self.first_astray, words=["axis_1"])
 
     def test_second_master(self):
         self.stop("second_master", 3, 5, act=lambda run: send("vcan1", two.NMT, b"\x80\x63"),

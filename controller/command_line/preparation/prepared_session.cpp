@@ -200,7 +200,11 @@ void add_delay(description::SensorPlacement& sensor, double extra_delay_s) {
 void choose_passivity(PreparedSession& session, const RunOptions& options) {
   using controller::Passivity;
   const std::string& cells = session.cell.passivity;
-  const Passivity otherwise = cells == "on" ? Passivity::on : cells == "observe" ? Passivity::observe : Passivity::off;
+  const Passivity unsaid = session.impedance() ? Passivity::off : Passivity::on;
+  const Passivity otherwise = cells.empty()        ? unsaid
+                              : cells == "on"      ? Passivity::on
+                              : cells == "observe" ? Passivity::observe
+                                                   : Passivity::off;
   session.settings.passivity = options.passivity.value_or(otherwise);
   if (!session.impedance() || session.settings.passivity == Passivity::off) return;
   throw description::SetupError({.file = options.passivity ? "" : session.cell.file.string(),
@@ -243,6 +247,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
+  session.settings.force_age_s = session.cell.sensor.delay_s;
   return session;
 }
 

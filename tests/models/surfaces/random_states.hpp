@@ -19,6 +19,9 @@ inline std::int64_t scaled(double count) {
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(count * (scale > 0.0 ? scale : 1.0)));
 }
 
+// The same for what has to be met often enough to tell anything: never fewer than `least`.
+inline std::int64_t scaled(double count, std::int64_t least) { return std::max(scaled(count), least); }
+
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) { testing::Test::RecordProperty("seed", std::to_string(seed)); }

@@ -255,7 +255,7 @@ TEST(GuideAmongObjects, KeepsAssumption1WhilePushed) {
         std::size_t contacts = 0, pressed = 0;
         double worst = 0.0, least = 1.0;
         const std::uint64_t before = allocation_count();
-        const int steps = static_cast<int>(std::max(scaled(4000), std::int64_t{2000}));
+        const int steps = static_cast<int>(scaled(4000, 500));
         for (int k = 1; k <= steps; ++k) {
           const models::StepTime time{.time_s = 1e-3 * k, .period_s = 1e-3};
           flat_world ? world.algorithm<2>().set_time(time) : world.algorithm<3>().set_time(time);
@@ -289,7 +289,7 @@ TEST(GuideAmongObjects, KeepsAssumption1WhilePushed) {
         EXPECT_TRUE(!allocations_are_counted() || allocation_count() == before) << "allocated";
         EXPECT_LE(worst, 1.0) << c.name << guide << in_plane;
         EXPECT_GE(least, -1e-12) << c.name << guide << in_plane;
-        EXPECT_GT(contacts, 100u) << c.name << guide << in_plane;
+        EXPECT_GT(contacts, static_cast<std::size_t>(steps / 40)) << c.name << guide << in_plane;
         // The ball that holds it from inside swings off the guide.
         EXPECT_LT(pressed, static_cast<std::size_t>(steps / 2)) << c.name << guide << in_plane;
       }
@@ -299,14 +299,15 @@ TEST(GuideAmongObjects, KeepsAssumption1WhilePushed) {
 
 // Assumption 1, rests, repeatable.
 TEST(GuideAmongObjects, KeepsTheContract) {
+  const std::int64_t states = scaled(3000, 300);
   for (const std::string& guide : {along_x, on_floor, around}) {
     for (const Case& c : cases()) {
       const Scene scene =
           parse_scene("objects:\n  - " + c.object + "\n  - sphere: {centre_m: [-0.5, 0, 0], radius_m: 0.1}\n" + guide,
                       "guide.yaml");
-      for (const auto& report : scenes::check_scene(scene, {.states = 3000})) {
+      for (const auto& report : scenes::check_scene(scene, {.states = states})) {
         EXPECT_TRUE(report.passed()) << c.name << ", " << guide << report.text();
-        EXPECT_GT(report.in_contact, 100) << c.name;
+        EXPECT_GT(report.in_contact, states / 30) << c.name;
       }
     }
   }
@@ -325,7 +326,7 @@ TEST(GuideAmongObjects, NeverEntersAnything) {
       std::size_t stopped = 0;
       double least = 1.0, off = 0.0;
       // Fewer don't meet everything often enough to tell.
-      const std::int64_t steps = std::max(scaled(20'000), std::int64_t{20'000});
+      const std::int64_t steps = scaled(20'000, 20'000);
       for (std::int64_t i = 0; i < steps; ++i) {
         q = g(1e6, q + random.log_uniform(1e-9, 1.0) * random.direction<3>() + Vec3(1e-5, 0, 0), q);
         off = std::max(off, std::abs(q.z()));
