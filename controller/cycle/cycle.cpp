@@ -59,8 +59,8 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       recorder_(record_capacity),
       bus_(parts_, recorder_, alarm_),
       measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
-      faults_(parts_.drives, settings_, limits.max_force_N, supervisor_, alarm_, tool_monitor(parts_, settings, limits),
-              drive_monitor(parts_, limits)),
+      faults_(parts_.drives, settings_, {limits.max_force_N, parts_.supervision.max_bias_drift_N}, supervisor_, alarm_,
+              tool_monitor(parts_, settings, limits), drive_monitor(parts_, limits)),
       motion_(make_motion(parts_, settings, limits)),
       timestep_(parts_.can_drives) {}
 

@@ -113,6 +113,8 @@ void Cycle::render() noexcept {
   if (!motion_->render(motion_cycle())) return;
   ++state_.rendered_cycles;
   state_.rendered_ns += period_ns();
+  if (const models::Wrench* const rest_W = motion_->resting_wrench_W()) measurement_.follow_bias(*rest_W);
+  if (motion_->wants_hold()) supervisor_.hold();
 }
 
 void Cycle::free() noexcept {

@@ -145,9 +145,10 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
   }
   const double force_N = measured.hand_W.force.norm();
-  if (supervisor_.phase() == Phase::rendering && force_N > max_force_N_) {
-    alarm_.raise(Fault::force_excessive, -1, force_N, max_force_N_);
-  }
+  if (supervisor_.phase() != Phase::rendering) return;
+  if (force_N > bounds_.max_force_N) alarm_.raise(Fault::force_excessive, -1, force_N, bounds_.max_force_N);
+  const double drift_N = measured.bias.drift_N;
+  if (drift_N > bounds_.max_bias_drift_N) alarm_.raise(Fault::sensor_drifts, -1, drift_N, bounds_.max_bias_drift_N);
 }
 
 // A person who is pinned may press a gauge to its rail: what leads to a hold, a hold and backing off do without force.

@@ -42,16 +42,22 @@ struct JudgedCycle {
   bool backs_off = false;  // where the arm is freed, it goes along a direction that is set
 };
 
+// Beyond which a reading isn't believed.
+struct ForceBounds {
+  double max_force_N = 0.0;
+  double max_bias_drift_N = 0.0;
+};
+
 class FaultMonitor {
  public:
   // `drives_follow` and `tool`: none where drives take torques, so that a hand moves the arm as it likes. All but these
-  // and `max_force_N` must outlive this; T and what is counted in cycles may change in `settings`.
-  FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, double max_force_N,
+  // and `bounds` must outlive this; T and what is counted in cycles may change in `settings`.
+  FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ForceBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
                std::optional<DriveMonitor> drives_follow = {}) noexcept
       : drives_(drives),
         settings_(settings),
-        max_force_N_(max_force_N),
+        bounds_(bounds),
         supervisor_(supervisor),
         alarm_(alarm),
         tool_(std::move(tool)),
@@ -92,7 +98,7 @@ class FaultMonitor {
 
   std::span<const DriveOnBus> drives_;
   const SessionSettings& settings_;
-  double max_force_N_;
+  ForceBounds bounds_;
   const Supervisor& supervisor_;
   Alarm& alarm_;
   std::optional<ToolMonitor> tool_;

@@ -21,6 +21,8 @@ constexpr double pinning_force_N = 5.0;
 constexpr double commanded_share = 0.9;
 // A two-hundred-and-fiftieth of a step that is cut is some micrometres.
 constexpr int bisections = 8;
+// Where a torque turns the tool, it shows a hand as the force does that makes it at a handle's length.
+constexpr double torque_lever_m = 0.1;
 
 Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
   return Eigen::Quaterniond(X_WT.linear()).normalized();
@@ -32,7 +34,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
                                    std::vector<description::DriveDescription> drives,
                                    const description::CellLimits& limits,
                                    const description::SupervisionDescription& supervision,
-                                   const SessionSettings& settings)
+                                   const SessionSettings& settings, double tool_mass_kg)
     : parts_(std::move(parts)),
       arm_(arm),
       drives_(std::move(drives)),
@@ -46,6 +48,13 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
   state_.link_step_rad = state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
   start_guards(arm.start_rad());
+  if (supervision.let_go != description::LetGo::coast) {
+    const bool turns = settings.orientation == OrientationMode::free;
+    empty_handle_.emplace(EmptyHandleConfig{.band_N = supervision.empty_handle_N,
+                                            .tool_mass_kg = tool_mass_kg,
+                                            .lever_m = turns ? torque_lever_m : 0.0},
+                          settings.period_s);
+  }
   if (settings.passivity != Passivity::off) {
     passivity_.emplace(PassivityConfig{.force_age_s = settings.force_age_s}, settings.period_s,
                        settings.passivity == Passivity::on);
@@ -68,6 +77,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   start_guards(target_rad);
   world().start(state_.q_k1_W);
   if (passivity_) passivity_->start(measured.tool_W);
+  if (empty_handle_) empty_handle_->start();
   parts_.orientation.start(orientation_of(X_WT));
   if (beginning == Beginning::resuming) {
     state_.speed_limit_m_per_s = std::min(state_.speed_limit_m_per_s, supervision_.release_speed_m_per_s);
@@ -107,6 +117,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   parts_.world->set_period(period_s);
   parts_.release->set_period(period_s);
   if (passivity_) passivity_->set_period(period_s);
+  if (empty_handle_) empty_handle_->set_period(period_s);
   limiter_.set_period(period_s);
   guard_.set_period(period_s);
   tool_guard_.set_period(period_s);
@@ -116,6 +127,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   parts_.world->archive(state);
   parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
+  if (empty_handle_) empty_handle_->archive(state);
   state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_);
   archive_fields(state, state_);
   if (state.reading()) arm_.kinematics(state_.link_rad, solution_.kinematics);
@@ -128,13 +140,15 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   make_limits(cycle);
   if (passivity_) parts_.world->add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
   let_force_in(cycle.record);
-  const WorldStep step = parts_.world->step(state_.force_share * measured.hand_W.force, step_limits_);
-  const ProxyFault turned = parts_.orientation.step(state_.force_share * measured.hand_W.torque);
+  const models::Wrench h_W = acting_wrench_W(cycle);
+  const WorldStep step = parts_.world->step(h_W.force, step_limits_);
+  const ProxyFault turned = parts_.orientation.step(h_W.torque);
   if (step.fault != ProxyFault::none || turned != ProxyFault::none) {
     cycle.alarm.raise(step.fault == ProxyFault::squeezed ? Fault::proxy_squeezed : Fault::proxy_not_finite);
     return false;
   }
   active_.add(step.limits);
+  state_.mass_kg = step.mass_kg;
   advance_proxy(step.q_W);
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
@@ -182,6 +196,22 @@ void AdmittanceMotion::let_force_in(CycleRecord& record) noexcept {
   const double ramp_s = supervision_.ramp_in_s;
   state_.force_share = ramp_s > 0.0 ? std::min(1.0, state_.force_share + period_s_ / ramp_s) : 1.0;
   record.set(RecordFlag::ramp_in, state_.force_share < 1.0);
+}
+
+// The hand's, as far as it is let in; where nobody is, what brakes the proxy.
+models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexcept {
+  const Measured& measured = cycle.measured;
+  const models::Wrench hand_W{state_.force_share * measured.hand_W.force, state_.force_share * measured.hand_W.torque};
+  if (!empty_handle_) return hand_W;
+  const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
+  const bool empty = empty_handle_->step({.hand_W = measured.hand_W,
+                                          .noise_N = measured.bias.noise_N,
+                                          .tare_samples = measured.bias.samples,
+                                          .sample_cycles = measured.bias.sample_cycles,
+                                          .v_W = v_W});
+  cycle.record.set(RecordFlag::hands_off, empty);
+  if (!empty) return hand_W;
+  return {empty_handle_->braking_force_W(state_.mass_kg, v_W), Vec3::Zero()};
 }
 
 void AdmittanceMotion::advance_proxy(const Vec3& q_W) noexcept {

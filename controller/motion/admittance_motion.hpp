@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
+#include "controller/motion/empty_handle.hpp"
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/setpoints/joint_guard.hpp"
@@ -30,7 +31,7 @@ class AdmittanceMotion final : public Motion {
   // `arm` must outlive this.
   AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm, std::vector<description::DriveDescription> drives,
                    const description::CellLimits& limits, const description::SupervisionDescription& supervision,
-                   const SessionSettings& settings);
+                   const SessionSettings& settings, double tool_mass_kg = 0.0);
 
   void wait_for_drives(const Measured& measured) noexcept override { start_guards(measured.drive_target_rad); }
   void stand(const Measured& /*measured*/) noexcept override {}
@@ -50,6 +51,12 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] bool can_hold() const noexcept override { return true; }
   [[nodiscard]] bool stands() const noexcept override { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
   [[nodiscard]] bool backs_off() const noexcept override { return parts_.release->backs_off(); }
+  [[nodiscard]] const models::Wrench* resting_wrench_W() const noexcept override {
+    return empty_handle_ && empty_handle_->rests() ? &empty_handle_->wrench_W() : nullptr;
+  }
+  [[nodiscard]] bool wants_hold() const noexcept override {
+    return supervision_.let_go == description::LetGo::hold && empty_handle_ && empty_handle_->empty();
+  }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
 
   void archive(fieldbus::StateArchive& state) noexcept override;
@@ -67,6 +74,7 @@ class AdmittanceMotion final : public Motion {
     double force_share = 1.0;                           // of the hand's force that is let in
     double speed_limit_m_per_s = 0.0;                   // of the tool
     models::Vec3 last_normal_W = models::Vec3::Zero();  // of the last contact; zero: there was none
+    double mass_kg = 0.0;                               // of the proxy's last step
     bool freeing = false;                               // it moves without the scene
   };
 
@@ -74,6 +82,7 @@ class AdmittanceMotion final : public Motion {
   void make_limits(const MotionCycle& cycle) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
   void let_force_in(CycleRecord& record) noexcept;
+  [[nodiscard]] models::Wrench acting_wrench_W(const MotionCycle& cycle) noexcept;
   void advance_proxy(const models::Vec3& q_W) noexcept;
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;
@@ -93,6 +102,7 @@ class AdmittanceMotion final : public Motion {
   description::SupervisionDescription supervision_;
   double period_s_;
   std::optional<PassivityObserver> passivity_;  // none: not wanted
+  std::optional<EmptyHandle> empty_handle_;     // none: the proxy coasts
   StepLimiter limiter_;
   JointGuard guard_;
   ToolGuard tool_guard_;

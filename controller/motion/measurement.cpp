@@ -1,6 +1,15 @@
 #include "controller/motion/measurement.hpp"
 
 namespace proxarm::controller {
+namespace {
+
+// With this time constant, and at most so fast. A sensor that warms up drifts by 0.01 N/s; a hand that presses less
+// than 0.25 N more in a second is taken for drift, until it has pressed by max_bias_drift_N.
+constexpr double bias_s = 0.5, bias_N_per_s = 0.25;
+// A torque's bias counts as the force that makes it at this lever: about a handle's length.
+constexpr double bias_lever_m = 0.1;
+
+}  // namespace
 
 using models::JointVector;
 using models::Vec3;
@@ -58,13 +67,29 @@ void Measurement::read_sensor() noexcept {
 
 void Measurement::add_tare_sample() noexcept {
   const Measured& now = state_.measured;
+  state_.tare_cycles += 1.0;
   if (now.sample_is_new) compensation_.add_tare_sample(now.reading_S, now.R_WS);
 }
 
 void Measurement::finish_tare() noexcept {
   Measured& now = state_.measured;
   compensation_.finish_tare();
+  const double samples = compensation_.tare_samples();
+  now.bias = {.noise_N = compensation_.noise_N(),
+              .samples = samples,
+              .sample_cycles = state_.tare_cycles / samples,
+              .drift_N = 0.0};
   now.hand_W = compensation_.hand_wrench_W(now.reading_S, now.R_WS);
+}
+
+void Measurement::follow_bias(const models::Wrench& rest_W) noexcept {
+  Measured& now = state_.measured;
+  const double share = period_s_ / bias_s, most_N = bias_N_per_s * period_s_;
+  models::Wrench rest_S = compensation_.reading_S(rest_W, now.R_WS);
+  rest_S.force *= share;
+  rest_S.torque *= share;
+  compensation_.follow_bias(rest_S, most_N, most_N * bias_lever_m);
+  now.bias.drift_N = compensation_.drift_N();
 }
 
 void Measurement::set_period(double period_s) noexcept {

@@ -20,6 +20,14 @@
 
 namespace proxarm::controller {
 
+// What taring the sensor has told of it, and what its bias did since.
+struct SensorBias {
+  double noise_N = 0.0;        // standard deviation of a sample, in the noisiest axis
+  double samples = 0.0;        // that the bias is the mean of
+  double sample_cycles = 1.0;  // from one to the next
+  double drift_N = 0.0;        // by which it has gone while nobody held the handle
+};
+
 // Of one cycle. Joint vectors are in the order of the arm's joints, bits of joints too.
 struct Measured {
   // By the encoders.
@@ -37,6 +45,7 @@ struct Measured {
   // By the sensor.
   bool sample_is_new = false;
   models::Wrench reading_S;
+  SensorBias bias;
   models::Wrench hand_W;  // bias and tool weight taken off, about the rendered point
 
   [[nodiscard]] Eigen::Index axes() const noexcept { return motor_rad.size(); }
@@ -58,6 +67,9 @@ class Measurement {
   // Takes the average as the bias, from this cycle on.
   void finish_tare() noexcept;
 
+  // Nobody holds the handle, and this is what its wrench is read as: it goes into the bias by and by.
+  void follow_bias(const models::Wrench& rest_W) noexcept;
+
   // T of the cycles to come; what is counted in cycles is counted in the new ones.
   void set_period(double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -69,6 +81,7 @@ class Measurement {
   struct State {
     Measured measured;
     models::JointVector stale_cycles;  // since each drive's position came
+    double tare_cycles = 0.0;
   };
 
   void read_encoders() noexcept;

@@ -30,7 +30,8 @@ std::unique_ptr<Motion> make_motion(CycleParts& parts, const SessionSettings& se
     return std::make_unique<TorqueMotion>(std::move(*torque), *parts.arm, drives, settings.period_s);
   }
   return std::make_unique<AdmittanceMotion>(std::move(std::get<AdmittanceParts>(parts.rendering)), *parts.arm,
-                                            std::move(drives), limits, parts.supervision, settings);
+                                            std::move(drives), limits, parts.supervision, settings,
+                                            parts.compensation.tool_mass_kg());
 }
 
 }  // namespace proxarm::controller

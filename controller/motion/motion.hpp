@@ -79,6 +79,11 @@ class Motion {
   // Run out, and at rest.
   [[nodiscard]] virtual bool stands() const noexcept = 0;
   [[nodiscard]] virtual bool backs_off() const noexcept = 0;
+  // Nobody holds the handle, and the proxy has come to rest: what is read as the hand's wrench is the sensor's bias.
+  // Null: somebody may be there.
+  [[nodiscard]] virtual const models::Wrench* resting_wrench_W() const noexcept { return nullptr; }
+  // Nobody holds the handle, and the cell wants a hold then.
+  [[nodiscard]] virtual bool wants_hold() const noexcept { return false; }
   [[nodiscard]] virtual const models::Vec3& proxy_W() const noexcept = 0;
   // Which limits were active in this cycle.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }

@@ -1,6 +1,7 @@
 #include "controller/motion/wrench_compensation.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace proxarm::controller {
 
@@ -22,6 +23,8 @@ Wrench WrenchCompensation::tool_weight_S(const Mat3& R_WS) const noexcept {
 void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_WS) noexcept {
   const Wrench weight_S = tool_weight_S(R_WS);
   const Vec3 force = reading_S.force - weight_S.force;
+  if (tare_count_ == 0) tare_first_S_ = force;
+  tare_squares_S_ += (force - tare_first_S_).cwiseAbs2();
   if (tare_count_ > 0) {
     const Vec3 mean = tare_sum_S_.force / static_cast<double>(tare_count_);
     tare_spread_N_ = std::max(tare_spread_N_, (force - mean).norm());
@@ -34,6 +37,25 @@ void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_
 void WrenchCompensation::finish_tare() noexcept {
   bias_S_.force = tare_sum_S_.force / static_cast<double>(tare_count_);
   bias_S_.torque = tare_sum_S_.torque / static_cast<double>(tare_count_);
+  drift_S_ = {};
+}
+
+// Σ(x − x₁)² − n (x̄ − x₁)², over n − 1: about the first sample, so that nothing is lost by a large bias.
+double WrenchCompensation::noise_N() const noexcept {
+  if (tare_count_ < 2) return 0.0;
+  const double n = tare_samples();
+  const Vec3 mean = tare_sum_S_.force / n - tare_first_S_;
+  const Vec3 variance = (tare_squares_S_ - n * mean.cwiseAbs2()) / (n - 1.0);
+  return std::sqrt(std::max(0.0, variance.maxCoeff()));
+}
+
+void WrenchCompensation::follow_bias(const Wrench& rest_S, double most_N, double most_Nm) noexcept {
+  const Vec3 force = rest_S.force.cwiseMax(-most_N).cwiseMin(most_N);
+  const Vec3 torque = rest_S.torque.cwiseMax(-most_Nm).cwiseMin(most_Nm);
+  bias_S_.force += force;
+  bias_S_.torque += torque;
+  drift_S_.force += force;
+  drift_S_.torque += torque;
 }
 
 Wrench WrenchCompensation::hand_wrench_W(const Wrench& reading_S, const Mat3& R_WS) const noexcept {
@@ -41,6 +63,11 @@ Wrench WrenchCompensation::hand_wrench_W(const Wrench& reading_S, const Mat3& R_
   const Vec3 force_S = reading_S.force - bias_S_.force - weight_S.force;
   const Vec3 torque_S = reading_S.torque - bias_S_.torque - weight_S.torque - handle_S_.cross(force_S);
   return {R_WS * force_S, R_WS * torque_S};
+}
+
+Wrench WrenchCompensation::reading_S(const Wrench& hand_W, const Mat3& R_WS) const noexcept {
+  const Vec3 force_S = R_WS.transpose() * hand_W.force;
+  return {force_S, R_WS.transpose() * hand_W.torque + handle_S_.cross(force_S)};
 }
 
 }  // namespace proxarm::controller

@@ -30,13 +30,26 @@ class WrenchCompensation {
   void finish_tare() noexcept;
   // Largest deviation of a sample from the running mean, in N: the handle was touched if it exceeds the noise.
   [[nodiscard]] double tare_spread_N() const noexcept { return tare_spread_N_; }
+  // Of one tare sample's force, per axis: the standard deviation of the noisiest one, in N. After finish_tare().
+  [[nodiscard]] double noise_N() const noexcept;
+  [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
+  // The tool's own, behind the sensor.
+  [[nodiscard]] double tool_mass_kg() const noexcept { return mass_kg_; }
+  // Nobody holds the handle, so what is left of the reading is bias: by so much of it at most in each axis of S.
+  void follow_bias(const models::Wrench& rest_S, double most_N, double most_Nm) noexcept;
+  // By how much the force's bias has gone since the tare, in N.
+  [[nodiscard]] double drift_N() const noexcept { return drift_S_.force.norm(); }
   [[nodiscard]] const models::Wrench& bias_S() const noexcept { return bias_S_; }
 
   // The hand's wrench about T's origin, in W.
   [[nodiscard]] models::Wrench hand_wrench_W(const models::Wrench& reading_S, const models::Mat3& R_WS) const noexcept;
 
+  // What such a wrench adds to the reading: the inverse of hand_wrench_W().
+  [[nodiscard]] models::Wrench reading_S(const models::Wrench& hand_W, const models::Mat3& R_WS) const noexcept;
+
   void archive(fieldbus::StateArchive& state) noexcept {
-    state(bias_S_.force, bias_S_.torque, tare_sum_S_.force, tare_sum_S_.torque, tare_count_, tare_spread_N_);
+    state(bias_S_.force, bias_S_.torque, tare_sum_S_.force, tare_sum_S_.torque, tare_squares_S_, tare_first_S_,
+          drift_S_.force, drift_S_.torque, tare_count_, tare_spread_N_);
   }
 
  private:
@@ -46,6 +59,9 @@ class WrenchCompensation {
   models::Vec3 gravity_W_;
   models::Wrench bias_S_;
   models::Wrench tare_sum_S_;
+  models::Vec3 tare_squares_S_ = models::Vec3::Zero();  // of the forces less the first one
+  models::Vec3 tare_first_S_ = models::Vec3::Zero();
+  models::Wrench drift_S_;  // of the bias, since the tare; in it
   std::int64_t tare_count_ = 0;
   double tare_spread_N_ = 0.0;
 };

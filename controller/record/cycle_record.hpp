@@ -29,8 +29,9 @@ enum class RecordFlag : std::uint32_t {
   limit_joint = 1u << 5,
   limit_leash = 1u << 6,
   limit_orientation = 1u << 7,
-  truth = 1u << 9,     // the fields of the simulation's truth are filled in
-  overrun = 1u << 10,  // the cycle was late; wall-clock, so it goes to timing.json and not to signals.csv
+  hands_off = 1u << 8,  // nobody holds the handle: the proxy comes to rest
+  truth = 1u << 9,      // the fields of the simulation's truth are filled in
+  overrun = 1u << 10,   // the cycle was late; wall-clock, so it goes to timing.json and not to signals.csv
   limit_power = 1u << 11,
   limit_keep_out = 1u << 12,
   limit_joint_speed = 1u << 13,

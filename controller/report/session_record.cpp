@@ -94,7 +94,8 @@ constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
                                    {RecordFlag::oscillation, "oscillation"},
                                    {RecordFlag::timestep, "timestep"},
                                    {RecordFlag::ramp_in, "ramp_in"},
-                                   {RecordFlag::slowed, "slowed"}};
+                                   {RecordFlag::slowed, "slowed"},
+                                   {RecordFlag::hands_off, "hands_off"}};
 
 void append_flags(std::string& row, const CycleRecord& record) {
   bool first = true;

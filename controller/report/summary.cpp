@@ -160,6 +160,7 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (record.has(RecordFlag::overrun)) ++summary.overruns;
   if (record.phase != Phase::rendering) return;
   if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
+  if (record.has(RecordFlag::hands_off)) summary.hands_off_s += 1e-9 * static_cast<double>(record.period_ns);
   if (limited(record)) ++summary.limited_cycles;
   if (record.has(RecordFlag::limit_orientation)) ++summary.active_limits["orientation"];
   for (const LimitFlag& flag : limit_flags) {
@@ -271,7 +272,8 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   if (now.contact == ContactPhase::free) {
     // A world without contacts may act all the same: a field of friction, a soft layer. Where a limit acts, the motion
     // isn't the mass's.
-    if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in))
+    if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in) &&
+        !now.has(RecordFlag::hands_off))
       return apparent.add(hand - spring, x);
   }
   apparent.end_segment();

@@ -101,6 +101,7 @@ void add_repeatable(Json& json, const Summary& s) {
   json["active_limits"] = Json::object();
   for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
   json["passivity"] = passivity(s.passivity);
+  json["hands_off_s"] = s.hands_off_s;
   json["held_samples"] = s.held_samples;
   json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
   json["end"] = {{"reason", s.end.reason}, {"text", s.end.text}};
@@ -286,6 +287,7 @@ std::string summary_text(const Summary& s) {
   tell_time(s, line);
   tell_motion(s, line);
   tell_limits(s, line);
+  if (s.hands_off_s > 0.0) line("hands off", format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s));
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
   line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
   line("setpoints (SHA-256)", s.setpoint_sha256);

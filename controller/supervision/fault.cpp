@@ -48,6 +48,10 @@ constexpr std::array texts{
               nullptr, "check the sensor's calibration matrix"},
     FaultText{Fault::force_excessive, "force_excessive", Reaction::stop_1, "force beyond limits.max_force_N", "N",
               "push less, or raise the limit in the cell file"},
+    FaultText{Fault::sensor_drifts, "sensor_drifts", Reaction::stop_1,
+              "the force sensor's bias has drifted while nobody held the handle", "N",
+              "start anew, which tares the sensor; if it comes again, let the sensor warm up, or look for damage and "
+              "for something that leans on the handle"},
     FaultText{Fault::force_at_start, "force_at_start", Reaction::stop_1,
               "the handle was touched while the sensor was tared", "N",
               "take the hand off the handle until rendering starts", still},

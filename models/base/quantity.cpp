@@ -33,6 +33,8 @@ constexpr Unit forces[] = {{"N", 1, 1}};
 constexpr Unit torques[] = {{"Nm", 1, 1}, {"N*m", 1, 1}};
 constexpr Unit angles[] = {{"rad", 1, 1}, {"mrad", 1, 1e3}};
 constexpr Unit angular_speeds[] = {{"rad/s", 1, 1}, {"mrad/s", 1, 1e3}};
+constexpr Unit force_rates[] = {{"N/s", 1, 1}};
+constexpr Unit factors[] = {{"", 1, 1}};
 constexpr Unit stiffnesses[] = {{"N/m", 1, 1}, {"N/mm", 1e3, 1}};
 
 std::string expected(const Kind& kind) {
@@ -107,6 +109,14 @@ double parse_angle(std::string_view text, std::string_view option) {
 
 double parse_angular_speed(std::string_view text, std::string_view option) {
   return parse(text, option, {"a speed", "0.5rad/s", angular_speeds, false, false});
+}
+
+double parse_force_rate(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a force per time", "0.5N/s", force_rates, false, false});
+}
+
+double parse_factor(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a factor", "2", factors, false, false});
 }
 
 }  // namespace proxarm::description

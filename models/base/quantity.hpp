@@ -35,4 +35,10 @@ double parse_angle(std::string_view text, std::string_view option = "angle");
 // "0.5", "0.5rad/s" → rad/s, above zero.
 double parse_angular_speed(std::string_view text, std::string_view option = "speed");
 
+// "0.5", "0.5N/s" → N/s, above zero.
+double parse_force_rate(std::string_view text, std::string_view option = "drift");
+
+// "2", "0.5": a plain number above zero.
+double parse_factor(std::string_view text, std::string_view option = "factor");
+
 }  // namespace proxarm::description

@@ -11,6 +11,7 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"sensor_late", {"slow", "continue", "hold", "stop_1"}},
       {"sensor_saturated", {"stop_1", "hold"}},
       {"force_excessive", {"stop_1", "hold"}},
+      {"sensor_drifts", {"stop_1", "hold", "continue"}},
       {"feedback_late", {"continue", "slow"}},
       {"position_implausible", {"stop_0", "stop_1"}},
       {"drive_deviates", {"stop_0", "stop_1"}},
@@ -36,6 +37,10 @@ SupervisionDescription read_supervision(const YamlNode& node) {
   s.ramp_in_s = node.number_or("ramp_in_s", s.ramp_in_s, 0.0, 10.0);
   s.slow_speed_m_per_s = node.number_or("slow_speed_m_per_s", s.slow_speed_m_per_s, 0.01, 1.0);
   s.release_speed_m_per_s = node.number_or("release_speed_m_per_s", s.release_speed_m_per_s, 0.005, 0.25);
+  const std::string let_go = node.has("let_go") ? node.choice("let_go", {"rest", "coast", "hold"}) : "rest";
+  s.let_go = let_go == "coast" ? LetGo::coast : let_go == "hold" ? LetGo::hold : LetGo::rest;
+  s.empty_handle_N = node.number_or("empty_handle_N", s.empty_handle_N, 0.001, 10.0);
+  s.max_bias_drift_N = node.number_or("max_bias_drift_N", s.max_bias_drift_N, 0.01, 100.0);
   s.brake_release = node.string_or("brake_release", "");
   if (s.brake_release.size() > 120) throw node.error_at("brake_release", "at most 120 characters");
   const auto reactions = node.find_map("reactions");

@@ -6,6 +6,9 @@
 //     slow_speed_m_per_s: 0.1          # of the tool, where the reaction to a fault is slow
 //     release_speed_m_per_s: 0.05      # of the tool that follows a pinned hand, and of backing off
 //     brake_release: "key switch S3"   # where the brakes can be opened by hand, for the messages
+//     let_go: rest                     # what the arm does when nobody holds the handle: rest, coast or hold
+//     empty_handle_N: 0.1              # below this force for half a second nobody holds it
+//     max_bias_drift_N: 0.5            # by which the force sensor's bias may go meanwhile
 //     reactions: {sensor_lost: hold}   # of faults that leave a choice: reaction_choices()
 //
 //   enabling_input: {drive: axis_3, bit: 16}                                  # of 60FDh, the drive's digital inputs
@@ -30,11 +33,21 @@ struct ReactionChoice {
 };
 [[nodiscard]] const std::vector<ReactionChoice>& reaction_choices();
 
+// What the arm does when nobody holds the handle (controller/motion/empty_handle.hpp).
+enum class LetGo : std::uint8_t {
+  rest,   // it comes to rest and stays, until somebody takes hold of it
+  coast,  // the proxy keeps its speed
+  hold,   // a hold, as by order
+};
+
 struct SupervisionDescription {
   double hold_s = 10.0;
   double ramp_in_s = 0.2;
   double slow_speed_m_per_s = 0.1;
   double release_speed_m_per_s = 0.05;
+  LetGo let_go = LetGo::rest;
+  double empty_handle_N = 0.1;                   // below this for half a second nobody is there
+  double max_bias_drift_N = 0.5;                 // by which the sensor's bias may go while nobody is there
   std::string brake_release;                     // how a person opens the brakes by hand; empty: not at all
   std::map<std::string, std::string> reactions;  // by the fault's name; a choice of reaction_choices()
 };

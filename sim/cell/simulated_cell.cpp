@@ -476,6 +476,7 @@ void SimulatedCell::set_fault(std::size_t index, bool on, std::int64_t time_ns) 
     set_drive_fault(axis, fault, on, time_ns);
   } else {
     set_sensor_fault(fault, on);
+    set_sensor_lie(fault, on, time_ns);
   }
 }
 
@@ -537,6 +538,30 @@ SensorFaults& SimulatedCell::sensor_faults() noexcept {
   return described_sensor_ ? described_sensor_->faults() : sensor_->faults();
 }
 
+void SimulatedCell::set_sensor_lie(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept {
+  SensorLies& lies = plant_.sensor_lies();
+  switch (fault.kind) {
+    case DeviceFaultKind::sensor_offset:
+      lies.offset_N = on ? fault.amount : 0.0;
+      return;
+    case DeviceFaultKind::drift:
+      lies.drift_N_per_s = on ? fault.amount : 0.0;
+      lies.drifts_from_ns = time_ns;
+      return;
+    case DeviceFaultKind::scale:
+      lies.scale = on ? fault.amount : 1.0;
+      return;
+    case DeviceFaultKind::inverted:
+      lies.inverted = on;
+      return;
+    case DeviceFaultKind::turned:
+      lies.turned = on;
+      return;
+    default:
+      return;
+  }
+}
+
 void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept {
   SensorFaults& faults = sensor_faults();
   switch (fault.kind) {
@@ -570,6 +595,9 @@ void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept
       return;
     case DeviceFaultKind::saturated:
       faults.saturated = on;
+      return;
+    case DeviceFaultKind::channel_stuck:
+      faults.stuck_channel = on ? static_cast<int>(fault.value) : -1;
       return;
     case DeviceFaultKind::lost:
       faults.lost_one_in = on ? fault.value : 0;

@@ -113,6 +113,7 @@ class SimulatedCell final : private Clockwork {
   void set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
   void set_modbus_fault(std::size_t axis, const DeviceFault& fault, bool on) noexcept;
   void set_sensor_fault(const DeviceFault& fault, bool on) noexcept;
+  void set_sensor_lie(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept;
   void tick(std::int64_t time_ns) noexcept;
   [[nodiscard]] std::size_t bus_index(const std::string& name, const std::string& key) const;
   [[nodiscard]] std::size_t axis_of(const std::string& joint) const noexcept;  // drives_.size(): none

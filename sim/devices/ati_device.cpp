@@ -85,7 +85,14 @@ void AtiDevice::send_sample_frame(std::uint8_t operation, std::span<const std::u
 
 void AtiDevice::send_sample(std::int64_t time_ns) noexcept {
   if (faults_.silent_samples) return;
-  if (!faults_.frozen) last_ = gauges_.gauges(time_ns);
+  if (!faults_.frozen) {
+    const std::array<std::int16_t, 6> before = last_;
+    last_ = gauges_.gauges(time_ns);
+    if (faults_.stuck_channel >= 0) {
+      const auto stuck = static_cast<std::size_t>(faults_.stuck_channel);
+      last_[stuck] = before[stuck];
+    }
+  }
   if (faults_.saturated) last_[0] = 32767;
   std::array<std::uint8_t, 8> first{};
   std::array<std::uint8_t, 6> second{};

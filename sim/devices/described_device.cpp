@@ -130,6 +130,8 @@ void DescribedDevice::fill_signals(std::int64_t time_ns) noexcept {
     for (std::size_t k = 0; k < 6; ++k) value += signals_of_wrench_[i][k] * (measured_[k] - bias_[k]);
     double number = (value - signal.offset) / signal.scale;
     if (faults_.saturated && i == 0) number = signal.saturated_above;
+    if (faults_.stuck_channel == static_cast<int>(i)) number = numbers_[i];
+    numbers_[i] = number;
     if (signal.number.kind == NumberKind::real) {
       put(signal.number, std::bit_cast<std::uint32_t>(static_cast<float>(number)));
     } else {

@@ -67,6 +67,7 @@ class DescribedDevice final : public BusDevice {
   std::vector<std::uint8_t> sample_;
   std::vector<std::array<double, 6>> signals_of_wrench_;  // inverse of the matrix, by rows
   std::array<double, 6> measured_{}, bias_{};
+  std::array<double, 6> numbers_{};  // of the signals in the last sample
   std::uint64_t count_ = 0, frames_ = 0;
   std::int64_t period_ns_ = 0, ready_ns_ = INT64_MAX;
   bool streaming_ = false;

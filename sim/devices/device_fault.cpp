@@ -13,7 +13,7 @@ namespace {
 using description::SetupError;
 
 constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
-constexpr std::uint64_t none = 0, u16 = 0xFFFF, u32 = 0xFFFFFFFF;
+constexpr std::uint64_t none = 0, u16 = 0xFFFF, u32 = 0xFFFFFFFF, last_channel = 5;
 using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
@@ -55,6 +55,12 @@ constexpr KindName kinds[] = {
     {"saturated", sensor, DeviceFaultKind::saturated, none},
     {"lost", sensor, DeviceFaultKind::lost, u32},
     {"status", sensor, DeviceFaultKind::status, u32},
+    {"channel", sensor, DeviceFaultKind::channel_stuck, last_channel},
+    {"offset", sensor, DeviceFaultKind::sensor_offset, none, description::parse_force, true},
+    {"drift", sensor, DeviceFaultKind::drift, none, description::parse_force_rate, true},
+    {"scale", sensor, DeviceFaultKind::scale, none, description::parse_factor},
+    {"inverted", sensor, DeviceFaultKind::inverted, none},
+    {"turned", sensor, DeviceFaultKind::turned, none},
     {"delay", sensor, DeviceFaultKind::delay, u32},
 };
 

@@ -50,6 +50,12 @@ enum class DeviceFaultKind : std::uint8_t {
   saturated,        // "saturated": the first channel is at its rail
   lost,             // "lost": every VALUE-th frame of samples is lost
   status,           // "status": bits VALUE in the status word
+  channel_stuck,    // "channel": gauge or signal number VALUE, from 0, repeats its last value
+  sensor_offset,    // "offset": AMOUNT N too much along x of S; for a millisecond it is a spike
+  drift,            // "drift": AMOUNT N more along x of S each second
+  scale,            // "scale": all readings are AMOUNT times what they should be
+  inverted,         // "inverted": all readings have the wrong sign
+  turned,           // "turned": mounted turned by half a turn about z of S
   delay,            // "delay": answers VALUE microseconds later
 };
 

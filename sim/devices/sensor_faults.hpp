@@ -15,6 +15,7 @@ struct SensorFaults {
   bool short_frames = false;      // each frame of a sample lacks its last byte
   bool bad_checksum = false;      // each sample's checksum is wrong; without one, nothing happens
   bool saturated = false;         // the first channel is at its upper end
+  int stuck_channel = -1;         // this gauge or signal repeats its last value; −1: none
   std::uint32_t status_bits = 0;  // set in the status word, where there is one
   std::uint32_t lost_one_in = 0;  // every so many-th frame of samples is lost; 0: none
   std::int64_t delay_ns = 0;      // on top of the answer time

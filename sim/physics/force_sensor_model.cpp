@@ -106,8 +106,18 @@ ForceSensorModel::Instant ForceSensorModel::latest_instant(std::int64_t time_ns)
   return latest;
 }
 
+void ForceSensorModel::lie(Vec6& wrench, std::int64_t time_ns) const noexcept {
+  if (lies_.turned) {
+    for (const int i : {0, 1, 3, 4}) wrench[i] = -wrench[i];
+  }
+  wrench *= lies_.inverted ? -lies_.scale : lies_.scale;
+  const auto drifts_ns = static_cast<double>(std::max<std::int64_t>(0, time_ns - lies_.drifts_from_ns));
+  wrench[0] += lies_.offset_N + 1e-9 * drifts_ns * lies_.drift_N_per_s;
+}
+
 Vec6 ForceSensorModel::noisy_wrench(const Instant& instant) const noexcept {
   Vec6 wrench = filtered(instant.time_ns >= now_.start_ns ? now_ : before_, instant.time_ns);
+  lie(wrench, instant.time_ns);
   const std::uint64_t key = seed_ + 32 * static_cast<std::uint64_t>(instant.number);
   for (int i = 0; i < 6; ++i) wrench[i] += noise_deviation_[i] * normal(key + 4 * static_cast<std::uint64_t>(i));
   return wrench;

@@ -22,6 +22,16 @@ struct GaugeSample {
   std::int64_t time_ns = 0;  // of the converter's instant
 };
 
+// What a sensor may say that isn't so, and nobody can tell from its words.
+struct SensorLies {
+  double scale = 1.0;          // of the whole wrench
+  bool inverted = false;       // with the wrong sign
+  bool turned = false;         // by half a turn about z
+  double offset_N = 0.0;       // along x
+  double drift_N_per_s = 0.0;  // along x, from that time on
+  std::int64_t drifts_from_ns = 0;
+};
+
 class ForceSensorModel {
  public:
   // Throws description::SetupError on a singular matrix, or a rate or counts per unit of zero.
@@ -32,6 +42,7 @@ class ForceSensorModel {
   void reset(std::int64_t time_ns, const models::Wrench& wrench_S) noexcept;
   // The wrench from now on until the next call; times rise.
   void set_wrench(std::int64_t time_ns, const models::Wrench& wrench_S) noexcept;
+  [[nodiscard]] SensorLies& lies() noexcept { return lies_; }
   // The latest sample at this time: not before the last but one set_wrench().
   [[nodiscard]] GaugeSample sample(std::int64_t time_ns) const noexcept;
   // What went into that sample, noise included, before any gauge: fx fy fz (N), tx ty tz (Nm).
@@ -48,6 +59,7 @@ class ForceSensorModel {
     std::int64_t number = 0, time_ns = 0;
   };
   [[nodiscard]] Instant latest_instant(std::int64_t time_ns) const noexcept;
+  void lie(Vec6& wrench, std::int64_t time_ns) const noexcept;
   [[nodiscard]] Vec6 noisy_wrench(const Instant& instant) const noexcept;
   [[nodiscard]] Vec6 filtered(const Piece& piece, std::int64_t time_ns) const noexcept;
 
@@ -58,6 +70,7 @@ class ForceSensorModel {
   std::int64_t step_ns_ = 0;  // steps are equal: the decay over one is kept
   double step_decay_ = 1.0;
   Piece before_, now_;
+  SensorLies lies_;
 };
 
 }  // namespace proxarm::sim

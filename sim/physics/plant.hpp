@@ -43,6 +43,7 @@ class Plant {
   [[nodiscard]] ServoLoop& servo(std::size_t axis) noexcept { return servos_[axis]; }
   [[nodiscard]] const ServoLoop& servo(std::size_t axis) const noexcept { return servos_[axis]; }
   [[nodiscard]] const ForceSensorModel& force_sensor() const noexcept { return force_sensor_; }
+  [[nodiscard]] SensorLies& sensor_lies() noexcept { return force_sensor_.lies(); }
   [[nodiscard]] ArmDynamics& arm() noexcept { return arm_; }
   [[nodiscard]] const ArmDynamics& arm() const noexcept { return arm_; }
   [[nodiscard]] const Hand& hand() const noexcept { return hand_; }

@@ -173,6 +173,15 @@ RigOptions failing_bus(fieldbus::FaultRule rule) {
   return {.script = {{std::move(rule)}}};
 }
 
+RigOptions nobody_there(const std::string& fault) {
+  RigOptions options{.device_faults = {fault}, .duration_s = 10.0, .scene = "scenes/free.yaml"};
+  options.edit_hand = [](description::HandDescription& hand) {
+    hand.mass_kg = hand.stiffness_N_per_m = hand.damping_Ns_per_m = 0.0;
+    hand.waypoints.resize(1);
+  };
+  return options;
+}
+
 RigOptions late_samples() {
   RigOptions options;
   for (std::uint64_t i = 0; i < 200; ++i) {
@@ -379,6 +388,8 @@ std::vector<Row> rows() {
          return options;
        }},
       {force_excessive, Reaction::stop_1, 0, way_m, weak_force_limit, force_above_5_N},
+      // Half a newton at 0.2 N/s, and what the bias is behind.
+      {sensor_drifts, Reaction::stop_1, 3500, still_m, [] { return nobody_there("sensor:drift=0.2N/s@1.9s"); }},
       {force_at_start, Reaction::stop_1, 400, 2e-3, hand_at_start, at_start},
       {feedback_late, Reaction::carry_on, 2, 1.0,
        [] {

@@ -41,7 +41,7 @@ struct FaultMonitorTest : ::testing::Test {
   std::vector<fieldbus::BusStatus> buses = std::vector<fieldbus::BusStatus>(3);
   std::uint32_t overruns = 0;
   Measurement measurement{drives.on_bus, sensor, arm, WrenchCompensation(cell), settings.period_s};
-  FaultMonitor monitor{drives.on_bus, settings, 200.0, watched.supervisor, watched.alarm};
+  FaultMonitor monitor{drives.on_bus, settings, {200.0, 0.5}, watched.supervisor, watched.alarm};
 };
 
 TEST_F(FaultMonitorTest, FindsNothingWrongWithDevicesThatAreWell) {
@@ -171,7 +171,7 @@ struct FollowingTest : FaultMonitorTest {
   }
   FaultMonitor following{drives.on_bus,
                          settings,
-                         200.0,
+                         {200.0, 0.5},
                          watched.supervisor,
                          watched.alarm,
                          std::nullopt,

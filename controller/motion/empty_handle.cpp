@@ -1,0 +1,78 @@
+#include "controller/motion/empty_handle.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+
+constexpr double filter_s = 0.015;
+// Of σ_f: 8 in one of three axes come once in 1e15 samples.
+constexpr double noise_deviations = 8.0, tare_deviations = 4.0;
+// How long a hand may need no force: at speed in a narrow band, at rest in the wide one.
+constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
+constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
+constexpr double longest_s = 1.5;
+constexpr double leaving = 1.5;
+// For so long the handle may ring from an acceleration of the arm (its first mode, 15 Hz, twice).
+constexpr double ringing_s = 0.1;
+// 4 m/s² stop 0.45 m/s within 5 cm; a handle of 0.25 kg then reads 1 N. They come within 0.05 s, so that a hand that
+// was taken for none feels a pull, not a jerk.
+constexpr double braking_m_per_s2 = 4.0, braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
+// Below 0.1 mm/s for half a second: what the arm does by itself is over.
+constexpr double rest_m_per_s = 1e-4, rest_time_s = 0.5;
+
+}  // namespace
+
+EmptyHandle::EmptyHandle(const EmptyHandleConfig& config, double period_s) noexcept
+    : config_(config), period_s_(period_s) {}
+
+void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
+
+// A torque counts as the force that would make it at the lever.
+double EmptyHandle::size_N() const noexcept {
+  const double force_N = state_.wrench_W.force.norm();
+  if (!(config_.lever_m > 0.0)) return force_N;
+  return std::max(force_N, state_.wrench_W.torque.norm() / config_.lever_m);
+}
+
+bool EmptyHandle::step(const HandSigns& signs) noexcept {
+  const double T = period_s_, share = T / (T + filter_s);
+  State& s = state_;
+  s.wrench_W.force += share * (signs.hand_W.force - s.wrench_W.force);
+  s.wrench_W.torque += share * (signs.hand_W.torque - s.wrench_W.torque);
+  const double speed = signs.v_W.norm();
+  s.acceleration_m_per_s2 =
+      std::max((1.0 - T / (T + ringing_s)) * s.acceleration_m_per_s2, (signs.v_W - s.v_k1_W).norm() / T);
+  s.v_k1_W = signs.v_W;
+
+  const double sigma_f = signs.noise_N * std::sqrt(std::min(1.0, signs.sample_cycles * T / (2.0 * filter_s)));
+  const double sigma_mean = signs.tare_samples > 0.0 ? signs.noise_N / std::sqrt(signs.tare_samples) : 0.0;
+  const double noise_band = noise_deviations * sigma_f + tare_deviations * sigma_mean;
+  const double band = std::max(config_.band_N, noise_band);
+  const double size = size_N();
+  s.calm_s = size <= noise_band ? s.calm_s + T : 0.0;
+  s.quiet_s = size <= band ? s.quiet_s + T : 0.0;
+  if (s.empty) {
+    s.empty = size <= leaving * band + leaving * config_.tool_mass_kg * s.acceleration_m_per_s2;
+    if (!s.empty) s.calm_s = s.quiet_s = 0.0;
+  } else {
+    s.empty = s.calm_s >= std::clamp(calm_way_m / speed, shortest_calm_s, longest_s) ||
+              s.quiet_s >= std::clamp(quiet_way_m / speed, shortest_quiet_s, longest_s);
+  }
+  s.braking_m_per_s2 = s.empty ? std::min(braking_m_per_s2, s.braking_m_per_s2 + braking_rise_m_per_s3 * T) : 0.0;
+  s.rest_s = s.empty && speed <= rest_m_per_s ? s.rest_s + T : 0.0;
+  return s.empty;
+}
+
+bool EmptyHandle::rests() const noexcept { return state_.rest_s >= rest_time_s; }
+
+Vec3 EmptyHandle::braking_force_W(double mass_kg, const Vec3& v_W) const noexcept {
+  const double wanted = v_W.norm() / braking_s;
+  const double share = wanted > state_.braking_m_per_s2 ? state_.braking_m_per_s2 / wanted : 1.0;
+  return -mass_kg * share / braking_s * v_W;
+}
+
+}  // namespace proxarm::controller
