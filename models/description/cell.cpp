@@ -134,6 +134,8 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.gear_stiffness_ratio = node.number_or("gear_stiffness_ratio", s.gear_stiffness_ratio, 0.1, 10.0);
   s.backlash_rad = node.number_or("backlash_rad", s.backlash_rad, 0.0, 0.1);
   s.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
+  s.brake_torque_Nm = node.number_or("brake_torque_Nm", s.brake_torque_Nm, 0.0, 1e6);
+  s.brake_delay_s = node.number_or("brake_delay_s", s.brake_delay_s, 0.0, 1.0);
   s.position_gain_per_s = node.number("position_gain_per_s", above(0.0, 1e4));
   s.velocity_bandwidth_Hz = node.number("velocity_bandwidth_Hz", above(0.0, 5e3));
   s.velocity_feedforward = node.number_or("velocity_feedforward", s.velocity_feedforward, 0.0, 1.0);

@@ -55,6 +55,8 @@ struct SimulatedDrive {
   double gear_stiffness_ratio = 1.0;      // real stiffness over gear_stiffness_Nm_per_rad: no data sheet is exact
   double backlash_rad = 0.0;              // total play at the joint
   double max_torque_Nm = 0.0;             // current limit, as torque at the joint
+  double brake_torque_Nm = 0.0;           // that the closed brake holds or brakes with; 0: without limit
+  double brake_delay_s = 0.0;             // from the power being gone to the brake being closed
   double position_gain_per_s = 0.0;       // outer loop of the cascade
   double velocity_bandwidth_Hz = 0.0;     // inner loop
   double velocity_feedforward = 1.0;      // of the interpolated setpoint
