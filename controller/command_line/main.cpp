@@ -76,8 +76,9 @@ void add_enabling_option(CLI::App& app, RunOptions& options) {
                    return true;
                  }),
                  "simulated enabling switch only, may be repeated: when it is pressed, FROM..UNTIL counted from the "
-                 "first cycle, such as 0.5s..3s (default: from 0.1s on); for a cell with enabling_input")
-      ->type_name("TIME..TIME")
+                 "first cycle, such as 0.5s..3s (default: from 0.1s on); for a cell with enabling_input. "
+                 "squeezed:2s..2.5s: a switch with three positions is squeezed through")
+      ->type_name("[squeezed:]TIME..TIME")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }

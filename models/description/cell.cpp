@@ -9,6 +9,7 @@
 #include <set>
 
 #include "models/base/text.hpp"
+#include "models/description/profile.hpp"
 #include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
@@ -432,6 +433,7 @@ Cell read_cell(const YamlNode& root) {
   cell.passivity = root.choice_or("passivity", cell.passivity, {"off", "observe", "on"});
   if (const auto supervision = root.find_map("supervision")) cell.supervision = read_supervision(*supervision);
   if (const auto input = root.find_map("enabling_input")) cell.enabling_input = read_enabling(*input, cell);
+  if (root.choice_or("profile", "none", {"none", "hand_guiding"}) == "hand_guiding") apply_hand_guiding(root, cell);
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
   cell.default_scene = absolute_path_or_empty(root, "default_scene");

@@ -156,6 +156,9 @@ struct CellLimits {
   double setpoint_bandwidth_Hz = 25.0;   // of the filter that keeps elastic gears from ringing; 0: none
 };
 
+// What a cell says it is used for, and what is therefore required of it (profile.hpp).
+enum class Profile : std::uint8_t { none, hand_guiding };
+
 struct Cell {
   std::filesystem::path file;  // as given, made absolute
   std::string name;
@@ -169,6 +172,7 @@ struct Cell {
   std::vector<DriveDescription> drives;
   SensorPlacement sensor;
   CellLimits limits;
+  Profile profile = Profile::none;
   std::string passivity = "off";  // "off", "observe", "on" (--passivity)
   SupervisionDescription supervision;
   std::optional<EnablingInputDescription> enabling_input;
