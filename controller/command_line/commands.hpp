@@ -42,6 +42,12 @@ struct ScanOptions {
   std::optional<std::uint32_t> sensor_base_id;
 };
 
+struct AssessOptions {
+  RunOptions run;
+  std::filesystem::path thresholds;  // empty: the shipped ones
+  int poses = 4;
+};
+
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
@@ -51,6 +57,7 @@ int set_command(const SetOptions& options);        // of a running session
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);
+int assess_command(const AssessOptions& options);  // 1: a threshold is exceeded
 // What a study measures and writes, for its help; empty: there is none of that name.
 std::string study_description(const std::string& name);
 int study_command(const StudyOptions& options);

@@ -76,8 +76,9 @@ void add_enabling_option(CLI::App& app, RunOptions& options) {
                    return true;
                  }),
                  "simulated enabling switch only, may be repeated: when it is pressed, FROM..UNTIL counted from the "
-                 "first cycle, such as 0.5s..3s (default: from 0.1s on); for a cell with enabling_input")
-      ->type_name("TIME..TIME")
+                 "first cycle, such as 0.5s..3s (default: from 0.1s on); for a cell with enabling_input. "
+                 "squeezed:2s..2.5s: a switch with three positions is squeezed through")
+      ->type_name("[squeezed:]TIME..TIME")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
@@ -261,6 +262,27 @@ void add_study_options(CLI::App& app, command_line::StudyOptions& options) {
       ->type_name("SEED");
 }
 
+void add_assess_options(CLI::App& app, command_line::AssessOptions& options) {
+  add_session_options(app, options.run);
+  leave_out(app, {"--scene", "--stiffness", "--scheme", "--duration", "--bus"});
+  app.add_option("--thresholds", options.thresholds,
+                 "file of the forces that clamping is held against, with their source (default: "
+                 "models/thresholds/hands.yaml)")
+      ->type_name("FILE");
+  app.add_option("--poses",
+                 whole_number("--poses",
+                              [&](std::uint64_t n) {
+                                if (n < 1 || n > 100) {
+                                  throw description::SetupError(
+                                      {.key = "--poses", .found = std::to_string(n), .expected = "1 to 100"});
+                                }
+                                options.poses = static_cast<int>(n);
+                              }),
+                 "in how many poses, the start and others about it (default 4)")
+      ->type_name("N");
+  app.add_flag("--json", options.run.json, "print the figures as one JSON object");
+}
+
 // CLI11's message in one line, with the nearest word that is known.
 int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
   std::vector<std::string> commands;
@@ -391,6 +413,14 @@ int run(int argc, char** argv) {
   add_session_options(*tune_app, tune_options);
   leave_out(*tune_app, {"--scene", "--stiffness", "--duration", "--bus"});
   tune_app->callback([&] { command = [&] { return command_line::tune_command(tune_options); }; });
+
+  command_line::AssessOptions assess_options;
+  CLI::App* assess_app = app.add_subcommand(
+      "assess",
+      "stopping times and distances, and clamping forces, of the simulated arm, held against thresholds; certifies "
+      "nothing. Status 1: a threshold is exceeded");
+  add_assess_options(*assess_app, assess_options);
+  assess_app->callback([&] { command = [&] { return command_line::assess_command(assess_options); }; });
 
   command_line::StudyOptions study_options;
   for (int i = 1; i < argc; ++i) study_options.command_line += (i > 1 ? " " : "proxarm ") + std::string(argv[i]);

@@ -29,6 +29,11 @@ std::optional<DriveMonitor> drive_monitor(const CycleParts& parts, const descrip
   return DriveMonitor(*parts.arm, std::move(drives), limits.following_error_rad);
 }
 
+std::optional<StandstillMonitor> standstill_monitor(const CycleParts& parts, const description::CellLimits& limits) {
+  if (!parts.supervision.monitored_standstill || renders_torques(parts)) return {};
+  return StandstillMonitor(parts.arm->axes(), limits.following_error_rad);
+}
+
 // What a torque can't do, a stop does: nothing is held or slowed there.
 Reactions reactions_for(const CycleParts& parts) {
   Reactions reactions = reactions_of(parts.supervision);
@@ -60,7 +65,8 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       bus_(parts_, recorder_, alarm_),
       measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
       faults_(parts_.drives, settings_, {limits.max_force_N, parts_.supervision.max_bias_drift_N}, supervisor_, alarm_,
-              tool_monitor(parts_, settings, limits), drive_monitor(parts_, limits)),
+              tool_monitor(parts_, settings, limits), drive_monitor(parts_, limits),
+              standstill_monitor(parts_, limits)),
       motion_(make_motion(parts_, settings, limits)),
       timestep_(parts_.can_drives) {}
 
@@ -105,6 +111,7 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
                  .overruns_in_a_row = overruns_in_a_row_,
                  .telling = timestep_.telling(),
                  .tared = state_.tared,
+                 .stands = stands_in_hold() || state_.entered_phase == Phase::taring,
                  .backs_off = motion_->backs_off()});
   take_command(t_k_ns);
   take_timestep();

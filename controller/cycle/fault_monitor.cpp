@@ -62,6 +62,7 @@ void FaultMonitor::judge(const JudgedCycle& cycle) noexcept {
     alarm_.raise(Fault::overrun, -1, cycle.overruns_in_a_row, settings_.max_overruns);
   }
   judge_enabling(cycle.enabling);
+  judge_standstill(cycle);
   judge_buses(cycle.buses);
   judge_drives(cycle.telling);
   judge_sensor(cycle);
@@ -71,8 +72,16 @@ void FaultMonitor::judge_enabling(const EnablingInput* enabling) noexcept {
   if (enabling == nullptr || enabling->pressed()) return;
   const Phase phase = supervisor_.phase();
   if (supervisor_.live() || phase == Phase::enabling || phase == Phase::taring) {
-    alarm_.raise(Fault::enabling_released);
+    alarm_.raise(enabling->squeezed() ? Fault::enabling_squeezed : Fault::enabling_released);
   }
+}
+
+void FaultMonitor::judge_standstill(const JudgedCycle& cycle) noexcept {
+  if (!standstill_) return;
+  const Measured& measured = cycle.measured;
+  const StandstillVerdict verdict =
+      standstill_->step(measured.motor_rad, measured.fresh, cycle.stands, settings_.period_s);
+  if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, verdict.joint, verdict.value_rad, verdict.limit_rad);
 }
 
 void FaultMonitor::judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept {

@@ -21,6 +21,7 @@
 #include "controller/supervision/alarm.hpp"
 #include "controller/supervision/drive_monitor.hpp"
 #include "controller/supervision/enabling_input.hpp"
+#include "controller/supervision/standstill_monitor.hpp"
 #include "controller/supervision/supervisor.hpp"
 #include "controller/supervision/tool_monitor.hpp"
 #include "fieldbus/can/can_network.hpp"
@@ -39,6 +40,7 @@ struct JudgedCycle {
   std::uint32_t overruns_in_a_row = 0;
   bool telling = false;    // SDO answers are on the buses: a drive's own frame may come later by one of theirs
   bool tared = false;      // the sensor was, so drives that are enabled are enabled anew
+  bool stands = false;     // the arm is to stand still
   bool backs_off = false;  // where the arm is freed, it goes along a direction that is set
 };
 
@@ -54,14 +56,16 @@ class FaultMonitor {
   // and `bounds` must outlive this; T and what is counted in cycles may change in `settings`.
   FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ForceBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
-               std::optional<DriveMonitor> drives_follow = {}) noexcept
+               std::optional<DriveMonitor> drives_follow = {},
+               std::optional<StandstillMonitor> standstill = {}) noexcept
       : drives_(drives),
         settings_(settings),
         bounds_(bounds),
         supervisor_(supervisor),
         alarm_(alarm),
         tool_(std::move(tool)),
-        drives_follow_(std::move(drives_follow)) {}
+        drives_follow_(std::move(drives_follow)),
+        standstill_(std::move(standstill)) {}
 
   // An encoder can't be where its joint can't have come to since it was last heard, nor a drive far from what it was
   // told. `entered`: the phase of the cycle before; without drives that hold it the arm may be moved by hand, and isn't
@@ -75,6 +79,7 @@ class FaultMonitor {
     archive_fields(state, state_);
     if (tool_) tool_->archive(state);
     if (drives_follow_) drives_follow_->archive(state);
+    if (standstill_) standstill_->archive(state);
   }
 
  private:
@@ -88,6 +93,7 @@ class FaultMonitor {
   void judge_following(const Measured& measured, Phase entered) noexcept;
   void judge_tool(const models::Vec3& tool_W, Phase entered) noexcept;
   void judge_enabling(const EnablingInput* enabling) noexcept;
+  void judge_standstill(const JudgedCycle& cycle) noexcept;
   void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;
   void judge_drives(bool telling) noexcept;
   void judge_drive_fault(std::int32_t where, fieldbus::DriveFault fault) noexcept;
@@ -103,6 +109,7 @@ class FaultMonitor {
   Alarm& alarm_;
   std::optional<ToolMonitor> tool_;
   std::optional<DriveMonitor> drives_follow_;
+  std::optional<StandstillMonitor> standstill_;
   State state_;
 };
 

@@ -23,24 +23,44 @@ EnablingInput::EnablingInput(const description::EnablingInputDescription& input,
       id_(input.drive.empty() ? input.identifier
                               : fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 2, node_of(cell, input.drive))),
       extended_(input.drive.empty() && input.extended),
-      byte_(static_cast<std::size_t>(input.drive.empty() ? input.byte : input.bit / 8)),
-      mask_(static_cast<std::uint8_t>(1u << (input.bit % 8))),
-      pressed_is_(input.pressed_is),
-      timeout_ns_(std::llround(1e9 * input.timeout_s)) {}
+      timeout_ns_(std::llround(1e9 * input.timeout_s)) {
+  const auto contact = [&](int byte, int bit, bool made_is) {
+    return Contact{static_cast<std::size_t>(input.drive.empty() ? byte : bit / 8),
+                   static_cast<std::uint8_t>(1u << (bit % 8)), made_is};
+  };
+  middle_ = contact(input.byte, input.bit, input.pressed_is);
+  if (!input.three_position) return;
+  const description::PanicContact& panic = *input.three_position;
+  panic_ = contact(panic.byte, panic.bit, panic.squeezed_is);
+}
 
 std::uint32_t EnablingInput::wanted_id() const noexcept { return extended_ ? id_ | fieldbus::extended_id_flag : id_; }
 
 bool EnablingInput::on_frame(std::size_t bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept {
   if (bus != bus_ || frame.id != id_ || frame.extended != extended_ || frame.remote || frame.error) return false;
   on_cycle(time_ns);
-  const bool says = byte_ < frame.length && ((frame.data[byte_] & mask_) != 0) == pressed_is_;
+  const Position position = position_by(frame);
+  if (position == Position::squeezed) squeezed_ = true;
+  if (position == Position::released) squeezed_ = false;
+  // With three positions the middle one counts only on the way in.
+  const bool says = position == Position::middle && (!panic_ || pressed_ || released_before_);
   if (says && released_before_) pressed_anew_ = true;
-  released_before_ = !says && byte_ < frame.length;
+  released_before_ = position == Position::released;
   if (!says) pressed_anew_ = false;
   pressed_ = says;
   heard_ = true;
   last_ns_ = time_ns;
   return true;
+}
+
+EnablingInput::Position EnablingInput::position_by(const fieldbus::CanFrame& frame) const noexcept {
+  const auto is_there = [&](const Contact& contact) { return contact.byte < frame.length; };
+  const auto is_made = [&](const Contact& contact) {
+    return ((frame.data[contact.byte] & contact.mask) != 0) == contact.made_is;
+  };
+  if (!is_there(middle_) || (panic_ && !is_there(*panic_))) return Position::unknown;
+  if (panic_ && is_made(*panic_)) return Position::squeezed;
+  return is_made(middle_) ? Position::middle : Position::released;
 }
 
 void EnablingInput::on_cycle(std::int64_t t_k_ns) noexcept {

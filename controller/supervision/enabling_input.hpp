@@ -5,10 +5,22 @@
 // older than the timeout, or when it is too short to hold the bit. To start or go on, the person must press it anew: a
 // message says released and the next one says pressed, without a gap beyond the timeout. A switch that is held, tied
 // down or stuck at "pressed" never starts anything.
+//
+// A switch with three positions has a second contact, which is made when it is squeezed through (IEC 60204-1, 10.9):
+//
+//   contacts (middle, panic)   position    what was before         then
+//   0, 0                       released    anything                released
+//   1, 0                       middle      released                pressed, anew
+//   1, 0                       middle      pressed                 pressed
+//   1, 0                       middle      squeezed, or unknown    not pressed, until it was let go
+//   0, 1 and 1, 1              squeezed    anything                squeezed, not pressed
+//   none, or too old           unknown     anything                not pressed; squeezed stays so
+// So the way back from the third position through the middle one enables nothing.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "fieldbus/can/can_frame.hpp"
 #include "models/base/state_archive.hpp"
@@ -30,23 +42,35 @@ class EnablingInput {
   // Called in each cycle before the others: forgets a message that is too old by now.
   void on_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
+  // It was squeezed through and hasn't been let go since; never so with two positions.
+  [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
   // True once for each press after a release, while it is still pressed.
   [[nodiscard]] bool take_press() noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
-    state(last_ns_, heard_, pressed_, released_before_, pressed_anew_);
+    state(last_ns_, heard_, pressed_, released_before_, pressed_anew_, squeezed_);
   }
 
  private:
+  enum class Position : std::uint8_t { unknown, released, middle, squeezed };
+  // A bit in the message's data, and what it is when its contact is made.
+  struct Contact {
+    std::size_t byte = 0;
+    std::uint8_t mask = 0;
+    bool made_is = true;
+  };
+
+  [[nodiscard]] Position position_by(const fieldbus::CanFrame& frame) const noexcept;
+
   std::size_t bus_;
   std::uint32_t id_;
   bool extended_;
-  std::size_t byte_;
-  std::uint8_t mask_;
-  bool pressed_is_;
+  Contact middle_;
+  std::optional<Contact> panic_;  // of the third position
   std::int64_t timeout_ns_;
   std::int64_t last_ns_ = 0;
   bool heard_ = false, pressed_ = false, released_before_ = false, pressed_anew_ = false;
+  bool squeezed_ = false;
 };
 
 }  // namespace proxarm::controller

@@ -128,6 +128,13 @@ constexpr std::array texts{
     FaultText{Fault::enabling_not_pressed, "enabling_not_pressed", Reaction::stop_1,
               "the enabling input wasn't pressed in time", nullptr,
               "let go of it and press it: one that is pressed already could be tied down", still},
+    FaultText{Fault::enabling_squeezed, "enabling_squeezed", Reaction::stop_1,
+              "the enabling switch was squeezed through", nullptr,
+              "see to whoever holds it first; then let go of it and press it to its middle position"},
+    FaultText{Fault::standstill_left, "standstill_left", Reaction::stop_0,
+              "a joint moved while the arm was to stand, by its encoder", "rad away",
+              "look for a drive that runs off, an encoder that is off, or a load that the drive can't hold, before "
+              "anybody comes near"},
 };
 
 const FaultText& text_of(Fault fault) noexcept {

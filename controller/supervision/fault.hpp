@@ -52,8 +52,10 @@ enum class Fault : std::uint8_t {
   interface_down,     // a CAN interface is down or gone: its drives stop by themselves
   enabling_released,  // the enabling input was let go, or says nothing any more
   enabling_not_pressed,  // it wasn't let go and pressed within enabling_timeout_s of the start: nothing moves
+  enabling_squeezed,     // a switch with three positions was squeezed through
+  standstill_left,       // a joint moves, by its encoder, where the arm is to stand
 };
-inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::enabling_not_pressed) + 1;
+inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::standstill_left) + 1;
 
 // What the arm does; each one does more than the one before.
 enum class Reaction : std::uint8_t {

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "models/base/text.hpp"
+#include "models/description/profile.hpp"
 #include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
@@ -134,6 +135,8 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.gear_stiffness_ratio = node.number_or("gear_stiffness_ratio", s.gear_stiffness_ratio, 0.1, 10.0);
   s.backlash_rad = node.number_or("backlash_rad", s.backlash_rad, 0.0, 0.1);
   s.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
+  s.brake_torque_Nm = node.number_or("brake_torque_Nm", s.brake_torque_Nm, 0.0, 1e6);
+  s.brake_delay_s = node.number_or("brake_delay_s", s.brake_delay_s, 0.0, 1.0);
   s.position_gain_per_s = node.number("position_gain_per_s", above(0.0, 1e4));
   s.velocity_bandwidth_Hz = node.number("velocity_bandwidth_Hz", above(0.0, 5e3));
   s.velocity_feedforward = node.number_or("velocity_feedforward", s.velocity_feedforward, 0.0, 1.0);
@@ -430,6 +433,7 @@ Cell read_cell(const YamlNode& root) {
   cell.passivity = root.choice_or("passivity", cell.passivity, {"off", "observe", "on"});
   if (const auto supervision = root.find_map("supervision")) cell.supervision = read_supervision(*supervision);
   if (const auto input = root.find_map("enabling_input")) cell.enabling_input = read_enabling(*input, cell);
+  if (root.choice_or("profile", "none", {"none", "hand_guiding"}) == "hand_guiding") apply_hand_guiding(root, cell);
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
   cell.default_scene = absolute_path_or_empty(root, "default_scene");

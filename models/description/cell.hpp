@@ -55,6 +55,8 @@ struct SimulatedDrive {
   double gear_stiffness_ratio = 1.0;      // real stiffness over gear_stiffness_Nm_per_rad: no data sheet is exact
   double backlash_rad = 0.0;              // total play at the joint
   double max_torque_Nm = 0.0;             // current limit, as torque at the joint
+  double brake_torque_Nm = 0.0;           // that the closed brake holds or brakes with; 0: without limit
+  double brake_delay_s = 0.0;             // from the power being gone to the brake being closed
   double position_gain_per_s = 0.0;       // outer loop of the cascade
   double velocity_bandwidth_Hz = 0.0;     // inner loop
   double velocity_feedforward = 1.0;      // of the interpolated setpoint
@@ -154,6 +156,9 @@ struct CellLimits {
   double setpoint_bandwidth_Hz = 25.0;   // of the filter that keeps elastic gears from ringing; 0: none
 };
 
+// What a cell says it is used for, and what is therefore required of it (profile.hpp).
+enum class Profile : std::uint8_t { none, hand_guiding };
+
 struct Cell {
   std::filesystem::path file;  // as given, made absolute
   std::string name;
@@ -167,6 +172,7 @@ struct Cell {
   std::vector<DriveDescription> drives;
   SensorPlacement sensor;
   CellLimits limits;
+  Profile profile = Profile::none;
   std::string passivity;  // "off", "observe", "on" (--passivity); empty: on, where there is a proxy with a mass
   SupervisionDescription supervision;
   std::optional<EnablingInputDescription> enabling_input;

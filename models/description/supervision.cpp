@@ -27,6 +27,7 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"second_master", {"stop_1", "stop_0"}},
       {"error_passive", {"slow", "hold", "stop_1"}},
       {"enabling_released", {"hold", "stop_1", "stop_0"}},
+      {"enabling_squeezed", {"stop_1", "hold", "stop_0"}},
   };
   return choices;
 }
@@ -43,6 +44,7 @@ SupervisionDescription read_supervision(const YamlNode& node) {
   s.max_bias_drift_N = node.number_or("max_bias_drift_N", s.max_bias_drift_N, 0.01, 100.0);
   s.brake_release = node.string_or("brake_release", "");
   if (s.brake_release.size() > 120) throw node.error_at("brake_release", "at most 120 characters");
+  s.monitored_standstill = node.boolean_or("monitored_standstill", s.monitored_standstill);
   const auto reactions = node.find_map("reactions");
   if (!reactions) return s;
   for (const ReactionChoice& choice : reaction_choices()) {
@@ -50,6 +52,26 @@ SupervisionDescription read_supervision(const YamlNode& node) {
   }
   return s;
 }
+
+namespace {
+
+// Where the input is has been read already.
+void read_three_position(const YamlNode& node, EnablingInputDescription& input) {
+  const auto contact = node.find_map("three_position");
+  if (!contact) return;
+  PanicContact panic;
+  const bool of_drive = !input.drive.empty();
+  panic.bit = static_cast<int>(contact->integer("panic_bit", 0, of_drive ? 31 : 7));
+  if (!of_drive) panic.byte = static_cast<int>(contact->integer_or("panic_byte", input.byte, 0, 7));
+  panic.squeezed_is = contact->integer_or("panic_is", 1, 0, 1) == 1;
+  if (panic.bit == input.bit && panic.byte == input.byte) {
+    throw contact->error_at("panic_bit", "another bit than that of the middle position", {},
+                            "a switch with three positions has a contact of its own for each");
+  }
+  input.three_position = panic;
+}
+
+}  // namespace
 
 EnablingInputDescription read_enabling_input(const YamlNode& node) {
   EnablingInputDescription input;
@@ -68,6 +90,7 @@ EnablingInputDescription read_enabling_input(const YamlNode& node) {
       }
       input.object = static_cast<std::uint32_t>(*index << 8);
     }
+    read_three_position(node, input);
     return input;
   }
   input.bus = node.string("bus");
@@ -75,6 +98,7 @@ EnablingInputDescription read_enabling_input(const YamlNode& node) {
   input.identifier = static_cast<std::uint32_t>(node.integer("identifier", 1, input.extended ? 0x1FFFFFFF : 0x7FF));
   input.byte = static_cast<int>(node.integer("byte", 0, 7));
   input.bit = static_cast<int>(node.integer("bit", 0, 7));
+  read_three_position(node, input);
   return input;
 }
 

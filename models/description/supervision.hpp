@@ -11,8 +11,11 @@
 //     max_bias_drift_N: 0.5            # by which the force sensor's bias may go meanwhile
 //     reactions: {sensor_lost: hold}   # of faults that leave a choice: reaction_choices()
 //
+//     monitored_standstill: false      # where the arm is to stand, a joint that moves is a fault (standstill_left)
+//
 //   enabling_input: {drive: axis_3, bit: 16}                                  # of 60FDh, the drive's digital inputs
 //   enabling_input: {bus: sensor, identifier: 0x1A0, byte: 0, bit: 0}         # of a CAN message
+//   enabling_input: {drive: axis_3, bit: 16, three_position: {panic_bit: 17}}   # squeezed through: a stop
 #pragma once
 
 #include <cstdint>
@@ -46,13 +49,22 @@ struct SupervisionDescription {
   double slow_speed_m_per_s = 0.1;
   double release_speed_m_per_s = 0.05;
   LetGo let_go = LetGo::rest;
-  double empty_handle_N = 0.1;                   // below this for half a second nobody is there
-  double max_bias_drift_N = 0.5;                 // by which the sensor's bias may go while nobody is there
+  double empty_handle_N = 0.1;    // below this for half a second nobody is there
+  double max_bias_drift_N = 0.5;  // by which the sensor's bias may go while nobody is there
+  bool monitored_standstill = false;
   std::string brake_release;                     // how a person opens the brakes by hand; empty: not at all
   std::map<std::string, std::string> reactions;  // by the fault's name; a choice of reaction_choices()
 };
 
-// One bit that says that the person's enabling switch is pressed.
+// The second contact of an enabling switch with three positions, in the same object or message: it says that the switch
+// is squeezed through.
+struct PanicContact {
+  int byte = 0;             // of the message's data
+  int bit = 0;              // of that byte; of a drive's object, 0 to 31
+  bool squeezed_is = true;  // what the bit is while the switch is squeezed through
+};
+
+// One bit that says that the person's enabling switch is pressed; with three positions, that it is in the middle one.
 struct EnablingInputDescription {
   std::string drive;                // joint of the drive that has it among its digital inputs; empty: a CAN message
   std::uint32_t object = 0x60FD00;  // of that drive, index << 8 | sub-index, 32 bits, in TPDO2 at every SYNC
@@ -63,6 +75,7 @@ struct EnablingInputDescription {
   int bit = 0;                      // of that byte; with `drive` of the object, 0 to 31
   bool pressed_is = true;           // what the bit is while the switch is pressed
   double timeout_s = 0.05;          // a message that is older says nothing: released
+  std::optional<PanicContact> three_position;
 };
 
 // `node` is the map under the key. Buses and drives are for the caller to check.

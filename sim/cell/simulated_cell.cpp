@@ -65,14 +65,16 @@ std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cel
 
 class SimulatedCell::PlantAxis final : public ServoAxis {
  public:
-  PlantAxis(ServoLoop& servo, const description::DriveDescription& drive)
-      : servo_(servo),
+  PlantAxis(Plant& plant, std::size_t axis, const description::DriveDescription& drive)
+      : plant_(plant),
+        axis_(axis),
+        servo_(plant.servo(axis)),
         counts_per_rad_(drive.counts_per_rad()),
         rated_torque_Nm_(drive.rated_torque_Nm > 0.0 ? drive.rated_torque_Nm : drive.simulation.max_torque_Nm),
         max_torque_Nm_(drive.simulation.max_torque_Nm) {}
 
-  void enable(std::int64_t time_ns) noexcept override { servo_.enable(time_ns); }
-  void disable() noexcept override { servo_.disable(); }
+  void enable(std::int64_t time_ns) noexcept override { plant_.enable(axis_, time_ns); }
+  void disable() noexcept override { plant_.switch_off(axis_); }
   void set_interpolation_period_ns(std::int64_t period_ns) noexcept override {
     servo_.set_interpolation_period_ns(period_ns);
   }
@@ -136,6 +138,8 @@ class SimulatedCell::PlantAxis final : public ServoAxis {
            static_cast<std::int32_t>(std::lround(off));
   }
 
+  Plant& plant_;
+  std::size_t axis_;
   ServoLoop& servo_;
   double counts_per_rad_, rated_torque_Nm_, max_torque_Nm_;
   double runaway_counts_per_s_ = 0.0;
@@ -234,7 +238,7 @@ SimulatedCell::SimulatedCell(const description::Cell& cell, const description::S
       faults_(config.faults),
       plant_(cell, sensor, hand, events.now_ns(), config.plant) {
   for (std::size_t axis = 0; axis < cell_.drives.size(); ++axis) {
-    axes_.push_back(std::make_unique<PlantAxis>(plant_.servo(axis), cell_.drives[axis]));
+    axes_.push_back(std::make_unique<PlantAxis>(plant_, axis, cell_.drives[axis]));
     drives_.emplace_back();
     modbus_drives_.emplace_back();
     node_of_axis_.push_back(nodes_.size());
@@ -387,6 +391,19 @@ void SimulatedCell::power_on() {
     events_.schedule(now_ns + described_sensor_->period_ns(), [this](std::int64_t time_ns) { convert(time_ns); });
   }
   events_.schedule(now_ns + tick_ns_, [this](std::int64_t time_ns) { tick(time_ns); });
+}
+
+void SimulatedCell::cut_power() noexcept {
+  const std::int64_t now_ns = events_.now_ns();
+  advance_to(now_ns);
+  const DeviceFault lost{.device = "", .kind = DeviceFaultKind::power_loss};
+  for (std::size_t axis = 0; axis < drives_.size(); ++axis) {
+    if (modbus_drives_[axis]) {
+      set_modbus_fault(axis, lost, true);
+    } else {
+      set_drive_fault(axis, lost, true, now_ns);
+    }
+  }
 }
 
 void SimulatedCell::tick(std::int64_t time_ns) noexcept {

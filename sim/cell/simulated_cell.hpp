@@ -81,6 +81,9 @@ class SimulatedCell final : private Clockwork {
   // Everything starts at the event queue's present time, and the physics and the devices' clocks with it.
   void power_on();
 
+  // All drives lose their power at once and for good, as by the main switch: no torque, no word, brakes close.
+  void cut_power() noexcept;
+
   // At the event queue's present time, up to one step of the physics before it.
   [[nodiscard]] Truth truth() noexcept;
   // Called after each step of the physics, in order of time; may allocate nothing where the run mustn't. Empty: none.

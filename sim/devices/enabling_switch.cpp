@@ -17,12 +17,16 @@ constexpr std::int64_t message_period_ns = 10'000'000;
 }  // namespace
 
 PressedSpan parse_pressed_span(std::string_view text) {
+  constexpr std::string_view squeezed = "squeezed:";
+  const bool is_squeezed = text.substr(0, squeezed.size()) == squeezed;
+  if (is_squeezed) text.remove_prefix(squeezed.size());
   const std::size_t dots = text.find("..");
   const auto time_ns = [&](std::string_view part) -> std::int64_t {
     if (part == "0" || part == "0s") return 0;
     return std::llround(1e9 * description::parse_duration(part, "--enabling"));
   };
   PressedSpan span;
+  span.squeezed = is_squeezed;
   span.from_ns = time_ns(text.substr(0, dots));
   if (dots != std::string_view::npos && dots + 2 < text.size()) span.until_ns = time_ns(text.substr(dots + 2));
   if (span.from_ns < span.until_ns) return span;
@@ -34,7 +38,8 @@ PressedSpan parse_pressed_span(std::string_view text) {
 EnablingSwitch::EnablingSwitch(const description::EnablingInputDescription& input, std::vector<PressedSpan> spans,
                                DevicePort* port)
     : input_(input), spans_(std::move(spans)), port_(port) {
-  if (spans_.empty()) spans_.push_back({by_itself_ns, INT64_MAX});
+  const bool ever_pressed = std::any_of(spans_.begin(), spans_.end(), [](const auto& span) { return !span.squeezed; });
+  if (!ever_pressed) spans_.push_back({by_itself_ns, INT64_MAX});
 }
 
 void EnablingSwitch::on_sync(std::int64_t time_ns) noexcept {
@@ -48,8 +53,17 @@ void EnablingSwitch::begin_without_sync(std::int64_t time_ns) noexcept {
   begun_ = endless_ = true;
 }
 
-std::uint32_t EnablingSwitch::digital_inputs() const noexcept {
-  return pressed_ == input_.pressed_is ? 1u << input_.bit : 0u;
+std::uint32_t EnablingSwitch::digital_inputs() const noexcept { return static_cast<std::uint32_t>(contacts()); }
+
+std::uint64_t EnablingSwitch::contacts() const noexcept {
+  const auto bit = [&](int byte, int bit_of_byte) {
+    return std::uint64_t{1} << (bit_of_byte + (input_.drive.empty() ? 8 * byte : 0));
+  };
+  std::uint64_t made = pressed_ == input_.pressed_is ? bit(input_.byte, input_.bit) : 0;
+  if (const auto& panic = input_.three_position) {
+    if (squeezed_ == panic->squeezed_is) made |= bit(panic->byte, panic->bit);
+  }
+  return made;
 }
 
 void EnablingSwitch::power_on(std::int64_t time_ns) noexcept { next_ns_ = time_ns; }
@@ -59,9 +73,13 @@ void EnablingSwitch::on_frame(const fieldbus::CanFrame&, std::int64_t) noexcept 
 void EnablingSwitch::on_time(std::int64_t time_ns) noexcept {
   const bool session = endless_ || (begun_ && time_ns - last_sync_ns_ <= end_of_session_ns);
   const std::int64_t since_ns = time_ns - begin_ns_;
-  pressed_ = session && std::any_of(spans_.begin(), spans_.end(), [&](const PressedSpan& span) {
-               return span.from_ns <= since_ns && since_ns < span.until_ns;
-             });
+  const auto any = [&](bool squeezed) {
+    return session && std::any_of(spans_.begin(), spans_.end(), [&](const PressedSpan& span) {
+             return span.squeezed == squeezed && span.from_ns <= since_ns && since_ns < span.until_ns;
+           });
+  };
+  squeezed_ = any(true);
+  pressed_ = any(false) && !squeezed_;
   if (port_ == nullptr || time_ns < next_ns_) return;
   next_ns_ = std::max(next_ns_ + message_period_ns, time_ns);
   send(time_ns);
@@ -71,9 +89,11 @@ void EnablingSwitch::send(std::int64_t time_ns) noexcept {
   fieldbus::CanFrame frame;
   frame.id = input_.identifier;
   frame.extended = input_.extended;
-  frame.length = static_cast<std::uint8_t>(std::min(input_.byte, 7) + 1);
-  const auto byte = static_cast<std::size_t>(frame.length - 1);
-  if (pressed_ == input_.pressed_is) frame.data[byte] = static_cast<std::uint8_t>(1u << input_.bit);
+  const int last = std::max(input_.byte, input_.three_position ? input_.three_position->byte : 0);
+  frame.length = static_cast<std::uint8_t>(std::min(last, 7) + 1);
+  const std::uint64_t made = contacts();
+  for (std::size_t byte = 0; byte < frame.length; ++byte)
+    frame.data[byte] = static_cast<std::uint8_t>(made >> 8 * byte);
   port_->send(frame, time_ns);
 }
 

@@ -13,12 +13,14 @@
 
 namespace proxarm::sim {
 
+// A switch with two positions is pressed meanwhile; one with three is in its middle position, or squeezed through.
 struct PressedSpan {
   std::int64_t from_ns = 0;
   std::int64_t until_ns = INT64_MAX;
+  bool squeezed = false;
 };
 
-// "0.5s..3s", "2s.." or "2s". Throws SetupError that names the option.
+// "0.5s..3s", "2s.." or "2s"; "squeezed:2s..3s". Throws SetupError that names the option.
 [[nodiscard]] PressedSpan parse_pressed_span(std::string_view text);
 
 class EnablingSwitch final : public BusDevice {
@@ -30,6 +32,7 @@ class EnablingSwitch final : public BusDevice {
   // Where no SYNC will ever come.
   void begin_without_sync(std::int64_t time_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
+  [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
   // What it makes of the drive's object; bits that aren't its own are zero.
   [[nodiscard]] std::uint32_t digital_inputs() const noexcept;
 
@@ -39,13 +42,15 @@ class EnablingSwitch final : public BusDevice {
 
  private:
   void send(std::int64_t time_ns) noexcept;
+  // Each contact with its bit, counted from bit 0 of byte 0 of the message, or of the object.
+  [[nodiscard]] std::uint64_t contacts() const noexcept;
 
   description::EnablingInputDescription input_;
   std::vector<PressedSpan> spans_;
   DevicePort* port_;
   std::int64_t begin_ns_ = 0, last_sync_ns_ = 0, next_ns_ = 0;
   bool begun_ = false, endless_ = false;
-  bool pressed_ = false;
+  bool pressed_ = false, squeezed_ = false;
 };
 
 }  // namespace proxarm::sim

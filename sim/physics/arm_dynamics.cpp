@@ -86,6 +86,7 @@ ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, dou
     axis.dof = m.jnt_dofadr[joint];
     axis.rotor_inertia_kg_m2 = drive.rotor_inertia_kg_m2;
     axis.coulomb_Nm = drive.simulation.coulomb_friction_Nm;
+    axis.brake_Nm = drive.simulation.brake_torque_Nm;
     axis.viscous_Nms_per_rad = drive.simulation.viscous_friction_Nms_per_rad;
     axis.stiffness_Nm_per_rad = drive.gear_stiffness_Nm_per_rad * drive.simulation.gear_stiffness_ratio;
     axis.damping_Nms_per_rad = drive.simulation.gear_damping_Nms_per_rad;
@@ -151,8 +152,8 @@ void ArmDynamics::advance() noexcept {
     const double J = axis.rotor_inertia_kg_m2;
     const double free_speed = (axis.speed_rad_per_s + h / J * (axis.torque_Nm - axis.gear_torque_Nm)) /
                               (1.0 + h / J * axis.viscous_Nms_per_rad);
-    const double friction = h / J * axis.coulomb_Nm;
-    if (axis.braked || axis.jammed || std::abs(free_speed) <= friction) {
+    const double friction = h / J * (axis.coulomb_Nm + (axis.braked ? axis.brake_Nm : 0.0));
+    if ((axis.braked && axis.brake_Nm <= 0.0) || axis.jammed || std::abs(free_speed) <= friction) {
       axis.speed_rad_per_s = 0.0;
     } else {
       axis.speed_rad_per_s = free_speed - std::copysign(friction, free_speed);
@@ -162,9 +163,11 @@ void ArmDynamics::advance() noexcept {
   update_kinematics();
 }
 
-void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W) noexcept {
+void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W,
+                        const Vec3& arm_force_W) noexcept {
   for (std::size_t i = 0; i < axes_.size(); ++i) axes_[i].torque_Nm = motor_torque_Nm[i];
   hand_force_W_ = hand_force_W;
+  arm_force_W_ = arm_force_W;
   update_accelerations();
 }
 
@@ -218,7 +221,7 @@ void ArmDynamics::update_accelerations() noexcept {
     if (angle < l.lower_stop[i]) stop = std::max(0.0, k * (l.lower_stop[i] - angle) - c * d->qvel[axis.dof]);
     d->qfrc_applied[axis.dof] = axis.gear_torque_Nm + stop - d->qfrc_bias[axis.dof];
   }
-  const Vec3 force_B = X_WB_.linear().transpose() * (hand_force_W_ - hand_mass_kg_ * gravity_W_);
+  const Vec3 force_B = X_WB_.linear().transpose() * (hand_force_W_ + arm_force_W_ - hand_mass_kg_ * gravity_W_);
   const Vec3 point_B = l.p_BL + l.arm_B, no_torque = Vec3::Zero();
   mj_applyFT(m, d, force_B.data(), no_torque.data(), point_B.data(), l.body, d->qfrc_applied);
   mj_solveM(m, d, d->qacc, d->qfrc_applied, 1);

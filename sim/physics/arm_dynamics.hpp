@@ -58,9 +58,12 @@ class ArmDynamics {
 
   void advance() noexcept;
   // Motor torques, as torques at the joint, and the force of the hand's muscles on hand and handle at T, in W.
-  void apply(std::span<const double> motor_torque_Nm, const models::Vec3& hand_force_W) noexcept;
+  // `arm_force_W` acts at the same point on the arm in front of the sensor, which doesn't feel it.
+  void apply(std::span<const double> motor_torque_Nm, const models::Vec3& hand_force_W,
+             const models::Vec3& arm_force_W = models::Vec3::Zero()) noexcept;
 
-  // A closed brake or a jam hold the rotor where it is, at once and without limit; the gear stays elastic.
+  // A jam holds the rotor where it is, at once and without limit; the gear stays elastic. So does a closed brake,
+  // unless the cell says its torque: then it is dry friction of that torque, and a rotor that turns runs out.
   void brake(std::size_t axis, bool closed) noexcept { axes_[axis].braked = closed; }
   void jam(std::size_t axis, bool jammed) noexcept { axes_[axis].jammed = jammed; }
   [[nodiscard]] bool braked(std::size_t axis) const noexcept { return axes_[axis].braked; }
@@ -94,6 +97,7 @@ class ArmDynamics {
     int dof = 0;  // of the link in MuJoCo's model; hinges only, so also the index in qpos
     double rotor_inertia_kg_m2 = 0.0, coulomb_Nm = 0.0, viscous_Nms_per_rad = 0.0;
     double stiffness_Nm_per_rad = 0.0, damping_Nms_per_rad = 0.0, half_backlash_rad = 0.0;
+    double brake_Nm = 0.0;                          // 0: without limit
     double angle_rad = 0.0, speed_rad_per_s = 0.0;  // of the motor, as at the joint
     double torque_Nm = 0.0, gear_torque_Nm = 0.0;
     bool braked = true, jammed = false;
@@ -115,6 +119,7 @@ class ArmDynamics {
   double hand_mass_kg_ = 0.0;
   double step_s_ = 0.0;
   models::Vec3 hand_force_W_ = models::Vec3::Zero();
+  models::Vec3 arm_force_W_ = models::Vec3::Zero();
   models::Vec3 handle_force_W_ = models::Vec3::Zero();
   ToolState tool_;
   models::Wrench sensor_S_;

@@ -12,6 +12,9 @@ namespace {
 using description::Cell;
 using description::SetupError;
 
+// Longer than any brake takes to close, and far from where a sum of periods overflows.
+constexpr std::int64_t far_ns = 10'000'000'000;
+
 std::int64_t servo_period_ns(const Cell& cell, std::size_t drive) {
   const double rate_Hz = cell.drives[drive].simulation.servo_rate_Hz, period_ns = 1e9 / rate_Hz;
   const auto whole = static_cast<std::int64_t>(std::nearbyint(period_ns));
@@ -49,6 +52,8 @@ Plant::Plant(const Cell& cell, const description::SensorDescription& sensor, con
       time_ns_(start_ns) {
   for (std::size_t i = 0; i < cell.drives.size(); ++i) {
     servo_period_ns_.push_back(servo_period_ns(cell, i));
+    const std::int64_t delay_ns = std::llround(1e9 * cell.drives[i].simulation.brake_delay_s);
+    brakes_.push_back({.delay_ns = delay_ns, .unpowered_ns = delay_ns});
     servos_.emplace_back(cell.drives[i], servo_period_ns_.back());
     servos_.back().reset(arm_.motor_angle_rad(i), arm_.static_torque_Nm(i));
   }
@@ -67,6 +72,30 @@ void Plant::advance_to(std::int64_t time_ns) noexcept {
   while (time_ns_ + step_ns_ <= time_ns) step();
 }
 
+void Plant::switch_off(std::size_t axis) noexcept {
+  Brake& brake = brakes_[axis];
+  if (servos_[axis].powered() && servos_[axis].at_rest() && brake.delay_ns > 0) {
+    brake.closes_in_ns = brake.delay_ns;
+  } else {
+    servos_[axis].disable();
+  }
+}
+
+// Each servo period.
+void Plant::move_brake(std::size_t axis) noexcept {
+  Brake& brake = brakes_[axis];
+  ServoLoop& servo = servos_[axis];
+  if (brake.closes_in_ns > 0) {
+    brake.closes_in_ns = servo.powered() ? brake.closes_in_ns - servo_period_ns_[axis] : 0;
+    if (servo.powered() && brake.closes_in_ns <= 0) {
+      servo.disable();
+      brake.unpowered_ns = brake.delay_ns;
+    }
+  }
+  brake.unpowered_ns = servo.powered() ? 0 : std::min(brake.unpowered_ns + servo_period_ns_[axis], far_ns);
+  arm_.brake(axis, !servo.powered() && brake.unpowered_ns > brake.delay_ns);
+}
+
 void Plant::step() noexcept {
   arm_.advance();
   time_ns_ += step_ns_;
@@ -75,7 +104,7 @@ void Plant::step() noexcept {
     ServoLoop& servo = servos_[i];
     if ((time_ns_ - start_ns_) % servo_period_ns_[i] == 0) {
       torque_Nm_[i] = servo.update(arm_.motor_angle_rad(i), time_ns_);
-      arm_.brake(i, !servo.powered());
+      move_brake(i);
     }
     all_powered = all_powered && servo.powered();
   }
@@ -83,7 +112,10 @@ void Plant::step() noexcept {
   if (all_powered && !hand_started_) start_hand(time_ns_);
   const double hand_time_s = hand_started_ ? 1e-9 * static_cast<double>(time_ns_ - hand_start_ns_) : 0.0;
   const ToolState& tool = arm_.tool();
-  arm_.apply(torque_Nm_, hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W));
+  models::Vec3 hand_W = hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W);
+  models::Vec3 arm_W = models::Vec3::Zero();
+  if (clamp_) (clamp_->felt ? hand_W : arm_W) += clamp_->force_W(tool.X_WT.translation());
+  arm_.apply(torque_Nm_, hand_W, arm_W);
   models::Wrench wrench_S = arm_.sensor_wrench_S();
   if (!sensed_.empty()) {
     std::swap(wrench_S, sensed_[next_sensed_]);

@@ -6,12 +6,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
 #include "sim/physics/arm_dynamics.hpp"
+#include "sim/physics/clamp.hpp"
 #include "sim/physics/force_sensor_model.hpp"
 #include "sim/physics/hand.hpp"
 #include "sim/physics/servo_loop.hpp"
@@ -39,8 +41,13 @@ class Plant {
 
   [[nodiscard]] std::size_t axis_count() const noexcept { return servos_.size(); }
   [[nodiscard]] std::int64_t step_ns() const noexcept { return step_ns_; }
-  // A brake opens when its servo is enabled and closes when it is disabled.
+  // A brake opens when its servo is enabled and closes when it is disabled, brake_delay_s later: a servo that is
+  // disabled by itself gives no torque meanwhile.
   [[nodiscard]] ServoLoop& servo(std::size_t axis) noexcept { return servos_[axis]; }
+  void enable(std::size_t axis, std::int64_t time_ns) noexcept {
+    brakes_[axis].closes_in_ns = 0;
+    servos_[axis].enable(time_ns);
+  }
   [[nodiscard]] const ServoLoop& servo(std::size_t axis) const noexcept { return servos_[axis]; }
   [[nodiscard]] const ForceSensorModel& force_sensor() const noexcept { return force_sensor_; }
   [[nodiscard]] SensorLies& sensor_lies() noexcept { return force_sensor_.lies(); }
@@ -53,12 +60,27 @@ class Plant {
   [[nodiscard]] bool hand_started() const noexcept { return hand_started_; }
   [[nodiscard]] std::int64_t hand_start_ns() const noexcept { return hand_start_ns_; }
 
+  // Switches a servo off as a drive does that commands its brake: one whose setpoint rests holds the axis until the
+  // brake has closed, any other loses its torque at once. Enabling it takes that back.
+  void switch_off(std::size_t axis) noexcept;
+
+  // From now on there is a body in the tool's way.
+  void set_clamp(const Clamp& clamp) noexcept { clamp_ = clamp; }
+
   // Truth, for summaries and studies; the controller never sees it.
   [[nodiscard]] const ToolState& tool() const noexcept { return arm_.tool(); }
   [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return arm_.handle_force_W(); }
 
  private:
+  // What is left to be done by a brake.
+  struct Brake {
+    std::int64_t delay_ns = 0;      // of closing
+    std::int64_t unpowered_ns = 0;  // since its servo had power
+    std::int64_t closes_in_ns = 0;  // above 0: while its servo still holds the axis
+  };
+
   void step() noexcept;
+  void move_brake(std::size_t axis) noexcept;
 
   std::int64_t step_ns_;
   ArmDynamics arm_;
@@ -66,6 +88,8 @@ class Plant {
   ForceSensorModel force_sensor_;
   std::vector<ServoLoop> servos_;
   std::vector<std::int64_t> servo_period_ns_;
+  std::vector<Brake> brakes_;
+  std::optional<Clamp> clamp_;
   std::vector<double> torque_Nm_;
   std::vector<models::Wrench> sensed_;  // on their way through the sensor, a step each; the next one is the oldest
   std::size_t next_sensed_ = 0;

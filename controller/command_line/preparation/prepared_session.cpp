@@ -213,6 +213,15 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                                  .expected = "off: it has no proxy with a mass to be damped"});
 }
 
+// What the profile asks for is in the cell's file; what an option could take away again isn't left out.
+void require_profile(const PreparedSession& session) {
+  if (session.cell.profile != description::Profile::hand_guiding) return;
+  if (!session.settings.without_enabling_input) return;
+  throw description::SetupError({.key = "--without-enabling-input",
+                                 .found = "a cell with profile: hand_guiding",
+                                 .expected = "its enabling input: whoever leads the arm holds it"});
+}
+
 }  // namespace
 
 PreparedSession prepare(const RunOptions& options) {
@@ -239,6 +248,7 @@ PreparedSession prepare(const RunOptions& options) {
   set_timestep(session, options, options.period_s.value_or(session.cell.default_period_s));
   choose_scheme(session, options);
   choose_passivity(session, options);
+  require_profile(session);
 
   session.loop.delay_s = loop_delay_s(session);
   if (session.impedance()) return session;

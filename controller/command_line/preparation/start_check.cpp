@@ -165,6 +165,11 @@ void require_enabling_switch(const PreparedSession& session, const RunOptions& o
            "in a copy of models/cells/default.yaml: enabling_input: {drive: axis_6, bit: 16} (docs/supervision.md)");
   }
   if (session.settings.without_enabling_input) refuse("--without-enabling-input", "one of the two", "");
+  const bool squeezed = std::any_of(options.enabling.begin(), options.enabling.end(),
+                                    [](const sim::PressedSpan& span) { return span.squeezed; });
+  if (squeezed && !session.cell.enabling_input->three_position) {
+    refuse("squeezed, with a switch of two positions", "one whose file has enabling_input: three_position", "");
+  }
 }
 
 void require_nodes_apart(const PreparedSession& session, const std::vector<std::string>& interfaces) {

@@ -486,6 +486,24 @@ std::vector<Row> rows() {
          return with_enabling_input({{3'600'000'000'000, INT64_MAX}});
        },
        at_start},
+      {enabling_squeezed, Reaction::stop_1, 3, way_m,
+       [] {
+         RigOptions options = with_enabling_input({{100'000'000, INT64_MAX}, {1'700'000'000, INT64_MAX, true}});
+         options.edit_cell = [with_two = options.edit_cell](description::Cell& cell) {
+           with_two(cell);
+           cell.enabling_input->three_position = description::PanicContact{.bit = 20};
+         };
+         return options;
+       },
+       [](const ClosedLoopRig&) { return std::size_t{1700}; }},
+      // In a hold: 1 mrad at 0.1 rad/s, after the lag of drives and feedback.
+      {standstill_left, Reaction::stop_0, 20, 2e-3,
+       [] {
+         RigOptions options = running_off(0.1);
+         options.edit_cell = [](description::Cell& cell) { cell.supervision.monitored_standstill = true; };
+         options.commands = {{1'000'000'000, {Order::hold}}};
+         return options;
+       }},
   };
 }
 

@@ -7,6 +7,8 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "fieldbus/sensors/force_sensor.hpp"
 
@@ -224,6 +226,119 @@ TEST(EnablingInput, AnIdentifierOf29BitsIsAskedForAsSuch) {
   frame.extended = true;
   EXPECT_TRUE(input.on_frame(bus, frame, 1 * ms));
   EXPECT_TRUE(input.pressed());
+}
+
+// ---- three positions
+
+enum class Says { released, middle, squeezed, both, nothing };
+
+// Middle is bit 3 of byte 1, panic bit 0 of byte 2; all other bits stand the wrong way round.
+CanFrame three(Says says, bool panic_is) {
+  const bool middle = says == Says::middle || says == Says::both;
+  const bool panic = says == Says::squeezed || says == Says::both;
+  if (says == Says::nothing) return message({0x00, 0x08});  // the byte of the panic contact is missing
+  const bool panic_bit = panic == panic_is;
+  return message(
+      {0xFF, static_cast<std::uint8_t>(middle ? 0x08 : 0xF7), static_cast<std::uint8_t>(panic_bit ? 1 : 0xFE)});
+}
+
+description::EnablingInputDescription with_three_positions(bool panic_is) {
+  description::EnablingInputDescription description;
+  description.identifier = identifier;
+  description.byte = 1;
+  description.bit = 3;
+  description.three_position = description::PanicContact{.byte = 2, .bit = 0, .squeezed_is = panic_is};
+  return description;
+}
+
+struct AfterAll {
+  std::vector<Says> said;
+  bool pressed, anew, squeezed;
+};
+
+// Every way of at most three steps that matters; `anew` is whether the last message was a press.
+const std::vector<AfterAll>& ways() {
+  using enum Says;
+  static const std::vector<AfterAll> all{
+      {{released}, false, false, false},
+      {{middle}, false, false, false},
+      {{squeezed}, false, false, true},
+      {{both}, false, false, true},
+      {{nothing}, false, false, false},
+      {{released, middle}, true, true, false},
+      {{released, squeezed}, false, false, true},
+      {{released, nothing, middle}, false, false, false},
+      {{released, middle, middle}, true, false, false},
+      {{released, middle, released}, false, false, false},
+      {{released, middle, squeezed}, false, false, true},
+      {{released, middle, both}, false, false, true},
+      {{released, middle, nothing}, false, false, false},
+      {{released, middle, nothing, middle}, false, false, false},
+      {{released, middle, released, middle}, true, true, false},
+      {{released, middle, squeezed, middle}, false, false, true},
+      {{released, middle, squeezed, middle, middle}, false, false, true},
+      {{released, middle, squeezed, nothing, middle}, false, false, true},
+      {{released, middle, squeezed, released}, false, false, false},
+      {{released, middle, squeezed, released, middle}, true, true, false},
+      {{released, middle, squeezed, middle, released, middle}, true, true, false},
+      {{middle, released, middle}, true, true, false},
+      {{squeezed, middle}, false, false, true},
+      {{squeezed, released, middle}, true, true, false},
+  };
+  return all;
+}
+
+TEST(ThreePositions, OnlyTheMiddleReachedFromReleasedEnables) {
+  for (const bool panic_is : {true, false}) {
+    for (const AfterAll& way : ways()) {
+      std::string told = panic_is ? "one is squeezed:" : "zero is squeezed:";
+      EnablingInput input(with_three_positions(panic_is), {}, bus);
+      bool anew = false;
+      std::int64_t time_ns = 0;
+      for (const Says says : way.said) {
+        told += " " + std::to_string(static_cast<int>(says));
+        time_ns += 10 * ms;
+        ASSERT_TRUE(input.on_frame(bus, three(says, panic_is), time_ns));
+        input.on_cycle(time_ns);
+        anew = input.take_press();
+      }
+      EXPECT_EQ(input.pressed(), way.pressed) << told;
+      EXPECT_EQ(anew, way.anew) << told;
+      EXPECT_EQ(input.squeezed(), way.squeezed) << told;
+    }
+  }
+}
+
+// Whoever lets the switch fall silent and then says "middle" hasn't let it go.
+TEST(ThreePositions, AGapIsNoReleaseAndForgetsNoSqueeze) {
+  EnablingInput input(with_three_positions(true), {}, bus);
+  for (const Says says : {Says::released, Says::middle}) input.on_frame(bus, three(says, true), 10 * ms);
+  ASSERT_TRUE(input.pressed());
+  input.on_cycle(100 * ms);
+  EXPECT_FALSE(input.pressed());
+  input.on_frame(bus, three(Says::middle, true), 110 * ms);
+  EXPECT_FALSE(input.pressed());
+  input.on_frame(bus, three(Says::squeezed, true), 120 * ms);
+  input.on_cycle(300 * ms);
+  input.on_frame(bus, three(Says::middle, true), 310 * ms);
+  EXPECT_TRUE(input.squeezed());
+  EXPECT_FALSE(input.pressed());
+}
+
+TEST(ThreePositions, ASqueezeIsArchived) {
+  EnablingInput input(with_three_positions(true), {}, bus);
+  for (const Says says : {Says::released, Says::middle, Says::squeezed})
+    input.on_frame(bus, three(says, true), 10 * ms);
+  std::array<std::byte, 64> bytes{};
+  auto written = fieldbus::StateArchive::writer(bytes);
+  input.archive(written);
+  EnablingInput copy(with_three_positions(true), {}, bus);
+  auto read = fieldbus::StateArchive::reader(std::span<const std::byte>(bytes).first(written.bytes()));
+  copy.archive(read);
+  ASSERT_TRUE(read.whole());
+  EXPECT_TRUE(copy.squeezed());
+  copy.on_frame(bus, three(Says::middle, true), 20 * ms);
+  EXPECT_FALSE(copy.pressed());
 }
 
 }  // namespace

@@ -277,5 +277,88 @@ TEST(Plant, ReportsHowLong10SecondsTake) {
             << taken.count() * 1e6 / 40000 << " us per step\n";
 }
 
+// A brake of limited torque, alone on a rotor that turns without power: J ω̇ = −(brake + Coulomb friction).
+TEST(Plant, ABrakeOfLimitedTorqueLetsTheRotorRunOut) {
+  description::Cell cell = default_cell();
+  constexpr double torque_Nm = 300.0, delay_s = 0.05;
+  for (description::DriveDescription& drive : cell.drives) {
+    drive.simulation.brake_torque_Nm = 20.0 * torque_Nm;  // holds the weight
+    drive.simulation.brake_delay_s = delay_s;
+  }
+  description::SimulatedDrive& first = cell.drives[0].simulation;
+  first.brake_torque_Nm = torque_Nm;
+  const auto run_out = [&](double brake_delay_s) {
+    first.brake_delay_s = brake_delay_s;
+    DefaultPlant plant(no_hand(), cell);
+    plant.enable_all();
+    // The vertical axis is led up to 0.5 rad/s: along it there is no weight.
+    const double counts_per_rad = cell.drives[0].counts_per_rad();
+    for (int k = 0; k < 500; ++k) {
+      const double t = 1e-3 * k;
+      plant.servo(0).set_target(static_cast<std::int32_t>(std::lround(0.5 * t * t * counts_per_rad)), k * ms);
+      plant.advance_to((k + 1) * ms);
+    }
+    for (std::size_t i = 0; i < plant.axis_count(); ++i) plant.servo(i).disable();
+    const double from = plant.arm().motor_angle_rad(0);
+    plant.advance_to(3000 * ms);
+    EXPECT_EQ(plant.arm().motor_speed_rad_per_s(0), 0.0);
+    return plant.arm().motor_angle_rad(0) - from;
+  };
+  const double at_once = run_out(0.0), late = run_out(delay_s);
+  // ω²J/2τ, with J of rotor and arm about the vertical axis: 58 kg m² of the rotor alone is the least.
+  EXPECT_GT(at_once, 0.5 * 58.0 * 0.25 / (torque_Nm + 25.0));
+  EXPECT_LT(at_once, 0.5 * 160.0 * 0.25 / torque_Nm);
+  // The delay adds ω t, less what friction takes of ω in t.
+  EXPECT_NEAR(late - at_once, 0.5 * delay_s, 0.15 * 0.5 * delay_s);
+}
+
+// A drive that rests holds its axis until the brake has closed; one without power lets it sink meanwhile.
+TEST(Plant, ADriveThatIsSwitchedOffAtRestHoldsUntilItsBrakeHasClosed) {
+  description::Cell cell = default_cell();
+  for (description::DriveDescription& drive : cell.drives) {
+    drive.simulation.brake_torque_Nm = drive.simulation.max_torque_Nm;
+    drive.simulation.brake_delay_s = 0.1;
+  }
+  const auto sinks_m = [&](bool switched_off) {
+    DefaultPlant plant(no_hand(), cell);
+    plant.enable_all();
+    plant.advance_to(100 * ms);
+    const double from_m = plant.position().z();
+    for (std::size_t i = 0; i < plant.axis_count(); ++i) {
+      if (switched_off) {
+        plant.switch_off(i);
+      } else {
+        plant.servo(i).disable();
+      }
+    }
+    plant.advance_to(1000 * ms);
+    for (std::size_t i = 0; i < plant.axis_count(); ++i) EXPECT_TRUE(plant.arm().braked(i));
+    return from_m - plant.position().z();
+  };
+  EXPECT_LT(std::abs(sinks_m(true)), 1e-5);
+  EXPECT_GT(sinks_m(false), 2e-3);
+}
+
+// The tool comes to rest where spring and pull balance; the sensor feels a body that the handle presses, and not one
+// that the arm presses.
+TEST(Plant, ABodyInTheWayPressesOnTheHandleOrOnTheArm) {
+  for (const bool felt : {true, false}) {
+    DefaultPlant plant;
+    plant.enable_all();
+    plant.advance_to(200 * ms);
+    const models::Wrench before = plant.arm().sensor_wrench_S();
+    const Vec3 start = plant.position();
+    // It reaches a millimetre over the tool from the front: the arm gives way a little.
+    plant.set_clamp({start - 1e-3 * Vec3::UnitX(), Vec3::UnitX(), 50e3, felt});
+    plant.advance_to(3000 * ms);
+    const double depth = 1e-3 + (plant.position() - start).x();
+    EXPECT_GT(depth, 0.5e-3);
+    EXPECT_LT(plant.position().x(), start.x());
+    // x of S is -x of W: a push along -x of W reads +x.
+    const double read_N = plant.arm().sensor_wrench_S().force.x() - before.force.x();
+    EXPECT_NEAR(read_N, felt ? 50e3 * depth : 0.0, 0.5) << (felt ? "felt" : "unfelt");
+  }
+}
+
 }  // namespace
 }  // namespace proxarm::sim

@@ -1,0 +1,36 @@
+// Forces that a body region may bear, as a file states them with its source.
+//
+//   source: "…"                    # standard, year, table, and where it was read; printed with each figure
+//   regions:
+//     - {name: hands and fingers, stiffness_N_per_mm: 75, quasi_static_N: 140, transient_N: 280}
+//
+// A region is judged against a body of its own stiffness. Pressures aren't: they are a matter of the parts' shapes,
+// which a cell file doesn't have.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace proxarm::assessment {
+
+struct Region {
+  std::string name;
+  double stiffness_N_per_m = 0.0;
+  double transient_N = 0.0;     // in the first half second of a contact
+  double quasi_static_N = 0.0;  // later
+};
+
+struct Thresholds {
+  std::filesystem::path file;
+  std::string source;
+  std::vector<Region> regions;
+};
+
+// A contact counts as quasi-static from here on, in seconds after its beginning.
+inline constexpr double quasi_static_from_s = 0.5;
+
+// Throws SetupError, with file, line and key.
+Thresholds load_thresholds(const std::filesystem::path& file);
+
+}  // namespace proxarm::assessment

@@ -1,0 +1,51 @@
+#include "models/description/profile.hpp"
+
+#include <algorithm>
+
+#include "models/description/cell.hpp"
+#include "models/files/yaml_file.hpp"
+
+namespace proxarm::description {
+namespace {
+
+constexpr const char* asked = " (profile: hand_guiding)";
+
+void require_at_most(const YamlNode& limits, const char* key, double value, double most, const char* unit) {
+  if (value <= most) return;
+  throw limits.error_at(key, "at most " + number_text(most) + " " + unit + asked, number_text(value));
+}
+
+void require_there(const YamlNode& node, const char* key, const char* what) {
+  if (!node.has(key)) throw node.error_at(key, std::string(what) + asked, "nothing");
+}
+
+void require_limits(const YamlNode& limits, const CellLimits& given) {
+  require_there(limits, "max_tool_speed_m_per_s", "the tool's speed, at most 0.25 m/s");
+  require_at_most(limits, "max_tool_speed_m_per_s", given.max_tool_speed_m_per_s, reduced_speed_m_per_s, "m/s");
+  require_at_most(limits, "max_elbow_speed_m_per_s", given.max_elbow_speed_m_per_s, reduced_speed_m_per_s, "m/s");
+  require_there(limits, "max_tool_acceleration_m_per_s2", "the tool's acceleration, at most 10 m/s²");
+  require_at_most(limits, "max_tool_acceleration_m_per_s2", given.max_tool_acceleration_m_per_s2,
+                  reduced_acceleration_m_per_s2, "m/s²");
+  require_there(limits, "max_force_N", "the force above which the arm stops");
+  require_there(limits, "workspace_m", "the box that the tool stays in");
+}
+
+}  // namespace
+
+void apply_hand_guiding(const YamlNode& root, Cell& cell) {
+  require_there(root, "limits", "limits of speed, force and place");
+  require_limits(root.map("limits"), cell.limits);
+  require_there(root, "enabling_input", "an enabling switch with three positions");
+  if (!cell.enabling_input->three_position) {
+    throw root.map("enabling_input")
+        .error_at("three_position", std::string("the contact of the third position, {panic_bit: N}") + asked,
+                  "nothing");
+  }
+  const bool torques = std::any_of(cell.drives.begin(), cell.drives.end(),
+                                   [](const DriveDescription& drive) { return drive.mode == "cst"; });
+  if (torques) throw root.error_at("profile", "none: drives that take torques can't hold an arm still");
+  cell.profile = Profile::hand_guiding;
+  cell.supervision.monitored_standstill = true;
+}
+
+}  // namespace proxarm::description
