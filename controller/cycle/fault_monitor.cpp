@@ -1,5 +1,7 @@
 #include "controller/cycle/fault_monitor.hpp"
 
+#include "fieldbus/sensors/channel_watch.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -152,6 +154,9 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (sample.saturated && needs_force(cycle)) return alarm_.raise(Fault::sensor_saturated);
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
+  }
+  if (settings_.max_repeated_samples > 0 && sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
+    return alarm_.raise(Fault::sensor_frozen, -1, sample.channel_repeats, fieldbus::ChannelWatch::most_repeats);
   }
   const double force_N = measured.hand_W.force.norm();
   if (supervisor_.phase() != Phase::rendering) return;

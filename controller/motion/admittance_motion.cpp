@@ -78,6 +78,8 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   world().start(state_.q_k1_W);
   if (passivity_) passivity_->start(measured.tool_W);
   if (empty_handle_) empty_handle_->start();
+  reversed_.start();
+  straight_.start();
   parts_.orientation.start(orientation_of(X_WT));
   if (beginning == Beginning::resuming) {
     state_.speed_limit_m_per_s = std::min(state_.speed_limit_m_per_s, supervision_.release_speed_m_per_s);
@@ -128,7 +130,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
   if (empty_handle_) empty_handle_->archive(state);
-  state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_);
+  state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_, reversed_, straight_);
   archive_fields(state, state_);
   if (state.reading()) arm_.kinematics(state_.link_rad, solution_.kinematics);
 }
@@ -149,6 +151,8 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   }
   active_.add(step.limits);
   state_.mass_kg = step.mass_kg;
+  state_.damping_Ns_per_m = step.damping_Ns_per_m;
+  state_.touches = step.contacts > 0;
   advance_proxy(step.q_W);
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
@@ -202,16 +206,37 @@ void AdmittanceMotion::let_force_in(CycleRecord& record) noexcept {
 models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   const models::Wrench hand_W{state_.force_share * measured.hand_W.force, state_.force_share * measured.hand_W.torque};
-  if (!empty_handle_) return hand_W;
   const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
+  if (!empty_handle_) {
+    judge_force(cycle, v_W, false);
+    return hand_W;
+  }
   const bool empty = empty_handle_->step({.hand_W = measured.hand_W,
                                           .noise_N = measured.bias.noise_N,
                                           .tare_samples = measured.bias.samples,
                                           .sample_cycles = measured.bias.sample_cycles,
                                           .v_W = v_W});
   cycle.record.set(RecordFlag::hands_off, empty);
+  judge_force(cycle, v_W, empty);
   if (!empty) return hand_W;
   return {empty_handle_->braking_force_W(state_.mass_kg, v_W), Vec3::Zero()};
+}
+
+// Whether a hand can have made this force, by the motion that it made.
+void AdmittanceMotion::judge_force(const MotionCycle& cycle, const Vec3& v_W, bool empty) noexcept {
+  const SensorBias& bias = cycle.measured.bias;
+  const ForceAndMotion now{.force_W = cycle.measured.hand_W.force,
+                           .q_W = state_.q_k1_W,
+                           .v_W = v_W,
+                           .mass_kg = state_.mass_kg,
+                           .damping_Ns_per_m = state_.damping_Ns_per_m,
+                           .period_s = period_s_,
+                           .free = !state_.touches};
+  const double force_N = now.force_W.norm();
+  if (reversed_.step(now)) cycle.alarm.raise(Fault::force_reversed, -1, force_N, 0.0);
+  if (straight_.step(now, empty, bias.noise_N)) {
+    cycle.alarm.raise(Fault::sensor_drifts, -1, force_N, supervision_.max_bias_drift_N);
+  }
 }
 
 void AdmittanceMotion::advance_proxy(const Vec3& q_W) noexcept {

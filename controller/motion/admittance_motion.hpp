@@ -15,6 +15,7 @@
 
 #include "controller/limits/step_limits.hpp"
 #include "controller/motion/empty_handle.hpp"
+#include "controller/motion/force_plausibility.hpp"
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/setpoints/joint_guard.hpp"
@@ -74,7 +75,8 @@ class AdmittanceMotion final : public Motion {
     double force_share = 1.0;                           // of the hand's force that is let in
     double speed_limit_m_per_s = 0.0;                   // of the tool
     models::Vec3 last_normal_W = models::Vec3::Zero();  // of the last contact; zero: there was none
-    double mass_kg = 0.0;                               // of the proxy's last step
+    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // of the proxy's last step
+    bool touches = false;                               // it did
     bool freeing = false;                               // it moves without the scene
   };
 
@@ -83,6 +85,7 @@ class AdmittanceMotion final : public Motion {
   void limit_speed(const MotionCycle& cycle) noexcept;
   void let_force_in(CycleRecord& record) noexcept;
   [[nodiscard]] models::Wrench acting_wrench_W(const MotionCycle& cycle) noexcept;
+  void judge_force(const MotionCycle& cycle, const models::Vec3& v_W, bool empty) noexcept;
   void advance_proxy(const models::Vec3& q_W) noexcept;
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;
@@ -103,6 +106,8 @@ class AdmittanceMotion final : public Motion {
   double period_s_;
   std::optional<PassivityObserver> passivity_;  // none: not wanted
   std::optional<EmptyHandle> empty_handle_;     // none: the proxy coasts
+  ReversedForce reversed_;
+  StraightForce straight_;
   StepLimiter limiter_;
   JointGuard guard_;
   ToolGuard tool_guard_;

@@ -42,7 +42,7 @@ constexpr std::array texts{
     FaultText{Fault::sensor_saturated, "sensor_saturated", Reaction::stop_1,
               "a gauge of the force sensor is at its rail", nullptr, "push less, or use a sensor with a larger range"},
     FaultText{Fault::sensor_frozen, "sensor_frozen", Reaction::stop_1,
-              "the force sensor repeats one reading to the last digit", "samples",
+              "the force sensor, or a channel of it, repeats one reading to the last digit", "samples",
               "power-cycle the sensor; of a simulated one without noise, sensor.noise_N is 0 in the cell file"},
     FaultText{Fault::force_not_finite, "force_not_finite", Reaction::stop_1, "the decoded force isn't a finite number",
               nullptr, "check the sensor's calibration matrix"},
@@ -52,6 +52,9 @@ constexpr std::array texts{
               "the force sensor's bias has drifted while nobody held the handle", "N",
               "start anew, which tares the sensor; if it comes again, let the sensor warm up, or look for damage and "
               "for something that leans on the handle"},
+    FaultText{Fault::force_reversed, "force_reversed", Reaction::stop_1,
+              "the hand's force grows with the motion that it causes, as if the arm went the other way", "N",
+              "check the sensor's sign and how it is mounted (sensor.pose_link), and each drive's direction"},
     FaultText{Fault::force_at_start, "force_at_start", Reaction::stop_1,
               "the handle was touched while the sensor was tared", "N",
               "take the hand off the handle until rendering starts", still},

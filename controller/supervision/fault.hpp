@@ -22,6 +22,7 @@ enum class Fault : std::uint8_t {
   sensor_frozen,         // one reading for more than max_repeated_samples samples
   force_not_finite,      // decoded force is NaN or infinite
   force_excessive,       // beyond the cell's max_force_N
+  force_reversed,        // it grows with the motion that it causes: wrong sign, mounting or joint direction
   sensor_drifts,         // with nobody at the handle its bias has gone further than max_bias_drift_N
   force_at_start,        // the handle was pushed while the sensor was tared: nothing moves
   feedback_late,         // a drive's TPDO missing, for no more than max_missed_feedback cycles

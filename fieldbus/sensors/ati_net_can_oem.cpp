@@ -53,6 +53,10 @@ bool AtiNetCanOem::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcep
 void AtiNetCanOem::complete(std::int64_t time_ns) noexcept {
   latest_.repeats = latest_.number > 0 && half_gauges_ == gauges_ ? latest_.repeats + 1 : 0;
   gauges_ = half_gauges_;
+  std::array<double, 6> counts{};
+  for (std::size_t i = 0; i < 6; ++i) counts[i] = gauges_[i];
+  channels_.add(counts);
+  latest_.channel_repeats = channels_.repeats();
   latest_.time_ns = time_ns;
   latest_.status = half_status_;
   latest_.healthy = half_status_ == 0;

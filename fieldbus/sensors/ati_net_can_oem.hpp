@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "fieldbus/sensors/channel_watch.hpp"
 #include "fieldbus/sensors/force_sensor.hpp"
 
 namespace proxarm::fieldbus {
@@ -51,7 +52,7 @@ class AtiNetCanOem final : public ForceSensor {
   [[nodiscard]] std::string describe_losses() const override;
   void archive(StateArchive& state) noexcept override {
     state(scaled_, poll_ns_, polled_, half_, half_status_, half_gauges_, gauges_, fresh_, latest_, incomplete_,
-          dropped_, wrong_lengths_);
+          dropped_, wrong_lengths_, channels_);
   }
 
   // What was read at start, and what has been wrong since.
@@ -89,6 +90,7 @@ class AtiNetCanOem final : public ForceSensor {
   Gauges half_gauges_{};
   Gauges gauges_{};
   bool fresh_ = false;
+  ChannelWatch channels_;
   ForceSample latest_{};
   std::uint64_t incomplete_ = 0;
   std::uint64_t dropped_ = 0;

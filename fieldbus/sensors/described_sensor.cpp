@@ -201,6 +201,8 @@ void DescribedSensor::decode(std::int64_t time_ns) noexcept {
   latest_.healthy = !protocol_.status || (latest_.status & protocol_.status->error_mask) == 0;
   if (protocol_.status && (latest_.status & protocol_.status->overload_mask) != 0) latest_.saturated = true;
   latest_.repeats = same ? latest_.repeats + 1 : 0;
+  watch_.add(numbers_);
+  latest_.channel_repeats = watch_.repeats();
   latest_.time_ns = time_ns;
   ++latest_.number;
   fresh_ = true;

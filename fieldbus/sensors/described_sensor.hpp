@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "fieldbus/sensors/channel_watch.hpp"
 #include "fieldbus/sensors/force_sensor.hpp"
 #include "models/description/sensor.hpp"
 
@@ -53,7 +54,7 @@ class DescribedSensor final : public ForceSensor {
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
   [[nodiscard]] std::string describe_losses() const override;
   void archive(StateArchive& state) noexcept override {
-    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, values_,
+    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, watch_, values_,
           latest_, counts_);
     if (next_ >= slots_.size()) next_ = 0;
   }
@@ -127,6 +128,7 @@ class DescribedSensor final : public ForceSensor {
   bool fresh_ = false;
   bool counted_ = false;  // a counter has been seen
   std::uint64_t last_count_ = 0;
+  ChannelWatch watch_;
   std::array<double, max_signals> numbers_{}, values_{};
   ForceSample latest_{};
   DescribedSensorCounts counts_{};

@@ -34,7 +34,11 @@ struct ForceSample {
   std::uint64_t number = 0;   // counts the samples, from 1
   std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
 
-  void archive(StateArchive& state) noexcept { state(wrench_S, time_ns, status, healthy, saturated, number, repeats); }
+  std::uint32_t channel_repeats = 0;  // of one channel alone, while others went on (channel_watch.hpp)
+
+  void archive(StateArchive& state) noexcept {
+    state(wrench_S, time_ns, status, healthy, saturated, number, repeats, channel_repeats);
+  }
 };
 
 // Marks a 29-bit identifier in lists of identifiers, as CAN_EFF_FLAG does.

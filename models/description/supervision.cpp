@@ -11,6 +11,7 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"sensor_late", {"slow", "continue", "hold", "stop_1"}},
       {"sensor_saturated", {"stop_1", "hold"}},
       {"force_excessive", {"stop_1", "hold"}},
+      {"force_reversed", {"stop_1", "stop_0", "hold"}},
       {"sensor_drifts", {"stop_1", "hold", "continue"}},
       {"feedback_late", {"continue", "slow"}},
       {"position_implausible", {"stop_0", "stop_1"}},

@@ -76,7 +76,8 @@ std::string sensor_text(const controller::FaultReport& report, const fieldbus::F
 
 bool is_of_sensor(Fault fault) noexcept {
   return fault == Fault::sensor_lost || fault == Fault::sensor_late || fault == Fault::sensor_status ||
-         fault == Fault::sensor_saturated || fault == Fault::sensor_frozen || fault == Fault::sensor_drifts;
+         fault == Fault::sensor_saturated || fault == Fault::sensor_frozen || fault == Fault::sensor_drifts ||
+         fault == Fault::force_reversed;
 }
 
 std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts,

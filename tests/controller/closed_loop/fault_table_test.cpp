@@ -353,6 +353,7 @@ struct Row {
 
 std::size_t at_start(const ClosedLoopRig& /*rig*/) { return 0; }
 std::size_t at_the_end(const ClosedLoopRig& rig) { return first_in(rig, Phase::disabling); }
+std::size_t rendering_begins(const ClosedLoopRig& rig) { return first_in(rig, Phase::rendering); }
 std::size_t force_above_5_N(const ClosedLoopRig& rig) {
   std::size_t k = first_in(rig, Phase::rendering);
   while (k + 1 < rig.records.size() && vec3(rig.records[k].force_W_N).norm() <= 5.0) ++k;
@@ -388,6 +389,9 @@ std::vector<Row> rows() {
          return options;
        }},
       {force_excessive, Reaction::stop_1, 0, way_m, weak_force_limit, force_above_5_N},
+      // From where the hand begins to pull, 0.4 s after the drives are enabled.
+      {force_reversed, Reaction::stop_1, 1200, 0.06,
+       [] { return RigOptions{.device_faults = {"sensor:inverted"}, .scene = "scenes/free.yaml"}; }, rendering_begins},
       // Half a newton at 0.2 N/s, and what the bias is behind.
       {sensor_drifts, Reaction::stop_1, 3500, still_m, [] { return nobody_there("sensor:drift=0.2N/s@1.9s"); }},
       {force_at_start, Reaction::stop_1, 400, 2e-3, hand_at_start, at_start},

@@ -1,0 +1,134 @@
+#include "controller/motion/force_plausibility.hpp"
+
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+
+// Below that speed the proxy rests: a hand that holds still trembles as fast.
+constexpr double rest_m_per_s = 2e-3;
+constexpr double first_mark_m = 0.5e-3;
+constexpr std::size_t doublings = 4;
+constexpr double least_growth = 1.45, least_time = 0.75, most_time = 1.1;
+// A hundred times the noise of a usual sensor: below, ratios of forces say little.
+constexpr double least_force_N = 2.0;
+
+// Of the straight line.
+constexpr double near_m = 1e-3, far_m = 1e-2;
+// It is looked at every 30 samples: looked at each time, a good line would be given up by chance now and then.
+constexpr double looks = 30.0, deviations = 3.0;
+// Of the jump. A fifth: the tool behind the sensor rings as the arm starts.
+constexpr double jump_s = 0.03, jump_share = 0.2, jump_noises = 20.0;
+constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.15, speed_gain = 1.5;
+
+}  // namespace
+
+bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noexcept {
+  const State& s = state_;
+  if (last < doublings || s.force_N[last] < least_force_N) return false;
+  for (std::size_t i = last + 1 - doublings; i <= last; ++i) {
+    if (!(s.force_N[i] >= least_growth * s.force_N[i - 1])) return false;
+    // λ of M λ² + B λ = F/x.
+    const double M = now.mass_kg, B = now.damping_Ns_per_m;
+    const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
+    const double lambda = (std::sqrt(B * B + 4.0 * M * stiffness) - B) / (2.0 * M);
+    const double took = (s.time_s[i] - s.time_s[i - 1]) * lambda / std::log(2.0);
+    if (took < least_time || took > most_time) return false;
+  }
+  return true;
+}
+
+bool ReversedForce::step(const ForceAndMotion& now) noexcept {
+  State& s = state_;
+  if (now.v_W.norm() < rest_m_per_s) {
+    s = {.rest_W = now.q_W, .force_N = {}, .time_s = {}, .passed = 0.0, .since_s = 0.0, .judged = now.free};
+    return false;
+  }
+  s.judged = s.judged && now.free && now.mass_kg > 0.0;
+  s.since_s += now.period_s;
+  if (!s.judged) return false;
+  const double way_m = (now.q_W - s.rest_W).norm();
+  bool found = false;
+  for (auto i = static_cast<std::size_t>(s.passed); i < marks && way_m >= first_mark_m * std::exp2(s.passed); ++i) {
+    s.force_N[i] = now.force_W.norm();
+    s.time_s[i] = s.since_s;
+    s.passed += 1.0;
+    found = found || grows(i, now);
+  }
+  return found;
+}
+
+void StraightForce::add(const ForceAndMotion& now) noexcept {
+  State& s = state_;
+  if (s.n == 0.0) {
+    s.first_W = now.force_W;
+    s.first_speed_m_per_s = now.v_W.norm();
+    s.h = s.th = s.hh = Vec3::Zero();
+    s.t = s.tt = 0.0;
+  }
+  const double t = s.n * now.period_s;
+  const Vec3 h = now.force_W - s.first_W;
+  s.n += 1.0;
+  s.t += t;
+  s.tt += t * t;
+  s.h += h;
+  s.th += t * h;
+  s.hh += h.cwiseAbs2();
+}
+
+// What the force was 30 ms after the handle was empty, it is still to a fifth.
+bool StraightForce::jumped(const ForceAndMotion& now, bool empty, double noise_N) noexcept {
+  State& s = state_;
+  if (empty) {
+    s.left_s = 0.0;
+    s.keeps = now.free;
+    return false;
+  }
+  s.left_s += now.period_s;
+  if (s.left_s <= jump_s) s.jump_W = now.force_W;
+  const double jump_N = s.jump_W.norm();
+  s.keeps = s.keeps && now.free && (now.force_W - s.jump_W).norm() <= jump_share * jump_N;
+  if (!s.keeps || s.left_s <= jump_s || jump_N < jump_noises * noise_N) return false;
+  const Vec3 gone_W = now.q_W - s.rest_W;
+  return gone_W.norm() >= far_m && gone_W.dot(s.jump_W) > 0.0;
+}
+
+// Least squares, h = a + b t:  b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,
+// what is left: (Σhh − a Σh − b Σth)/(n − 2), whose standard deviation is √(2/(n − 2)) of it.
+bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) noexcept {
+  State& s = state_;
+  if (empty) {
+    s.rest_W = now.q_W;
+    s.judged = now.free;
+  }
+  s.judged = s.judged && now.free;
+  if (jumped(now, empty, noise_N)) return true;
+  // While it is empty the bias follows, which bends the line.
+  if (!s.judged || empty) {
+    s.n = 0.0;
+    return false;
+  }
+  add(now);
+  const Vec3 gone_W = now.q_W - s.rest_W;
+  const bool went = gone_W.norm() >= far_m;
+  if (s.n < looks || (!went && std::fmod(s.n, looks) != 0.0)) return false;
+  const Vec3 b = (s.n * s.th - s.t * s.h) / (s.n * s.tt - s.t * s.t);
+  const Vec3 a = (s.h - b * s.t) / s.n;
+  const Vec3 left = (s.hh - a.cwiseProduct(s.h) - b.cwiseProduct(s.th)) / (s.n - 2.0);
+  if (!(left.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * std::sqrt(2.0 / (s.n - 2.0))))) {
+    s.n = 0.0;
+    s.judged = gone_W.norm() <= near_m;
+    return false;
+  }
+  const double lasted_s = (s.n - 1.0) * now.period_s;
+  const Vec3 force_W = s.first_W + a + lasted_s * b;
+  if (!went || gone_W.dot(force_W) <= 0.0) return false;
+  const double force_N = force_W.norm();
+  if (force_N >= ramp_noises * noise_N) return true;
+  return force_N >= constant_noises * noise_N && lasted_s * b.norm() <= constant_share * force_N &&
+         now.v_W.norm() >= speed_gain * s.first_speed_m_per_s;
+}
+
+}  // namespace proxarm::controller
