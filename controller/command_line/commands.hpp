@@ -42,6 +42,12 @@ struct ScanOptions {
   std::optional<std::uint32_t> sensor_base_id;
 };
 
+struct ProveOptions {
+  RunOptions run;
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the same
+  std::filesystem::path out;  // empty: beside the cell
+};
+
 struct AssessOptions {
   RunOptions run;
   std::filesystem::path thresholds;  // empty: the shipped ones
@@ -57,6 +63,7 @@ int set_command(const SetOptions& options);        // of a running session
 int check_command(const FileOptions& options);
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);
+int prove_command(const ProveOptions& options);    // 1: not proven
 int assess_command(const AssessOptions& options);  // 1: a threshold is exceeded
 // What a study measures and writes, for its help; empty: there is none of that name.
 std::string study_description(const std::string& name);

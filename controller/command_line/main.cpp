@@ -83,6 +83,12 @@ void add_enabling_option(CLI::App& app, RunOptions& options) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void add_hardware_option(CLI::App& app, RunOptions& options) {
+  app.add_flag("--hardware{ask}", options.hardware,
+               "drives on real interfaces: shows a checklist to be confirmed on the terminal (scripts: "
+               "--hardware=checked)");
+}
+
 void add_supervision_options(CLI::App& app, RunOptions& options) {
   app.add_option("--do", options.orders,
                  "by script, counted from the first cycle: hold, resume, release, \"back-off 20mm\" or reset, such as "
@@ -103,9 +109,9 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
       ->type_name("N");
   app.add_flag("--without-enabling-input", options.settings.without_enabling_input,
                "leave out the cell's enabling input; needed on real interfaces for a cell that has none");
-  app.add_flag("--hardware{ask}", options.hardware,
-               "drives on real interfaces: shows a checklist to be confirmed on the terminal (scripts: "
-               "--hardware=checked)");
+  add_hardware_option(app, options);
+  app.add_flag("--without-proof", options.without_proof,
+               "real drives of a cell that `proxarm prove` hasn't proven on them");
 }
 
 void add_session_options(CLI::App& app, RunOptions& options) {
@@ -283,6 +289,20 @@ void add_assess_options(CLI::App& app, command_line::AssessOptions& options) {
   app.add_flag("--json", options.run.json, "print the figures as one JSON object");
 }
 
+void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
+  add_session_options(app, options.run);
+  leave_out(app, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
+                  "--extra-delay"});
+  add_fault_option(app, options.run);
+  add_enabling_option(app, options.run);
+  add_hardware_option(app, options.run);
+  app.add_option("--arm", options.arm,
+                 "cell file of the simulated arm, where it is another one than the controller takes it for")
+      ->type_name("FILE");
+  app.add_option("--out", options.out, "file of the proof (default: beside the cell, CELL.proof)")->type_name("FILE");
+  app.add_flag("--json", options.run.json, "print the verdict as one JSON object");
+}
+
 // CLI11's message in one line, with the nearest word that is known.
 int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
   std::vector<std::string> commands;
@@ -413,6 +433,17 @@ int run(int argc, char** argv) {
   add_session_options(*tune_app, tune_options);
   leave_out(*tune_app, {"--scene", "--stiffness", "--duration", "--bus"});
   tune_app->callback([&] { command = [&] { return command_line::tune_command(tune_options); }; });
+
+  command_line::ProveOptions prove_options;
+  CLI::App* prove_app = app.add_subcommand(
+      "prove",
+      "whether an arm is as its cell says, by small slow motions and pushes: joint signs, gear ratios, the sensor's "
+      "mounting, sign and scale, brakes. Status 1: not proven");
+  add_prove_options(*prove_app, prove_options);
+  prove_app->callback([&] {
+    prove_options.run.without_proof = true;
+    command = [&] { return command_line::prove_command(prove_options); };
+  });
 
   command_line::AssessOptions assess_options;
   CLI::App* assess_app = app.add_subcommand(

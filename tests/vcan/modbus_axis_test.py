@@ -109,7 +109,8 @@ class RealPeer(ModbusAxis):
         self.assertIn("for a real arm --hardware", errors)
         self.assertIn("enabling_input: found none, expected one",
                       self.refused(self.without_switch, "--hardware=checked"))
-        errors = self.refused(self.real, "--hardware")
+        self.assertIn("real.yaml.proof: found no proof", self.refused(self.real, "--hardware"))
+        errors = self.refused(self.real, "--hardware", "--without-proof")
         self.assertIn("drives of a real arm on 10.77.0.1, port 15020", errors)
         self.assertIn("8. each Modbus drive stops by its own communication timeout", errors)
         self.assertIn("no terminal to confirm on", errors)
@@ -118,7 +119,7 @@ class RealPeer(ModbusAxis):
     def test_runs_with_all_of_them(self):
         with drive_in_the_network():
             status, summary, errors = self.run_both(far_end=self.near, cell=self.real,
-                                                    options=["--hardware=checked"])
+                                                    options=["--hardware=checked", "--without-proof"])
         self.assertEqual(status, 0, errors)
         self.assertEqual(summary["faults"], [])
         self.assertIn("This will enable the drives of a real arm on 10.77.0.1, port 15020", errors)
@@ -126,7 +127,7 @@ class RealPeer(ModbusAxis):
 
     def test_nobody_there_is_said_with_the_place(self):
         with two.simulated_arm(BUSES, self.near):
-            errors = self.refused(self.real, "--hardware=checked")
+            errors = self.refused(self.real, "--hardware=checked", "--without-proof")
         self.assertIn("the Modbus line can't be opened: found 10.77.0.1, port 15020:", errors)
 
 

@@ -123,19 +123,54 @@ class Refusals(two.VcanTestCase):
         status, errors = self.as_if_real("--hardware=checked")
         self.assertEqual(status, 2)
         self.assertIn("enabling_input: found none, expected one", errors)
-        status, errors = self.as_if_real(cell, "--hardware")
+        status, errors = self.as_if_real(cell, "--hardware", "--without-proof")
         self.assertEqual(status, 2)
         self.assertIn("no terminal to confirm on", errors)
         self.assertIn("E-stop and STO act in hardware", errors)
         self.assertEqual(self.as_if_real(cell, "--hardware=yes")[0], 2)
-        status, shown = self.as_if_real(cell, "--hardware", typed="yes")
+        status, shown = self.as_if_real(cell, "--hardware", "--without-proof", typed="yes")
         self.assertEqual(status, 2, shown)
         self.assertIn('found "yes", expected "checked"', shown)
         with two.simulated_arm(two.THREE, cell):
             for options in (("--hardware=checked",), ("--hardware=checked", "--without-enabling-input")):
-                status, shown = self.as_if_real(cell, *options)
+                status, shown = self.as_if_real(cell, *options, "--without-proof")
                 self.assertEqual(status, 0, shown)
                 self.assertIn("bit 16 of the inputs of axis_2" if len(options) == 1 else "NONE", shown)
+
+    def test_a_real_interface_needs_a_proof_of_this_very_cell_on_a_real_arm(self):
+        text = (CELLS / "default.yaml").read_text()
+        text = re.sub(r"(:\s*)(\.\./[\w./]+)", lambda m: m[1] + str((CELLS / m[2]).resolve()), text)
+        cell, proof = self.folder / "cell.yaml", self.folder / "cell.yaml.proof"
+        cell.write_text(text + "enabling_input: {drive: axis_2, bit: 16}\n")
+        status, errors = self.as_if_real(cell, "--hardware=checked")
+        self.assertEqual(status, 2)
+        self.assertIn("cell.yaml.proof: found no proof, expected a proof of this cell on a real arm", errors)
+        self.assertIn("--without-proof", errors)
+        done = subprocess.run([two.PROGRAM, "prove", cell], capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        status, errors = self.as_if_real(cell, "--hardware=checked")
+        self.assertEqual(status, 2)
+        self.assertIn("found a proof on a simulated arm", errors)
+        # No hand is there that would push: the file as such a proof would have left it.
+        proof.write_text(proof.read_text().replace("arm: simulated", "arm: real"))
+        with two.simulated_arm(two.THREE, cell):
+            status, shown = self.as_if_real(cell, "--hardware=checked")
+        self.assertEqual(status, 0, shown)
+        cell.write_text(cell.read_text() + "# another cell\n")
+        status, errors = self.as_if_real(cell, "--hardware=checked")
+        self.assertEqual(status, 2)
+        self.assertIn("or of this one before it", errors)
+
+    def test_a_proof_on_interfaces_asks_for_pushes_and_is_none_without_them(self):
+        hand = self.folder / "nobody.yaml"
+        hand.write_text("mass_kg: 0\nstiffness_N_per_m: 0\ndamping_Ns_per_m: 0\n")
+        with two.simulated_arm(two.THREE, "--hand", hand):
+            done = subprocess.run([two.PROGRAM, "prove", "--bus", two.THREE, "--out", self.folder / "proof"],
+                                  capture_output=True, text=True, timeout=600, stdin=subprocess.DEVNULL)
+        self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+        self.assertIn("push the handle along +x of the world W", done.stderr)
+        self.assertIn("nobody pushed", done.stdout)
+        self.assertFalse((self.folder / "proof").exists())
 
     def setUp(self):
         super().setUp()

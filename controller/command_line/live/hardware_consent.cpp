@@ -7,6 +7,7 @@
 #include <iostream>
 #include <sstream>
 
+#include "controller/command_line/preparation/proof_file.hpp"
 #include "fieldbus/can/socket_can_network.hpp"
 #include "fieldbus/modbus/modbus_client.hpp"
 #include "models/base/setup_error.hpp"
@@ -120,6 +121,7 @@ void require_hardware_consent(const PreparedSession& session, const RunOptions& 
   if (real.empty() && lines.empty()) return;
   if (options.hardware.empty()) refuse(real, lines);
   require_enabling_input(session);
+  if (!options.without_proof) require_proof(session);
   for (const description::ModbusLineDescription& line : lines) real.push_back(fieldbus::peer_text(line));
   print_checklist(session, real, !lines.empty(), surroundings.out);
   if (options.hardware == confirmation) return;
@@ -138,18 +140,30 @@ void require_hardware_consent(const PreparedSession& session, const RunOptions& 
                     .expected = description::in_quotes(confirmation)});
 }
 
-void require_hardware_consent(const PreparedSession& session, const RunOptions& options,
-                              const std::vector<std::string>& interfaces) {
+namespace {
+
+// By this process' terminal and kernel, and by PROXARM_TREAT_AS_REAL.
+HardwareSurroundings surroundings_here() {
   const char* const named = std::getenv("PROXARM_TREAT_AS_REAL");
   const std::string taken = named == nullptr ? "" : "," + std::string(named) + ",";
-  const auto is_taken = [&](const std::string& name) { return taken.find("," + name + ",") != std::string::npos; };
-  require_hardware_consent(
-      session, options, interfaces,
-      {[&](const std::string& interface) { return !is_taken(interface) && fieldbus::is_virtual_can(interface); },
-       [&](const description::ModbusLineDescription& line) {
-         return !is_taken(line.serial() ? line.device : line.host) && fieldbus::is_on_this_machine(line);
-       },
-       isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0, std::cin, std::cerr});
+  const auto is_taken = [taken](const std::string& name) { return taken.find("," + name + ",") != std::string::npos; };
+  return {[=](const std::string& interface) { return !is_taken(interface) && fieldbus::is_virtual_can(interface); },
+          [=](const description::ModbusLineDescription& line) {
+            return !is_taken(line.serial() ? line.device : line.host) && fieldbus::is_on_this_machine(line);
+          },
+          isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0, std::cin, std::cerr};
+}
+
+}  // namespace
+
+void require_hardware_consent(const PreparedSession& session, const RunOptions& options,
+                              const std::vector<std::string>& interfaces) {
+  require_hardware_consent(session, options, interfaces, surroundings_here());
+}
+
+bool is_real(const PreparedSession& session, const std::vector<std::string>& interfaces) {
+  const HardwareSurroundings surroundings = surroundings_here();
+  return !real_interfaces(interfaces, surroundings).empty() || !real_lines(session.cell, surroundings).empty();
 }
 
 }  // namespace proxarm::command_line

@@ -35,5 +35,7 @@ void require_hardware_consent(const PreparedSession& session, const RunOptions& 
 // and devices of Modbus lines, that are to be taken for real ones: to try all this out.
 void require_hardware_consent(const PreparedSession& session, const RunOptions& options,
                               const std::vector<std::string>& interfaces);
+// Whether one of them, or a Modbus line of the cell, is real by the same words.
+bool is_real(const PreparedSession& session, const std::vector<std::string>& interfaces);
 
 }  // namespace proxarm::command_line

@@ -48,6 +48,7 @@ struct RunOptions {
   std::filesystem::path record_dir;     // empty: no record
   std::vector<std::string> changes;     // NAME=VALUE@TIME
   std::vector<std::string> orders;      // ORDER@TIME
+  bool without_proof = false;           // real drives of a cell that isn't proven
   std::string hardware;                 // empty: simulations only; ask, checked
   std::filesystem::path control;        // socket that takes changes; empty: none
   std::filesystem::path black_box_dir;  // empty: in the record, or proxarm-black-box

@@ -17,6 +17,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sessions/interface_network.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
 #include "controller/record/frame_tap.hpp"
 #include "controller/report/latency.hpp"
@@ -38,53 +39,10 @@ constexpr std::size_t record_capacity = 8192;  // 8 s at 1 kHz, should a disk ta
 constexpr std::size_t frame_capacity = 262144;
 constexpr auto drain_interval = std::chrono::milliseconds(5);
 
-controller::BusIndices indices_in(const SocketCanNetwork& network, std::size_t buses) {
-  controller::BusIndices indices;
-  for (std::size_t i = 0; i < buses; ++i) indices.push_back(network.bus_of(i));
-  return indices;
-}
-
 std::vector<std::string> names_in(fieldbus::CanNetwork& network) {
   std::vector<std::string> names;
   for (std::size_t bus = 0; bus < network.bus_count(); ++bus) names.push_back(network.bus(bus).name());
   return names;
-}
-
-void set_filters(SocketCanNetwork& network, const controller::CycleParts& parts) {
-  for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
-    std::vector<fieldbus::CanFilter> filters;
-    for (const std::uint32_t id : controller::wanted_ids(parts, bus)) {
-      const bool extended = (id & fieldbus::extended_id_flag) != 0;
-      const std::uint32_t mask = extended ? 0x1FFFFFFF : 0x7FF;
-      filters.push_back({.id = id & mask, .mask = mask, .extended = extended});
-    }
-    network.set_filters(bus, filters);
-  }
-}
-
-// Without its interfaces the arm can still be simulated in this process.
-SocketCanNetwork open_network(const std::vector<std::string>& interfaces) {
-  try {
-    return SocketCanNetwork(interfaces, {.closed = true});
-  } catch (const description::SetupError& error) {
-    description::SetupProblem problem = error.problem();
-    problem.advice +=
-        std::string(problem.advice.empty() ? "" : "; ") + "without --bus, `proxarm run` simulates the buses too";
-    throw description::SetupError(problem);
-  }
-}
-
-// Whoever has no answer on a virtual interface has most likely no simulated arm there.
-void bring_up_devices(controller::CycleParts& parts) {
-  try {
-    controller::bring_up(parts);
-  } catch (const description::SetupError& error) {
-    if (error.found().find("no answer") == std::string::npos) throw;
-    description::SetupProblem problem = error.problem();
-    problem.advice = "is `proxarm sim` running on the same interfaces?" +
-                     (problem.advice.empty() ? "" : " Or, with devices of your own: " + problem.advice);
-    throw description::SetupError(problem);
-  }
 }
 
 // Bitrates by bus of the network: the slowest of the cell's buses that share an interface.

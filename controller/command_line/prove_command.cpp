@@ -1,0 +1,123 @@
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/proof_file.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sessions/proof_run.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int not_proven = 1;
+
+PreparedSession prepared(const RunOptions& options) {
+  RunOptions run = options;
+  run.scene = shipped_file("scenes/free.yaml");
+  PreparedSession session = prepare(run);
+  if (!session.impedance()) return session;
+  throw description::SetupError({.file = session.cell.file.string(),
+                                 .key = "prove",
+                                 .found = "a cell of the impedance type",
+                                 .expected = "one whose drives take positions"});
+}
+
+void refuse_on_interfaces(const ProveOptions& options) {
+  const char* key = !options.arm.empty()            ? "--arm"
+                    : !options.run.faults.empty()   ? "--fault"
+                    : !options.run.enabling.empty() ? "--enabling"
+                                                    : nullptr;
+  if (key == nullptr) return;
+  throw description::SetupError({.key = key,
+                                 .found = "a bus that isn't simulated",
+                                 .expected = "--bus sim, where the arm is simulated",
+                                 .advice = "on an interface, give it to `proxarm sim`"});
+}
+
+std::string today() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[24];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+// What ended the session before all was read, and brakes that don't hold; empty: nothing.
+std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome) {
+  using controller::Fault;
+  if (outcome.fault.fault != Fault::none) {
+    const bool of_joint = outcome.fault.where >= 0;
+    const std::string where =
+        of_joint ? session.cell.drives[static_cast<std::size_t>(outcome.fault.where) % session.cell.drives.size()].joint
+                 : "";
+    return controller::describe(outcome.fault, where);
+  }
+  if (outcome.not_pushed) return "nobody pushed, or took the hand off again, within a minute";
+  if (!outcome.complete) return "the session ended before all was read";
+  if (!outcome.slipped_rad) return "the brakes were never seen closed";
+  if (*outcome.slipped_rad <= session.cell.limits.following_error_rad) return "";
+  return "the brakes don't hold: a joint moved by " + description::number_text(*outcome.slipped_rad) +
+         " rad in a second without power";
+}
+
+std::string text_of(const proof::Verdict& verdict, const std::string& failure) {
+  if (!failure.empty()) return failure + "\nNOT PROVEN\n";
+  return proof::text(verdict);
+}
+
+Json json_of(const proof::Explanation& e) {
+  return {{"mistake", e.mistake}, {"residual", e.residual}, {"angle_deg", e.angle_rad * 180.0 / std::numbers::pi}};
+}
+
+Json json_of(const proof::Verdict& verdict, const std::string& failure) {
+  Json mistakes = Json::array();
+  for (const proof::Explanation& mistake : verdict.mistakes) mistakes.push_back(json_of(mistake));
+  return {{"proven", failure.empty() && verdict.proven},
+          {"failure", failure},
+          {"as_it_is", json_of(verdict.as_it_is)},
+          {"mistakes", mistakes}};
+}
+
+}  // namespace
+
+int prove_command(const ProveOptions& options) {
+  const bool simulated = options.run.bus.simulated();
+  if (!simulated) refuse_on_interfaces(options);
+  const PreparedSession session = prepared(options.run);
+  proof::require_provable(session.cell, models::Arm(session.cell));
+  require_enabling_switch(session, options.run);
+  ProofOutcome outcome;
+  if (simulated) {
+    require_carried(session);
+    RunOptions of_arm = options.run;
+    if (!options.arm.empty()) of_arm.cell = options.arm;
+    outcome = prove_simulated(session, prepared(of_arm), options.run);
+  } else {
+    outcome = prove_on_interfaces(session, options.run);
+  }
+  const std::string failure = failure_of(session, outcome);
+  proof::Verdict verdict;
+  if (failure.empty()) verdict = proof::judge(session.cell, models::Arm(session.cell), outcome.readings);
+  const bool proven = failure.empty() && verdict.proven;
+  const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
+  const std::string told = options.run.json ? json_of(verdict, failure).dump() + "\n" : text_of(verdict, failure);
+  std::fputs(told.c_str(), stdout);
+  if (!proven) return not_proven;
+  write_proof(file, {cell_sha256(session), outcome.real_arm, today(), "signs, ratios, sensor and brakes proven"});
+  if (!options.run.json) {
+    std::printf("proof, on a %s arm: %s\n", outcome.real_arm ? "real" : "simulated", file.c_str());
+  }
+  return 0;
+}
+
+}  // namespace proxarm::command_line

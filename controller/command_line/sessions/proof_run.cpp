@@ -1,0 +1,158 @@
+#include "controller/command_line/sessions/proof_run.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "controller/command_line/live/hardware_consent.hpp"
+#include "controller/command_line/live/realtime.hpp"
+#include "controller/command_line/live/signal_watch.hpp"
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sessions/interface_network.hpp"
+#include "controller/session/bring_up.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
+#include "sim/cell/simulated_cell.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using proof::Asked;
+
+ProofOutcome outcome_of(const proof::ProofSession& session) {
+  ProofOutcome outcome{session.readings(), session.complete(), session.not_pushed(), {}, session.slipped_rad(), false};
+  outcome.fault = session.fault();
+  return outcome;
+}
+
+// Cycles until the end. Periods that were slept through are left out, and end a proof: its drives have stopped by
+// themselves by then, or are about to.
+template <typename BeforeCycle>
+void run(proof::ProofSession& proof, fieldbus::CanNetwork& network, double period_s, const BeforeCycle& before) {
+  const std::int64_t period_ns = std::llround(1e9 * period_s);
+  std::int64_t t_k_ns = network.now_ns() + period_ns;
+  while (!proof.done()) {
+    network.sleep_until(t_k_ns);
+    before();
+    proof.run_cycle(t_k_ns);
+    if (proof.needs_plan()) proof.begin_plan();
+    t_k_ns += period_ns;
+    const std::int64_t late_ns = network.now_ns() - t_k_ns;
+    if (late_ns <= 0) continue;
+    t_k_ns += (late_ns / period_ns + 1) * period_ns;
+    if (late_ns > 10 * period_ns) proof.request_stop();
+  }
+  proof.shut_down();
+}
+
+// Leans on the handle along the direction that is asked for, with 15 N, for as long as it is.
+class SimulatedHand {
+ public:
+  explicit SimulatedHand(sim::SimulatedCell& arm) : arm_(arm) {}
+
+  void heed(const proof::ProofSession& proof) {
+    const bool asked = proof.asked() == Asked::push || pushed_at_ == proof.station();
+    const bool pushes = proof.asked() != Asked::let_go && asked && proof.station() < proof.stations().size();
+    if (!pushes) return lean(models::Vec3::Zero());
+    if (pushed_at_ != proof.station()) {
+      pushed_at_ = proof.station();
+      from_W_ = arm_.truth().X_WT.translation();
+    }
+    lean(proof.stations()[proof.station()].push_W);
+  }
+
+ private:
+  void lean(const models::Vec3& along_W) {
+    constexpr double depth_m = 0.02, stiffness_N_per_m = 750.0;
+    if (along_W.isZero()) return arm_.plant().set_clamp({});
+    arm_.plant().set_clamp({from_W_ + depth_m * along_W, -along_W, stiffness_N_per_m});
+  }
+
+  sim::SimulatedCell& arm_;
+  std::size_t pushed_at_ = static_cast<std::size_t>(-1);
+  models::Vec3 from_W_ = models::Vec3::Zero();
+};
+
+// Says what is asked for, in a thread of its own: the cycle doesn't wait for a terminal.
+class Announcer {
+ public:
+  Announcer(const proof::ProofSession& proof) : proof_(proof), thread_([this] { loop(); }) {}
+  Announcer(const Announcer&) = delete;
+  Announcer& operator=(const Announcer&) = delete;
+  ~Announcer() {
+    ended_ = true;
+    thread_.join();
+  }
+
+ private:
+  void loop() {
+    Asked before = Asked::nothing;
+    while (!ended_) {
+      const Asked asked = proof_.asked();
+      if (asked != before) say(asked);
+      before = asked;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+  void say(Asked asked) const {
+    if (asked == Asked::press) std::fprintf(stderr, "let go of the enabling switch, then press it and keep it so\n");
+    if (asked == Asked::let_go) std::fprintf(stderr, "  that's it: take the hand off\n");
+    if (asked != Asked::push) return;
+    const models::Vec3& along = proof_.stations()[proof_.station()].push_W;
+    std::fprintf(stderr, "push the handle along +%s of the world W, by some 15 N, and keep it so\n",
+                 along.x() > 0.5 ? "x" : "y");
+  }
+
+  const proof::ProofSession& proof_;
+  std::atomic<bool> ended_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options) {
+  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(arm.cell));
+  description::HandDescription nobody;
+  nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
+  sim::SimulatedCellConfig config;
+  config.faults = options.faults;
+  config.enabling = options.enabling;
+  sim::SimulatedCell far_end(arm.cell, arm.sensor, nobody, network.events(), config);
+  scenes::CompiledScene scene = scenes::compile(session.scene);
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
+                                                         buses_in_order(session.cell));
+  far_end.attach_to(network);
+  far_end.power_on();
+  controller::bring_up(parts);
+  proof::ProofSession proof(std::move(parts), session.settings, session.cell);
+  SimulatedHand hand(far_end);
+  run(proof, network, session.settings.period_s, [&] { hand.heed(proof); });
+  return outcome_of(proof);
+}
+
+ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options) {
+  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
+  require_nodes_apart(session, interfaces);
+  fieldbus::SocketCanNetwork network = open_network(interfaces);
+  require_hardware_consent(session, options, interfaces);
+  require_fd(session.cell, network);
+  scenes::CompiledScene scene = scenes::compile(session.scene);
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
+                                                         indices_in(network, interfaces.size()),
+                                                         controller::opener_of(fieldbus::ModbusPeers::any));
+  set_filters(network, parts);
+  bring_up_devices(parts);
+  proof::ProofSession proof(std::move(parts), session.settings, session.cell);
+  SignalWatch signals([&] { proof.request_stop(); });
+  {
+    const Announcer announcer(proof);
+    const RealtimeThread realtime;
+    run(proof, network, session.settings.period_s, [] {});
+  }
+  ProofOutcome outcome = outcome_of(proof);
+  outcome.real_arm = is_real(session, interfaces);
+  return outcome;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,25 @@
+// `proxarm prove`: the session of a proof, against a simulated arm in this process or on interfaces.
+#pragma once
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/proof/proof_session.hpp"
+
+namespace proxarm::command_line {
+
+struct ProofOutcome {
+  std::vector<proof::Reading> readings;
+  bool complete = false, not_pushed = false;
+  controller::FaultReport fault;
+  std::optional<double> slipped_rad;
+  bool real_arm = false;
+};
+
+// `arm`: what the simulated arm is, where that isn't what the controller takes it for. A simulated hand pushes where it
+// is asked to. In virtual time, nothing printed.
+ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options);
+
+// On the interfaces of options.bus, in real time; tells on standard error what is to be done. Throws SetupError as
+// `run` does, but wants no proof.
+ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,273 @@
+#include "controller/proof/proof_session.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace proxarm::proof {
+namespace {
+
+using controller::Event;
+using controller::Fault;
+using controller::Phase;
+using models::JointVector;
+using models::Vec3;
+
+// Paths keep to this share of the speed, since T moves along arcs and drives overshoot.
+constexpr double share_of_speed = 0.7, share_of_joint_speed = 0.25, peak_of_minimum_jerk = 15.0 / 8.0;
+constexpr double settle_s = 0.4, read_s = 0.3;
+// A push is one from here on, when it has lasted; and it is over.
+constexpr double push_N = 8.0, no_push_N = 2.0, steady_s = 0.3, push_timeout_s = 60.0;
+constexpr double run_out_s = 0.1, brakes_watched_s = 1.0, disable_timeout_s = 1.0;
+
+description::CellLimits slow(description::CellLimits limits) {
+  limits.max_tool_speed_m_per_s = std::min(limits.max_tool_speed_m_per_s, proof_speed_m_per_s);
+  return limits;
+}
+
+std::vector<description::DriveDescription> drives_of(const controller::CycleParts& parts) {
+  std::vector<description::DriveDescription> drives;
+  for (const controller::DriveOnBus& axis : parts.drives) drives.push_back(axis.drive.description());
+  return drives;
+}
+
+double longest_feedback_s(const controller::CycleParts& parts) {
+  double longest = 0.0;
+  for (const controller::DriveOnBus& axis : parts.drives) {
+    longest = std::max(longest, axis.drive.feedback_period_s());
+  }
+  return longest;
+}
+
+}  // namespace
+
+ProofSession::ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings,
+                           const description::Cell& cell)
+    : parts_(std::move(parts)),
+      settings_(settings),
+      cell_(cell),
+      limits_(slow(cell.limits)),
+      supervisor_(controller::reactions_of(parts_.supervision)),
+      alarm_(supervisor_, cycle_),
+      recorder_(1),
+      bus_(parts_, recorder_, alarm_),
+      measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
+      faults_(parts_.drives, settings_, limits_.max_force_N, supervisor_, alarm_,
+              controller::ToolMonitor(limits_, settings.max_missed_feedback, longest_feedback_s(parts_)),
+              controller::DriveMonitor(*parts_.arm, drives_of(parts_), limits_.following_error_rad)) {
+  setpoints_.values = parts_.arm->start_rad();
+  from_rad_ = way_rad_ = braked_rad_ = JointVector::Zero(parts_.arm->axes());
+}
+
+void ProofSession::run_cycle(std::int64_t t_k_ns) noexcept {
+  recorder_.begin(t_k_ns, [](fieldbus::StateArchive&) noexcept {});
+  if (cycle_ == 0) {
+    first_ns_ = since_ns_ = t_k_ns;
+    asked_ = parts_.enabling ? Asked::press : Asked::nothing;
+    if (!parts_.enabling) supervisor_.handle(Event::begin);
+  }
+  bus_.begin(t_k_ns);
+  bus_.receive_until(t_k_ns + std::llround(0.45e9 * settings_.period_s), listener_);
+  measurement_.take();
+  faults_.judge_encoders(measurement_.now(), entered_);
+  heed(t_k_ns);
+  act(t_k_ns);
+  if (supervisor_.phase() != entered_) enter(t_k_ns);
+  bus_.send_setpoints(setpoints_, t_k_ns, cycle_);
+  bus_.hand_over();
+  ++cycle_;
+}
+
+// What came from outside. A hold ends it, too: there is nothing to be gone on with.
+void ProofSession::heed(std::int64_t t_k_ns) noexcept {
+  if (stop_.load()) supervisor_.handle(Event::stop);
+  if (parts_.enabling) {
+    parts_.enabling->on_cycle(t_k_ns);
+    if (parts_.enabling->take_press() && supervisor_.phase() == Phase::idle) supervisor_.handle(Event::begin);
+  }
+  faults_.judge({.measured = measurement_.now(),
+                 .sample = parts_.sensor->latest(),
+                 .enabling = parts_.enabling ? &*parts_.enabling : nullptr,
+                 .buses = bus_.read_status()});
+  if (supervisor_.phase() == Phase::holding) supervisor_.handle(Event::stop);
+  if (supervisor_.phase() != entered_) enter(t_k_ns);
+}
+
+void ProofSession::enter(std::int64_t t_k_ns) noexcept {
+  entered_ = supervisor_.phase();
+  since_ns_ = t_k_ns;
+  if (entered_ != Phase::rendering) asked_ = Asked::nothing;
+  const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == controller::Reaction::stop_0;
+  bus_.request(entered_ < Phase::disabling ? fieldbus::DriveGoal::operation_enabled
+               : at_once                   ? fieldbus::DriveGoal::none
+                                           : fieldbus::DriveGoal::switched_off);
+  if (entered_ == Phase::rendering) from_rad_ = setpoints_.values;
+}
+
+void ProofSession::act(std::int64_t t_k_ns) noexcept {
+  const double in_phase_s = 1e-9 * static_cast<double>(t_k_ns - since_ns_);
+  switch (entered_) {
+    case Phase::idle:
+      setpoints_.values = measurement_.now().motor_rad;
+      if (in_phase_s > settings_.enabling_timeout_s) alarm_.raise(Fault::enabling_not_pressed);
+      return;
+    case Phase::enabling:
+      return wait_for_drives(in_phase_s);
+    case Phase::taring:
+      return tare(in_phase_s);
+    case Phase::rendering:
+      return follow_plan();
+    case Phase::stopping:
+      rate_ = std::max(0.0, rate_ - settings_.period_s / run_out_s);
+      move();
+      if (rate_ <= 0.0) supervisor_.handle(Event::at_rest);
+      return;
+    case Phase::disabling:
+      return watch_brakes(in_phase_s);
+    default:
+      return;
+  }
+}
+
+void ProofSession::wait_for_drives(double in_phase_s) noexcept {
+  const controller::Measured& measured = measurement_.now();
+  for (Eigen::Index i = 0; i < measured.axes(); ++i) {
+    if ((measured.following & 1u << i) == 0) setpoints_.values[i] = measured.motor_rad[i];
+  }
+  const int waits_for = std::countr_one(measured.following);
+  if (waits_for >= static_cast<int>(measured.axes())) {
+    supervisor_.handle(Event::enabled);
+  } else if (in_phase_s > settings_.enable_timeout_s) {
+    alarm_.raise(Fault::drive_not_enabled, waits_for, in_phase_s, settings_.enable_timeout_s);
+  }
+}
+
+void ProofSession::tare(double in_phase_s) noexcept {
+  measurement_.add_tare_sample();
+  if (measurement_.tare_spread_N() > settings_.tare_spread_N) {
+    alarm_.raise(Fault::force_at_start, -1, measurement_.tare_spread_N(), settings_.tare_spread_N);
+  } else if (in_phase_s >= settings_.tare_s) {
+    measurement_.finish_tare();
+    supervisor_.handle(Event::tared);
+  }
+}
+
+bool ProofSession::needs_plan() const noexcept { return entered_ == Phase::rendering && stations_.empty(); }
+
+void ProofSession::begin_plan() {
+  std::vector<Station> stations = plan(cell_, *parts_.arm, setpoints_.values);
+  readings_.reserve(stations.size());
+  stations_ = std::move(stations);
+  begin_move(stations_.front().motor_rad);
+}
+
+void ProofSession::begin_move(const JointVector& to_rad) noexcept {
+  from_rad_ = setpoints_.values;
+  way_rad_ = to_rad - from_rad_;
+  models::ToolKinematics at;
+  double tool_m = 0.0, joints_s = 0.0;
+  for (const JointVector& end : {from_rad_, to_rad}) {
+    parts_.arm->kinematics(end, at);
+    double way_m = 0.0;
+    for (Eigen::Index i = 0; i < way_rad_.size(); ++i) way_m += std::abs(way_rad_[i]) * at.J_W.col(i).head<3>().norm();
+    tool_m = std::max(tool_m, way_m);
+  }
+  for (Eigen::Index i = 0; i < way_rad_.size(); ++i) {
+    const double most = cell_.drives[static_cast<std::size_t>(i)].max_speed_rad_per_s;
+    joints_s = std::max(joints_s, std::abs(way_rad_[i]) / (share_of_joint_speed * most));
+  }
+  const double tool_s = tool_m / (share_of_speed * limits_.max_tool_speed_m_per_s);
+  duration_s_ = peak_of_minimum_jerk * std::max(tool_s, joints_s);
+  path_s_ = 0.0;
+  go_to(Step::moving);
+}
+
+void ProofSession::go_to(Step step) noexcept {
+  step_ = step;
+  step_s_ = pressed_s_ = 0.0;
+  force_sum_S_.setZero();
+  samples_ = 0;
+  const bool asks = step == Step::waiting, frees = step == Step::releasing;
+  asked_ = asks ? Asked::push : frees ? Asked::let_go : Asked::nothing;
+}
+
+// x = x₀ + (x₁ − x₀)(10 s³ − 15 s⁴ + 6 s⁵)
+void ProofSession::move() noexcept {
+  if (stations_.empty()) return;
+  path_s_ = std::min(duration_s_, path_s_ + rate_ * settings_.period_s);
+  const double s = duration_s_ > 0.0 ? path_s_ / duration_s_ : 1.0;
+  setpoints_.values = from_rad_ + s * s * s * (10.0 + s * (-15.0 + s * 6.0)) * way_rad_;
+}
+
+void ProofSession::follow_plan() noexcept {
+  if (stations_.empty() || station_ >= stations_.size()) return;
+  step_s_ += settings_.period_s;
+  switch (step_) {
+    case Step::moving:
+      move();
+      if (path_s_ >= duration_s_) go_to(Step::settling);
+      return;
+    case Step::settling:
+      if (step_s_ < settle_s) return;
+      return go_to(stations_[station_].push_W.isZero() ? Step::reading : Step::waiting);
+    case Step::waiting:
+      return wait_for_push(true);
+    case Step::reading:
+      return read();
+    case Step::releasing:
+      return wait_for_push(false);
+  }
+}
+
+void ProofSession::wait_for_push(bool pressed) noexcept {
+  const double force_N = (measurement_.now().reading_S.force - unpushed_S_).norm();
+  const bool is_so = pressed ? force_N >= push_N : force_N <= no_push_N;
+  pressed_s_ = is_so ? pressed_s_ + settings_.period_s : 0.0;
+  if (step_s_ > push_timeout_s) {
+    not_pushed_ = true;
+    supervisor_.handle(Event::stop);
+  } else if (pressed_s_ >= steady_s) {
+    pressed ? go_to(Step::reading) : next_station();
+  }
+}
+
+void ProofSession::read() noexcept {
+  const controller::Measured& measured = measurement_.now();
+  if (measured.sample_is_new) {
+    force_sum_S_ += measured.reading_S.force;
+    ++samples_;
+  }
+  if (step_s_ < read_s || samples_ == 0) return;
+  const Station& station = stations_[station_];
+  const Vec3 mean_S = force_sum_S_ / samples_;
+  readings_.push_back({station, measured.motor_rad, mean_S});  // into what begin_plan() reserved
+  if (!station.push_W.isZero()) return go_to(Step::releasing);
+  unpushed_S_ = mean_S;
+  next_station();
+}
+
+void ProofSession::next_station() noexcept {
+  ++station_;
+  if (station_ >= stations_.size()) {
+    asked_ = Asked::nothing;
+    supervisor_.handle(Event::stop);
+    return;
+  }
+  begin_move(stations_[station_].motor_rad);
+}
+
+// The drives go off, and the brakes close; then nothing may move.
+void ProofSession::watch_brakes(double in_phase_s) noexcept {
+  const JointVector& motor_rad = measurement_.now().motor_rad;
+  if (!bus_.drives_off()) {
+    braked_rad_ = motor_rad;
+    if (in_phase_s <= disable_timeout_s) return;
+    alarm_.raise(Fault::drive_not_disabled, bus_.first_drive_on());
+    supervisor_.handle(Event::disabled);
+    return;
+  }
+  slipped_rad_ = std::max(slipped_rad_.value_or(0.0), (motor_rad - braked_rad_).cwiseAbs().maxCoeff());
+  if (in_phase_s > brakes_watched_s || supervisor_.faulted()) supervisor_.handle(Event::disabled);
+}
+
+}  // namespace proxarm::proof

@@ -1,0 +1,124 @@
+// The session in which an arm is proven: each joint by a small slow motion, and pushes, under the same supervision as
+// any other session.
+//
+//   enabling, taring, then by the plan: move, settle, read; where a push is needed, wait for it, read, wait for its
+//   end; then the drives are switched off, and the brakes are watched for a second
+// The tool moves at proof_speed_m_per_s at most, joints on minimum-jerk paths from rest to rest. Any fault, any hold
+// and an enabling input that is let go end it: the motion runs out within a tenth of a second, and the drives are
+// switched off. run_cycle() neither allocates, locks, throws nor prints; begin_plan() is called between cycles and
+// does.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "controller/cycle/bus_image.hpp"
+#include "controller/cycle/cycle_recorder.hpp"
+#include "controller/cycle/fault_monitor.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "controller/motion/measurement.hpp"
+#include "controller/proof/proof.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/alarm.hpp"
+#include "controller/supervision/supervisor.hpp"
+
+namespace proxarm::proof {
+
+// Of the tool: the paths are slower, and what the encoders report faster than 1.2 times this is tool_too_fast.
+inline constexpr double proof_speed_m_per_s = 0.1;
+
+// What somebody is asked for, as one number that another thread may read.
+enum class Asked : std::uint8_t { nothing, press, push, let_go };
+
+class ProofSession {
+ public:
+  ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings,
+               const description::Cell& cell);
+  ProofSession(const ProofSession&) = delete;
+  ProofSession& operator=(const ProofSession&) = delete;
+
+  void run_cycle(std::int64_t t_k_ns) noexcept;
+  // The arm stands and waits for its plan. Throws SetupError where there is none.
+  [[nodiscard]] bool needs_plan() const noexcept;
+  void begin_plan();
+  [[nodiscard]] bool done() const noexcept { return supervisor_.phase() == controller::Phase::done; }
+  void shut_down() noexcept { bus_.shut_down(); }
+
+  // ---- any thread
+  void request_stop() noexcept { stop_.store(true); }
+  [[nodiscard]] Asked asked() const noexcept { return asked_.load(); }
+  // Of the push that is asked for: an index of readings and stations.
+  [[nodiscard]] std::size_t station() const noexcept { return station_.load(); }
+
+  // ---- between cycles
+  [[nodiscard]] const std::vector<Station>& stations() const noexcept { return stations_; }
+
+  // ---- after the last cycle
+  [[nodiscard]] bool complete() const noexcept { return !readings_.empty() && station_ == stations_.size(); }
+  // A push, or its end, was waited for in vain.
+  [[nodiscard]] bool not_pushed() const noexcept { return not_pushed_; }
+  [[nodiscard]] const std::vector<Reading>& readings() const noexcept { return readings_; }
+  // Of the stop, or of the hold that led to it; none: no fault.
+  [[nodiscard]] const controller::FaultReport& fault() const noexcept {
+    return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
+  }
+  // By how much the joints moved while their brakes held them, rad; none: it didn't come to that.
+  [[nodiscard]] std::optional<double> slipped_rad() const noexcept { return slipped_rad_; }
+  [[nodiscard]] const controller::CycleParts& parts() const noexcept { return parts_; }
+
+ private:
+  enum class Step : std::uint8_t { moving, settling, waiting, reading, releasing };
+  class NoListener final : public controller::FrameListener {
+   public:
+    bool on_frame(std::size_t /*bus*/, const fieldbus::CanFrame& /*frame*/) noexcept override { return false; }
+  };
+
+  void heed(std::int64_t t_k_ns) noexcept;
+  void enter(std::int64_t t_k_ns) noexcept;
+  void act(std::int64_t t_k_ns) noexcept;
+  void wait_for_drives(double in_phase_s) noexcept;
+  void tare(double in_phase_s) noexcept;
+  void follow_plan() noexcept;
+  void move() noexcept;
+  void wait_for_push(bool pressed) noexcept;
+  void read() noexcept;
+  void next_station() noexcept;
+  void begin_move(const models::JointVector& to_rad) noexcept;
+  void watch_brakes(double in_phase_s) noexcept;
+  void go_to(Step step) noexcept;
+
+  controller::CycleParts parts_;
+  controller::SessionSettings settings_;
+  description::Cell cell_;
+  description::CellLimits limits_;
+  std::uint64_t cycle_ = 0;
+  controller::Supervisor supervisor_;
+  controller::Alarm alarm_;
+  controller::CycleRecorder recorder_;
+  controller::BusImage bus_;
+  controller::Measurement measurement_;
+  controller::FaultMonitor faults_;
+  NoListener listener_;
+  controller::Phase entered_ = controller::Phase::idle;
+  std::int64_t first_ns_ = 0, since_ns_ = 0;
+  std::atomic<bool> stop_{false};
+  std::atomic<Asked> asked_{Asked::nothing};
+  std::atomic<std::size_t> station_{0};
+  controller::Setpoints setpoints_;
+
+  std::vector<Station> stations_;
+  std::vector<Reading> readings_;
+  Step step_ = Step::moving;
+  double step_s_ = 0.0, pressed_s_ = 0.0;  // in this step; for how long a push has lasted, or its end
+  models::JointVector from_rad_, way_rad_;
+  double duration_s_ = 0.0, path_s_ = 0.0, rate_ = 1.0;
+  models::Vec3 force_sum_S_ = models::Vec3::Zero(), unpushed_S_ = models::Vec3::Zero();
+  int samples_ = 0;
+  bool not_pushed_ = false;
+  models::JointVector braked_rad_;
+  std::optional<double> slipped_rad_;
+};
+
+}  // namespace proxarm::proof
