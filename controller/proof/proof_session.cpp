@@ -52,7 +52,7 @@ ProofSession::ProofSession(controller::CycleParts parts, const controller::Sessi
       recorder_(1),
       bus_(parts_, recorder_, alarm_),
       measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
-      faults_(parts_.drives, settings_, limits_.max_force_N, supervisor_, alarm_,
+      faults_(parts_.drives, settings_, {limits_.max_force_N, parts_.supervision.max_bias_drift_N}, supervisor_, alarm_,
               controller::ToolMonitor(limits_, settings.max_missed_feedback, longest_feedback_s(parts_)),
               controller::DriveMonitor(*parts_.arm, drives_of(parts_), limits_.following_error_rad)) {
   setpoints_.values = parts_.arm->start_rad();
