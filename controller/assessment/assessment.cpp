@@ -88,7 +88,7 @@ std::vector<std::vector<double>> poses_about_start(const description::Cell& cell
   constexpr double reach = 0.4;  // of each joint from the start, in rad or m
   constexpr double least_share_of_mobility = 0.6;
   constexpr int tries = 1000;
-  const models::JointVector start = arm.start_rad();
+  const models::JointVector& start = arm.start_rad();
   const double mobility = worst_mobility(arm, start);
   std::vector<std::vector<double>> poses{{start.begin(), start.end()}};
   models::Random random(1);
