@@ -64,7 +64,8 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
          "period, power, jammed, ignored, reversed, runaway=rad/s, weak=Nm, offset=rad, stuck) or sensor (KIND: "
          "silent, samples, frozen, half, swapped, duplicated, short, checksum, "
          "saturated, lost=N, status=BITS, "
-         "delay=US). Such as axis_2:silent@2s, axis_3:fault=0x4210@2s, sensor:frozen@1s..1.5s")
+         "delay=US, channel=N, offset=FORCE, drift=N/s, scale=NUMBER, inverted, turned). Such as axis_2:silent@2s, "
+         "axis_3:fault=0x4210@2s, sensor:frozen@1s..1.5s")
       ->type_name("TEXT")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -204,8 +205,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                  choice<Passivity>("--passivity",
                                    {{"off", Passivity::off}, {"observe", Passivity::observe}, {"on", Passivity::on}},
                                    [&](Passivity value) { options.passivity = value; }),
-                 "on: add damping while the loop makes the hand swing (default: the cell's, or this); observe: only "
-                 "find it, and count energies at the hand's and the proxy's port")
+                 "observe: energies at the hand's and the proxy's port, and oscillations; on: add damping against "
+                 "them (default: the cell's, or off)")
       ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,

@@ -249,7 +249,7 @@ void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
   for (const auto& [parameter, cycles] : s.active_limits)
     line("", parameter + ": " + std::to_string(cycles) + " cycles");
-  if (s.passivity && s.passivity->oscillating_time_s > 0.0) {
+  if (s.passivity) {
     const PortEnergies& e = s.passivity->energies_J;
     line("energy", format("hand to tool %.3g J, ", e.hand) + format("hand to proxy %.3g J, ", e.proxy) +
                        format("world to proxy %.3g J, ", e.world) + format("damped %.3g J", e.damping));

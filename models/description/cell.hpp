@@ -173,7 +173,7 @@ struct Cell {
   SensorPlacement sensor;
   CellLimits limits;
   Profile profile = Profile::none;
-  std::string passivity;  // "off", "observe", "on" (--passivity); empty: on, where there is a proxy with a mass
+  std::string passivity = "off";  // "off", "observe", "on" (--passivity)
   SupervisionDescription supervision;
   std::optional<EnablingInputDescription> enabling_input;
   double default_period_s = 1e-3;

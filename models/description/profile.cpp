@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "models/base/text.hpp"
 #include "models/description/cell.hpp"
 #include "models/files/yaml_file.hpp"
 
@@ -26,8 +27,18 @@ void require_limits(const YamlNode& limits, const CellLimits& given) {
   require_there(limits, "max_tool_acceleration_m_per_s2", "the tool's acceleration, at most 10 m/s²");
   require_at_most(limits, "max_tool_acceleration_m_per_s2", given.max_tool_acceleration_m_per_s2,
                   reduced_acceleration_m_per_s2, "m/s²");
+  require_at_most(limits, "following_error_rad", given.following_error_rad, guided_following_error_rad, "rad");
   require_there(limits, "max_force_N", "the force above which the arm stops");
   require_there(limits, "workspace_m", "the box that the tool stays in");
+}
+
+// A switch that is squeezed through ends the session: nobody clenches a hand for a pause.
+void require_stop_when_squeezed(const YamlNode& root, const Cell& cell) {
+  const auto chosen = cell.supervision.reactions.find("enabling_squeezed");
+  if (chosen == cell.supervision.reactions.end() || chosen->second != "hold") return;
+  throw root.map("supervision")
+      .map("reactions")
+      .error_at("enabling_squeezed", std::string("stop_1 or stop_0") + asked, in_quotes(chosen->second));
 }
 
 }  // namespace
@@ -41,6 +52,7 @@ void apply_hand_guiding(const YamlNode& root, Cell& cell) {
         .error_at("three_position", std::string("the contact of the third position, {panic_bit: N}") + asked,
                   "nothing");
   }
+  require_stop_when_squeezed(root, cell);
   const bool torques = std::any_of(cell.drives.begin(), cell.drives.end(),
                                    [](const DriveDescription& drive) { return drive.mode == "cst"; });
   if (torques) throw root.error_at("profile", "none: drives that take torques can't hold an arm still");

@@ -30,6 +30,7 @@ constexpr Unit units[] = {
     {"counts_per_Nm", "1/Nm"},
     {"counts_per_N", "1/N"},
     {"_Ns_per_m", "Ns/m"},
+    {"_N_per_mm", "N/mm"},
     {"_N_per_m", "N/m"},
     {"_m_per_s", "m/s"},
     {"_kg_m2", "kg m²"},

@@ -200,11 +200,7 @@ void add_delay(description::SensorPlacement& sensor, double extra_delay_s) {
 void choose_passivity(PreparedSession& session, const RunOptions& options) {
   using controller::Passivity;
   const std::string& cells = session.cell.passivity;
-  const Passivity unsaid = session.impedance() ? Passivity::off : Passivity::on;
-  const Passivity otherwise = cells.empty()        ? unsaid
-                              : cells == "on"      ? Passivity::on
-                              : cells == "observe" ? Passivity::observe
-                                                   : Passivity::off;
+  const Passivity otherwise = cells == "on" ? Passivity::on : cells == "observe" ? Passivity::observe : Passivity::off;
   session.settings.passivity = options.passivity.value_or(otherwise);
   if (!session.impedance() || session.settings.passivity == Passivity::off) return;
   throw description::SetupError({.file = options.passivity ? "" : session.cell.file.string(),
