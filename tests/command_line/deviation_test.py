@@ -9,18 +9,15 @@ without end.
 Judged by the columns true_tool_W of signals.csv: the simulated steel, which the controller never sees. What a deviation
 does is told by another session with the same hand and no deviation.
 """
-import csv
 import math
 import re
 import unittest
 
 import harness
 import tool_motion
+from steel import BEFORE_FIRST_CYCLE_S, NOBODY, SLACK_S, Track
 
-# From power on; the first cycle is 0.2 s later, to a cycle or two.
-FAULT_S = 1.9
-BEFORE_FIRST_CYCLE_S = 0.2
-SLACK_S = 0.003
+FAULT_S = 1.9  # from power on
 # What the deviation may last, and how far the tool may go by it.
 MOST_S, MOST_M = 0.2, 0.05
 # An empty handle drifts by the sensor's bias and noise: 0.5 mm/s here.
@@ -30,13 +27,6 @@ SHOWS_M = 1e-3
 # For as long a joint may be behind; where the hand makes its setpoint swing about it, twice as long.
 BLOCKED_S, SWINGS_S = 0.5, 1.0
 
-NOBODY = """name: nobody
-mass_kg: 0
-stiffness_N_per_m: 0
-damping_Ns_per_m: 0
-waypoints:
-  - {time_s: 0, offset_m: [0, 0, 0]}
-"""
 # To all sides, so that every joint has to move.
 SOMEBODY = """name: somebody
 mass_kg: 1.0
@@ -48,25 +38,6 @@ waypoints:
 """
 
 DEVIATES = {"drive_deviates", "position_implausible"}
-
-
-class Track:
-    """A session's phases and places of the steel, by its record."""
-
-    def __init__(self, folder):
-        with open(folder / "signals.csv", newline="") as file:
-            header, *rows = csv.reader(file)
-        time, phase, *place = map(header.index, ("time_s", "phase", *(f"true_tool_W_{axis}_m" for axis in "xyz")))
-        self.time_s = [float(row[time]) for row in rows]
-        self.phase = [row[phase] for row in rows]
-        self.place = [tuple(float(row[i]) for i in place) for row in rows]
-
-    def at(self, time_s):
-        return next(k for k, t in enumerate(self.time_s) if t >= time_s)
-
-    def leaves_rendering(self, start):
-        """The first cycle from `start` on that doesn't render; None: there is none before the session's end."""
-        return next((k for k in range(start, len(self.phase)) if self.phase[k] != "rendering"), None)
 
 
 class Deviations(harness.ProgramTest):

@@ -7,19 +7,13 @@ minute, because the sensor's bias is known to some millinewtons only.
 Judged by true_tool_W and hand_force_W of signals.csv: the simulated steel and the hand's force on it, which the
 controller never sees.
 """
-import csv
 import math
 import unittest
 
 import harness
+import steel
+from steel import NOBODY
 
-NOBODY = """name: nobody
-mass_kg: 0
-stiffness_N_per_m: 0
-damping_Ns_per_m: 0
-waypoints:
-  - {time_s: 0, offset_m: [0, 0, 0]}
-"""
 # A hand without a mass of its own, so that nothing of it stays at the handle.
 LETS_GO = """name: lets go at speed
 mass_kg: 0
@@ -44,18 +38,11 @@ waypoints:
 """
 
 
-class Track:
-    def __init__(self, folder):
-        with open(folder / "signals.csv", newline="") as file:
-            header, *rows = csv.reader(file)
-        column = {name: i for i, name in enumerate(header)}
-        triple = lambda name, unit: [tuple(float(row[column[f"{name}_{axis}_{unit}"]]) for axis in "xyz")
-                                     for row in rows]
-        self.time_s = [float(row[column["time_s"]]) for row in rows]
-        self.phase = [row[column["phase"]] for row in rows]
+class Track(steel.Track):
+    def take(self, column, rows):
+        super().take(column, rows)
         self.hands_off = ["hands_off" in row[column["flags"]].split("|") for row in rows]
-        self.place, self.hand_N = triple("true_tool_W", "m"), triple("hand_force_W", "N")
-        self.began = self.phase.index("rendering")
+        self.hand_N = steel.vectors(column, rows, "hand_force_W", "N")
 
     def speed(self, k):
         """Over 10 ms."""

@@ -7,24 +7,16 @@ channel not at all; a drift led an empty handle through the room.
 Judged by true_tool_W of signals.csv, the simulated steel, beside a session with the same hand and a sensor that says the
 truth. Nothing here knows how a lie is found.
 """
-import csv
 import math
 import unittest
 
 import harness
+from steel import BEFORE_FIRST_CYCLE_S, NOBODY, SLACK_S, Track
 
-# From power on; the first cycle is 0.2 s later, to a cycle or two.
-LIE_S, BEFORE_FIRST_CYCLE_S, SLACK_S = 3.0, 0.2, 0.003
+LIE_S = 3.0  # from power on
 # How far a lie may lead the tool off.
 MOST_M = 0.1
 
-NOBODY = """name: nobody
-mass_kg: 0
-stiffness_N_per_m: 0
-damping_Ns_per_m: 0
-waypoints:
-  - {time_s: 0, offset_m: [0, 0, 0]}
-"""
 # To all sides; still on its way when the sensor begins to lie.
 SOMEBODY = """name: somebody
 mass_kg: 1.0
@@ -35,23 +27,6 @@ waypoints:
   - {time_s: 4.4, offset_m: [0.16, 0.12, -0.1]}
 """
 HANDS = {"nobody": NOBODY, "somebody": SOMEBODY % (500, 20), "soft": SOMEBODY % (150, 10), "stiff": SOMEBODY % (1500, 40)}
-
-
-class Track:
-    def __init__(self, folder):
-        with open(folder / "signals.csv", newline="") as file:
-            header, *rows = csv.reader(file)
-        time, phase, *place = map(header.index, ("time_s", "phase", *(f"true_tool_W_{axis}_m" for axis in "xyz")))
-        self.time_s = [float(row[time]) for row in rows]
-        self.phase = [row[phase] for row in rows]
-        self.place = [tuple(float(row[i]) for i in place) for row in rows]
-        self.began = self.phase.index("rendering")
-
-    def at(self, time_s):
-        return next(k for k, t in enumerate(self.time_s) if t >= time_s)
-
-    def leaves_rendering(self, start):
-        return next((k for k in range(start, len(self.phase)) if self.phase[k] != "rendering"), len(self.phase) - 1)
 
 
 class Liars(harness.ProgramTest):
@@ -80,6 +55,8 @@ class Liars(harness.ProgramTest):
         summary, track = self.session(hand, mass, "--fault", f"sensor:{lie}{when}")
         began = track.at(at_s - BEFORE_FIRST_CYCLE_S - SLACK_S) if at_s else track.began
         ended = track.leaves_rendering(began)
+        if ended is None:
+            ended = len(track.phase) - 1
         until = min(ended, len(reference.place) - 1)
         off = max(math.dist(track.place[k], reference.place[k]) for k in range(began, until + 1))
         coasting = max(math.dist(place, track.place[ended]) for place in track.place[ended:])
