@@ -15,18 +15,6 @@ struct FileOptions {
   std::vector<std::filesystem::path> files;
 };
 
-struct StudyOptions {
-  std::vector<std::string> words;  // a study's name; or "merge" and the folders of its parts
-  std::filesystem::path out;
-  bool quick = false;
-  std::uint64_t seed = 1;
-  std::string shard = "1/1";
-  std::optional<double> runs;
-  unsigned threads = 0;
-  std::optional<std::uint64_t> replay;
-  std::string command_line;  // for the record
-};
-
 struct SetOptions {
   std::vector<std::string> changes;
   std::filesystem::path control;
@@ -65,8 +53,5 @@ int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);    // 1: not proven
 int assess_command(const AssessOptions& options);  // 1: a threshold is exceeded
-// What a study measures and writes, for its help; empty: there is none of that name.
-std::string study_description(const std::string& name);
-int study_command(const StudyOptions& options);
 
 }  // namespace proxarm::command_line

@@ -2,8 +2,8 @@
 #include <cstdio>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
-#include "controller/command_line/preparation/exit_status.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/arm/arm.hpp"

@@ -1,19 +1,22 @@
 // proxarm's command line: the one place that knows the controller, the field bus and the simulated arm.
 //
 // Exit status: 0 fine, 1 a fault ended the run, 2 set-up mistake.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdio>
-#include <exception>
+#include <filesystem>
 #include <functional>
 #include <initializer_list>
 #include <iostream>
 #include <memory>
+#include <utility>
 
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/help.hpp"
-#include "controller/command_line/live/standard_streams.hpp"
-#include "controller/command_line/preparation/exit_status.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/entry/help.hpp"
+#include "controller/command_line/entry/options.hpp"
+#include "controller/command_line/entry/program.hpp"
 #include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
@@ -23,33 +26,11 @@ namespace {
 
 using namespace proxarm;
 using command_line::BusMapping;
+using command_line::choice;
 using command_line::Pace;
+using command_line::quantity;
 using command_line::RunOptions;
-
-// A number with its unit, checked while the command line is parsed, so that CLI11 names the option in its message.
-template <typename Parse, typename Store>
-CLI::callback_t quantity(Parse parse, Store store) {
-  return [parse, store](const CLI::results_t& words) {
-    store(parse(words.back()));
-    return true;
-  };
-}
-
-// One word out of a few.
-template <typename Value, typename Store>
-CLI::callback_t choice(std::string option, std::map<std::string, Value> choices, Store store) {
-  return [option = std::move(option), choices = std::move(choices), store](const CLI::results_t& words) {
-    const auto found = choices.find(words.back());
-    if (found == choices.end()) {
-      std::vector<std::string> known;
-      for (const auto& [word, value] : choices) known.push_back(word);
-      throw description::SetupError(
-          {.key = option, .found = description::in_quotes(words.back()), .expected = description::one_of(known)});
-    }
-    store(found->second);
-    return true;
-  };
-}
+using command_line::whole_number;
 
 // Scripted faults of simulated devices.
 void add_fault_option(CLI::App& app, RunOptions& options) {
@@ -232,43 +213,6 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                "simulation only: run with a mass that is predicted unstable");
 }
 
-// A whole number in decimal digits.
-CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store) {
-  return [option = std::move(option), store = std::move(store)](const CLI::results_t& words) {
-    const std::string& word = words.back();
-    if (word.empty() || word.size() > 16 || word.find_first_not_of("0123456789") != std::string::npos) {
-      throw description::SetupError(
-          {.key = option, .found = description::in_quotes(word), .expected = "a whole number of at most 16 digits"});
-    }
-    store(std::stoull(word));
-    return true;
-  };
-}
-
-void add_study_options(CLI::App& app, command_line::StudyOptions& options) {
-  app.add_option("study", options.words,
-                 "figure5, stress, stress_meshes, stress_layers, error, stability, fidelity or skip; or merge and the "
-                 "folders of its parts")
-      ->type_name("NAME")
-      ->required();
-  app.add_option("--out", options.out, "folder for CSV, JSON and plots")->type_name("DIR");
-  app.add_flag("--quick", options.quick, "fewer and coarser runs");
-  app.add_option("--seed", whole_number("--seed", [&](std::uint64_t n) { options.seed = n; }),
-                 "of all that is random (default 1)")
-      ->type_name("N");
-  app.add_option("--runs", whole_number("--runs", [&](std::uint64_t n) { options.runs = static_cast<double>(n); }),
-                 "how many, in studies of random runs")
-      ->type_name("N");
-  app.add_option("--shard", options.shard, "do the I-th of N parts")->type_name("I/N");
-  app.add_option("--threads",
-                 whole_number("--threads", [&](std::uint64_t n) { options.threads = static_cast<unsigned>(n); }),
-                 "how many (default: one per core)")
-      ->type_name("N");
-  app.add_option("--replay", whole_number("--replay", [&](std::uint64_t n) { options.replay = n; }),
-                 "stress, stress_meshes and stress_layers: one run again, by the seed that was printed for it")
-      ->type_name("SEED");
-}
-
 void add_assess_options(CLI::App& app, command_line::AssessOptions& options) {
   add_session_options(app, options.run);
   leave_out(app, {"--scene", "--stiffness", "--scheme", "--duration", "--bus"});
@@ -304,34 +248,147 @@ void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
   app.add_flag("--json", options.run.json, "print the verdict as one JSON object");
 }
 
-// CLI11's message in one line, with the nearest word that is known.
-int refuse_command_line(CLI::App& app, int argc, char** argv, const CLI::ParseError& error) {
+// The commands with their options; the one that was chosen waits in `chosen`.
+class Commands {
+ public:
+  explicit Commands(CLI::App& app) : app_(app) {
+    add_sessions();
+    add_bus();
+    add_orders();
+    add_files();
+    add_judges();
+    app_.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");  // become_study()
+  }
+
+  std::function<int()> chosen;
+
+ private:
+  CLI::App* add(const char* name, const char* text, std::function<int()> command) {
+    CLI::App* added = app_.add_subcommand(name, text);
+    added->callback([this, command = std::move(command)] { chosen = command; });
+    return added;
+  }
+
+  void add_sessions() {
+    add_run_options(*add("run", "render a scene on a simulated or real arm", [this] { return run_command(run_); }),
+                    run_);
+    CLI::App* sim =
+        add("sim", "the simulated arm as a process of its own on CAN interfaces", [this] { return sim_command(sim_); });
+    add_session_options(*sim, sim_);
+    add_fault_option(*sim, sim_);
+    add_enabling_option(*sim, sim_);
+    CLI::App* replay = add("replay", "a recorded session or black box again, by the controller alone",
+                           [this] { return replay_command(replay_); });
+    replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
+    replay->add_flag("--json", replay_.json, "print the result as one JSON object");
+  }
+
+  void add_bus() {
+    CLI::App* plan =
+        add("plan", "bus budget of a cell; status 1 if it can't be carried", [this] { return plan_command(plan_); });
+    add_session_options(*plan, plan_);
+    leave_out(*plan,
+              {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay", "--duration"});
+    CLI::App* scan = add("scan", "what is on a CAN interface: listens, then asks; changes nothing",
+                         [this] { return scan_command(scan_); });
+    scan->add_option("--bus", scan_.interface, "CAN interface, such as can0")->required()->type_name("IFACE");
+    scan->add_option_function<std::string>(
+            "--poll-sensor",
+            [this](const std::string& text) {
+              const auto id = description::strict_integer(text);
+              if (!id || *id < 0 || *id > 0x7F) throw CLI::ValidationError("--poll-sensor", "expected 0x09 to 0x7F");
+              scan_.sensor_base_id = static_cast<std::uint32_t>(*id);
+            },
+            "poll an ATI Net CAN OEM at this base id, such as 0x68; never guessed")
+        ->type_name("BASE_ID");
+  }
+
+  // Changes and orders to a running session, each a line on its socket.
+  void add_orders() {
+    constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
+    CLI::App* set =
+        add("set", "change mass, damping, spring, timestep, or an object's friction or place, in a running session",
+            [this] { return set_command(set_); });
+    set->add_option("changes", set_.changes,
+                    "one or more of:\n"
+                    "mass=6kg: mass that the hand feels, in kg, handle included\n"
+                    "damping=20Ns/m: against the world\n"
+                    "spring=100N/m: to the start position\n"
+                    "timestep=2ms: the arm stops for it, and goes on\n"
+                    "OBJECT.friction=0.6: of an object, by its name in the scene\n"
+                    "OBJECT.position_m=X,Y,Z: of an object with motion: {driven: true}, in metres from where the scene "
+                    "describes it")
+        ->required()
+        ->type_name("NAME=VALUE");
+    set->add_option("--control", set_.control, control_text)->type_name("PATH");
+
+    const std::pair<const char*, const char*> orders[] = {
+        {"hold", "stop the arm of a running session, its drives enabled"},
+        {"resume", "go on out of a hold"},
+        {"release", "out of a hold: let the arm follow the hand slowly, without the scene; hold ends it"},
+        {"back-off", "out of a hold: move the tool away from what was touched last"},
+        {"reset", "after a fault, with --wait-after-fault: enable the drives again, into a hold"}};
+    for (const auto& [name, help] : orders) {
+      const bool has_distance = std::string(name) == "back-off";
+      CLI::App* order = add(name, help, [this, line = std::string(name), has_distance] {
+        set_.changes = {has_distance ? line + " " + distance_ : line};
+        return set_command(set_);
+      });
+      order->add_option("--control", set_.control, control_text)->type_name("PATH");
+      if (has_distance) order->add_option("distance", distance_, "such as 20mm")->required();
+    }
+  }
+
+  void add_files() {
+    add("check", "validate cell, scene, hand and sensor files", [this] { return check_command(check_); })
+        ->add_option("files", check_.files, "files to check")
+        ->required();
+    add("explain", "what a scene compiles to, what is skipped and why", [this] { return explain_command(explain_); })
+        ->add_option("scene", explain_.files, "scene file")
+        ->required();
+  }
+
+  void add_judges() {
+    CLI::App* tune = add("tune", "advice on mass, damping and timestep for a cell and a hand",
+                         [this] { return tune_command(tune_); });
+    add_session_options(*tune, tune_);
+    leave_out(*tune, {"--scene", "--stiffness", "--duration", "--bus"});
+    add_prove_options(
+        *add("prove",
+             "whether an arm is as its cell says, by small slow motions and pushes: joint signs, gear ratios, the "
+             "sensor's mounting, sign and scale, brakes. Status 1: not proven",
+             [this] {
+               prove_.run.without_proof = true;
+               return prove_command(prove_);
+             }),
+        prove_);
+    add_assess_options(
+        *add("assess",
+             "stopping times and distances, and clamping forces, of the simulated arm, held against thresholds; "
+             "certifies nothing. Status 1: a threshold is exceeded",
+             [this] { return assess_command(assess_); }),
+        assess_);
+  }
+
+  CLI::App& app_;
+  RunOptions run_, sim_, plan_, tune_;
+  command_line::ReplayOptions replay_;
+  command_line::ScanOptions scan_;
+  command_line::SetOptions set_;
+  std::string distance_;
+  command_line::FileOptions check_, explain_;
+  command_line::ProveOptions prove_;
+  command_line::AssessOptions assess_;
+};
+
+int refuse_command(const CLI::App& app, const std::string& word) {
   std::vector<std::string> commands;
   for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
-  const CLI::App* chosen = app.get_subcommands().empty() ? nullptr : app.get_subcommands().front();
-  std::string message = error.what(), advice = "see proxarm --help";
-  if (chosen != nullptr) {
-    advice = "see proxarm " + chosen->get_name() + " --help";
-    std::vector<std::string> known;
-    for (const CLI::Option* option : chosen->get_options()) {
-      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
-    }
-    for (int i = 2; i < argc; ++i) {
-      const std::string word = argv[i], name = word.substr(0, word.find('='));
-      if (word.substr(0, 2) != "--" || std::find(known.begin(), known.end(), name) != known.end()) continue;
-      message = "unknown option " + description::in_quotes(name);
-      const std::string near = description::nearest(name, known);
-      if (!near.empty()) message += "; did you mean " + near + "?";
-      break;
-    }
-  } else {
-    const std::string word = argc > 1 ? argv[1] : "";
-    message = (word.empty() ? "found no command" : "found " + description::in_quotes(word)) + ", expected " +
-              description::one_of(commands);
-    const std::string near = description::nearest(word, commands);
-    if (!near.empty()) message += "; did you mean " + near + "?";
-  }
-  std::fprintf(stderr, "proxarm: %s; %s\n", message.c_str(), advice.c_str());
+  std::string message = (word.empty() ? "found no command" : "found " + description::in_quotes(word)) + ", expected " +
+                        description::one_of(commands);
+  const std::string near = description::nearest(word, commands);
+  if (!near.empty()) message += "; did you mean " + near + "?";
+  std::fprintf(stderr, "proxarm: %s; see proxarm --help\n", message.c_str());
   return command_line::set_up_mistake;
 }
 
@@ -341,134 +398,26 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", std::string("proxarm ") + PROXARM_VERSION);
   app.formatter(std::make_shared<command_line::HelpFormatter>());
   app.set_help_all_flag("--help-all", "help of all commands");
-
-  std::function<int()> command;
-  RunOptions run_options, sim_options, plan_options, tune_options;
-  command_line::FileOptions check_options, explain_options;
-  command_line::ScanOptions scan_options;
-
-  CLI::App* run_app = app.add_subcommand("run", "render a scene on a simulated or real arm");
-  add_run_options(*run_app, run_options);
-  run_app->callback([&] { command = [&] { return command_line::run_command(run_options); }; });
-
-  CLI::App* sim_app = app.add_subcommand("sim", "the simulated arm as a process of its own on CAN interfaces");
-  add_session_options(*sim_app, sim_options);
-  add_fault_option(*sim_app, sim_options);
-  add_enabling_option(*sim_app, sim_options);
-  sim_app->callback([&] { command = [&] { return command_line::sim_command(sim_options); }; });
-
-  CLI::App* plan_app = app.add_subcommand("plan", "bus budget of a cell; status 1 if it can't be carried");
-  add_session_options(*plan_app, plan_options);
-  leave_out(*plan_app,
-            {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay", "--duration"});
-  plan_app->callback([&] { command = [&] { return command_line::plan_command(plan_options); }; });
-
-  CLI::App* scan_app = app.add_subcommand("scan", "what is on a CAN interface: listens, then asks; changes nothing");
-  scan_app->add_option("--bus", scan_options.interface, "CAN interface, such as can0")->required()->type_name("IFACE");
-  scan_app
-      ->add_option_function<std::string>(
-          "--poll-sensor",
-          [&](const std::string& text) {
-            const auto id = description::strict_integer(text);
-            if (!id || *id < 0 || *id > 0x7F) throw CLI::ValidationError("--poll-sensor", "expected 0x09 to 0x7F");
-            scan_options.sensor_base_id = static_cast<std::uint32_t>(*id);
-          },
-          "poll an ATI Net CAN OEM at this base id, such as 0x68; never guessed")
-      ->type_name("BASE_ID");
-  scan_app->callback([&] { command = [&] { return command_line::scan_command(scan_options); }; });
-
-  constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
-  command_line::SetOptions set_options;
-  CLI::App* set_app = app.add_subcommand(
-      "set", "change mass, damping, spring, timestep, or an object's friction or place, in a running session");
-  set_app
-      ->add_option("changes", set_options.changes,
-                   "one or more of:\n"
-                   "mass=6kg: mass that the hand feels, in kg, handle included\n"
-                   "damping=20Ns/m: against the world\n"
-                   "spring=100N/m: to the start position\n"
-                   "timestep=2ms: the arm stops for it, and goes on\n"
-                   "OBJECT.friction=0.6: of an object, by its name in the scene\n"
-                   "OBJECT.position_m=X,Y,Z: of an object with motion: {driven: true}, in metres from where the scene "
-                   "describes it")
-      ->required()
-      ->type_name("NAME=VALUE");
-  set_app->add_option("--control", set_options.control, control_text)->type_name("PATH");
-  set_app->callback([&] { command = [&] { return command_line::set_command(set_options); }; });
-
-  // Orders to a running session, each a line on its socket.
-  command_line::SetOptions order_options;
-  std::string distance;
-  const std::pair<const char*, const char*> orders[] = {
-      {"hold", "stop the arm of a running session, its drives enabled"},
-      {"resume", "go on out of a hold"},
-      {"release", "out of a hold: let the arm follow the hand slowly, without the scene; hold ends it"},
-      {"back-off", "out of a hold: move the tool away from what was touched last"},
-      {"reset", "after a fault, with --wait-after-fault: enable the drives again, into a hold"}};
-  for (const auto& [name, help] : orders) {
-    CLI::App* order_app = app.add_subcommand(name, help);
-    order_app->add_option("--control", order_options.control, control_text)->type_name("PATH");
-    const bool has_distance = std::string(name) == "back-off";
-    if (has_distance) order_app->add_option("distance", distance, "such as 20mm")->required();
-    order_app->callback([&, line = std::string(name), has_distance] {
-      order_options.changes = {has_distance ? line + " " + distance : line};
-      command = [&] { return command_line::set_command(order_options); };
-    });
-  }
-
-  command_line::ReplayOptions replay_options;
-  CLI::App* replay_app = app.add_subcommand("replay", "a recorded session or black box again, by the controller alone");
-  replay_app->add_option("folder", replay_options.folder, "folder of --record, or of a black box")->required();
-  replay_app->add_flag("--json", replay_options.json, "print the result as one JSON object");
-  replay_app->callback([&] { command = [&] { return command_line::replay_command(replay_options); }; });
-
-  CLI::App* check_app = app.add_subcommand("check", "validate cell, scene, hand and sensor files");
-  check_app->add_option("files", check_options.files, "files to check")->required();
-  check_app->callback([&] { command = [&] { return command_line::check_command(check_options); }; });
-
-  CLI::App* explain_app = app.add_subcommand("explain", "what a scene compiles to, what is skipped and why");
-  explain_app->add_option("scene", explain_options.files, "scene file")->required();
-  explain_app->callback([&] { command = [&] { return command_line::explain_command(explain_options); }; });
-
-  CLI::App* tune_app = app.add_subcommand("tune", "advice on mass, damping and timestep for a cell and a hand");
-  add_session_options(*tune_app, tune_options);
-  leave_out(*tune_app, {"--scene", "--stiffness", "--duration", "--bus"});
-  tune_app->callback([&] { command = [&] { return command_line::tune_command(tune_options); }; });
-
-  command_line::ProveOptions prove_options;
-  CLI::App* prove_app = app.add_subcommand(
-      "prove",
-      "whether an arm is as its cell says, by small slow motions and pushes: joint signs, gear ratios, the sensor's "
-      "mounting, sign and scale, brakes. Status 1: not proven");
-  add_prove_options(*prove_app, prove_options);
-  prove_app->callback([&] {
-    prove_options.run.without_proof = true;
-    command = [&] { return command_line::prove_command(prove_options); };
-  });
-
-  command_line::AssessOptions assess_options;
-  CLI::App* assess_app = app.add_subcommand(
-      "assess",
-      "stopping times and distances, and clamping forces, of the simulated arm, held against thresholds; certifies "
-      "nothing. Status 1: a threshold is exceeded");
-  add_assess_options(*assess_app, assess_options);
-  assess_app->callback([&] { command = [&] { return command_line::assess_command(assess_options); }; });
-
-  command_line::StudyOptions study_options;
-  for (int i = 1; i < argc; ++i) study_options.command_line += (i > 1 ? " " : "proxarm ") + std::string(argv[i]);
-  CLI::App* study_app = app.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
-  add_study_options(*study_app, study_options);
-  const std::string study = argc > 2 ? command_line::study_description(argv[2]) : "";
-  if (!study.empty()) study_app->description(study);
-  study_app->callback([&] { command = [&] { return command_line::study_command(study_options); }; });
-
+  Commands commands(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);  // help, version
-    return refuse_command_line(app, argc, argv, error);
+    if (app.get_subcommands().empty()) return refuse_command(app, argc > 1 ? argv[1] : "");
+    const CLI::App& command = *app.get_subcommands().front();
+    return command_line::refuse_options(command, "proxarm " + command.get_name(), {argv + 2, argv + argc}, error);
   }
-  return command();
+  return commands.chosen();
+}
+
+// The studies are a program of their own, which a session doesn't wait for when it is built.
+int become_study(std::vector<char*> words) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("proxarm-study");
+  words.push_back(nullptr);
+  execv(program.c_str(), words.data() + 1);
+  throw description::SetupError({.found = "no program " + program + ", which measures",
+                                 .expected = "it beside proxarm",
+                                 .advice = "in a source tree `./dev study` builds it"});
 }
 
 }  // namespace
@@ -480,15 +429,8 @@ int main(int argc, char** argv) {
     words.erase(words.begin() + 1);
     words.push_back(help.data());
   }
-  command_line::open_standard_descriptors();
-  try {
-    return command_line::flush_standard_output(run(static_cast<int>(words.size()), words.data()));
-  } catch (const description::SetupError& error) {
-    std::fprintf(stderr, "proxarm: %s\n", error.what());
-  } catch (const std::bad_alloc&) {
-    std::fprintf(stderr, "proxarm: out of memory; see ulimit -v, or give a smaller scene or mesh\n");
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "proxarm: %s\n", error.what());
-  }
-  return command_line::set_up_mistake;
+  return command_line::run_program([&] {
+    if (words.size() > 1 && std::string(words[1]) == "study") return become_study(words);
+    return run(static_cast<int>(words.size()), words.data());
+  });
 }

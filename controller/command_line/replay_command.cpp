@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "controller/command_line/commands.hpp"
-#include "controller/command_line/preparation/exit_status.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
 #include "controller/record/replay_log.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/base/setup_error.hpp"

@@ -2,8 +2,8 @@
 #include <sstream>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/live/control_socket.hpp"
-#include "controller/command_line/preparation/exit_status.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
 

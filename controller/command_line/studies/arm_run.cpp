@@ -1,4 +1,4 @@
-#include "controller/command_line/sessions/arm_run.hpp"
+#include "controller/command_line/studies/arm_run.hpp"
 
 #include <numbers>
 

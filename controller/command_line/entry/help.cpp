@@ -1,4 +1,4 @@
-#include "controller/command_line/help.hpp"
+#include "controller/command_line/entry/help.hpp"
 
 #include <sstream>
 

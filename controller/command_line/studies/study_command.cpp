@@ -1,8 +1,9 @@
+#include "controller/command_line/studies/study_command.hpp"
+
 #include <algorithm>
 #include <cstdio>
 
-#include "controller/command_line/commands.hpp"
-#include "controller/command_line/sessions/arm_run.hpp"
+#include "controller/command_line/studies/arm_run.hpp"
 #include "controller/studies/stress/stress.hpp"
 #include "controller/studies/studies.hpp"
 #include "models/base/setup_error.hpp"

@@ -1,4 +1,4 @@
-#include "controller/command_line/live/standard_streams.hpp"
+#include "controller/command_line/entry/standard_streams.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -8,7 +8,7 @@
 #include <cstring>
 #include <iostream>
 
-#include "controller/command_line/preparation/exit_status.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
 
 namespace proxarm::command_line {
 

@@ -1,0 +1,45 @@
+// What options take, checked while the command line is parsed, so that CLI11 names the option in its message.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
+
+namespace proxarm::command_line {
+
+// A number with its unit.
+template <typename Parse, typename Store>
+CLI::callback_t quantity(Parse parse, Store store) {
+  return [parse, store](const CLI::results_t& words) {
+    store(parse(words.back()));
+    return true;
+  };
+}
+
+// One word out of a few.
+template <typename Value, typename Store>
+CLI::callback_t choice(std::string option, std::map<std::string, Value> choices, Store store) {
+  return [option = std::move(option), choices = std::move(choices), store](const CLI::results_t& words) {
+    const auto found = choices.find(words.back());
+    if (found == choices.end()) {
+      std::vector<std::string> known;
+      for (const auto& [word, value] : choices) known.push_back(word);
+      throw description::SetupError(
+          {.key = option, .found = description::in_quotes(words.back()), .expected = description::one_of(known)});
+    }
+    store(found->second);
+    return true;
+  };
+}
+
+// A whole number in decimal digits.
+CLI::callback_t whole_number(std::string option, std::function<void(std::uint64_t)> store);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,48 @@
+#include "controller/command_line/entry/program.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <new>
+
+#include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/entry/standard_streams.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
+
+namespace proxarm::command_line {
+
+int run_program(const std::function<int()>& run) noexcept {
+  open_standard_descriptors();
+  try {
+    return flush_standard_output(run());
+  } catch (const description::SetupError& error) {
+    std::fprintf(stderr, "proxarm: %s\n", error.what());
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "proxarm: out of memory; see ulimit -v, or give a smaller scene or mesh\n");
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "proxarm: %s\n", error.what());
+  }
+  return set_up_mistake;
+}
+
+int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
+                   const CLI::ParseError& error) {
+  std::vector<std::string> known;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+  }
+  std::string message = error.what();
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (word.substr(0, 2) != "--" || std::find(known.begin(), known.end(), name) != known.end()) continue;
+    message = "unknown option " + description::in_quotes(name);
+    const std::string near = description::nearest(name, known);
+    if (!near.empty()) message += "; did you mean " + near + "?";
+    break;
+  }
+  std::fprintf(stderr, "proxarm: %s; see %s --help\n", message.c_str(), called.c_str());
+  return set_up_mistake;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,20 @@
+// A program of ours around its commands.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace proxarm::command_line {
+
+// What `main` returns: opens the standard descriptors, runs, says in one line what went wrong, and hands over what was
+// printed.
+int run_program(const std::function<int()>& run) noexcept;
+
+// CLI11's message about options in one line, with the nearest one that `command` knows. `called` is how it was called,
+// such as "proxarm run". Returns the exit status.
+int refuse_options(const CLI::App& command, const std::string& called, const std::vector<std::string>& words,
+                   const CLI::ParseError& error);
+
+}  // namespace proxarm::command_line
