@@ -57,10 +57,10 @@ const char* check(const fs::path& file) {
       description::load_modbus_drive(file);
       return "register map of a Modbus drive";
     case FileKind::eds:
-      description::load_eds(file);
+      for (const std::string& remark : description::load_eds(file).remarks) std::printf("%s\n", remark.c_str());
       return "description of a CANopen device";
     case FileKind::dbc:
-      (void)description::load_dbc(file);
+      for (const std::string& remark : description::load_dbc(file).remarks) std::printf("%s\n", remark.c_str());
       return "list of messages and signals";
     case FileKind::sensor:
       description::load_sensor(file);

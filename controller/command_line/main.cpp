@@ -277,10 +277,6 @@ class Commands {
     add_session_options(*sim, sim_);
     add_fault_option(*sim, sim_);
     add_enabling_option(*sim, sim_);
-    CLI::App* replay = add("replay", "a recorded session or black box again, by the controller alone",
-                           [this] { return replay_command(replay_); });
-    replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
-    replay->add_flag("--json", replay_.json, "print the result as one JSON object");
   }
 
   void add_bus() {
@@ -340,6 +336,10 @@ class Commands {
   }
 
   void add_files() {
+    CLI::App* replay = add("replay", "a recorded session or black box again, by the controller alone",
+                           [this] { return replay_command(replay_); });
+    replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
+    replay->add_flag("--json", replay_.json, "print the result as one JSON object");
     add("check", "validate cell, scene, hand and sensor files", [this] { return check_command(check_); })
         ->add_option("files", check_.files, "files to check")
         ->required();

@@ -300,10 +300,10 @@ std::string frame_row(const FramePlan& frame) {
 std::string plan_text(const BusPlan& plan) {
   const std::string rate = megabits(plan.bitrate) + (plan.data_bitrate != 0 ? "/" + megabits(plan.data_bitrate) : "");
   std::string text = plan.name + ": " + rate + " Mbit/s, timestep " + milliseconds(plan.period_ns) + "\n";
-  text += "  load at worst " + number(100.0 * plan.worst_load, 1) + " % (" + std::to_string(plan.worst_bits) +
-          " bits, " + microseconds(plan.worst_ns) + " of " + microseconds(plan.period_ns) + "), at least " +
-          number(100.0 * plan.least_load, 1) + " %, over many cycles at most " +
-          number(100.0 * plan.mean_worst_load, 1) + " %, typically " + number(100.0 * plan.typical_load, 1) + " %\n";
+  text += "  load where every frame is due: " + number(100.0 * plan.least_load, 1) + " to " +
+          number(100.0 * plan.worst_load, 1) + " % (" + std::to_string(plan.worst_bits) + " bits, " +
+          microseconds(plan.worst_ns) + " of " + microseconds(plan.period_ns) + "); over many cycles typically " +
+          number(100.0 * plan.typical_load, 1) + " %, at most " + number(100.0 * plan.mean_worst_load, 1) + " %\n";
   if (plan.sync_jitter_ns > 0) {
     text += "  SYNC can be held back by " + microseconds(plan.sync_jitter_ns) + " (the longest other frame)\n";
   }

@@ -41,6 +41,8 @@ std::string section_of(std::uint32_t object) {
 const EdsObject& require(const EdsFile& eds, std::uint32_t object, int bits, const std::string& for_what) {
   const EdsObject* there = eds.find(object);
   if (there == nullptr) refuse(eds, object, "", "no such object", for_what);
+  if (!there->mistake.empty())
+    throw description::SetupError({.message = there->mistake, .advice = "wanted: " + for_what});
   if (there->bits != bits) {
     refuse(eds, object, "DataType", std::to_string(there->bits) + " bits", std::to_string(bits) + " bits: " + for_what);
   }

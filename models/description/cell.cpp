@@ -29,7 +29,7 @@ PoseDescription pose_or_identity(const YamlNode& node, std::string_view key) {
 
 // The path of a scene or a hand. Whether the file exists isn't checked here: a run may name another one.
 std::string absolute_path_or_empty(const YamlNode& node, std::string_view key) {
-  return node.has(key) ? node.path_of(key).string() : std::string();
+  return node.has(key) ? node.existing_file(key).string() : std::string();
 }
 
 // A name for the command line (--bus NAME=IFACE,…), for files and for messages.

@@ -12,7 +12,9 @@ namespace proxarm::description {
 namespace {
 
 constexpr std::size_t max_bytes = 4U << 20, max_messages = 4096, max_signals = 512;
+constexpr int max_bytes_of_message = 64;  // of CAN FD
 constexpr std::uint32_t extended_bit = 0x80000000U, unassigned_id = 0xC0000000U;
+constexpr std::string_view unassigned_name = "VECTOR__INDEPENDENT_SIG_MSG";
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -26,7 +28,10 @@ struct Token {
 
 class Reader {
  public:
-  Reader(std::string_view text, const std::filesystem::path& file) : rest_(text), file_(file) { advance(); }
+  Reader(std::string_view text, const std::filesystem::path& file) : rest_(text), file_(file) {
+    unassigned_.bytes = max_bytes_of_message;
+    advance();
+  }
 
   DbcFile read() {
     DbcFile dbc;
@@ -131,15 +136,46 @@ class Reader {
   void read_section(DbcFile& dbc) {
     const int line = token_.line;
     const std::string name = word("a section such as BO_");
-    if (name == "BO_") return read_message(dbc, line);
-    if (name == "SG_") return read_signal(dbc);
+    if (name == "BO_") return read_or_note(dbc, [&] { read_message(dbc, line); });
+    if (name == "SG_") {
+      if (current(dbc) == nullptr) throw error("a message (BO_) before its signals");
+      return read_or_note(dbc, [&] { read_signal(*current(dbc)); });
+    }
     if (name == "SIG_VALTYPE_") return read_type(dbc);
     if (name == "VERSION") return void(string("the version, in quotes"));
     if (name == "NS_") return skip_new_symbols();
     if (name == "BS_" || name == "BU_") return skip_line(line);
     while (token_.kind != Token::Kind::end && !at_sign(';')) advance();
+    if (token_.kind == Token::Kind::end)
+      return dbc.remarks.emplace_back(error("';', which ends " + name).what()), void();
     sign(';');
   }
+
+  // The message that signals belong to.
+  DbcMessage* current(DbcFile& dbc) {
+    if (in_unassigned_) return &unassigned_;
+    return dbc.messages.empty() ? nullptr : &dbc.messages.back();
+  }
+
+  // What can't be read is the current message's mistake. The reader goes on at the next line that begins a section.
+  template <typename Read>
+  void read_or_note(DbcFile& dbc, Read read) {
+    try {
+      read();
+    } catch (const SetupError& mistake) {
+      dbc.remarks.emplace_back(mistake.what());
+      if (DbcMessage* message = current(dbc); message != nullptr && message->mistake.empty()) {
+        message->mistake = mistake.what();
+      }
+      int line = token_.line;
+      while (token_.kind != Token::Kind::end && !(token_.line != line && begins_section())) {
+        line = token_.line;
+        advance();
+      }
+    }
+  }
+
+  [[nodiscard]] bool begins_section() const { return token_.kind == Token::Kind::word && token_.text.ends_with('_'); }
 
   // A list of words that are sections elsewhere; BS_ with its colon ends it.
   void skip_new_symbols() {
@@ -158,27 +194,34 @@ class Reader {
 
   // BO_ 256 FORCE: 8 SENSOR
   void read_message(DbcFile& dbc, int line) {
-    DbcMessage message;
+    in_unassigned_ = false;
+    if (dbc.messages.size() >= max_messages) throw error("no more than 4096 messages");
+    DbcMessage& message = dbc.messages.emplace_back();
     message.line = line;
+    message.bytes = max_bytes_of_message;  // until it is known
     const auto id = static_cast<std::uint32_t>(integer("an identifier", 0, 0xFFFFFFFF));
     message.extended = (id & extended_bit) != 0;
     message.id = id & ~extended_bit;
-    if (id != unassigned_id && message.id > (message.extended ? 0x1FFFFFFFU : 0x7FFU)) {
-      throw error("an identifier of 11 bits, or of 29 with bit 31 set");
-    }
+    const SetupError wrong_id = error("an identifier of 11 bits, or of 29 with bit 31 set");
     message.name = word("the message's name");
     sign(':');
-    message.bytes = static_cast<std::uint8_t>(integer("a length", 0, 64));
+    message.bytes = static_cast<std::uint8_t>(integer("a length", 0, max_bytes_of_message));
     (void)word("the sender's name");
-    if (dbc.find(message.name) != nullptr) throw error("a message that isn't there yet: " + message.name);
-    if (dbc.messages.size() >= max_messages) throw error("no more than 4096 messages");
-    dbc.messages.push_back(std::move(message));
+    if (id == unassigned_id || message.name == unassigned_name) {
+      dbc.messages.pop_back();
+      in_unassigned_ = true;
+      return unassigned_.signals.clear();
+    }
+    if (message.id > (message.extended ? 0x1FFFFFFFU : 0x7FFU)) throw SetupError(wrong_id);
+    for (DbcMessage& other : dbc.messages) {
+      if (&other == &message || other.name != message.name) continue;
+      other.mistake = error("a message that isn't there yet: " + message.name).what();
+      throw error("a message that isn't there yet: " + message.name);
+    }
   }
 
   // SG_ Fx m0 : 7|16@0- (0.01,0) [-300|300] "N" A,B
-  void read_signal(DbcFile& dbc) {
-    if (dbc.messages.empty()) throw error("a message (BO_) before its signals");
-    DbcMessage& message = dbc.messages.back();
+  void read_signal(DbcMessage& message) {
     DbcSignal signal;
     signal.name = word("the signal's name");
     if (token_.kind == Token::Kind::word) {
@@ -252,6 +295,8 @@ class Reader {
     }
   }
 
+  DbcMessage unassigned_;
+  bool in_unassigned_ = false;
   std::string_view rest_;
   const std::filesystem::path& file_;
   Token token_;
@@ -275,7 +320,11 @@ DbcFile parse_dbc(std::string_view text, const std::filesystem::path& file) {
   if (text.size() > max_bytes) {
     throw SetupError({.file = file.string(), .message = "is larger than 4 MiB", .advice = "is it the right file?"});
   }
-  return Reader(text, file).read();
+  DbcFile dbc = Reader(text, file).read();
+  const bool all_lost = std::none_of(dbc.messages.begin(), dbc.messages.end(),
+                                     [](const DbcMessage& message) { return message.mistake.empty(); });
+  if (all_lost && !dbc.remarks.empty()) throw SetupError({.message = dbc.remarks.front()});
+  return dbc;
 }
 
 DbcFile load_dbc(const std::filesystem::path& file) {

@@ -2,9 +2,11 @@
 //
 // Of the format, what a sensor needs: BO_ (message), SG_ (signal), SIG_VALTYPE_ (float); other sections are skipped,
 // not judged. Debian 12 packages no DBC parser for C++, and this part of the format is a flat list of words: a small
-// strict reader is less than a grammar's library would bring along. Refused, with the line: anything that isn't of the
-// format, a signal that doesn't fit its message, two messages or signals with one name; and files above 4 MiB, 4096
-// messages, 512 signals in one. Nothing nests, so there is no depth to limit.
+// strict reader is less than a grammar's library would bring along. What isn't of the format in a message or its
+// signals, a signal that doesn't fit its message, two messages or signals with one name: that message's mistake, with
+// the line, for whoever names it; the others can be used. Refused: a text that isn't of the format elsewhere, and files
+// above 4 MiB, 4096 messages, 512 signals in one. Nothing nests, so there is no depth to limit. The message that some
+// editors keep signals of no message in (identifier C0000000h, or by its name) is passed over.
 #pragma once
 
 #include <cstdint>
@@ -33,6 +35,7 @@ struct DbcMessage {
   std::uint8_t bytes = 0;
   int line = 0;
   std::vector<DbcSignal> signals;
+  std::string mistake;  // the first, with file and line; else empty
 
   [[nodiscard]] const DbcSignal* find(std::string_view signal) const noexcept;
 };
@@ -40,6 +43,7 @@ struct DbcMessage {
 struct DbcFile {
   std::filesystem::path file;
   std::vector<DbcMessage> messages;
+  std::vector<std::string> remarks;  // mistakes of messages, a line each
 
   [[nodiscard]] const DbcMessage* find(std::string_view message) const noexcept;
 };

@@ -39,6 +39,7 @@ struct Reader {
     if (!dbc) throw node.error_at("message", "the key `dbc` with a file beside it, at the top");
     const DbcMessage* message = dbc->find(node.string("message"));
     if (message == nullptr) throw node.error_at("message", "a message of " + dbc->file.filename().string());
+    if (!message->mistake.empty()) throw SetupError({.message = message->mistake});
     if (message->extended != protocol.extended) {
       throw node.error_at("message",
                           protocol.extended ? "one of 29 bits" : "one of 11 bits, or format: {extended: true}");

@@ -1,142 +1,82 @@
 #include "models/files/eds_file.hpp"
 
 #include <algorithm>
-#include <boost/property_tree/ini_parser.hpp>
+#include <bit>
+#include <cctype>
 #include <fstream>
 #include <sstream>
 
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
 #include "models/files/eds_bitrates.hpp"
+#include "models/files/ini_file.hpp"
 
 namespace proxarm::description {
 namespace {
 
-using boost::property_tree::ptree;
+constexpr std::int64_t u32 = 0xFFFFFFFF;
+constexpr int most_sub_indices = 254, real32 = 0x08;
 
-constexpr std::size_t most_bytes = 4'000'000;
-constexpr int most_sub_indices = 254;
-
-std::string lower(std::string_view text) {
-  std::string small(text);
-  std::transform(small.begin(), small.end(), small.begin(),
-                 [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c + ('a' - 'A') : c); });
-  return small;
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
 }
 
-std::string trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return "";
-  return std::string(text.substr(first, text.find_last_not_of(" \t\r") - first + 1));
-}
-
-// Bits of a data type by its number in CiA 301, table 44.
-int bits_of_type(std::int64_t type) noexcept {
-  constexpr std::pair<int, int> types[] = {{0x01, 1},  {0x02, 8},  {0x03, 16}, {0x04, 32}, {0x05, 8},
-                                           {0x06, 16}, {0x07, 32}, {0x08, 32}, {0x10, 24}, {0x11, 64},
-                                           {0x12, 40}, {0x13, 48}, {0x14, 56}, {0x15, 64}, {0x16, 24},
-                                           {0x18, 40}, {0x19, 48}, {0x1A, 56}, {0x1B, 64}};
-  for (const auto& [number, bits] : types) {
-    if (number == type) return bits;
-  }
-  return 0;
-}
-
-// The INI with its keys in lower case, and the line of each key, since Boost's parser doesn't keep lines.
-class Ini {
- public:
-  Ini(std::string_view text, const std::filesystem::path& file) : file_(file) {
-    if (text.size() > most_bytes) throw SetupError({.file = file.string(), .expected = "a file of at most 4 MB"});
-    note_lines(text);
-    try {
-      std::istringstream in{std::string(text)};
-      ptree tree;
-      boost::property_tree::read_ini(in, tree);
-      for (const auto& [section, keys] : tree) {
-        auto& into = sections_[lower(trimmed(section))];
-        for (const auto& [key, value] : keys) into[lower(trimmed(key))] = trimmed(value.data());
-      }
-    } catch (const boost::property_tree::ini_parser_error& error) {
-      throw SetupError({.file = file.string(), .line = static_cast<int>(error.line()), .message = error.message()});
-    }
-  }
-
-  [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& sections() const { return sections_; }
-  [[nodiscard]] int line_of(const std::string& section, const std::string& key = "") const {
-    const auto found = lines_.find({section, key});
-    return found == lines_.end() ? 0 : found->second;
-  }
-  [[nodiscard]] SetupError error(const std::string& section, const std::string& key, std::string found,
-                                 std::string expected) const {
-    const std::string small = lower(key);
-    return SetupError({.file = file_.string(),
-                       .line = line_of(section, line_of(section, small) != 0 ? small : ""),
-                       .key = "[" + section + "] " + key,
-                       .found = std::move(found),
-                       .expected = std::move(expected)});
-  }
-  [[nodiscard]] std::string text(const std::string& section, const std::string& key) const {
-    const auto in = sections_.find(section);
-    if (in == sections_.end()) return "";
-    const auto found = in->second.find(lower(key));
-    return found == in->second.end() ? "" : found->second;
-  }
-  // nullopt if the value is missing, empty or relative to $NODEID.
-  [[nodiscard]] std::optional<std::int64_t> number(const std::string& section, const std::string& key, std::int64_t low,
-                                                   std::int64_t high) const {
-    const std::string value = text(section, key);
-    if (value.empty() || lower(value).find("$nodeid") != std::string::npos) return std::nullopt;
-    const auto parsed = parse(value);
-    if (!parsed || *parsed < low || *parsed > high) {
-      throw error(section, key, in_quotes(value),
-                  "a whole number from " + std::to_string(low) + " to " + std::to_string(high) + ", or 0x...");
-    }
-    return parsed;
-  }
-  // A value of an object: a signed number as its bits.
-  [[nodiscard]] std::optional<std::uint32_t> value(const std::string& section, const std::string& key, int bits) const {
-    if (bits == 0 || bits > 32) return std::nullopt;
-    const std::int64_t most = (std::int64_t{1} << bits) - 1;
-    const auto found = number(section, key, -(most / 2) - 1, most);
-    if (!found) return std::nullopt;
-    return static_cast<std::uint32_t>(*found & most);
-  }
-
- private:
-  // Numbers as in C: decimal, hexadecimal with 0x, octal with 0.
-  static std::optional<std::int64_t> parse(const std::string& value) {
-    const bool negative = value[0] == '-';
-    const std::string digits = value.substr(negative ? 1 : 0);
-    const bool hex = lower(digits).rfind("0x", 0) == 0;
-    const std::string rest = hex ? digits.substr(2) : digits;
-    const char* known = hex ? "0123456789abcdefABCDEF" : "0123456789";
-    if (rest.empty() || rest.size() > 16 || rest.find_first_not_of(known) != std::string::npos) return std::nullopt;
-    const bool octal = !hex && rest.size() > 1 && rest[0] == '0';
-    if (octal && rest.find_first_of("89") != std::string::npos) return std::nullopt;
-    if (hex && rest.size() > 15) return std::nullopt;
-    const std::int64_t size = std::stoll(rest, nullptr, hex ? 16 : octal ? 8 : 10);
-    return negative ? -size : size;
-  }
-
-  void note_lines(std::string_view text) {
-    std::istringstream in{std::string(text)};
-    std::string line, section;
-    for (int number = 1; std::getline(in, line); ++number) {
-      const std::string entry = trimmed(line);
-      if (entry.empty() || entry[0] == ';' || entry[0] == '#') continue;
-      if (entry[0] == '[') {
-        section = lower(trimmed(std::string_view(entry).substr(1, entry.find(']') - 1)));
-        lines_.emplace(std::pair(section, std::string()), number);
-      } else {
-        lines_.emplace(std::pair(section, lower(trimmed(std::string_view(entry).substr(0, entry.find('='))))), number);
-      }
-    }
-  }
-
-  std::filesystem::path file_;
-  std::map<std::string, std::map<std::string, std::string>> sections_;
-  std::map<std::pair<std::string, std::string>, int> lines_;
+struct DataType {
+  int number = 0, bits = 0;
+  bool is_signed = false;
 };
+
+// By its number in CiA 301, table 44; of no bits where it isn't a number of 1 to 64 bits.
+DataType data_type(std::int64_t number) noexcept {
+  constexpr DataType types[] = {{0x01, 1},        {0x02, 8, true},  {0x03, 16, true}, {0x04, 32, true}, {0x05, 8},
+                                {0x06, 16},       {0x07, 32},       {real32, 32},     {0x10, 24, true}, {0x11, 64},
+                                {0x12, 40, true}, {0x13, 48, true}, {0x14, 56, true}, {0x15, 64, true}, {0x16, 24},
+                                {0x18, 40},       {0x19, 48},       {0x1A, 56},       {0x1B, 64}};
+  for (const DataType& type : types) {
+    if (type.number == number) return type;
+  }
+  return {};
+}
+
+// "$NODEID+0x180", either way round, for a node that is known.
+std::optional<std::int64_t> relative_value(const std::string& text, int node) {
+  const std::size_t plus = text.find('+');
+  std::string rest = lower(text);
+  const std::size_t name = rest.find("$nodeid");
+  rest = name == 0 ? (plus == std::string::npos ? "0" : rest.substr(plus + 1)) : rest.substr(0, plus);
+  const IniFile offset("[x]\nvalue=" + rest, "");
+  const auto number = offset.number("x", "value", 0, u32);
+  return number ? std::optional(*number + node) : std::nullopt;
+}
+
+// A value of an object as its bits. Signed ones come as decimals, or as the bits of the type or of a wider one.
+std::optional<std::uint32_t> value_of(const IniFile& ini, const std::string& section, const std::string& key,
+                                      const DataType& type, std::optional<int> node) {
+  if (type.bits == 0 || type.bits > 32) return std::nullopt;
+  const std::string text = ini.text(section, key);
+  if (type.number == real32 && lower(text).rfind("0x", 0) != 0) {
+    if (text.empty()) return std::nullopt;
+    const auto real = strict_number(text);
+    if (!real) throw ini.error(section, key, in_quotes(text), "a number");
+    return std::bit_cast<std::uint32_t>(static_cast<float>(*real));
+  }
+  const std::int64_t most = (std::int64_t{1} << type.bits) - 1, least = -(most / 2) - 1;
+  if (node && lower(text).find("$nodeid") != std::string::npos) {
+    const auto sum = relative_value(text, *node);
+    if (!sum || *sum > most) throw ini.error(section, key, in_quotes(text), "$NODEID+0x...");
+    return static_cast<std::uint32_t>(*sum);
+  }
+  if (type.is_signed) {
+    if (const auto wide = ini.number(section, key, least, u32); wide && *wide > u32 + least) {
+      return static_cast<std::uint32_t>(*wide & most);
+    }
+  }
+  const auto found = ini.number(section, key, least, most);
+  if (!found) return std::nullopt;
+  return static_cast<std::uint32_t>(*found & most);
+}
 
 // Index and sub-index of a section named "1a00" or "1a00sub1"; nullopt for any other section.
 std::optional<std::uint32_t> object_of(const std::string& section, bool& has_sub) {
@@ -150,48 +90,109 @@ std::optional<std::uint32_t> object_of(const std::string& section, bool& has_sub
   return static_cast<std::uint32_t>(std::stoul(index, nullptr, 16) << 8 | std::stoul(rest, nullptr, 16));
 }
 
-EdsObject read_object(const Ini& ini, const std::string& section) {
-  EdsObject object;
-  object.line = ini.line_of(section);
-  object.name = ini.text(section, "ParameterName").substr(0, 80);
-  const auto type = ini.number(section, "DataType", 0, 0xFFFF);
-  if (!type) throw ini.error(section, "DataType", "none", "the number of a data type");
-  object.bits = bits_of_type(*type);
-  const std::string access = lower(ini.text(section, "AccessType"));
-  constexpr const char* known[] = {"ro", "wo", "rw", "rwr", "rww", "const"};
-  if (std::find(std::begin(known), std::end(known), access) == std::end(known)) {
-    throw ini.error(section, "AccessType", in_quotes(access), "ro, wo, rw, rwr, rww or const");
-  }
-  object.readable = access != "wo";
-  object.writable = access != "ro" && access != "const";
-  object.mappable = ini.number(section, "PDOMapping", 0, 1).value_or(0) == 1;
-  object.default_value = ini.value(section, "DefaultValue", object.bits);
-  object.value = ini.value(section, "ParameterValue", object.bits);
-  return object;
-}
+class Reader {
+ public:
+  Reader(const IniFile& ini, EdsFile& eds) : ini_(ini), eds_(eds) {}
 
-void add_objects(const Ini& ini, EdsFile& eds) {
-  constexpr std::int64_t array = 8, record = 9, most_types = 0xFF;
-  for (const auto& [section, keys] : ini.sections()) {
-    bool has_sub = false;
-    const auto address = object_of(section, has_sub);
-    if (!address || keys.count("parametername") == 0) continue;
-    const std::int64_t kind = ini.number(section, "ObjectType", 0, most_types).value_or(7);
-    const std::int64_t alike = ini.number(section, "CompactSubObj", 0, most_sub_indices).value_or(0);
-    const bool compound = !has_sub && (kind == array || kind == record);
-    if (compound && alike == 0) continue;  // its sub-indices have sections of their own
-    const EdsObject object = read_object(ini, section);
-    if (!compound) {
-      eds.objects[*address] = object;
-      continue;
+  void read_objects() {
+    for (const auto& [section, keys] : ini_.sections()) {
+      bool has_sub = false;
+      const auto address = object_of(section, has_sub);
+      if (address && keys.values.count("parametername") != 0) add(section, keys, *address, has_sub);
     }
-    EdsObject& number = eds.objects[*address] = object;
-    number.bits = 8;
-    number.writable = number.mappable = false;
-    number.default_value = number.value = std::nullopt;
-    for (std::uint32_t sub = 1; sub <= static_cast<std::uint32_t>(alike); ++sub) eds.objects[*address + sub] = object;
+    for (const auto& [section, keys] : ini_.sections()) {
+      bool has_sub = false;
+      if (section.size() != 9 || section.substr(4) != "value") continue;
+      if (const auto address = object_of(section.substr(0, 4), has_sub)) set_compact(section, keys, *address);
+    }
+    if (unreadable_) throw SetupError(*unreadable_);
   }
-}
+
+ private:
+  void add(const std::string& section, const IniFile::Section& keys, std::uint32_t address, bool has_sub) {
+    constexpr std::int64_t array = 8, record = 9, most_types = 0xFF;
+    EdsObject object;
+    object.line = keys.line;
+    object.name = ini_.text(section, "ParameterName").substr(0, 80);
+    std::int64_t kind = 7, alike = 0;
+    try {
+      kind = ini_.number(section, "ObjectType", 0, most_types).value_or(7);
+      alike = ini_.number(section, "CompactSubObj", 0, most_sub_indices).value_or(0);
+      if (!keys.mistake.empty()) {
+        throw SetupError({.file = eds_.file.string(),
+                          .line = keys.mistake_line,
+                          .key = "[" + section + "]",
+                          .message = keys.mistake});
+      }
+      const bool compound = !has_sub && (kind == array || kind == record);
+      if (compound && alike == 0) return;  // its sub-indices have sections of their own
+      read(object, section, kind);
+    } catch (const SetupError& error) {
+      object.mistake = error.what();
+      eds_.remarks.push_back(object.mistake);
+    }
+    const bool compact = !has_sub && (kind == array || kind == record);
+    EdsObject& first = eds_.objects[address] = object;
+    if (!compact) return;
+    first.bits = 8;
+    first.writable = first.mappable = false;
+    first.default_value = first.value = std::nullopt;
+    for (std::uint32_t sub = 1; sub <= static_cast<std::uint32_t>(alike); ++sub) eds_.objects[address + sub] = object;
+  }
+
+  void read(EdsObject& object, const std::string& section, std::int64_t kind) {
+    constexpr std::int64_t variable = 7, array = 8, record = 9;
+    const auto number = ini_.number(section, "DataType", 0, 0xFFFF);
+    const bool holds_data = kind == variable || kind == array || kind == record;
+    if (!number && holds_data) throw ini_.error(section, "DataType", "none", "the number of a data type");
+    const DataType type = data_type(number.value_or(0));
+    object.type = type.number;
+    object.bits = type.bits;
+    // What is set must be known, whatever else is wrong here.
+    object.value = value_that_is_set(section, "ParameterValue", type);
+    const std::string access = lower(ini_.text(section, "AccessType"));
+    constexpr const char* known[] = {"ro", "wo", "rw", "rwr", "rww", "const"};
+    if (std::find(std::begin(known), std::end(known), access) == std::end(known) && (holds_data || !access.empty())) {
+      throw ini_.error(section, "AccessType", in_quotes(access), "ro, wo, rw, rwr, rww or const");
+    }
+    object.readable = access != "wo";
+    object.writable = access != "ro" && access != "const";
+    object.mappable = ini_.number(section, "PDOMapping", 0, 1).value_or(0) == 1;
+    try {
+      object.default_value = value_of(ini_, section, "DefaultValue", type, std::nullopt);
+    } catch (const SetupError& error) {
+      eds_.remarks.push_back(error.what());
+    }
+  }
+
+  // What a DCF sets. That it can't be read is no mistake of one object: the drive wouldn't be set as the file says.
+  std::optional<std::uint32_t> value_that_is_set(const std::string& section, const std::string& key,
+                                                 const DataType& type) {
+    try {
+      return value_of(ini_, section, key, type, eds_.node);
+    } catch (const SetupError& error) {
+      if (!unreadable_) unreadable_ = error;
+      return std::nullopt;
+    }
+  }
+
+  // [1016Value]: 1=0x7F0064, by sub-index.
+  void set_compact(const std::string& section, const IniFile::Section& keys, std::uint32_t address) {
+    for (const auto& [key, text] : keys.values) {
+      if (key == "nrofentries") continue;
+      const auto sub = strict_integer(key);
+      const auto object = sub && *sub >= 1 && *sub <= most_sub_indices
+                              ? eds_.objects.find(address + static_cast<std::uint32_t>(*sub))
+                              : eds_.objects.end();
+      if (object == eds_.objects.end()) throw ini_.error(section, key, "no such sub-index", "one that the object has");
+      object->second.value = value_that_is_set(section, key, data_type(object->second.type));
+    }
+  }
+
+  const IniFile& ini_;
+  EdsFile& eds_;
+  std::optional<SetupError> unreadable_;
+};
 
 }  // namespace
 
@@ -201,10 +202,9 @@ const EdsObject* EdsFile::find(std::uint32_t object) const noexcept {
 }
 
 EdsFile parse_eds(std::string_view text, const std::filesystem::path& file) {
-  const Ini ini(text, file);
+  const IniFile ini(text, file);
   EdsFile eds;
   eds.file = file;
-  constexpr std::int64_t u32 = 0xFFFFFFFF;
   const auto u32_of = [&](const char* key) -> std::optional<std::uint32_t> {
     const auto number = ini.number("deviceinfo", key, 0, u32);
     return number ? std::optional(static_cast<std::uint32_t>(*number)) : std::nullopt;
@@ -215,10 +215,11 @@ EdsFile parse_eds(std::string_view text, const std::filesystem::path& file) {
   eds.vendor = u32_of("VendorNumber");
   eds.product = u32_of("ProductNumber");
   eds.revision = u32_of("RevisionNumber");
-  for (const char* section : {"devicecomissioning", "devicecommissioning"}) {
+  for (const char* section : {"devicecomissioning", "devicecommissioning", "devicecommisioning"}) {
     if (const auto node = ini.number(section, "NodeID", 1, 127)) eds.node = static_cast<int>(*node);
   }
-  add_objects(ini, eds);
+  Reader reader(ini, eds);
+  reader.read_objects();
   if (eds.objects.empty()) throw SetupError({.file = file.string(), .expected = "objects, in sections such as [1000]"});
   return eds;
 }
@@ -238,7 +239,7 @@ std::string read_text(const std::filesystem::path& file) {
 EdsFile load_eds(const std::filesystem::path& file) { return parse_eds(read_text(file), file); }
 
 void require_bitrate(std::string_view eds_text, const std::filesystem::path& file, std::int64_t bitrate) {
-  const Ini ini(eds_text, file);
+  const IniFile ini(eds_text, file);
   std::string known;
   for (const int kilobits : {10, 20, 50, 125, 250, 500, 800, 1000}) {
     if (ini.number("deviceinfo", "BaudRate_" + std::to_string(kilobits), 0, 1).value_or(0) == 0) continue;

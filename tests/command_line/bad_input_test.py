@@ -95,7 +95,9 @@ class CellFile(ProgramTest):
                     "drives[0].range_rad", "32 bits")
 
     def test_files_that_the_cell_names_must_be_there(self):
-        self.refuse("default_scene: ../../scenes/wall.yaml", "default_scene: lost.yaml", "lost.yaml", "no such file")
+        # `check` found nothing wrong, and `run` named the cell's folder.
+        self.refuse("default_scene: ../../scenes/wall.yaml", "default_scene: lost.yaml", "default_scene", "lost.yaml",
+                    "doesn't exist")
         self.refuse("urdf: ../arms/arm150.urdf", "urdf: lost.urdf", "default.yaml:6: urdf", "lost.urdf", "doesn't exist")
 
     def test_a_joint_that_the_urdf_lacks_is_named_with_those_it_has(self):

@@ -12,8 +12,8 @@ from harness import SOURCE, ProgramTest
 import sensors_test  # not its classes: they would run here, too
 
 BUS = re.compile(r"^(\S+): 1 Mbit/s, timestep ([\d.]+) ms$")
-LOAD = re.compile(r"load at worst ([\d.]+) % .*, at least ([\d.]+) %, over many cycles at most ([\d.]+) %, "
-                  r"typically ([\d.]+) %")
+LOAD = re.compile(r"load where every frame is due: (?P<least>[\d.]+) to (?P<worst>[\d.]+) % .*; over many cycles "
+                  r"typically (?P<typical>[\d.]+) %, at most (?P<most>[\d.]+) %")
 FRAME = re.compile(r"^  (\S.*?) +([0-9A-F]{3,8}) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+)  in time$")
 LOGGED = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-F]+)#([0-9A-F]*)$")
 
@@ -55,7 +55,7 @@ class Plan(ProgramTest):
                 ends = collections.defaultdict(list)
                 plans[match[1]] = plan = {"period_us": 1000 * float(match[2]), "end_us": ends}
             elif match := LOAD.search(line):
-                plan["load"] = [float(figure) / 100 for figure in match.groups()]
+                plan["load"] = [float(match[name]) / 100 for name in ("worst", "least", "most", "typical")]
             elif match := FRAME.match(line):
                 ends[match[2]].append(float(match[5]))
         return plans

@@ -82,6 +82,17 @@ class Help(ProgramTest):
         for name in ("mass=", "damping=", "spring=", "timestep=", "OBJECT.friction=", "OBJECT.position_m="):
             self.assertIn(name, text)
 
+    def test_a_cell_without_a_scene_and_a_hand_has_some(self):
+        # `run` and `plan` said that the cell's folder is a folder.
+        text = (SOURCE / "models/cells/default.yaml").read_text().replace("../", str(SOURCE / "models") + "/")
+        bare = "".join(line for line in text.splitlines(True) if not line.startswith(("default_scene", "default_hand")))
+        cell = self.folder / "bare.yaml"
+        cell.write_text(bare)
+        for command in (("check",), ("plan",), ("run", "--no-plot", "--duration", "0.1s")):
+            outcome = self.call(command[0], cell, *command[1:])
+            self.assertEqual(outcome.status, 0, outcome.err)
+        self.assertIn("free space", outcome.out)
+
     def test_commands_offer_what_has_an_effect(self):
         for command in ("plan", "tune"):
             self.assertNotIn("--duration", self.call(command, "--help").out)

@@ -109,6 +109,11 @@ TEST(EdsCheck, RefusesADriveThatCantBeLed) {
   EXPECT_THAT(refusal("ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=rw",
                       "ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=ro"),
               HasSubstr("[6060] AccessType: found ro"));
+  EXPECT_THAT(refusal("ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=rw",
+                      "ParameterName=Modes of operation\nObjectType=0x7\nDataType=0x0002\nAccessType=some"),
+              AllOf(HasSubstr("[6060] AccessType: found \"some\""), HasSubstr("wanted: modes of operation")));
+  EXPECT_EQ(refusal("[DeviceInfo]", "[2FFF]\nParameterName=x\nDataType=7\nAccessType=some\n[DeviceInfo]"), "taken")
+      << "nobody asks for it";
   EXPECT_THAT(refusal("[DeviceInfo]", "[DeviceComissioning]\nNodeID=5\n[DeviceInfo]"),
               HasSubstr("NodeID: found 5, expected 2, the node of axis_2"));
 }

@@ -46,7 +46,8 @@ SIG_VALTYPE_ 2147483905 Tx : 1;
 
 std::string told(const std::string& text) {
   try {
-    (void)parse_dbc(text, "own.dbc");
+    const DbcFile dbc = parse_dbc(text, "own.dbc");
+    if (!dbc.remarks.empty()) return dbc.remarks.front();
   } catch (const SetupError& error) {
     return error.what();
   }
@@ -84,7 +85,50 @@ TEST(DbcFile, ReadsMessagesAndPlaces) {
   EXPECT_TRUE(torque.find("Page")->multiplexed);
 }
 
-TEST(DbcFile, RefusesWithTheLine) {
+// A vehicle's file has hundreds of messages, of which a sensor needs two.
+TEST(DbcFile, LosesOneMessageByAMistakeAndNoOther) {
+  const auto lost = [](const std::string& what, const std::string& instead) {
+    std::string text = usual;
+    text.replace(text.find(what), what.size(), instead);
+    const DbcFile dbc = parse_dbc(text, "own.dbc");
+    EXPECT_EQ(dbc.remarks.size(), 1U) << instead;
+    EXPECT_NE(dbc.find("TORQUE"), nullptr) << instead;
+    std::string names;
+    for (const DbcMessage& message : dbc.messages) names += message.mistake.empty() ? "" : message.name + " ";
+    return names;
+  };
+  EXPECT_EQ(lost("7|16@0-", "7|72@0-"), "FORCE ");
+  EXPECT_EQ(lost("35|12@0-", "35|40@0-"), "FORCE ") << "its last signal: the next message begins in time";
+  EXPECT_EQ(lost("0|32@1-", "40|32@1-"), "TORQUE ");
+  EXPECT_EQ(lost("BO_ 256 FORCE", "BO_ 2048 FORCE"), "FORCE ");
+  EXPECT_EQ(lost("CM_ SG_", "BO_ 9 FORCE: 8 SENSOR\nCM_ SG_"), "FORCE FORCE ") << "which of them is meant?";
+  EXPECT_EQ(lost("[-300|355.35]", "[-300|]"), "FORCE ");
+}
+
+TEST(DbcFile, PassesOverTheMessageOfSignalsWithoutOne) {
+  const DbcFile dbc = parse_dbc(
+      "BO_ 3221225472 VECTOR__INDEPENDENT_SIG_MSG: 0 Vector__XXX\n"
+      " SG_ Spare : 0|16@1+ (1,0) [0|0] \"\" Vector__XXX\n" +
+          usual,
+      "own.dbc");
+  EXPECT_TRUE(dbc.remarks.empty());
+  ASSERT_EQ(dbc.messages.size(), 2U);
+  EXPECT_EQ(dbc.messages[0].signals.size(), 3U);
+}
+
+TEST(DbcFile, ReadsMultiplexersOfMultiplexersAndSectionsItDoesNotKnow) {
+  const std::string text =
+      "BO_ 1 A: 8 S\n SG_ M1 M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ M2 m0M : 8|8@1+ (1,0) [0|0] \"\" X\n"
+      " SG_ V m3 : 16|8@1+ (1,0) [0|0] \"\" X\nSG_MUL_VAL_ 1 M2 M1 0-0,5-6;\nBO_TX_BU_ 1 : S,T;\n"
+      "BA_ \"SystemSignalLongSymbol\" SG_ 1 V \"A_name_of_more_than_32_characters_is_cut\";\n";
+  const DbcFile dbc = parse_dbc(text, "own.dbc");
+  EXPECT_TRUE(dbc.remarks.empty());
+  EXPECT_FALSE(dbc.find("A")->find("M1")->multiplexed);
+  EXPECT_TRUE(dbc.find("A")->find("M2")->multiplexed);
+  EXPECT_TRUE(dbc.find("A")->find("V")->multiplexed);
+}
+
+TEST(DbcFile, SaysTheLine) {
   const auto with = [](const std::string& what, const std::string& instead) {
     std::string text = usual;
     text.replace(text.find(what), what.size(), instead);
@@ -100,7 +144,7 @@ TEST(DbcFile, RefusesWithTheLine) {
   EXPECT_THAT(with("(0.01,0)", "(0.01)"), HasSubstr("','"));
   EXPECT_THAT(told("SG_ Fx : 7|16@0- (1,0) [0|0] \"\" A"), HasSubstr("a message (BO_) before"));
   EXPECT_THAT(told("CM_ \"never ends"), HasSubstr("a string that ends"));
-  EXPECT_THAT(told("VAL_ 1 2 3"), HasSubstr("the end of the file"));
+  EXPECT_THAT(told("VAL_ 1 2 3"), HasSubstr("the end of the file, expected ';', which ends VAL_"));
   EXPECT_THAT(told(std::string((4U << 20) + 1, ' ')), HasSubstr("4 MiB"));
 }
 
