@@ -36,6 +36,8 @@ const char* check_laws(const scenes::Scene& scene) {
 // With the files that it names, and each device as the controller would make it.
 void check_cell(const fs::path& file) {
   const description::Cell cell = description::load_cell(file);
+  if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
+  if (!cell.default_hand.empty()) description::require_default_file(cell, "default_hand", cell.default_hand);
   const models::Arm arm(cell);
   const std::int64_t period_ns = std::llround(1e9 * cell.default_period_s);
   for (const description::DriveDescription& drive : cell.drives) {

@@ -213,6 +213,7 @@ models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexc
   }
   const bool empty = empty_handle_->step({.hand_W = measured.hand_W,
                                           .noise_N = measured.bias.noise_N,
+                                          .noise_is_white = measured.bias.noise_is_white,
                                           .tare_samples = measured.bias.samples,
                                           .sample_cycles = measured.bias.sample_cycles,
                                           .v_W = v_W});

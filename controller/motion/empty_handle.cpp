@@ -50,7 +50,9 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
 
   const double sigma_f = signs.noise_N * std::sqrt(std::min(1.0, signs.sample_cycles * T / (2.0 * filter_s)));
   const double sigma_mean = signs.tare_samples > 0.0 ? signs.noise_N / std::sqrt(signs.tare_samples) : 0.0;
-  const double noise_band = noise_deviations * sigma_f + tare_deviations * sigma_mean;
+  double noise_band = noise_deviations * sigma_f + tare_deviations * sigma_mean;
+  // Somebody moved the handle during the tare, or the sensor filters by itself: how much of this is noise isn't known.
+  if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
   const double band = std::max(config_.band_N, noise_band);
   const double size = size_N();
   s.calm_s = size <= noise_band ? s.calm_s + T : 0.0;

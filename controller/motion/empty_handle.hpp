@@ -7,9 +7,10 @@
 // and 1.5 s are enough for both,
 // with σ the standard deviation of a sample as it was while the sensor was tared, per axis, σ_f = σ √(T/2τ) what the
 // low-pass leaves of it (T of the sensor's samples, where they come more seldom than the cycle), and σ/√n the
-// uncertainty of the mean over n samples that was taken for the bias. A hand that leads the handle through a place
-// where it needs no force is in the narrow band for milliseconds only; one that rests can't be told from none, and
-// loses nothing by it.
+// uncertainty of the mean over n samples that was taken for the bias. Where the tare's samples weren't white noise, a
+// hand may have moved the handle, and the noise band is empty_handle_N at most. A hand that leads the handle through a
+// place where it needs no force is in the narrow band for milliseconds only; one that rests can't be told from none,
+// and loses nothing by it.
 //
 // It is taken hold of again when the force leaves 1.5 times the band, and what the tool behind the sensor does by its
 // own inertia: m times the largest acceleration of the last tenth of a second.
@@ -33,6 +34,7 @@ struct EmptyHandleConfig {
 struct HandSigns {
   const models::Wrench& hand_W;  // bias and tool weight taken off
   double noise_N = 0.0;          // σ; 0: not known
+  bool noise_is_white = true;    // σ is the sensor's, and no hand's motion
   double tare_samples = 0.0;     // n
   double sample_cycles = 1.0;    // from one to the next
   const models::Vec3& v_W;       // of the proxy, in the step before

@@ -76,6 +76,7 @@ void Measurement::finish_tare() noexcept {
   compensation_.finish_tare();
   const double samples = compensation_.tare_samples();
   now.bias = {.noise_N = compensation_.noise_N(),
+              .noise_is_white = compensation_.noise_is_white(),
               .samples = samples,
               .sample_cycles = state_.tare_cycles / samples,
               .drift_N = 0.0};

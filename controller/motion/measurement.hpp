@@ -23,6 +23,7 @@ namespace proxarm::controller {
 // What taring the sensor has told of it, and what its bias did since.
 struct SensorBias {
   double noise_N = 0.0;        // standard deviation of a sample, in the noisiest axis
+  bool noise_is_white = true;  // nobody moved the handle meanwhile
   double samples = 0.0;        // that the bias is the mean of
   double sample_cycles = 1.0;  // from one to the next
   double drift_N = 0.0;        // by which it has gone while nobody held the handle

@@ -23,7 +23,9 @@ Wrench WrenchCompensation::tool_weight_S(const Mat3& R_WS) const noexcept {
 void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_WS) noexcept {
   const Wrench weight_S = tool_weight_S(R_WS);
   const Vec3 force = reading_S.force - weight_S.force;
-  if (tare_count_ == 0) tare_first_S_ = force;
+  if (tare_count_ == 0) tare_first_S_ = tare_last_S_ = force;
+  tare_steps_S_ += (force - tare_last_S_).cwiseAbs2();
+  tare_last_S_ = force;
   tare_squares_S_ += (force - tare_first_S_).cwiseAbs2();
   if (tare_count_ > 0) {
     const Vec3 mean = tare_sum_S_.force / static_cast<double>(tare_count_);
@@ -41,12 +43,24 @@ void WrenchCompensation::finish_tare() noexcept {
 }
 
 // Σ(x − x₁)² − n (x̄ − x₁)², over n − 1: about the first sample, so that nothing is lost by a large bias.
-double WrenchCompensation::noise_N() const noexcept {
-  if (tare_count_ < 2) return 0.0;
+Vec3 WrenchCompensation::tare_variance_S() const noexcept {
   const double n = tare_samples();
   const Vec3 mean = tare_sum_S_.force / n - tare_first_S_;
-  const Vec3 variance = (tare_squares_S_ - n * mean.cwiseAbs2()) / (n - 1.0);
-  return std::sqrt(std::max(0.0, variance.maxCoeff()));
+  return (tare_squares_S_ - n * mean.cwiseAbs2()) / (n - 1.0);
+}
+
+double WrenchCompensation::noise_N() const noexcept {
+  if (tare_count_ < 2) return 0.0;
+  return std::sqrt(std::max(0.0, tare_variance_S().maxCoeff()));
+}
+
+// Von Neumann's ratio, Σ(xᵢ₊₁ − xᵢ)² over twice the variance: 1 for white noise, to within 1/√n; (ωT)²/2 for a motion
+// at ω, 2 % at 30 Hz and 1 ms; 1 − e^(−T/τ) behind a first-order filter, 0.5 at 110 Hz and 1 ms.
+bool WrenchCompensation::noise_is_white() const noexcept {
+  if (tare_count_ < 2) return true;
+  int noisiest = 0;
+  const double variance = tare_variance_S().maxCoeff(&noisiest);
+  return tare_steps_S_[noisiest] >= 0.5 * 2.0 * (tare_samples() - 1.0) * variance;
 }
 
 void WrenchCompensation::follow_bias(const Wrench& rest_S, double most_N, double most_Nm) noexcept {

@@ -32,6 +32,8 @@ class WrenchCompensation {
   [[nodiscard]] double tare_spread_N() const noexcept { return tare_spread_N_; }
   // Of one tare sample's force, per axis: the standard deviation of the noisiest one, in N. After finish_tare().
   [[nodiscard]] double noise_N() const noexcept;
+  // False: what was noise_N has a memory from sample to sample, such as a hand's motion has, or a sensor's own filter.
+  [[nodiscard]] bool noise_is_white() const noexcept;
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
   // The tool's own, behind the sensor.
   [[nodiscard]] double tool_mass_kg() const noexcept { return mass_kg_; }
@@ -49,10 +51,12 @@ class WrenchCompensation {
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(bias_S_.force, bias_S_.torque, tare_sum_S_.force, tare_sum_S_.torque, tare_squares_S_, tare_first_S_,
-          drift_S_.force, drift_S_.torque, tare_count_, tare_spread_N_);
+          tare_last_S_, tare_steps_S_, drift_S_.force, drift_S_.torque, tare_count_, tare_spread_N_);
   }
 
  private:
+  [[nodiscard]] models::Vec3 tare_variance_S() const noexcept;
+
   double mass_kg_;
   models::Vec3 centre_of_mass_S_;
   models::Vec3 handle_S_;  // from S's origin to T's
@@ -61,7 +65,9 @@ class WrenchCompensation {
   models::Wrench tare_sum_S_;
   models::Vec3 tare_squares_S_ = models::Vec3::Zero();  // of the forces less the first one
   models::Vec3 tare_first_S_ = models::Vec3::Zero();
-  models::Wrench drift_S_;  // of the bias, since the tare; in it
+  models::Vec3 tare_last_S_ = models::Vec3::Zero();
+  models::Vec3 tare_steps_S_ = models::Vec3::Zero();  // squares of the differences between one and the next
+  models::Wrench drift_S_;                            // of the bias, since the tare; in it
   std::int64_t tare_count_ = 0;
   double tare_spread_N_ = 0.0;
 };

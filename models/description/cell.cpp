@@ -29,7 +29,7 @@ PoseDescription pose_or_identity(const YamlNode& node, std::string_view key) {
 
 // The path of a scene or a hand. Whether the file exists isn't checked here: a run may name another one.
 std::string absolute_path_or_empty(const YamlNode& node, std::string_view key) {
-  return node.has(key) ? node.existing_file(key).string() : std::string();
+  return node.has(key) ? node.path_of(key).string() : std::string();
 }
 
 // A name for the command line (--bus NAME=IFACE,…), for files and for messages.
@@ -440,6 +440,15 @@ Cell read_cell(const YamlNode& root) {
   cell.default_hand = absolute_path_or_empty(root, "default_hand");
   root.finish();
   return cell;
+}
+
+void require_default_file(const Cell& cell, const char* key, const std::filesystem::path& path) {
+  std::error_code unknown;
+  if (std::filesystem::is_regular_file(path, unknown)) return;
+  throw SetupError({.file = cell.file.string(),
+                    .key = key,
+                    .found = in_quotes(path.string(), 200) + ", which isn't there",
+                    .expected = "a readable file"});
 }
 
 }  // namespace proxarm::description

@@ -188,5 +188,7 @@ struct Cell {
 Cell load_cell(const std::filesystem::path& file);
 // The same of a file that has been read already.
 Cell read_cell(const YamlNode& root);
+// The cell's default_scene or default_hand (KEY), which a run may do without, must be a file. Throws SetupError.
+void require_default_file(const Cell& cell, const char* key, const std::filesystem::path& path);
 
 }  // namespace proxarm::description

@@ -97,7 +97,10 @@ class CellFile(ProgramTest):
     def test_files_that_the_cell_names_must_be_there(self):
         # `check` found nothing wrong, and `run` named the cell's folder.
         self.refuse("default_scene: ../../scenes/wall.yaml", "default_scene: lost.yaml", "default_scene", "lost.yaml",
-                    "doesn't exist")
+                    "isn't there")
+        cell = self.changed(CELL, ("default_scene: ../../scenes/wall.yaml", "default_scene: lost.yaml"))
+        self.assert_refused(self.call("check", cell), "default_scene", "lost.yaml", "isn't there")
+        cell.write_text(cell.read_text().replace("lost.yaml", "../../scenes/wall.yaml"))
         self.refuse("urdf: ../arms/arm150.urdf", "urdf: lost.urdf", "default.yaml:6: urdf", "lost.urdf", "doesn't exist")
 
     def test_a_joint_that_the_urdf_lacks_is_named_with_those_it_has(self):

@@ -65,7 +65,7 @@ class Session:
                 flood.kill()
                 flood.wait()
             took_s = time.monotonic() - begun
-            time.sleep(0.3)  # for candump to read what it has missed
+            self.wait_for(witness)
             self.seen = two.frames_of(witness)
             self.complained = witness.errors()
         if not output:
@@ -74,6 +74,14 @@ class Session:
         self.flood_per_s = (transmitted() - before - len(self.seen)) / took_s
         self.recorded = two.by_identifier(two.read_log(folder / "frames.log"))
         self.late_us = lateness_us(self.seen)
+
+    @staticmethod
+    def wait_for(witness):
+        """Until candump has read what it has missed: it has printed nothing more for half a second."""
+        printed = -1
+        while printed != witness.printed():
+            printed = witness.printed()
+            time.sleep(0.5)
 
     def clean(self):
         return self.status == 0 and max(self.late_us) <= PERIOD_US

@@ -45,17 +45,17 @@ class Sensor(python_peer.Peer):
 
 
 class Aidin(Sensor):
-    """AFT200-D80: F = n / 100 - 300 N, T = n / 500 - 50 Nm, unsigned, big-endian."""
+    """AFT200-D80: F = n / 100 - 300 N, T = n / 500 - 50 Nm, unsigned, big-endian, then two bytes of nothing."""
     file, base_id, heard = "aidin_aft200", "", ("001", "002")
     wrench = (12.34, -5.00, 0.0, 0.4, -0.6, 0.25)
-    told = [(0x102, "0301")]
+    told = [(0x102, "0103010000000000")]
 
     def frames(self, number):
-        return ((0x001, bytes.fromhex("7A02 733C 7530" if number % 2 else "7A02 733C 7531")),
-                (0x002, bytes.fromhex("6270 607C 6225")))
+        return ((0x001, bytes.fromhex("7A02 733C 7530 0000" if number % 2 else "7A02 733C 7531 0000")),
+                (0x002, bytes.fromhex("6270 607C 6225 0000")))
 
     def obey(self, identifier, data):
-        if (identifier, data) == (0x102, b"\x03\x01"):
+        if (identifier, data) == (0x102, bytes.fromhex("0103010000000000")):
             self.streaming = True
 
 

@@ -108,6 +108,10 @@ class Process:
     def output(self):
         return self._read(self.out)
 
+    def printed(self):
+        """How many bytes it has printed so far."""
+        return os.fstat(self.out.fileno()).st_size
+
     def errors(self):
         return self._read(self.err)
 

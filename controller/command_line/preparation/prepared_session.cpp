@@ -47,10 +47,14 @@ void require_file(const fs::path& given, const char* option, const char* example
                                  .expected = std::string("a file, such as ") + example});
 }
 
-fs::path chosen(const fs::path& given, const description::Cell& cell, const std::string& cells_own,
+// The file that was named on the command line, or the cell's own (of which KEY tells in its file), or that one.
+fs::path chosen(const fs::path& given, const description::Cell& cell, const char* key, const std::string& cells_own,
                 const char* without) {
-  if (given.empty() && cells_own.empty()) return shipped_file(without);
-  return given.empty() ? beside(cell.file, cells_own) : user_file(given);
+  if (!given.empty()) return user_file(given);
+  if (cells_own.empty()) return shipped_file(without);
+  const fs::path file = beside(cell.file, cells_own);
+  description::require_default_file(cell, key, file);
+  return file;
 }
 
 // Mean age of a sample: its converter holds it for half a period, its filter delays by its time constant.
@@ -235,10 +239,12 @@ PreparedSession prepare(const RunOptions& options) {
   require_file(options.hand, "--hand", "sim/hands/touch.yaml");
   session.cell = loaded(cell_file, FileKind::cell, description::load_cell);
   session.sensor = description::load_sensor(beside(session.cell.file, session.cell.sensor.description));
-  session.hand = loaded(chosen(options.hand, session.cell, session.cell.default_hand, "sim/hands/touch.yaml"),
-                        FileKind::hand, description::load_hand);
-  session.scene = loaded(chosen(options.scene, session.cell, session.cell.default_scene, "scenes/free.yaml"),
-                         FileKind::scene, scenes::load_scene);
+  session.hand =
+      loaded(chosen(options.hand, session.cell, "default_hand", session.cell.default_hand, "sim/hands/touch.yaml"),
+             FileKind::hand, description::load_hand);
+  session.scene =
+      loaded(chosen(options.scene, session.cell, "default_scene", session.cell.default_scene, "scenes/free.yaml"),
+             FileKind::scene, scenes::load_scene);
   add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);

@@ -118,6 +118,19 @@ TEST_F(EmptyHandleTest, IsFoundWithoutNoiseAndWithMuchOfIt) {
   }
 }
 
+// What was taken for noise may have been a hand: 0.3 N at 0.2 m/s are one's, whatever the tare says.
+TEST_F(EmptyHandleTest, ANoiseThatMayHaveBeenAHandHidesNone) {
+  const Wrench hand{Vec3(0.3, 0.0, 0.0), Vec3::Zero()};
+  for (const bool white : {true, false}) {
+    handle.start();
+    for (int k = 0; k < 1'000; ++k) {
+      handle.step(
+          {.hand_W = hand, .noise_N = 1.0, .noise_is_white = white, .tare_samples = 200.0, .v_W = Vec3(0.2, 0.0, 0.0)});
+    }
+    EXPECT_EQ(handle.empty(), white);
+  }
+}
+
 TEST_F(EmptyHandleTest, AHandThatOnlyTurnsTheToolIsOneWhereItMayTurn) {
   EmptyHandle turning{{.band_N = 0.1, .tool_mass_kg = tool_kg, .lever_m = 0.1}, T};
   const Wrench twist{Vec3::Zero(), Vec3(0.0, 0.0, 0.1)};

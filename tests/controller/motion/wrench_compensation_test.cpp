@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 namespace {
@@ -76,6 +77,37 @@ TEST(WrenchCompensation, TellsAHandOnTheHandleByTheSpreadOfTheReadings) {
   pushed.force.x() += 2.0;
   compensation.add_tare_sample(pushed, R_WS);
   EXPECT_NEAR(compensation.tare_spread_N(), 2.0, 1e-12);
+}
+
+// The story: a hand that shook the handle during the tare was taken for noise, the band in which nobody counts as there
+// grew to newtons, and the arm braked that hand from then on.
+TEST(WrenchCompensation, TellsNoiseFromAHandThatMovesTheHandleDuringTheTare) {
+  const auto tared = [](auto force_N) {
+    controller::WrenchCompensation compensation(cell_with_tool());
+    for (int k = 0; k < 200; ++k) {
+      compensation.add_tare_sample({force_N(1e-3 * k) - Vec3(0.0, 0.0, 0.25 * 9.80665), Vec3::Zero()},
+                                   Mat3::Identity());
+    }
+    compensation.finish_tare();
+    return compensation;
+  };
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const auto noise = [&](double sigma_N) {
+    return Vec3(sigma_N * Vec3(normal(random), normal(random), normal(random)));
+  };
+  for (const double sigma_N : {0.0, 0.02, 2.0}) {
+    for (int trial = 0; trial < 100; ++trial) {
+      EXPECT_TRUE(tared([&](double) { return noise(sigma_N); }).noise_is_white()) << sigma_N;
+    }
+  }
+  EXPECT_TRUE(tared([](double) { return Vec3(100.0, -3.0, 0.1); }).noise_is_white()) << "a force that doesn't change";
+  for (const double f : {0.5, 1.0, 5.0, 8.0, 12.0, 30.0}) {
+    const auto shaken =
+        tared([&](double t) { return Vec3(noise(0.02) + Vec3(0.0, std::sin(2.0 * M_PI * f * t + 1.0), 0.0)); });
+    EXPECT_FALSE(shaken.noise_is_white()) << f << " Hz";
+    EXPECT_GT(shaken.noise_N(), 2.0 * 0.02) << f << " Hz";
+  }
 }
 
 }  // namespace

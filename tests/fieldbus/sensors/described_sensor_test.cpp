@@ -64,24 +64,24 @@ void expect_wrench(const Wrench& got, const Wrench& expected) {
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(got[i], expected[i], 1e-9) << i;
 }
 
-// ---- AIDIN AFT200: 0x01 force, 0x02 torque, u16 big-endian; F = n/100 − 300, T = n/500 − 50
+// ---- AIDIN AFT200: 0x01 force, 0x02 torque, u16 big-endian and two unused bytes; F = n/100 − 300, T = n/500 − 50
 
 // 7530 is 30000, no force; 61A8 is 25000, no torque.
 TEST(DescribedSensor, ReadsAnAidinsBytes) {
   Rig rig(shipped("aidin_aft200"));
-  expect_wrench(rig.read({"001#753075307530", "002#61A861A861A8"}), {0, 0, 0, 0, 0, 0});
+  expect_wrench(rig.read({"001#7530753075300000", "002#61A861A861A80000"}), {0, 0, 0, 0, 0, 0});
   // 7594 = 30100: 1 N; 6D60 = 28000: −20 N; 7531 = 30001: 0.01 N; 639C = 25500: 1 Nm; 61A7: −0.002; 6590 = 26000: 2
-  expect_wrench(rig.read({"001#75946D607531", "002#639C61A76590"}), {1, -20, 0.01, 1, -0.002, 2});
+  expect_wrench(rig.read({"001#75946D6075310000", "002#639C61A765900000"}), {1, -20, 0.01, 1, -0.002, 2});
   EXPECT_FALSE(rig.sensor.latest().saturated);
   EXPECT_TRUE(rig.sensor.latest().healthy);
 }
 
 TEST(DescribedSensor, StartsAnAidinWithTheMakersCommands) {
   ScriptedNetwork network{{"sensor"}};
-  Conversation c(network.bus(0), {"> 102#0202",    // clear bias
-                                  "> 102#0503E8",  // period 1000 us
-                                  "> 102#0301",    // stream
-                                  "< 001#753075307530", "< 002#61A861A861A8"});
+  Conversation c(network.bus(0), {"> 102#0102020000000000",  // clear bias
+                                  "> 102#010503E800000000",  // period 1000 us
+                                  "> 102#0103010000000000",  // stream
+                                  "< 001#7530753075300000", "< 002#61A861A861A80000"});
   DescribedSensor sensor(shipped("aidin_aft200"), {.bus_name = "sensor"});
   sensor.start(network, 0);
   EXPECT_TRUE(c.complete()) << c.mistakes;
@@ -220,12 +220,12 @@ struct AidinFaults : ::testing::Test {
   // Force of 1 N (k = 1), 2 N ... on x and torque of as many Nm.
   static std::string force(int k) {
     char text[32];
-    std::snprintf(text, sizeof text, "001#%04X75307530", 30000 + 100 * k);
+    std::snprintf(text, sizeof text, "001#%04X753075300000", 30000 + 100 * k);
     return text;
   }
   static std::string torque(int k) {
     char text[32];
-    std::snprintf(text, sizeof text, "002#%04X61A861A8", 25000 + 500 * k);
+    std::snprintf(text, sizeof text, "002#%04X61A861A80000", 25000 + 500 * k);
     return text;
   }
   // The next cycle, a period later.
@@ -305,7 +305,7 @@ TEST_F(AidinFaults, WrongLengthsAndForeignFramesAreNoSample) {
   EXPECT_TRUE(rig.take("001#7530753075"));
   EXPECT_TRUE(rig.take("001#75307530753000"));
   EXPECT_EQ(rig.sensor.counts().wrong_lengths, 2U);
-  EXPECT_FALSE(rig.take("003#753075307530"));
+  EXPECT_FALSE(rig.take("003#7530753075300000"));
   CanFrame wide = frame_of(force(1));
   wide.extended = true;
   EXPECT_FALSE(rig.sensor.on_frame(wide, rig.now_ns));
@@ -330,14 +330,14 @@ TEST_F(AidinFaults, AFrozenValueIsCounted) {
 
 // 0000 and FFFF are the ends of 16 bits; 61A8 + 1 hundredth above 300 N is beyond the range.
 TEST_F(AidinFaults, NumbersAtTheirRailsAreSaturated) {
-  for (const char* text : {"001#000075307530", "001#7530FFFF7530", "001#75307530EA61"}) {
+  for (const char* text : {"001#0000753075300000", "001#7530FFFF75300000", "001#75307530EA610000"}) {
     cycle();
     rig.take(text);
     rig.take(torque(0));
     EXPECT_TRUE(rig.sensor.latest().saturated) << text;
   }
   cycle();
-  rig.take("001#7530EA607530");  // 300.00 N
+  rig.take("001#7530EA6075300000");  // 300.00 N
   rig.take(torque(0));
   EXPECT_FALSE(rig.sensor.latest().saturated);
 }

@@ -54,8 +54,8 @@ std::vector<std::string> sample_of(const std::string& name, std::uint32_t base_i
 
 // The same bytes as in tests/fieldbus/sensors/described_sensor_test.cpp, worked out by hand there.
 TEST(DescribedDevice, SendsWhatTheMakersSend) {
-  EXPECT_THAT(sample_of("aidin_aft200", 0, "102#0301", {1, -20, 0.01, 1, -0.002, 2}),
-              ElementsAre("001#75946D607531", "002#639C61A76590"));
+  EXPECT_THAT(sample_of("aidin_aft200", 0, "102#0103010000000000", {1, -20, 0.01, 1, -0.002, 2}),
+              ElementsAre("001#75946D6075310000", "002#639C61A765900000"));
   EXPECT_THAT(sample_of("robotous_rft", 0x1F0, "1F0#0B00000000000000", {1, -1, 10, 1, -1, 0.0005}),
               ElementsAre("1F1#0B0032FFCE01F407", "1F2#D0F8300001000000"));
   EXPECT_THAT(sample_of("onrobot_hex", 0, "101#AA00320301010000", {1, -1, 10, 1, -1, 0.001}),
@@ -63,7 +63,7 @@ TEST(DescribedDevice, SendsWhatTheMakersSend) {
 }
 
 TEST(DescribedDevice, StreamsOnlyWhenToldTo) {
-  EXPECT_TRUE(sample_of("aidin_aft200", 0, "102#0201", {}).empty());
+  EXPECT_TRUE(sample_of("aidin_aft200", 0, "102#0102010000000000", {}).empty());
   EXPECT_TRUE(sample_of("robotous_rft", 0x1F0, "1F0#0C00000000000000", {}).empty());
   EXPECT_TRUE(sample_of("onrobot_hex", 0, "101#AA00320300010000", {}).empty());
 }
