@@ -120,6 +120,33 @@ TEST_F(MasterAndDrives, ComeUpTogetherMoveAndSwitchOff) {
   }
 }
 
+// Every clean end left an EMCY 8130h of each drive: the heartbeat had ended, and they still waited for it.
+TEST_F(MasterAndDrives, AreLeftWithoutAWordOfAFaultWhenTheyWereOffAndStopByThemselvesWhenNot) {
+  for (const bool off_first : {true, false}) {
+    drives.clear();
+    slots.clear();
+    start();
+    ASSERT_EQ(failure(), "");
+    for (auto& drive : drives) drive.request(fieldbus::DriveGoal::operation_enabled);
+    for (int i = 0; i < 200; ++i) cycle();
+    if (off_first) {
+      for (auto& drive : drives) drive.request(fieldbus::DriveGoal::switched_off);
+      for (int i = 0; i < 200; ++i) cycle();
+    }
+    fieldbus::shut_down_drives(*network, slots);
+    network->sleep_until(network->now_ns() + 500 * ms);
+    int emergencies = 0;
+    fieldbus::TimedFrame received;
+    for (std::size_t bus = 0; bus < network->bus_count(); ++bus) {
+      while (network->bus(bus).receive(received)) emergencies += received.frame.id > 0x080 && received.frame.id < 0x100;
+    }
+    EXPECT_EQ(emergencies, off_first ? 0 : static_cast<int>(drives.size()));
+    for (std::size_t i = 0; i < drives.size(); ++i) {
+      EXPECT_NE(far_end->drive(i).state(), DriveState::operation_enabled) << i;
+    }
+  }
+}
+
 // Everything at the far end lives inside the controller's calls to wait: it must not allocate there once it runs.
 TEST_F(MasterAndDrives, AllocateNothingInSteadyMotion) {
   start();
