@@ -13,11 +13,10 @@
 namespace proxarm::command_line {
 namespace {
 
+using controller::delay_margin;
+using controller::hand_margin;
 using controller::HandModel;
 using controller::LoopModel;
-
-// What the advice allows for: a hand that holds on harder and is heavier, and a loop that is slower, than described.
-constexpr double hand_margin = 1.5, delay_margin = 1.2;
 
 // Felt mass, handle included, at which the loop is just stable.
 std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop) {
@@ -29,21 +28,12 @@ std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop
 // delay as it is and longer.
 std::optional<double> with_margin(const HandModel& hand, const LoopModel& loop) {
   double worst = 0.0;
-  for (const double stiffer : {1.0, hand_margin}) {
-    for (const double heavier : {1.0, hand_margin}) {
-      for (const double later : {1.0, delay_margin}) {
-        HandModel other = hand;
-        other.stiffness_N_per_m *= stiffer;
-        other.mass_kg *= heavier;
-        LoopModel slower = loop;
-        slower.delay_s *= later;
-        const auto mass = smallest_felt(other, slower);
-        if (!mass) return std::nullopt;
-        worst = std::max(worst, *mass);
-      }
-    }
-  }
-  return worst;
+  const bool all = controller::with_margins(hand, loop, [&](const HandModel& other, const LoopModel& slower) {
+    const auto mass = smallest_felt(other, slower);
+    worst = std::max(worst, mass.value_or(0.0));
+    return mass.has_value();
+  });
+  return all ? std::optional<double>(worst) : std::nullopt;
 }
 
 double round_up(double value) {

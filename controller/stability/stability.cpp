@@ -65,6 +65,11 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   const Polynomial grip = Polynomial{hand.stiffness_N_per_m * T * T} + hand.damping_Ns_per_m * T * difference +
                           m * (difference * difference);
   Polynomial force = (1.0 - beta) * (delay(1.0 + loop.delay_s / T) * grip);
+  if (loop.horizon_s > 0.0) {
+    const double steps = loop.horizon_s / T;
+    const Polynomial ahead = Polynomial{1.0} + steps * difference + 0.5 * steps * (steps + 1.0) * (difference * difference);
+    force = ahead * force;
+  }
   if (loop.order == 2 && loop.matched_labels) force = Polynomial{2.0, -1.0} * force;
   return {lag * (derivative * derivative), lag * (B * T * damper + Polynomial{loop.spring_N_per_m * T * T}) + force};
 }
@@ -169,6 +174,40 @@ std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopMode
     smallest = above = edge;
   }
   return smallest;
+}
+
+bool with_margins(const HandModel& hand, const LoopModel& loop,
+                  const std::function<bool(const HandModel&, const LoopModel&)>& holds) {
+  for (const double stiffer : {1.0, hand_margin}) {
+    for (const double heavier : {1.0, hand_margin}) {
+      for (const double later : {1.0, delay_margin}) {
+        HandModel other = hand;
+        other.stiffness_N_per_m *= stiffer;
+        other.mass_kg *= heavier;
+        LoopModel slower = loop;
+        slower.delay_s *= later;
+        if (!holds(other, slower)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+double stable_horizon_s(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
+  if (!(proxy_mass_kg > 0.0)) return 0.0;
+  const auto stable = [proxy_mass_kg](const HandModel& other, const LoopModel& loop) {
+    return spectral_radius(other, loop, proxy_mass_kg) < 1.0;
+  };
+  LoopModel loop = model;
+  const double T = loop.period_s;
+  const double most_s = T + loop.delay_s + loop.drive_time_constant_s;
+  double longest_s = 0.0;
+  for (int steps = 0; steps * T <= most_s; ++steps) {
+    loop.horizon_s = steps * T;
+    if (!with_margins(hand, loop, stable)) break;
+    longest_s = loop.horizon_s;
+  }
+  return longest_s;
 }
 
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable) {

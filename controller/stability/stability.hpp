@@ -12,6 +12,11 @@
 // weighted mean of both. What moves after the force sensor (the handle, the hand) belongs to m_h: the sensor doesn't
 // see it push.
 //
+// With lookahead (rendering/lookahead.hpp) the drives are sent to where the proxy will be s = H/T steps on, if h stays:
+//   q + s(q − q₁) + ½s(s+1)T²h/M,  which is  P q  with  P(w) = 1 + s(1−w) + ½s(s+1)(1−w)²      (B = K_v = 0)
+// the sampled 1 + Hz + ½H²z² (z the derivative): P multiplies the term with (1−β). B and K_v change p by their share of
+// the acceleration within H alone, and are left out there.
+//
 // C is linear in M (D-decomposition): C = M X + Y. The masses at which a root lies on the unit circle follow from a
 // sweep over θ, w = exp(−jθ): those where M(θ) = −Y/X is real and positive. Between two neighbours of them stability
 // doesn't change, which makes "the smallest mass above which all are stable" exact, also where the stable masses are
@@ -20,6 +25,7 @@
 // For set-up: takes some hundred microseconds, allocates, never runs in the cycle.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 namespace proxarm::controller {
@@ -41,6 +47,7 @@ struct LoopModel {
   bool explicit_damping = false;       // −B(q₁ − q₂)/T instead of the implicit damping; order 1, for comparison
   int order = 1;
   bool matched_labels = false;
+  double horizon_s = 0.0;  // H ≥ 0 of the lookahead
 };
 
 // The largest |z|; the loop is stable below 1. M is the proxy's (felt mass less the handle's), > 0.
@@ -49,6 +56,18 @@ double spectral_radius(const HandModel& hand, const LoopModel& loop, double prox
 // The proxy's mass above which every mass up to max_mass_kg is stable (itself the boundary); nothing when max_mass_kg
 // isn't stable. At least 1e-6 kg.
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& loop, double max_mass_kg = 1000.0);
+
+// The loops and hands that an advice holds for: the hand as described and one that is 1.5 times as stiff, and as heavy,
+// and the delay as it is and 1.2 times as long.
+inline constexpr double hand_margin = 1.5, delay_margin = 1.2;
+// Whether `holds`, of a hand and a loop, is true of all of these.
+bool with_margins(const HandModel& hand, const LoopModel& loop,
+                  const std::function<bool(const HandModel&, const LoopModel&)>& holds);
+
+// The horizon that `--lookahead auto` takes for this mass, in whole periods: the longest at which, and at all shorter
+// ones, the loop is stable with the margins above; at most `auto_share` of the loop's delay. 0 where the loop without
+// lookahead has no such margins: what is left of them then isn't spent.
+double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
 // What --mass must pass: throws description::SetupError that names the smallest felt mass (proxy and handle) that is
 // stable, rounded up to two digits, or what else would help where no mass does; also for a mass at or below the

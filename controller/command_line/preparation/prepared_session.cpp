@@ -211,6 +211,12 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                                  .expected = "off: it has no proxy with a mass to be damped"});
 }
 
+[[noreturn]] void refuse_lookahead() {
+  throw description::SetupError({.key = "--lookahead",
+                                 .found = "the impedance type",
+                                 .expected = "off: its tool isn't sent anywhere, and follows the hand without delay"});
+}
+
 // What the profile asks for is in the cell's file; what an option could take away again isn't left out.
 void require_profile(const PreparedSession& session) {
   if (session.cell.profile != description::Profile::hand_guiding) return;
@@ -221,6 +227,22 @@ void require_profile(const PreparedSession& session) {
 }
 
 }  // namespace
+
+controller::HandModel hand_model(const PreparedSession& session) {
+  const description::Grip grip = description::tightest_grip(session.hand);
+  return {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
+}
+
+void choose_horizon(PreparedSession& session) {
+  using Kind = LookaheadChoice::Kind;
+  double horizon_s = session.lookahead.kind == Kind::fixed ? session.lookahead.horizon_s : 0.0;
+  session.loop.horizon_s = 0.0;
+  if (session.lookahead.kind == Kind::automatic) {
+    const double proxy_kg = session.settings.mass_kg - session.loop.handle_mass_kg;
+    horizon_s = controller::stable_horizon_s(hand_model(session), session.loop, proxy_kg);
+  }
+  session.settings.horizon_s = session.loop.horizon_s = horizon_s;
+}
 
 PreparedSession prepare(const RunOptions& options) {
   constexpr double week_s = 604800.0;
@@ -249,19 +271,27 @@ PreparedSession prepare(const RunOptions& options) {
   require_profile(session);
 
   session.loop.delay_s = loop_delay_s(session);
-  if (session.impedance()) return session;
+  session.lookahead = options.lookahead.value_or(LookaheadChoice{});
+  if (session.impedance()) {
+    if (options.lookahead && session.lookahead.kind != LookaheadChoice::Kind::off) refuse_lookahead();
+    session.lookahead = {};
+    return session;
+  }
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
   session.loop.handle_mass_kg = session.cell.tool.mass_kg;
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
   session.settings.force_age_s = session.cell.sensor.delay_s;
+  session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
+  choose_horizon(session);
   return session;
 }
 
 PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s) {
   set_timestep(session, options, period_s);
   session.loop.delay_s = loop_delay_s(session);
+  if (!session.impedance()) choose_horizon(session);
   return session;
 }
 
@@ -277,23 +307,41 @@ void require_mass_in_range(const PreparedSession& session, const RunOptions& opt
                                  .found = description::number_text(mass_kg) + " kg",
                                  .expected = "at most " + description::number_text(heaviest_kg) + " kg"});
 }
+
+// A horizon that was asked for. What `auto` takes has its margins.
+void require_stable_horizon(const PreparedSession& session) {
+  const controller::HandModel hand = hand_model(session);
+  const double proxy_kg = session.settings.mass_kg - session.loop.handle_mass_kg;
+  if (controller::spectral_radius(hand, session.loop, proxy_kg) < 1.0) return;
+  controller::LoopModel without = session.loop;
+  without.horizon_s = 0.0;
+  std::array<char, 80> found{}, expected{};
+  std::snprintf(found.data(), found.size(), "%.4g ms with %.4g kg", 1e3 * session.loop.horizon_s,
+                session.settings.mass_kg);
+  std::snprintf(expected.data(), expected.size(), "a horizon that is stable; with margins at most %.4g ms",
+                1e3 * controller::stable_horizon_s(hand, without, proxy_kg));
+  throw description::SetupError({.key = "--lookahead",
+                                 .found = found.data(),
+                                 .expected = expected.data(),
+                                 .advice = "--lookahead auto, or a larger --mass (--force-unstable overrides, in "
+                                           "simulation)"});
+}
+
 }  // namespace
 
 void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (session.impedance()) return require_stable_coupling(session);
   require_mass_in_range(session, options);
-  controller::HandModel hand;
-  const description::Grip grip = description::tightest_grip(session.hand);
-  hand.stiffness_N_per_m = grip.stiffness_N_per_m;
-  hand.damping_Ns_per_m = grip.damping_Ns_per_m;
-  hand.mass_kg = session.hand.mass_kg;
   if (options.force_unstable && !options.bus.simulated()) {
     throw description::SetupError({.key = "--force-unstable",
                                    .found = "a bus that isn't simulated",
                                    .expected = "--bus sim: an unstable mass is for simulation only"});
   }
   try {
-    controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+    // Without lookahead first, so that it never makes a mass pass that wouldn't without.
+    controller::LoopModel loop = session.loop;
+    loop.horizon_s = 0.0;
+    controller::require_stable_mass(session.settings.mass_kg, hand_model(session), loop, options.force_unstable);
   } catch (const description::SetupError& error) {
     if (options.mass_kg) throw;
     description::SetupProblem problem = error.problem();
@@ -301,6 +349,7 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
     problem.key = "default_mass_kg";
     throw description::SetupError(problem);
   }
+  if (!options.force_unstable) require_stable_horizon(session);
 }
 
 double motion_delay_s(const PreparedSession& session) {
