@@ -26,8 +26,8 @@ namespace {
 
 using namespace proxarm;
 using command_line::BusMapping;
-using command_line::LookaheadChoice;
 using command_line::choice;
+using command_line::LookaheadChoice;
 using command_line::Pace;
 using command_line::quantity;
 using command_line::RunOptions;

@@ -1,15 +1,14 @@
 // The point that the arm is sent to, where that isn't the proxy itself but where the proxy is going to be (lookahead).
 //
-//   p(k)    where the proxy will be a horizon H after q(k), if the hand's force stays as it is (rendering/lookahead.hpp)
+//   p(k)    where the proxy will be a horizon H after q(k), if it coasts there (rendering/lookahead.hpp)
 //   c(k) = the point of the limits' sets around c(k−1) that is nearest to p(k) + o(k)
 //
 // Nothing in c jumps:
 // - H goes to the wanted horizon by at most `horizon_rate` seconds per second: at the speed v, that moves c by no more
 //   than that share of v.
-// - p takes the force in by ½H²h/M, and a mass, a damping or a friction that changes would let it jump. o takes that up:
-//   in the cycle of the change c goes on with its last velocity, and what p is beside it fades with `fading_s`.
-// - p moves at once with a force that steps, and c follows it as fast as the sets allow; p is made anew in each cycle,
-//   so nothing winds up.
+// - Damping and spring act within H, so p would jump when one of them, or the mass that they act on, changes. o takes
+//   that up: in the cycle of the change c goes on with its last velocity, and what p is beside it fades with `fading_s`.
+// - c follows p as fast as the sets allow; p is made anew in each cycle, so nothing winds up.
 // The proxy keeps within the same limits as without lookahead. Their acceleration is that of a commanded point, behind
 // the setpoints' filter, so here the proxy has such a filter of its own: x, v of step_limits.hpp, as if the arm were
 // sent to the proxy.

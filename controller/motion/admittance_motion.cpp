@@ -179,7 +179,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
   if (passivity_) record_passivity(step, cycle.record);
-  if (sent_) send_ahead(h_W.force);
+  if (sent_) send_ahead();
   cycle.record.set(RecordFlag::limit_orientation,
                    parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy(cycle);
@@ -219,10 +219,12 @@ void AdmittanceMotion::make_sent_limits(StepStart start) noexcept {
   limiter_.make_sent(start, step_limits_, sent_limits_);
 }
 
-// The point that the arm is sent to, for the proxy's step under this force.
-void AdmittanceMotion::send_ahead(const Vec3& h_W) noexcept {
+// The point that the arm is sent to: where the proxy comes to if it coasts. With the hand's force held it would come
+// ½H²h/M further; the hand's own mass, which the sensor sees at the handle, feeds just that back, so the arm's elastic
+// modes stay calm up to half as long a horizon only (docs/studies.md has the figures).
+void AdmittanceMotion::send_ahead() noexcept {
   sent_->advance_horizon();
-  sent_->step(state_.q_k1_W, world().look_ahead(h_W, step_limits_, ahead_s()), sent_limits_);
+  sent_->step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), sent_limits_);
   active_.add(sent_->active());
 }
 
@@ -333,7 +335,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   active_.add(step.limits);
   advance_proxy(step.q_W);
   cycle.record.p_hat_W_m = triple(step.p_hat_W);
-  if (sent_) send_ahead(h_W);
+  if (sent_) send_ahead();
   follow_proxy(cycle);
   return parts_.release->over(state_.q_k1_W, hand_W);
 }

@@ -87,7 +87,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
   void make_limits(const MotionCycle& cycle) noexcept;
   void make_sent_limits(StepStart start) noexcept;
-  void send_ahead(const models::Vec3& h_W) noexcept;
+  void send_ahead() noexcept;
   [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
   // The horizon; none while the arm gets free, where nobody feels a mass.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }

@@ -28,6 +28,9 @@ struct PreparedSession {
 // The hand at its tightest grip, as the stability check takes it.
 controller::HandModel hand_model(const PreparedSession& session);
 
+// The longest horizon of a lookahead that is stable with margins for the session's mass and loop.
+double longest_horizon_s(const PreparedSession& session);
+
 // The lookahead's horizon for the session's mass and loop. To be called when one of them has changed.
 void choose_horizon(PreparedSession& session);
 

@@ -18,7 +18,6 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   RunOptions options;
   options.mass_kg = setup.mass_kg;
   options.period_s = setup.period_s;
-  if (setup.lookahead) options.lookahead = {LookaheadChoice::Kind::automatic, 0.0};
   options.duration_s = setup.settling_s + setup.duration_s;
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
   PreparedSession session = prepare(options);
