@@ -92,12 +92,15 @@ class Lookahead(ProgramTest):
             with self.subTest(change=change):
                 still = self.jerk("--mass", 12, "--lookahead", "auto")
                 changed = self.jerk("--mass", 12, "--lookahead", "auto", "--set", change)
-                self.assertLess(changed, 2.0 * still + 1e-3)
+                # A lighter mass is moved faster, with lookahead or without.
+                most = self.jerk("--mass", 12, "--set", change) if change.startswith("mass") else still
+                print(change, still, changed, most)
+                self.assertLess(changed, 2.0 * max(still, most))
 
     def test_a_timestep_changes_with_it(self):
-        summary = self.summary("--mass", 10, "--lookahead", "auto", "--duration", "4s", "--record", "session",
-                               "--set", "timestep=2ms@1s")
-        self.assertEqual(summary["faults"], [])
+        outcome = self.call("run", "--json", "--mass", 10, "--lookahead", "auto", "--duration", "4s", "--record",
+                            "session", "--set", "timestep=2ms@1s")
+        self.assertEqual((outcome.status, outcome.summary["faults"]), (0, []), outcome.err)
         self.assertEqual(self.call("replay", "session").status, 0)
 
     def test_it_is_written_down(self):
