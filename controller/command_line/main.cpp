@@ -291,9 +291,8 @@ class Commands {
     CLI::App* plan =
         add("plan", "bus budget of a cell; status 1 if it can't be carried", [this] { return plan_command(plan_); });
     add_session_options(*plan, plan_);
-    leave_out(*plan,
-              {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay", "--lookahead",
-               "--duration"});
+    leave_out(*plan, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay",
+                      "--lookahead", "--duration"});
     CLI::App* scan = add("scan", "what is on a CAN interface: listens, then asks; changes nothing",
                          [this] { return scan_command(scan_); });
     scan->add_option("--bus", scan_.interface, "CAN interface, such as can0")->required()->type_name("IFACE");

@@ -7,7 +7,8 @@
 // - H goes to the wanted horizon by at most `horizon_rate` seconds per second: at the speed v, that moves c by no more
 //   than that share of v.
 // - Damping and spring act within H, so p would jump when one of them, or the mass that they act on, changes. o takes
-//   that up: in the cycle of the change c goes on with its last velocity, and what p is beside it fades with `fading_s`.
+//   that up: in the cycle of the change c goes on with its last velocity, and what p is beside it fades with
+//   `fading_s`.
 // - c follows p as fast as the sets allow; p is made anew in each cycle, so nothing winds up.
 // The proxy keeps within the same limits as without lookahead. Their acceleration is that of a commanded point, behind
 // the setpoints' filter, so here the proxy has such a filter of its own: x, v of step_limits.hpp, as if the arm were

@@ -383,9 +383,8 @@ void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& 
     const double most = coasting + std::copysign(most_change[i], way[i]);
     if (std::abs(way[i]) > std::abs(most)) too_far = std::min(too_far, std::max(0.0, most / way[i]));
   }
-  const double most_m =
-      std::min(commanded_share * state_.speed_limit_m_per_s * T,
-               (sent_W() - reached_k1_W).norm() + limits_.max_tool_acceleration_m_per_s2 * T * T);
+  const double most_m = std::min(commanded_share * state_.speed_limit_m_per_s * T,
+                                 (sent_W() - reached_k1_W).norm() + limits_.max_tool_acceleration_m_per_s2 * T * T);
   const auto goes_m = [&](double share) {
     return (arm_.tool_pose(brakes + share * way).translation() - reached_k1_W).norm();
   };

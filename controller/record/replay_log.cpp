@@ -22,10 +22,10 @@ constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r'
 void archive(fieldbus::StateArchive& state, SessionSettings& s) noexcept {
   static_assert(sizeof(SessionSettings) == 168, "a new setting belongs into this list");
   state(s.scheme, s.coupling_stiffness_N_per_m, s.coupling_damping_Ns_per_m, s.period_s, s.mass_kg, s.damping_Ns_per_m,
-        s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.orientation, s.passivity, s.force_age_s, s.rotational_inertia_kg_m2,
-        s.rotational_damping_Nms_per_rad, s.tare_s, s.tare_spread_N, s.enable_timeout_s, s.enabling_timeout_s,
-        s.wait_after_fault_s, s.without_enabling_input, s.max_missed_samples, s.max_repeated_samples,
-        s.max_missed_feedback, s.max_overruns);
+        s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.orientation, s.passivity, s.force_age_s,
+        s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad, s.tare_s, s.tare_spread_N, s.enable_timeout_s,
+        s.enabling_timeout_s, s.wait_after_fault_s, s.without_enabling_input, s.max_missed_samples,
+        s.max_repeated_samples, s.max_missed_feedback, s.max_overruns);
 }
 
 void archive(fieldbus::StateArchive& state, ReplayHead& head) noexcept {
@@ -47,8 +47,8 @@ bool archive(fieldbus::StateArchive& state, BoxCycle& cycle, std::vector<BoxFram
              std::uint32_t buses) {
   std::uint32_t count = static_cast<std::uint32_t>(frames.size());
   state(cycle.record.cycle, cycle.t_k_ns, cycle.overruns_in_a_row, cycle.stop_requested, cycle.change.parameter,
-        cycle.change.value, cycle.change.object, cycle.change.position_m, cycle.change.period_s, cycle.change.horizon_s, cycle.command.order,
-        cycle.command.value, cycle.timestep.period_s, cycle.timestep.max_missed_samples,
+        cycle.change.value, cycle.change.object, cycle.change.position_m, cycle.change.period_s, cycle.change.horizon_s,
+        cycle.command.order, cycle.command.value, cycle.timestep.period_s, cycle.timestep.max_missed_samples,
         cycle.timestep.max_repeated_samples, cycle.timestep.horizon_s, cycle.input_bytes, count);
   if (cycle.input_bytes > cycle.inputs.size() || count > most_frames_per_cycle) return false;
   state.raw(std::span(cycle.inputs).first(cycle.input_bytes));

@@ -12,8 +12,8 @@ enum class Parameter : std::uint8_t { none, mass, damping, spring, friction, pos
 
 struct Change {
   Parameter parameter = Parameter::none;
-  double value = 0.0;  // of the proxy: kg (felt mass less the tool's), Ns/m, N/m; of an object: μ; horizon in s
-  std::int32_t object = -1;            // whose, by its index in the scene
+  double value = 0.0;        // of the proxy: kg (felt mass less the tool's), Ns/m, N/m; of an object: μ; horizon in s
+  std::int32_t object = -1;  // whose, by its index in the scene
   std::array<double, 3> position_m{};  // of an object that is driven: by how much it is away from where it is described
   double period_s = 0.0;               // T that it was checked for; it is left out at another one. 0: good for any
   double horizon_s = -1.0;             // of the lookahead from then on; negative: as it is

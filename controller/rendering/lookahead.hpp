@@ -5,8 +5,8 @@
 //
 // In free flight under a constant force p = q + Hv + ½H²a to rounding at order 1. In contact p is a point of the same
 // world: it doesn't lie in a flat wall, it sticks where the proxy will stick, and it leaves where the proxy will leave.
-// Objects that move are where they will be then: the time of each step is its own, and objects that are driven, or whose
-// friction changes, go on as they would (scene_changes.hpp).
+// Objects that move are where they will be then: the time of each step is its own, and objects that are driven, or
+// whose friction changes, go on as they would (scene_changes.hpp).
 //
 // Of the step's limits the prediction keeps those that can matter within H: speed and power, and the planes that the
 // proxy can reach. A border's plane falls behind as the prediction nears it, so that it slows down as the proxy will.

@@ -115,8 +115,8 @@ void SceneChanges::follow(const SceneChanges& other) noexcept {
   period_s_ = other.period_s_;
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     const Object &from = other.objects_[i], &to = objects_[i];
-    const bool same = idle && from.friction == to.friction && from.position_m == to.position_m &&
-                      from.before_m == to.before_m;
+    const bool same =
+        idle && from.friction == to.friction && from.position_m == to.position_m && from.before_m == to.before_m;
     objects_[i] = from;
     if (!same && (from.driven || from.rubs)) tell_scene(i);
   }

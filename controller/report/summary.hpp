@@ -144,7 +144,7 @@ struct Summary {
   std::uint64_t limited_cycles = 0;                    // some limit was active
   std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
-  double lookahead_s = 0.0;  // horizon at the start; 0: none
+  double lookahead_s = 0.0;               // horizon at the start; 0: none
   double hands_off_s = 0.0;               // nobody held the handle
   std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor
   EndSummary end;                         // set by the caller

@@ -202,7 +202,8 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
   LoopModel loop = model;
   const double T = loop.period_s;
   constexpr double lightest_hand_kg = 1.0;
-  const double heavy = (proxy_mass_kg + model.handle_mass_kg) / (auto_mass_ratio * std::max(hand.mass_kg, lightest_hand_kg));
+  const double heavy =
+      (proxy_mass_kg + model.handle_mass_kg) / (auto_mass_ratio * std::max(hand.mass_kg, lightest_hand_kg));
   const double most_s = auto_share * std::min(1.0, heavy) * (T + loop.delay_s + loop.drive_time_constant_s);
   double longest_s = 0.0;
   for (int steps = 0; steps * T <= most_s; ++steps) {

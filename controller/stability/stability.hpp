@@ -12,9 +12,9 @@
 // weighted mean of both. What moves after the force sensor (the handle, the hand) belongs to m_h: the sensor doesn't
 // see it push.
 //
-// With lookahead (rendering/lookahead.hpp) the drives are sent to where the proxy will be s = H/T steps on, if it coasts:
-// q + s(q − q₁), which is P q with P(w) = 1 + s(1−w). P multiplies the term with (1−β). B and K_v change that point by
-// their share of the acceleration within H alone, and are left out there.
+// With lookahead (rendering/lookahead.hpp) the drives are sent to where the proxy will be s = H/T steps on, if it
+// coasts: q + s(q − q₁), which is P q with P(w) = 1 + s(1−w). P multiplies the term with (1−β). B and K_v change that
+// point by their share of the acceleration within H alone, and are left out there.
 //
 // C is linear in M (D-decomposition): C = M X + Y. The masses at which a root lies on the unit circle follow from a
 // sweep over θ, w = exp(−jθ): those where M(θ) = −Y/X is real and positive. Between two neighbours of them stability
@@ -47,8 +47,9 @@ struct LoopModel {
   int order = 1;
   bool matched_labels = false;
   double horizon_s = 0.0;  // H ≥ 0 of the lookahead
-  // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s: for the choice of a horizon, where the filter counts
-  // as the two lags that it is. What looks ahead makes up for their phase; as a pure delay they would seem worse.
+  // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s: for the choice of a horizon, where the filter
+  // counts as the two lags that it is. What looks ahead makes up for their phase; as a pure delay they would seem
+  // worse.
   double filter_s = 0.0;
 };
 
@@ -69,8 +70,9 @@ bool with_margins(const HandModel& hand, const LoopModel& loop,
 // The horizon that `--lookahead auto` takes for this mass, in whole periods: the longest at which, and at all shorter
 // ones, the loop is stable with the margins above; at most `auto_share` of the loop's delay, since beyond the felt mass
 // gets worse again. The model has no elastic gears, which a long horizon sets ringing where the hand is heavy: below
-// `auto_mass_ratio` times the hand's mass (1 kg at least) the horizon shrinks with the mass, as found by simulation with
-// hands of 0.3 and 2 kg, 100 to 3000 N/m, and gears of 0.7 to 1.4 times the stiffness that is believed. 0 where the loop without lookahead has no such margins: what is left of them then isn't spent.
+// `auto_mass_ratio` times the hand's mass (1 kg at least) the horizon shrinks with the mass, as found by simulation
+// with hands of 0.3 and 2 kg, 100 to 3000 N/m, and gears of 0.7 to 1.4 times the stiffness that is believed. 0 where
+// the loop without lookahead has no such margins: what is left of them then isn't spent.
 inline constexpr double auto_share = 0.85, auto_mass_ratio = 10.0;
 double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 

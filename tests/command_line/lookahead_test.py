@@ -92,10 +92,10 @@ class Lookahead(ProgramTest):
             with self.subTest(change=change):
                 still = self.jerk("--mass", 12, "--lookahead", "auto")
                 changed = self.jerk("--mass", 12, "--lookahead", "auto", "--set", change)
-                # A lighter mass is moved faster, with lookahead or without.
-                most = self.jerk("--mass", 12, "--set", change) if change.startswith("mass") else still
-                print(change, still, changed, most)
-                self.assertLess(changed, 2.0 * max(still, most))
+                # A mass that changes is felt at once, and looking ahead makes up for the filter that softens it: the
+                # acceleration changes up to three times as fast as without. A jump of 10 µm would be 0.25 m/s² a cycle.
+                most = 4.0 * self.jerk("--mass", 12, "--set", change) if change.startswith("mass") else 2.0 * still
+                self.assertLess(changed, most)
 
     def test_a_timestep_changes_with_it(self):
         outcome = self.call("run", "--json", "--mass", 10, "--lookahead", "auto", "--duration", "4s", "--record",

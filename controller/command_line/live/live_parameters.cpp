@@ -143,8 +143,7 @@ controller::Timestep LiveParameters::take_timestep(const std::string& text) {
   }
   session_ = std::move(changed);
   const controller::SessionSettings& settings = session_.settings;
-  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples,
-          settings.horizon_s};
+  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples, settings.horizon_s};
 }
 
 bool LiveParameters::is_timestep(const std::string& text) { return text.compare(0, 9, "timestep=") == 0; }
@@ -195,9 +194,8 @@ controller::Change LiveParameters::take_lookahead(const std::string& text) {
   judged.mass_kg = changed.settings.mass_kg;
   require_stable(changed, judged);
   session_ = std::move(changed);
-  return {.parameter = Parameter::lookahead,
-          .value = session_.settings.horizon_s,
-          .period_s = session_.settings.period_s};
+  return {
+      .parameter = Parameter::lookahead, .value = session_.settings.horizon_s, .period_s = session_.settings.period_s};
 }
 
 namespace {

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
-#include "controller/command_line/entry/exit_status.hpp"
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/compile.hpp"
 

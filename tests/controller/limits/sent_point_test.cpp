@@ -74,7 +74,7 @@ TEST(SentPoint, AChangeOfTheMassMovesItSlowly) {
     const Vec3 before = sent.c_k1_W();
     sent.step(q, q + Vec3(k < 300 ? 8e-4 : 10e-4, 0.0, 0.0), {});
     const Vec3 step = sent.c_k1_W() - before;
-    if (k > 0) {
+    if (k > 1) {  // before, it goes to where the prediction begins
       // 0.2 mm that fade in 50 ms: 4 mm/s at first.
       ASSERT_LE((step - last_step).norm(), 2e-4 * T / SentPoint::fading_s * 1.01) << "cycle " << k;
     }
@@ -104,7 +104,8 @@ TEST(SentPoint, FiltersTheProxyAsTheArmIsFiltered) {
   for (int k = 0; k < 500; ++k) sent.step(q += T * v, q, {});
   const double omega = 2.0 * 3.14159265358979 * 25.0;
   EXPECT_NEAR((q - sent.filtered_W()).x(), 0.1 * (2.0 / omega), 0.1 * T);
-  EXPECT_NEAR(sent.filtered_velocity_W().x(), 0.1, 1e-9);
+  // An input that holds still over each period leaves a ripple of (ωT)²/12.
+  EXPECT_NEAR(sent.filtered_velocity_W().x(), 0.1, 0.1 * omega * omega * T * T / 11.0);
 }
 
 }  // namespace
