@@ -27,6 +27,7 @@ namespace {
 using namespace proxarm;
 using command_line::BusMapping;
 using command_line::choice;
+using command_line::LookaheadChoice;
 using command_line::Pace;
 using command_line::quantity;
 using command_line::RunOptions;
@@ -143,6 +144,12 @@ void add_session_options(CLI::App& app, RunOptions& options) {
                  "readings of the force sensor are this much older than the cell says, such as 8ms: simulated, and "
                  "counted where stability is judged")
       ->type_name("TIME");
+  app.add_option("--lookahead",
+                 quantity([](const std::string& w) { return LookaheadChoice::parse(w, "--lookahead"); },
+                          [&](LookaheadChoice value) { options.lookahead = value; }),
+                 "send the arm to where the proxy is going to be, which makes up for the loop's delay: off (default), "
+                 "auto, the horizon that is stable with margins for this mass, hand and cell, or a time, such as 8ms")
+      ->type_name("auto|off|TIME");
   app.add_option("--duration",
                  quantity([](const std::string& w) { return description::parse_duration(w, "--duration"); },
                           [&](double value) { options.duration_s = value; }),
@@ -192,7 +199,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,
                  "change a parameter when so much time has been rendered (holds and stops don't count), such as "
-                 "mass=3@4s (mass, damping, spring, timestep, "
+                 "mass=3@4s (mass, damping, spring, lookahead, timestep, "
                  "OBJECT.friction, OBJECT.position_m); may be repeated")
       ->type_name("NAME=VALUE@TIME")
       ->expected(1)
@@ -237,7 +244,7 @@ void add_assess_options(CLI::App& app, command_line::AssessOptions& options) {
 void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
   add_session_options(app, options.run);
   leave_out(app, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
-                  "--extra-delay"});
+                  "--extra-delay", "--lookahead"});
   add_fault_option(app, options.run);
   add_enabling_option(app, options.run);
   add_hardware_option(app, options.run);
@@ -275,6 +282,7 @@ class Commands {
     CLI::App* sim =
         add("sim", "the simulated arm as a process of its own on CAN interfaces", [this] { return sim_command(sim_); });
     add_session_options(*sim, sim_);
+    leave_out(*sim, {"--lookahead"});
     add_fault_option(*sim, sim_);
     add_enabling_option(*sim, sim_);
   }
@@ -283,8 +291,8 @@ class Commands {
     CLI::App* plan =
         add("plan", "bus budget of a cell; status 1 if it can't be carried", [this] { return plan_command(plan_); });
     add_session_options(*plan, plan_);
-    leave_out(*plan,
-              {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay", "--duration"});
+    leave_out(*plan, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--extra-delay",
+                      "--lookahead", "--duration"});
     CLI::App* scan = add("scan", "what is on a CAN interface: listens, then asks; changes nothing",
                          [this] { return scan_command(scan_); });
     scan->add_option("--bus", scan_.interface, "CAN interface, such as can0")->required()->type_name("IFACE");

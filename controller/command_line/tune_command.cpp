@@ -13,11 +13,10 @@
 namespace proxarm::command_line {
 namespace {
 
+using controller::delay_margin;
+using controller::hand_margin;
 using controller::HandModel;
 using controller::LoopModel;
-
-// What the advice allows for: a hand that holds on harder and is heavier, and a loop that is slower, than described.
-constexpr double hand_margin = 1.5, delay_margin = 1.2;
 
 // Felt mass, handle included, at which the loop is just stable.
 std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop) {
@@ -29,21 +28,12 @@ std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop
 // delay as it is and longer.
 std::optional<double> with_margin(const HandModel& hand, const LoopModel& loop) {
   double worst = 0.0;
-  for (const double stiffer : {1.0, hand_margin}) {
-    for (const double heavier : {1.0, hand_margin}) {
-      for (const double later : {1.0, delay_margin}) {
-        HandModel other = hand;
-        other.stiffness_N_per_m *= stiffer;
-        other.mass_kg *= heavier;
-        LoopModel slower = loop;
-        slower.delay_s *= later;
-        const auto mass = smallest_felt(other, slower);
-        if (!mass) return std::nullopt;
-        worst = std::max(worst, *mass);
-      }
-    }
-  }
-  return worst;
+  const bool all = controller::with_margins(hand, loop, [&](const HandModel& other, const LoopModel& slower) {
+    const auto mass = smallest_felt(other, slower);
+    worst = std::max(worst, mass.value_or(0.0));
+    return mass.has_value();
+  });
+  return all ? std::optional<double>(worst) : std::nullopt;
 }
 
 double round_up(double value) {
@@ -129,7 +119,8 @@ int tune_command(const RunOptions& options) {
   }
   const description::Grip grip = description::tightest_grip(session.hand);
   const HandModel hand{grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
-  const LoopModel& loop = session.loop;
+  LoopModel loop = session.loop;
+  loop.horizon_s = 0.0;
   const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
   std::printf("%s, held by %s: %.4g N/m, %.4g Ns/m, %.3g kg; T = %.4g ms\n", session.cell.name.c_str(),
               session.hand.name.c_str(), hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, 1e3 * T);
@@ -159,6 +150,8 @@ int tune_command(const RunOptions& options) {
         "R: %.2g Ns/m at 20 N and 0.1 m\n",
         T * 20.0 / 0.1);
   }
+  std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
+              1e3 * longest_horizon_s(session), session.settings.mass_kg);
   const auto sorted = limits(session, hand);
   constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
   const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);

@@ -184,6 +184,14 @@ void Cycle::apply(const Timestep& timestep) noexcept {
   if (ratio != 1.0) supervisor_.rescale(state_.cycle, ratio);
   measurement_.set_period(timestep.period_s);
   motion_->set_period(timestep.period_s);
+  look_ahead(timestep.horizon_s);
+}
+
+// Negative: as it is.
+void Cycle::look_ahead(double horizon_s) noexcept {
+  if (!(horizon_s >= 0.0)) return;
+  settings_.horizon_s = horizon_s;
+  motion_->set({.parameter = Parameter::lookahead, .value = horizon_s});
 }
 
 // The timestep comes first, since what follows is of it.

@@ -118,6 +118,7 @@ class Cycle {
   void write_record(std::int64_t t_k_ns) noexcept;
   void end_cycle() noexcept;
   void apply(const Timestep& timestep) noexcept;
+  void look_ahead(double horizon_s) noexcept;
 
   // cycle_phases.cpp: what a phase does
   void enter(Phase phase, std::int64_t t_k_ns) noexcept;

@@ -16,7 +16,7 @@ std::int64_t ns_of(double period_s) noexcept { return std::llround(1e9 * period_
 bool plausible(const Timestep& timestep) noexcept { return timestep.period_s >= 1e-5 && timestep.period_s <= 1.0; }
 
 Timestep timestep_of(const SessionSettings& settings) noexcept {
-  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples};
+  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples, settings.horizon_s};
 }
 
 void TimestepChange::begin(const Timestep& from, const Timestep& to, bool resumes, Alarm& alarm) noexcept {

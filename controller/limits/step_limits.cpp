@@ -85,6 +85,15 @@ void StepLimiter::make(const StepStart& start, const JointVector& joint_rad, con
   add_joints(joint_rad, twist_rad, J_W, out);
 }
 
+void StepLimiter::make_sent(const StepStart& start, const StepLimits& of_proxy, StepLimits& out) const noexcept {
+  out.soft_count = out.plane_count = out.hard_count = 0;
+  add_balls(start, out);
+  add_borders(start.q_k1_W, Borders::slow_down, out);
+  for (std::size_t i = 0; i < of_proxy.plane_count; ++i) {
+    if (of_proxy.planes[i].axis_bits != 0) add_plane(out, of_proxy.planes[i]);
+  }
+}
+
 void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, const models::Jacobian& J_W,
                              StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
@@ -118,10 +127,10 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
     const auto k = static_cast<std::size_t>(i);
     const double to_upper = limits_.workspace_max_m[k] - q_W[i], to_lower = q_W[i] - limits_.workspace_min_m[k];
     if (std::isfinite(to_upper)) {
-      add_plane(out, {Vec3::Unit(i), room(to_upper), Limit::workspace, 0});
+      add_plane(out, {Vec3::Unit(i), room(to_upper), Limit::workspace, 0, share});
     }
     if (std::isfinite(to_lower)) {
-      add_plane(out, {-Vec3::Unit(i), room(to_lower), Limit::workspace, 0});
+      add_plane(out, {-Vec3::Unit(i), room(to_lower), Limit::workspace, 0, share});
     }
   }
   for (const description::BoxDescription& zone : limits_.keep_out) {
@@ -133,6 +142,7 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
       if (above > nearest.bound_m) nearest = {-Vec3::Unit(i), above, Limit::keep_out, 0};
     }
     nearest.bound_m = room(nearest.bound_m);
+    nearest.share = share;
     add_plane(out, nearest);
   }
 }
@@ -164,7 +174,7 @@ void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& tw
       const double room = std::max(0.0, share * (sign > 0.0 ? to_upper : to_lower));
       const bool range = room < per_step;
       add_plane(out, {sign / length * row, std::min(room, per_step) / length,
-                      range ? Limit::joint_range : Limit::joint_speed, bit});
+                      range ? Limit::joint_range : Limit::joint_speed, bit, range ? share : 0.0});
     }
   }
 }

@@ -95,6 +95,7 @@ struct LimitPlane {
   double bound_m = 0.0;
   Limit limit = Limit::workspace;
   std::uint8_t axis_bits = 0;
+  double share = 0.0;  // of a way towards it by which the bound of the step after it falls; of a speed, none
 };
 
 struct StepLimits {
@@ -126,6 +127,9 @@ class StepLimiter {
   // link; `J_W`: of T at joint_rad. Neither allocates nor throws.
   void make(const StepStart& start, const models::JointVector& joint_rad, const models::JointVector& twist_rad,
             const models::Jacobian& J_W, StepLimits& out) const noexcept;
+  // The sets around the point that the arm is sent to, where that isn't the proxy (sent_point.hpp): `start` has it as
+  // q_k1_W and q_k2_W. The planes of the joints are those of `of_proxy`, which make() has made for the same angles.
+  void make_sent(const StepStart& start, const StepLimits& of_proxy, StepLimits& out) const noexcept;
   // For the impedance type: the borders alone, as walls for a proxy whose tool is at q_W. The tool isn't slowed down
   // ahead of them; one that is pushed through a border is pushed back.
   void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,

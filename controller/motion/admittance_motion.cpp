@@ -48,6 +48,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
   state_.link_step_rad = state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
   start_guards(arm.start_rad());
+  if (settings.looks_ahead) sent_.emplace(limits, settings.horizon_s, settings.period_s);
   if (supervision.let_go != description::LetGo::coast) {
     const bool turns = settings.orientation == OrientationMode::free;
     empty_handle_.emplace(EmptyHandleConfig{.band_N = supervision.empty_handle_N,
@@ -76,6 +77,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   state_.link_step_rad.setZero();
   start_guards(target_rad);
   world().start(state_.q_k1_W);
+  if (sent_) sent_->start(state_.q_k1_W);
   if (passivity_) passivity_->start(measured.tool_W);
   if (empty_handle_) empty_handle_->start();
   reversed_.start();
@@ -121,8 +123,27 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   if (passivity_) passivity_->set_period(period_s);
   if (empty_handle_) empty_handle_->set_period(period_s);
   limiter_.set_period(period_s);
+  if (sent_) sent_->set_period(period_s);
   guard_.set_period(period_s);
   tool_guard_.set_period(period_s);
+}
+
+// What the prediction makes of another mass, damping or spring is another point: the arm comes to it slowly.
+void AdmittanceMotion::set(const Change& change) noexcept {
+  parts_.world->set(change);
+  if (!sent_) return;
+  switch (change.parameter) {
+    case Parameter::lookahead:
+      return sent_->want(change.value);
+    case Parameter::mass:
+    case Parameter::damping:
+    case Parameter::spring:
+      return sent_->take_up_change();
+    case Parameter::friction:
+    case Parameter::position:
+    case Parameter::none:
+      return;
+  }
 }
 
 void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
@@ -130,6 +151,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
   if (empty_handle_) empty_handle_->archive(state);
+  if (sent_) sent_->archive(state);
   state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_, reversed_, straight_);
   archive_fields(state, state_);
   if (state.reading()) arm_.kinematics(state_.link_rad, solution_.kinematics);
@@ -157,6 +179,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
   if (passivity_) record_passivity(step, cycle.record);
+  if (sent_) send_ahead();
   cycle.record.set(RecordFlag::limit_orientation,
                    parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy(cycle);
@@ -171,15 +194,44 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
 void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
   limit_speed(cycle);
   arm_.kinematics(parts_.elastic.link_rad(), filtered_);
-  const StepStart start{.q_k1_W = state_.q_k1_W,
-                        .q_k2_W = state_.q_k2_W,
-                        .filtered_W = filtered_.X_WT.translation(),
-                        .filtered_velocity_W = filtered_.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
-                        .measured_W = cycle.measured.tool_W,
-                        .force_N = cycle.measured.hand_W.force.norm(),
-                        .max_speed_m_per_s = state_.speed_limit_m_per_s};
+  StepStart start{.q_k1_W = state_.q_k1_W,
+                  .q_k2_W = state_.q_k2_W,
+                  .filtered_W = filtered_.X_WT.translation(),
+                  .filtered_velocity_W = filtered_.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
+                  .measured_W = cycle.measured.tool_W,
+                  .force_N = cycle.measured.hand_W.force.norm(),
+                  .max_speed_m_per_s = state_.speed_limit_m_per_s};
+  const StepStart sent = start;
+  if (sent_) {
+    start.filtered_W = sent_->filtered_W();
+    start.filtered_velocity_W = sent_->filtered_velocity_W();
+  }
   limiter_.make(start, state_.link_rad, guard_.target_rad() - parts_.elastic.link_rad(), solution_.kinematics.J_W,
                 step_limits_);
+  if (sent_) make_sent_limits(sent);
+}
+
+// Around the point that the arm is sent to. The proxy's acceleration is held against a filter of its own, this one's
+// against the arm's.
+void AdmittanceMotion::make_sent_limits(StepStart start) noexcept {
+  start.q_k1_W = sent_->c_k1_W();
+  start.q_k2_W = sent_->c_k2_W();
+  limiter_.make_sent(start, step_limits_, sent_limits_);
+}
+
+// The point that the arm is sent to: where the proxy comes to if it coasts. With the hand's force held it would come
+// ½H²h/M further; the hand's own mass, which the sensor sees at the handle, feeds just that back, so the arm's elastic
+// modes stay calm up to half as long a horizon only (docs/studies.md has the figures).
+void AdmittanceMotion::send_ahead() noexcept {
+  sent_->advance_horizon();
+  sent_->step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), sent_limits_);
+  active_.add(sent_->active());
+}
+
+// The arm is at c_W and goes on from there: so does the proxy, which is behind it by what it looks ahead.
+void AdmittanceMotion::go_on_from(const Vec3& c_W, const Vec3& velocity_W) noexcept {
+  const Vec3 q_W = sent_ ? sent_->resume(c_W, velocity_W, ahead_s()) : c_W;
+  state_.q_k2_W = state_.q_k1_W = world().resume(q_W, velocity_W);
 }
 
 // The tool's speed limit of this cycle. Where it stands, a lower one holds at once.
@@ -284,6 +336,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   active_.add(step.limits);
   advance_proxy(step.q_W);
   cycle.record.p_hat_W_m = triple(step.p_hat_W);
+  if (sent_) send_ahead();
   follow_proxy(cycle);
   return parts_.release->over(state_.q_k1_W, hand_W);
 }
@@ -294,7 +347,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 // the arm is.
 void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   models::Pose X_WT = models::Pose::Identity();
-  X_WT.translation() = state_.q_k1_W;
+  X_WT.translation() = sent_W();
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
   const Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
   const JointVector link_k1_rad = state_.link_rad;
@@ -305,7 +358,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     active_.set(Limit::singularity);
     shorten_step(link_k1_rad, reached_k1_W);
     const Vec3& reached_W = solution_.kinematics.X_WT.translation();
-    state_.q_k2_W = state_.q_k1_W = world().resume(reached_W, (reached_W - reached_k1_W) / period_s_);
+    go_on_from(reached_W, (reached_W - reached_k1_W) / period_s_);
   }
   state_.link_step_rad = state_.link_rad - link_k1_rad;
   move_motors(parts_.elastic.step(state_.link_rad), cycle.measured);
@@ -331,9 +384,8 @@ void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& 
     const double most = coasting + std::copysign(most_change[i], way[i]);
     if (std::abs(way[i]) > std::abs(most)) too_far = std::min(too_far, std::max(0.0, most / way[i]));
   }
-  const double most_m =
-      std::min(commanded_share * state_.speed_limit_m_per_s * T,
-               (state_.q_k1_W - reached_k1_W).norm() + limits_.max_tool_acceleration_m_per_s2 * T * T);
+  const double most_m = std::min(commanded_share * state_.speed_limit_m_per_s * T,
+                                 (sent_W() - reached_k1_W).norm() + limits_.max_tool_acceleration_m_per_s2 * T * T);
   const auto goes_m = [&](double share) {
     return (arm_.tool_pose(brakes + share * way).translation() - reached_k1_W).norm();
   };
@@ -425,7 +477,7 @@ void AdmittanceMotion::wind_back(std::uint8_t blocked) noexcept {
   state_.link_step_rad = period_s_ * speed;
   arm_.kinematics(state_.link_rad, solution_.kinematics);
   const Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
-  state_.q_k1_W = world().resume(solution_.kinematics.X_WT.translation(), velocity_W);
+  go_on_from(solution_.kinematics.X_WT.translation(), velocity_W);
   state_.q_k2_W = state_.q_k1_W - period_s_ * velocity_W;
   parts_.orientation.start(orientation_of(solution_.kinematics.X_WT));
 }

@@ -4,6 +4,9 @@
 //             ▲                                                                                  │
 //             └────────── wind_back(): from what was commanded, where it couldn't be followed ───┘
 //
+// With lookahead, inverse kinematics gets the point where the proxy is going to be instead (sent_point.hpp); proxy,
+// record and reports stay what they are.
+//
 // Each of these has a history of its own; this class alone starts them, winds them back and gives them another T, and
 // always all together. make_final() is the one place where setpoints become final.
 #pragma once
@@ -13,6 +16,7 @@
 #include <optional>
 #include <vector>
 
+#include "controller/limits/sent_point.hpp"
 #include "controller/limits/step_limits.hpp"
 #include "controller/motion/empty_handle.hpp"
 #include "controller/motion/force_plausibility.hpp"
@@ -43,7 +47,7 @@ class AdmittanceMotion final : public Motion {
   void start(const Measured& measured, Beginning beginning) noexcept override;
   void start_run_out() noexcept override;
   bool prepare_freeing(const Command& command, const Measured& measured) noexcept override;
-  void set(const Change& change) noexcept override { parts_.world->set(change); }
+  void set(const Change& change) noexcept override;
   void set_period(double period_s) noexcept override;
 
   [[nodiscard]] Setpoints setpoints() const noexcept override {
@@ -82,6 +86,12 @@ class AdmittanceMotion final : public Motion {
 
   [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
   void make_limits(const MotionCycle& cycle) noexcept;
+  void make_sent_limits(StepStart start) noexcept;
+  void send_ahead() noexcept;
+  [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
+  // The horizon; none while the arm gets free, where nobody feels a mass.
+  [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
+  void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
   void let_force_in(CycleRecord& record) noexcept;
   [[nodiscard]] models::Wrench acting_wrench_W(const MotionCycle& cycle) noexcept;
@@ -109,6 +119,7 @@ class AdmittanceMotion final : public Motion {
   ReversedForce reversed_;
   StraightForce straight_;
   StepLimiter limiter_;
+  std::optional<SentPoint> sent_;  // none: the arm is sent to the proxy
   JointGuard guard_;
   ToolGuard tool_guard_;
   SetpointEnvelope envelope_;  // of a blocked joint: as it was before
@@ -116,6 +127,7 @@ class AdmittanceMotion final : public Motion {
 
   // Of this cycle.
   StepLimits step_limits_;
+  StepLimits sent_limits_;                    // around the point that the arm is sent to, with lookahead
   models::ToolKinematics filtered_;           // of the links as they are commanded, behind the filter
   models::InverseKinematicsResult solution_;  // for the proxy
 };

@@ -14,6 +14,7 @@ constexpr double arrived_m = 1e-5;
 SessionSettings plain(SessionSettings settings) {
   settings.damping_Ns_per_m = settings.spring_N_per_m = 0.0;
   settings.order = 1;
+  settings.looks_ahead = false;
   return settings;
 }
 

@@ -42,6 +42,14 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
 }
 
 template <int N>
+void AdmittanceProxy<N>::follow(const AdmittanceProxy& other) noexcept {
+  const ProxySolver<N> own = solve_;
+  *this = other;
+  solve_ = own;
+  if (solve_.timed()) solve_.g().set_time({time_s(), config_.period_s});
+}
+
+template <int N>
 ProxyFault AdmittanceProxy<N>::step(const V& h) noexcept {
   if (solve_.timed()) solve_.set_time(epoch_s_ + static_cast<double>(steps_ + 1) * config_.period_s);
   ProxyTrial<N> trial;

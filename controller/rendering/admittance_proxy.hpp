@@ -49,6 +49,9 @@ class AdmittanceProxy {
   // and nothing changes.
   bool start(const ProxyStart<N>& start) noexcept;
 
+  // The state of `other`, its parameters included, with this proxy's own 𝒢. Objects that move are told its time.
+  void follow(const AdmittanceProxy& other) noexcept;
+
   // One period under the measured force h(k). On a fault nothing has changed, and the step may be repeated.
   [[nodiscard]] ProxyFault step(const V& h) noexcept;
 

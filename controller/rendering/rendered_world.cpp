@@ -1,6 +1,7 @@
 #include "controller/rendering/rendered_world.hpp"
 
 #include "controller/limits/limited_algorithm.hpp"
+#include "controller/rendering/lookahead.hpp"
 #include "controller/rendering/scene_changes.hpp"
 #include "controller/rendering/scene_space.hpp"
 
@@ -16,13 +17,15 @@ constexpr double rounding_m = 1e-12;  // of positions of some metres, a few oper
 template <int N>
 class WorldOfDimension final : public RenderedWorld {
  public:
-  WorldOfDimension(scenes::CompiledScene& scene, const AdmittanceConfig& config)
+  WorldOfDimension(scenes::CompiledScene& scene, const AdmittanceConfig& config, bool looks_ahead)
       : scene_(&scene),
         changes_(scene, config.period_s),
         space_(scene),
         limited_(scene.algorithm<N>()),
         proxy_(config, limited_),
-        damping_Ns_per_m_(config.damping_Ns_per_m) {}
+        damping_Ns_per_m_(config.damping_Ns_per_m) {
+    if (looks_ahead) ahead_ = std::make_unique<Lookahead<N>>(*scene.source, config);
+  }
 
   void start(const Vec3& q_W) noexcept override {
     space_.start(q_W);
@@ -79,6 +82,12 @@ class WorldOfDimension final : public RenderedWorld {
     return last_;
   }
 
+  Vec3 look_ahead(const Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept override {
+    if (!ahead_) return last_.q_W;
+    const Vec<N> h = space_.basis().transpose() * h_W;
+    return space_.to_W((*ahead_)(proxy_, changes_, h, limits, space_.basis(), horizon_s));
+  }
+
   void set(const Change& change) noexcept override {
     switch (change.parameter) {
       case Parameter::mass:
@@ -94,6 +103,7 @@ class WorldOfDimension final : public RenderedWorld {
       case Parameter::position:
         changes_.set(change);
         break;
+      case Parameter::lookahead:
       case Parameter::none:
         break;
     }
@@ -120,6 +130,7 @@ class WorldOfDimension final : public RenderedWorld {
   SceneSpace<N> space_;
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
+  std::unique_ptr<Lookahead<N>> ahead_;  // none: looks no further than the proxy
   WorldStep last_;
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
   bool started_ = false;
@@ -137,11 +148,11 @@ std::unique_ptr<RenderedWorld> make_rendered_world(scenes::CompiledScene& scene,
   config.order = settings.order;
   switch (scene.dimensions()) {
     case 1:
-      return std::make_unique<WorldOfDimension<1>>(scene, config);
+      return std::make_unique<WorldOfDimension<1>>(scene, config, settings.looks_ahead);
     case 2:
-      return std::make_unique<WorldOfDimension<2>>(scene, config);
+      return std::make_unique<WorldOfDimension<2>>(scene, config, settings.looks_ahead);
     default:
-      return std::make_unique<WorldOfDimension<3>>(scene, config);
+      return std::make_unique<WorldOfDimension<3>>(scene, config, settings.looks_ahead);
   }
 }
 

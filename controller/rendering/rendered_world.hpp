@@ -64,6 +64,9 @@ class RenderedWorld {
   // One period under the hand's force, within these limits. q_W of the result is always finite; after a fault it is
   // that of the step before.
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
+  // Where the proxy will be `horizon_s` after its last step, which was of this force and within these limits, if the
+  // force stays (lookahead.hpp). The proxy itself, in a world that isn't made for looking ahead.
+  virtual models::Vec3 look_ahead(const models::Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept = 0;
   // The arm couldn't follow: the proxy goes on with this velocity from the place nearest to q_W that the scene's
   // objects let it reach. Returns that place.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;

@@ -94,14 +94,33 @@ void SceneChanges::archive(fieldbus::StateArchive& state) noexcept {
     if (!object.driven && !object.rubs) continue;
     state(object.friction, object.wanted_friction, object.position_m, object.before_m, object.wanted_m,
           object.speed_m_per_s);
-    if (!state.reading()) continue;
-    if (object.rubs && object.friction >= 0.0) scene_->set_friction(i, object.friction);
-    if (!object.driven || !object.before_m.allFinite() || !object.position_m.allFinite()) continue;
-    const Vec3 now_m = object.position_m;
-    drive(i, object.before_m);
-    drive(i, now_m);
+    if (state.reading()) tell_scene(i);
   }
   state(under_way_);
+}
+
+// Its friction, and its last two places, of which an obstacle takes its motion.
+void SceneChanges::tell_scene(std::size_t index) noexcept {
+  Object& object = objects_[index];
+  if (object.rubs && object.friction >= 0.0) scene_->set_friction(index, object.friction);
+  if (!object.driven || !object.before_m.allFinite() || !object.position_m.allFinite()) return;
+  const Vec3 now_m = object.position_m;
+  drive(index, object.before_m);
+  drive(index, now_m);
+}
+
+// A scene in which nothing has changed since the last time, and nothing is under way, has been told already.
+void SceneChanges::follow(const SceneChanges& other) noexcept {
+  const bool idle = !under_way_ && !other.under_way_;
+  period_s_ = other.period_s_;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const Object &from = other.objects_[i], &to = objects_[i];
+    const bool same =
+        idle && from.friction == to.friction && from.position_m == to.position_m && from.before_m == to.before_m;
+    objects_[i] = from;
+    if (!same && (from.driven || from.rubs)) tell_scene(i);
+  }
+  under_way_ = other.under_way_;
 }
 
 }  // namespace proxarm::controller

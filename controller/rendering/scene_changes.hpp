@@ -33,6 +33,9 @@ class SceneChanges {
   // Called before each step of the proxy.
   void step() noexcept;
 
+  // Goes on from where `other` is, in a scene of its own, compiled from the same file.
+  void follow(const SceneChanges& other) noexcept;
+
   // The present μ of an object, by its index in the scene; 0 where there is no such object.
   [[nodiscard]] double friction(std::int32_t object) const noexcept;
   // How far an object is now from where the scene describes it, m.
@@ -48,6 +51,7 @@ class SceneChanges {
     double speed_m_per_s = 0.0;
     bool driven = false, rubs = false;
   };
+  void tell_scene(std::size_t index) noexcept;
   bool rub(std::size_t index) noexcept;
   bool move(std::size_t index) noexcept;
   void drive(std::size_t index, const models::Vec3& position_m) noexcept;

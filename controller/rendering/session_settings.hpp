@@ -30,6 +30,8 @@ struct SessionSettings {
   double damping_Ns_per_m = 0.0;  // B, virtual damping against the world at rest
   double spring_N_per_m = 0.0;    // K_v, to the start position
   int order = 1;                  // 1: (26); 2: BDF2 (bdf2.hpp)
+  bool looks_ahead = false;       // the arm is sent to where the proxy is going to be (lookahead.hpp)
+  double horizon_s = 0.0;         // H, so far ahead
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
   double force_age_s = 0.0;  // how old the sensor's readings are when they come, for the passivity

@@ -329,6 +329,7 @@ Summary SummaryBuilder::finish() {
   }
   summary.setpoint_sha256 = s.hash.hex();
   summary.wanted_mass_kg = s.config.wanted_mass_kg;
+  summary.lookahead_s = s.config.lookahead_s;
   return summary;
 }
 

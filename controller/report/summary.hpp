@@ -54,6 +54,7 @@ struct SummaryConfig {
   double touch_s = 0.1;                      // how long a contact counts as a touch
   double settle_s = 0.5;                     // how long the arm may ring from it
   bool passivity = false;                    // observed
+  double lookahead_s = 0.0;                  // horizon at the start, which the delays above are without
   std::vector<std::string> axis_names = {};  // for limits of single joints
 };
 
@@ -143,6 +144,7 @@ struct Summary {
   std::uint64_t limited_cycles = 0;                    // some limit was active
   std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
+  double lookahead_s = 0.0;               // horizon at the start; 0: none
   double hands_off_s = 0.0;               // nobody held the handle
   std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor
   EndSummary end;                         // set by the caller

@@ -100,6 +100,7 @@ void add_repeatable(Json& json, const Summary& s) {
   json["limited_cycles"] = s.limited_cycles;
   json["active_limits"] = Json::object();
   for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
+  json["lookahead_s"] = s.lookahead_s;
   json["passivity"] = passivity(s.passivity);
   json["hands_off_s"] = s.hands_off_s;
   json["held_samples"] = s.held_samples;
@@ -225,6 +226,8 @@ void tell_motion(const Summary& s, Lines& line) {
            (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own") +
            (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : "") +
            (s.limited_cycles > 0 ? "; where no limit acts" : ""));
+  if (s.lookahead_s > 0.0)
+    line("lookahead", format("%.3g ms: the arm is sent to where the proxy will be", 1e3 * s.lookahead_s));
   line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m));
   if (s.contacts == 0) {
     line("contact", s.proxy_clearance_min_m

@@ -58,13 +58,19 @@ struct Loop {
 Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   const double T = loop.period_s, B = loop.damping_Ns_per_m;
   const double beta = loop.drive_time_constant_s > 0.0 ? std::exp(-T / loop.drive_time_constant_s) : 0.0;
-  const Polynomial difference{1.0, -1.0}, lag{1.0, -beta};
+  const double pole = loop.filter_s > 0.0 ? std::exp(-T / loop.filter_s) : 0.0;
+  const Polynomial difference{1.0, -1.0}, one_lag{1.0, -pole};
+  const Polynomial lag = Polynomial{1.0, -beta} * (one_lag * one_lag);
+  const double delay_s = std::max(0.0, loop.delay_s - 2.0 * loop.filter_s);
   const Polynomial derivative = loop.order == 2 ? Polynomial{1.5, -2.0, 0.5} : difference;  // times T
   const Polynomial damper = loop.explicit_damping ? Polynomial{0.0, 1.0} * difference : derivative;
   const double m = hand.mass_kg + loop.handle_mass_kg;
   const Polynomial grip = Polynomial{hand.stiffness_N_per_m * T * T} + hand.damping_Ns_per_m * T * difference +
                           m * (difference * difference);
-  Polynomial force = (1.0 - beta) * (delay(1.0 + loop.delay_s / T) * grip);
+  Polynomial force = (1.0 - beta) * (1.0 - pole) * (1.0 - pole) * (delay(1.0 + delay_s / T) * grip);
+  if (loop.horizon_s > 0.0) {
+    force = (Polynomial{1.0} + loop.horizon_s / T * difference) * force;
+  }
   if (loop.order == 2 && loop.matched_labels) force = Polynomial{2.0, -1.0} * force;
   return {lag * (derivative * derivative), lag * (B * T * damper + Polynomial{loop.spring_N_per_m * T * T}) + force};
 }
@@ -169,6 +175,43 @@ std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopMode
     smallest = above = edge;
   }
   return smallest;
+}
+
+bool with_margins(const HandModel& hand, const LoopModel& loop,
+                  const std::function<bool(const HandModel&, const LoopModel&)>& holds) {
+  for (const double stiffer : {1.0, hand_margin}) {
+    for (const double heavier : {1.0, hand_margin}) {
+      for (const double later : {1.0, delay_margin}) {
+        HandModel other = hand;
+        other.stiffness_N_per_m *= stiffer;
+        other.mass_kg *= heavier;
+        LoopModel slower = loop;
+        slower.delay_s *= later;
+        if (!holds(other, slower)) return false;
+      }
+    }
+  }
+  return true;
+}
+
+double stable_horizon_s(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
+  if (!(proxy_mass_kg > 0.0)) return 0.0;
+  const auto stable = [proxy_mass_kg](const HandModel& other, const LoopModel& loop) {
+    return spectral_radius(other, loop, proxy_mass_kg) < 1.0;
+  };
+  LoopModel loop = model;
+  const double T = loop.period_s;
+  constexpr double lightest_hand_kg = 1.0;
+  const double heavy =
+      (proxy_mass_kg + model.handle_mass_kg) / (auto_mass_ratio * std::max(hand.mass_kg, lightest_hand_kg));
+  const double most_s = auto_share * std::min(1.0, heavy) * (T + loop.delay_s + loop.drive_time_constant_s);
+  double longest_s = 0.0;
+  for (int steps = 0; steps * T <= most_s; ++steps) {
+    loop.horizon_s = steps * T;
+    if (!with_margins(hand, loop, stable)) break;
+    longest_s = loop.horizon_s;
+  }
+  return longest_s;
 }
 
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable) {

@@ -12,6 +12,10 @@
 // weighted mean of both. What moves after the force sensor (the handle, the hand) belongs to m_h: the sensor doesn't
 // see it push.
 //
+// With lookahead (rendering/lookahead.hpp) the drives are sent to where the proxy will be s = H/T steps on, if it
+// coasts: q + s(q − q₁), which is P q with P(w) = 1 + s(1−w). P multiplies the term with (1−β). B and K_v change that
+// point by their share of the acceleration within H alone, and are left out there.
+//
 // C is linear in M (D-decomposition): C = M X + Y. The masses at which a root lies on the unit circle follow from a
 // sweep over θ, w = exp(−jθ): those where M(θ) = −Y/X is real and positive. Between two neighbours of them stability
 // doesn't change, which makes "the smallest mass above which all are stable" exact, also where the stable masses are
@@ -20,6 +24,7 @@
 // For set-up: takes some hundred microseconds, allocates, never runs in the cycle.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 namespace proxarm::controller {
@@ -41,6 +46,11 @@ struct LoopModel {
   bool explicit_damping = false;       // −B(q₁ − q₂)/T instead of the implicit damping; order 1, for comparison
   int order = 1;
   bool matched_labels = false;
+  double horizon_s = 0.0;  // H ≥ 0 of the lookahead
+  // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s: for the choice of a horizon, where the filter
+  // counts as the two lags that it is. What looks ahead makes up for their phase; as a pure delay they would seem
+  // worse.
+  double filter_s = 0.0;
 };
 
 // The largest |z|; the loop is stable below 1. M is the proxy's (felt mass less the handle's), > 0.
@@ -49,6 +59,22 @@ double spectral_radius(const HandModel& hand, const LoopModel& loop, double prox
 // The proxy's mass above which every mass up to max_mass_kg is stable (itself the boundary); nothing when max_mass_kg
 // isn't stable. At least 1e-6 kg.
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& loop, double max_mass_kg = 1000.0);
+
+// The loops and hands that an advice holds for: the hand as described and one that is 1.5 times as stiff, and as heavy,
+// and the delay as it is and 1.2 times as long.
+inline constexpr double hand_margin = 1.5, delay_margin = 1.2;
+// Whether `holds`, of a hand and a loop, is true of all of these.
+bool with_margins(const HandModel& hand, const LoopModel& loop,
+                  const std::function<bool(const HandModel&, const LoopModel&)>& holds);
+
+// The horizon that `--lookahead auto` takes for this mass, in whole periods: the longest at which, and at all shorter
+// ones, the loop is stable with the margins above; at most `auto_share` of the loop's delay, since beyond the felt mass
+// gets worse again. The model has no elastic gears, which a long horizon sets ringing where the hand is heavy: below
+// `auto_mass_ratio` times the hand's mass (1 kg at least) the horizon shrinks with the mass, as found by simulation
+// with hands of 0.3 and 2 kg, 100 to 3000 N/m, and gears of 0.7 to 1.4 times the stiffness that is believed. 0 where
+// the loop without lookahead has no such margins: what is left of them then isn't spent.
+inline constexpr double auto_share = 0.85, auto_mass_ratio = 10.0;
+double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
 // What --mass must pass: throws description::SetupError that names the smallest felt mass (proxy and handle) that is
 // stable, rounded up to two digits, or what else would help where no mass does; also for a mass at or below the

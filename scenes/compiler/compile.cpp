@@ -330,6 +330,7 @@ Algorithm<N> build(const Scene& scene, CompiledScene& out) {
 CompiledScene compile(const Scene& scene) {
   CompiledScene out;
   out.name = scene.name;
+  out.source = std::make_shared<const Scene>(scene);
   // Three dimensions are all of W, in its own coordinates.
   if (scene.space.dimensions < 3) out.space = scene.space;
   for (const Object& object : scene.objects) out.frictions.push_back(object.friction);

@@ -26,7 +26,8 @@ struct CompiledScene {
 
   std::string name;
   Space space;
-  Plan plan;  // what it was built from
+  Plan plan;                            // what it was built from
+  std::shared_ptr<const Scene> source;  // to be compiled again, for another proxy
   std::variant<Algorithm<1>, Algorithm<2>, Algorithm<3>> any_algorithm;
 
   [[nodiscard]] int dimensions() const noexcept { return space.dimensions; }

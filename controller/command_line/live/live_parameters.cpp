@@ -28,6 +28,9 @@ struct Live {
   double (*parse)(std::string_view text, std::string_view option);
 };
 
+// A time, or a word that choose_horizon() makes one of.
+bool is_lookahead(const std::string& text) { return text.compare(0, 10, "lookahead=") == 0; }
+
 constexpr Live live[] = {{"mass", Parameter::mass, description::parse_mass},
                          {"damping", Parameter::damping, description::parse_damping},
                          {"spring", Parameter::spring, description::parse_stiffness}};
@@ -42,7 +45,7 @@ const Live& find(const std::string& text) {
   throw SetupError({.key = "--set",
                     .found = description::in_quotes(text),
                     .expected = "NAME=VALUE with NAME " + description::one_of(known) +
-                                ", timestep, OBJECT.friction, OBJECT.position_m"});
+                                ", lookahead, timestep, OBJECT.friction, OBJECT.position_m"});
 }
 
 [[noreturn]] void refuse(const std::string& key, const std::string& found, const std::string& expected,
@@ -140,13 +143,14 @@ controller::Timestep LiveParameters::take_timestep(const std::string& text) {
   }
   session_ = std::move(changed);
   const controller::SessionSettings& settings = session_.settings;
-  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples};
+  return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples, settings.horizon_s};
 }
 
 bool LiveParameters::is_timestep(const std::string& text) { return text.compare(0, 9, "timestep=") == 0; }
 
 controller::Change LiveParameters::take(const std::string& text) {
   if (const std::optional<Change> change = change_of_object(text, session_.scene)) return *change;
+  if (is_lookahead(text)) return take_lookahead(text);
   const Live& parameter = find(text);
   const double value = parameter.parse(text.substr(text.find('=') + 1), parameter.name);
   PreparedSession changed = session_;
@@ -162,15 +166,36 @@ controller::Change LiveParameters::take(const std::string& text) {
       break;
     case Parameter::friction:
     case Parameter::position:
+    case Parameter::lookahead:
     case Parameter::none:
       break;
   }
+  choose_horizon(changed);
   RunOptions judged = options_;
   judged.mass_kg = changed.settings.mass_kg;  // so that the message names it
   require_stable(changed, judged);
   session_ = std::move(changed);
   const double handle_kg = parameter.parameter == Parameter::mass ? session_.cell.tool.mass_kg : 0.0;
-  return {.parameter = parameter.parameter, .value = value - handle_kg, .period_s = session_.settings.period_s};
+  return {.parameter = parameter.parameter,
+          .value = value - handle_kg,
+          .period_s = session_.settings.period_s,
+          .horizon_s = session_.settings.horizon_s};
+}
+
+controller::Change LiveParameters::take_lookahead(const std::string& text) {
+  if (!session_.settings.looks_ahead) {
+    refuse("lookahead", "a session without lookahead", "one that was started with --lookahead auto or a time",
+           "start a new session with --lookahead");
+  }
+  PreparedSession changed = session_;
+  changed.lookahead = LookaheadChoice::parse(std::string_view(text).substr(text.find('=') + 1), "lookahead");
+  choose_horizon(changed);
+  RunOptions judged = options_;
+  judged.mass_kg = changed.settings.mass_kg;
+  require_stable(changed, judged);
+  session_ = std::move(changed);
+  return {
+      .parameter = Parameter::lookahead, .value = session_.settings.horizon_s, .period_s = session_.settings.period_s};
 }
 
 namespace {

@@ -23,6 +23,7 @@ class LiveParameters {
 
   // Throws SetupError.
   controller::Change take(const std::string& text);
+  controller::Change take_lookahead(const std::string& text);
   // "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);
   // Judged by what the start judges it by, as far as it depends on T. Throws SetupError.

@@ -215,6 +215,12 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                                  .expected = "off: it has no proxy with a mass to be damped"});
 }
 
+[[noreturn]] void refuse_lookahead() {
+  throw description::SetupError({.key = "--lookahead",
+                                 .found = "the impedance type",
+                                 .expected = "off: its tool isn't sent anywhere, and follows the hand without delay"});
+}
+
 // What the profile asks for is in the cell's file; what an option could take away again isn't left out.
 void require_profile(const PreparedSession& session) {
   if (session.cell.profile != description::Profile::hand_guiding) return;
@@ -225,6 +231,27 @@ void require_profile(const PreparedSession& session) {
 }
 
 }  // namespace
+
+controller::HandModel hand_model(const PreparedSession& session) {
+  const description::Grip grip = description::tightest_grip(session.hand);
+  return {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
+}
+
+double longest_horizon_s(const PreparedSession& session) {
+  const double proxy_kg = session.settings.mass_kg - session.loop.handle_mass_kg;
+  controller::LoopModel loop = session.loop;
+  loop.horizon_s = 0.0;
+  loop.filter_s = 0.5 * setpoint_filter_delay_s(session.cell);
+  return controller::stable_horizon_s(hand_model(session), loop, proxy_kg);
+}
+
+void choose_horizon(PreparedSession& session) {
+  using Kind = LookaheadChoice::Kind;
+  double horizon_s = session.lookahead.kind == Kind::fixed ? session.lookahead.horizon_s : 0.0;
+  session.loop.horizon_s = 0.0;
+  if (session.lookahead.kind == Kind::automatic) horizon_s = longest_horizon_s(session);
+  session.settings.horizon_s = session.loop.horizon_s = horizon_s;
+}
 
 PreparedSession prepare(const RunOptions& options) {
   constexpr double week_s = 604800.0;
@@ -255,19 +282,27 @@ PreparedSession prepare(const RunOptions& options) {
   require_profile(session);
 
   session.loop.delay_s = loop_delay_s(session);
-  if (session.impedance()) return session;
+  session.lookahead = options.lookahead.value_or(LookaheadChoice{});
+  if (session.impedance()) {
+    if (options.lookahead && session.lookahead.kind != LookaheadChoice::Kind::off) refuse_lookahead();
+    session.lookahead = {};
+    return session;
+  }
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
   session.loop.handle_mass_kg = session.cell.tool.mass_kg;
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
   session.settings.force_age_s = session.cell.sensor.delay_s;
+  session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
+  choose_horizon(session);
   return session;
 }
 
 PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s) {
   set_timestep(session, options, period_s);
   session.loop.delay_s = loop_delay_s(session);
+  if (!session.impedance()) choose_horizon(session);
   return session;
 }
 
@@ -283,23 +318,38 @@ void require_mass_in_range(const PreparedSession& session, const RunOptions& opt
                                  .found = description::number_text(mass_kg) + " kg",
                                  .expected = "at most " + description::number_text(heaviest_kg) + " kg"});
 }
+
+// A horizon that was asked for is held against what `auto` would take.
+void require_stable_horizon(const PreparedSession& session) {
+  if (session.lookahead.kind != LookaheadChoice::Kind::fixed) return;
+  const double longest_s = longest_horizon_s(session);
+  if (session.settings.horizon_s <= longest_s) return;
+  std::array<char, 80> found{}, expected{};
+  std::snprintf(found.data(), found.size(), "%.4g ms with %.4g kg", 1e3 * session.settings.horizon_s,
+                session.settings.mass_kg);
+  std::snprintf(expected.data(), expected.size(), "at most %.4g ms, which is stable with margins", 1e3 * longest_s);
+  throw description::SetupError({.key = "--lookahead",
+                                 .found = found.data(),
+                                 .expected = expected.data(),
+                                 .advice = "--lookahead auto, or a larger --mass (--force-unstable overrides, in "
+                                           "simulation)"});
+}
+
 }  // namespace
 
 void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (session.impedance()) return require_stable_coupling(session);
   require_mass_in_range(session, options);
-  controller::HandModel hand;
-  const description::Grip grip = description::tightest_grip(session.hand);
-  hand.stiffness_N_per_m = grip.stiffness_N_per_m;
-  hand.damping_Ns_per_m = grip.damping_Ns_per_m;
-  hand.mass_kg = session.hand.mass_kg;
   if (options.force_unstable && !options.bus.simulated()) {
     throw description::SetupError({.key = "--force-unstable",
                                    .found = "a bus that isn't simulated",
                                    .expected = "--bus sim: an unstable mass is for simulation only"});
   }
   try {
-    controller::require_stable_mass(session.settings.mass_kg, hand, session.loop, options.force_unstable);
+    // Without lookahead first, so that it never makes a mass pass that wouldn't without.
+    controller::LoopModel loop = session.loop;
+    loop.horizon_s = 0.0;
+    controller::require_stable_mass(session.settings.mass_kg, hand_model(session), loop, options.force_unstable);
   } catch (const description::SetupError& error) {
     if (options.mass_kg) throw;
     description::SetupProblem problem = error.problem();
@@ -307,6 +357,7 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
     problem.key = "default_mass_kg";
     throw description::SetupError(problem);
   }
+  if (!options.force_unstable) require_stable_horizon(session);
 }
 
 double motion_delay_s(const PreparedSession& session) {

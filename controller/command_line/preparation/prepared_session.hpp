@@ -19,10 +19,20 @@ struct PreparedSession {
   scenes::Scene scene;
   controller::SessionSettings settings;
   double duration_s = 10.0;
+  LookaheadChoice lookahead;   // what was asked for; settings.horizon_s is what came of it
   controller::LoopModel loop;  // how the controller expects the closed loop to behave
 
   [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
+
+// The hand at its tightest grip, as the stability check takes it.
+controller::HandModel hand_model(const PreparedSession& session);
+
+// The longest horizon of a lookahead that is stable with margins for the session's mass and loop.
+double longest_horizon_s(const PreparedSession& session);
+
+// The lookahead's horizon for the session's mass and loop. To be called when one of them has changed.
+void choose_horizon(PreparedSession& session);
 
 // Throws SetupError. Opens no bus and starts nothing.
 PreparedSession prepare(const RunOptions& options);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <sstream>
 
+#include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -19,6 +21,26 @@ std::string join(const std::vector<std::string>& names) {
 }
 
 }  // namespace
+
+LookaheadChoice LookaheadChoice::parse(std::string_view text, std::string_view option) {
+  if (text == "off") return {};
+  if (text == "auto") return {Kind::automatic, 0.0};
+  // Beyond, a hand would feel its own push answered before it has made up its mind.
+  constexpr double longest_s = 0.1;
+  const auto refuse = [&] {
+    throw description::SetupError({.key = std::string(option),
+                                   .found = description::in_quotes(std::string(text)),
+                                   .expected = "auto, off, or a time of at most 100 ms, such as 8ms"});
+  };
+  double horizon_s = 0.0;
+  try {
+    horizon_s = description::parse_duration(text, option);
+  } catch (const description::SetupError&) {
+    refuse();
+  }
+  if (!(horizon_s >= 0.0 && horizon_s <= longest_s)) refuse();
+  return horizon_s > 0.0 ? LookaheadChoice{Kind::fixed, horizon_s} : LookaheadChoice{};
+}
 
 BusMapping BusMapping::parse(const std::string& text) {
   BusMapping mapping;

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/rendering/session_settings.hpp"
@@ -15,6 +16,15 @@
 namespace proxarm::command_line {
 
 enum class Pace : std::uint8_t { virtual_time, realtime };
+
+// How far ahead of the proxy the arm is sent (rendering/lookahead.hpp).
+struct LookaheadChoice {
+  enum class Kind : std::uint8_t { off, automatic, fixed } kind = Kind::off;
+  double horizon_s = 0.0;  // fixed
+
+  // "auto", "off" or a time with its unit. Throws SetupError that names `option`.
+  static LookaheadChoice parse(std::string_view text, std::string_view option);
+};
 
 // Which interface carries each bus of the cell. Empty: all of them in-process.
 class BusMapping {
@@ -42,6 +52,7 @@ struct RunOptions {
   std::optional<controller::Scheme> scheme;        // unset: what the drives' modes say
   std::optional<controller::Passivity> passivity;  // unset: the cell's
   std::optional<double> stiffness_N_per_m;         // impedance type
+  std::optional<LookaheadChoice> lookahead;        // unset: off
   controller::SessionSettings settings;            // all that isn't optional above
   BusMapping bus;
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -36,8 +37,11 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
   if (!session.impedance()) config.handle_mass_kg = session.cell.tool.mass_kg;
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
-  config.setpoint_filter_s = motion_delay_s(session) - 2.0 * session.settings.period_s;
-  config.setpoint_delay_cycles = static_cast<int>(std::lround(motion_delay_s(session) / session.settings.period_s));
+  // What is looked ahead isn't behind.
+  config.lookahead_s = session.settings.horizon_s;
+  config.setpoint_filter_s = motion_delay_s(session) - 2.0 * session.settings.period_s - session.settings.horizon_s;
+  const double behind_s = std::max(0.0, motion_delay_s(session) - session.settings.horizon_s);
+  config.setpoint_delay_cycles = static_cast<int>(std::lround(behind_s / session.settings.period_s));
   config.passivity = session.settings.passivity != controller::Passivity::off;
   config.axis_names = joint_names(session.cell);
   return config;

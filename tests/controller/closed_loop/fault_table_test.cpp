@@ -40,6 +40,9 @@ class WrongWorld final : public RenderedWorld {
     if (++steps_ > 1300) spoil_(step);
     return step;
   }
+  models::Vec3 look_ahead(const models::Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept override {
+    return inner_->look_ahead(h_W, limits, horizon_s);
+  }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override {
     return inner_->resume(q_W, v_W);
   }

@@ -1,0 +1,96 @@
+#include "controller/limits/sent_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace proxarm::controller {
+
+using models::Vec3;
+
+namespace {
+
+constexpr double tolerance_m = 1e-11;  // 10 nm/s at 1 kHz, as in limited_algorithm.hpp
+constexpr int most_sweeps = 300;       // of Dykstra's algorithm, where the sets have hardly a point in common
+
+}  // namespace
+
+SentPoint::SentPoint(const description::CellLimits& limits, double horizon_s, double period_s)
+    : omega_rad_per_s_(2.0 * std::numbers::pi * limits.setpoint_bandwidth_Hz) {
+  set_period(period_s);
+  want(horizon_s);
+  state_.horizon_s = state_.wanted_s;
+}
+
+void SentPoint::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  decay_ = std::exp(-omega_rad_per_s_ * period_s);
+  fading_ = std::exp(-period_s / fading_s);
+}
+
+void SentPoint::want(double horizon_s) noexcept {
+  if (std::isfinite(horizon_s) && horizon_s >= 0.0) state_.wanted_s = horizon_s;
+}
+
+void SentPoint::start(const Vec3& q_W) noexcept {
+  state_.c_k1_W = state_.c_k2_W = q_W;
+  state_.beside_W.setZero();
+  state_.changes = false;
+  start_filter(q_W, Vec3::Zero());
+}
+
+Vec3 SentPoint::resume(const Vec3& c_W, const Vec3& velocity_W, double ahead_s) noexcept {
+  state_.c_k1_W = c_W;
+  state_.c_k2_W = c_W - period_s_ * velocity_W;
+  state_.beside_W.setZero();
+  state_.changes = false;
+  const Vec3 q_W = c_W - ahead_s * velocity_W;
+  start_filter(q_W, velocity_W);
+  return q_W;
+}
+
+void SentPoint::advance_horizon() noexcept {
+  const double most_s = horizon_rate * period_s_;
+  state_.horizon_s += std::clamp(state_.wanted_s - state_.horizon_s, -most_s, most_s);
+}
+
+void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits& limits) noexcept {
+  filter(q_W);
+  const Vec3 coasting_W = 2.0 * state_.c_k1_W - state_.c_k2_W;
+  state_.beside_W = state_.changes ? Vec3(coasting_W - predicted_W) : Vec3(fading_ * state_.beside_W);
+  state_.changes = false;
+  Vec3 way = predicted_W + state_.beside_W - state_.c_k1_W;
+  sets_.set(limits, models::Mat3::Identity());
+  active_ = {};
+  if (!sets_.contains(way, tolerance_m, true)) {
+    int sweeps = most_sweeps;
+    auto nearest = sets_.nearest(way, true, sweeps);
+    if (!sets_.contains(nearest.x, 1e-9, true)) {  // leash and power give way
+      sweeps = most_sweeps;
+      nearest = sets_.nearest(way, false, sweeps);
+    }
+    active_ = nearest.active;
+    way = sets_.contains(nearest.x, 1e-9, false) ? nearest.x : sets_.draw_back(nearest.x, false);
+  }
+  state_.c_k2_W = state_.c_k1_W;
+  state_.c_k1_W += way;
+}
+
+// So that it has come to q_W at this velocity: 2/ω behind it.
+void SentPoint::start_filter(const Vec3& q_W, const Vec3& velocity_W) noexcept {
+  state_.v_W = velocity_W;
+  state_.x_W = q_W;
+  if (omega_rad_per_s_ > 0.0) state_.x_W -= 2.0 / omega_rad_per_s_ * velocity_W;
+}
+
+// As ElasticSetpoint::step() has it for the links' angles.
+void SentPoint::filter(const Vec3& q_W) noexcept {
+  if (!(omega_rad_per_s_ > 0.0)) return;
+  const double omega = omega_rad_per_s_, T = period_s_;
+  const Vec3 e = state_.x_W - q_W;
+  const Vec3 c = state_.v_W + omega * e;
+  state_.x_W = q_W + decay_ * (e + T * c);
+  state_.v_W = decay_ * (state_.v_W - omega * T * c);
+}
+
+}  // namespace proxarm::controller
