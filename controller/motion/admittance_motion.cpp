@@ -154,6 +154,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
   advance_proxy(step.q_W);
+  if (step.settled) state_.q_k2_W = state_.q_k1_W;
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
   if (passivity_) record_passivity(step, cycle.record);
