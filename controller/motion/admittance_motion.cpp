@@ -303,6 +303,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   state_.link_rad = solution_.q;
   if (solution_.status != models::InverseKinematicsResult::Status::converged) {
     active_.set(Limit::singularity);
+    tool_guard_.strain();
     shorten_step(link_k1_rad, reached_k1_W);
     const Vec3& reached_W = solution_.kinematics.X_WT.translation();
     state_.q_k2_W = state_.q_k1_W = world().resume(reached_W, (reached_W - reached_k1_W) / period_s_);
@@ -354,6 +355,7 @@ void AdmittanceMotion::move_motors(const JointVector& motor_rad, const Measured&
   JointVector wanted_rad = motor_rad;
   const std::uint8_t blocked = find_blocked(motor_rad, measured, wanted_rad);
   const bool held_back = make_final(wanted_rad, state_.speed_limit_m_per_s);
+  if (blocked != 0) tool_guard_.relax();
   follow_setpoints(measured, blocked);
   made_setpoints_ = true;
   if (held_back || blocked != 0 || guard_.lag_rad() > limits_.following_error_rad) wind_back(blocked);

@@ -221,6 +221,8 @@ DriveDescription read_drive(const YamlNode& node) {
     if (!d.on_can()) throw node.error_at("mode", "csp: a drive on Modbus takes positions");
     d.rated_torque_Nm = node.number("rated_torque_Nm", above(0.0, 1e5));
     d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 10.0 * d.rated_torque_Nm));
+  } else if (node.has("max_torque_Nm")) {
+    d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
   }
   if (d.on_can()) {
     if (node.has("eds")) d.eds = node.existing_file("eds").string();
