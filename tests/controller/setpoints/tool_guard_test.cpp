@@ -271,8 +271,6 @@ TEST(ToolGuard, LetsAToolThatStandsOutsideComeInAndNotGoFurtherOut) {
   const models::Arm arm(cell);
   const double x = arm.tool_pose(arm.link_from_motor(theta)).translation().x();
   cell.limits.workspace_max_m[0] = x - 0.01;
-  // Where torques are known, a motion that jumps comes in more slowly: here the border is asked for alone.
-  for (description::DriveDescription& drive : cell.drives) drive.max_torque_Nm = 0.0;
   Guarded guarded(cell, 1e-3, theta);
   for (int k = 0; k < 300; ++k) {
     JointVector wanted = guarded.theta;

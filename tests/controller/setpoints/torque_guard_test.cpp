@@ -21,7 +21,12 @@ using tests::Random;
 
 constexpr double T = 1e-3;
 
-description::Cell default_cell() { return description::load_cell(source_file("models/cells/default.yaml")); }
+// With ratings as its simulated drives have them.
+description::Cell default_cell() {
+  description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  for (description::DriveDescription& drive : cell.drives) drive.max_torque_Nm = drive.simulation.max_torque_Nm;
+  return cell;
+}
 
 // Both guards, as the motion has them.
 struct Guards {
