@@ -176,6 +176,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
   advance_proxy(step.q_W);
+  if (step.settled) state_.q_k2_W = state_.q_k1_W;
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
   if (passivity_) record_passivity(step, cycle.record);
@@ -356,6 +357,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   state_.link_rad = solution_.q;
   if (solution_.status != models::InverseKinematicsResult::Status::converged) {
     active_.set(Limit::singularity);
+    tool_guard_.strain();
     shorten_step(link_k1_rad, reached_k1_W);
     const Vec3& reached_W = solution_.kinematics.X_WT.translation();
     go_on_from(reached_W, (reached_W - reached_k1_W) / period_s_);
@@ -406,6 +408,7 @@ void AdmittanceMotion::move_motors(const JointVector& motor_rad, const Measured&
   JointVector wanted_rad = motor_rad;
   const std::uint8_t blocked = find_blocked(motor_rad, measured, wanted_rad);
   const bool held_back = make_final(wanted_rad, state_.speed_limit_m_per_s);
+  if (blocked != 0) tool_guard_.relax();
   follow_setpoints(measured, blocked);
   made_setpoints_ = true;
   if (held_back || blocked != 0 || guard_.lag_rad() > limits_.following_error_rad) wind_back(blocked);

@@ -1,5 +1,8 @@
 #include "controller/rendering/rendered_world.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "controller/limits/limited_algorithm.hpp"
 #include "controller/rendering/lookahead.hpp"
 #include "controller/rendering/scene_changes.hpp"
@@ -13,6 +16,47 @@ using models::Vec3;
 namespace {
 
 constexpr double rounding_m = 1e-12;  // of positions of some metres, a few operations
+
+// Where the spring of (26) pulls to: the start position, but for a while after the spring has become stiffer.
+//
+// With q the proxy and a the anchor, K'(a' − q) = K(a − q) is the a' that leaves the force as it was when K becomes K';
+// without a spring before it is q itself. From there the anchor goes back, as a driven object goes to its place:
+//   v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: the distance that is left
+// A mass on an undamped spring swings about an anchor of constant speed v by v at most, and about one that stops by the
+// 2v that it may then have: nobody at the handle, and the proxy does 2 v_max = 0.1 m/s at most. A spring that becomes
+// softer throws nobody: its anchor stays.
+template <int N>
+class SpringAnchor {
+ public:
+  using V = Vec<N>;
+  static constexpr double speed_m_per_s = 0.05, acceleration_m_per_s2 = 0.5;
+
+  void start(const V& home) noexcept {
+    home_ = at_ = home;
+    speed_ = 0.0;
+  }
+  void stiffen(double K, double K_before, const V& q) noexcept {
+    if (!(K > K_before) || q == at_) return;
+    at_ = q - K_before / K * (q - at_);
+    speed_ = 0.0;
+  }
+  // One period. True: it has moved.
+  bool step(double period_s) noexcept {
+    const V way = home_ - at_;
+    const double distance_m = way.norm(), a = acceleration_m_per_s2;
+    if (distance_m == 0.0) return false;
+    speed_ = std::min({speed_ + a * period_s, speed_m_per_s, std::sqrt(2.0 * a * distance_m)});
+    const double step_m = speed_ * period_s;
+    at_ = step_m >= distance_m ? home_ : V(at_ + step_m / distance_m * way);
+    return true;
+  }
+  [[nodiscard]] const V& at() const noexcept { return at_; }
+  void archive(fieldbus::StateArchive& state) noexcept { state(home_, at_, speed_); }
+
+ private:
+  V home_ = V::Zero(), at_ = V::Zero();
+  double speed_ = 0.0;
+};
 
 template <int N>
 class WorldOfDimension final : public RenderedWorld {
@@ -35,7 +79,8 @@ class WorldOfDimension final : public RenderedWorld {
     if (started_) start.time_s = proxy_.time_s() + lead_s();
     started_ = true;
     proxy_.start(start);
-    proxy_.set_reference(start.q);
+    anchor_.start(start.q);
+    unsettled_ = true;
     last_ = {};
     last_.q_W = last_.p_hat_W = q_W;
   }
@@ -52,33 +97,24 @@ class WorldOfDimension final : public RenderedWorld {
     start.v = v;
     start.time_s = proxy_.time_s() + lead_s();
     proxy_.start(start);
-    proxy_.set_reference(space_.start());
+    proxy_.set_reference(anchor_.at());
+    unsettled_ = false;
     last_.q_W = space_.to_W(start.q);
     return last_.q_W;
   }
 
   WorldStep step(const Vec3& h_W, const StepLimits& limits) noexcept override {
     changes_.step();
+    if (anchor_.step(proxy_.config().period_s)) proxy_.set_reference(anchor_.at());
     limited_.set_limits(limits, space_.basis(), proxy_.q());
+    if (unsettled_ && settle()) return last_;
     ProxyFault fault = proxy_.step(space_.basis().transpose() * h_W);
     if (fault == ProxyFault::none && limited_.squeezed()) fault = ProxyFault::squeezed;
     if (fault != ProxyFault::none) {
       last_.fault = fault;
       return last_;
     }
-    last_ = {};
-    last_.q_W = space_.to_W(proxy_.q());
-    last_.p_hat_W = space_.to_W(proxy_.p_hat());
-    last_.limit_force_W = space_.basis() * (proxy_.kappa_N_per_m() * limited_.limit_shift());
-    last_.f_W = space_.basis() * proxy_.f();
-    last_.limits = limited_.active();
-    if (last_.limits.kinds != 0) last_.f_W -= last_.limit_force_W;
-    last_.soft_limits_met = limited_.soft_limits_met();
-    last_.v_W = space_.basis() * proxy_.velocity();
-    last_.mass_kg = proxy_.config().mass_kg;
-    last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
-    add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
-    last_.friction = changes_.friction(last_.object);
+    take_last();
     return last_;
   }
 
@@ -97,7 +133,7 @@ class WorldOfDimension final : public RenderedWorld {
         if (proxy_.set_damping(change.value + added_Ns_per_m_)) damping_Ns_per_m_ = change.value;
         break;
       case Parameter::spring:
-        proxy_.set_spring(change.value);
+        set_spring(change.value);
         break;
       case Parameter::friction:
       case Parameter::position:
@@ -119,11 +155,54 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   void archive(fieldbus::StateArchive& state) noexcept override {
-    state(proxy_, space_, changes_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_, started_);
+    state(proxy_, space_, changes_, anchor_, last_.q_W, damping_Ns_per_m_, added_Ns_per_m_, started_, unsettled_);
   }
 
  private:
   [[nodiscard]] double lead_s() const noexcept { return proxy_.config().order == 2 ? proxy_.config().period_s : 0.0; }
+
+  // A start that the scene doesn't let be, some micrometres off a guide or inside of a wall, is left at rest: 𝒢 of the
+  // place itself is where the proxy starts, with q(k−2) = q(k−1). As a step of (26) the same way would be a velocity,
+  // 21 µm in a millisecond. False: there was nothing to settle. What limits don't let go in one step takes several.
+  bool settle() noexcept {
+    unsettled_ = false;
+    const Vec<N> before = proxy_.q();
+    const double next_s = proxy_.time_s() + proxy_.config().period_s;
+    if (limited_.wants_time()) limited_.set_time({next_s, proxy_.config().period_s});
+    ProxyStart<N> start;
+    start.q = limited_(proxy_.kappa_N_per_m(), before, before);
+    start.time_s = next_s + lead_s();
+    if (!((start.q - before).norm() > rounding_m) || limited_.squeezed() || !proxy_.start(start)) return false;
+    unsettled_ = limited_.active().kinds != 0;
+    proxy_.set_reference(anchor_.at());
+    take_last();
+    last_.f_W = last_.limit_force_W = Vec3::Zero();
+    last_.settled = true;
+    return true;
+  }
+
+  void take_last() noexcept {
+    last_ = {};
+    last_.q_W = space_.to_W(proxy_.q());
+    last_.p_hat_W = space_.to_W(proxy_.p_hat());
+    last_.limit_force_W = space_.basis() * (proxy_.kappa_N_per_m() * limited_.limit_shift());
+    last_.f_W = space_.basis() * proxy_.f();
+    last_.limits = limited_.active();
+    if (last_.limits.kinds != 0) last_.f_W -= last_.limit_force_W;
+    last_.soft_limits_met = limited_.soft_limits_met();
+    last_.v_W = space_.basis() * proxy_.velocity();
+    last_.mass_kg = proxy_.config().mass_kg;
+    last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
+    add_contacts<N>(last_, scene_->algorithm<N>().contacts(), space_.basis());
+    last_.friction = changes_.friction(last_.object);
+  }
+
+  void set_spring(double spring_N_per_m) noexcept {
+    const double before = proxy_.config().spring_N_per_m;
+    if (!proxy_.set_spring(spring_N_per_m)) return;
+    anchor_.stiffen(spring_N_per_m, before, proxy_.q());
+    proxy_.set_reference(anchor_.at());
+  }
 
   scenes::CompiledScene* scene_;
   SceneChanges changes_;
@@ -131,9 +210,11 @@ class WorldOfDimension final : public RenderedWorld {
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
   std::unique_ptr<Lookahead<N>> ahead_;  // none: looks no further than the proxy
+  SpringAnchor<N> anchor_;
   WorldStep last_;
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
   bool started_ = false;
+  bool unsettled_ = false;  // it may stand where the scene doesn't let it be
 };
 
 }  // namespace

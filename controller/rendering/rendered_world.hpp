@@ -36,6 +36,7 @@ struct WorldStep {
   bool soft_limits_met = true;                        // leash and power
   models::Vec3 limit_force_W = models::Vec3::Zero();  // of the limits on the proxy; f_W is without it
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // M and B of this step
+  bool settled = false;  // the start was moved to where the scene lets it be; it rests there
   ProxyFault fault = ProxyFault::none;
 };
 
@@ -59,7 +60,8 @@ class RenderedWorld {
   RenderedWorld& operator=(const RenderedWorld&) = delete;
   virtual ~RenderedWorld() = default;
 
-  // Sets the proxy to rest at q_W; the spring, where there is one, pulls to it.
+  // Sets the proxy to rest at q_W; the spring, where there is one, pulls to it. Where an object or a guide doesn't let
+  // it be there, the first steps take it to where it may be, at rest, and heed no force.
   virtual void start(const models::Vec3& q_W) noexcept = 0;
   // One period under the hand's force, within these limits. q_W of the result is always finite; after a fault it is
   // that of the step before.

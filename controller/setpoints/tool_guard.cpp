@@ -84,7 +84,8 @@ ToolGuard::ToolGuard(const models::Arm& arm, const std::vector<description::Driv
       curvature_(arm.path_curvature()),
       limits_(limits),
       has_borders_(!limits.keep_out.empty()),
-      period_s_(period_s) {
+      period_s_(period_s),
+      torques_(arm, drives, limits.max_tool_speed_m_per_s, period_s) {
   for (Eigen::Index i = 0; i < acceleration_.size(); ++i) {
     acceleration_[i] = drives[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2;
   }
@@ -101,13 +102,17 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
   arm_->points(arm_->link_from_motor(target_rad), points_);
   twist_k2_rad_ = points_.twist_rad;
   steps_.fill(Vec3::Zero());
+  brakes_for_s_ = 0.0;
+  torques_.start(target_rad_ - points_.twist_rad);
 }
 
 ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s) noexcept {
   ActiveLimits active;
   // Where the tool is slowed, so is the elbow.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
-  const Speeds limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s};
+  torques_.step();
+  const Speeds limit{std::min(share * limits_.max_tool_speed_m_per_s, torques_.eased_m_per_s()),
+                     share * limits_.max_elbow_speed_m_per_s};
   ArmPoints at;
   evaluate(wanted_rad, quick_rounds, at);
   if (broken(wanted_rad, at, limit, Care::quick).kinds == 0) {
@@ -128,7 +133,7 @@ void ToolGuard::evaluate(const JointVector& theta, int rounds, ArmPoints& out) c
 }
 
 double ToolGuard::stop_s(const JointVector& u) const noexcept {
-  return u.cwiseAbs().cwiseQuotient(acceleration_).maxCoeff();
+  return std::max(u.cwiseAbs().cwiseQuotient(acceleration_).maxCoeff(), torques_.stop_s(u));
 }
 
 double ToolGuard::bend(const JointVector& d) const noexcept {
@@ -150,6 +155,7 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
   const JointVector u = (theta - target_rad_) / T;
   const double t = stop_s(u), curvature = bend(u);  // of the path, m/s²
   const JointVector way = braking_way(u, t);
+  torques_.judge(u, speed_rad_per_s_, out);
   judge_ranges(theta + way, out);
   judge_motion(at, t * curvature, limit, care, out);
   if (!has_borders_) return out;
@@ -230,7 +236,9 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   evaluate(wanted, exact_rounds, at);
   out = broken(wanted, at, limit, Care::exact);
   if (out.kinds == 0) return accept(wanted, at);
-  const double T = period_s_, t = stop_s(speed_rad_per_s_);
+  torques_.strain();
+  // With torques, what a braking takes depends on the pose: it goes on as it was judged.
+  const double T = period_s_, t = torques_.rated() ? brakes_for_s_ : stop_s(speed_rad_per_s_);
   const JointVector brakes = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
   JointVector best = brakes;
   ArmPoints best_at;
@@ -249,6 +257,8 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
     best_at = at;
   }
   accept(best, best_at);
+  if (kept == 0.0) brakes_for_s_ = std::max(0.0, t - T);
+  if (out.has(Limit::joint_torque)) torques_.ease_from(steps_[0].norm() / T / exact_share);
 }
 
 void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
@@ -256,7 +266,10 @@ void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
   for (std::size_t i = first_joint; i < static_cast<std::size_t>(theta.size()); ++i) {
     steps_[i + 1] = at.joint_W[i] - points_.joint_W[i];
   }
-  speed_rad_per_s_ = (theta - target_rad_) / period_s_;
+  const JointVector u = (theta - target_rad_) / period_s_;
+  brakes_for_s_ = stop_s(u);
+  torques_.accept(u, speed_rad_per_s_, theta - at.twist_rad);
+  speed_rad_per_s_ = u;
   target_rad_ = theta;
   twist_k2_rad_ = points_.twist_rad;
   points_ = at;
@@ -266,6 +279,8 @@ void ToolGuard::archive(fieldbus::StateArchive& state) noexcept {
   state(target_rad_, speed_rad_per_s_, twist_k2_rad_, points_.twist_rad, points_.tool_W);
   for (Vec3& joint_W : points_.joint_W) state(joint_W);
   for (Vec3& step : steps_) state(step);
+  state(brakes_for_s_);
+  torques_.archive(state, target_rad_ - points_.twist_rad);
 }
 
 }  // namespace proxarm::controller

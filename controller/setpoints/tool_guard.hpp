@@ -13,6 +13,7 @@
 // and all of it (but the acceleration) on the way to rest, too: from θ, with the speed u = (θ − θ₁)/T, all joints brake
 // together along u, the one that takes longest at its own deceleration:
 //   θ_b = θ + (1 − T/t)uT and so on,   t = max_i |u_i|/a_i
+// or longer, where the cell rates the drives' torques (torque_guard.hpp), which bound the way from θ₁ to θ as well.
 // Such a braking never has to be judged when it is needed: it was, when the setpoint before was let through. So where
 // what is wanted breaks a bound, the setpoint lies on the straight line (in the joints) from θ_b to what is wanted, as
 // far along as bisection finds all bounds kept; θ_b itself always keeps them, by induction from rest.
@@ -30,6 +31,7 @@
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
+#include "controller/setpoints/torque_guard.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/description/cell.hpp"
@@ -43,12 +45,20 @@ class ToolGuard {
             const description::CellLimits& limits, double period_s);
 
   // Precondition: at rest.
-  void set_period(double period_s) noexcept { period_s_ = period_s; }
+  void set_period(double period_s) noexcept {
+    period_s_ = period_s;
+    torques_.set_period(period_s);
+  }
   // At rest there.
   void start(const models::JointVector& target_rad) noexcept;
   // One period. Precondition: `wanted_rad` is finite and within each joint's own limits (JointGuard). `max_speed`: of
   // T, where it is lower than the cell's for now. Returns what held something back.
   ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;
+
+  // The arm is at the end of its reach: what is wanted may be cut from cycle to cycle (torque_guard.hpp).
+  void strain() noexcept { torques_.strain(); }
+  // A drive is blocked: what its setpoints ask for isn't what it takes to move the arm.
+  void relax() noexcept { torques_.relax(); }
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
@@ -86,10 +96,12 @@ class ToolGuard {
   description::CellLimits limits_;
   bool has_borders_;
   double period_s_;
+  TorqueGuard torques_;
 
   models::JointVector target_rad_, speed_rad_per_s_, twist_k2_rad_;
-  models::ArmPoints points_;  // at target_rad_
-  Steps steps_{};             // of the points, in the last period
+  models::ArmPoints points_;   // at target_rad_
+  Steps steps_{};              // of the points, in the last period
+  double brakes_for_s_ = 0.0;  // as long as the braking that was judged when target_rad_ was let through
 };
 
 }  // namespace proxarm::controller

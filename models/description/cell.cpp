@@ -221,6 +221,8 @@ DriveDescription read_drive(const YamlNode& node) {
     if (!d.on_can()) throw node.error_at("mode", "csp: a drive on Modbus takes positions");
     d.rated_torque_Nm = node.number("rated_torque_Nm", above(0.0, 1e5));
     d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 10.0 * d.rated_torque_Nm));
+  } else if (node.has("max_torque_Nm")) {
+    d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
   }
   if (d.on_can()) {
     if (node.has("eds")) d.eds = node.existing_file("eds").string();
@@ -431,6 +433,12 @@ Cell read_cell(const YamlNode& root) {
   if (!on_line) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
   cell.passivity = root.choice_or("passivity", cell.passivity, {"off", "observe", "on"});
+  const bool torques = std::any_of(cell.drives.begin(), cell.drives.end(),
+                                   [](const DriveDescription& drive) { return drive.mode == "cst"; });
+  if (torques && cell.passivity != "off") {
+    throw root.error_at("passivity",
+                        "off: drives that take torques (mode: cst) have no proxy with a mass to be damped");
+  }
   if (const auto supervision = root.find_map("supervision")) cell.supervision = read_supervision(*supervision);
   if (const auto input = root.find_map("enabling_input")) cell.enabling_input = read_enabling(*input, cell);
   if (root.choice_or("profile", "none", {"none", "hand_guiding"}) == "hand_guiding") apply_hand_guiding(root, cell);

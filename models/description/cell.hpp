@@ -98,7 +98,8 @@ struct DriveDescription {
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
   double rated_torque_Nm = 0.0;            // mode cst: 6076h times the gear ratio, what 1000 in 6071h is at the joint
-  double max_torque_Nm = 0.0;              // mode cst: what the joint may be asked for
+  double max_torque_Nm = 0.0;              // mode cst: what the joint may be asked for; others: what the drive has at
+                                           // the joint, which its setpoints are kept to; 0: not said
   double rotor_inertia_kg_m2 = 0.0;        // reflected to the joint
   double position_bandwidth_Hz = 100.0;    // of the drive's position loop, as its maker or a test states it: the lag
                                            // that the stability check counts on

@@ -65,7 +65,7 @@ constexpr KindName kinds[] = {
 };
 
 [[noreturn]] void refuse(std::string_view text, std::string expected) {
-  throw SetupError({.key = "device fault", .found = description::in_quotes(text), .expected = std::move(expected)});
+  throw SetupError({.key = "--fault", .found = description::in_quotes(text), .expected = std::move(expected)});
 }
 
 std::string names_for(unsigned devices) {
@@ -93,13 +93,13 @@ std::uint32_t parse_value(std::string_view all, std::string_view text, std::uint
 
 double parse_amount(const KindName& kind, std::string_view text) {
   const bool negative = kind.is_signed && text.substr(0, 1) == "-";
-  const double amount = kind.parse_amount(negative ? text.substr(1) : text, "device fault");
+  const double amount = kind.parse_amount(negative ? text.substr(1) : text, "--fault");
   return negative ? -amount : amount;
 }
 
 std::int64_t parse_time_ns(std::string_view text) {
   if (text == "0" || text == "0s") return 0;
-  return std::llround(description::parse_duration(text, "time of a device fault") * 1e9);
+  return std::llround(description::parse_duration(text, "--fault") * 1e9);
 }
 
 }  // namespace
@@ -108,7 +108,7 @@ void require_known_fault(const DeviceFault& fault, FaultyDevice device) {
   const auto devices = static_cast<unsigned>(device);
   for (const KindName& kind : kinds) {
     if (kind.kind != fault.kind || (kind.devices & devices) != 0) continue;
-    throw SetupError({.key = "device fault",
+    throw SetupError({.key = "--fault",
                       .found = std::string(kind.name) + " for " + fault.device,
                       .expected = names_for(devices)});
   }
@@ -146,7 +146,7 @@ DeviceFault parse_device_fault(std::string_view text) {
   const std::size_t dots = times.find("..");
   fault.from_ns = parse_time_ns(times.substr(0, dots));
   if (dots != std::string_view::npos) fault.until_ns = parse_time_ns(times.substr(dots + 2));
-  if (fault.until_ns <= fault.from_ns) refuse(all, "an end after the beginning");
+  if (fault.until_ns <= fault.from_ns) refuse(all, "an end after the beginning, such as @2s..3s");
   return fault;
 }
 

@@ -25,10 +25,16 @@ PressedSpan parse_pressed_span(std::string_view text) {
     if (part == "0" || part == "0s") return 0;
     return std::llround(1e9 * description::parse_duration(part, "--enabling"));
   };
+  // A single time could be its beginning, its end or how long.
+  if (dots == std::string_view::npos || dots == 0) {
+    throw description::SetupError({.key = "--enabling",
+                                   .found = description::in_quotes(text),
+                                   .expected = "FROM..UNTIL, such as 0.5s..3s, or FROM.. for as long as there is"});
+  }
   PressedSpan span;
   span.squeezed = is_squeezed;
   span.from_ns = time_ns(text.substr(0, dots));
-  if (dots != std::string_view::npos && dots + 2 < text.size()) span.until_ns = time_ns(text.substr(dots + 2));
+  if (dots + 2 < text.size()) span.until_ns = time_ns(text.substr(dots + 2));
   if (span.from_ns < span.until_ns) return span;
   throw description::SetupError({.key = "--enabling",
                                  .found = description::in_quotes(text),

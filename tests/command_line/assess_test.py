@@ -29,7 +29,7 @@ class Assess(ProgramTest):
     def braked(self, torque, delay):
         """The default cell, with what it says of its drives' brakes."""
         cell = self.copies() / "models/cells/default.yaml"
-        text, n = re.subn(r"( +)(max_torque_Nm: .*\n)", rf"\1\2\1brake_torque_Nm: {torque}\n\1brake_delay_s: {delay}\n",
+        text, n = re.subn(r"( {6})(max_torque_Nm: .*\n)", rf"\1\2\1brake_torque_Nm: {torque}\n\1brake_delay_s: {delay}\n",
                           cell.read_text())
         self.assertEqual(n, 6)
         return self.written_beside(cell, f"braked{delay}.yaml", text)

@@ -44,6 +44,14 @@ class Passivity(ProgramTest):
     def test_what_has_no_proxy_has_none(self):
         self.assert_refused(self.call("run", "models/cells/light.yaml", "--passivity", "on"), "--passivity", "off")
 
+    def test_a_cell_whose_drives_take_torques_is_refused_with_it(self):
+        for mode in ("on", "observe"):
+            cell = self.changed("models/cells/light.yaml")
+            text = (SOURCE / "models/cells/light.yaml").read_text().replace("../drives", f"{SOURCE}/models/drives")
+            cell.write_text(text + f"passivity: {mode}\n")
+            for command in ("check", "run"):
+                self.assert_refused(self.call(command, cell), "passivity", f'"{mode}"', "cst")
+
     def test_a_delay_has_bounds(self):
         for value, said in (("200ms", "at most 0.1 s"), ("8", "--extra-delay"), ("-1ms", "--extra-delay")):
             with self.subTest(value):

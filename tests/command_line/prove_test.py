@@ -103,7 +103,7 @@ class Prove(ProgramTest):
         self.assertIn("drive_deviates (axis_3)", verdict["failure"])
 
     def test_brakes_that_do_not_hold_are_no_proof(self):
-        weak = self.cell("weak.yaml", lambda text: re.sub("( +)(max_torque_Nm: .*)", r"\1\2\n\1brake_torque_Nm: 50", text))
+        weak = self.cell("weak.yaml", lambda text: re.sub("( {6})(max_torque_Nm: .*)", r"\1\2\n\1brake_torque_Nm: 50", text))
         self.assertIn("the brakes don't hold", self.verdict(self.cell("arm.yaml"), "--arm", weak)["failure"])
 
     def test_the_enabling_switch_is_part_of_it(self):

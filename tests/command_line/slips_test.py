@@ -153,6 +153,12 @@ class Scenes(ProgramTest):
                 if scene.name not in ("free.yaml", "coulomb.yaml"):  # there is nothing to touch
                     self.assertGreaterEqual(outcome.summary["contacts"], 1)
 
+    def test_the_enabling_switch_is_told_from_when_until_when(self):
+        cell = self.changed("models/cells/default.yaml",
+                            ("default_period_s", "enabling_input: {drive: axis_6, bit: 16}\ndefault_period_s"))
+        for wrong in ("1s", "..2s", "squeezed:1s"):
+            self.assert_refused(self.call("run", cell, "--enabling", wrong), "--enabling", "FROM..UNTIL", "FROM..")
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -153,6 +153,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"direction: -1", "direction: 0", "drives[1].direction: found 0, expected 1 or -1"},
         Mistake{"profile: cia402", "profile: cia401", "drives[0].profile: found \"cia401\", expected cia402"},
         Mistake{"mode: csp", "mode: cst", "drives[0].rated_torque_Nm"},
+        Mistake{"mode: csp", "max_torque_Nm: 0\n    mode: csp",
+                "drives[0].max_torque_Nm: found 0, expected a number above 0"},
         Mistake{"mode: csp", "objects: {target: 60C1h}\n    mode: csp", "drives[0].objects.target: found \"60C1h\""},
         Mistake{"mode: csp", "eds: nowhere.eds\n    mode: csp", "drives[0].eds"},
         Mistake{"mode: csp", "mode: velocity", "drives[0].mode: found \"velocity\", expected csp, ip or cst"},
