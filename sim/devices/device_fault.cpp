@@ -108,9 +108,8 @@ void require_known_fault(const DeviceFault& fault, FaultyDevice device) {
   const auto devices = static_cast<unsigned>(device);
   for (const KindName& kind : kinds) {
     if (kind.kind != fault.kind || (kind.devices & devices) != 0) continue;
-    throw SetupError({.key = "--fault",
-                      .found = std::string(kind.name) + " for " + fault.device,
-                      .expected = names_for(devices)});
+    throw SetupError(
+        {.key = "--fault", .found = std::string(kind.name) + " for " + fault.device, .expected = names_for(devices)});
   }
 }
 
