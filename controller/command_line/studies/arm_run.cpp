@@ -19,6 +19,7 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   options.mass_kg = setup.mass_kg;
   options.period_s = setup.period_s;
   options.duration_s = setup.settling_s + setup.duration_s;
+  if (setup.looks_ahead) options.lookahead = LookaheadChoice{.kind = LookaheadChoice::Kind::automatic};
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
   PreparedSession session = prepare(options);
   session.hand.waypoints.clear();
