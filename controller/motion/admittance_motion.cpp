@@ -222,7 +222,7 @@ void AdmittanceMotion::make_sent_limits(StepStart start) noexcept {
 
 // The point that the arm is sent to: where the proxy comes to if it coasts. With the hand's force held it would come
 // ½H²h/M further; the hand's own mass, which the sensor sees at the handle, feeds just that back, so the arm's elastic
-// modes stay calm up to half as long a horizon only (docs/studies.md has the figures).
+// modes stay calm up to half as long a horizon only (docs/design.md has the figures).
 void AdmittanceMotion::send_ahead() noexcept {
   sent_->advance_horizon();
   sent_->step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), sent_limits_);

@@ -23,7 +23,6 @@ class LiveParameters {
 
   // Throws SetupError.
   controller::Change take(const std::string& text);
-  controller::Change take_lookahead(const std::string& text);
   // "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);
   // Judged by what the start judges it by, as far as it depends on T. Throws SetupError.
@@ -35,6 +34,7 @@ class LiveParameters {
   [[nodiscard]] std::uint32_t asked_timesteps() const noexcept { return asked_timesteps_; }
 
  private:
+  controller::Change take_lookahead(const std::string& text);
   [[nodiscard]] RunOptions named(double period_s) const;
 
   PreparedSession session_;
