@@ -154,9 +154,7 @@ void BusImage::forget_faults() noexcept {
   for (DriveOnBus& axis : parts_.drives) axis.drive.forget_fault();
 }
 
-// The drives take their last controlword with one more SYNC.
 void BusImage::shut_down() noexcept {
-  for (DriveBus& bus : parts_.drive_buses) send(bus.bus, bus.sync.next());
   fieldbus::shut_down_drives(parts_.can_drives,
                              [this](std::size_t bus, const fieldbus::CanFrame& frame) noexcept { send(bus, frame); });
   hand_over();

@@ -10,7 +10,7 @@
 
 #include "controller/motion/release.hpp"
 #include "controller/motion/wrench_compensation.hpp"
-#include "controller/rendering/orientation_proxy.hpp"
+#include "controller/proxies/orientation_proxy.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/torque_rendering.hpp"
 #include "controller/setpoints/elastic_setpoint.hpp"

@@ -17,7 +17,7 @@
 #pragma once
 
 #include "controller/limits/limited_algorithm.hpp"
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/rendering/scene_changes.hpp"
 #include "scenes/compiler/compile.hpp"
 

@@ -12,7 +12,7 @@
 #include <span>
 
 #include "controller/limits/step_limits.hpp"
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/rendering/change.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "models/base/state_archive.hpp"

@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
-#include "controller/rendering/impedance_proxy.hpp"
+#include "controller/proxies/impedance_proxy.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "models/arm/arm.hpp"
 #include "scenes/compiler/compile.hpp"

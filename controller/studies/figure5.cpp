@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "controller/rendering/impedance_proxy.hpp"
+#include "controller/proxies/impedance_proxy.hpp"
 #include "controller/studies/common/chart.hpp"
 #include "models/surfaces/friction_plane.hpp"
 

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <sstream>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/studies/common/chart.hpp"
 #include "models/surfaces/free_space.hpp"
 #include "models/surfaces/plane.hpp"

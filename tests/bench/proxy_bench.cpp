@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "controller/limits/limited_algorithm.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/record/cycle_record.hpp"
-#include "controller/rendering/admittance_proxy.hpp"
 #include "controller/report/session_record.hpp"
 #include "controller/report/summary.hpp"
 #include "controller/stability/passivity.hpp"

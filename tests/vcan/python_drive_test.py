@@ -26,7 +26,7 @@ class PythonDrive(python_peer.Peer):
         self.nmt, self.state = PRE_OPERATIONAL, SWITCH_ON_DISABLED
         self.controlword, self.target, self.position = 0, 0, 0
         self.next_heartbeat = 0.0
-        self.controlwords, self.positions, self.written = [], [], {}
+        self.controlwords, self.positions, self.written, self.heartbeats = [], [], {}, []
         # Object, size in bytes, value.
         self.objects = {(0x1000, 0): (4, 0x00020192), (0x1018, 1): (4, 0x000000AB), (0x6502, 0): (4, 1 << 7)}
         for index, size in ((0x1017, 2), (0x6007, 2), (0x6060, 1), (0x6061, 1), (0x605A, 2), (0x6065, 4), (0x6066, 2)):
@@ -103,6 +103,8 @@ class PythonDrive(python_peer.Peer):
         value = int.from_bytes(request[4:4 + size], "little")
         self.objects[index, sub] = (size, value)
         self.written[index, sub] = value
+        if (index, sub) == (0x1016, 1):
+            self.heartbeats.append(value)
         if (index, sub) == (0x6060, 0):
             self.objects[0x6061, 0] = (1, value)
         return struct.pack("<BHBI", 0x60, index, sub, 0)
@@ -122,9 +124,9 @@ class PythonCiA402Drive(two.VcanTestCase):
         self.assertNotEqual(drive.state, ENABLED)
         self.assertGreater(len(drive.positions), 500, "a target in every cycle")
         self.assertLess(max(abs(b - a) for a, b in zip(drive.positions, drive.positions[1:])), 1000)
-        # 60C2h: 1 · 10⁻³ s. 1016h: node 127, 60 ms. 6060h: mode 8. PDO1: 6040h and 607Ah; 6041h and 6064h.
+        # 60C2h: 1 · 10⁻³ s. 1016h: node 127, 60 ms; none before it is set, and none in the end. 6060h: mode 8. PDO1: 6040h and 607Ah; 6041h and 6064h.
         self.assertEqual((drive.written[0x60C2, 1], drive.written[0x60C2, 2]), (1, 0xFD))
-        self.assertEqual(drive.written[0x1016, 1], 0x007F003C)
+        self.assertEqual(drive.heartbeats, [0, 0x007F003C, 0])
         self.assertEqual(drive.written[0x6060, 0], 8)
         self.assertEqual([drive.written[0x1600, n] for n in (1, 2)], [0x60400010, 0x607A0020])
         self.assertEqual([drive.written[0x1A00, n] for n in (1, 2)], [0x60410010, 0x60640020])

@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/studies/common/chart.hpp"
 #include "controller/studies/error/error_cases.hpp"
 #include "controller/studies/error/error_methods.hpp"

@@ -7,7 +7,7 @@
 #include <limits>
 #include <memory>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 
 namespace proxarm::studies {
 namespace {

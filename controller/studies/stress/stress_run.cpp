@@ -6,7 +6,7 @@
 #include <memory>
 #include <sstream>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/studies/stress/random_scene.hpp"
 #include "controller/studies/stress/stress_laws.hpp"
 #include "models/mesh/mesh_obstacle.hpp"

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "controller/limits/limited_algorithm.hpp"
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "controller/setpoints/joint_guard.hpp"
 #include "models/surfaces/friction_plane.hpp"
 #include "models/surfaces/plane.hpp"

@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "models/mesh/mesh_surface.hpp"
 #include "models/surfaces/coulomb_field.hpp"
 #include "models/surfaces/free_space.hpp"

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "models/surfaces/friction_plane.hpp"
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 #include "tests/models/surfaces/random_states.hpp"

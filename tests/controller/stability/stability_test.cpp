@@ -10,7 +10,7 @@
 #include <random>
 #include <string>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "models/base/setup_error.hpp"
 #include "tests/controller/rendering/small_worlds.hpp"
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 #include "models/geometry/geometric_algorithm.hpp"
 
 using proxarm::controller::AdmittanceProxy;

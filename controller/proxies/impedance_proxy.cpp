@@ -1,4 +1,4 @@
-#include "controller/rendering/impedance_proxy.hpp"
+#include "controller/proxies/impedance_proxy.hpp"
 
 #include "models/base/option_check.hpp"
 

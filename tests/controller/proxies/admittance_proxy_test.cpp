@@ -1,4 +1,4 @@
-#include "controller/rendering/admittance_proxy.hpp"
+#include "controller/proxies/admittance_proxy.hpp"
 
 #include <gtest/gtest.h>
 

@@ -29,8 +29,8 @@
 
 #include <cstdint>
 
-#include "controller/rendering/bdf2.hpp"
-#include "controller/rendering/proxy_step.hpp"
+#include "controller/proxies/bdf2.hpp"
+#include "controller/proxies/proxy_step.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometric_algorithm.hpp"
 #include "models/geometry/geometry.hpp"

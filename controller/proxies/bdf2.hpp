@@ -22,7 +22,7 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/rendering/proxy_step.hpp"
+#include "controller/proxies/proxy_step.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometric_algorithm.hpp"
 

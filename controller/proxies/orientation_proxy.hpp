@@ -15,7 +15,7 @@
 
 #include <cstdint>
 
-#include "controller/rendering/proxy_step.hpp"
+#include "controller/proxies/proxy_step.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
 

@@ -1,4 +1,4 @@
-#include "controller/rendering/proxy_step.hpp"
+#include "controller/proxies/proxy_step.hpp"
 
 #include "models/base/option_check.hpp"
 

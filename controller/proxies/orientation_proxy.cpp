@@ -1,4 +1,4 @@
-#include "controller/rendering/orientation_proxy.hpp"
+#include "controller/proxies/orientation_proxy.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "controller/rendering/impedance_proxy.hpp"
+#include "controller/proxies/impedance_proxy.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "controller/rendering/bdf2.hpp"
+#include "controller/proxies/bdf2.hpp"
 
 namespace proxarm::controller {
 
