@@ -17,7 +17,8 @@ namespace {
 
 constexpr double rounding_m = 1e-12;  // of positions of some metres, a few operations
 
-// Where the spring of (26) pulls to: the start position, but for a while after the spring has become stiffer.
+// Where the spring of (26) pulls to: the start position, but for a while after the spring has become stiffer, and after
+// a hold.
 //
 // With q the proxy and a the anchor, K'(a' − q) = K(a − q) is the a' that leaves the force as it was when K becomes K';
 // without a spring before it is q itself. From there the anchor goes back, as a driven object goes to its place:
@@ -33,6 +34,11 @@ class SpringAnchor {
 
   void start(const V& home) noexcept {
     home_ = at_ = home;
+    speed_ = 0.0;
+  }
+  // Out of a hold, which whoever held the arm may have left: the spring begins without a force.
+  void start_again(const V& q) noexcept {
+    at_ = q;
     speed_ = 0.0;
   }
   void stiffen(double K, double K_before, const V& q) noexcept {
@@ -77,9 +83,13 @@ class WorldOfDimension final : public RenderedWorld {
     start.q = space_.start();
     // Out of a hold the scene goes on from where it stood.
     if (started_) start.time_s = proxy_.time_s() + lead_s();
-    started_ = true;
     proxy_.start(start);
-    anchor_.start(start.q);
+    if (started_) {
+      anchor_.start_again(start.q);
+    } else {
+      anchor_.start(start.q);
+    }
+    started_ = true;
     unsettled_ = true;
     last_ = {};
     last_.q_W = last_.p_hat_W = q_W;

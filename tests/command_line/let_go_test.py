@@ -104,6 +104,19 @@ class LetGo(harness.ProgramTest):
                 self.assertLess(fastest, 3e-3)
                 self.assertLess(max(ways), 5e-3)
 
+    def test_a_spring_still_pulls_to_the_start_after_a_timestep_change_and_a_hold(self):
+        """The story: it then pulled to where the arm happened to stand, 0.135 m away, for good."""
+        changes = (("--set", "timestep=2ms@6s"), ("--do", "hold@6s", "--do", "resume@7s"))
+        for change in changes:
+            with self.subTest(change):
+                summary, track = self.session(LETS_GO_AWAY, "--duration", "16s", "--set", "spring=500@4s", *change)
+                self.assertEqual(summary["faults"], [])
+                left = math.dist(track.place[-1], track.place[track.began])
+                fastest = max(track.speed(k) for k in range(track.at(5.5), len(track.place)))
+                print(f"a spring after {change[1]}: at most {fastest:.3f} m/s, {1e3 * left:.1f} mm left")
+                self.assertLess(left, 1e-3)
+                self.assertLess(fastest, 0.1)  # twice the speed of its anchor
+
     def test_a_spring_that_becomes_stiffer_far_from_its_place_throws_nobody(self):
         """The story: set to 2000 N/m 0.15 m from where it pulls to, the spring pulled with 300 N at once: 0.52 m/s."""
         for spring in ("2000", "20"):
