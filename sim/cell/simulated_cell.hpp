@@ -30,6 +30,8 @@
 
 namespace proxarm::sim {
 
+class PlantAxis;
+
 struct SimulatedCellConfig {
   PlantConfig plant;
   std::vector<DeviceFault> faults;
@@ -65,8 +67,7 @@ class SimulatedCell final : private Clockwork {
   ~SimulatedCell() override;
 
   // Nodes, one per drive on CAN in the cell's order, then the enabling switch where it has a message and the sensor, if
-  // it is on CAN: to be connected to their
-  // buses before power_on().
+  // it is on CAN: to be connected to their buses before power_on().
   [[nodiscard]] std::size_t node_count() const noexcept { return nodes_.size(); }
   [[nodiscard]] DeviceNode& node(std::size_t index) noexcept { return *nodes_[index]; }
 
@@ -96,7 +97,6 @@ class SimulatedCell final : private Clockwork {
   [[nodiscard]] const description::Cell& cell() const noexcept { return cell_; }
 
  private:
-  class PlantAxis;
   class PlantGauges;
   class WirelessModbus;
   class PlantWrench;

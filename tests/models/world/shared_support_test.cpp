@@ -58,8 +58,11 @@ TEST(SharedSupport, TwoPadsShareALoad) {
     const double k1 = random.log_uniform(1e2, 1e6), k2 = random.log_uniform(1e2, 1e6), K = random.log_uniform(1.0, 1e7);
     World g = world({{Vec3::Zero(), n1, 0.0, {k1, 0.1}}, {Vec3::Zero(), n2, 0.0, {k2, 0.1}}});
     const Vec3 f = -random.uniform(0.1, 10.0) * (n1 + random.uniform(0.1, 2.0) * n2), p = f / K;
-    const Mat3 A = K * Mat3::Identity() + k1 * n1 * n1.transpose() + k2 * n2 * n2.transpose();
-    const Vec3 r = A.ldlt().solve(K * p);
+    using Real = long double;
+    const auto a = n1.cast<Real>().eval(), b = n2.cast<Real>().eval();
+    const Eigen::Matrix<Real, 3, 3> A =
+        K * Eigen::Matrix<Real, 3, 3>::Identity() + Real(k1) * a * a.transpose() + Real(k2) * b * b.transpose();
+    const Vec3 r = A.ldlt().solve(Real(K) * p.cast<Real>()).cast<double>();
     if (!(n1.dot(r) < 0.0 && n2.dot(r) < 0.0 && n1.dot(r) > -0.1 && n2.dot(r) > -0.1)) continue;
     // Forces settle to 64 u of what is added up: p and two forces over K, each at most ‖p‖ / sin².
     ASSERT_LE((g(K, p, Vec3::Zero()) - r).norm(), 1e-13 * (1.0 + p.norm()) / n1.cross(n2).squaredNorm())
@@ -117,8 +120,10 @@ ContractOptions<3> options(std::vector<double> friction) {
   o.friction = std::move(friction);
   o.soft = true;
   o.reach_m = 0.05;
-  // Centimetres into layers of ten millimetres; in steps of up to a millimetre, below, both are nothing.
-  o.several = scaled(o.states) < 5'000 ? 1e-2 : 3e-3;  // of a few hundred states chance finds more
+  // Centimetres into layers of ten millimetres; in steps of up to a millimetre, below, both are nothing. At most 2.93
+  // of a thousand states have several solutions (1464 of 500,000 of the first soft corner): with three times the root
+  // of the count, 45 of 10,000.
+  o.several = scaled(o.states) < 5'000 ? 1e-2 : 4.5e-3;  // of a few hundred states chance finds more
   o.unresolved = scaled(o.states) < 5'000 ? 1e-2 : 2e-3;
   return o;
 }

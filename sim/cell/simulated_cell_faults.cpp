@@ -1,0 +1,223 @@
+// What can be wrong with the devices of a simulated cell, and when: of SimulatedCell.
+#include <algorithm>
+#include <iterator>
+
+#include "models/base/setup_error.hpp"
+#include "sim/cell/plant_axis.hpp"
+#include "sim/cell/simulated_cell.hpp"
+
+namespace proxarm::sim {
+
+using description::SetupError;
+
+namespace {
+
+// A fault that this sensor can't have would do nothing.
+void require_fault_of_sensor(const DeviceFault& fault, const description::SensorDescription& sensor) {
+  require_known_fault(fault, FaultyDevice::sensor);
+  const bool described = sensor.described.has_value();
+  const auto refuse = [&](const char* found, const char* expected) {
+    throw SetupError({.file = sensor.file.string(), .key = "device fault", .found = found, .expected = expected});
+  };
+  if (fault.kind == DeviceFaultKind::bad_checksum && !(described && sensor.described->checksum)) {
+    refuse("sensor:checksum for a sensor whose samples have none", "another fault, or a sensor with a checksum");
+  }
+  if (fault.kind == DeviceFaultKind::status && described && !sensor.described->status) {
+    refuse("sensor:status for a sensor whose samples have no status word", "another fault, or a sensor with one");
+  }
+  if (fault.kind == DeviceFaultKind::status && described &&
+      std::uint64_t{fault.value} >> sensor.described->status->number.bits != 0) {
+    refuse("sensor:status with bits that the status word hasn't", "one of that word's width");
+  }
+  constexpr DeviceFaultKind of_registers[] = {DeviceFaultKind::sensor_silent, DeviceFaultKind::frozen,
+                                              DeviceFaultKind::saturated, DeviceFaultKind::status};
+  const bool has_it = std::find(std::begin(of_registers), std::end(of_registers), fault.kind) != std::end(of_registers);
+  if (described && sensor.described->registers && !has_it) {
+    refuse("a fault of CAN frames for a sensor on Modbus", "silent, frozen, saturated, or status where it has one");
+  }
+  const bool of_order = fault.kind == DeviceFaultKind::half_sample || fault.kind == DeviceFaultKind::swapped;
+  if (of_order && described && sensor.described->frames.size() < 2) {
+    refuse("a fault of the frames' order for a sensor with one frame a sample", "another fault");
+  }
+}
+
+}  // namespace
+
+void SimulatedCell::check_faults(const description::SensorDescription& sensor) const {
+  for (const DeviceFault& fault : faults_) {
+    const std::size_t axis = axis_of(fault.device);
+    if (fault.device == "sensor" || axis < cell_.drives.size()) {
+      if (fault.device == "sensor") {
+        require_fault_of_sensor(fault, sensor);
+      } else {
+        require_known_fault(fault, modbus_drives_[axis] ? FaultyDevice::modbus_drive : FaultyDevice::can_drive);
+      }
+      continue;
+    }
+    std::string names;
+    for (const auto& drive : cell_.drives) names += drive.joint + ", ";
+    throw SetupError({.key = "device fault",
+                      .found = description::in_quotes(fault.device),
+                      .expected = "one of " + names + "sensor"});
+  }
+}
+
+void SimulatedCell::schedule_faults() {
+  const std::int64_t start_ns = events_.now_ns();
+  for (std::size_t i = 0; i < faults_.size(); ++i) {
+    if (faults_[i].from_ns <= 0) {
+      set_fault(i, true, start_ns);
+    } else {
+      events_.schedule(start_ns + faults_[i].from_ns, [this, i](std::int64_t t) { set_fault(i, true, t); });
+    }
+    if (faults_[i].until_ns > fieldbus::EventQueue::never - start_ns) continue;
+    events_.schedule(start_ns + faults_[i].until_ns, [this, i](std::int64_t t) { set_fault(i, false, t); });
+  }
+}
+
+void SimulatedCell::set_fault(std::size_t index, bool on, std::int64_t time_ns) noexcept {
+  const DeviceFault& fault = faults_[index];
+  advance_to(time_ns);
+  const std::size_t axis = axis_of(fault.device);
+  if (axis < drives_.size() && axes_[axis]->set_fault(fault, on, time_ns)) return;
+  if (axis < drives_.size() && modbus_drives_[axis]) {
+    set_modbus_fault(axis, fault, on);
+  } else if (axis < drives_.size()) {
+    set_drive_fault(axis, fault, on, time_ns);
+  } else {
+    set_sensor_fault(fault, on);
+    set_sensor_lie(fault, on, time_ns);
+  }
+}
+
+void SimulatedCell::set_drive_fault(std::size_t axis, const DeviceFault& fault, bool on,
+                                    std::int64_t time_ns) noexcept {
+  switch (fault.kind) {
+    case DeviceFaultKind::drive_silent:
+      return nodes_[node_of_axis_[axis]]->cut(on);
+    case DeviceFaultKind::drive_fault:
+      if (on) drives_[axis]->inject_fault(static_cast<std::uint16_t>(fault.value), time_ns);
+      return;
+    case DeviceFaultKind::heartbeat_lost:
+      return drives_[axis]->canopen().mute_heartbeat(on);
+    case DeviceFaultKind::sdo_silent:
+      return drives_[axis]->canopen().mute_sdo(on);
+    case DeviceFaultKind::period_fixed:
+      return drives_[axis]->fix_period_while_enabled(on);
+    case DeviceFaultKind::power_loss:
+      if (on) plant_.servo(axis).disable();
+      return nodes_[node_of_axis_[axis]]->set_power(!on, time_ns);
+    case DeviceFaultKind::jammed:
+      return plant_.arm().jam(axis, on);
+    default:
+      return;
+  }
+}
+
+void SimulatedCell::set_modbus_fault(std::size_t axis, const DeviceFault& fault, bool on) noexcept {
+  ModbusFault kind = ModbusFault::none;
+  switch (fault.kind) {
+    case DeviceFaultKind::drive_silent:
+      kind = ModbusFault::silent;
+      break;
+    case DeviceFaultKind::power_loss:
+      if (on) plant_.servo(axis).disable();
+      kind = ModbusFault::silent;
+      break;
+    case DeviceFaultKind::modbus_exception:
+      kind = ModbusFault::exception;
+      break;
+    case DeviceFaultKind::modbus_closed:
+      kind = ModbusFault::closed;
+      break;
+    case DeviceFaultKind::modbus_wrong_unit:
+      kind = ModbusFault::wrong_unit;
+      break;
+    case DeviceFaultKind::modbus_half:
+      kind = ModbusFault::half;
+      break;
+    case DeviceFaultKind::jammed:
+      return plant_.arm().jam(axis, on);
+    default:
+      return;
+  }
+  modbus_drives_[axis]->set_fault(on ? kind : ModbusFault::none);
+}
+
+SensorFaults& SimulatedCell::sensor_faults() noexcept {
+  return described_sensor_ ? described_sensor_->faults() : sensor_->faults();
+}
+
+void SimulatedCell::set_sensor_lie(const DeviceFault& fault, bool on, std::int64_t time_ns) noexcept {
+  SensorLies& lies = plant_.sensor_lies();
+  switch (fault.kind) {
+    case DeviceFaultKind::sensor_offset:
+      lies.offset_N = on ? fault.amount : 0.0;
+      return;
+    case DeviceFaultKind::drift:
+      lies.drift_N_per_s = on ? fault.amount : 0.0;
+      lies.drifts_from_ns = time_ns;
+      return;
+    case DeviceFaultKind::scale:
+      lies.scale = on ? fault.amount : 1.0;
+      return;
+    case DeviceFaultKind::inverted:
+      lies.inverted = on;
+      return;
+    case DeviceFaultKind::turned:
+      lies.turned = on;
+      return;
+    default:
+      return;
+  }
+}
+
+void SimulatedCell::set_sensor_fault(const DeviceFault& fault, bool on) noexcept {
+  SensorFaults& faults = sensor_faults();
+  switch (fault.kind) {
+    case DeviceFaultKind::sensor_silent:
+      faults.silent = on;
+      if (sensor_registers_) sensor_registers_->set_silent(on);
+      return;
+    case DeviceFaultKind::samples_missing:
+      faults.silent_samples = on;
+      return;
+    case DeviceFaultKind::frozen:
+      faults.frozen = on;
+      return;
+    case DeviceFaultKind::half_sample:
+      faults.half_sample = on;
+      return;
+    case DeviceFaultKind::swapped:
+      faults.swapped = on;
+      return;
+    case DeviceFaultKind::duplicated:
+      faults.duplicated = on;
+      return;
+    case DeviceFaultKind::short_frames:
+      faults.short_frames = on;
+      return;
+    case DeviceFaultKind::status:
+      faults.status_bits = on ? fault.value : 0;
+      return;
+    case DeviceFaultKind::bad_checksum:
+      faults.bad_checksum = on;
+      return;
+    case DeviceFaultKind::saturated:
+      faults.saturated = on;
+      return;
+    case DeviceFaultKind::channel_stuck:
+      faults.stuck_channel = on ? static_cast<int>(fault.value) : -1;
+      return;
+    case DeviceFaultKind::lost:
+      faults.lost_one_in = on ? fault.value : 0;
+      return;
+    case DeviceFaultKind::delay:
+      faults.delay_ns = on ? std::int64_t{fault.value} * 1'000 : 0;
+      return;
+    default:
+      return;
+  }
+}
+
+}  // namespace proxarm::sim
