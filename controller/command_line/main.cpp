@@ -1,6 +1,6 @@
 // proxarm's command line: the one place that knows the controller, the field bus and the simulated arm.
 //
-// Exit status: 0 fine, 1 a fault ended the run, 2 set-up mistake.
+// Exit status: 0 fine, 1 a fault ended the run or the arm oscillated, 2 set-up mistake.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -193,8 +193,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                  choice<Passivity>("--passivity",
                                    {{"off", Passivity::off}, {"observe", Passivity::observe}, {"on", Passivity::on}},
                                    [&](Passivity value) { options.passivity = value; }),
-                 "observe: energies at the hand's and the proxy's port, and oscillations; on: add damping against "
-                 "them (default: the cell's, or off)")
+                 "observe (default): energies at the hand's and the proxy's port, and oscillations; on: add damping "
+                 "against them; off: neither")
       ->type_name("off|observe|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,

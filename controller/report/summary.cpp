@@ -108,6 +108,7 @@ struct SummaryBuilder::State {
   Durations durations;
   Spread tracking, contact_force;
   ApparentMass apparent;
+  OscillationWatch oscillation;
   Slide sliding;
   double contact_s = 0.0;  // how long the contact has lasted
   // Whole periods, so that no sum of them rounds.
@@ -132,6 +133,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   if (record.phase != Phase::rendering || !follows) {
     s.recent.clear();
     s.apparent.end_segment();
+    s.oscillation.reset();
     s.contact_s = 0.0;
   }
   if (record.phase != Phase::rendering) return;
@@ -220,6 +222,8 @@ void SummaryBuilder::State::observe(const CycleRecord& record) {
   p.oscillation_max_m_per_s = std::max(p.oscillation_max_m_per_s, record.oscillation_m_per_s);
   p.added_damping_max_Ns_per_m = std::max(p.added_damping_max_Ns_per_m, record.added_damping_Ns_per_m);
   if (record.added_damping_Ns_per_m >= noticeable_Ns_per_m) p.added_time_s += config.period_s;
+  const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+  oscillation.add(seconds(record.time_ns), config.period_s, record.has(RecordFlag::oscillation), vec3(tool));
   if (!record.has(RecordFlag::oscillation)) return;
   p.oscillating_time_s += config.period_s;
   p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);
@@ -307,6 +311,8 @@ void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& 
   sliding.travel_m += along.norm();
 }
 
+Oscillation SummaryBuilder::oscillation() const { return state_->oscillation.present(); }
+
 Summary SummaryBuilder::finish() {
   State& s = *state_;
   s.apparent.end_segment();
@@ -327,6 +333,7 @@ Summary SummaryBuilder::finish() {
   if (s.sliding.length_s >= shortest_slide_s && s.sliding.travel_m >= shortest_slide_m && s.sliding.limit > 0.0) {
     summary.friction_ratio_error = s.sliding.tangential / s.sliding.limit - 1.0;
   }
+  if (s.config.passivity) summary.oscillation = s.oscillation.longest();
   summary.setpoint_sha256 = s.hash.hex();
   summary.wanted_mass_kg = s.config.wanted_mass_kg;
   summary.lookahead_s = s.config.lookahead_s;

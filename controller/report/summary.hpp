@@ -39,6 +39,7 @@
 
 #include "controller/record/cycle_record.hpp"
 #include "controller/record/page_faults.hpp"
+#include "controller/report/oscillation.hpp"
 #include "controller/supervision/fault.hpp"
 
 namespace proxarm::controller {
@@ -106,7 +107,7 @@ struct TimestepSummary {
 // Why a timestep was given up: "drive of axis_3, 60C2h:01: SDO abort …".
 std::string refusal_text(const fieldbus::PeriodRefusal& refusal, const std::vector<std::string>& axis_names);
 
-// Of a session with --passivity; passivity.hpp has the symbols. Work and energies at the end of the rendering.
+// Of a session without --passivity off; passivity.hpp has the symbols. Work and energies at the end of the rendering.
 struct PassivitySummary {
   PortEnergies energies_J;
   double oscillating_time_s = 0.0;
@@ -144,14 +145,15 @@ struct Summary {
   std::uint64_t limited_cycles = 0;                    // some limit was active
   std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
-  double lookahead_s = 0.0;               // horizon at the start; 0: none
-  double hands_off_s = 0.0;               // nobody held the handle
-  std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor
-  EndSummary end;                         // set by the caller
-  std::vector<OrderSummary> idle_orders;  // set by the caller
-  std::vector<FaultSummary> faults;       // set by the caller
-  std::string black_box;                  // its folder, after a fault; set by the caller
-  std::vector<NoticeSummary> notices;     // set by the caller
+  std::optional<Oscillation> oscillation;  // the longest; absent: not looked for
+  double lookahead_s = 0.0;                // horizon at the start; 0: none
+  double hands_off_s = 0.0;                // nobody held the handle
+  std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor
+  EndSummary end;                          // set by the caller
+  std::vector<OrderSummary> idle_orders;   // set by the caller
+  std::vector<FaultSummary> faults;        // set by the caller
+  std::string black_box;                   // its folder, after a fault; set by the caller
+  std::vector<NoticeSummary> notices;      // set by the caller
   std::vector<TimestepSummary> timesteps;
   bool from_truth = false;
   std::string setpoint_sha256;
@@ -166,6 +168,8 @@ class SummaryBuilder {
   SummaryBuilder& operator=(SummaryBuilder&&) noexcept;
 
   void add(const CycleRecord& record);
+  // That goes on in the last record that was added.
+  [[nodiscard]] Oscillation oscillation() const;
   // Of all that was added. More may be added afterwards, but segments and slides are cut here.
   [[nodiscard]] Summary finish();
 
@@ -174,6 +178,8 @@ class SummaryBuilder {
   std::unique_ptr<State> state_;
 };
 
+// "16.2 Hz, 1.3 mm to either side, for 6.97 s from 2.91 s on".
+std::string oscillation_text(const Oscillation& oscillation);
 // One JSON object on one line, without its end: everything, for `--json`.
 std::string summary_json(const Summary& summary);
 // For files: all that is the same in two runs with the same input, and the wall-clock figures, each on lines of their

@@ -58,6 +58,15 @@ void add_timing(Json& json, const Summary& s) {
   if (s.page_faults) json["page_faults"] = {{"minor", s.page_faults->minor}, {"major", s.page_faults->major}};
 }
 
+Json oscillation(const std::optional<Oscillation>& summary) {
+  if (!summary) return nullptr;
+  return {{"from_s", summary->from_s},
+          {"duration_s", summary->duration_s},
+          {"frequency_Hz", summary->frequency_Hz},
+          {"amplitude_m", summary->amplitude_m},
+          {"lasts", summary->lasts}};
+}
+
 Json passivity(const std::optional<PassivitySummary>& summary) {
   if (!summary) return nullptr;
   const PortEnergies& e = summary->energies_J;
@@ -101,6 +110,7 @@ void add_repeatable(Json& json, const Summary& s) {
   json["active_limits"] = Json::object();
   for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
   json["lookahead_s"] = s.lookahead_s;
+  json["oscillation"] = oscillation(s.oscillation);
   json["passivity"] = passivity(s.passivity);
   json["hands_off_s"] = s.hands_off_s;
   json["held_samples"] = s.held_samples;
@@ -247,6 +257,25 @@ void tell_motion(const Summary& s, Lines& line) {
   line("pulling force", format("%.3g N", s.pulling_force_max_N));
 }
 
+}  // namespace
+
+std::string oscillation_text(const Oscillation& o) {
+  return format("%.3g Hz, ", o.frequency_Hz) + length(o.amplitude_m) +
+         format(" to either side, for %.2f s ", o.duration_s) + format("from %.2f s on", o.from_s);
+}
+
+namespace {
+
+// Whether the loop was stable with this hand.
+void tell_oscillation(const Summary& s, Lines& line) {
+  if (!s.oscillation) return;
+  if (s.oscillation->duration_s == 0.0) return line("oscillation", "none");
+  line(s.oscillation->lasts ? "OSCILLATION" : "oscillation", oscillation_text(*s.oscillation));
+  if (!s.oscillation->lasts) return;
+  line("", "the loop isn't stable with this hand and arm: a larger mass or damping, a shorter timestep,");
+  line("", "a longer setpoint filter or --passivity on; `proxarm tune` says which mass");
+}
+
 // What kept the motion back, and the energy that went through it.
 void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
@@ -256,10 +285,10 @@ void tell_limits(const Summary& s, Lines& line) {
     const PortEnergies& e = s.passivity->energies_J;
     line("energy", format("hand to tool %.3g J, ", e.hand) + format("hand to proxy %.3g J, ", e.proxy) +
                        format("world to proxy %.3g J, ", e.world) + format("damped %.3g J", e.damping));
-    line("oscillation", format("%.2f s, ", s.passivity->oscillating_time_s) +
-                            format("at most %.3g mm/s", 1e3 * s.passivity->oscillation_max_m_per_s));
-    line("damping added", format("%.2f s, ", s.passivity->added_time_s) +
-                              format("at most %.3g Ns/m", s.passivity->added_damping_max_Ns_per_m));
+    if (s.passivity->added_time_s > 0.0) {
+      line("damping added", format("%.2f s, ", s.passivity->added_time_s) +
+                                format("at most %.3g Ns/m", s.passivity->added_damping_max_Ns_per_m));
+    }
   }
 }
 
@@ -289,6 +318,7 @@ std::string summary_text(const Summary& s) {
   Lines line;
   tell_time(s, line);
   tell_motion(s, line);
+  tell_oscillation(s, line);
   tell_limits(s, line);
   if (s.hands_off_s > 0.0) line("hands off", format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s));
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");

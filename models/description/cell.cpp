@@ -432,9 +432,9 @@ Cell read_cell(const YamlNode& root) {
                                    [&](const ModbusLineDescription& line) { return line.name == cell.sensor.bus; });
   if (!on_line) check_bus(root.map("sensor"), cell.sensor.bus, cell.buses);
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
-  cell.passivity = root.choice_or("passivity", cell.passivity, {"off", "observe", "on"});
   const bool torques = std::any_of(cell.drives.begin(), cell.drives.end(),
                                    [](const DriveDescription& drive) { return drive.mode == "cst"; });
+  cell.passivity = root.choice_or("passivity", torques ? "off" : "observe", {"off", "observe", "on"});
   if (torques && cell.passivity != "off") {
     throw root.error_at("passivity",
                         "off: drives that take torques (mode: cst) have no proxy with a mass to be damped");

@@ -12,13 +12,18 @@ class Passivity(ProgramTest):
         self.assert_refused(self.call("run", *GRIP), "3000 N/m", "--damping")
 
     def test_a_stiff_grip_is_damped_and_let_go(self):
-        self.assertIsNone(self.summary(*GRIP, "--force-unstable")["passivity"])
-        seen = self.summary(*GRIP, "--force-unstable", "--passivity", "observe")["passivity"]
+        self.assertIsNone(self.summary(*GRIP, "--force-unstable", "--passivity", "off")["passivity"])
+        outcome = self.call("run", "--json", *GRIP, "--force-unstable")
+        self.assertEqual(outcome.status, 1)
+        self.assertTrue(outcome.summary["oscillation"]["lasts"])
+        seen = outcome.summary["passivity"]
         self.assertEqual(seen["added_damping_max_Ns_per_m"], 0)
         self.assertLess(seen["hand_J"], -1)  # the loop gives the hand energy
         self.assertGreater(seen["oscillating_time_s"], 4)
         self.assertLess(seen["felt_damping_min_Ns_per_m"], -20)
-        done = self.summary(*GRIP, "--force-unstable", "--passivity", "on")["passivity"]
+        damped = self.summary(*GRIP, "--force-unstable", "--passivity", "on")
+        self.assertFalse(damped["oscillation"]["lasts"])
+        done = damped["passivity"]
         self.assertGreater(done["hand_J"], 0)
         self.assertLess(done["oscillating_time_s"], 1)
         self.assertGreater(done["added_damping_max_Ns_per_m"], 20)

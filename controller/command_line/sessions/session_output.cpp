@@ -271,6 +271,17 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
   }
 }
 
+// On standard error, while it happens: once for each spell that lasts.
+void SessionOutput::say_oscillation() {
+  const controller::Oscillation present = builder_.oscillation();
+  if (present.lasts && !told_oscillation_) {
+    std::fprintf(stderr,
+                 "proxarm: the arm oscillates, %s and on: not stable with this hand; let go, or `proxarm hold`\n",
+                 controller::oscillation_text(present).c_str());
+  }
+  told_oscillation_ = present.lasts;
+}
+
 void SessionOutput::add(CycleRecord record) {
   if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
   // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
@@ -281,12 +292,14 @@ void SessionOutput::add(CycleRecord record) {
   complete(record, session_, rendered_ns_);
   say_timestep(record);
   builder_.add(record);
+  say_oscillation();
   if (writer_) writer_->add(record);
   if (plot_) plot_->add(record);
   if (progress_.enabled()) {
     const bool rendering = record.phase == controller::Phase::rendering;
-    progress_.update(static_cast<double>(record.time_ns) * 1e-9,
-                     rendering ? controller::contact_phase_name(record.contact) : controller::phase_name(record.phase));
+    const char* what =
+        rendering ? controller::contact_phase_name(record.contact) : controller::phase_name(record.phase);
+    progress_.update(static_cast<double>(record.time_ns) * 1e-9, told_oscillation_ ? "OSCILLATES" : what);
   }
 }
 
@@ -344,7 +357,8 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
     }
     return fault_ended_the_run;
   }
-  return drawn || options_.plot_file.empty() ? fine : set_up_mistake;
+  if (!drawn && !options_.plot_file.empty()) return set_up_mistake;
+  return summary.oscillation && summary.oscillation->lasts ? fault_ended_the_run : fine;
 }
 
 bool SessionOutput::draw_plot() {

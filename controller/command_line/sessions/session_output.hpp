@@ -49,6 +49,7 @@ class SessionOutput {
   void refuse_lost_plot() const;
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);
+  void say_oscillation();
   void say_how_to_get_free(controller::Phase phase) const;
 
   const PreparedSession& session_;
@@ -59,6 +60,7 @@ class SessionOutput {
   std::unique_ptr<controller::SessionWriter> writer_;
   std::int64_t rendered_ns_ = 0;
   std::int64_t told_period_ns_ = 0;  // that the user knows of
+  bool told_oscillation_ = false;    // of the present spell
   controller::Phase last_phase_ = controller::Phase::idle;
 };
 

@@ -1,0 +1,70 @@
+// Whether the arm swung by itself: the longest spell in which PassivityObserver found an oscillation, with its
+// frequency and amplitude, for the verdict of the summary.
+//
+// The observer (controller/stability/passivity.hpp) says in each cycle whether the tool moves above the band of a
+// hand's will and the device gives the hand energy there. Cycles that say so make a spell as long as pauses between
+// them are shorter than `pause_s`: an oscillation that a wall stops in every period has such. A blow is a spell of some
+// 0.1 to 0.3 s; an unstable loop swings until something limits it, so what goes on for `lasting_s` is one.
+//
+// Position and velocity of the spell, behind a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of 2
+// Hz), have the mean squares ⟨z²⟩ and ⟨ż²⟩; of a sinusoid of amplitude A and frequency ω
+//   ω² = ⟨ż²⟩/⟨z²⟩,   A = √(2⟨z²⟩)/|H(ω)|,   |H| = (1 + (2πfc/ω)²)^(−n/2).
+// Vectors in W. Not for the cycle: whoever drains the records calls it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+struct Oscillation {
+  double from_s = 0.0;      // time of the record in which the spell began
+  double duration_s = 0.0;  // 0: there was none
+  double frequency_Hz = 0.0;
+  double amplitude_m = 0.0;  // of the tool
+  bool lasts = false;
+};
+
+class OscillationWatch {
+ public:
+  static constexpr double pause_s = 0.25;
+  static constexpr double lasting_s = 1.0;        // from an amplitude of felt_m on,
+  static constexpr double small_lasting_s = 3.0;  // and below it
+  static constexpr double felt_m = 0.5e-3;
+
+  // A cycle of rendering; consecutive ones, or reset() between them.
+  void add(double time_s, double period_s, bool oscillates, const models::Vec3& tool_W) noexcept;
+  // The next cycle doesn't follow the last one.
+  void reset() noexcept;
+
+  // The spell that goes on now; and the longest of all that last, or of all if none does.
+  [[nodiscard]] Oscillation present() const noexcept;
+  [[nodiscard]] Oscillation longest() const noexcept;
+
+ private:
+  struct Spell {
+    double from_s = 0.0, until_s = 0.0;
+    double z2 = 0.0, zdot2 = 0.0;  // sums of the squares,
+    double cycles = 0.0;           // of so many
+    double recent = 0.0;           // average of ‖z‖²
+    bool lasts = false;
+    [[nodiscard]] double duration_s() const noexcept { return until_s - from_s; }
+    [[nodiscard]] bool outdoes(const Spell& other) const noexcept;
+    [[nodiscard]] Oscillation measured() const noexcept;
+  };
+  void end_spell() noexcept;
+  void high_pass(double period_s, const models::Vec3& tool_W) noexcept;
+
+  bool filled_ = false;
+  struct Stage {
+    models::Vec3 x, z;  // what came in and went out in the cycle before
+  };
+  static constexpr std::size_t stage_count = 5;
+  std::array<Stage, stage_count> stages_;  // set by the first cycle
+  models::Vec3 z_ = models::Vec3::Zero(), zdot_ = models::Vec3::Zero();
+  Spell present_, longest_;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,100 @@
+"""An arm that swings by itself is told, in the summary, in the exit status and while it happens; and one that doesn't
+isn't. The judge here counts how often the steel turns round, by the record, and shares nothing with the program."""
+import statistics
+import unittest
+
+from harness import SOURCE, ProgramTest
+from steel import Track
+
+# Slower and smaller swings are a hand's.
+LEAST_M, LEAST_HZ = 0.2e-3, 3.0
+
+
+def swings(track):
+    """(seconds, Hz, m) of the longest stretch in which the steel goes back and forth, each time by LEAST_M or more and
+    within half a period of LEAST_HZ, along the axis on which it does so longest."""
+    best = (0.0, 0.0, 0.0)
+    for axis in range(3):
+        turns = turning_points(track, axis)
+        begin = 0
+        for k in range(1, len(turns) + 1):
+            in_time = k < len(turns) and turns[k][0] - turns[k - 1][0] < 0.5 / LEAST_HZ
+            if in_time:
+                continue
+            stretch = turns[begin:k]
+            begin = k
+            seconds = stretch[-1][0] - stretch[0][0] if stretch else 0.0
+            if seconds > best[0]:
+                sizes = [abs(b[1] - a[1]) / 2 for a, b in zip(stretch, stretch[1:])]
+                best = (seconds, (len(stretch) - 1) / 2 / seconds, statistics.median(sizes))
+    return best
+
+
+def turning_points(track, axis):
+    """Times and places at which the steel turns round, by LEAST_M or more since the last one."""
+    turns, extreme, direction = [], None, 0
+    for time_s, phase, place in zip(track.time_s, track.phase, track.place):
+        if phase != "rendering":
+            continue
+        x = place[axis]
+        if extreme is None:
+            extreme = (time_s, x)
+        elif direction == 0:
+            direction = (x > extreme[1] + LEAST_M) - (x < extreme[1] - LEAST_M)
+        elif direction * (x - extreme[1]) >= 0:
+            extreme = (time_s, x)
+        elif direction * (extreme[1] - x) > LEAST_M:
+            turns.append(extreme)
+            extreme, direction = (time_s, x), -direction
+    return turns
+
+
+class Oscillation(ProgramTest):
+    def run_of(self, *arguments):
+        outcome = self.call("run", "--json", "--no-plot", "--record", "record", *arguments)
+        return outcome, swings(Track(self.folder / "record"))
+
+    def test_a_mass_too_small_for_its_timestep_is_told(self):
+        for arguments in (("--timestep", "2ms", "--mass", "2"), ("--timestep", "4ms", "--mass", "3.4")):
+            with self.subTest(arguments):
+                outcome, (seconds, hertz, metres) = self.run_of(*arguments)
+                said = outcome.summary["oscillation"]
+                self.assertGreater(seconds, 1.0)
+                self.assertEqual(outcome.status, 1)
+                self.assertTrue(said["lasts"])
+                self.assertGreater(said["duration_s"], 0.5 * seconds)
+                self.assertAlmostEqual(said["frequency_Hz"] / hertz, 1.0, delta=0.15)
+                self.assertLess(abs(said["amplitude_m"] / metres - 1.0), 0.6)  # it isn't one all the time
+                self.assertGreaterEqual(outcome.err.count("the arm oscillates"), 1, outcome.err)
+                self.assertEqual(outcome.summary["end"]["reason"], "duration")
+
+    def test_people_read_what_to_change(self):
+        outcome = self.call("run", "--no-plot", "--timestep", "2ms", "--mass", "2")
+        self.assertIn("OSCILLATION:", outcome.out)
+        self.assertIn("proxarm tune", outcome.out)
+
+    def test_calm_sessions_end_well(self):
+        for arguments in ((), ("--mass", "10", "--timestep", "2ms"), ("--order", "2")):
+            with self.subTest(arguments):
+                outcome, (seconds, _, _) = self.run_of(*arguments)
+                self.assertEqual(outcome.status, 0, outcome.err)
+                self.assertFalse(outcome.summary["oscillation"]["lasts"])
+                self.assertLess(seconds, 1.0)
+
+    def test_no_shipped_scene_is_blamed(self):
+        for scene in sorted((SOURCE / "scenes").glob("*.yaml")):
+            for hand in ("touch", "explore"):
+                with self.subTest(scene=scene.name, hand=hand):
+                    outcome = self.call("run", "--json", "--no-plot", "--scene", scene, "--hand",
+                                        SOURCE / f"sim/hands/{hand}.yaml")
+                    self.assertEqual(outcome.status, 0, outcome.err)
+                    self.assertFalse(outcome.summary["oscillation"]["lasts"])
+
+    def test_who_doesnt_look_says_nothing(self):
+        outcome = self.call("run", "--json", "--no-plot", "--passivity", "off", "--timestep", "2ms", "--mass", "2")
+        self.assertEqual(outcome.status, 0)
+        self.assertIsNone(outcome.summary["oscillation"])
+
+
+if __name__ == "__main__":
+    unittest.main()

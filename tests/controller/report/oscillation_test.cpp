@@ -1,0 +1,114 @@
+#include "controller/report/oscillation.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+
+constexpr double T = 1e-3;
+
+// A hand that goes back and forth by will, and the arm that swings by itself upon it.
+Vec3 tool(double t, double frequency_Hz, double amplitude_m) {
+  const Vec3 by_will(0.05 * std::sin(2.0 * std::numbers::pi * 0.3 * t), 0.3, 0.0);
+  return by_will + amplitude_m * std::sin(2.0 * std::numbers::pi * frequency_Hz * t) * Vec3(0.6, 0.0, 0.8);
+}
+
+TEST(OscillationWatch, TellsFrequencyAmplitudeAndTimeWhateverTheHandDoesByWill) {
+  for (const double frequency_Hz : {3.5, 8.0, 16.0, 40.0}) {
+    for (const double amplitude_m : {1e-3, 2e-2}) {
+      OscillationWatch watch;
+      for (int k = 0; k < 8000; ++k) {
+        const double t = k * T;
+        watch.add(t, T, t >= 3.0 && t < 6.0, tool(t, frequency_Hz, amplitude_m));
+      }
+      const Oscillation o = watch.longest();
+      EXPECT_NEAR(o.from_s, 3.0, 1e-9);
+      EXPECT_NEAR(o.duration_s, 3.0, 1e-9);
+      EXPECT_TRUE(o.lasts);
+      // What the high-pass leaves of 0.05 m at 0.3 Hz is nothing beside that.
+      EXPECT_NEAR(o.amplitude_m, amplitude_m, 0.05 * amplitude_m) << frequency_Hz;
+      EXPECT_NEAR(o.frequency_Hz, frequency_Hz, 0.02 * frequency_Hz);
+    }
+  }
+}
+
+Vec3 swing(double t, double amplitude_m) {
+  return Vec3(0.8, 0.1 + amplitude_m * std::sin(2.0 * std::numbers::pi * 8.0 * t), 0.5);
+}
+
+// As the arm rings in a soft corner after a blow: 1.3 s, to a seventh of its amplitude in the first one.
+TEST(OscillationWatch, WhatDiesAwayDoesntLast) {
+  OscillationWatch watch;
+  for (int k = 0; k < 1500; ++k) watch.add(k * T, T, true, swing(k * T, 2e-3 * std::exp(-2.0 * k * T)));
+  EXPECT_NEAR(watch.longest().duration_s, 1.5, 1e-9);
+  EXPECT_FALSE(watch.longest().lasts);
+}
+
+TEST(OscillationWatch, WhatIsHardlyFeltMayTakeThreeSeconds) {
+  for (const double amplitude_m : {0.3e-3, 0.8e-3}) {
+    for (const int cycles : {900, 1100, 2900, 3100}) {
+      OscillationWatch watch;
+      for (int k = 0; k < cycles; ++k) watch.add(k * T, T, true, swing(k * T, amplitude_m));
+      EXPECT_EQ(watch.longest().lasts, cycles > (amplitude_m > 0.5e-3 ? 1000 : 3000)) << amplitude_m << " " << cycles;
+    }
+  }
+}
+
+TEST(OscillationWatch, WhatGrowsLastsAndIsTheVerdict) {
+  OscillationWatch watch;
+  for (int k = 0; k < 1200; ++k) watch.add(k * T, T, true, swing(k * T, 3e-4 * std::exp(3.0 * k * T)));
+  EXPECT_TRUE(watch.longest().lasts);
+  watch.reset();
+  for (int k = 0; k < 3000; ++k) watch.add(2.0 + k * T, T, true, swing(k * T, 1e-2 * std::exp(-2.0 * k * T)));
+  EXPECT_TRUE(watch.longest().lasts);
+  EXPECT_NEAR(watch.longest().duration_s, 1.2, 1e-9);
+}
+
+TEST(OscillationWatch, TakesTheLongestSpellAndBridgesShortPauses) {
+  OscillationWatch watch;
+  const auto says = [](double t) {
+    if (t >= 1.0 && t < 1.4) return true;                         // a blow
+    return t >= 3.0 && t < 5.0 && std::fmod(t - 3.0, 0.3) < 0.1;  // a wall ends it for 0.2 s in each 0.3 s
+  };
+  for (int k = 0; k < 8000; ++k) watch.add(k * T, T, says(k * T), tool(k * T, 8.0, 1e-3));
+  EXPECT_NEAR(watch.longest().from_s, 3.0, 1e-9);
+  EXPECT_NEAR(watch.longest().duration_s, 1.9, 2e-3);
+  EXPECT_EQ(watch.present().duration_s, 0.0);
+}
+
+TEST(OscillationWatch, HasNothingToSayWhereNothingSwung) {
+  OscillationWatch watch;
+  for (int k = 0; k < 3000; ++k) watch.add(k * T, T, false, tool(k * T, 8.0, 1e-2));
+  EXPECT_EQ(watch.longest().duration_s, 0.0);
+  EXPECT_FALSE(watch.longest().lasts);
+}
+
+TEST(OscillationWatch, BlowsThatLieApartAreNoSpellTogether) {
+  OscillationWatch watch;
+  for (int k = 0; k < 20000; ++k) watch.add(k * T, T, k % 500 < 200, tool(k * T, 8.0, 1e-3));
+  EXPECT_NEAR(watch.longest().duration_s, 0.2, 1e-9);
+}
+
+TEST(OscillationWatch, AHoldEndsASpell) {
+  OscillationWatch watch;
+  for (int k = 0; k < 800; ++k) watch.add(k * T, T, true, tool(k * T, 8.0, 1e-3));
+  watch.reset();
+  EXPECT_EQ(watch.present().duration_s, 0.0);
+  for (int k = 900; k < 1700; ++k) watch.add(k * T, T, true, tool(k * T, 8.0, 1e-3));
+  EXPECT_NEAR(watch.longest().duration_s, 0.8, 1e-9);
+}
+
+TEST(OscillationWatch, AToolThatStandsIsFinite) {
+  OscillationWatch watch;
+  for (int k = 0; k < 2000; ++k) watch.add(k * T, T, true, Vec3::Zero());
+  EXPECT_EQ(watch.longest().amplitude_m, 0.0);
+  EXPECT_EQ(watch.longest().frequency_Hz, 0.0);
+}
+
+}  // namespace
+}  // namespace proxarm::controller
