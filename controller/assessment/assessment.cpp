@@ -1,12 +1,12 @@
 #include "controller/assessment/assessment.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <set>
 
 #include "models/base/random.hpp"
+#include "models/geometry/eigenvalues.hpp"
 
 namespace proxarm::assessment {
 namespace {
@@ -27,7 +27,7 @@ const std::array<Direction, 6> directions{Direction{"+x", Vec3::UnitX()}, Direct
 double worst_mobility(const models::Arm& arm, const models::JointVector& q) {
   models::ToolKinematics at;
   arm.kinematics(q, at);
-  return Eigen::JacobiSVD<Eigen::MatrixXd>(at.J_W.topRows<3>()).singularValues()[2];
+  return models::smallest_singular_value(at.J_W.topRows<3>());
 }
 
 bool allowed(const description::CellLimits& limits, const Vec3& tool_W) {

@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "models/geometry/linear_systems.hpp"
+
 namespace proxarm::controller {
 
 using models::JointVector;
@@ -152,12 +154,11 @@ void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& tw
   // G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0]
   models::Jacobian J = J_W;
   J.bottomRows<3>() *= length_m;
-  Eigen::Matrix<double, 6, 6> A;
-  A.noalias() = J * J.transpose();
+  models::Mat6 A = J.lazyProduct(J.transpose());
   A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
   Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
   right.topRows<3>().setIdentity();
-  const Eigen::Matrix<double, 6, 3> solved = A.llt().solve(right);
+  const Eigen::Matrix<double, 6, 3> solved = models::solve_positive_definite(A, right);
   const double T = period_s_;
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     const Joint& joint = joints_[i];
@@ -182,8 +183,7 @@ void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& tw
 // The same for the tool's translation alone, which is all that torques render: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
 void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
                                   StepLimits& out) const noexcept {
-  models::Mat3 A;
-  A.noalias() = J_W.topRows<3>() * J_W.topRows<3>().transpose();
+  models::Mat3 A = J_W.topRows<3>().lazyProduct(J_W.topRows<3>().transpose());
   A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
   const Eigen::LLT<models::Mat3> factors(A);
   for (std::size_t i = 0; i < joints_.size(); ++i) {

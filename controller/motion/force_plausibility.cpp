@@ -8,7 +8,7 @@ namespace {
 using models::Vec3;
 
 // Below that speed the proxy rests: a hand that holds still trembles as fast.
-constexpr double rest_m_per_s = 2e-3;
+constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
 constexpr double least_growth = 1.45, least_time = 0.75, most_time = 1.1;
@@ -42,7 +42,7 @@ bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noe
 
 bool ReversedForce::step(const ForceAndMotion& now) noexcept {
   State& s = state_;
-  if (now.v_W.norm() < rest_m_per_s) {
+  if (now.v_W.norm() < at_rest_m_per_s) {
     s = {.rest_W = now.q_W, .force_N = {}, .time_s = {}, .passed = 0.0, .since_s = 0.0, .judged = now.free};
     return false;
   }

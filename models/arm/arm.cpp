@@ -2,7 +2,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,8 @@
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/geometry/eigenvalues.hpp"
+#include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -461,11 +462,8 @@ Eigen::Matrix3d Arm::mobility(const JointVector& q) const noexcept {
   ToolKinematics at_q;
   kinematics(q, at_q);
   const JointMatrix M = mass_matrix(q);
-  using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, max_axes, 3>;
-  const Rows Jt = at_q.J_W.topRows<3>().transpose();
-  const Eigen::LLT<JointMatrix> llt(M);
-  const Rows solved = llt.solve(Jt);
-  return Jt.transpose() * solved;
+  const SmallColumns3 Jt = at_q.J_W.topRows<3>().transpose();
+  return Jt.transpose().lazyProduct(solve_positive_definite(M, Jt));
 }
 
 double Arm::effective_mass(const JointVector& q, const Vec3& n_W) const noexcept {
@@ -506,8 +504,7 @@ double Arm::first_elastic_frequency_Hz(const JointVector& q) const noexcept {
       A(i, j) = M(a, b) / std::sqrt(gear_stiffness_[a] * gear_stiffness_[b]);
     }
   }
-  const Eigen::SelfAdjointEigenSolver<JointMatrix> eigen(A, Eigen::EigenvaluesOnly);
-  return 1.0 / (2.0 * std::numbers::pi * std::sqrt(eigen.eigenvalues()[n - 1]));
+  return 1.0 / (2.0 * std::numbers::pi * std::sqrt(symmetric_eigenvalues(A)[n - 1]));
 }
 
 }  // namespace proxarm::models

@@ -17,14 +17,15 @@
 
 #include "models/description/cell.hpp"
 #include "models/geometry/geometry.hpp"
+#include "models/geometry/small_matrix.hpp"
 
 namespace proxarm::models {
 
-constexpr int max_axes = 8;
+constexpr int max_axes = most_rows;
 
 // Their size is set at run time; they are stored in place.
-using JointVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, max_axes, 1>;
-using JointMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, max_axes, max_axes>;
+using JointVector = SmallVector;
+using JointMatrix = SmallMatrix;
 // Column i is the motion of T for 1 rad/s of axis i, in W: rows 0..2 velocity (m/s), rows 3..5 angular velocity
 // (rad/s).
 using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, max_axes>;

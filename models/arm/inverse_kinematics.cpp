@@ -1,18 +1,17 @@
 #include "models/arm/inverse_kinematics.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "models/base/setup_error.hpp"
+#include "models/geometry/eigenvalues.hpp"
+#include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::models {
 namespace {
 
 using Vec6 = Vec<6>;
-using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Status = InverseKinematicsResult::Status;
 
 // log of a rotation as rotation vector, |·| ≤ π. Through the quaternion, whose vector part is exact to rounding where
@@ -99,7 +98,7 @@ InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinema
   return e;
 }
 
-InverseKinematics::Mat6 InverseKinematics::weighted_jacobian(const ToolKinematics& kinematics) const noexcept {
+Mat6 InverseKinematics::weighted_jacobian(const ToolKinematics& kinematics) const noexcept {
   Mat6 J = kinematics.J_W.leftCols<6>();
   J.bottomRows<3>() *= config_.length_m;
   return J;
@@ -108,21 +107,21 @@ InverseKinematics::Mat6 InverseKinematics::weighted_jacobian(const ToolKinematic
 // Newton's method. True if it ended within tolerance and within the step limit; otherwise result.q is where it stopped.
 bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   Vec6 e = error(X_WT, result);
-  Eigen::PartialPivLU<Mat6> lu;
+  FactoredMatrix J;
   for (int i = 0;; ++i) {
     const bool arrived = result.position_residual_m <= config_.position_tolerance_m &&
                          result.rotation_residual_rad <= config_.rotation_tolerance_rad;
-    if (!arrived || i == 0) lu.compute(weighted_jacobian(result.kinematics));
+    if (!arrived || i == 0) J.factor(weighted_jacobian(result.kinematics));
     if (arrived) break;
     if (i == config_.max_iterations) return false;
-    const Vec6 q = result.q + lu.solve(e);
+    const Vec6 q = result.q + J.solve(e);
     // Written so that NaN and infinity, from a singular J, end here too.
     if (!(((q - q0).array().abs() <= max_step_.array()).all())) return false;
     result.q = q;
     ++result.iterations;
     e = error(X_WT, result);
   }
-  smallest_singular_value(lu.inverse(), result.smallest_singular_value_m_per_rad, result.lost_direction_W);
+  smallest_singular_value(J.inverse(), result.smallest_singular_value_m_per_rad, result.lost_direction_W);
   return true;
 }
 
@@ -138,9 +137,9 @@ void InverseKinematics::damped(const Vec6& q0, const Vec6& box, int iterations, 
     }
     // J Jᵀ = U S U ᵀ with S = σ², so Δq = Jᵀ U (S + λ²)⁻¹ Uᵀ e.
     const Mat6 J = weighted_jacobian(result.kinematics);
-    const Eigen::SelfAdjointEigenSolver<Mat6> eigen(J * J.transpose());
-    const Vec6 squares = eigen.eigenvalues().cwiseMax(0.0);
-    const Mat6& U = eigen.eigenvectors();
+    const SymmetricEigen eigen = symmetric_eigen(J * J.transpose());
+    const Vec6 squares = eigen.values.cwiseMax(0.0);
+    const Mat6& U = eigen.vectors;
     const Vec6 projected = U.transpose() * e;
     result.smallest_singular_value_m_per_rad = std::sqrt(squares[0]);
     result.lost_direction_W = U.col(0);

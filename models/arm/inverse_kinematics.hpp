@@ -72,7 +72,6 @@ class InverseKinematics {
 
  private:
   using Vec6 = Vec<6>;
-  using Mat6 = Eigen::Matrix<double, 6, 6>;
 
   [[nodiscard]] Vec6 error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] Mat6 weighted_jacobian(const ToolKinematics& kinematics) const noexcept;

@@ -1,11 +1,10 @@
 #include "models/world/shared_support.hpp"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "models/geometry/linear_systems.hpp"
 #include "models/world/settling.hpp"
 
 namespace proxarm::models {
@@ -17,10 +16,7 @@ constexpr int most_rounds = 4;
 // Largest ‖p − q‖, and largest sum of forces over K, that is solved. Typical steps are micrometres. Forces settle to 64
 // u of this, which is 0.1 nm; beyond, rounding would be as large as thin layers are thick.
 constexpr double farthest_m = 1e4;
-constexpr int most_rows = 3 * static_cast<int>(most);
-// Sizes are bounded at compile time, so that these live on the stack.
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, most_rows, 1>;
-using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, most_rows, most_rows>;
+static_assert(3 * most <= most_equations);
 
 // One contact on its tangent plane.
 struct FlatContact {
@@ -164,11 +160,11 @@ class FlatSupport {
 
   // A dx = b. Rigid contacts that stick leave open who bears how much; A is then singular, and any solution will do.
   template <int Size>
-  static Rows solution(const Square& A, const Rows& b) noexcept {
+  static Unknowns solution(const Equations& A, const Unknowns& b) noexcept {
     const Eigen::Matrix<double, Size, Size> square = A;
-    const Eigen::Matrix<double, Size, 1> right = b, dx = square.partialPivLu().solve(right);
+    const Eigen::Matrix<double, Size, 1> right = b, dx = solve_square<Size>(square, right);
     if ((square * dx - right).norm() <= 1e-9 * right.norm()) return dx;
-    return A.colPivHouseholderQr().solve(b);
+    return solve_least_squares(A, b);
   }
 
   // One Newton step with backtracking. Its linear system: (D_i − I) Σ dx_j − D_i dx_i/σ = −R_i for all i, σ = stiffer_.
@@ -177,8 +173,8 @@ class FlatSupport {
   bool step(double K, const Vec3& p, double& apart, bool bold) noexcept {
     budget -= static_cast<int>(count * count * count);
     const Eigen::Index n = 3 * static_cast<Eigen::Index>(count);
-    Square A(n, n);
-    Rows b(n);
+    Equations A(n, n);
+    Unknowns b(n);
     for (std::size_t i = 0; i < count; ++i) {
       const auto row = 3 * static_cast<Eigen::Index>(i);
       b.segment<3>(row) = r - response_[i].r;
@@ -188,9 +184,7 @@ class FlatSupport {
         if (j == i) A.block<3, 3>(row, column) -= response_[i].D / stiffer_;
       }
     }
-    const Rows dx = count == 2   ? solution<6>(A, b)
-                    : count == 3 ? solution<9>(A, b)
-                                 : Rows(A.colPivHouseholderQr().solve(b));
+    const Unknowns dx = count == 2 ? solution<6>(A, b) : count == 3 ? solution<9>(A, b) : solve_least_squares(A, b);
     if (!dx.allFinite()) return false;
     const std::array<Vec3, most> before = x;
     const double apart_before = apart;

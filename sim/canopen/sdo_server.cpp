@@ -224,7 +224,7 @@ void SdoServer::block_download_segment(const Message& request) {
 void SdoServer::end_block_download(const Message& request) {
   if (phase_ != Phase::block_download_end) return abort(SdoAbort::command_specifier_not_valid);
   const std::size_t unused = static_cast<std::size_t>(request[0] >> 2 & 0x07);
-  data_.resize(data_.size() - std::min(unused, data_.size()));
+  data_.erase(data_.end() - static_cast<std::ptrdiff_t>(std::min(unused, data_.size())), data_.end());
   const auto crc = static_cast<std::uint16_t>(request[1] | request[2] << 8);
   if (with_crc_ && crc != sdo_block_crc(data_)) return abort(SdoAbort::crc_error);
   finish_download({0xA1, 0, 0, 0, 0, 0, 0, 0});

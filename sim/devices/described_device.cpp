@@ -1,11 +1,11 @@
 #include "sim/devices/described_device.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
 #include "models/base/setup_error.hpp"
+#include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -34,23 +34,23 @@ DescribedDevice::DescribedDevice(const description::SensorDescription& sensor, c
   signals_of_wrench_.assign(6, {});
   for (std::size_t i = 0; i < 6; ++i) signals_of_wrench_[i][i] = 1.0;
   if (protocol_.matrix_columns.empty()) return;
-  Eigen::MatrixXd matrix(6, static_cast<Eigen::Index>(protocol_.matrix_columns.size()));
-  for (Eigen::Index column = 0; column < matrix.cols(); ++column) {
-    for (Eigen::Index row = 0; row < 6; ++row) {
-      matrix(row, column) = protocol_.matrix_columns[static_cast<std::size_t>(column)][static_cast<std::size_t>(row)];
+  models::Mat6 matrix = models::Mat6::Zero();
+  const std::size_t columns = protocol_.matrix_columns.size();
+  for (std::size_t column = 0; columns == 6 && column < 6; ++column) {
+    for (std::size_t row = 0; row < 6; ++row) {
+      matrix(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column)) = protocol_.matrix_columns[column][row];
     }
   }
-  const Eigen::FullPivLU<Eigen::MatrixXd> lu(matrix);
-  if (matrix.cols() != 6 || !lu.isInvertible()) {
+  const std::optional<models::Mat6> inverse = models::inverse_if_regular(matrix);
+  if (!inverse) {
     throw description::SetupError(
         {.file = sensor.file.string(),
          .key = "matrix",
          .message = "only a sensor with an invertible matrix of six columns can be simulated"});
   }
-  const Eigen::MatrixXd inverse = lu.inverse();
   for (std::size_t row = 0; row < 6; ++row) {
     for (std::size_t column = 0; column < 6; ++column) {
-      signals_of_wrench_[row][column] = inverse(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column));
+      signals_of_wrench_[row][column] = (*inverse)(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(column));
     }
   }
 }

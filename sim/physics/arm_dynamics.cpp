@@ -1,7 +1,5 @@
 #include "sim/physics/arm_dynamics.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 
 #include "models/base/setup_error.hpp"
 #include "models/geometry/eigenvalues.hpp"
+#include "models/geometry/linear_systems.hpp"
 #include "sim/physics/arm_model.hpp"
 #include "sim/physics/pose.hpp"
 
@@ -20,7 +19,7 @@ using models::Mat3;
 using models::Pose;
 using models::Vec3;
 using RowMat3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-using RowMatX = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using MujocoJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, models::most_rows>;
 
 // Mechanical end stops sit this far past the URDF's limits (software limits come first): 3 degrees.
 constexpr double end_stop_margin_rad = 0.05;
@@ -46,7 +45,7 @@ struct ArmDynamics::Links {
   Vec3 p_BL = Vec3::Zero();
   Vec3 arm_B = Vec3::Zero();                   // from L's origin to T's, in B
   std::vector<double> lower_stop, upper_stop;  // per axis
-  RowMatX jacobian;                            // 3 × nv, scratch
+  MujocoJacobian jacobian;                     // 3 × nv, scratch
 };
 
 ArmDynamics::~ArmDynamics() = default;
@@ -310,20 +309,20 @@ Energy ArmDynamics::energy() const {
 Mat3 ArmDynamics::effective_mass_kg() const {
   Links& l = *links_;
   const mjModel* m = l.model.get();
-  RowMatX M(m->nv, m->nv);
+  models::SmallMatrix M(m->nv, m->nv);
   mj_fullM(m, M.data(), l.data->qM);
   const Vec3 point_B = l.p_BL + l.arm_B;
   mj_jac(m, l.data.get(), l.jacobian.data(), nullptr, point_B.data(), l.body);
-  M -= hand_mass_kg_ * l.jacobian.transpose() * l.jacobian;
+  M -= (hand_mass_kg_ * l.jacobian.transpose()).lazyProduct(l.jacobian);
   for (const Axis& axis : axes_) M(axis.dof, axis.dof) += axis.rotor_inertia_kg_m2;
-  const Mat3 inverse_B = l.jacobian * M.ldlt().solve(Eigen::MatrixXd(l.jacobian.transpose()));
+  const Mat3 inverse_B = l.jacobian.lazyProduct(models::solve_positive_definite(M, l.jacobian.transpose()));
   const Mat3 R_WB = X_WB_.linear();
   return R_WB * inverse_B.inverse() * R_WB.transpose();
 }
 
 std::vector<double> ArmDynamics::locked_modes_Hz() const {
   const mjModel* m = links_->model.get();
-  RowMatX M(m->nv, m->nv);
+  models::SmallMatrix M(m->nv, m->nv);
   mj_fullM(m, M.data(), links_->data->qM);
   Eigen::MatrixXd K = Eigen::MatrixXd::Zero(m->nv, m->nv);
   for (const Axis& axis : axes_) K(axis.dof, axis.dof) = axis.stiffness_Nm_per_rad;

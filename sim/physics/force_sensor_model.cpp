@@ -1,10 +1,10 @@
 #include "sim/physics/force_sensor_model.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "models/base/setup_error.hpp"
+#include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::sim {
 namespace {
@@ -52,18 +52,17 @@ ForceSensorModel::ForceSensorModel(const description::SensorPlacement& placement
   }
   if (simulation.counts_per_N == 0 || simulation.counts_per_Nm == 0)
     throw SetupError({.key = "simulation.counts_per_N, counts_per_Nm", .found = "0", .expected = "at least 1"});
-  Eigen::Matrix<double, 6, 6> matrix;
+  models::Mat6 matrix;
   for (int row = 0; row < 6; ++row)
     for (int column = 0; column < 6; ++column)
       matrix(row, column) = simulation.matrix[static_cast<std::size_t>(row)][static_cast<std::size_t>(column)];
-  const Eigen::FullPivLU<Eigen::Matrix<double, 6, 6>> lu(matrix);
-  if (!lu.isInvertible())
-    throw SetupError({.key = "simulation.matrix", .message = "the calibration matrix can't be inverted"});
+  const std::optional<models::Mat6> inverse = models::inverse_if_regular(matrix);
+  if (!inverse) throw SetupError({.key = "simulation.matrix", .message = "the calibration matrix can't be inverted"});
   const auto counts_N = static_cast<double>(simulation.counts_per_N);
   const auto counts_Nm = static_cast<double>(simulation.counts_per_Nm);
   Vec6 counts_per_unit;
   counts_per_unit << counts_N, counts_N, counts_N, counts_Nm, counts_Nm, counts_Nm;
-  gauges_per_unit_ = lu.inverse() * counts_per_unit.asDiagonal();
+  gauges_per_unit_ = *inverse * counts_per_unit.asDiagonal();
   bias_counts_ = Vec6(simulation.bias_counts.data());
   const double n = placement.noise_N, m = placement.noise_Nm;
   noise_deviation_ << n, n, n, m, m, m;

@@ -1,6 +1,5 @@
 #include "controller/command_line/preparation/start_check.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,6 +8,7 @@
 #include "models/arm/arm.hpp"
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/geometry/eigenvalues.hpp"
 #include "scenes/compiler/compile.hpp"
 
 namespace proxarm::command_line {
@@ -32,8 +32,7 @@ double smallest_singular_value(const PreparedSession& session, const models::Arm
   if (session.impedance()) {
     models::ToolKinematics tool;
     arm.kinematics(arm.start_rad(), tool);
-    const models::Mat3 squares = tool.J_W.topRows<3>() * tool.J_W.topRows<3>().transpose();
-    return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<models::Mat3>(squares).eigenvalues()[0]));
+    return models::smallest_singular_value(tool.J_W.topRows<3>());
   }
   const models::InverseKinematics inverse(arm);
   models::InverseKinematicsResult result;

@@ -135,6 +135,22 @@ TEST_F(SdoServerTest, RefusesABlockWithAWrongCrc) {
   EXPECT_THAT(od.at(0x2100).value, IsEmpty());
 }
 
+// The end request says how many bytes of the last segment are no data. gcc took the subtraction for one that may go
+// below zero; it can't: the phase is reached with one segment at least, and the number has three bits.
+TEST_F(SdoServerTest, ABlockOfWhichNoByteIsDataIsEmpty) {
+  ask("C0 00 21 00 00 00 00 00");
+  ask("81 31 32 33 34 35 36 37");
+  EXPECT_THAT(ask("DD 00 00 00 00 00 00 00"), ElementsAre("A100000000000000"));
+  EXPECT_THAT(od.at(0x2100).value, IsEmpty());
+}
+
+TEST_F(SdoServerTest, ABlockCannotEndBeforeItsFirstSegment) {
+  ask("C0 00 21 00 00 00 00 00");
+  // In this phase it is a segment, 5Dh, and out of order.
+  EXPECT_THAT(ask("DD 00 00 00 00 00 00 00"), ElementsAre("A2007F0000000000"));
+  EXPECT_THAT(od.at(0x2100).value, IsEmpty());
+}
+
 TEST_F(SdoServerTest, UploadsABlockAndRepeatsWhatWasLost) {
   const std::string digits = "123456789";
   od.at(0x2100).value.assign(digits.begin(), digits.end());
