@@ -268,7 +268,7 @@ void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
   }
   const JointVector u = (theta - target_rad_) / period_s_;
   brakes_for_s_ = stop_s(u);
-  torques_.accept(u, speed_rad_per_s_, theta - at.twist_rad);
+  torques_.accept(theta - at.twist_rad);
   speed_rad_per_s_ = u;
   target_rad_ = theta;
   twist_k2_rad_ = points_.twist_rad;
