@@ -40,6 +40,7 @@ class TorqueGuard {
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // At rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
+  [[nodiscard]] bool strained() const noexcept { return state_.strained_s > 0.0; }
   // A period begins.
   void step() noexcept;
   // Setpoints may be cut: from now on each is judged by itself, for a tenth of a second.
@@ -65,7 +66,6 @@ class TorqueGuard {
     double strained_s = 0.0;  // for how long setpoints still count as such
     double eased_m_per_s = 0.0;
   };
-  [[nodiscard]] bool strained() const noexcept { return state_.strained_s > 0.0; }
   void weigh() noexcept;
 
   const models::Arm* arm_;
