@@ -66,9 +66,11 @@ class Worst {
       if (worst.felt != figure.felt || worst.stiffness_N_per_m != figure.stiffness_N_per_m) continue;
       const double quasi_static_N = std::max(worst.quasi_static_N, figure.quasi_static_N);
       const double energy_J = std::max(worst.energy_J, figure.energy_J);
+      const double left_N = std::max(worst.left_N, figure.left_N);
       if (figure.transient_N > worst.transient_N) worst = figure;
       worst.quasi_static_N = quasi_static_N;
       worst.energy_J = energy_J;
+      worst.left_N = left_N;
       return;
     }
     result_.clamps.push_back(figure);
@@ -127,6 +129,7 @@ ClampFigure clamp_figure(const Body& body, const TrialResult& result) {
   figure.end = result.end;
   double touched_s = -1.0;
   for (const Sample& sample : result.samples) {
+    figure.left_N = 0.0;
     const double depth_m = (sample.tool_W - body.surface_W).dot(body.normal_W);
     // Before the body is there, the tool is on its outer side.
     if (depth_m <= 0.0) continue;
@@ -137,6 +140,7 @@ ClampFigure clamp_figure(const Body& body, const TrialResult& result) {
     const double force_N = body.stiffness_N_per_m * depth_m;
     double& largest_N = sample.time_s - touched_s < quasi_static_from_s ? figure.transient_N : figure.quasi_static_N;
     largest_N = std::max(largest_N, force_N);
+    figure.left_N = force_N;
     figure.energy_J = std::max(figure.energy_J, 0.5 * force_N * depth_m);
   }
   return figure;

@@ -73,6 +73,7 @@ struct ClampFigure {
   double stiffness_N_per_m = 0.0;
   double transient_N = 0.0, quasi_static_N = 0.0;  // largest force until half a second after the contact, and later
   double energy_J = 0.0;                           // largest k x²/2
+  double left_N = 0.0;                             // what still presses at the trial's end
   double at_m_per_s = 0.0;                         // when the tool met it
   int pose = 0;                                    // of the largest transient force
   std::string direction{}, end{};

@@ -81,12 +81,13 @@ std::string clamps_text(const Assessment& assessment, const Thresholds& threshol
   for (std::size_t i = 0; i < assessment.clamps.size(); ++i) {
     const ClampFigure& c = assessment.clamps[i];
     if (i == 0 || c.felt != felt) {
-      text += line("%-49s %8s %8s %8s", where(c.felt), "0.5 s", "later", "energy");
+      text += line("%-49s %8s %8s %8s %8s", where(c.felt), "0.5 s", "later", "at last", "energy");
       felt = c.felt;
     }
-    text += line("  a body of %4.0f N/mm, %.2f m/s, pose %d, %-11s %6.0f N %6.0f N %6.2f J  %s%s%s",
-                 1e-3 * c.stiffness_N_per_m, c.at_m_per_s, c.pose, c.direction.c_str(), c.transient_N, c.quasi_static_N,
-                 c.energy_J, verdict(c, thresholds).c_str(), c.end.empty() ? "" : "  ended by ", c.end.c_str());
+    text +=
+        line("  a body of %4.0f N/mm, %.2f m/s, pose %d, %-11s %6.0f N %6.0f N %6.0f N %6.2f J  %s%s%s",
+             1e-3 * c.stiffness_N_per_m, c.at_m_per_s, c.pose, c.direction.c_str(), c.transient_N, c.quasi_static_N,
+             c.left_N, c.energy_J, verdict(c, thresholds).c_str(), c.end.empty() ? "" : "  ended by ", c.end.c_str());
   }
   return text;
 }
@@ -123,6 +124,7 @@ Json clamps_json(const Assessment& assessment, const Thresholds& thresholds) {
                {"at_m_per_s", c.at_m_per_s},
                {"transient_N", c.transient_N},
                {"quasi_static_N", c.quasi_static_N},
+               {"left_N", c.left_N},
                {"energy_J", c.energy_J},
                {"pose", c.pose},
                {"direction", c.direction},

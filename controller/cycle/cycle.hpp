@@ -107,6 +107,9 @@ class Cycle {
     bool tared = false;
     bool wants_resume = false;  // out of this hold: the enabling input was pressed anew, or somebody asked for it
     Command awaits_rest;        // release or back_off, in a hold in which the arm still moves
+    bool yields = false;        // stopped for a force, it backs off from what presses
+    bool yielded = false;       // it has
+    std::int64_t yields_since_ns = 0;
   };
 
   // cycle.cpp: the stages
@@ -129,7 +132,9 @@ class Cycle {
   void tare(std::int64_t t_k_ns) noexcept;
   void render() noexcept;
   void free() noexcept;
-  void run_out() noexcept;
+  void run_out(std::int64_t t_k_ns) noexcept;
+  void yield(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] bool may_yield() const noexcept;
   void await_disabled(std::int64_t t_k_ns) noexcept;
   void await_reset(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] MotionCycle motion_cycle() noexcept;

@@ -8,6 +8,8 @@ namespace {
 
 // How long the drives may take to switch off before the session ends with Fault::drive_not_disabled.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
+// 20 mm at 0.05 m/s, as soon as it has got that fast, are 0.5 s.
+constexpr std::int64_t longest_yield_ns = 1'000'000'000;
 // For so long after the last fault that slows, the tool stays slow.
 constexpr double clear_of_slow_s = 0.5;
 
@@ -28,6 +30,7 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
     case Phase::stopping:
       state_.wants_resume = false;
       state_.awaits_rest = {};
+      state_.yields = state_.yielded = false;
       return motion_->start_run_out();
     default:
       return;
@@ -58,7 +61,7 @@ void Cycle::act(std::int64_t t_k_ns) noexcept {
     case Phase::freeing:
       return free();
     case Phase::stopping:
-      return run_out();
+      return run_out(t_k_ns);
     case Phase::disabling:
       return await_disabled(t_k_ns);
     case Phase::faulted:
@@ -121,9 +124,30 @@ void Cycle::free() noexcept {
   if (motion_->free(motion_cycle())) supervisor_.handle(Event::freed);
 }
 
-void Cycle::run_out() noexcept {
+void Cycle::run_out(std::int64_t t_k_ns) noexcept {
+  if (state_.yields) return yield(t_k_ns);
   motion_->run_out();
-  if (motion_->stands()) supervisor_.handle(Event::at_rest);
+  if (!motion_->stands()) return;
+  if (may_yield() && motion_->start_yielding(measurement_.now())) {
+    state_.yields = true;
+    state_.yields_since_ns = t_k_ns;
+  } else {
+    supervisor_.handle(Event::at_rest);
+  }
+}
+
+// An arm that was stopped because it presses too hard would go on pressing, with its brakes closed.
+void Cycle::yield(std::int64_t t_k_ns) noexcept {
+  const bool over = motion_->free(motion_cycle());
+  if (!over && may_yield() && t_k_ns - state_.yields_since_ns <= longest_yield_ns) return;
+  state_.yields = false;
+  state_.yielded = true;
+  motion_->start_run_out();
+}
+
+bool Cycle::may_yield() const noexcept {
+  return supervisor_.report().fault == Fault::force_excessive && !state_.yielded &&
+         (!parts_.enabling || parts_.enabling->pressed());
 }
 
 void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {

@@ -269,9 +269,10 @@ models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexc
                                           .noise_is_white = measured.bias.noise_is_white,
                                           .tare_samples = measured.bias.samples,
                                           .sample_cycles = measured.bias.sample_cycles,
-                                          .v_W = v_W});
+                                          .v_W = v_W,
+                                          .mass_kg = state_.mass_kg});
   cycle.record.set(RecordFlag::hands_off, empty);
-  judge_force(cycle, v_W, empty);
+  judge_force(cycle, v_W, empty && !empty_handle_->led());
   if (!empty) return hand_W;
   return {empty_handle_->braking_force_W(state_.mass_kg, v_W), Vec3::Zero()};
 }
@@ -321,6 +322,14 @@ bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& m
   if (n_W.isZero(0.0) || !(command.value > 0.0)) return false;
   const Vec3 start_W = arm_.tool_pose(arm_.link_from_motor(guard_.target_rad())).translation();
   parts_.release->start_back_off(start_W, n_W, command.value, force_W);
+  return true;
+}
+
+bool AdmittanceMotion::start_yielding(const Measured& measured) noexcept {
+  const Vec3& force_W = measured.hand_W.force;
+  if (!force_W.allFinite() || force_W.norm() < Release::yielded_N) return false;
+  start(measured, Beginning::freeing);
+  parts_.release->start_yield(state_.q_k1_W, force_W);
   return true;
 }
 

@@ -47,6 +47,7 @@ class AdmittanceMotion final : public Motion {
   void start(const Measured& measured, Beginning beginning) noexcept override;
   void start_run_out() noexcept override;
   bool prepare_freeing(const Command& command, const Measured& measured) noexcept override;
+  bool start_yielding(const Measured& measured) noexcept override;
   void set(const Change& change) noexcept override;
   void set_period(double period_s) noexcept override;
 

@@ -22,6 +22,9 @@ constexpr double ringing_s = 0.1;
 // was taken for none feels a pull, not a jerk.
 constexpr double braking_m_per_s2 = 4.0, braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
 // Below 0.1 mm/s for half a second: what the arm does by itself is over.
+// Of a force that led the handle: what the tool behind the sensor does as the arm is braked, and its gears ring.
+constexpr double led_share = 0.2;
+constexpr double bias_s = 0.1, bias_N_per_s = 2.0;
 constexpr double rest_m_per_s = 1e-4, rest_time_s = 0.5;
 
 }  // namespace
@@ -33,9 +36,18 @@ void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
 
 // A torque counts as the force that would make it at the lever.
 double EmptyHandle::size_N() const noexcept {
-  const double force_N = state_.wrench_W.force.norm();
+  const double force_N = (state_.wrench_W.force - state_.bias_W).norm();
   if (!(config_.lever_m > 0.0)) return force_N;
   return std::max(force_N, state_.wrench_W.torque.norm() / config_.lever_m);
+}
+
+// A bias that led the handle is still there, and goes on; the sensor's, that the cycle keeps, takes it over.
+void EmptyHandle::follow() noexcept {
+  State& s = state_;
+  if (!s.led) return;
+  const Vec3 behind_W = s.wrench_W.force - s.bias_W;
+  const double most_N = std::min(period_s_ / bias_s, bias_N_per_s * period_s_ / std::max(1e-9, behind_W.norm()));
+  s.bias_W += std::min(1.0, most_N) * behind_W;
 }
 
 bool EmptyHandle::step(const HandSigns& signs) noexcept {
@@ -54,14 +66,25 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   // Somebody moved the handle during the tare, or the sensor filters by itself: how much of this is noise isn't known.
   if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
   const double band = std::max(config_.band_N, noise_band);
+  follow();
   const double size = size_N();
   s.calm_s = size <= noise_band ? s.calm_s + T : 0.0;
   s.quiet_s = size <= band ? s.quiet_s + T : 0.0;
   if (s.empty) {
-    s.empty = size <= leaving * band + leaving * config_.tool_mass_kg * s.acceleration_m_per_s2;
-    if (!s.empty) s.calm_s = s.quiet_s = 0.0;
+    s.empty =
+        size <= leaving * band + leaving * config_.tool_mass_kg * s.acceleration_m_per_s2 + led_share * s.bias_W.norm();
+    if (!s.empty) {
+      s.calm_s = s.quiet_s = 0.0;
+      s.led = false;
+      s.bias_W.setZero();
+      way_.start();
+    }
   } else {
-    s.empty = s.calm_s >= std::clamp(calm_way_m / speed, shortest_calm_s, longest_s) ||
+    // What was noise during the tare may have been a hand's motion: then nothing is known of it.
+    const double noise_N = signs.noise_is_white ? signs.noise_N : 0.0;
+    s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, noise_N, T});
+    if (s.led) s.bias_W = way_.line_W();
+    s.empty = s.led || s.calm_s >= std::clamp(calm_way_m / speed, shortest_calm_s, longest_s) ||
               s.quiet_s >= std::clamp(quiet_way_m / speed, shortest_quiet_s, longest_s);
   }
   s.braking_m_per_s2 = s.empty ? std::min(braking_m_per_s2, s.braking_m_per_s2 + braking_rise_m_per_s3 * T) : 0.0;

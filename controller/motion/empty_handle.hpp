@@ -19,6 +19,7 @@
 // force as any other: contacts, friction, springs and objects that move act as ever, and nothing jumps.
 #pragma once
 
+#include "controller/motion/unexplained_way.hpp"
 #include "models/base/archive_fields.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -38,6 +39,7 @@ struct HandSigns {
   double tare_samples = 0.0;     // n
   double sample_cycles = 1.0;    // from one to the next
   const models::Vec3& v_W;       // of the proxy, in the step before
+  double mass_kg = 0.0;          // its own
 };
 
 class EmptyHandle {
@@ -45,12 +47,17 @@ class EmptyHandle {
   EmptyHandle(const EmptyHandleConfig& config, double period_s) noexcept;
 
   // Rendering begins: whether somebody is there isn't known.
-  void start() noexcept { state_ = {}; }
+  void start() noexcept {
+    state_ = {};
+    way_.start();
+  }
   void set_period(double period_s) noexcept;
   // Each cycle of rendering. True: nobody holds the handle.
   bool step(const HandSigns& signs) noexcept;
 
   [[nodiscard]] bool empty() const noexcept { return state_.empty; }
+  // A force without a hand led it here.
+  [[nodiscard]] bool led() const noexcept { return state_.led; }
   // Empty, and the proxy has stood for so long that what the sensor reads is its bias.
   [[nodiscard]] bool rests() const noexcept;
   // What the low-pass makes of the hand's wrench.
@@ -58,24 +65,31 @@ class EmptyHandle {
   // In place of the hand's force, for a proxy of this mass and velocity.
   [[nodiscard]] models::Vec3 braking_force_W(double mass_kg, const models::Vec3& v_W) const noexcept;
 
-  void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
+  void archive(fieldbus::StateArchive& state) noexcept {
+    archive_fields(state, state_);
+    state(way_);
+  }
 
  private:
   struct State {
     models::Wrench wrench_W;
     models::Vec3 v_k1_W = models::Vec3::Zero();
-    double acceleration_m_per_s2 = 0.0;  // the largest lately
-    double calm_s = 0.0;                 // within the noise band
-    double quiet_s = 0.0;                // within the band
-    double rest_s = 0.0;                 // empty, and at rest
-    double braking_m_per_s2 = 0.0;       // what it brakes with at most, by now
+    double acceleration_m_per_s2 = 0.0;          // the largest lately
+    double calm_s = 0.0;                         // within the noise band
+    double quiet_s = 0.0;                        // within the band
+    double rest_s = 0.0;                         // empty, and at rest
+    double braking_m_per_s2 = 0.0;               // what it brakes with at most, by now
+    models::Vec3 bias_W = models::Vec3::Zero();  // what is read with nobody there; zero, unless it led the handle
     bool empty = false;
+    bool led = false;  // it is empty because nothing showed a hand
   };
 
   [[nodiscard]] double size_N() const noexcept;
+  void follow() noexcept;
 
   EmptyHandleConfig config_;
   double period_s_;
+  UnexplainedWay way_;
   State state_;
 };
 

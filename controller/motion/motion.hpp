@@ -68,6 +68,8 @@ class Motion {
   virtual void start_run_out() noexcept = 0;
   // Release or back_off: what free() is to do. False: nothing says which way.
   virtual bool prepare_freeing(const Command& command, const Measured& measured) noexcept = 0;
+  // Away from what presses on the tool of an arm that stands: what free() is to do then. False: little does.
+  virtual bool start_yielding(const Measured& /*measured*/) noexcept { return false; }
   virtual void set(const Change& change) noexcept = 0;
   // T of the cycles to come; the arm stands. What was commanded and rendered stays as it is.
   virtual void set_period(double period_s) noexcept = 0;

@@ -31,6 +31,12 @@ void Release::start_back_off(const Vec3& start_W, const Vec3& n_W, double distan
   n_W_ = n_W;
   distance_m_ = std::clamp(distance_m, 2.0 * arrived_m, longest_back_off_m);
   against_N_ = std::max(0.0, -n_W.dot(force_W));
+  pressed_N_ = 0.0;
+}
+
+void Release::start_yield(const Vec3& start_W, const Vec3& force_W) noexcept {
+  start_back_off(start_W, force_W.normalized(), longest_yield_m, force_W);
+  pressed_N_ = force_W.norm();
 }
 
 Vec3 Release::force_W(const Vec3& q_W, const Vec3& v_W, const Vec3& hand_W) const noexcept {
@@ -46,7 +52,12 @@ Vec3 Release::force_W(const Vec3& q_W, const Vec3& v_W, const Vec3& hand_W) cons
 }
 
 bool Release::over(const Vec3& q_W, const Vec3& hand_W) const noexcept {
-  return backs_off() && (left_m(q_W) <= arrived_m || -n_W_.dot(hand_W) > against_N_ + resisted_N);
+  if (!backs_off()) return false;
+  if (left_m(q_W) <= arrived_m || -n_W_.dot(hand_W) > against_N_ + resisted_N) return true;
+  if (pressed_N_ == 0.0) return false;
+  const double presses_N = n_W_.dot(hand_W);
+  const bool tried = distance_m_ - left_m(q_W) > relief_way_m;
+  return presses_N < yielded_N || (tried && presses_N > (1.0 - relief_share) * pressed_N_);
 }
 
 }  // namespace proxarm::controller

@@ -32,6 +32,11 @@ constexpr double bulge_m = 5e-5;
 // Of a speed that the tool is slowed to for now: its motors are faster for a moment, where their gears are bent (by up
 // to 1.42 where an arm that was let go in contact begins to move, and more at order 2).
 constexpr double slowed_share = 1.8;
+// The fifth joint's place, where an arm's wrist has its centre.
+constexpr std::size_t wrist = 4;
+// Near the end of its reach or above its base an arm folds and is flat. At the start of the default cell and around it,
+// where hands are led and scenes stand, the former is below 2 and the latter above 0.58.
+constexpr double folding = 2.5, flat = 0.5;
 // Of the cell's acceleration limit: see the header.
 constexpr double acceleration_share = 2.0;
 
@@ -236,7 +241,8 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   evaluate(wanted, exact_rounds, at);
   out = broken(wanted, at, limit, Care::exact);
   if (out.kinds == 0) return accept(wanted, at);
-  torques_.strain();
+  // In other poses a setpoint that is held back isn't followed by others that are.
+  if (torques_.strained() || folds() || stretched()) torques_.strain();
   // With torques, what a braking takes depends on the pose: it goes on as it was judged.
   const double T = period_s_, t = torques_.rated() ? brakes_for_s_ : stop_s(speed_rad_per_s_);
   const JointVector brakes = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
@@ -261,6 +267,30 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   if (out.has(Limit::joint_torque)) torques_.ease_from(steps_[0].norm() / T / exact_share);
 }
 
+// The joints that carry the arm turn faster than the tool's own speed explains.
+bool ToolGuard::folds() const noexcept {
+  const double reach_m = (points_.tool_W - points_.joint_W[first_joint - 1]).norm();
+  const Eigen::Index carrying = std::min<Eigen::Index>(3, speed_rad_per_s_.size());
+  const double fastest = speed_rad_per_s_.head(carrying).cwiseAbs().maxCoeff();
+  return reach_m * fastest * period_s_ > folding * steps_[0].norm();
+}
+
+// They move the wrist in nearly one plane: the volume that the directions of their motions span, 1 where they are at
+// right angles, is small.
+bool ToolGuard::stretched() const noexcept {
+  const auto axes = static_cast<std::size_t>(target_rad_.size());
+  if (axes < 3) return true;
+  models::ToolKinematics at;
+  arm_->kinematics(target_rad_ - points_.twist_rad, at);
+  const Vec3 wrist_T = points_.joint_W[std::min(wrist, axes - 1)] - points_.tool_W;
+  models::Mat3 moves;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    moves.col(i) = at.J_W.col(i).head<3>() + Vec3(at.J_W.col(i).tail<3>()).cross(wrist_T);
+    moves.col(i).stableNormalize();
+  }
+  return std::abs(moves.determinant()) < flat;
+}
+
 void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
   steps_[0] = at.tool_W - points_.tool_W;
   for (std::size_t i = first_joint; i < static_cast<std::size_t>(theta.size()); ++i) {
@@ -268,7 +298,7 @@ void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
   }
   const JointVector u = (theta - target_rad_) / period_s_;
   brakes_for_s_ = stop_s(u);
-  torques_.accept(u, speed_rad_per_s_, theta - at.twist_rad);
+  torques_.accept(theta - at.twist_rad);
   speed_rad_per_s_ = u;
   target_rad_ = theta;
   twist_k2_rad_ = points_.twist_rad;

@@ -88,6 +88,8 @@ class ToolGuard {
   void judge_borders(const models::Vec3& p, const models::Vec3& rest_p, double step_bend, double rest_bend,
                      ActiveLimits& out) const noexcept;
   void hold_back(const models::JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept;
+  [[nodiscard]] bool folds() const noexcept;
+  [[nodiscard]] bool stretched() const noexcept;
   void accept(const models::JointVector& theta, const models::ArmPoints& at) noexcept;
 
   const models::Arm* arm_;

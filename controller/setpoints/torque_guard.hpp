@@ -8,10 +8,11 @@
 // At full stretch axis 2 of the default cell has 10 rad/s² left of its 30: it lagged, and caught up at up to 2.4 times
 // the tool's speed limit.
 //
-// Peaks of milliseconds, as at each contact, gears and drives take without harm (a hundredth of a milliradian), so in
-// ordinary motion a is behind a low-pass. Where setpoints are strained, at the end of the arm's reach or after the
-// guard has held one back, they may be cut from cycle to cycle; then each of them is judged by itself, by a share of
-// the torque, and so is braking:
+// In ordinary motion the filter of the setpoints is ahead of this, and what it leaves is peaks of milliseconds, as at
+// each contact, which gears and drives take without harm (a hundredth of a milliradian). There nothing is judged: held
+// back, such a peak has the proxy stand in what it touches. Where setpoints are strained, at the end of the arm's reach
+// or after the guard has held one back, they may be cut from cycle to cycle; then each of them is judged by itself, by
+// a share of the torque, and so is braking:
 //   t ≥ max_i |(M u)_i| / (share τ_max,i − |g_i|)
 // Without the filter of the setpoints ahead of it, a cut setpoint makes the gears ring: a tool that is accelerated by b
 // swings beyond its speed by b/ω. From the speed at which torque was short, it gets faster by eased_m_per_s2 only.
@@ -36,9 +37,10 @@ class TorqueGuard {
               double max_speed_m_per_s, double period_s);
 
   [[nodiscard]] bool rated() const noexcept { return rated_; }
-  void set_period(double period_s) noexcept;
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
   // At rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
+  [[nodiscard]] bool strained() const noexcept { return state_.strained_s > 0.0; }
   // A period begins.
   void step() noexcept;
   // Setpoints may be cut: from now on each is judged by itself, for a tenth of a second.
@@ -50,9 +52,8 @@ class TorqueGuard {
   void judge(const models::JointVector& u, const models::JointVector& u_k1, ActiveLimits& out) const noexcept;
   // How long all joints together must take to rest from these speeds; 0: their accelerations alone decide.
   [[nodiscard]] double stop_s(const models::JointVector& u) const noexcept;
-  // Setpoints with these speeds after those were let through; the links are there now.
-  void accept(const models::JointVector& u, const models::JointVector& u_k1,
-              const models::JointVector& link_rad) noexcept;
+  // Setpoints were let through; the links are there now.
+  void accept(const models::JointVector& link_rad) noexcept;
   // Torque was short at this speed of the tool.
   void ease_from(double speed_m_per_s) noexcept;
   // What the tool may do after that.
@@ -62,21 +63,18 @@ class TorqueGuard {
 
  private:
   struct State {
-    models::JointVector smoothed_rad_per_s2;  // a behind the low-pass
-    double strained_s = 0.0;                  // for how long setpoints still count as such
+    double strained_s = 0.0;  // for how long setpoints still count as such
     double eased_m_per_s = 0.0;
   };
-  [[nodiscard]] models::JointVector smoothed(const models::JointVector& u,
-                                             const models::JointVector& u_k1) const noexcept;
-  void weigh(const models::JointVector& link_rad) noexcept;
+  void weigh() noexcept;
 
   const models::Arm* arm_;
   models::JointVector max_torque_Nm_;  // infinite where the cell doesn't say
   bool rated_ = false;
   double max_speed_m_per_s_, period_s_;
-  double smoothing_share_ = 0.0;
   State state_;
-  // Where the last setpoint was.
+  models::JointVector link_rad_;  // where the last setpoint was
+  // There, while setpoints are strained.
   models::JointMatrix mass_;
   models::JointVector gravity_Nm_;
 };

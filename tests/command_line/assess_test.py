@@ -91,6 +91,18 @@ class Assess(ProgramTest):
         for a, b in zip(felt, unfelt):
             self.assertLess(a["transient_N"], b["transient_N"], "what the sensor feels the arm gives way to")
 
+    def test_what_presses_too_hard_is_backed_off_from(self):
+        """The story: an arm that force_excessive had stopped went on pressing with its brakes closed: 536 N on 75 N/mm."""
+        excessive = [clamp for clamp in self.figures()["clamps"] if clamp["ended_by"] == "force_excessive"]
+        self.assertGreaterEqual(len(excessive), 4)
+        for clamp in excessive:
+            print(f"{clamp['stiffness_N_per_m'] / 1e3:.0f} N/mm: {clamp['transient_N']:.0f} N, "
+                  f"{clamp['left_N']:.0f} N at last")
+            self.assertTrue(clamp["felt"])
+            # The hand goes on leading: 500 N/m over half of its way, 0.15 m, are 75 N. The rest is what is left to be
+            # pressed on, 20 N, and what the arm gives while its brakes close, 0.1 s after its drives are off.
+            self.assertLess(clamp["left_N"], min(200, 0.55 * clamp["transient_N"]))
+
     def test_thresholds_decide_the_exit_status_and_their_source_is_told(self):
         told = self.shipped()
         self.assertEqual(told.status, 1)

@@ -104,15 +104,12 @@ class Lookahead(ProgramTest):
         self.assertEqual(self.call("replay", "session").status, 0)
 
     def test_where_it_is_not_known_to_be_calm_it_looks_no_further(self):
-        """The story: at 4 ms a hand of 500 N/m rang by 6.2 mm at 16 Hz; with drives whose torque is rated the proxy ended
-        60 mm inside of a moving mesh."""
+        """The story: at 4 ms a hand of 500 N/m rang by 6.2 mm at 16 Hz."""
         for timestep in ("2ms", "4ms"):
             self.assertEqual(self.summary("--lookahead", "auto", "--mass", 10, "--timestep", timestep, "--duration",
                                           "0.2s")["lookahead_s"], 0.0)
             self.assert_refused(self.call("run", "--lookahead", "4ms", "--mass", 10, "--timestep", timestep),
                                 "--lookahead", "timesteps above 1 ms")
-        cell = self.changed("models/cells/default.yaml", ("    simulation:", "    max_torque_Nm: 2500\n    simulation:"))
-        self.assert_refused(self.call("run", cell, "--lookahead", "auto"), "--lookahead", "max_torque_Nm")
 
     def test_it_is_written_down(self):
         self.summary("--lookahead", "4ms", "--mass", 10, "--duration", "0.5s", "--record", "session")

@@ -220,18 +220,6 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
 // What makes a horizon stable was found in sessions at 1 ms. At 4 ms it let a hand of 500 N/m ring by 6 mm at 16 Hz.
 constexpr double longest_period_ahead_s = 1.000001e-3;
 
-// Setpoints that the drives' torque holds back and a proxy ahead of them don't get along yet: at 10 kg the proxy ended
-// 60 mm inside of scenes/moving_mesh.yaml.
-void refuse_lookahead_on_rated_drives(const description::Cell& cell) {
-  for (const description::DriveDescription& drive : cell.drives) {
-    if (drive.max_torque_Nm <= 0.0) continue;
-    throw description::SetupError({.key = "--lookahead",
-                                   .found = "a cell whose " + drive.joint + " has max_torque_Nm",
-                                   .expected = "off: lookahead and rated drives don't go together yet",
-                                   .advice = "leave max_torque_Nm out, or --lookahead"});
-  }
-}
-
 [[noreturn]] void refuse_lookahead() {
   throw description::SetupError({.key = "--lookahead",
                                  .found = "the impedance type",
@@ -313,7 +301,6 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.order = session.settings.order;
   session.settings.force_age_s = session.cell.sensor.delay_s;
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
-  if (session.settings.looks_ahead) refuse_lookahead_on_rated_drives(session.cell);
   choose_horizon(session);
   return session;
 }
