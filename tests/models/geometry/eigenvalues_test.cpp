@@ -34,5 +34,33 @@ TEST(Eigenvalues, ChainOfTwoMassesHasItsTextbookFrequencies) {
   EXPECT_NEAR(squares[1], k / m * (3.0 + std::sqrt(5.0)) / 2.0, 1e3 * rounding);
 }
 
+// The same chain, without masses; and one row, which has nothing to be made tridiagonal.
+TEST(Eigenvalues, OfASmallSymmetricMatrix) {
+  SmallMatrix A(2, 2);
+  A << 2.0, -1.0, -1.0, 1.0;
+  const SmallVector values = symmetric_eigenvalues(A);
+  EXPECT_NEAR(values[0], (3.0 - std::sqrt(5.0)) / 2.0, rounding);
+  EXPECT_NEAR(values[1], (3.0 + std::sqrt(5.0)) / 2.0, rounding);
+  EXPECT_EQ(symmetric_eigenvalues(SmallMatrix::Constant(1, 1, -3.0))[0], -3.0);
+  EXPECT_EQ(symmetric_eigenvalues(SmallMatrix::Zero(3, 3)).norm(), 0.0);
+}
+
+TEST(Eigenvalues, AndVectorsMakeTheMatrixAgain) {
+  Mat6 A = Mat6::Constant(0.25);
+  A.diagonal() << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0;
+  const SymmetricEigen eigen = symmetric_eigen(A);
+  EXPECT_LT((eigen.vectors * eigen.values.asDiagonal() * eigen.vectors.transpose() - A).norm(), 10.0 * rounding);
+}
+
+TEST(Eigenvalues, TheSmallestSingularValueOfThreeRows) {
+  Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, most_rows> A(3, 4);
+  A << 3.0, 0.0, 0.0, 4.0,  //
+      0.0, 2.0, 0.0, 0.0,   //
+      0.0, 0.0, -7.0, 0.0;
+  EXPECT_NEAR(smallest_singular_value(A), 2.0, rounding);
+  A.row(1) = A.row(0);
+  EXPECT_NEAR(smallest_singular_value(A), 0.0, 1e-7);
+}
+
 }  // namespace
 }  // namespace proxarm::models
