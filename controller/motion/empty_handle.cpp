@@ -21,10 +21,11 @@ constexpr double ringing_s = 0.1;
 // 4 m/s² stop 0.45 m/s within 5 cm; a handle of 0.25 kg then reads 1 N. They come within 0.05 s, so that a hand that
 // was taken for none feels a pull, not a jerk.
 constexpr double braking_m_per_s2 = 4.0, braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
-// Below 0.1 mm/s for half a second: what the arm does by itself is over.
 // Of a force that led the handle: what the tool behind the sensor does as the arm is braked, and its gears ring.
 constexpr double led_share = 0.2;
-constexpr double bias_s = 0.1, bias_N_per_s = 2.0;
+// How fast that force is followed meanwhile.
+constexpr double followed_s = 0.1, followed_N_per_s = 2.0;
+// Below 0.1 mm/s for half a second: what the arm does by itself is over.
 constexpr double rest_m_per_s = 1e-4, rest_time_s = 0.5;
 
 }  // namespace
@@ -46,7 +47,7 @@ void EmptyHandle::follow() noexcept {
   State& s = state_;
   if (!s.led) return;
   const Vec3 behind_W = s.wrench_W.force - s.bias_W;
-  const double most_N = std::min(period_s_ / bias_s, bias_N_per_s * period_s_ / std::max(1e-9, behind_W.norm()));
+  const double most_N = std::min(period_s_ / followed_s, followed_N_per_s * period_s_ / std::max(1e-9, behind_W.norm()));
   s.bias_W += std::min(1.0, most_N) * behind_W;
 }
 
