@@ -47,7 +47,8 @@ void EmptyHandle::follow() noexcept {
   State& s = state_;
   if (!s.led) return;
   const Vec3 behind_W = s.wrench_W.force - s.bias_W;
-  const double most_N = std::min(period_s_ / followed_s, followed_N_per_s * period_s_ / std::max(1e-9, behind_W.norm()));
+  const double most_N =
+      std::min(period_s_ / followed_s, followed_N_per_s * period_s_ / std::max(1e-9, behind_W.norm()));
   s.bias_W += std::min(1.0, most_N) * behind_W;
 }
 
