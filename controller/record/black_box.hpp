@@ -78,7 +78,7 @@ class CycleBox {
 class BlackBox final : public CycleBox {
  public:
   static constexpr double seconds = 10.0;
-  static constexpr std::size_t most_state_bytes = 9216;
+  static constexpr std::size_t most_state_bytes = 12288;
 
   // `frames_per_cycle`: the largest number that is expected.
   BlackBox(double period_s, std::size_t frames_per_cycle);

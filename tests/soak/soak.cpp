@@ -92,10 +92,11 @@ double resident_MB() {
 }
 
 // To and fro, into the wall and along it, for as long as the session may last.
-std::string wandering_hand(const tests::ScratchFolder& folder, Random& random, double duration_s, double most_N_per_m) {
+std::string wandering_hand(const tests::ScratchFolder& folder, Random& random, double duration_s,
+                           double stiffness_N_per_m) {
   const std::string file = folder / "hand.yaml";
   std::ofstream out(file);
-  out << "name: wanders\nmass_kg: 1\nstiffness_N_per_m: " << random.log_uniform(200.0, most_N_per_m)
+  out << "name: wanders\nmass_kg: 1\nstiffness_N_per_m: " << stiffness_N_per_m
       << "\ndamping_Ns_per_m: 20\nwaypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n";
   for (double time_s = 2.0; time_s < duration_s; time_s += random.uniform(0.8, 3.0)) {
     out << "  - {time_s: " << time_s << ", offset_m: [" << random.uniform(-0.1, 0.24) << ", "
@@ -109,6 +110,7 @@ struct Session {
   std::uint64_t harmless = 0;  // faults that mustn't end it
   bool ends = false;           // whether one may
   double pauses_s = 0.0;       // for which it may be held, at most
+  double hand_N_per_m = 0.0;
 };
 
 std::string span_of(const char* fault, double from_s, double duration_s) {
@@ -199,7 +201,8 @@ Session session_of(const tests::ScratchFolder& folder, Random& random) {
   o.scene = std::string("scenes/") + scenes[random.below(scenes.size())] + ".yaml";
   const int kind = random.below(3);
   // Where the arm is held, the hand moves on without it: by up to 0.5 m, and 200 N are a fault.
-  o.hand = wandering_hand(folder, random, o.duration_s, kind == 2 ? 800.0 : 300.0);
+  session.hand_N_per_m = random.log_uniform(200.0, kind == 2 ? 800.0 : 300.0);
+  o.hand = wandering_hand(folder, random, o.duration_s, session.hand_N_per_m);
   o.settings.mass_kg = random.uniform(4.0, 12.0);
   o.settings.order = random.chance(0.3) ? 2 : 1;
   o.settings.passivity = random.chance(0.5) ? Passivity::on : Passivity::off;
@@ -248,6 +251,15 @@ class Watch {
   // Their time, as it was planned.
   [[nodiscard]] double seen_s() const { return 1e-9 * static_cast<double>(seen_ns_); }
   [[nodiscard]] const std::string& wrong() const { return wrong_; }
+  // For whoever looks into what went wrong.
+  [[nodiscard]] std::string last_state(const Session& session) const {
+    char text[128];
+    std::snprintf(text, sizeof text, ", a hand of %.4g N/m, %.4g kg, %.4g ms, order %d, passivity %s",
+                  session.hand_N_per_m, k1_.proxy_mass_kg + rig_.cell.tool.mass_kg,
+                  1e-6 * static_cast<double>(k1_.period_ns), session.options.settings.order,
+                  session.options.settings.passivity == Passivity::on ? "on" : "off");
+    return session.options.scene + text;
+  }
 
  private:
   static constexpr std::uint64_t heap_every = 10'000;  // cycles
@@ -310,6 +322,7 @@ std::string run(const Session& session, State& state, Digest& digest) {
   } else if (fault == Fault::none && rendered_s < session.options.duration_s - longest_period_s) {
     wrong = "it rendered for " + std::to_string(rendered_s) + " s of " + std::to_string(session.options.duration_s);
   }
+  if (!wrong.empty()) wrong += "; " + watch.last_state(session);
   cycle.shut_down();
   rig.network.sleep_until(rig.network.now_ns() + 100'000'000);
   ++state.sessions;
