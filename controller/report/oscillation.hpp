@@ -4,7 +4,10 @@
 // The observer (controller/stability/passivity.hpp) says in each cycle whether the tool moves above the band of a
 // hand's will and the device gives the hand energy there. Cycles that say so make a spell as long as pauses between
 // them are shorter than `pause_s`: an oscillation that a wall stops in every period has such. A blow is a spell of some
-// 0.1 to 0.3 s; an unstable loop swings until something limits it, so what goes on for `lasting_s` is one.
+// 0.1 to 0.3 s, an arm that rings after it one of up to 1.4 s; an unstable loop swings until something limits it. So a
+// spell lasts where it has gone on for `lasting_s` and the mean square of the last eighth of a second (exponential
+// average) is then at least a quarter of that of the whole spell: the amplitude hasn't fallen to half. Below `felt_m`
+// it takes `small_lasting_s`, since gears ring that long in soft contacts.
 //
 // Position and velocity of the spell, behind a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of 2
 // Hz), have the mean squares ⟨z²⟩ and ⟨ż²⟩; of a sinusoid of amplitude A and frequency ω
