@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "controller/cycle/compute_time.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
 
 namespace proxarm::controller {
@@ -51,7 +50,6 @@ void BusImage::receive_until(std::int64_t deadline_ns, FrameListener& listener) 
 }
 
 void BusImage::receive_all(FrameListener& listener) noexcept {
-  const ComputeTime timed(recorder_.record().compute_ns);
   fieldbus::TimedFrame received;
   for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
     while (parts_.network.bus(bus).receive(received)) deliver(bus, received, listener);
@@ -116,21 +114,21 @@ void BusImage::send_setpoints(const Setpoints& setpoints, std::int64_t t_k_ns, s
 
 void BusImage::send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept {
   Outbox& outbox = outboxes_[bus];
-  if (outbox.count == outbox.frames.size()) hand_over(bus);
+  if (outbox.count == outbox.frames.size()) hand_over(bus, parts_.network.now_ns());
   outbox.frames[outbox.count++] = frame;
 }
 
 void BusImage::hand_over() noexcept {
+  const std::int64_t now_ns = parts_.network.now_ns();
   for (std::size_t bus = 0; bus < outboxes_.size(); ++bus) {
-    if (outboxes_[bus].count > 0) hand_over(bus);
+    if (outboxes_[bus].count > 0) hand_over(bus, now_ns);
   }
 }
 
-void BusImage::hand_over(std::size_t bus) noexcept {
+void BusImage::hand_over(std::size_t bus, std::int64_t now_ns) noexcept {
   Outbox& outbox = outboxes_[bus];
   std::array<fieldbus::SendResult, std::tuple_size_v<decltype(Outbox::frames)>> results{};
-  parts_.network.bus(bus).send_all({outbox.frames.data(), outbox.count}, results.data());
-  const std::int64_t now_ns = parts_.network.now_ns();
+  parts_.network.bus(bus).send_all({outbox.frames.data(), outbox.count}, now_ns, results.data());
   for (std::size_t i = 0; i < outbox.count; ++i) {
     recorder_.add_sent(bus, outbox.frames[i], now_ns, results[i]);
     if (results[i] == fieldbus::SendResult::sent) continue;

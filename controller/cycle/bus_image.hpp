@@ -29,7 +29,6 @@ class BusImage {
   BusImage(CycleParts& parts, CycleRecorder& recorder, Alarm& alarm);
 
   void begin(std::int64_t t_k_ns) noexcept;
-  // The time that it takes, but not the time that it waits, is added to the record's compute_ns.
   void receive_until(std::int64_t deadline_ns, FrameListener& listener) noexcept;
   // Of each bus, as of now; once per cycle, since the recorder keeps it.
   std::span<const fieldbus::BusStatus> read_status() noexcept;
@@ -66,7 +65,7 @@ class BusImage {
   void deliver(std::size_t bus, const fieldbus::TimedFrame& received, FrameListener& listener) noexcept;
   [[nodiscard]] bool is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) const noexcept;
   [[nodiscard]] bool everything_received() const noexcept;
-  void hand_over(std::size_t bus) noexcept;
+  void hand_over(std::size_t bus, std::int64_t now_ns) noexcept;
 
   CycleParts& parts_;
   CycleRecorder& recorder_;

@@ -1,20 +1,26 @@
-// Adds the wall-clock time of a scope to a sum: what a cycle computes, without what it waits.
+// The time of this machine that goes by from its making on, without what the network waits for frames.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 
+#include "fieldbus/can/can_network.hpp"
+
 namespace proxarm::controller {
 
 class ComputeTime {
  public:
-  explicit ComputeTime(std::int64_t& sum_ns) noexcept : sum_ns_(sum_ns), begun_(std::chrono::steady_clock::now()) {}
-  ComputeTime(const ComputeTime&) = delete;
-  ComputeTime& operator=(const ComputeTime&) = delete;
-  ~ComputeTime() { sum_ns_ += std::chrono::nanoseconds(std::chrono::steady_clock::now() - begun_).count(); }
+  explicit ComputeTime(const fieldbus::CanNetwork& network) noexcept
+      : network_(network), waited_before_ns_(network.waited_ns()), begun_(std::chrono::steady_clock::now()) {}
+
+  [[nodiscard]] std::int64_t ns() const noexcept {
+    const std::chrono::nanoseconds passed = std::chrono::steady_clock::now() - begun_;
+    return passed.count() - (network_.waited_ns() - waited_before_ns_);
+  }
 
  private:
-  std::int64_t& sum_ns_;
+  const fieldbus::CanNetwork& network_;
+  std::int64_t waited_before_ns_;
   std::chrono::steady_clock::time_point begun_;
 };
 

@@ -71,22 +71,20 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       timestep_(parts_.can_drives) {}
 
 void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
+  const ComputeTime timed(parts_.network);
   begin_cycle(t_k_ns);
   bus_.receive_until(t_k_ns + std::llround(receive_window * settings_.period_s * 1e9), timestep_);
-  {
-    const ComputeTime timed(recorder_.record().compute_ns);
-    measure();
-    judge(t_k_ns);
-    choose_setpoints(t_k_ns);
-    send_setpoints(t_k_ns);
-  }
+  measure();
+  judge(t_k_ns);
+  choose_setpoints(t_k_ns);
+  send_setpoints(t_k_ns);
+  recorder_.record().compute_ns = timed.ns();
   write_record(t_k_ns);
   end_cycle();
 }
 
 void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
   recorder_.begin(t_k_ns, [this](fieldbus::StateArchive& state) noexcept { archive(state); });
-  const ComputeTime timed(recorder_.record().compute_ns);
   if (state_.cycle == 0) {
     state_.first_cycle_ns = t_k_ns;
     if (!parts_.enabling) supervisor_.handle(Event::begin);

@@ -27,8 +27,11 @@ BlackBox::BlackBox(double period_s, std::size_t frames_per_cycle)
   static_assert(alignof(BoxCycle) <= 8 && alignof(BoxFrame) <= 8 && alignof(State) <= 8 && sizeof(Head) % 8 == 0);
   void* const memory = mmap(nullptr, bytes_, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
-  // MAP_POPULATE isn't enough: where the processor keeps no dirty bits (User-Mode Linux, some ARM) the first write to
-  // each page of a shared mapping still is a page fault, which would fall into the cycle.
+  // All pages now: a page fault would fall into the cycle. Written, not just there: where the processor keeps no dirty
+  // bits (User-Mode Linux, some ARM) the first write to each page of a shared mapping still is a fault. In one go,
+  // since one by one they take seconds where each is a process switch (User-Mode Linux); a kernel before 5.14 refuses
+  // that.
+  (void)madvise(memory, bytes_, MADV_POPULATE_WRITE);
   std::memset(memory, 0, bytes_);
   memory_ = static_cast<std::byte*>(memory);
   head_ = new (memory_) Head;

@@ -11,9 +11,9 @@ class FrameTap::TappedBus final : public fieldbus::CanBus {
     if (result == fieldbus::SendResult::sent) tap_.frames_.push({frame, tap_.network_.now_ns(), index_});
     return result;
   }
-  void send_all(std::span<const fieldbus::CanFrame> frames, fieldbus::SendResult* results) noexcept override {
-    bus_.send_all(frames, results);
-    const std::int64_t now_ns = tap_.network_.now_ns();
+  void send_all(std::span<const fieldbus::CanFrame> frames, std::int64_t now_ns,
+                fieldbus::SendResult* results) noexcept override {
+    bus_.send_all(frames, now_ns, results);
     for (std::size_t i = 0; i < frames.size(); ++i) {
       if (results[i] == fieldbus::SendResult::sent) tap_.frames_.push({frames[i], now_ns, index_});
     }

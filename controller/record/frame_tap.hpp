@@ -32,6 +32,7 @@ class FrameTap final : public fieldbus::CanNetwork {
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return network_.now_ns(); }
   void sleep_until(std::int64_t deadline_ns) noexcept override { network_.sleep_until(deadline_ns); }
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return network_.wait_for_frame(deadline_ns); }
+  [[nodiscard]] std::int64_t waited_ns() const noexcept override { return network_.waited_ns(); }
 
  private:
   class TappedBus;

@@ -43,8 +43,10 @@ class CanBus {
 
   virtual SendResult send(const CanFrame& frame) noexcept = 0;
   // send() for each of these in their order, at the price of one call where the bus can do that; results[i] is that of
-  // frames[i], and one that fails doesn't keep the next from being tried.
-  virtual void send_all(std::span<const CanFrame> frames, SendResult* results) noexcept {
+  // frames[i], and one that fails doesn't keep the next from being tried. now_ns is the caller's reading of the clock,
+  // for who keeps a record.
+  virtual void send_all(std::span<const CanFrame> frames, [[maybe_unused]] std::int64_t now_ns,
+                        SendResult* results) noexcept {
     for (std::size_t i = 0; i < frames.size(); ++i) results[i] = send(frames[i]);
   }
   // Takes the oldest received frame; false when there is none. Own frames don't come back.
@@ -70,6 +72,8 @@ class CanNetwork {
   virtual void sleep_until(std::int64_t deadline_ns) noexcept = 0;
   // Returns true as soon as some bus has a frame to receive, false at the deadline.
   virtual bool wait_for_frame(std::int64_t deadline_ns) noexcept = 0;
+  // Time of this machine that went by in wait_for_frame() so far; 0 for who doesn't measure it.
+  [[nodiscard]] virtual std::int64_t waited_ns() const noexcept { return 0; }
 };
 
 }  // namespace proxarm::fieldbus

@@ -117,6 +117,7 @@ class SocketCanNetwork::Clocks {
     read_again_ns_ = now_ns_ + difference_kept_ns;
   }
   // 0: no stamp.
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }  // of the last reading
   [[nodiscard]] std::int64_t monotonic_ns(std::int64_t stamp_ns) const noexcept {
     return stamp_ns > 0 ? std::min(stamp_ns + offset_ns_, now_ns_) : now_ns_;
   }
@@ -134,10 +135,10 @@ class SocketCanNetwork::Bus final : public CanBus {
 
   SendResult send(const CanFrame& frame) noexcept override {
     SendResult result = SendResult::refused;
-    send_all({&frame, 1}, &result);
+    send_all({&frame, 1}, 0, &result);
     return result;
   }
-  void send_all(std::span<const CanFrame> frames, SendResult* results) noexcept override;
+  void send_all(std::span<const CanFrame> frames, std::int64_t now_ns, SendResult* results) noexcept override;
   bool receive(TimedFrame& out) noexcept override;
   [[nodiscard]] const BusStatus& status() const noexcept override { return status_; }
   [[nodiscard]] const std::string& name() const noexcept override { return name_; }
@@ -231,7 +232,7 @@ bool SocketCanNetwork::Bus::can_send(const CanFrame& frame) const noexcept {
          is_valid_length(frame.length, frame.fd) && !(frame.fd && (frame.remote || !fd_capable_));
 }
 
-void SocketCanNetwork::Bus::send_all(std::span<const CanFrame> frames, SendResult* results) noexcept {
+void SocketCanNetwork::Bus::send_all(std::span<const CanFrame> frames, std::int64_t, SendResult* results) noexcept {
   std::size_t count = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     results[i] = status_.state == BusState::bus_off ? SendResult::bus_off : SendResult::refused;
@@ -393,7 +394,7 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
     if (bus->has_frame()) return true;
   }
   for (;;) {
-    const std::int64_t rest_ns = deadline_ns - now_ns();
+    const std::int64_t begun_ns = now_ns(), rest_ns = deadline_ns - begun_ns;
     const int ready = system_.poll(poll_.data(), poll_.size(), rest_ns);
     bool any = false;
     if (ready > 0) {
@@ -408,6 +409,7 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
       }
       if (any) {
         clocks_->read();
+        waited_ns_ += clocks_->now_ns() - begun_ns;
         for (std::size_t i = 0; i < poll_.size(); ++i) {
           if (filled_[i]) buses_[i]->date();
         }
@@ -415,7 +417,13 @@ bool SocketCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
       }
       // Error frames only, or an interface that went down (reported once): wait on.
     }
-    if (rest_ns <= 0 || (ready == 0 && now_ns() >= deadline_ns)) return false;
+    if (rest_ns > 0 && ready != 0) continue;
+    // The kernel is never early: what it waited for has passed.
+    if (ready == 0) {
+      waited_ns_ += std::max<std::int64_t>(rest_ns, 0);
+      for (const auto& bus : buses_) bus->known_empty();
+    }
+    return false;
   }
 }
 

@@ -60,6 +60,7 @@ class SocketCanNetwork final : public CanNetwork {
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return system_.clock_ns(CLOCK_MONOTONIC); }
   void sleep_until(std::int64_t deadline_ns) noexcept override { system_.sleep_until(deadline_ns); }
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override;
+  [[nodiscard]] std::int64_t waited_ns() const noexcept override { return waited_ns_; }
 
  private:
   class Bus;
@@ -71,6 +72,7 @@ class SocketCanNetwork final : public CanNetwork {
   std::vector<std::size_t> bus_of_;
   std::vector<pollfd> poll_;
   std::vector<bool> filled_;  // by the last wait
+  std::int64_t waited_ns_ = 0;
 };
 
 // True only for interfaces of kind vcan or vxcan, as the kernel says by rtnetlink (IFLA_INFO_KIND), whatever their

@@ -108,14 +108,16 @@ void SimulatedCanNetwork::live_through_gap() noexcept {
 }
 
 bool SimulatedCanNetwork::wait_for_frame(std::int64_t deadline_ns) noexcept {
+  if (frames_waiting_ > 0) return true;
+  const std::int64_t begun_ns = monotonic_ns();
   while (frames_waiting_ == 0) {
     if (real_time_) pace(std::min(events_.next_time(), deadline_ns));
-    if (!events_.run_next(deadline_ns)) {
-      events_.advance_to(deadline_ns);
-      return false;
-    }
+    if (events_.run_next(deadline_ns)) continue;
+    events_.advance_to(deadline_ns);
+    break;
   }
-  return true;
+  waited_ns_ += monotonic_ns() - begun_ns;
+  return frames_waiting_ > 0;
 }
 
 }  // namespace proxarm::fieldbus

@@ -56,6 +56,7 @@ class SimulatedCanNetwork final : public CanNetwork {
   void sleep_until(std::int64_t deadline_ns) noexcept override;
   // A frame that completes at the deadline itself is still in time.
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override;
+  [[nodiscard]] std::int64_t waited_ns() const noexcept override { return waited_ns_; }
 
  private:
   void pace(std::int64_t time_ns) noexcept;
@@ -63,6 +64,7 @@ class SimulatedCanNetwork final : public CanNetwork {
 
   EventQueue events_;
   std::size_t frames_waiting_ = 0;
+  std::int64_t waited_ns_ = 0;  // by the machine's clock
   std::vector<std::unique_ptr<SimulatedCanBus>> buses_;
   bool real_time_ = false;
   std::int64_t real_time_offset_ns_ = 0, woken_late_ns_ = 0;  // of the monotonic clock against virtual time

@@ -107,27 +107,27 @@ void FarEndProcess::run(const std::atomic<bool>& stop, std::int64_t until_ns) {
     cell_->power_on();
     powered_ = true;
   }
-  while (!stop.load(std::memory_order_relaxed)) {
-    const std::int64_t now_ns = network_.now_ns();
-    if (now_ns >= until_ns) break;
+  // The clock is read once a round: where it is a system call, it is most of a round.
+  for (std::int64_t now_ns = network_.now_ns(); now_ns < until_ns && !stop.load(std::memory_order_relaxed);) {
     network_.wait_for_frame(std::min({events_.next_time(), until_ns, now_ns + longest_sleep}));
     ++statistics_.wake_ups;
-    receive_all();
-    run_events();
+    now_ns = network_.now_ns();
+    receive_all(now_ns);
+    run_events(now_ns);
   }
 }
 
-void FarEndProcess::receive_all() {
+void FarEndProcess::receive_all(std::int64_t now_ns) {
   for (std::size_t interface = 0; interface < network_.bus_count(); ++interface) {
-    for (fieldbus::TimedFrame timed; network_.bus(interface).receive(timed);) deliver(interface, timed);
+    for (fieldbus::TimedFrame timed; network_.bus(interface).receive(timed);) deliver(interface, timed, now_ns);
   }
 }
 
 // What was due before the frame comes first. A time stamp that lies ahead of the clock, or before what has been
 // simulated already, can't be honoured.
-void FarEndProcess::deliver(std::size_t interface, const fieldbus::TimedFrame& timed) {
+void FarEndProcess::deliver(std::size_t interface, const fieldbus::TimedFrame& timed, std::int64_t now_ns) {
   ++statistics_.frames_received;
-  const std::int64_t time_ns = std::max(std::min(timed.time_ns, network_.now_ns()), events_.now_ns());
+  const std::int64_t time_ns = std::max(std::min(timed.time_ns, now_ns), events_.now_ns());
   events_.run_until(time_ns);
   for (std::size_t i = 0; i < cell_->node_count(); ++i) {
     DeviceNode& node = cell_->node(i);
@@ -135,8 +135,8 @@ void FarEndProcess::deliver(std::size_t interface, const fieldbus::TimedFrame& t
   }
 }
 
-void FarEndProcess::run_events() {
-  const std::int64_t now_ns = network_.now_ns(), due_ns = events_.next_time();
+void FarEndProcess::run_events(std::int64_t now_ns) {
+  const std::int64_t due_ns = events_.next_time();
   if (due_ns > now_ns) return;
   const std::int64_t late_ns = now_ns - due_ns;
   if (late_ns > tick_ns_) ++statistics_.late_wake_ups;

@@ -52,9 +52,9 @@ class FarEndProcess {
  private:
   class InterfacePort;
 
-  void receive_all();
-  void deliver(std::size_t interface, const fieldbus::TimedFrame& timed);
-  void run_events();
+  void receive_all(std::int64_t now_ns);
+  void deliver(std::size_t interface, const fieldbus::TimedFrame& timed, std::int64_t now_ns);
+  void run_events(std::int64_t now_ns);
 
   fieldbus::CanNetwork& network_;
   fieldbus::EventQueue events_;

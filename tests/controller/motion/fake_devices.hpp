@@ -101,9 +101,10 @@ struct FakeBus final : fieldbus::CanBus {
     sent.push_back(frame.id);
     return result;
   }
-  void send_all(std::span<const fieldbus::CanFrame> frames, fieldbus::SendResult* results) noexcept override {
+  void send_all(std::span<const fieldbus::CanFrame> frames, std::int64_t now_ns,
+                fieldbus::SendResult* results) noexcept override {
     ++batches;
-    CanBus::send_all(frames, results);
+    CanBus::send_all(frames, now_ns, results);
   }
   bool receive(fieldbus::TimedFrame& out) noexcept override {
     if (waiting.empty()) return false;

