@@ -18,8 +18,8 @@
 
 #include "controller/limits/sent_point.hpp"
 #include "controller/limits/step_limits.hpp"
-#include "controller/motion/empty_handle.hpp"
-#include "controller/motion/force_plausibility.hpp"
+#include "controller/handle/empty_handle.hpp"
+#include "controller/handle/force_plausibility.hpp"
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/setpoints/joint_guard.hpp"

@@ -36,7 +36,7 @@ struct ReactionChoice {
 };
 [[nodiscard]] const std::vector<ReactionChoice>& reaction_choices();
 
-// What the arm does when nobody holds the handle (controller/motion/empty_handle.hpp).
+// What the arm does when nobody holds the handle (controller/handle/empty_handle.hpp).
 enum class LetGo : std::uint8_t {
   rest,   // it comes to rest and stays, until somebody takes hold of it
   coast,  // the proxy keeps its speed

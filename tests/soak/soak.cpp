@@ -238,6 +238,7 @@ class Watch {
     if (seen_ >= 2) judge_motion(record);
     k2_ = k1_;
     k1_ = record;
+    if (record.phase == Phase::rendering) rendered_ = record;
     ++seen_;
     seen_ns_ += record.period_ns;
     // After the hand's first ten seconds nothing more is wanted from the heap.
@@ -255,8 +256,8 @@ class Watch {
   [[nodiscard]] std::string last_state(const Session& session) const {
     char text[128];
     std::snprintf(text, sizeof text, ", a hand of %.4g N/m, %.4g kg, %.4g ms, order %d, passivity %s",
-                  session.hand_N_per_m, k1_.proxy_mass_kg + rig_.cell.tool.mass_kg,
-                  1e-6 * static_cast<double>(k1_.period_ns), session.options.settings.order,
+                  session.hand_N_per_m, rendered_.proxy_mass_kg + rig_.cell.tool.mass_kg,
+                  1e-6 * static_cast<double>(rendered_.period_ns), session.options.settings.order,
                   session.options.settings.passivity == Passivity::on ? "on" : "off");
     return session.options.scene + text;
   }
@@ -281,7 +282,7 @@ class Watch {
   }
 
   const ClosedLoopRig& rig_;
-  CycleRecord k1_, k2_;
+  CycleRecord k1_, k2_, rendered_;  // the last two, and the last of rendering
   std::uint64_t seen_ = 0;
   std::int64_t seen_ns_ = 0;
   double base_MB_ = 0.0;

@@ -58,8 +58,8 @@ JointVector stretched(Random& random) {
   return q;
 }
 
-// Jumps and noise at full stretch: of each drive's torque three quarters are asked for at most, and a twentieth more,
-// since a braking goes on as it was judged while the arm's masses change on the way.
+// Jumps and noise at full stretch: each drive is asked for four fifths of its torque at most. Accelerating takes two
+// fifths; a braking goes on as it was judged, though the arm's masses change on the way, and the weight comes on top.
 TEST(TorqueGuard, AsksNoDriveForMoreThanItHasAtFullStretch) {
   const description::Cell cell = default_cell();
   const models::Arm arm(cell);

@@ -1,4 +1,4 @@
-#include "controller/motion/force_plausibility.hpp"
+#include "controller/handle/force_plausibility.hpp"
 
 #include <cmath>
 
@@ -11,7 +11,7 @@ using models::Vec3;
 constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
-constexpr double least_growth = 1.45, least_time = 0.75, most_time = 1.1;
+constexpr double least_growth = 1.45, most_growth = 2.1, least_time = 0.78, most_time = 1.05;
 // A hundred times the noise of a usual sensor: below, ratios of forces say little.
 constexpr double least_force_N = 2.0;
 
@@ -29,7 +29,8 @@ bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noe
   const State& s = state_;
   if (last < doublings || s.force_N[last] < least_force_N) return false;
   for (std::size_t i = last + 1 - doublings; i <= last; ++i) {
-    if (!(s.force_N[i] >= least_growth * s.force_N[i - 1])) return false;
+    const double growth = s.force_N[i] / s.force_N[i - 1];
+    if (!(growth >= least_growth && growth <= most_growth)) return false;
     // λ of M λ² + B λ = F/x.
     const double M = now.mass_kg, B = now.damping_Ns_per_m;
     const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
@@ -61,21 +62,8 @@ bool ReversedForce::step(const ForceAndMotion& now) noexcept {
 }
 
 void StraightForce::add(const ForceAndMotion& now) noexcept {
-  State& s = state_;
-  if (s.n == 0.0) {
-    s.first_W = now.force_W;
-    s.first_speed_m_per_s = now.v_W.norm();
-    s.h = s.th = s.hh = Vec3::Zero();
-    s.t = s.tt = 0.0;
-  }
-  const double t = s.n * now.period_s;
-  const Vec3 h = now.force_W - s.first_W;
-  s.n += 1.0;
-  s.t += t;
-  s.tt += t * t;
-  s.h += h;
-  s.th += t * h;
-  s.hh += h.cwiseAbs2();
+  if (state_.fit.n == 0.0) state_.first_speed_m_per_s = now.v_W.norm();
+  state_.fit.add(now.force_W, now.period_s);
 }
 
 // What the force was 30 ms after the handle was empty, it is still to a fifth.
@@ -95,8 +83,6 @@ bool StraightForce::jumped(const ForceAndMotion& now, bool empty, double noise_N
   return gone_W.norm() >= far_m && gone_W.dot(s.jump_W) > 0.0;
 }
 
-// Least squares, h = a + b t:  b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,
-// what is left: (Σhh − a Σh − b Σth)/(n − 2), whose standard deviation is √(2/(n − 2)) of it.
 bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) noexcept {
   State& s = state_;
   if (empty) {
@@ -107,27 +93,23 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
   if (jumped(now, empty, noise_N)) return true;
   // While it is empty the bias follows, which bends the line.
   if (!s.judged || empty) {
-    s.n = 0.0;
+    s.fit.n = 0.0;
     return false;
   }
   add(now);
   const Vec3 gone_W = now.q_W - s.rest_W;
   const bool went = gone_W.norm() >= far_m;
-  if (s.n < looks || (!went && std::fmod(s.n, looks) != 0.0)) return false;
-  const Vec3 b = (s.n * s.th - s.t * s.h) / (s.n * s.tt - s.t * s.t);
-  const Vec3 a = (s.h - b * s.t) / s.n;
-  const Vec3 left = (s.hh - a.cwiseProduct(s.h) - b.cwiseProduct(s.th)) / (s.n - 2.0);
-  if (!(left.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * std::sqrt(2.0 / (s.n - 2.0))))) {
-    s.n = 0.0;
+  if (s.fit.n < looks || (!went && std::fmod(s.fit.n, looks) != 0.0)) return false;
+  const FittedLine line = fitted(s.fit, now.period_s);
+  if (!(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation))) {
+    s.fit.n = 0.0;
     s.judged = gone_W.norm() <= near_m;
     return false;
   }
-  const double lasted_s = (s.n - 1.0) * now.period_s;
-  const Vec3 force_W = s.first_W + a + lasted_s * b;
-  if (!went || gone_W.dot(force_W) <= 0.0) return false;
-  const double force_N = force_W.norm();
+  if (!went || gone_W.dot(line.end_W) <= 0.0) return false;
+  const double force_N = line.end_W.norm();
   if (force_N >= ramp_noises * noise_N) return true;
-  return force_N >= constant_noises * noise_N && lasted_s * b.norm() <= constant_share * force_N &&
+  return force_N >= constant_noises * noise_N && line.risen_W.norm() <= constant_share * force_N &&
          now.v_W.norm() >= speed_gain * s.first_speed_m_per_s;
 }
 

@@ -17,6 +17,7 @@
 // Neither allocates, locks nor throws.
 #pragma once
 
+#include "controller/handle/line_fit.hpp"
 #include "models/base/archive_fields.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -41,19 +42,15 @@ class UnexplainedWay {
 
  private:
   struct State {
-    models::Vec3 first_W = models::Vec3::Zero();  // the force with which the line begins; all sums are less it
-    models::Vec3 h = models::Vec3::Zero(), th = models::Vec3::Zero(), hh = models::Vec3::Zero();
-    double n = 0.0, t = 0.0, tt = 0.0;
+    LineFit fit;
     models::Vec3 way_W = models::Vec3::Zero();      // gone since the line began
     models::Vec3 first_v_W = models::Vec3::Zero();  // when the line began
   };
   void add(const LedHandle& now) noexcept;
-  [[nodiscard]] bool bends(const LedHandle& now) noexcept;
-  [[nodiscard]] bool leads(const LedHandle& now) const noexcept;
+  [[nodiscard]] bool leads(const LedHandle& now, const FittedLine& line) const noexcept;
 
   State state_;
-  // Of the last look: the line's end, and by how much it has risen.
-  models::Vec3 line_W_ = models::Vec3::Zero(), risen_W_ = models::Vec3::Zero();
+  models::Vec3 line_W_ = models::Vec3::Zero();  // the line's end when it was last looked at
 };
 
 }  // namespace proxarm::controller

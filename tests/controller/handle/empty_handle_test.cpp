@@ -1,6 +1,6 @@
 // The story: a proxy without a hand kept its speed for as long as nothing stopped it, and the sensor's bias of some
 // millinewtons led an empty handle through the room, 0.83 m in a minute.
-#include "controller/motion/empty_handle.hpp"
+#include "controller/handle/empty_handle.hpp"
 
 #include <gtest/gtest.h>
 

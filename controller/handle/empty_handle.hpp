@@ -19,7 +19,7 @@
 // force as any other: contacts, friction, springs and objects that move act as ever, and nothing jumps.
 #pragma once
 
-#include "controller/motion/unexplained_way.hpp"
+#include "controller/handle/unexplained_way.hpp"
 #include "models/base/archive_fields.hpp"
 #include "models/geometry/geometry.hpp"
 

@@ -1,4 +1,4 @@
-#include "controller/motion/empty_handle.hpp"
+#include "controller/handle/empty_handle.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // The story: with a force sensor of the wrong sign a hand pushed the handle on by its own stiffness, for 0.38 m and up
 // to 196 N; a sensor that drifted led an empty handle through the room.
-#include "controller/motion/force_plausibility.hpp"
+#include "controller/handle/force_plausibility.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The story: a bias of half a newton that came before the handle was known to be empty led an arm that nobody held
 // through the room, 1.7 m far: nothing but the force's size was looked at.
-#include "controller/motion/unexplained_way.hpp"
+#include "controller/handle/unexplained_way.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,48 @@
+// The straight line in time through a force, by least squares in each axis of W:  h = a + b t.
+#pragma once
+
+#include <cmath>
+
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+// The samples since the line began, as sums; plain, to be archived with what it belongs to. Empty: n = 0.
+struct LineFit {
+  models::Vec3 first_W = models::Vec3::Zero();  // the force with which the line begins; all sums are less it
+  models::Vec3 h = models::Vec3::Zero(), th = models::Vec3::Zero(), hh = models::Vec3::Zero();
+  double n = 0.0, t = 0.0, tt = 0.0;
+
+  void add(const models::Vec3& force_W, double period_s) noexcept {
+    if (n == 0.0) *this = {.first_W = force_W};
+    const double now = n * period_s;
+    const models::Vec3 more = force_W - first_W;
+    n += 1.0;
+    t += now;
+    tt += now * now;
+    h += more;
+    th += now * more;
+    hh += more.cwiseAbs2();
+  }
+};
+
+// Of three samples and more, which came once in period_s.
+struct FittedLine {
+  models::Vec3 end_W;        // the line at the last sample
+  models::Vec3 risen_W;      // since the first
+  models::Vec3 variance_N2;  // of the samples beside it
+  double deviation = 0.0;    // standard deviation of these variances, in parts of them
+};
+
+// b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,  what is left: (Σhh − a Σh − b Σth)/(n − 2).
+inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
+  const models::Vec3 b = (s.n * s.th - s.t * s.h) / (s.n * s.tt - s.t * s.t);
+  const models::Vec3 a = (s.h - b * s.t) / s.n;
+  const models::Vec3 risen_W = (s.n - 1.0) * period_s * b;
+  return {.end_W = s.first_W + a + risen_W,
+          .risen_W = risen_W,
+          .variance_N2 = (s.hh - a.cwiseProduct(s.h) - b.cwiseProduct(s.th)) / (s.n - 2.0),
+          .deviation = std::sqrt(2.0 / (s.n - 2.0))};
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,62 @@
+#include "controller/handle/unexplained_way.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+
+// Twice this, and what it takes to brake, are within the 5 cm that an arm may go with nobody at the handle.
+constexpr double longest_way_m = 0.02;
+// Looked at each time, a good line would be given up by chance now and then.
+constexpr double looks = 10.0, deviations = 4.0;
+// Of the force. A hand of 100 N/m changes by 2 N on the way allowed; the tool's swing is 6 % at first and dies out.
+constexpr double share = 0.02;
+// Of a sensor that says nothing of its noise.
+constexpr double least_noise_N = 0.005;
+constexpr double rest_m_per_s = 0.01, seen_s = 0.02;
+constexpr double small_N = 1.5, same_share = 0.2, accelerated_share = 0.5, long_s = 1.0;
+
+bool bends(const FittedLine& line, double sensors_noise_N) noexcept {
+  const double noise_N = std::max(sensors_noise_N, least_noise_N), swing_N = share * line.end_W.norm();
+  return !(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation) + swing_N * swing_N);
+}
+
+}  // namespace
+
+void UnexplainedWay::add(const LedHandle& now) noexcept {
+  if (state_.fit.n == 0.0) state_ = {.fit = {}, .way_W = Vec3::Zero(), .first_v_W = now.v_W};
+  state_.fit.add(now.force_W, now.period_s);
+  state_.way_W += now.period_s * now.v_W;
+}
+
+bool UnexplainedWay::leads(const LedHandle& now, const FittedLine& line) const noexcept {
+  const State& s = state_;
+  const Vec3 mean_W = s.fit.first_W + s.fit.h / s.fit.n;
+  const double mean_N = mean_W.norm(), lasted_s = s.fit.n * now.period_s;
+  if (!(line.end_W.dot(now.v_W) > 0.0) || !(now.mass_kg > 0.0)) return false;
+  const double gained = now.mass_kg * (now.v_W - s.first_v_W).dot(mean_W) / mean_N;
+  const bool accelerates = gained >= accelerated_share * mean_N * lasted_s;
+  const double now_N = line.end_W.norm();
+  const bool from_rest = s.first_v_W.norm() <= rest_m_per_s + std::min(mean_N, now_N) / now.mass_kg * seen_s;
+  if (from_rest && now_N < small_N) return true;
+  const bool jumped = from_rest && line.risen_W.norm() <= same_share * now_N;
+  return accelerates && (jumped || lasted_s >= long_s);
+}
+
+bool UnexplainedWay::step(const LedHandle& now) noexcept {
+  add(now);
+  const double n = state_.fit.n;
+  if (n < looks || std::fmod(n, looks) != 0.0) return false;
+  const FittedLine line = fitted(state_.fit, now.period_s);
+  line_W_ = line.end_W;
+  if (bends(line, now.noise_N)) {
+    state_.fit.n = 0.0;
+    return false;
+  }
+  return state_.way_W.norm() >= longest_way_m && leads(now, line);
+}
+
+}  // namespace proxarm::controller
