@@ -13,6 +13,8 @@ constexpr double overshoot_share = 1.2, rounding_m = 1e-4;
 ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double period_s) noexcept {
   const double off_m = off_limits(tool_W);
   if (count_ == 0) allowed_m_ = std::max(0.0, off_m);
+  if (period_s != period_s_) places_.fill(tool_W);
+  period_s_ = period_s;
   const double cycles = std::clamp(std::round(monitored_s / period_s), 1.0, static_cast<double>(most_places));
   const auto window = static_cast<std::uint32_t>(cycles);
   ToolVerdict verdict;
@@ -53,7 +55,7 @@ double ToolMonitor::off_limits(const models::Vec3& p) const noexcept {
 }
 
 void ToolMonitor::archive(fieldbus::StateArchive& state) noexcept {
-  state(count_, allowed_m_);
+  state(count_, allowed_m_, period_s_);
   for (models::Vec3& place : places_) state(place);
 }
 

@@ -40,9 +40,10 @@ class ToolMonitor {
     places_.fill(models::Vec3::Zero());
   }
 
-  // Where the arm begins to move, or another period begins.
+  // Where the arm begins to move.
   void start() noexcept { count_ = 0; }
-  // Each cycle in which it may move: the tool by the encoders.
+  // Each cycle in which it may move: the tool by the encoders. With another period the window begins where it is now:
+  // places of the old one are older than they count.
   ToolVerdict step(const models::Vec3& tool_W, double period_s) noexcept;
   // How far p is off limits, m; below zero: within them.
   [[nodiscard]] double off_limits(const models::Vec3& p) const noexcept;
@@ -56,6 +57,7 @@ class ToolMonitor {
   std::array<models::Vec3, most_places> places_;  // a ring
   std::uint32_t count_ = 0;                       // since start()
   double allowed_m_ = 0.0;                        // off limits at the start
+  double period_s_ = 0.0;                         // of the places
 };
 
 }  // namespace proxarm::controller

@@ -48,6 +48,19 @@ TEST(ToolMonitor, FindsOneThatIsFasterWithinItsWindow) {
   EXPECT_LE(found_after(1.0, 4e-3) * 4e-3, 0.025);
 }
 
+// A soak's session: 4 ms and 0.32 m/s, a hold, and 1 ms within the 80 ms in which the tool had still moved.
+TEST(ToolMonitor, TakesNoWayOfALongerPeriodForOneOfAShorter) {
+  description::CellLimits limits;
+  ToolMonitor monitor(limits, missed_cycles, 0.0);
+  monitor.start();
+  double x = 0.0;
+  for (int k = 0; k < 30; ++k) ASSERT_EQ(monitor.step(Vec3(x += 0.32 * 4e-3, 0.0, 0.0), 4e-3).fault, Fault::none);
+  for (int k = 0; k < 100; ++k) ASSERT_EQ(monitor.step(Vec3(x, 0.0, 0.0), 1e-3).fault, Fault::none) << k;
+  int k = 1;
+  while (monitor.step(Vec3(x += 2.0 * 1e-3, 0.0, 0.0), 1e-3).fault == Fault::none) ++k;
+  EXPECT_EQ(k, 7) << "ms until 13.6 mm at 2 m/s";
+}
+
 TEST(ToolMonitor, TakesMissingFeedbackAndItsCatchingUpForNothing) {
   ToolMonitor monitor({}, missed_cycles, 0.0);
   monitor.start();
