@@ -1,7 +1,6 @@
 #include "controller/cycle/bus_image.hpp"
 
 #include <algorithm>
-#include <tuple>
 
 #include "fieldbus/canopen/canopen_pdo.hpp"
 
@@ -114,25 +113,30 @@ void BusImage::send_setpoints(const Setpoints& setpoints, std::int64_t t_k_ns, s
 
 void BusImage::send(std::size_t bus, const fieldbus::CanFrame& frame) noexcept {
   Outbox& outbox = outboxes_[bus];
-  if (outbox.count == outbox.frames.size()) hand_over(bus, parts_.network.now_ns());
+  if (outbox.count == outbox.frames.size()) hand_over(bus, bus + 1);
   outbox.frames[outbox.count++] = frame;
 }
 
-void BusImage::hand_over() noexcept {
+void BusImage::hand_over() noexcept { hand_over(0, outboxes_.size()); }
+
+// The clock is read twice for all of them: it is a system call where the kernel has no vDSO.
+void BusImage::hand_over(std::size_t first_bus, std::size_t end_bus) noexcept {
   const std::int64_t now_ns = parts_.network.now_ns();
-  for (std::size_t bus = 0; bus < outboxes_.size(); ++bus) {
-    if (outboxes_[bus].count > 0) hand_over(bus, now_ns);
+  for (std::size_t bus = first_bus; bus < end_bus; ++bus) {
+    Outbox& outbox = outboxes_[bus];
+    if (outbox.count == 0) continue;
+    parts_.network.bus(bus).send_all({outbox.frames.data(), outbox.count}, now_ns, outbox.results.data());
   }
+  const std::int64_t handed_over_ns = parts_.network.now_ns();
+  for (std::size_t bus = first_bus; bus < end_bus; ++bus) note_sent(bus, handed_over_ns);
 }
 
-void BusImage::hand_over(std::size_t bus, std::int64_t now_ns) noexcept {
+void BusImage::note_sent(std::size_t bus, std::int64_t handed_over_ns) noexcept {
   Outbox& outbox = outboxes_[bus];
-  std::array<fieldbus::SendResult, std::tuple_size_v<decltype(Outbox::frames)>> results{};
-  parts_.network.bus(bus).send_all({outbox.frames.data(), outbox.count}, now_ns, results.data());
   for (std::size_t i = 0; i < outbox.count; ++i) {
-    recorder_.add_sent(bus, outbox.frames[i], now_ns, results[i]);
-    if (results[i] == fieldbus::SendResult::sent) continue;
-    alarm_.raise(fault_of(results[i]), static_cast<std::int32_t>(bus));
+    recorder_.add_sent(bus, outbox.frames[i], handed_over_ns, outbox.results[i]);
+    if (outbox.results[i] == fieldbus::SendResult::sent) continue;
+    alarm_.raise(fault_of(outbox.results[i]), static_cast<std::int32_t>(bus));
   }
   outbox.count = 0;
 }

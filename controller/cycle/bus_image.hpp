@@ -58,6 +58,7 @@ class BusImage {
   // Frames for one bus that go to its interface together.
   struct Outbox {
     std::array<fieldbus::CanFrame, 16> frames{};
+    std::array<fieldbus::SendResult, 16> results{};
     std::size_t count = 0;
   };
 
@@ -65,7 +66,8 @@ class BusImage {
   void deliver(std::size_t bus, const fieldbus::TimedFrame& received, FrameListener& listener) noexcept;
   [[nodiscard]] bool is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) const noexcept;
   [[nodiscard]] bool everything_received() const noexcept;
-  void hand_over(std::size_t bus, std::int64_t now_ns) noexcept;
+  void hand_over(std::size_t first_bus, std::size_t end_bus) noexcept;
+  void note_sent(std::size_t bus, std::int64_t handed_over_ns) noexcept;
 
   CycleParts& parts_;
   CycleRecorder& recorder_;

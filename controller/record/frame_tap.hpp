@@ -1,7 +1,8 @@
 // Passes another network's traffic through unchanged, and leaves a copy of every frame in a ring.
 //
-// For records of runs on real interfaces, where nothing else sees all frames. Sent frames carry the time of send():
-// in the log they are earlier than on the wire, by their time in the interface's queue and on the bus.
+// For records of runs on real interfaces, where nothing else sees all frames. Sent frames carry the time of send(), or
+// the one that send_all() is told: in the log they are earlier than on the wire, by their time in the interface's queue
+// and on the bus.
 #pragma once
 
 #include <cstdint>
