@@ -16,10 +16,10 @@
 #include <optional>
 #include <vector>
 
-#include "controller/limits/sent_point.hpp"
-#include "controller/limits/step_limits.hpp"
 #include "controller/handle/empty_handle.hpp"
 #include "controller/handle/force_plausibility.hpp"
+#include "controller/limits/sent_point.hpp"
+#include "controller/limits/step_limits.hpp"
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/setpoints/joint_guard.hpp"
