@@ -11,7 +11,7 @@ using models::Vec3;
 constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
-constexpr double least_growth = 1.45, most_growth = 2.1, least_time = 0.78, most_time = 1.05;
+constexpr double least_growth = 1.45, least_damped_growth = 1.6, most_growth = 2.1, least_time = 0.78, most_time = 1.05;
 // A hundred times the noise of a usual sensor: below, ratios of forces say little.
 constexpr double least_force_N = 2.0;
 
@@ -29,12 +29,13 @@ bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noe
   const State& s = state_;
   if (last < doublings || s.force_N[last] < least_force_N) return false;
   for (std::size_t i = last + 1 - doublings; i <= last; ++i) {
-    const double growth = s.force_N[i] / s.force_N[i - 1];
-    if (!(growth >= least_growth && growth <= most_growth)) return false;
     // λ of M λ² + B λ = F/x.
     const double M = now.mass_kg, B = now.damping_Ns_per_m;
     const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
     const double lambda = (std::sqrt(B * B + 4.0 * M * stiffness) - B) / (2.0 * M);
+    const double growth = s.force_N[i] / s.force_N[i - 1];
+    const double least = B > M * lambda ? least_damped_growth : least_growth;
+    if (!(growth >= least && growth <= most_growth)) return false;
     const double took = (s.time_s[i] - s.time_s[i - 1]) * lambda / std::log(2.0);
     if (took < least_time || took > most_time) return false;
   }
