@@ -102,7 +102,7 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
   const bool went = gone_W.norm() >= far_m;
   if (s.fit.n < looks || (!went && std::fmod(s.fit.n, looks) != 0.0)) return false;
   const FittedLine line = fitted(s.fit, now.period_s);
-  if (!(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation))) {
+  if (bends(line, noise_N, deviations)) {
     s.fit.n = 0.0;
     s.judged = gone_W.norm() <= near_m;
     return false;

@@ -45,4 +45,10 @@ inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
           .deviation = std::sqrt(2.0 / (s.n - 2.0))};
 }
 
+// The samples leave the line by more than noise of this standard deviation does, to within so many standard deviations
+// of the variance's estimate, and by more than `swing_N` beside it. What isn't a number bends.
+inline bool bends(const FittedLine& line, double noise_N, double deviations, double swing_N = 0.0) noexcept {
+  return !(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation) + swing_N * swing_N);
+}
+
 }  // namespace proxarm::controller

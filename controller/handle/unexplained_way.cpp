@@ -19,11 +19,6 @@ constexpr double least_noise_N = 0.005;
 constexpr double rest_m_per_s = 0.01, seen_s = 0.02;
 constexpr double small_N = 1.5, same_share = 0.2, accelerated_share = 0.5, long_s = 1.0;
 
-bool bends(const FittedLine& line, double sensors_noise_N) noexcept {
-  const double noise_N = std::max(sensors_noise_N, least_noise_N), swing_N = share * line.end_W.norm();
-  return !(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation) + swing_N * swing_N);
-}
-
 }  // namespace
 
 void UnexplainedWay::add(const LedHandle& now) noexcept {
@@ -52,7 +47,7 @@ bool UnexplainedWay::step(const LedHandle& now) noexcept {
   if (n < looks || std::fmod(n, looks) != 0.0) return false;
   const FittedLine line = fitted(state_.fit, now.period_s);
   line_W_ = line.end_W;
-  if (bends(line, now.noise_N)) {
+  if (bends(line, std::max(now.noise_N, least_noise_N), deviations, share * line.end_W.norm())) {
     state_.fit.n = 0.0;
     return false;
   }

@@ -116,8 +116,8 @@ class SocketCanNetwork::Clocks {
     offset_ns_ = now_ns_ - system_.clock_ns(CLOCK_REALTIME);
     read_again_ns_ = now_ns_ + difference_kept_ns;
   }
-  // 0: no stamp.
   [[nodiscard]] std::int64_t now_ns() const noexcept { return now_ns_; }  // of the last reading
+  // 0: no stamp.
   [[nodiscard]] std::int64_t monotonic_ns(std::int64_t stamp_ns) const noexcept {
     return stamp_ns > 0 ? std::min(stamp_ns + offset_ns_, now_ns_) : now_ns_;
   }
