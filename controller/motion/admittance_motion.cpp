@@ -28,6 +28,11 @@ Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
   return Eigen::Quaterniond(X_WT.linear()).normalized();
 }
 
+Damping damping_by(Passivity passivity) noexcept {
+  if (passivity == Passivity::on) return Damping::at_once;
+  return passivity == Passivity::automatic ? Damping::what_lasts : Damping::never;
+}
+
 }  // namespace
 
 AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm,
@@ -58,7 +63,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
   }
   if (settings.passivity != Passivity::off) {
     passivity_.emplace(PassivityConfig{.force_age_s = settings.force_age_s}, settings.period_s,
-                       settings.passivity == Passivity::on);
+                       damping_by(settings.passivity));
   }
 }
 
@@ -306,6 +311,7 @@ void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& reco
   record.oscillation_m_per_s = passivity_->oscillation_m_per_s();
   record.felt_damping_Ns_per_m = passivity_->felt_damping_Ns_per_m();
   record.set(RecordFlag::oscillation, passivity_->oscillates());
+  record.set(RecordFlag::oscillation_lasts, passivity_->lasts());
 }
 
 // ---- getting free

@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "controller/limits/step_limits.hpp"
-#include "controller/stability/passivity.hpp"
+#include "controller/stability/port_energies.hpp"
 #include "controller/supervision/supervisor.hpp"
 #include "fieldbus/cia402/cia402_period.hpp"
 #include "models/geometry/geometry.hpp"
@@ -47,6 +47,7 @@ enum class RecordFlag : std::uint32_t {
   guard_acceleration = 1u << 23,
   ramp_in = 1u << 24,  // only a share of the hand's force was let in
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
+  oscillation_lasts = 1u << 26,
 };
 
 // The flag of a limit, and the parameter that holds it ("limits.leash_m").

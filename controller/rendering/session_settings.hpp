@@ -17,8 +17,9 @@ enum class Scheme : std::uint8_t {
 
 enum class Passivity : std::uint8_t {
   off,
-  observe,  // energies and oscillations are found (passivity.hpp)
-  on,       // and damping is added against them
+  observe,    // energies and oscillations are found (passivity.hpp)
+  automatic,  // and damping is added against oscillations that last,
+  on,         // or against any at once
 };
 
 struct SessionSettings {

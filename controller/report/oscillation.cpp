@@ -7,8 +7,6 @@ namespace proxarm::controller {
 namespace {
 
 constexpr double corner_rad_per_s = 2.0 * std::numbers::pi * 4.0;
-constexpr double recent_s = 0.125;
-constexpr double kept_share = 0.25;  // of the mean square, by what still swings
 
 }  // namespace
 
@@ -38,22 +36,16 @@ void OscillationWatch::high_pass(double period_s, const models::Vec3& tool_W) no
   filled_ = true;
 }
 
-void OscillationWatch::add(double time_s, double period_s, bool oscillates, const models::Vec3& tool_W) noexcept {
-  high_pass(period_s, tool_W);
+void OscillationWatch::add(double time_s, double period_s, const Cycle& cycle) noexcept {
+  high_pass(period_s, cycle.tool_W);
   if (present_.cycles > 0.0 && time_s - present_.until_s > pause_s) end_spell();
-  if (!oscillates) return;
+  if (!cycle.oscillates) return;
   if (!(present_.cycles > 0.0)) present_.from_s = time_s;
   present_.until_s = time_s + period_s;
   present_.z2 += z_.squaredNorm();
   present_.zdot2 += zdot_.squaredNorm();
   present_.cycles += 1.0;
-  const double mean = present_.z2 / present_.cycles;
-  if (!(present_.cycles > 1.0)) present_.recent = mean;
-  present_.recent -= std::expm1(-period_s / recent_s) * (z_.squaredNorm() - present_.recent);
-  if (present_.lasts || present_.duration_s() < lasting_s || !(mean > 0.0)) return;
-  if (present_.recent < kept_share * mean) return;
-  const bool is_felt = present_.measured().amplitude_m * std::sqrt(present_.recent / mean) >= felt_m;
-  present_.lasts = is_felt || present_.duration_s() >= small_lasting_s;
+  present_.lasts = present_.lasts || cycle.lasts;
 }
 
 Oscillation OscillationWatch::present() const noexcept { return present_.measured(); }

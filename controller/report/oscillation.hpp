@@ -2,12 +2,10 @@
 // frequency and amplitude, for the verdict of the summary.
 //
 // The observer (controller/stability/passivity.hpp) says in each cycle whether the tool moves above the band of a
-// hand's will and the device gives the hand energy there. Cycles that say so make a spell as long as pauses between
-// them are shorter than `pause_s`: an oscillation that a wall stops in every period has such. A blow is a spell of some
-// 0.1 to 0.3 s, an arm that rings after it one of up to 1.4 s; an unstable loop swings until something limits it. So a
-// spell lasts where it has gone on for `lasting_s` and the mean square of the last eighth of a second (exponential
-// average) is then at least a quarter of that of the whole spell: the amplitude hasn't fallen to half. Below `felt_m`
-// it takes `small_lasting_s`, since gears ring that long in soft contacts.
+// hand's will and the device gives the hand energy there, and whether that lasts. Cycles that say so make a spell as
+// long as pauses between them are shorter than `pause_s`: an oscillation that a wall stops in every period has such. A
+// blow is a spell of some 0.1 to 0.3 s, an arm that rings after it one of up to 1.4 s; an unstable loop swings until
+// something limits it.
 //
 // Position and velocity of the spell, behind a high-pass H of n = 5 equal stages (fc = 4 Hz, which leaves 0.02 of 2
 // Hz), have the mean squares ⟨z²⟩ and ⟨ż²⟩; of a sinusoid of amplitude A and frequency ω
@@ -33,12 +31,13 @@ struct Oscillation {
 class OscillationWatch {
  public:
   static constexpr double pause_s = 0.25;
-  static constexpr double lasting_s = 1.0;        // from an amplitude of felt_m on,
-  static constexpr double small_lasting_s = 3.0;  // and below it
-  static constexpr double felt_m = 0.5e-3;
 
+  struct Cycle {
+    bool oscillates = false, lasts = false;
+    models::Vec3 tool_W;
+  };
   // A cycle of rendering; consecutive ones, or reset() between them.
-  void add(double time_s, double period_s, bool oscillates, const models::Vec3& tool_W) noexcept;
+  void add(double time_s, double period_s, const Cycle& cycle) noexcept;
   // The next cycle doesn't follow the last one.
   void reset() noexcept;
 
@@ -51,7 +50,6 @@ class OscillationWatch {
     double from_s = 0.0, until_s = 0.0;
     double z2 = 0.0, zdot2 = 0.0;  // sums of the squares,
     double cycles = 0.0;           // of so many
-    double recent = 0.0;           // average of ‖z‖²
     bool lasts = false;
     [[nodiscard]] double duration_s() const noexcept { return until_s - from_s; }
     [[nodiscard]] bool outdoes(const Spell& other) const noexcept;

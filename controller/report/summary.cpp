@@ -223,7 +223,10 @@ void SummaryBuilder::State::observe(const CycleRecord& record) {
   p.added_damping_max_Ns_per_m = std::max(p.added_damping_max_Ns_per_m, record.added_damping_Ns_per_m);
   if (record.added_damping_Ns_per_m >= noticeable_Ns_per_m) p.added_time_s += config.period_s;
   const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
-  oscillation.add(seconds(record.time_ns), config.period_s, record.has(RecordFlag::oscillation), vec3(tool));
+  oscillation.add(seconds(record.time_ns), config.period_s,
+                  {.oscillates = record.has(RecordFlag::oscillation),
+                   .lasts = record.has(RecordFlag::oscillation_lasts),
+                   .tool_W = vec3(tool)});
   if (!record.has(RecordFlag::oscillation)) return;
   p.oscillating_time_s += config.period_s;
   p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);

@@ -273,7 +273,7 @@ void tell_oscillation(const Summary& s, Lines& line) {
   line(s.oscillation->lasts ? "OSCILLATION" : "oscillation", oscillation_text(*s.oscillation));
   if (!s.oscillation->lasts) return;
   line("", "the loop isn't stable with this hand and arm: a larger mass or damping, a shorter timestep,");
-  line("", "a longer setpoint filter or --passivity on; `proxarm tune` says which mass");
+  line("", "a longer setpoint filter; `proxarm tune` says which mass, and `damping added` what --passivity did");
 }
 
 // What kept the motion back, and the energy that went through it.

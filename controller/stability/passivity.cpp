@@ -8,6 +8,13 @@ namespace proxarm::controller {
 
 using models::Vec3;
 
+namespace {
+
+// Of ⟨x̃²⟩, beside its largest: of an oscillation that lasts, and of one that is over.
+constexpr double kept_share = 0.5, died_away = 1.0 / 16.0;
+
+}  // namespace
+
 // s = (2/T)(1 − z⁻¹)/(1 + z⁻¹) in the all-pass, with c = 2τ/T:
 //   a₀ = c² + 6c + 12,   a₁ = (24 − 2c²)/a₀,   a₂ = (c² − 6c + 12)/a₀
 void PassivityObserver::Delay::design(double delay_s, double period_s) noexcept {
@@ -54,8 +61,8 @@ Vec3 PassivityObserver::Section::step(const Vec3& in) noexcept {
   return out;
 }
 
-PassivityObserver::PassivityObserver(const PassivityConfig& config, double period_s, bool acts)
-    : config_(config), acts_(acts) {
+PassivityObserver::PassivityObserver(const PassivityConfig& config, double period_s, Damping damping)
+    : config_(config), damping_(damping) {
   set_period(period_s);
 }
 
@@ -65,6 +72,7 @@ void PassivityObserver::set_period(double period_s) noexcept {
   delay_.design(config_.force_age_s, period_s);
   force_.design(config_.low_Hz, period_s);
   motion_.design(config_.low_Hz, period_s);
+  place_.design(config_.low_Hz, period_s);
 }
 
 void PassivityObserver::start(const Vec3& tool_W) noexcept {
@@ -72,10 +80,12 @@ void PassivityObserver::start(const Vec3& tool_W) noexcept {
   delay_.s2.setZero();
   force_.reset();
   motion_.reset();
-  tool_k1_ = tool_W;
+  place_.reset();
+  start_W_ = tool_k1_ = tool_W;
   h_.setZero();
   h_k1_.setZero();
-  power_ = band_ = all_ = added_ = 0.0;
+  power_ = band_ = all_ = square_ = force_square_ = added_ = remembered_s_ = 0.0;
+  spell_ = {};
   tank_ = config_.tank_J;
   release_s_ = config_.release_s;
   oscillates_ = false;
@@ -95,21 +105,57 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
   all_ += average_ * (velocity.squaredNorm() - all_);
   tank_ = std::clamp(tank_ + period_s_ * (power_ + config_.refill_W), -config_.tank_J, config_.tank_J);
   const bool did = oscillates_;
-  oscillates_ = tank_ < 0.0 && power_ < -config_.refill_W && band_ > config_.share * all_;
-  const double felt = felt_damping_Ns_per_m();
-  if (!acts_) return 0.0;
-  if (oscillates_ && !did && added_ > 0.0) release_s_ = std::min(2.0 * release_s_, config_.longest_release_s);
-  if (oscillates_ && felt < 0.0) {
-    const double growth = std::min(-felt, config_.most_felt_Ns_per_m) * period_s_ / config_.rise_s;
-    added_ = std::min(added_ + growth, config_.max_damping_Ns_per_m);
-  } else {
-    added_ -= added_ * period_s_ / release_s_;
-    if (added_ < config_.gone_Ns_per_m) {
-      added_ = 0.0;
-      release_s_ = config_.release_s;
-    }
-  }
+  square_ += average_ * (place_.step(tool_W - start_W_).squaredNorm() - square_);
+  force_square_ += average_ * (force.squaredNorm() - force_square_);
+  oscillates_ = shakes() || (tank_ < 0.0 && power_ < -config_.refill_W && band_ > config_.share * all_);
+  follow_spell();
+  if (damping_ != Damping::never) follow_damping(oscillates_ && !did);
   return added_;
+}
+
+bool PassivityObserver::shakes() const noexcept {
+  const double omega = 2.0 * std::numbers::pi * config_.shake_Hz;
+  return force_square_ > config_.shake_N * config_.shake_N && band_ > omega * omega * square_;
+}
+
+void PassivityObserver::follow_spell() noexcept {
+  remembered_s_ = std::max(0.0, remembered_s_ - period_s_);
+  if (oscillates_ && remembered_s_ > 0.0) remembered_s_ = config_.remembered_s;
+  spell_.pause_s = oscillates_ && !spell_.over ? 0.0 : spell_.pause_s + period_s_;
+  if (spell_.over) {
+    if (spell_.pause_s < config_.pause_s) return;
+    spell_ = {.most = square_, .over = square_ < kept_share * spell_.most};
+    return;
+  }
+  if (spell_.pause_s > config_.pause_s) spell_ = {};
+  if (!oscillates_ && !(spell_.lasted_s > 0.0)) return;
+  spell_.lasted_s += period_s_;
+  spell_.most = std::max(spell_.most, square_);
+  if (square_ < died_away * spell_.most) spell_ = {.most = square_, .over = true};
+  if (lasts()) remembered_s_ = config_.remembered_s;
+}
+
+bool PassivityObserver::lasts() const noexcept {
+  if (!oscillates_ || spell_.lasted_s < config_.lasting_s || square_ < kept_share * spell_.most) return false;
+  return 2.0 * square_ >= config_.felt_m * config_.felt_m || spell_.lasted_s >= config_.small_lasting_s;
+}
+
+// `begins`: a further oscillation.
+void PassivityObserver::follow_damping(bool begins) noexcept {
+  const double felt = felt_damping_Ns_per_m();
+  const bool acts = damping_ == Damping::at_once || remembered_s_ > 0.0;
+  if (begins && added_ > 0.0) release_s_ = std::min(2.0 * release_s_, config_.longest_release_s);
+  const double wanted = shakes() ? config_.most_felt_Ns_per_m : std::min(-felt, config_.most_felt_Ns_per_m);
+  if (acts && oscillates_ && wanted > 0.0) {
+    const double growth = wanted * period_s_ / config_.rise_s;
+    added_ = std::min(added_ + growth, config_.max_damping_Ns_per_m);
+    return;
+  }
+  added_ -= added_ * period_s_ / release_s_;
+  if (added_ < config_.gone_Ns_per_m) {
+    added_ = 0.0;
+    release_s_ = config_.release_s;
+  }
 }
 
 void PassivityObserver::observe_proxy(const Vec3& v_W, const Vec3& f_W, double mass_kg,

@@ -37,11 +37,25 @@
 // further one that begins before B_a has gone, up to longest_release_s: a grip that the loop can't stand oscillates
 // again as soon as it is let. B_a is part of (26)'s B, implicit, so it changes neither position nor velocity by itself.
 //
+// The encoders don't see how gears twist. Where the hand's mass swings upon them, its force shakes the proxy, and that
+// the gears in time with their own mode, the steel does far more than the motors: P̂ says nothing of it. So the device
+// also oscillates where the force itself shakes as no hand can: ⟨h̃²⟩ > shake_N² at a frequency (⟨ẋ̃²⟩/⟨x̃²⟩)^½ above
+// shake_Hz, the fastest at which people shake something. Damping then grows as it does for the largest −b̂.
+//
+// A blow on a wall, a hand that shakes for a moment and gears that ring look the same at first, but end by themselves.
+// An oscillation lasts where it has gone on for lasting_s, pauses up to pause_s included (a wall stops it in every
+// period), and hasn't died away meanwhile. Its amplitude is A with A² = 2⟨x̃²⟩, x̃ the motion behind the same high-pass:
+// ⟨x̃²⟩ must be half of its largest at least. Where it falls to a sixteenth it is over, and what is left begins anew once
+// it no longer falls to half in pause_s. Below felt_m it takes small_lasting_s. Then the loop isn't stable with this
+// grip. Damping::what_lasts begins with it, and acts at once for remembered_s after each oscillation.
+//
 // Vectors in W. Neither allocates, locks nor throws; a session without it has none of it.
 #pragma once
 
 #include <array>
+#include <cstdint>
 
+#include "controller/stability/port_energies.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -62,23 +76,23 @@ struct PassivityConfig {
   double gone_Ns_per_m = 0.1;  // of B_a; far below what any grip needs
   // A grip of K N/m is calm with about K L, L the loop's delay: 670 for 10,000 N/m and 67 ms.
   double max_damping_Ns_per_m = 1000.0;
+  double shake_N = 20.0, shake_Hz = 7.0;
+  // A blow swings for 0.1 to 0.3 s, gears ring for up to 1.4 s after it and fall meanwhile.
+  double lasting_s = 0.5, small_lasting_s = 3.0, felt_m = 0.5e-3;
+  double pause_s = 0.25;
+  double remembered_s = 60.0;
   double force_age_s = 0.0;  // τ, of a reading when it is used; below half a period it counts as 0
 };
 
-// J, since rendering began.
-struct PortEnergies {
-  double hand = 0.0;     // W_h
-  double proxy = 0.0;    // W_p
-  double world = 0.0;    // W_w
-  double kinetic = 0.0;  // ½Mv² of the proxy, now
-  double damping = 0.0;  // Σ T B v², the virtual damping's, added or not
-  double added = 0.0;    // the share of B_a in it
+enum class Damping : std::uint8_t {
+  never,  // energies and oscillations are found, B_a stays 0
+  what_lasts,
+  at_once,
 };
 
 class PassivityObserver {
  public:
-  // With `acts` it adds damping; otherwise B_a stays 0.
-  PassivityObserver(const PassivityConfig& config, double period_s, bool acts);
+  PassivityObserver(const PassivityConfig& config, double period_s, Damping damping);
 
   // Before start(): what the filters hold is of the period before.
   void set_period(double period_s) noexcept;
@@ -91,16 +105,18 @@ class PassivityObserver {
 
   [[nodiscard]] double added_damping_Ns_per_m() const noexcept { return added_; }
   [[nodiscard]] bool oscillates() const noexcept { return oscillates_; }
+  [[nodiscard]] bool lasts() const noexcept;
   // ⟨ẋ̃²⟩^½ in m/s, and b̂ in Ns/m, which is 0 where nothing moves.
   [[nodiscard]] double oscillation_m_per_s() const noexcept;
   [[nodiscard]] double felt_damping_Ns_per_m() const noexcept;
   [[nodiscard]] const PortEnergies& energies_J() const noexcept { return energies_; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
-    for (HighPass* filter : {&force_, &motion_}) {
+    for (HighPass* filter : {&force_, &motion_, &place_}) {
       for (Section& section : filter->sections) state(section.s1, section.s2);
     }
-    state(delay_.s1, delay_.s2, release_s_);
+    state(delay_.s1, delay_.s2, release_s_, start_W_, square_, force_square_, spell_.lasted_s, spell_.pause_s, spell_.most,
+          spell_.over, remembered_s_);
     state(h_k1_, h_, tool_k1_, power_, band_, all_, tank_, added_, oscillates_, energies_.hand, energies_.proxy,
           energies_.world, energies_.kinetic, energies_.damping, energies_.added);
   }
@@ -124,18 +140,31 @@ class PassivityObserver {
     models::Vec3 step(const models::Vec3& in) noexcept { return sections[1].step(sections[0].step(in)); }
     void reset() noexcept;
   };
+  struct Spell {  // of oscillation, with pauses
+    double lasted_s = 0.0;
+    double pause_s = 0.0;  // since the last oscillation
+    double most = 0.0;     // the largest ⟨x̃²⟩
+    bool over = false;     // it dies away: `most` is what it was pause_s ago
+  };
+  [[nodiscard]] bool shakes() const noexcept;
+  void follow_spell() noexcept;
+  void follow_damping(bool begins) noexcept;
 
   PassivityConfig config_;
   double period_s_ = 0.0;
-  bool acts_;
+  Damping damping_;
   double average_ = 0.0;    // share of a new value in an average
   double release_s_ = 0.0;  // with which B_a decays now
   Delay delay_;             // of the motion, to the force's age
-  HighPass force_, motion_;
+  HighPass force_, motion_, place_;
+  models::Vec3 start_W_ = models::Vec3::Zero();  // where the tool was when rendering began
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();
   double power_ = 0.0, band_ = 0.0, all_ = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩
+  double square_ = 0.0, force_square_ = 0.0;     // ⟨x̃²⟩, ⟨h̃²⟩
   double tank_ = 0.0;
   double added_ = 0.0;  // B_a
+  Spell spell_;
+  double remembered_s_ = 0.0;  // for so long an oscillation is damped at once
   bool oscillates_ = false;
   PortEnergies energies_;
 };

@@ -434,7 +434,7 @@ Cell read_cell(const YamlNode& root) {
   if (const auto limits = root.find_map("limits")) cell.limits = read_limits(*limits);
   const bool torques = std::any_of(cell.drives.begin(), cell.drives.end(),
                                    [](const DriveDescription& drive) { return drive.mode == "cst"; });
-  cell.passivity = root.choice_or("passivity", torques ? "off" : "observe", {"off", "observe", "on"});
+  cell.passivity = root.choice_or("passivity", torques ? "off" : "auto", {"off", "observe", "auto", "on"});
   if (torques && cell.passivity != "off") {
     throw root.error_at("passivity",
                         "off: drives that take torques (mode: cst) have no proxy with a mass to be damped");

@@ -174,7 +174,7 @@ struct Cell {
   SensorPlacement sensor;
   CellLimits limits;
   Profile profile = Profile::none;
-  std::string passivity = "observe";  // "off", "observe", "on" (--passivity); off with drives that take torques
+  std::string passivity = "auto";  // "off", "observe", "auto", "on" (--passivity); off with drives that take torques
   SupervisionDescription supervision;
   std::optional<EnablingInputDescription> enabling_input;
   double default_period_s = 1e-3;

@@ -105,7 +105,7 @@ BENCHMARK(limited_step)->Arg(0)->Arg(30);
 
 // What --passivity costs a cycle.
 void passivity_step(benchmark::State& state) {
-  controller::PassivityObserver observer({}, 1e-3, true);
+  controller::PassivityObserver observer({}, 1e-3, controller::Damping::what_lasts);
   observer.start(Vec3::Zero());
   Vec3 tool_W = Vec3::Zero(), v_W(0.0, 0.1, 0.0);
   int k = 0;

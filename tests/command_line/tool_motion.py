@@ -1,5 +1,7 @@
 """How fast and where the tool and the elbow are by a record's joint positions: an independent judge of the tool guard.
 
+Angles are numbers, or NumPy's arrays of a whole record with NumPy's `cos` and `sin` (`trig`).
+
 Shares nothing with the controller but the cell's and the arm's files: links and masses come from the URDF, drives and
 limits from the text of the cell file, positions from the counts in signals.csv. The model is a chain of joints whose
 gears are twisted by gravity alone, theta = q + tau_g(q)/k; its tool point is T, its elbow points are the places of the
@@ -34,9 +36,9 @@ def product(A, B):
     return tuple(tuple(sum(A[i][k] * B[k][j] for k in range(3)) for j in range(3)) for i in range(3))
 
 
-def about(axis, angle):
+def about(axis, angle, trig=math):
     x, y, z = axis
-    c, s = math.cos(angle), math.sin(angle)
+    c, s = trig.cos(angle), trig.sin(angle)
     d = 1.0 - c
     return ((c + d * x * x, d * x * y - s * z, d * x * z + s * y),
             (d * x * y + s * z, c + d * y * y, d * y * z - s * x),
@@ -95,8 +97,9 @@ class Cell:
 class Chain:
     """The URDF's joints from the root to the flange."""
 
-    def __init__(self, cell):
+    def __init__(self, cell, trig=math):
         self.cell = cell
+        self.trig = trig
         root = xml.etree.ElementTree.parse(cell.urdf).getroot()
         masses = {link.get("name"): (float(link.find("inertial/mass").get("value")),
                                      vector(link.find("inertial/origin").get("xyz")))
@@ -125,7 +128,7 @@ class Chain:
                 if joint["slides"]:
                     p = plus(p, tuple(q[joint["drive"]] * x for x in axis))
                 else:
-                    R = product(R, about(joint["axis"], q[joint["drive"]]))
+                    R = product(R, about(joint["axis"], q[joint["drive"]], self.trig))
                 places.append(p)
                 axes.append((axis, joint["drive"], joint["slides"]))
             mass, centre = joint["mass"]

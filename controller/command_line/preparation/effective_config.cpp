@@ -40,7 +40,7 @@ std::string effective_config(const PreparedSession& session) {
   number(out, "lookahead_s", settings.horizon_s);
   out << YAML::Key << "orientation" << YAML::Value
       << (settings.orientation == controller::OrientationMode::held ? "held" : "free");
-  constexpr const char* passivity[] = {"off", "observe", "on"};
+  constexpr const char* passivity[] = {"off", "observe", "auto", "on"};
   out << YAML::Key << "passivity" << YAML::Value << passivity[static_cast<int>(settings.passivity)];
   number(out, "sensor_delay_s", session.cell.sensor.delay_s);
   number(out, "rotational_inertia_kg_m2", settings.rotational_inertia_kg_m2);

@@ -206,9 +206,12 @@ void add_delay(description::SensorPlacement& sensor, double extra_delay_s) {
 void choose_passivity(PreparedSession& session, const RunOptions& options) {
   using controller::Passivity;
   const std::string& cells = session.cell.passivity;
-  const Passivity otherwise = cells == "on" ? Passivity::on : cells == "observe" ? Passivity::observe : Passivity::off;
-  // The impedance type has nothing to observe, so that a cell which doesn't ask for more than that suits it.
-  const bool nothing_to_see = session.impedance() && otherwise == Passivity::observe;
+  const Passivity otherwise = cells == "on"        ? Passivity::on
+                              : cells == "auto"    ? Passivity::automatic
+                              : cells == "observe" ? Passivity::observe
+                                                   : Passivity::off;
+  // The impedance type has nothing to observe, so that a cell which doesn't insist suits it.
+  const bool nothing_to_see = session.impedance() && otherwise != Passivity::on;
   session.settings.passivity = options.passivity.value_or(nothing_to_see ? Passivity::off : otherwise);
   if (!session.impedance() || session.settings.passivity == Passivity::off) return;
   throw description::SetupError({.file = options.passivity ? "" : session.cell.file.string(),

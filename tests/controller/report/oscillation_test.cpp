@@ -18,18 +18,19 @@ Vec3 tool(double t, double frequency_Hz, double amplitude_m) {
   return by_will + amplitude_m * std::sin(2.0 * std::numbers::pi * frequency_Hz * t) * Vec3(0.6, 0.0, 0.8);
 }
 
+OscillationWatch::Cycle cycle(bool oscillates, const Vec3& tool_W) { return {.oscillates = oscillates, .tool_W = tool_W}; }
+
 TEST(OscillationWatch, TellsFrequencyAmplitudeAndTimeWhateverTheHandDoesByWill) {
   for (const double frequency_Hz : {3.5, 8.0, 16.0, 40.0}) {
     for (const double amplitude_m : {1e-3, 2e-2}) {
       OscillationWatch watch;
       for (int k = 0; k < 8000; ++k) {
         const double t = k * T;
-        watch.add(t, T, t >= 3.0 && t < 6.0, tool(t, frequency_Hz, amplitude_m));
+        watch.add(t, T, cycle(t >= 3.0 && t < 6.0, tool(t, frequency_Hz, amplitude_m)));
       }
       const Oscillation o = watch.longest();
       EXPECT_NEAR(o.from_s, 3.0, 1e-9);
       EXPECT_NEAR(o.duration_s, 3.0, 1e-9);
-      EXPECT_TRUE(o.lasts);
       // What the high-pass leaves of 0.05 m at 0.3 Hz is nothing beside that.
       EXPECT_NEAR(o.amplitude_m, amplitude_m, 0.05 * amplitude_m) << frequency_Hz;
       EXPECT_NEAR(o.frequency_Hz, frequency_Hz, 0.02 * frequency_Hz);
@@ -37,36 +38,16 @@ TEST(OscillationWatch, TellsFrequencyAmplitudeAndTimeWhateverTheHandDoesByWill) 
   }
 }
 
-Vec3 swing(double t, double amplitude_m) {
-  return Vec3(0.8, 0.1 + amplitude_m * std::sin(2.0 * std::numbers::pi * 8.0 * t), 0.5);
-}
-
-// As the arm rings in a soft corner after a blow: 1.3 s, to a seventh of its amplitude in the first one.
-TEST(OscillationWatch, WhatDiesAwayDoesntLast) {
+// As a blow that rings for long beside an oscillation that is short, since it was damped.
+TEST(OscillationWatch, TheOneThatLastsIsTheVerdict) {
   OscillationWatch watch;
-  for (int k = 0; k < 1500; ++k) watch.add(k * T, T, true, swing(k * T, 2e-3 * std::exp(-2.0 * k * T)));
-  EXPECT_NEAR(watch.longest().duration_s, 1.5, 1e-9);
-  EXPECT_FALSE(watch.longest().lasts);
-}
-
-TEST(OscillationWatch, WhatIsHardlyFeltMayTakeThreeSeconds) {
-  for (const double amplitude_m : {0.3e-3, 0.8e-3}) {
-    for (const int cycles : {900, 1100, 2900, 3100}) {
-      OscillationWatch watch;
-      for (int k = 0; k < cycles; ++k) watch.add(k * T, T, true, swing(k * T, amplitude_m));
-      EXPECT_EQ(watch.longest().lasts, cycles > (amplitude_m > 0.5e-3 ? 1000 : 3000)) << amplitude_m << " " << cycles;
-    }
-  }
-}
-
-TEST(OscillationWatch, WhatGrowsLastsAndIsTheVerdict) {
-  OscillationWatch watch;
-  for (int k = 0; k < 1200; ++k) watch.add(k * T, T, true, swing(k * T, 3e-4 * std::exp(3.0 * k * T)));
-  EXPECT_TRUE(watch.longest().lasts);
+  for (int k = 0; k < 700; ++k) watch.add(k * T, T, {true, k > 500, tool(k * T, 8.0, 1e-3)});
+  EXPECT_TRUE(watch.present().lasts);
   watch.reset();
-  for (int k = 0; k < 3000; ++k) watch.add(2.0 + k * T, T, true, swing(k * T, 1e-2 * std::exp(-2.0 * k * T)));
+  for (int k = 0; k < 3000; ++k) watch.add(2.0 + k * T, T, cycle(true, tool(k * T, 8.0, 1e-3)));
+  EXPECT_FALSE(watch.present().lasts);
   EXPECT_TRUE(watch.longest().lasts);
-  EXPECT_NEAR(watch.longest().duration_s, 1.2, 1e-9);
+  EXPECT_NEAR(watch.longest().duration_s, 0.7, 1e-9);
 }
 
 TEST(OscillationWatch, TakesTheLongestSpellAndBridgesShortPauses) {
@@ -75,7 +56,7 @@ TEST(OscillationWatch, TakesTheLongestSpellAndBridgesShortPauses) {
     if (t >= 1.0 && t < 1.4) return true;                         // a blow
     return t >= 3.0 && t < 5.0 && std::fmod(t - 3.0, 0.3) < 0.1;  // a wall ends it for 0.2 s in each 0.3 s
   };
-  for (int k = 0; k < 8000; ++k) watch.add(k * T, T, says(k * T), tool(k * T, 8.0, 1e-3));
+  for (int k = 0; k < 8000; ++k) watch.add(k * T, T, cycle(says(k * T), tool(k * T, 8.0, 1e-3)));
   EXPECT_NEAR(watch.longest().from_s, 3.0, 1e-9);
   EXPECT_NEAR(watch.longest().duration_s, 1.9, 2e-3);
   EXPECT_EQ(watch.present().duration_s, 0.0);
@@ -83,29 +64,29 @@ TEST(OscillationWatch, TakesTheLongestSpellAndBridgesShortPauses) {
 
 TEST(OscillationWatch, HasNothingToSayWhereNothingSwung) {
   OscillationWatch watch;
-  for (int k = 0; k < 3000; ++k) watch.add(k * T, T, false, tool(k * T, 8.0, 1e-2));
+  for (int k = 0; k < 3000; ++k) watch.add(k * T, T, cycle(false, tool(k * T, 8.0, 1e-2)));
   EXPECT_EQ(watch.longest().duration_s, 0.0);
   EXPECT_FALSE(watch.longest().lasts);
 }
 
 TEST(OscillationWatch, BlowsThatLieApartAreNoSpellTogether) {
   OscillationWatch watch;
-  for (int k = 0; k < 20000; ++k) watch.add(k * T, T, k % 500 < 200, tool(k * T, 8.0, 1e-3));
+  for (int k = 0; k < 20000; ++k) watch.add(k * T, T, cycle(k % 500 < 200, tool(k * T, 8.0, 1e-3)));
   EXPECT_NEAR(watch.longest().duration_s, 0.2, 1e-9);
 }
 
 TEST(OscillationWatch, AHoldEndsASpell) {
   OscillationWatch watch;
-  for (int k = 0; k < 800; ++k) watch.add(k * T, T, true, tool(k * T, 8.0, 1e-3));
+  for (int k = 0; k < 800; ++k) watch.add(k * T, T, cycle(true, tool(k * T, 8.0, 1e-3)));
   watch.reset();
   EXPECT_EQ(watch.present().duration_s, 0.0);
-  for (int k = 900; k < 1700; ++k) watch.add(k * T, T, true, tool(k * T, 8.0, 1e-3));
+  for (int k = 900; k < 1700; ++k) watch.add(k * T, T, cycle(true, tool(k * T, 8.0, 1e-3)));
   EXPECT_NEAR(watch.longest().duration_s, 0.8, 1e-9);
 }
 
 TEST(OscillationWatch, AToolThatStandsIsFinite) {
   OscillationWatch watch;
-  for (int k = 0; k < 2000; ++k) watch.add(k * T, T, true, Vec3::Zero());
+  for (int k = 0; k < 2000; ++k) watch.add(k * T, T, cycle(true, Vec3::Zero()));
   EXPECT_EQ(watch.longest().amplitude_m, 0.0);
   EXPECT_EQ(watch.longest().frequency_Hz, 0.0);
 }

@@ -1,0 +1,226 @@
+#!/usr/bin/python3
+"""Millions of cycles of hands that reach for singularities, borders and walls: do tool, elbow and joints keep their limits?
+
+    PROXARM_PROGRAM=build/release/controller/proxarm tests/soak/tool_limits_hunt.py --cycles 10000000 --seed 1
+
+Judged by the records alone, with kinematics of the judge's own (tests/command_line/tool_motion.py). What is sent must
+keep every limit, but for the rounding to counts; what the encoders say and what the simulated steel does is told as a
+share of the limits. Status 1 and the session's files, in `--keep DIR`, where what is sent doesn't.
+"""
+import argparse
+import csv
+import math
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(SOURCE / "tests/command_line"))
+import harness  # noqa: E402
+import tool_motion  # noqa: E402
+
+DURATION_S = 10.0
+# A setpoint is rounded by half a count, about 2e-8 rad: for each end of a step and each of six axes, at a metre or so.
+ROUNDING_M = 2.5e-7
+# Of a joint: a count at each end of a step.
+ROUNDING_COUNTS = 1.0
+BORDER_M = 1e-4
+SCENES = ("free", "free", "wall", "room", "frictionless_wall", "coulomb")
+
+
+def log_uniform(chance, low, high):
+    return math.exp(chance.uniform(math.log(low), math.log(high)))
+
+
+def triple(values):
+    return "[" + ", ".join(f"{x:.6g}" for x in values) + "]"
+
+
+def direction(chance):
+    way = [chance.gauss(0, 1) for _ in range(3)]
+    return [x / math.hypot(*way) for x in way]
+
+
+def made_hand(chance):
+    """Of up to 200 N: how far it wants beyond where the arm can go, times its stiffness."""
+    stiffness, force_N = log_uniform(chance, 100, 1000), log_uniform(chance, 30, 190)
+    lines = ["name: reaches", f"mass_kg: {chance.uniform(0.3, 2):.3g}", f"stiffness_N_per_m: {stiffness:.4g}",
+             f"damping_Ns_per_m: {log_uniform(chance, 5, 60):.4g}", "waypoints:",
+             "  - {time_s: 0.2, offset_m: [0, 0, 0]}"]
+    time_s = 0.2
+    while time_s < DURATION_S:
+        time_s += chance.uniform(0.3, 2.5)
+        reach = min(1.6, chance.uniform(0.5, 1) * force_N / stiffness + 0.5)
+        lines.append(f"  - {{time_s: {time_s:.4g}, offset_m: {triple(reach * x for x in direction(chance))}}}")
+    return "\n".join(lines) + "\n"
+
+
+def made_cell(chance):
+    """The default cell with narrow limits; beside a singularity, now and then."""
+    text = (SOURCE / "models/cells/default.yaml").read_text()
+    for folder in ("arms", "drives", "sensors"):
+        text = text.replace(f"../{folder}", f"{SOURCE}/models/{folder}")
+    speed = log_uniform(chance, 0.05, 0.5)
+    lines = [f"max_tool_speed_m_per_s: {speed:.4g}"]
+    if chance.random() < 0.5:
+        lines.append(f"max_elbow_speed_m_per_s: {log_uniform(chance, 0.05, 0.5):.4g}")
+    if chance.random() < 0.4:
+        start = (0, chance.uniform(-0.4, 1.0), chance.uniform(-1.0, 1.2), 0,
+                 chance.choice((-1, 1)) * log_uniform(chance, 0.05, 0.3), 0)
+        text = text.replace("start_rad: [0, 0.0675, 0.5008, 0, 1.0025, 0]", f"start_rad: {triple(start)}")
+    elif chance.random() < 0.6:
+        half = [log_uniform(chance, 0.02, 0.4) for _ in range(3)]
+        place = (0.7, 0.0, 0.6)
+        lines.append(f"workspace_m: {{min: {triple(p - h for p, h in zip(place, half))}, "
+                     f"max: {triple(p + h for p, h in zip(place, half))}}}")
+        if chance.random() < 0.5:
+            lines.append("keep_out_m: [{min: [0.72, -0.2, 0.4], max: [0.721, 0.05, 0.9]}]")
+    old = "  max_tool_speed_m_per_s: 0.5\n"
+    assert old in text
+    return text.replace(old, "".join(f"  {line}\n" for line in lines))
+
+
+def made_arguments(chance):
+    period_ms = chance.choice((1, 1, 1, 2, 4))
+    return ["--scene", str(SOURCE / f"scenes/{chance.choice(SCENES)}.yaml"), "--timestep", f"{period_ms}ms", "--mass",
+            f"{log_uniform(chance, 4, 30):.4g}", "--orientation", chance.choice(("held", "held", "free")),
+            "--duration", f"{DURATION_S:g}s", "--accept-force", "200N", "--force-unstable", "--no-plot", "--json"]
+
+
+class Signals:
+    """The columns of a record that are judged."""
+
+    def __init__(self, file, joints):
+        with open(file, newline="") as text:
+            rows = csv.reader(text)
+            column = {name: i for i, name in enumerate(next(rows))}
+            wanted = [column["time_s"]] + [column[f"{j}_{kind}_counts"] for kind in ("target", "actual") for j in joints]
+            wanted += [column[f"true_tool_W_{axis}_m"] for axis in "xyz"]
+            phase = column["phase"]
+            taken, moves = [], []
+            for row in rows:
+                taken.append([float(row[i]) for i in wanted])
+                moves.append(row[phase] in tool_motion.MOVING)
+        table = numpy.array(taken).T
+        n = len(joints)
+        self.time_s, self.target, self.actual = table[0], table[1:1 + n], table[1 + n:1 + 2 * n]
+        self.steel = table[1 + 2 * n:]
+        self.moves = numpy.array(moves)
+
+
+def speeds(points, T):
+    """Of each point, over each step."""
+    return numpy.array([numpy.sqrt(sum(numpy.diff(x) ** 2 for x in p)) / T for p in points])
+
+
+def beyond(points, cell):
+    """How far T is out of the workspace or in a zone, at most."""
+    worst = 0.0
+    if cell.workspace:
+        for x, low, high in zip(points[0], *cell.workspace):
+            worst = max(worst, float(numpy.max(low - x)), float(numpy.max(x - high)))
+    for low, high in cell.keep_out:
+        sides = [side for x, a, b in zip(points[0], low, high) for side in (x - a, b - x)]
+        worst = max(worst, float(numpy.max(numpy.min(sides, axis=0))))
+    return worst
+
+
+def judged(folder):
+    """Figures of a session's record: shares of the limits, and metres beyond borders."""
+    cell = tool_motion.Cell(folder / "cell.yaml")
+    chain = tool_motion.Chain(cell, numpy)
+    signals = Signals(folder / "record/signals.csv", cell.joints)
+    steps = signals.moves[1:] & signals.moves[:-1]
+    figures = {"cycles": int(signals.moves.sum())}
+    if not steps.any():
+        return figures
+    T = numpy.diff(signals.time_s)
+    for name, counts in (("sent", signals.target), ("seen", signals.actual)):
+        points = [[numpy.broadcast_to(x, len(signals.time_s)) for x in point]
+                  for point in chain.at_motors([cell.angle(i, counts[i]) for i in range(len(counts))])]
+        v = numpy.maximum(0.0, speeds(points, T) - ROUNDING_M / T)[:, steps]
+        figures[f"{name} tool"] = float(v[0].max()) / cell.speed
+        figures[f"{name} elbow"] = float(v[3:].max()) / cell.elbow_speed
+        figures[f"{name} beyond"] = beyond([[x[signals.moves] for x in points[0]]], cell)
+        rates = numpy.maximum(0.0, numpy.abs(numpy.diff(counts)) - ROUNDING_COUNTS) / T
+        figures[f"{name} joint"] = max(
+            float(rates[i][steps].max()) * abs(cell.angle(i, 1.0) - cell.angle(i, 0.0)) /
+            float(drive["max_speed_rad_per_s"]) for i, drive in enumerate(cell.drives))
+    # Over a millisecond, gears ringing and all.
+    figures["steel tool"] = float(speeds([list(signals.steel)], T)[0][steps].max()) / cell.speed
+    figures["steel above m/s"] = (figures["steel tool"] - 1.0) * cell.speed
+    return figures
+
+
+def session(seed, folder):
+    chance = random.Random(seed)
+    folder.mkdir()
+    (folder / "cell.yaml").write_text(made_cell(chance))
+    (folder / "hand.yaml").write_text(made_hand(chance))
+    command = [harness.program(), "run", str(folder / "cell.yaml"), "--hand", str(folder / "hand.yaml"),
+               *made_arguments(chance), "--record", str(folder / "record")]
+    (folder / "command").write_text(" ".join(command) + "\n")
+    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    if done.returncode not in (0, 1) or not (folder / "record/signals.csv").exists():
+        said = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
+        return {"refused": "the start is inside of an object" if "expected a start in free space" in said[-1] else
+                said[-1].partition("cell.yaml: ")[2].partition(" (")[0] or said[-1]}
+    return judged(folder)
+
+
+def broken(figures):
+    return any(figures.get(f"sent {what}", 0.0) > 1.0 for what in ("tool", "elbow", "joint")) or \
+        figures.get("sent beyond", 0.0) > BORDER_M
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cycles", type=float, default=1e5)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", type=pathlib.Path, default=pathlib.Path("tool_limits_hunt"))
+    options = parser.parse_args()
+    total, sessions, refused, found = 0, 0, {}, []
+    figures_of = {}
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
+        def run(n):
+            folder = pathlib.Path(scratch) / str(n)
+            seed = f"{options.seed}/{n}"
+            figures = session(seed, folder)
+            if broken(figures):
+                shutil.copytree(folder, options.keep / f"{options.seed}-{n}", dirs_exist_ok=True)
+            shutil.rmtree(folder)
+            return n, figures
+        n = 0
+        while total < options.cycles:
+            for n, figures in pool.map(run, range(n, n + 16)):
+                if "refused" in figures:
+                    refused[figures["refused"]] = refused.get(figures["refused"], 0) + 1
+                    continue
+                sessions += 1
+                total += figures.pop("cycles")
+                if broken(figures):
+                    found.append(n)
+                for what, value in figures.items():
+                    figures_of.setdefault(what, []).append((value, n))
+            n += 1
+    print(f"{total} cycles of {sessions} sessions; {sum(refused.values())} refused: {refused}")
+    print("                    median      95 %       most")
+    for what, values in sorted(figures_of.items()):
+        values.sort()
+        most, at = values[-1]
+        middle, high = (values[int(share * (len(values) - 1))][0] for share in (0.5, 0.95))
+        print(f"{what:16s} {middle:9.6f} {high:9.6f} {most:10.6f} in session {at}")
+    print(f"what was sent broke a limit in {len(found)} sessions {found[:20]}")
+    return 1 if found or sessions == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
