@@ -1,5 +1,6 @@
 """An arm that swings by itself is told, in the summary, in the exit status and while it happens; and one that doesn't
 isn't. The judge here counts how often the steel turns round, by the record, and shares nothing with the program."""
+import math
 import statistics
 import unittest
 
@@ -57,7 +58,7 @@ class Oscillation(ProgramTest):
     def test_a_mass_too_small_for_its_timestep_is_told(self):
         for arguments in (("--timestep", "2ms", "--mass", "2"), ("--timestep", "4ms", "--mass", "3.4")):
             with self.subTest(arguments):
-                outcome, (seconds, hertz, metres) = self.run_of(*arguments)
+                outcome, (seconds, hertz, metres) = self.run_of(*arguments, "--passivity", "observe")
                 said = outcome.summary["oscillation"]
                 self.assertGreater(seconds, 1.0)
                 self.assertEqual(outcome.status, 1)
@@ -67,6 +68,42 @@ class Oscillation(ProgramTest):
                 self.assertLess(abs(said["amplitude_m"] / metres - 1.0), 0.6)  # it isn't one all the time
                 self.assertGreaterEqual(outcome.err.count("the arm oscillates"), 1, outcome.err)
                 self.assertEqual(outcome.summary["end"]["reason"], "duration")
+
+    def test_it_is_damped_by_default_and_told_all_the_same(self):
+        """Before: it swung for 5.9 s, by 9 and 13 mm."""
+        for arguments in (("--timestep", "2ms", "--mass", "2"), ("--timestep", "4ms", "--mass", "3.4")):
+            with self.subTest(arguments):
+                outcome, (seconds, _, metres) = self.run_of(*arguments)
+                print(f"{arguments}: {seconds:.2f} s, {1e3 * metres:.1f} mm")
+                self.assertEqual(outcome.status, 1)
+                self.assertTrue(outcome.summary["oscillation"]["lasts"])
+                self.assertGreater(outcome.summary["passivity"]["added_damping_max_Ns_per_m"], 100)
+                # Half a second until it is known to last; what swings by 0.2 mm counts until it has died away.
+                self.assertLess(seconds, 3.0)
+                self.assertLess(metres, 4e-3)
+
+    def test_gears_that_swing_under_a_heavy_hand_are_damped(self):
+        """The story, found by a judge of random sessions: led at its speed limit, the proxy gave the hand no energy, by
+        the encoders; the steel swung by 20 mm at 12 Hz and 5.2 times its limit, and no word was said."""
+        hand = self.written("hand.yaml", "name: heavy\nmass_kg: 1.96\nstiffness_N_per_m: 132.1\n"
+                            "damping_Ns_per_m: 12.4\nwaypoints:\n" + "".join(
+                                f"  - {{time_s: {t}, offset_m: {list(p)}}}\n" for t, p in (
+                                    (0.2, (0, 0, 0)), (0.8409, (-0.0352797, 0.811858, -0.356721)),
+                                    (2.427, (0.411341, 0.413404, -0.687092)), (3.894, (-0.382024, -0.230843, -0.714007)),
+                                    (5.897, (0.257667, 0.106886, 0.865015)), (6.785, (0.577164, -0.0895496, -0.685476)),
+                                    (8.772, (0.738042, -0.300125, 0.343252)), (9.678, (-0.0709907, -0.435567, -0.8)))))
+        cell = self.changed("models/cells/default.yaml", ("  max_tool_speed_m_per_s: 0.5", "  max_tool_speed_m_per_s: 0.2319\n  max_elbow_speed_m_per_s: 0.3476"))
+        fastest = {}
+        for mode in ("observe", "auto"):
+            self.call("run", cell, "--no-plot", "--scene", SOURCE / "scenes/coulomb.yaml", "--hand", hand, "--timestep",
+                      "4ms", "--mass", "6.823", "--orientation", "free", "--accept-force", "200N", "--force-unstable",
+                      "--passivity", mode, "--record", "record")
+            track = Track(self.folder / "record")
+            fastest[mode] = max(math.dist(a, b) / 4e-3 for a, b in zip(track.place[track.began:],
+                                                                      track.place[track.began + 1:]))
+        print(f"the steel at a limit of 0.232 m/s: {fastest}")
+        self.assertLess(fastest["auto"], 0.6)
+        self.assertLess(fastest["auto"], 0.6 * fastest["observe"])
 
     def test_people_read_what_to_change(self):
         outcome = self.call("run", "--no-plot", "--timestep", "2ms", "--mass", "2")
@@ -89,6 +126,7 @@ class Oscillation(ProgramTest):
                                         SOURCE / f"sim/hands/{hand}.yaml")
                     self.assertEqual(outcome.status, 0, outcome.err)
                     self.assertFalse(outcome.summary["oscillation"]["lasts"])
+                    self.assertEqual(outcome.summary["passivity"]["added_time_s"], 0.0)
 
     def test_who_doesnt_look_says_nothing(self):
         outcome = self.call("run", "--json", "--no-plot", "--passivity", "off", "--timestep", "2ms", "--mass", "2")

@@ -13,7 +13,7 @@ class Passivity(ProgramTest):
 
     def test_a_stiff_grip_is_damped_and_let_go(self):
         self.assertIsNone(self.summary(*GRIP, "--force-unstable", "--passivity", "off")["passivity"])
-        outcome = self.call("run", "--json", *GRIP, "--force-unstable")
+        outcome = self.call("run", "--json", *GRIP, "--force-unstable", "--passivity", "observe")
         self.assertEqual(outcome.status, 1)
         self.assertTrue(outcome.summary["oscillation"]["lasts"])
         seen = outcome.summary["passivity"]
@@ -29,9 +29,18 @@ class Passivity(ProgramTest):
         self.assertGreater(done["added_damping_max_Ns_per_m"], 20)
         self.assertAlmostEqual(done["damping_J"], done["added_damping_J"])
 
+    def test_by_default_it_is_damped_once_it_has_shown_that_it_lasts(self):
+        outcome = self.call("run", "--json", *GRIP, "--force-unstable")
+        self.assertEqual(outcome.status, 1)  # the loop isn't stable with this grip, and that is said
+        done = outcome.summary["passivity"]
+        self.assertTrue(outcome.summary["oscillation"]["lasts"])
+        self.assertLess(outcome.summary["oscillation"]["duration_s"], 1.5)
+        self.assertGreater(done["added_damping_max_Ns_per_m"], 20)
+        self.assertLess(done["oscillating_time_s"], 2)
+
     def test_observing_changes_nothing(self):
         figures = [self.summary("--duration", "3s", "--passivity", mode)["setpoint_sha256"]
-                   for mode in ("off", "observe", "on")]
+                   for mode in ("off", "observe", "auto", "on")]
         self.assertEqual(len(set(figures)), 1)
 
     def test_a_replay_repeats_it(self):
@@ -44,13 +53,13 @@ class Passivity(ProgramTest):
         self.assertIsNotNone(self.summary(cell, "--duration", "1s")["passivity"])
         self.assertIsNone(self.summary(cell, "--duration", "1s", "--passivity", "off")["passivity"])
         cell.write_text(cell.read_text().replace("passivity: on", "passivity: yes"))
-        self.assert_refused(self.call("run", cell), "passivity", '"yes"', "off, observe or on")
+        self.assert_refused(self.call("run", cell), "passivity", '"yes"', "off, observe, auto or on")
 
     def test_what_has_no_proxy_has_none(self):
         self.assert_refused(self.call("run", "models/cells/light.yaml", "--passivity", "on"), "--passivity", "off")
 
     def test_a_cell_whose_drives_take_torques_is_refused_with_it(self):
-        for mode in ("on", "observe"):
+        for mode in ("on", "auto", "observe"):
             cell = self.changed("models/cells/light.yaml")
             text = (SOURCE / "models/cells/light.yaml").read_text().replace("../drives", f"{SOURCE}/models/drives")
             cell.write_text(text + f"passivity: {mode}\n")
