@@ -63,8 +63,7 @@ struct Limit {
   std::optional<double> mass_without;
 };
 
-std::vector<Limit> limits(const PreparedSession& session, const HandModel& hand) {
-  const LoopModel& loop = session.loop;
+std::vector<Limit> limits(const PreparedSession& session, const LoopModel& loop, const HandModel& hand) {
   const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
   const double sensor_s = std::max(0.0, loop.delay_s - T - filter_s);
   std::vector<Limit> list;
@@ -79,7 +78,12 @@ std::vector<Limit> limits(const PreparedSession& session, const HandModel& hand)
     l.delay_s -= 0.9 * T;
   });
   add("the delay of the setpoints' filter (limits.setpoint_bandwidth_Hz)",
-      [&](LoopModel& l, HandModel&) { l.delay_s = std::max(0.0, l.delay_s - filter_s); });
+      [&](LoopModel& l, HandModel&) {
+        l.delay_s = std::max(0.0, l.delay_s - filter_s);
+        std::vector<controller::ElasticArm> unfiltered = *l.arms;
+        for (controller::ElasticArm& arm : unfiltered) arm.filter_s = 0.0;
+        l.arms = std::make_shared<const std::vector<controller::ElasticArm>>(unfiltered);
+      });
   add("the sensor's delay", [&](LoopModel& l, HandModel&) { l.delay_s -= sensor_s; });
   add("the drives' lag", [](LoopModel& l, HandModel&) { l.drive_time_constant_s = 0.0; });
   add("the mass after the sensor (handle and hand)", [](LoopModel& l, HandModel& h) {
@@ -119,8 +123,10 @@ int tune_command(const RunOptions& options) {
   }
   const description::Grip grip = description::tightest_grip(session.hand);
   const HandModel hand{grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
-  LoopModel loop = session.loop;
+  LoopModel loop = led_loop(session);
   loop.horizon_s = 0.0;
+  LoopModel start = session.loop;  // in its pose
+  start.horizon_s = 0.0;
   const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
   std::printf("%s, held by %s: %.4g N/m, %.4g Ns/m, %.3g kg; T = %.4g ms\n", session.cell.name.c_str(),
               session.hand.name.c_str(), hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, 1e3 * T);
@@ -130,8 +136,8 @@ int tune_command(const RunOptions& options) {
       1e3 * total_delay_s(session), 1e3 * T, 1e3 * T, 1e3 * filter_s, 1e3 * std::max(0.0, loop.delay_s - T - filter_s),
       1e3 * loop.drive_time_constant_s);
   const auto smallest = smallest_felt(hand, loop), safe = with_margin(hand, loop);
-  std::printf("smallest stable mass: %s felt, handle's %.3g kg included\n", mass_text(smallest).c_str(),
-              loop.handle_mass_kg);
+  std::printf("smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
+              mass_text(smallest).c_str(), loop.handle_mass_kg, mass_text(smallest_felt(hand, start)).c_str());
   std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
               safe ? ("--mass " + mass_text(safe)).c_str() : "no mass up to 1000 kg",
               safe ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
@@ -152,7 +158,7 @@ int tune_command(const RunOptions& options) {
   }
   std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
               1e3 * longest_horizon_s(session), session.settings.mass_kg);
-  const auto sorted = limits(session, hand);
+  const auto sorted = limits(session, loop, hand);
   constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
   const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
   const std::string limit = helps ? sorted.front().what : "none of these alone";

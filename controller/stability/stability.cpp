@@ -144,6 +144,47 @@ std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   return masses;
 }
 
+// In all poses.
+class ElasticLoops {
+ public:
+  ElasticLoops(const HandModel& hand, const LoopModel& loop) {
+    for (const ElasticArm& arm : *loop.arms) loops_.emplace_back(arm, hand, loop);
+  }
+  [[nodiscard]] double spectral_radius(double proxy_mass_kg) const {
+    double largest = 0.0;
+    for (const ElasticLoop& loop : loops_) largest = std::max(largest, loop.spectral_radius(proxy_mass_kg));
+    return largest;
+  }
+  [[nodiscard]] bool stable(double proxy_mass_kg) const {
+    return std::all_of(loops_.begin(), loops_.end(),
+                       [&](const ElasticLoop& loop) { return loop.spectral_radius(proxy_mass_kg) < 1.0; });
+  }
+
+ private:
+  std::vector<ElasticLoop> loops_;
+};
+
+// Beyond, gears don't matter: the hand's mass is too little of the proxy's. Nor could rounding tell the slowest modes'
+// eigenvalues from 1, of which a proxy has two that are close.
+constexpr double heaviest_on_gears_kg = 50.0;
+
+// The same where only eigenvalues tell: from the top down until a mass isn't stable, then by halving the last step. An
+// interval of unstable masses that is narrower than a step, between stable ones, isn't seen.
+std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mass_kg) {
+  constexpr double step = 1.4, close_enough = 1.002, least_kg = 1e-3;
+  if (!loop.stable(max_mass_kg)) return std::nullopt;
+  double high = max_mass_kg, low = high / step;
+  while (low > least_kg && loop.stable(low)) {
+    high = low;
+    low /= step;
+  }
+  while (high > close_enough * low && low > least_kg) {
+    const double middle = std::sqrt(low * high);
+    (loop.stable(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
 // Rounded up to two digits.
 double round_up(double mass_kg) {
   const double unit = std::pow(10.0, std::floor(std::log10(mass_kg)) - 1.0);
@@ -159,10 +200,18 @@ std::string text(const char* pattern, double value) {
 }  // namespace
 
 double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  if (loop.arms && proxy_mass_kg <= heaviest_on_gears_kg) return ElasticLoops(hand, loop).spectral_radius(proxy_mass_kg);
   return spectral_radius(make_loop(hand, loop), proxy_mass_kg);
 }
 
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& model, double max_mass_kg) {
+  if (model.arms) {
+    LoopModel rigid = model;
+    rigid.arms = nullptr;
+    const auto without_gears = smallest_stable_mass(hand, rigid, max_mass_kg);
+    if (!without_gears || *without_gears > heaviest_on_gears_kg) return without_gears;
+    return smallest_on_gears(ElasticLoops(hand, model), std::min(max_mass_kg, heaviest_on_gears_kg));
+  }
   const Loop loop = make_loop(hand, model);
   if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
   // Goes from the top down and ends at the first interval that isn't stable.

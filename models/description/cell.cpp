@@ -250,6 +250,9 @@ DriveDescription read_drive(const YamlNode& node) {
   d.rotor_inertia_kg_m2 = node.number("rotor_inertia_kg_m2", 0.0, 1e5);
   d.position_bandwidth_Hz = node.number_or("position_bandwidth_Hz", 100.0, 1.0, 10000.0);
   d.gear_stiffness_Nm_per_rad = node.number_or("gear_stiffness_Nm_per_rad", 0.0, 0.0, 1e9);
+  if (node.has("gear_damping_Nms_per_rad")) {
+    d.gear_damping_Nms_per_rad = node.number("gear_damping_Nms_per_rad", 0.0, 1e6);
+  }
   d.simulation = read_simulation(node.map("simulation"));
   return d;
 }

@@ -104,6 +104,7 @@ struct DriveDescription {
   double position_bandwidth_Hz = 100.0;    // of the drive's position loop, as its maker or a test states it: the lag
                                            // that the stability check counts on
   double gear_stiffness_Nm_per_rad = 0.0;  // 0: taken as rigid; used to compensate gravity's deflection
+  std::optional<double> gear_damping_Nms_per_rad;  // for the stability check; none: not known
   SimulatedDrive simulation;
 
   [[nodiscard]] double counts_per_rad() const noexcept;  // signed by `direction`

@@ -58,7 +58,7 @@ class Oscillation(ProgramTest):
     def test_a_mass_too_small_for_its_timestep_is_told(self):
         for arguments in (("--timestep", "2ms", "--mass", "2"), ("--timestep", "4ms", "--mass", "3.4")):
             with self.subTest(arguments):
-                outcome, (seconds, hertz, metres) = self.run_of(*arguments, "--passivity", "observe")
+                outcome, (seconds, hertz, metres) = self.run_of(*arguments, "--force-unstable", "--passivity", "observe")
                 said = outcome.summary["oscillation"]
                 self.assertGreater(seconds, 1.0)
                 self.assertEqual(outcome.status, 1)
@@ -69,11 +69,18 @@ class Oscillation(ProgramTest):
                 self.assertGreaterEqual(outcome.err.count("the arm oscillates"), 1, outcome.err)
                 self.assertEqual(outcome.summary["end"]["reason"], "duration")
 
+    def test_such_a_mass_is_refused_with_the_smallest_that_is_stable(self):
+        """The story: the check took the links for rigid, and 1.5 kg for stable at any timestep."""
+        for arguments, said in ((("--timestep", "2ms", "--mass", "2"), "at least 2.6 kg"),
+                                (("--timestep", "4ms", "--mass", "3.4"), "at least 3.8 kg")):
+            with self.subTest(arguments):
+                self.assert_refused(self.call("run", *arguments), said, "--force-unstable")
+
     def test_it_is_damped_by_default_and_told_all_the_same(self):
         """Before: it swung for 5.9 s, by 9 and 13 mm."""
         for arguments in (("--timestep", "2ms", "--mass", "2"), ("--timestep", "4ms", "--mass", "3.4")):
             with self.subTest(arguments):
-                outcome, (seconds, _, metres) = self.run_of(*arguments)
+                outcome, (seconds, _, metres) = self.run_of(*arguments, "--force-unstable")
                 print(f"{arguments}: {seconds:.2f} s, {1e3 * metres:.1f} mm")
                 self.assertEqual(outcome.status, 1)
                 self.assertTrue(outcome.summary["oscillation"]["lasts"])
@@ -106,7 +113,7 @@ class Oscillation(ProgramTest):
         self.assertLess(fastest["auto"], 0.6 * fastest["observe"])
 
     def test_people_read_what_to_change(self):
-        outcome = self.call("run", "--no-plot", "--timestep", "2ms", "--mass", "2")
+        outcome = self.call("run", "--no-plot", "--timestep", "2ms", "--mass", "2", "--force-unstable")
         self.assertIn("OSCILLATION:", outcome.out)
         self.assertIn("proxarm tune", outcome.out)
 
@@ -129,7 +136,8 @@ class Oscillation(ProgramTest):
                     self.assertEqual(outcome.summary["passivity"]["added_time_s"], 0.0)
 
     def test_who_doesnt_look_says_nothing(self):
-        outcome = self.call("run", "--json", "--no-plot", "--passivity", "off", "--timestep", "2ms", "--mass", "2")
+        outcome = self.call("run", "--json", "--no-plot", "--passivity", "off", "--timestep", "2ms", "--mass", "2",
+                            "--force-unstable")
         self.assertEqual(outcome.status, 0)
         self.assertIsNone(outcome.summary["oscillation"])
 

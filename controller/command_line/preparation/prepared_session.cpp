@@ -238,6 +238,13 @@ void require_profile(const PreparedSession& session) {
                                  .expected = "its enabling input: whoever leads the arm holds it"});
 }
 
+std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const PreparedSession& session,
+                                                                   const std::vector<models::Vec3>& offsets_W) {
+  const models::Arm arm(session.cell);
+  return std::make_shared<const std::vector<controller::ElasticArm>>(
+      controller::elastic_arms(arm, session.cell, offsets_W));
+}
+
 }  // namespace
 
 controller::HandModel hand_model(const PreparedSession& session) {
@@ -245,10 +252,21 @@ controller::HandModel hand_model(const PreparedSession& session) {
   return {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
 }
 
+controller::LoopModel led_loop(const PreparedSession& session) {
+  std::vector<models::Vec3> offsets_W;
+  for (const description::Waypoint& waypoint : session.hand.waypoints) {
+    offsets_W.emplace_back(waypoint.offset_m[0], waypoint.offset_m[1], waypoint.offset_m[2]);
+  }
+  controller::LoopModel loop = session.loop;
+  loop.arms = arms_at(session, offsets_W);
+  return loop;
+}
+
 double longest_horizon_s(const PreparedSession& session) {
   if (session.settings.period_s > longest_period_ahead_s) return 0.0;
   const double proxy_kg = session.settings.mass_kg - session.loop.handle_mass_kg;
   controller::LoopModel loop = session.loop;
+  loop.arms = nullptr;  // auto_mass_ratio and auto_share stand for its gears
   loop.horizon_s = 0.0;
   loop.filter_s = 0.5 * setpoint_filter_delay_s(session.cell);
   return controller::stable_horizon_s(hand_model(session), loop, proxy_kg);
@@ -302,6 +320,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
+  session.loop.arms = arms_at(session, {});
   session.settings.force_age_s = session.cell.sensor.delay_s;
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
   choose_horizon(session);

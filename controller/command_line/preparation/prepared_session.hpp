@@ -20,13 +20,16 @@ struct PreparedSession {
   controller::SessionSettings settings;
   double duration_s = 10.0;
   LookaheadChoice lookahead;   // what was asked for; settings.horizon_s is what came of it
-  controller::LoopModel loop;  // how the controller expects the closed loop to behave
+  controller::LoopModel loop;  // how the controller expects the closed loop to behave, in the start pose
 
   [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
 
 // The hand at its tightest grip, as the stability check takes it.
 controller::HandModel hand_model(const PreparedSession& session);
+
+// The loop in all poses that the hand means to lead the arm to, whatever the scene has in its way.
+controller::LoopModel led_loop(const PreparedSession& session);
 
 // The longest horizon of a lookahead that is stable with margins for the session's mass and loop.
 double longest_horizon_s(const PreparedSession& session);

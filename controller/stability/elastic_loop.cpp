@@ -1,0 +1,250 @@
+#include "controller/stability/elastic_loop.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "controller/stability/stability.hpp"
+#include "models/arm/inverse_kinematics.hpp"
+#include "models/geometry/eigenvalues.hpp"
+#include "models/geometry/linear_systems.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// exp(A) by Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22, squared s times.
+MatrixXd exponential(MatrixXd A) {
+  const double norm = A.cwiseAbs().rowwise().sum().maxCoeff();
+  const int squarings = std::max(0, static_cast<int>(std::ceil(std::log2(norm))) + 1);
+  A /= std::exp2(squarings);
+  MatrixXd term = MatrixXd::Identity(A.rows(), A.rows()), sum = term;
+  for (int n = 1; n <= 18; ++n) {
+    term = (term * A / n).eval();
+    sum += term;
+  }
+  for (int i = 0; i < squarings; ++i) sum = (sum * sum).eval();
+  return sum;
+}
+
+// A(w) T²: the coefficients of q(k−i).
+std::array<double, 5> proxy_polynomial(int order, double M, double BT, double KTT) {
+  if (order == 2) {  // D = (3 − 4w + w²)/2T
+    return {2.25 * M + 1.5 * BT + KTT, -6.0 * M - 2.0 * BT, 5.5 * M + 0.5 * BT, -2.0 * M, 0.25 * M};
+  }
+  return {M + BT + KTT, -2.0 * M - BT, M, 0.0, 0.0};
+}
+
+// Of the arm's first mode; what a gear that is rigid rings with, far above all that a loop does.
+constexpr double ringing = 0.03, rigid_Hz = 300.0;
+// Rotations count with a length, and near a singularity joints turn by no more than 1/2λ per metre, as for the limits.
+constexpr double length_m = 0.5, damping_m_per_rad = 1e-3;
+
+// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0]
+MatrixXd joints_per_m(const models::Jacobian& J_W) {
+  MatrixXd J = J_W;
+  J.bottomRows<3>() *= length_m;
+  models::Mat6 A = J * J.transpose();
+  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
+  Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
+  right.topRows<3>().setIdentity();
+  return J.transpose() * models::solve_positive_definite(A, right);
+}
+
+}  // namespace
+
+ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell) {
+  constexpr double pi = std::numbers::pi;
+  models::ToolKinematics kinematics;
+  arm.kinematics(pose_rad, kinematics);
+  ElasticArm out{.mass = arm.link_mass_matrix(pose_rad),
+                 .jacobian = kinematics.J_W.topRows<3>(),
+                 .joints_per_m = joints_per_m(kinematics.J_W),
+                 .stiffness = arm.gear_stiffness_Nm_per_rad(),
+                 .damping = VectorXd::Zero(arm.axes())};
+  if (cell.limits.setpoint_bandwidth_Hz > 0.0) out.filter_s = 1.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz);
+  const double first = 2.0 * pi * arm.first_elastic_frequency_Hz(pose_rad);
+  for (Index i = 0; i < out.stiffness.size(); ++i) {
+    double &k = out.stiffness[i], &d = out.damping[i];
+    if (!(k > 0.0)) {
+      const double omega = 2.0 * pi * rigid_Hz;
+      k = out.mass(i, i) * omega * omega;
+      d = out.mass(i, i) * omega;
+      continue;
+    }
+    d = cell.drives[static_cast<std::size_t>(i)].gear_damping_Nms_per_rad.value_or(2.0 * ringing * k / first);
+  }
+  return out;
+}
+
+std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
+                                     const std::vector<models::Vec3>& offsets_W) {
+  constexpr double step_m = 0.005;  // no joint turns by the inverse kinematics' 0.01 rad on that, away from singularities
+  constexpr double apart_m = 0.05;
+  constexpr std::size_t most_poses = 16;
+  std::vector<ElasticArm> arms{elastic_arm(arm, arm.start_rad(), cell)};
+  if (arm.axes() != 6) return arms;
+  const models::InverseKinematics inverse(arm);
+  const models::Pose start = arm.tool_pose(arm.start_rad());
+  models::InverseKinematicsResult solution;
+  models::JointVector q = arm.start_rad();
+  models::Vec3 at = models::Vec3::Zero();
+  std::vector<models::Vec3> known{at};
+  for (const models::Vec3& offset : offsets_W) {
+    const auto near = [&](const models::Vec3& place) { return (offset - place).norm() < apart_m; };
+    if (arms.size() == most_poses) break;
+    if (std::any_of(known.begin(), known.end(), near)) continue;
+    known.push_back(offset);
+    const models::Vec3 way = offset - at;
+    const int steps = static_cast<int>(std::ceil(std::min(2.0, way.norm()) / step_m));
+    int gone = 0;
+    for (; gone < steps; ++gone) {
+      models::Pose X_WT = start;
+      X_WT.translation() += at + (gone + 1.0) / steps * way;
+      inverse.solve(q, X_WT, solution);
+      if (solution.status != models::InverseKinematicsResult::Status::converged || solution.out_of_range) break;
+      q = solution.q;
+    }
+    if (gone > 0) arms.push_back(elastic_arm(arm, q, cell));
+    at += gone > 0 ? models::Vec3(static_cast<double>(gone) / steps * way) : models::Vec3::Zero();
+  }
+  return arms;
+}
+
+// Where things stand in the state of a period's begin: the plant's [φ, φ̇, θ], the two last setpoints, four proxies,
+// the filter's x_f and ẋ_f, and the forces that were read.
+struct ElasticLoop::State {
+  Index n, ages;
+  [[nodiscard]] Index plant() const { return 0; }
+  [[nodiscard]] Index sent() const { return 3 * n; }
+  [[nodiscard]] Index proxies() const { return 5 * n; }
+  [[nodiscard]] Index filter() const { return 5 * n + 12; }
+  [[nodiscard]] Index forces() const { return 5 * n + 18; }
+  [[nodiscard]] Index size() const { return forces() + 3 * ages; }
+};
+
+ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const LoopModel& loop)
+    : arm_(arm),
+      period_s_(loop.period_s),
+      damping_(loop.damping_Ns_per_m),
+      spring_(loop.spring_N_per_m),
+      horizon_s_(loop.horizon_s),
+      time_constant_s_(loop.drive_time_constant_s),
+      force_age_periods_(std::max(0.0, (loop.delay_s - 2.0 * arm.filter_s) / loop.period_s - 1.0)),
+      order_(loop.order),
+      matched_labels_(loop.matched_labels),
+      joints_(arm.stiffness.size()) {
+  // Of a quotient of decimals; the newest force, one older to interpolate with, one for order 2's labels.
+  ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + 2;
+  twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
+  make_plant(hand);
+  const double after_sensor_kg = hand.mass_kg + loop.handle_mass_kg;
+  // h = −K_h Jφ − D_h Jφ̇ − m Jφ̈, with φ̈ the plant's second block of rows.
+  const MatrixXd& J = arm_.jacobian;
+  force_ = -after_sensor_kg * J * force_;
+  force_.leftCols(joints_) -= hand.stiffness_N_per_m * J;
+  force_.middleCols(joints_, joints_) -= hand.damping_Ns_per_m * J;
+}
+
+// ż = A z of z = [φ, φ̇, θ, r, ṙ], with ṙ constant; leaves φ̈'s rows in force_.
+void ElasticLoop::make_plant(const HandModel& hand) {
+  const Index n = joints_;
+  const MatrixXd& J = arm_.jacobian;
+  const MatrixXd mass = arm_.mass + hand.mass_kg * J.transpose() * J;
+  MatrixXd k = arm_.stiffness.asDiagonal(), d = arm_.damping.asDiagonal();
+  MatrixXd A = MatrixXd::Zero(5 * n, 5 * n);
+  const auto block = [&](Index row, Index column) { return A.block(row * n, column * n, n, n); };
+  const MatrixXd one = MatrixXd::Identity(n, n);
+  block(0, 1) = one;
+  block(3, 4) = one;
+  // θ̇ = (r − θ)/τ; without a lag θ is r, and so is its speed.
+  const bool lags = time_constant_s_ > 0.0;
+  if (lags) {
+    block(2, 2) = -one / time_constant_s_;
+    block(2, 3) = one / time_constant_s_;
+  } else {
+    block(2, 4) = one;
+  }
+  MatrixXd torque = MatrixXd::Zero(n, 5 * n);
+  torque.leftCols(n) = -k - hand.stiffness_N_per_m * J.transpose() * J;
+  torque.middleCols(n, n) = -d - hand.damping_Ns_per_m * J.transpose() * J;
+  torque.middleCols(2 * n, n) = k;
+  torque += d * A.middleRows(2 * n, n);
+  A.middleRows(n, n) = mass.llt().solve(torque);
+  force_ = A.middleRows(n, n);
+  plant_ = exponential(A * period_s_);
+}
+
+Index ElasticLoop::size() const noexcept { return State{joints_, ages_}.size(); }
+
+// One period, from before the reading of the sensor to before the next.
+void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const {
+  const Index n = joints_;
+  const State at{n, ages_};
+  const double T = period_s_;
+  const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
+
+  // The force now, by the slope that the setpoints have had in the period before: θ and r meet at its end.
+  VectorXd z = VectorXd::Zero(5 * n);
+  z.head(3 * n) = state.head(3 * n);
+  if (!(time_constant_s_ > 0.0)) z.segment(2 * n, n) = old_sent;  // else a difference of both would stay for ever
+  z.segment(3 * n, n) = old_sent;
+  z.tail(n) = (last_sent - old_sent) / T;
+  const Eigen::Vector3d h_now = force_ * z;
+  const auto force = [&](Index age) -> Eigen::Vector3d {
+    return age == 0 ? h_now : Eigen::Vector3d(state.segment<3>(at.forces() + 3 * (age - 1)));
+  };
+  const auto whole = static_cast<Index>(std::floor(force_age_periods_ + 1e-9));
+  const double rest = std::max(0.0, force_age_periods_ - static_cast<double>(whole));
+  Eigen::Vector3d h = (1.0 - rest) * force(whole) + rest * force(whole + 1);
+  if (order_ == 2 && matched_labels_) {
+    h = 2.0 * h - ((1.0 - rest) * force(whole + 1) + rest * force(std::min(whole + 2, ages_)));
+  }
+
+  const std::array<double, 5> a = proxy_polynomial(order_, M, damping_ * T, spring_ * T * T);
+  Eigen::Vector3d q = T * T * h;
+  for (Index i = 1; i < 5; ++i) q -= a[static_cast<std::size_t>(i)] * state.segment<3>(at.proxies() + 3 * (i - 1));
+  q /= a[0];
+  const Eigen::Vector3d p = q + horizon_s_ / T * (q - state.segment<3>(at.proxies()));
+
+  // As in ElasticSetpoint::step.
+  Eigen::Vector3d x = p, v = Eigen::Vector3d::Zero(), acceleration = Eigen::Vector3d::Zero();
+  if (arm_.filter_s > 0.0) {
+    const double omega = 1.0 / arm_.filter_s, decay = std::exp(-omega * T);
+    const Eigen::Vector3d e = state.segment<3>(at.filter()) - p, v_1 = state.segment<3>(at.filter() + 3);
+    const Eigen::Vector3d c = v_1 + omega * e;
+    x = p + decay * (e + T * c);
+    v = decay * (v_1 - omega * T * c);
+    acceleration = omega * omega * (p - x) - 2.0 * omega * v;
+  }
+
+  next.head(3 * n) = (plant_ * z).head(3 * n);
+  next.segment(at.sent(), n) = arm_.joints_per_m * x + twist_ * acceleration;
+  next.segment(at.sent() + n, n) = last_sent;
+  next.segment<3>(at.proxies()) = q;
+  next.segment<9>(at.proxies() + 3) = state.segment<9>(at.proxies());
+  next.segment<3>(at.filter()) = x;
+  next.segment<3>(at.filter() + 3) = v;
+  next.segment<3>(at.forces()) = h_now;
+  next.segment(at.forces() + 3, 3 * (ages_ - 1)) = state.segment(at.forces(), 3 * (ages_ - 1));
+}
+
+double ElasticLoop::spectral_radius(double proxy_mass_kg) const {
+  const Index rows = size();
+  MatrixXd map(rows, rows);
+  VectorXd unit = VectorXd::Zero(rows), column(rows);
+  for (Index i = 0; i < rows; ++i) {
+    unit[i] = 1.0;
+    advance(unit, proxy_mass_kg, column);
+    map.col(i) = column;
+    unit[i] = 0.0;
+  }
+  return models::spectral_radius(map);
+}
+
+}  // namespace proxarm::controller

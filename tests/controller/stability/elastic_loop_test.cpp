@@ -1,0 +1,139 @@
+// The stability check on elastic gears, held against the simulated arm itself: what it takes for unstable swings more and
+// more, and what it takes for stable comes to rest. The story: with rigid links in it, 1.5 kg were stable at any
+// timestep; the arm swung by 9 mm with 2 kg at 2 ms.
+#include "controller/stability/elastic_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "controller/stability/stability.hpp"
+#include "tests/controller/closed_loop/closed_loop_rig.hpp"
+#include "tests/source_file.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using models::Vec3;
+using testing::ClosedLoopRig;
+using testing::RigOptions;
+
+LoopModel loop_of(const description::Cell& cell, double period_s, const std::vector<Vec3>& offsets_W = {}) {
+  const double pi = std::numbers::pi;
+  const models::Arm arm(cell);
+  LoopModel loop;
+  loop.period_s = period_s;
+  loop.delay_s = period_s + 0.5 / cell.sensor.sample_rate_Hz + 1.0 / (2.0 * pi * cell.sensor.bandwidth_Hz) +
+                 2.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz);
+  loop.drive_time_constant_s = 1.0 / (2.0 * pi * cell.drives[0].position_bandwidth_Hz);
+  loop.handle_mass_kg = cell.tool.mass_kg;
+  loop.arms = std::make_shared<const std::vector<ElasticArm>>(elastic_arms(arm, cell, offsets_W));
+  return loop;
+}
+
+// A hand that moves the tool by 5 mm and holds it there.
+std::string nudging_hand(const HandModel& hand) {
+  const std::string file = ::testing::TempDir() + "nudge.yaml";
+  std::ofstream(file) << "name: nudge\nmass_kg: " << hand.mass_kg << "\nstiffness_N_per_m: " << hand.stiffness_N_per_m
+                      << "\ndamping_Ns_per_m: " << hand.damping_Ns_per_m
+                      << "\nwaypoints:\n  - {time_s: 0.3, offset_m: [0, 0, 0]}\n"
+                      << "  - {time_s: 0.45, offset_m: [0.003, 0.003, 0.003]}\n";
+  return file;
+}
+
+// Half of what the steel moves from peak to peak in a quarter of a second of rendering.
+double swing_m(const ClosedLoopRig& rig, double from_s) {
+  Vec3 low = Vec3::Constant(1e9), high = -low;
+  for (std::size_t k = 0; k < rig.records.size(); ++k) {
+    const double t = 1e-9 * static_cast<double>(rig.records[k].time_ns - rig.records[0].time_ns);
+    if (t < from_s || t > from_s + 0.25) continue;
+    const Vec3 x = rig.truths.at(k).X_WT.translation();
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  return 0.5 * (high - low).maxCoeff();
+}
+
+// Of the swing that is left 2 s after the nudge: how much of it there is 4 s later.
+double kept(const HandModel& hand, double period_s, double felt_kg) {
+  RigOptions options;
+  options.scene = "scenes/free.yaml";
+  options.hand = nudging_hand(hand);
+  options.settings.mass_kg = felt_kg;
+  options.settings.period_s = period_s;
+  options.settings.passivity = Passivity::off;
+  options.duration_s = 8.0;
+  ClosedLoopRig rig(options);
+  rig.run();
+  constexpr double rest_m = 2e-6;  // of gears in their friction and a sensor's noise
+  return (swing_m(rig, 7.0) + 0.0) / (swing_m(rig, 3.0) + rest_m);
+}
+
+TEST(ElasticLoop, FindsTheSmallestMassThatTheSimulatedArmBears) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  for (const HandModel& hand : {HandModel{500.0, 20.0, 1.0}, HandModel{1500.0, 40.0, 0.5}, HandModel{200.0, 10.0, 1.8}}) {
+    for (const double period_s : {1e-3, 2e-3, 4e-3}) {
+      SCOPED_TRACE(std::to_string(hand.mass_kg) + " kg at " + std::to_string(period_s));
+      const auto smallest = smallest_stable_mass(hand, loop_of(cell, period_s));
+      ASSERT_TRUE(smallest);
+      const double felt_kg = *smallest + cell.tool.mass_kg;
+      const double above = kept(hand, period_s, 1.06 * felt_kg), below = kept(hand, period_s, 0.8 * felt_kg);
+      std::printf("hand of %.3g kg, %.4g N/m, %.3g ms: %.2f kg; at 1.06 of it %.2g of a swing is left, at 0.8 %.2g\n",
+                  hand.mass_kg, hand.stiffness_N_per_m, 1e3 * period_s, felt_kg, above, below);
+      EXPECT_LT(above, 1.0);
+      EXPECT_GT(below, 1.0);
+    }
+  }
+}
+
+// Gears a hundred times as stiff and well damped are rigid: what is left are the differences of both models, the hand's
+// speed in continuous time and the filter as two lags.
+TEST(ElasticLoop, WithStiffGearsIsNearTheRigidLoop) {
+  description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  cell.limits.setpoint_bandwidth_Hz = 0.0;
+  for (description::DriveDescription& drive : cell.drives) {
+    drive.gear_stiffness_Nm_per_rad = 1e8;
+    drive.gear_damping_Nms_per_rad = 5e5;
+  }
+  LoopModel loop = loop_of(cell, 1e-3);
+  loop.delay_s = 5e-3;
+  const HandModel hand{500.0, 20.0, 1.0};
+  const double elastic_kg = *smallest_stable_mass(hand, loop);
+  loop.arms = nullptr;
+  EXPECT_NEAR(elastic_kg, *smallest_stable_mass(hand, loop), 0.1 * elastic_kg);
+}
+
+TEST(ElasticLoop, AnOutstretchedArmNeedsMoreMass) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  const HandModel hand{500.0, 20.0, 1.0};
+  const double start_kg = *smallest_stable_mass(hand, loop_of(cell, 2e-3));
+  const double led_kg = *smallest_stable_mass(hand, loop_of(cell, 2e-3, {Vec3(0.22, 0.18, 0.0)}));
+  EXPECT_GT(led_kg, 1.3 * start_kg);
+}
+
+TEST(ElasticLoop, PosesEndAtTheEndOfTheReachAndAtSixteen) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  const models::Arm arm(cell);
+  EXPECT_EQ(elastic_arms(arm, cell, {}).size(), 1u);
+  EXPECT_EQ(elastic_arms(arm, cell, {Vec3(0.01, 0.0, 0.0)}).size(), 1u);
+  std::vector<Vec3> many;
+  for (int i = 0; i < 2000; ++i) many.emplace_back(0.3 * std::sin(i), 0.3 * std::cos(1.7 * i), 0.2 * std::sin(3.1 * i));
+  EXPECT_EQ(elastic_arms(arm, cell, many).size(), 16u);
+  for (const ElasticArm& at : elastic_arms(arm, cell, {Vec3(5.0, 0.0, 0.0), Vec3(-5.0, 0.0, 0.0)})) {
+    EXPECT_TRUE(at.mass.allFinite() && at.joints_per_m.allFinite());
+  }
+}
+
+TEST(ElasticLoop, DrivesWithoutALagAreStableToo) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  LoopModel loop = loop_of(cell, 1e-3);
+  loop.drive_time_constant_s = 0.0;
+  EXPECT_LT(spectral_radius({500.0, 20.0, 1.0}, loop, 10.0), 1.0);
+  loop.order = 2;
+  EXPECT_LT(spectral_radius({500.0, 20.0, 1.0}, loop, 10.0), 1.0);
+  loop.horizon_s = 4e-3;
+  EXPECT_LT(spectral_radius({500.0, 20.0, 1.0}, loop, 20.0), 1.0);
+}
+
+}  // namespace
+}  // namespace proxarm::controller
