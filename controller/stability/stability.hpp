@@ -57,7 +57,7 @@ struct LoopModel {
   // counts as the two lags that it is. What looks ahead makes up for their phase; as a pure delay they would seem
   // worse.
   double filter_s = 0.0;
-  std::shared_ptr<const std::vector<ElasticArm>> arms;  // in the poses that count; none: rigid
+  std::shared_ptr<const std::vector<ElasticArm>> arms{};  // in the poses that count; none: rigid
 };
 
 // The largest |z|; the loop is stable below 1. M is the proxy's (felt mass less the handle's), > 0.

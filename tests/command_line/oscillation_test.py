@@ -71,8 +71,8 @@ class Oscillation(ProgramTest):
 
     def test_such_a_mass_is_refused_with_the_smallest_that_is_stable(self):
         """The story: the check took the links for rigid, and 1.5 kg for stable at any timestep."""
-        for arguments, said in ((("--timestep", "2ms", "--mass", "2"), "at least 2.6 kg"),
-                                (("--timestep", "4ms", "--mass", "3.4"), "at least 3.8 kg")):
+        for arguments, said in ((("--timestep", "2ms", "--mass", "2"), "at least 2.7 kg"),
+                                (("--timestep", "4ms", "--mass", "3.4"), "at least 4 kg")):
             with self.subTest(arguments):
                 self.assert_refused(self.call("run", *arguments), said, "--force-unstable")
 
