@@ -147,6 +147,13 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record.set(RecordFlag::timestep, timestep_.under_way());
   for (const LimitFlag& flag : limit_flags) record.set(flag.flag, motion_->active().has(flag.limit));
   record.limited_axes = motion_->active().axes;
+  record.fault = supervisor_.report().fault;
+  if (state_.entered_phase == Phase::holding) record.held_for = supervisor_.held_for().fault;
+  const FaultReport& report = record.fault != Fault::none ? supervisor_.report() : supervisor_.held_for();
+  record.fault_where = report.where;
+  record.fault_cycle = report.cycle;
+  record.fault_value = report.value;
+  record.fault_limit = report.limit;
   record.force_S_N = triple(measured.reading_S.force);
   record.torque_S_Nm = triple(measured.reading_S.torque);
   record.force_W_N = triple(measured.hand_W.force);

@@ -2,7 +2,8 @@
 //
 // The cycle writes here (noexcept, no lock, no allocation, no system call; every page is touched beforehand). The
 // memory is a shared mapping, so that a process that was forked off before still has it when this one has died
-// (command_line/black_box_keeper.hpp). Three rings, overwritten from their oldest end:
+// (command_line/black_box_keeper.hpp), and a process that is given its descriptor can read it (MappedBox). Three rings,
+// overwritten from their oldest end:
 //   cycles   one entry per cycle: what came in by other ways than frames, and the cycle's record
 //   frames   all that was received and sent, in order
 //   states   the controller's whole state at the begin of a cycle, once a second: where a replay can start
@@ -75,13 +76,68 @@ class CycleBox {
   virtual void finish_state(std::size_t bytes) noexcept = 0;
 };
 
-class BlackBox final : public CycleBox {
+// What any thread or process may read of a box while its cycle writes: whole cycles only.
+class BoxReader {
  public:
-  static constexpr double seconds = 10.0;
   static constexpr std::size_t most_state_bytes = 12288;
 
+  BoxReader(const BoxReader&) = delete;
+  BoxReader& operator=(const BoxReader&) = delete;
+
+  [[nodiscard]] std::uint64_t cycles() const noexcept { return head_->cycles.load(std::memory_order_acquire); }
+  // False where the cycle has been overwritten, which also happens while a reader in another thread copies it.
+  bool read(std::uint64_t cycle, BoxCycle& out, std::vector<BoxFrame>& frames) const;
+  // The same without its frames.
+  bool read(std::uint64_t cycle, BoxCycle& out) const noexcept;
+  [[nodiscard]] std::uint64_t oldest_cycle() const noexcept;
+  // The oldest state from which all cycles are still there. False where there is none.
+  bool oldest_state(std::uint64_t& cycle, std::vector<std::byte>& state) const;
+  // The frames of a cycle that was begun and never ended.
+  [[nodiscard]] std::vector<BoxFrame> unfinished() const;
+
+ protected:
+  struct State {
+    std::uint64_t cycle = 0;
+    std::size_t size = 0;
+    std::array<std::byte, most_state_bytes> bytes{};
+  };
+  static constexpr std::size_t state_count = 16;
+  struct Head {
+    std::uint64_t layout = 0;  // of the program that wrote it: layout_of_this_program()
+    std::uint64_t cycle_capacity = 0, frame_capacity = 0;
+    std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0};
+  };
+  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
+  // Another build may have other records.
+  [[nodiscard]] static std::uint64_t layout_of_this_program() noexcept {
+    return sizeof(BoxCycle) << 32U | sizeof(BoxFrame);
+  }
+
+  BoxReader() = default;
+  ~BoxReader() = default;
+  [[nodiscard]] static std::size_t bytes_for(std::size_t cycles, std::size_t frames) noexcept {
+    return sizeof(Head) + cycles * sizeof(BoxCycle) + frames * sizeof(BoxFrame) + state_count * sizeof(State);
+  }
+  // The rings within the memory that begins with `head`, which has the capacities.
+  void lay_out(Head* head) noexcept;
+
+  Head* head_ = nullptr;
+  BoxCycle* cycles_ = nullptr;
+  BoxFrame* frames_ = nullptr;
+  State* states_ = nullptr;
+};
+
+class BlackBox final : public CycleBox, public BoxReader {
+ public:
+  static constexpr double seconds = 10.0;
+
+  enum class Memory : std::uint8_t {
+    forked,         // for processes that are forked off
+    by_descriptor,  // for any process that is given descriptor(), too; counts against a limit of file sizes
+  };
+
   // `frames_per_cycle`: the largest number that is expected.
-  BlackBox(double period_s, std::size_t frames_per_cycle);
+  BlackBox(double period_s, std::size_t frames_per_cycle, Memory memory = Memory::forked);
   ~BlackBox() override;
 
   [[nodiscard]] BoxCycle& begin(std::int64_t t_k_ns) noexcept override;
@@ -90,36 +146,25 @@ class BlackBox final : public CycleBox {
   [[nodiscard]] std::span<std::byte> state_room() noexcept override;
   void finish_state(std::size_t bytes) noexcept override;
 
-  // ---- for any thread or process; whole cycles only ----
-  [[nodiscard]] std::uint64_t cycles() const noexcept { return head_->cycles.load(std::memory_order_acquire); }
-  // False where the cycle has been overwritten, which also happens while a reader in another thread copies it.
-  bool read(std::uint64_t cycle, BoxCycle& out, std::vector<BoxFrame>& frames) const;
-  [[nodiscard]] std::uint64_t oldest_cycle() const noexcept;
-  // The oldest state from which all cycles are still there. False where there is none.
-  bool oldest_state(std::uint64_t& cycle, std::vector<std::byte>& state) const;
-  // The frames of a cycle that was begun and never ended.
-  [[nodiscard]] std::vector<BoxFrame> unfinished() const;
+  // Memory::by_descriptor: closed on exec, and with the box; else −1.
+  [[nodiscard]] int descriptor() const noexcept { return descriptor_; }
 
  private:
-  struct State {
-    std::uint64_t cycle = 0;
-    std::size_t size = 0;
-    std::array<std::byte, most_state_bytes> bytes{};
-  };
-  static constexpr std::size_t state_count = 16;
-  struct Head {
-    std::atomic<std::uint64_t> cycles{0}, frames{0}, states{0};
-  };
-  static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
-
-  std::size_t cycle_capacity_, frame_capacity_;
   std::uint64_t cycles_per_state_;
   std::size_t bytes_;
-  std::byte* memory_;
-  Head* head_;
-  BoxCycle* cycles_;
-  BoxFrame* frames_;
-  State* states_;
+  int descriptor_ = -1;
+};
+
+// Another process's box, through its descriptor; the pages are mapped for reading alone.
+class MappedBox final : public BoxReader {
+ public:
+  // Throws std::runtime_error for memory that isn't a box of this build of the program.
+  explicit MappedBox(int descriptor);
+  ~MappedBox();
+
+ private:
+  void* memory_ = nullptr;
+  std::size_t bytes_ = 0;
 };
 
 }  // namespace proxarm::controller

@@ -91,6 +91,13 @@ struct CycleRecord {
   std::uint8_t limited_axes = 0;  // joints whose own limits were active, as bits
   std::uint32_t flags = 0;        // RecordFlag
 
+  // What the supervisor says: the fault that stopped the arm, and the one that it is held for; none where there is
+  // none, or where somebody asked for the hold.
+  Fault fault = Fault::none, held_for = Fault::none;
+  std::int32_t fault_where = -1;  // of the first of them that there is, as in FaultReport
+  std::uint64_t fault_cycle = 0;
+  double fault_value = 0.0, fault_limit = 0.0;
+
   Triple force_S_N{}, torque_S_Nm{};  // the sensor's wrench, as decoded
   Triple force_W_N{}, torque_W_Nm{};  // h(k): without bias and tool weight, in W, about the rendered point
   Triple p_hat_W_m{};                 // (26a)
