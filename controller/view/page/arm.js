@@ -1,0 +1,82 @@
+// The arm as its URDF draws it, and the handle behind the sensor.
+import * as THREE from './three/build/three.module.js';
+import { capsuleGeometry, cylinderGeometry, fetchMesh, setPose, vec } from './shapes.js';
+import { isDark, onTheme } from './theme.js';
+
+const EDGE_ANGLE_DEG = 30;
+
+export class ArmView extends THREE.Group {
+  constructor(stage) {
+    super();
+    this.name = 'arm';
+    // Faces a little behind, so that their edges are seen whole.
+    const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
+    this.materials = [new THREE.MeshLambertMaterial(behind), new THREE.MeshLambertMaterial(behind)];
+    this.handleMaterial = new THREE.MeshLambertMaterial();
+    this.edgeMaterial = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.65 });
+    this.links = stage.links.map((link, i) => this.makeLink(link, i));
+    this.add(...this.links);
+    this.addHandle(stage.tool);
+    onTheme(() => this.paint());
+  }
+
+  paint() {
+    const dark = isDark();
+    this.materials[0].color.set(dark ? 0x8fa0b1 : 0xe3e8ed);
+    this.materials[1].color.set(dark ? 0x5d6e80 : 0x94a3b2);
+    this.handleMaterial.color.set(dark ? 0xc98a2b : 0xd9923b);
+    this.edgeMaterial.color.set(dark ? 0x0b1016 : 0x51606f);
+  }
+
+  makeLink(link, index) {
+    const group = new THREE.Group();
+    group.name = link.name;
+    for (const shape of link.shapes) this.addShape(group, shape, index);
+    return group;
+  }
+
+  // Boxes are the arms, round things the joints: two tones make the joints readable.
+  addShape(group, shape, index) {
+    const material = shape.colour
+      ? new THREE.MeshLambertMaterial({ color: new THREE.Color(...shape.colour) })
+      : this.materials[shape.kind === 'box' || index === 0 ? 0 : 1];
+    if (shape.kind === 'mesh') {
+      fetchMesh(shape.mesh).then((geometry) => {
+        const mesh = new THREE.Mesh(geometry, material);
+        setPose(mesh, shape.pose);
+        group.add(mesh);
+      }).catch(() => {});  // what can't be had leaves a gap
+      return;
+    }
+    const geometry =
+      shape.kind === 'box' ? new THREE.BoxBufferGeometry(...shape.size)
+      : shape.kind === 'sphere' ? new THREE.SphereBufferGeometry(shape.radius, 32, 20)
+      : cylinderGeometry(shape.radius, shape.length);
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry, EDGE_ANGLE_DEG), this.edgeMaterial));
+    setPose(mesh, shape.pose);
+    group.add(mesh);
+  }
+
+  // From the sensor to the rendered point, and a little beyond: what the hand holds.
+  addHandle(tool) {
+    const link = this.links[tool.link];
+    if (!link) return;
+    const from = vec(tool.sensor), to = vec(tool.handle);
+    const length = from.distanceTo(to);
+    const sensor = new THREE.Mesh(cylinderGeometry(0.036, 0.022), this.materials[0]);
+    setPose(sensor, tool.sensor);
+    sensor.translateZ(0.002);
+    link.add(sensor);
+    if (length < 0.01) return;
+    const handle = new THREE.Mesh(capsuleGeometry(0.016, Math.max(0.01, length - 0.026)), this.handleMaterial);
+    handle.name = 'handle';
+    handle.position.copy(from).lerp(to, 0.5);
+    handle.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), to.clone().sub(from).normalize());
+    link.add(handle);
+  }
+
+  show(moment) {
+    this.links.forEach((link, i) => setPose(link, moment.links, 7 * i));
+  }
+}

@@ -1,0 +1,87 @@
+// The WebSocket to the process that serves this page, and what comes through it in numbers.
+//
+// Text is JSON with one key, handed on by its name. Binary is a moment or a history, laid out as "stage" says:
+// controller/view/stage/moment.hpp has the wire.
+
+const KIND_MOMENT = 1, KIND_HISTORY = 2;
+const POSE_FLOATS = 7;
+
+export class Connection {
+  constructor(handlers) {
+    this.handlers = handlers;
+    this.fields = [];
+    this.questions = new Map();
+    this.lastId = 0;
+    this.open();
+  }
+
+  open() {
+    this.socket = new WebSocket(`ws://${location.host}/live`);
+    this.socket.binaryType = 'arraybuffer';
+    this.socket.onmessage = (event) => this.receive(event.data);
+    this.socket.onclose = () => {
+      for (const answered of this.questions.values()) answered('refused: the connection was lost');
+      this.questions.clear();
+      this.handlers.lost();
+    };
+  }
+
+  // A line for the session's control socket; resolves to its answer, "ok: …" or "refused: …".
+  ask(line) {
+    const id = ++this.lastId;
+    return new Promise((answered) => {
+      if (this.socket.readyState !== WebSocket.OPEN) return answered('refused: the connection was lost');
+      this.questions.set(id, answered);
+      this.socket.send(JSON.stringify({ ask: line, id }));
+    });
+  }
+
+  // For records: {at: CYCLE} and the like.
+  want(request) {
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
+  }
+
+  receive(data) {
+    if (typeof data !== 'string') return this.receiveBinary(data);
+    const [name, value] = Object.entries(JSON.parse(data))[0];
+    if (name === 'answer') {
+      const answered = this.questions.get(value.id);
+      this.questions.delete(value.id);
+      if (answered) answered(value.text);
+      return;
+    }
+    if (name === 'stage') {
+      this.fields = value.fields;
+      this.links = value.links.length;
+      this.objects = value.scene.objects.length;
+    }
+    this.handlers[name]?.(value);
+  }
+
+  receiveBinary(buffer) {
+    const head = new Float64Array(buffer, 0, 2);
+    const width = this.fields.length;
+    if (head[0] === KIND_MOMENT) {
+      const posesAt = 8 * (1 + width);
+      this.handlers.moment({
+        ...this.named(new Float64Array(buffer, 8, width), 0),
+        links: new Float32Array(buffer, posesAt, POSE_FLOATS * this.links),
+        objects: new Float32Array(buffer, posesAt + 4 * POSE_FLOATS * this.links, POSE_FLOATS * this.objects),
+      });
+    } else if (head[0] === KIND_HISTORY) {
+      const rows = new Float64Array(buffer, 16);
+      this.handlers.history(Array.from({ length: head[1] }, (_, i) => this.named(rows, i * width)));
+    }
+  }
+
+  named(numbers, from) {
+    const moment = {};
+    for (let i = 0; i < this.fields.length; ++i) moment[this.fields[i]] = numbers[from + i];
+    return moment;
+  }
+}
+
+// The vector that three fields are: vector(moment, 'proxy').
+export function vector(moment, name) {
+  return [moment[`${name}_x`], moment[`${name}_y`], moment[`${name}_z`]];
+}

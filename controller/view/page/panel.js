@@ -1,0 +1,108 @@
+// What the session is doing, in words and figures.
+
+const MOMENTARY_MS = 700;  // for how long a limit that acted is still told: shorter can't be read
+
+const BETWEEN_FIGURES_MS = 100;
+
+const element = (id) => document.getElementById(id);
+
+function length(m) {
+  if (!Number.isFinite(m)) return '—';
+  if (Math.abs(m) < 5e-8) return '0';
+  const size = Math.abs(m);
+  if (size >= 0.1) return `${m.toFixed(3)} m`;
+  if (size >= 1e-3) return `${(1e3 * m).toFixed(1)} mm`;
+  return `${(1e6 * m).toFixed(1)} µm`.replace('-', '−');
+}
+
+const FIGURES = [
+  ['hand’s force', (m) => `${m.hand_N.toFixed(2)} N`],
+  ['force of contact', (m) => (m.contact ? `${m.contact_N.toFixed(2)} N` : '—')],
+  ['touches', (m, stage) => (m.contact ? name(stage, m) : 'nothing')],
+  ['friction μ', (m) => (m.contact ? m.friction.toFixed(3) : '—')],
+  ['proxy to surface', (m) => length(m.proxy_clearance_m)],
+  ['tool to surface', (m) => length(m.tool_clearance_m)],
+  ['tool to proxy', (m) => length(Math.hypot(m.tool_x - m.proxy_x, m.tool_y - m.proxy_y, m.tool_z - m.proxy_z))],
+  ['mass felt, wanted', (m) => (m.mass_kg > 0 ? `${m.mass_kg.toFixed(2)} kg` : '—')],
+  ['damping', (m) => `${m.damping_Ns_per_m.toFixed(1)} Ns/m`],
+  ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
+];
+
+function name(stage, moment) {
+  const object = stage.scene.objects[moment.object];
+  const more = moment.contacts > 1 ? ` + ${moment.contacts - 1}` : '';
+  return (object ? object.name : 'an object') + more;
+}
+
+export class Panel {
+  constructor() {
+    this.cells = FIGURES.map(([label]) => {
+      const term = document.createElement('dt'), value = document.createElement('dd');
+      term.textContent = label;
+      element('figures').append(term, value);
+      return value;
+    });
+    this.heldSince = new Map();
+    this.written = 0;
+  }
+
+  introduce(stage) {
+    this.stage = stage;
+    element('scene-name').textContent = stage.scene.name;
+    element('cell-name').textContent = `· ${stage.cell}`;
+    document.title = `proxarm: ${stage.scene.name}`;
+    element('notes').replaceChildren(...stage.notes.map((note) => {
+      const item = document.createElement('li');
+      item.textContent = note;
+      return item;
+    }));
+  }
+
+  status(status) {
+    element('fault').hidden = !status.fault;
+    element('fault').textContent = status.fault;
+    element('phase-chip').dataset.fault = String(Boolean(status.fault));
+    const how = status.exit_status === undefined ? '' : ` (exit status ${status.exit_status})`;
+    element('ended').hidden = !status.ended;
+    element('ended').textContent = status.ended + how;
+  }
+
+  lost() {
+    element('ended').hidden = false;
+    element('ended').textContent = 'The connection is gone: the session’s program has ended.';
+  }
+
+  show(moment) {
+    const { words } = this.stage;
+    const phase = words.phases[moment.phase], contact = words.contacts[moment.contact];
+    element('phase-chip').textContent = phase.name;
+    element('phase-chip').dataset.phase = phase.name;
+    element('phase-words').textContent = phase.words;
+    element('contact-chip').textContent = { free: 'free', stick: '■ sticks', slip: '▶ slips' }[contact];
+    element('contact-chip').dataset.contact = contact;
+    element('clock').textContent = `${moment.time_s.toFixed(2)} s`;
+    this.showFlags(moment);
+    // Figures that change faster can't be read.
+    const now = performance.now();
+    if (now - this.written < BETWEEN_FIGURES_MS) return;
+    this.written = now;
+    FIGURES.forEach(([, text], i) => { this.cells[i].textContent = text(moment, this.stage); });
+  }
+
+  showFlags(moment) {
+    const now = performance.now();
+    for (const flag of this.stage.words.flags) {
+      if (Math.floor(moment.flags_since / flag.bit) % 2 === 1) this.heldSince.set(flag.bit, now);
+    }
+    const told = this.stage.words.flags.filter((flag) => now - (this.heldSince.get(flag.bit) ?? -1e9) < MOMENTARY_MS);
+    const key = told.map((flag) => flag.bit).join();
+    if (key === this.toldKey) return;
+    this.toldKey = key;
+    element('held-back').replaceChildren(...told.map((flag) => {
+      const item = document.createElement('li');
+      item.textContent = flag.words;
+      item.className = flag.holds_back ? '' : 'note';
+      return item;
+    }));
+  }
+}

@@ -1,0 +1,324 @@
+// The last 20 s in four plots: forces, the way to the nearest surface, mass and energy, the cycle's computing time.
+// While something is touched the ground is shaded: plain where it sticks, hatched where it slips.
+import { colour, onTheme } from './theme.js';
+
+const WINDOW_S = 20;
+const MOST_ROWS = 1500;
+const STICK = 1, SLIP = 2;
+const LEFT = 46, RIGHT = 10, TOP = 24, BOTTOM = 20;
+
+// Distances reach from a hand's width down to micrometres, on both sides of the surface: linear below LINEAR_MM,
+// logarithmic beyond.
+const LINEAR_MM = 0.05;
+const bent = (mm) => Math.asinh(mm / LINEAR_MM);
+const BENT_TICKS_MM = [-10, -1, -0.1, 0, 0.1, 1, 10, 100];
+
+const DASH = { solid: [], dashed: [7, 4], dotted: [2, 3] };
+
+// Before rendering there is no proxy yet, and the sensor isn't tared.
+const PHASE_RENDERING = 3;
+const moved = (m, value) => (m.phase >= PHASE_RENDERING ? value : NaN);
+
+// Lines of peaks may leave the plot at its top: a blow of a millisecond would flatten all else.
+const PLOTS = [
+  { title: 'force', unit: 'N', least: 5, zero: true, lines: [
+    { name: 'peaks', value: (m) => moved(m, m.contact_peak_N), colour: '--soft', dash: 'dotted', peaks: true },
+    { name: 'contact', value: (m) => moved(m, m.contact_N), colour: '--stick', dash: 'solid' },
+    { name: 'hand', value: (m) => moved(m, m.hand_N), colour: '--hand', dash: 'dashed' }] },
+  { title: 'to the surface', unit: 'mm', bent: true, lines: [
+    { name: 'proxy', value: (m) => moved(m, 1e3 * m.proxy_clearance_m), colour: '--proxy', dash: 'solid' },
+    { name: 'tool', value: (m) => moved(m, 1e3 * m.tool_clearance_m), colour: '--tool', dash: 'dashed' }] },
+  { title: 'mass, energy', unit: 'kg · J', least: 1, zero: true, lines: [
+    { name: 'wanted', value: (m) => (m.mass_kg > 0 ? m.mass_kg : NaN), colour: '--ink', dash: 'dotted' },
+    { name: 'felt', value: (m) => m.felt_kg, colour: '--good', dash: 'solid' },
+    { name: 'hand’s energy', value: (m) => m.energy_hand_J, colour: '--hand', dash: 'dashed' }] },
+  { title: 'computing a cycle', unit: 'µs', least: 10, zero: true, lines: [
+    { name: 'longest', value: (m) => m.compute_peak_us, colour: '--soft', dash: 'dotted', peaks: true },
+    { name: 'last', value: (m) => m.compute_us, colour: '--accent', dash: 'solid' }],
+    note: (m) => (m.overruns > 0 ? `${m.overruns} overruns` : 'no overrun') },
+];
+
+// Mass that the hand feels, by its force over the tool's acceleration along it: a running fit over about half a second of
+// free motion. The tool's place is filtered as the force is, so both are late by the same.
+class FeltMass {
+  constructor() { this.reset(); }
+
+  reset() {
+    this.rows = [];
+    this.forceTimesA = this.aTimesA = 0;
+  }
+
+  of(moment) {
+    const last = this.rows[this.rows.length - 1];
+    if (last && moment.time_s <= last.time_s) this.reset();
+    this.rows.push(moment);
+    if (this.rows.length < 9) return NaN;
+    if (this.rows.length > 9) this.rows.shift();
+    const [a, b, c] = [this.rows[0], this.rows[4], this.rows[8]];
+    const h1 = b.time_s - a.time_s, h2 = c.time_s - b.time_s;
+    const keep = Math.exp(-(b.time_s - this.rows[3].time_s) / 0.5);
+    this.forceTimesA *= keep;
+    this.aTimesA *= keep;
+    if (a.contact === 0 && c.contact === 0 && c.mass_kg > 0 && h1 > 0 && h2 > 0) {
+      for (const axis of ['x', 'y', 'z']) {
+        const p = `tool_${axis}`, f = `force_${axis}`;
+        const acceleration = 2 * ((c[p] - b[p]) / h2 - (b[p] - a[p]) / h1) / (h1 + h2);
+        const mean = this.rows.reduce((sum, row) => sum + row[f], 0) / this.rows.length;
+        this.forceTimesA += mean * acceleration;
+        this.aTimesA += acceleration * acceleration;
+      }
+    }
+    const known = this.aTimesA > 0.5 && a.contact === 0 && c.contact === 0;
+    return known ? Math.min(200, Math.max(0, this.forceTimesA / this.aTimesA)) : NaN;
+  }
+}
+
+function niceStep(range, most) {
+  const raw = range / most, power = 10 ** Math.floor(Math.log10(raw));
+  return [1, 2, 5, 10].map((f) => f * power).find((step) => step >= raw);
+}
+
+class Plot {
+  constructor(description, parent) {
+    this.description = description;
+    const box = document.createElement('div');
+    box.className = 'plot';
+    box.setAttribute('role', 'img');
+    box.setAttribute('aria-label', `${description.title}, in ${description.unit}, over the last ${WINDOW_S} s`);
+    this.canvas = document.createElement('canvas');
+    box.append(this.canvas);
+    parent.append(box);
+    this.context = this.canvas.getContext('2d');
+    new ResizeObserver(() => this.resize()).observe(box);
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    const ratio = Math.min(2, devicePixelRatio || 1);
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    this.ratio = ratio;
+    this.width = width;
+    this.height = height;
+    this.stale = true;
+  }
+
+  range(rows) {
+    const { lines, least = 0, zero } = this.description;
+    let low = zero ? 0 : Infinity, high = zero ? least : -Infinity;
+    for (const row of rows) {
+      for (const line of lines) {
+        const value = this.scaled(line.value(row));
+        if (!Number.isFinite(value) || line.peaks) continue;
+        if (value < low) low = value;
+        if (value > high) high = value;
+      }
+    }
+    if (this.description.bent) {
+      low = Math.min(low, bent(-0.1));
+      high = Math.max(high, bent(10));
+    }
+    if (!(high > low)) return [0, 1];
+    return [low < 0 ? low * 1.08 : low, high + 0.08 * (high - low)];
+  }
+
+  scaled(value) {
+    return this.description.bent ? bent(value) : value;
+  }
+
+  ticks(low, high) {
+    if (this.description.bent) {
+      return BENT_TICKS_MM.map((mm) => [bent(mm), String(mm).replace('-', '−')]).filter(([y]) => y >= low && y <= high);
+    }
+    const step = niceStep(high - low, 4), out = [];
+    for (let y = Math.ceil(low / step) * step; y <= high; y += step) {
+      out.push([y, String(Number(y.toPrecision(6))).replace('-', '−')]);
+    }
+    return out;
+  }
+
+  draw(rows, from, to, playhead) {
+    const c = this.context;
+    if (!this.width || !this.height) return;
+    c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    c.clearRect(0, 0, this.width, this.height);
+    const [low, high] = this.range(rows);
+    const x = (t) => LEFT + ((t - from) / (to - from)) * (this.width - LEFT - RIGHT);
+    const y = (v) => this.height - BOTTOM - ((v - low) / (high - low)) * (this.height - TOP - BOTTOM);
+    this.shade(rows, x);
+    this.axes(low, high, from, to, x, y);
+    c.save();
+    c.beginPath();
+    c.rect(LEFT, TOP - 2, this.width - LEFT - RIGHT, this.height - TOP - BOTTOM + 4);
+    c.clip();
+    for (const line of this.description.lines) this.line(line, rows, x, y);
+    c.restore();
+    if (playhead !== undefined) {
+      c.strokeStyle = colour('--ink');
+      c.setLineDash([]);
+      c.beginPath();
+      c.moveTo(x(playhead), TOP - 4);
+      c.lineTo(x(playhead), this.height - BOTTOM);
+      c.stroke();
+    }
+    this.title(rows);
+  }
+
+  shade(rows, x) {
+    const c = this.context, top = TOP, height = this.height - TOP - BOTTOM;
+    const fills = { [STICK]: colour('--shade-stick'), [SLIP]: this.hatching() };
+    let i = 0;
+    while (i < rows.length) {
+      const contact = rows[i].contact, first = i;
+      while (i < rows.length && rows[i].contact === contact) ++i;
+      if (contact !== STICK && contact !== SLIP) continue;
+      const from = Math.max(LEFT, x(rows[first].time_s));
+      const to = x(rows[Math.min(i, rows.length - 1)].time_s);
+      c.fillStyle = fills[contact];
+      c.fillRect(from, top, Math.max(1, to - from), height);
+    }
+  }
+
+  hatching() {
+    const key = colour('--slip');
+    if (this.hatched !== key) {
+      const tile = document.createElement('canvas');
+      tile.width = tile.height = 8;
+      const c = tile.getContext('2d');
+      c.fillStyle = colour('--shade-slip');
+      c.fillRect(0, 0, 8, 8);
+      c.strokeStyle = key;
+      c.globalAlpha = 0.35;
+      for (const shift of [-8, 0, 8]) {
+        c.beginPath();
+        c.moveTo(shift, 8);
+        c.lineTo(shift + 8, 0);
+        c.stroke();
+      }
+      this.pattern = this.context.createPattern(tile, 'repeat');
+      this.hatched = key;
+    }
+    return this.pattern;
+  }
+
+  axes(low, high, from, to, x, y) {
+    const c = this.context;
+    c.font = '11px system-ui, "DejaVu Sans", sans-serif';
+    c.lineWidth = 1;
+    c.setLineDash([]);
+    c.strokeStyle = colour('--line');
+    c.fillStyle = colour('--soft');
+    c.textAlign = 'right';
+    c.textBaseline = 'middle';
+    for (const [value, text] of this.ticks(low, high)) {
+      const at = Math.round(y(value)) + 0.5;
+      c.beginPath();
+      c.moveTo(LEFT, at);
+      c.lineTo(this.width - RIGHT, at);
+      c.stroke();
+      c.fillText(text, LEFT - 5, at);
+    }
+    c.textAlign = 'center';
+    c.textBaseline = 'top';
+    const step = niceStep(to - from, Math.max(2, this.width / 90));
+    for (let t = Math.ceil(from / step) * step; t <= to; t += step) {
+      if (t < 0 || x(t) > this.width - 22) continue;
+      c.fillText(`${Number(t.toFixed(3))} s`, x(t), this.height - BOTTOM + 5);
+    }
+  }
+
+  line(line, rows, x, y) {
+    const c = this.context;
+    c.strokeStyle = colour(line.colour);
+    c.lineWidth = 1.8;
+    c.setLineDash(DASH[line.dash]);
+    c.beginPath();
+    let down = false;
+    for (const row of rows) {
+      const value = this.scaled(line.value(row));
+      if (!Number.isFinite(value)) { down = false; continue; }
+      if (down) c.lineTo(x(row.time_s), y(value)); else c.moveTo(x(row.time_s), y(value));
+      down = true;
+    }
+    c.stroke();
+  }
+
+  // The title, and each line's name behind a piece of it.
+  title(rows) {
+    const c = this.context, { title, unit, lines, note } = this.description;
+    c.textBaseline = 'middle';
+    c.textAlign = 'left';
+    c.font = '600 12px system-ui, "DejaVu Sans", sans-serif';
+    c.fillStyle = colour('--ink');
+    const head = `${title}, ${unit}`;
+    c.fillText(head, 10, 12);
+    let at = 10 + c.measureText(head).width + 14;
+    c.font = '11px system-ui, "DejaVu Sans", sans-serif';
+    for (const line of lines) {
+      const width = c.measureText(line.name).width;
+      if (at + 24 + width > this.width) break;
+      c.strokeStyle = colour(line.colour);
+      c.lineWidth = 2;
+      c.setLineDash(DASH[line.dash]);
+      c.beginPath();
+      c.moveTo(at, 12);
+      c.lineTo(at + 20, 12);
+      c.stroke();
+      c.setLineDash([]);
+      c.fillStyle = colour('--soft');
+      c.fillText(line.name, at + 25, 12);
+      at += 25 + width + 12;
+    }
+    const text = note && rows.length ? note(rows[rows.length - 1]) : '';
+    if (text && at + c.measureText(text).width < this.width) c.fillText(text, at, 12);
+  }
+}
+
+export class Plots {
+  constructor(parent) {
+    this.plots = PLOTS.map((description) => new Plot(description, parent));
+    this.rows = [];
+    this.felt = new FeltMass();
+    this.drawn = 0;
+    onTheme(() => { this.stale = true; });
+  }
+
+  add(moment) {
+    const last = this.rows[this.rows.length - 1];
+    if (last && moment.time_s <= last.time_s) return;
+    const { links, objects, ...row } = moment;
+    row.felt_kg = this.felt.of(row);
+    this.rows.push(row);
+    while (this.rows.length > MOST_ROWS || this.rows[0].time_s < row.time_s - WINDOW_S - 1) this.rows.shift();
+    this.stale = true;
+  }
+
+  // A window of a record, with the place in it that is shown.
+  setWindow(rows, from, to, playhead) {
+    this.felt.reset();
+    this.rows = rows;
+    for (const row of rows) row.felt_kg = this.felt.of(row);
+    this.window = { from, to };
+    this.setPlayhead(playhead);
+  }
+
+  setPlayhead(playhead) {
+    this.playhead = playhead;
+    this.stale = true;
+  }
+
+  // Twenty times a second is as often as an eye follows lines.
+  draw(now) {
+    if (now - this.drawn < 50 || !(this.stale || this.plots.some((plot) => plot.stale))) return;
+    this.drawn = now;
+    this.stale = false;
+    const newest = this.rows.length ? this.rows[this.rows.length - 1].time_s : 0;
+    const to = this.window ? this.window.to : Math.max(WINDOW_S, newest);
+    const from = this.window ? this.window.from : to - WINDOW_S;
+    const rows = this.rows.filter((row) => row.time_s >= from - 0.1 && row.time_s <= to + 0.1);
+    for (const plot of this.plots) {
+      plot.stale = false;
+      plot.draw(rows, from, to, this.playhead);
+    }
+  }
+}

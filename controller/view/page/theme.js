@@ -1,0 +1,39 @@
+// Dark and light: as the system has it, until somebody chooses.
+
+const listeners = [];
+let chosen = localStorage.getItem('proxarm-theme');
+const system = matchMedia('(prefers-color-scheme: dark)');
+
+export function isDark() {
+  return chosen ? chosen === 'dark' : system.matches;
+}
+
+export function toggleTheme() {
+  chosen = isDark() ? 'light' : 'dark';
+  localStorage.setItem('proxarm-theme', chosen);
+  apply();
+}
+
+export function onTheme(listener) {
+  listeners.push(listener);
+  listener();
+}
+
+// A colour of the style sheet: colour('--proxy'). Kept, since asking makes the browser lay out the page.
+const colours = new Map();
+export function colour(name) {
+  if (!colours.has(name)) {
+    colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  }
+  return colours.get(name);
+}
+
+function apply() {
+  document.documentElement.dataset.theme = isDark() ? 'dark' : 'light';
+  colours.clear();
+  document.getElementById('theme').textContent = isDark() ? 'light' : 'dark';
+  for (const listener of listeners) listener();
+}
+
+system.addEventListener('change', apply);
+apply();

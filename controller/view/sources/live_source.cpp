@@ -1,0 +1,57 @@
+#include "controller/view/sources/live_source.hpp"
+
+#include <algorithm>
+
+namespace proxarm::view {
+
+namespace {
+constexpr double history_s = 20.0;
+constexpr std::size_t most_rows = 1300;  // a little more than 20 s of 60 a second
+}  // namespace
+
+LiveSource::LiveSource(int descriptor, Stage& stage)
+    : box_(descriptor), stage_(stage), builder_(stage.handle_mass_kg()) {}
+
+bool LiveSource::advance() {
+  const std::uint64_t end = box_.cycles();
+  if (next_ >= end) return false;
+  if (const std::uint64_t oldest = box_.oldest_cycle(); next_ < oldest) next_ = oldest;
+  bool any = false;
+  for (; next_ < end; ++next_) {
+    if (!box_.read(next_, cycle_)) continue;
+    const controller::CycleRecord& record = cycle_.record;
+    const bool rendered = record.phase == controller::Phase::rendering;
+    stage_.follow(cycle_.change, rendered, 1e-9 * static_cast<double>(record.period_ns));
+    builder_.add(record, 1e-9 * static_cast<double>(cycle_.rendered_ns));
+    any = true;
+  }
+  return any;
+}
+
+Moment LiveSource::take() {
+  Moment moment = builder_.take();
+  stage_.complete(moment.record, moment.rendered_s);
+  remember(moment);
+  return moment;
+}
+
+std::string LiveSource::encode(const Moment& moment) {
+  stage_.place(moment.record, moment.rendered_s, links_, objects_);
+  return encode_moment(moment, links_, objects_);
+}
+
+void LiveSource::remember(const Moment& moment) {
+  const auto width = static_cast<std::ptrdiff_t>(field_names().size());
+  append_fields(history_, moment);
+  constexpr std::size_t time_field = 1;
+  const double from_s = 1e-9 * static_cast<double>(moment.record.time_ns) - history_s;
+  std::ptrdiff_t old = 0;
+  const auto rows = static_cast<std::ptrdiff_t>(history_.size()) / width;
+  while (old < rows && (history_[static_cast<std::size_t>(old * width) + time_field] < from_s ||
+                        static_cast<std::size_t>(rows - old) > most_rows)) {
+    ++old;
+  }
+  history_.erase(history_.begin(), history_.begin() + old * width);
+}
+
+}  // namespace proxarm::view

@@ -1,0 +1,145 @@
+#include "controller/view/stage/moment.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+namespace proxarm::view {
+namespace {
+
+using controller::CycleRecord;
+using controller::Triple;
+
+// A name, and the number that it stands for.
+struct Field {
+  const char* name;
+  double (*value)(const Moment&);
+};
+
+double norm(const Triple& v) noexcept { return controller::vec3(v).norm(); }
+
+constexpr std::array fields{
+    Field{"cycle", [](const Moment& m) { return static_cast<double>(m.record.cycle); }},
+    Field{"time_s", [](const Moment& m) { return 1e-9 * static_cast<double>(m.record.time_ns); }},
+    Field{"rendered_s", [](const Moment& m) { return m.rendered_s; }},
+    Field{"period_s", [](const Moment& m) { return 1e-9 * static_cast<double>(m.record.period_ns); }},
+    Field{"phase", [](const Moment& m) { return static_cast<double>(m.record.phase); }},
+    Field{"contact", [](const Moment& m) { return static_cast<double>(m.record.contact); }},
+    Field{"contacts", [](const Moment& m) { return static_cast<double>(m.record.contact_count); }},
+    Field{"object", [](const Moment& m) { return static_cast<double>(m.record.contact_object); }},
+    Field{"friction", [](const Moment& m) { return m.record.friction; }},
+    Field{"flags", [](const Moment& m) { return static_cast<double>(m.record.flags); }},
+    Field{"flags_since", [](const Moment& m) { return static_cast<double>(m.flags_since); }},
+    Field{"limited_axes", [](const Moment& m) { return static_cast<double>(m.record.limited_axes); }},
+    Field{"fault", [](const Moment& m) { return static_cast<double>(m.record.fault); }},
+    Field{"held_for", [](const Moment& m) { return static_cast<double>(m.record.held_for); }},
+    Field{"compute_us", [](const Moment& m) { return 1e-3 * static_cast<double>(m.record.compute_ns); }},
+    Field{"compute_peak_us", [](const Moment& m) { return m.compute_peak_us; }},
+    Field{"overruns", [](const Moment& m) { return static_cast<double>(m.overruns); }},
+    Field{
+        "mass_kg",
+        [](const Moment& m) { return m.record.proxy_mass_kg > 0.0 ? m.record.proxy_mass_kg + m.handle_mass_kg : 0.0; }},
+    Field{"damping_Ns_per_m", [](const Moment& m) { return m.record.proxy_damping_Ns_per_m; }},
+    Field{"energy_hand_J", [](const Moment& m) { return m.record.energies_J.hand; }},
+    Field{"energy_proxy_J", [](const Moment& m) { return m.record.energies_J.proxy; }},
+    Field{"proxy_clearance_m", [](const Moment& m) { return m.record.proxy_clearance_m; }},
+    Field{"tool_clearance_m", [](const Moment& m) { return m.record.tool_clearance_m; }},
+    Field{"hand_N", [](const Moment& m) { return norm(m.record.force_W_N); }},
+    Field{"hand_peak_N", [](const Moment& m) { return m.hand_peak_N; }},
+    Field{"contact_N", [](const Moment& m) { return norm(m.record.contact_force_W_N); }},
+    Field{"contact_peak_N", [](const Moment& m) { return m.contact_peak_N; }},
+};
+
+// Vectors have one name, and three numbers.
+struct VectorField {
+  const char* name;
+  Triple CycleRecord::*value;
+};
+constexpr std::array vectors{VectorField{"force", &CycleRecord::force_W_N},
+                             VectorField{"torque", &CycleRecord::torque_W_Nm},
+                             VectorField{"p_hat", &CycleRecord::p_hat_W_m},
+                             VectorField{"proxy", &CycleRecord::proxy_W_m},
+                             VectorField{"contact_force", &CycleRecord::contact_force_W_N},
+                             VectorField{"normal", &CycleRecord::normal_W},
+                             VectorField{"tool", &CycleRecord::tool_W_m}};
+
+template <typename Number>
+void append(std::string& bytes, std::span<const Number> numbers) {
+  const std::size_t at = bytes.size();
+  bytes.resize(at + numbers.size_bytes());
+  if (!numbers.empty()) std::memcpy(bytes.data() + at, numbers.data(), numbers.size_bytes());
+}
+
+void append_pose(std::string& bytes, const models::Pose& X) {
+  const Eigen::Quaterniond q(X.linear());
+  const std::array numbers{static_cast<float>(X.translation().x()),
+                           static_cast<float>(X.translation().y()),
+                           static_cast<float>(X.translation().z()),
+                           static_cast<float>(q.x()),
+                           static_cast<float>(q.y()),
+                           static_cast<float>(q.z()),
+                           static_cast<float>(q.w())};
+  append<float>(bytes, numbers);
+}
+
+}  // namespace
+
+void MomentBuilder::add(const CycleRecord& record, double rendered_s) noexcept {
+  if (cycles_++ == 0) {
+    next_.flags_since = 0;
+    next_.compute_peak_us = next_.hand_peak_N = next_.contact_peak_N = 0.0;
+  }
+  next_.record = record;
+  next_.rendered_s = rendered_s;
+  next_.flags_since |= record.flags;
+  next_.compute_peak_us = std::max(next_.compute_peak_us, 1e-3 * static_cast<double>(record.compute_ns));
+  next_.hand_peak_N = std::max(next_.hand_peak_N, norm(record.force_W_N));
+  next_.contact_peak_N = std::max(next_.contact_peak_N, norm(record.contact_force_W_N));
+  if (record.has(controller::RecordFlag::overrun)) ++next_.overruns;
+}
+
+Moment MomentBuilder::take() noexcept {
+  cycles_ = 0;
+  return next_;
+}
+
+const std::vector<std::string>& field_names() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const Field& field : fields) all.emplace_back(field.name);
+    for (const VectorField& vector : vectors) {
+      for (const char* axis : {"_x", "_y", "_z"}) all.push_back(std::string(vector.name) + axis);
+    }
+    return all;
+  }();
+  return names;
+}
+
+void append_fields(std::vector<double>& row, const Moment& moment) {
+  for (const Field& field : fields) row.push_back(field.value(moment));
+  for (const VectorField& vector : vectors) {
+    const Triple& value = moment.record.*vector.value;
+    row.insert(row.end(), value.begin(), value.end());
+  }
+}
+
+std::string encode_moment(const Moment& moment, std::span<const models::Pose> links,
+                          std::span<const models::Pose> objects) {
+  std::vector<double> row{kind_moment};
+  append_fields(row, moment);
+  std::string bytes;
+  append<double>(bytes, row);
+  for (const models::Pose& X : links) append_pose(bytes, X);
+  for (const models::Pose& X : objects) append_pose(bytes, X);
+  return bytes;
+}
+
+std::string encode_history(std::span<const double> rows) {
+  const std::array head{kind_history, static_cast<double>(rows.size() / field_names().size())};
+  std::string bytes;
+  append<double>(bytes, head);
+  append<double>(bytes, rows);
+  return bytes;
+}
+
+}  // namespace proxarm::view

@@ -1,0 +1,116 @@
+#include "controller/view/stage/stage.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "models/base/setup_error.hpp"
+#include "scenes/compiler/obstacles.hpp"
+#include "scenes/mesh_files/mesh_file.hpp"
+
+namespace proxarm::view {
+namespace {
+
+using controller::CycleRecord;
+using models::Pose;
+using models::Vec3;
+
+// A browser on a small machine still draws this many.
+constexpr std::size_t most_triangles = 2'000'000;
+
+template <typename Number>
+void put(std::string& bytes, Number number) {
+  const std::size_t at = bytes.size();
+  bytes.resize(at + sizeof number);
+  std::memcpy(bytes.data() + at, &number, sizeof number);
+}
+
+// Triangles beyond the most that are drawn are thinned out evenly: a surface with holes shows where it is.
+template <typename Vertices, typename Triangles>
+std::string packed(const Vertices& vertices, const Triangles& triangles, const Vec3& scale) {
+  const std::size_t step = triangles.size() / most_triangles + 1;
+  const std::size_t count = (triangles.size() + step - 1) / step;
+  std::string bytes;
+  bytes.reserve(8 + 12 * vertices.size() + 12 * count);
+  put(bytes, static_cast<std::uint32_t>(vertices.size()));
+  put(bytes, static_cast<std::uint32_t>(count));
+  for (const Vec3& v : vertices) {
+    for (int i = 0; i < 3; ++i) put(bytes, static_cast<float>(v[i] * scale[i]));
+  }
+  for (std::size_t i = 0; i < triangles.size(); i += step) {
+    for (const std::uint32_t corner : triangles[i]) put(bytes, corner);
+  }
+  return bytes;
+}
+
+}  // namespace
+
+Stage::Stage(description::Cell cell, scenes::Scene scene, const StageOptions& options)
+    : cell_(std::move(cell)),
+      scene_(std::move(scene)),
+      options_(options),
+      arm_(cell_),
+      tree_(cell_),
+      compiled_(scenes::compile(scene_)),
+      changes_(compiled_, options.period_s) {}
+
+std::string Stage::mesh_bytes(int link, std::size_t index) const {
+  if (link < 0) {
+    const auto* const shape =
+        index < scene_.objects.size() ? std::get_if<scenes::MeshShape>(&scene_.objects[index].shape) : nullptr;
+    if (shape == nullptr || !shape->mesh) throw description::SetupError({.message = "no such mesh"});
+    return packed(shape->mesh->structure().vertices, shape->mesh->structure().triangles, Vec3::Ones());
+  }
+  const auto& links = tree_.links();
+  const auto at = static_cast<std::size_t>(link);
+  const auto* const mesh = at < links.size() && index < links[at].shapes.size()
+                               ? std::get_if<models::DrawnMesh>(&links[at].shapes[index].shape)
+                               : nullptr;
+  if (mesh == nullptr) throw description::SetupError({.message = "no such mesh"});
+  const models::TriangleSoup soup = scenes::read_mesh_file(mesh->file);
+  return packed(soup.vertices, soup.triangles, mesh->scale);
+}
+
+void Stage::follow(const controller::Change& change, bool rendered, double period_s) noexcept {
+  changes_.set(change);
+  changes_.set_period(period_s);
+  if (rendered) changes_.step();
+}
+
+// Order 2's proxy is where it is a period before that of (26): see proxies/bdf2.hpp.
+void Stage::complete(CycleRecord& record, double rendered_s) const {
+  const double later_s = options_.order == 2 ? 1e-9 * static_cast<double>(record.period_ns) : 0.0;
+  const auto clearance_m = [&](const controller::Triple& x_W) {
+    return scenes::clearance_m(scene_, controller::vec3(x_W), rendered_s - later_s, scenes::Driven::left_out);
+  };
+  record.proxy_clearance_m = clearance_m(record.proxy_W_m);
+  record.tool_clearance_m = clearance_m(record.tool_W_m);
+}
+
+models::JointVector Stage::joint_angles(const CycleRecord& record) const {
+  models::JointVector motor = arm_.start_rad();
+  bool seen = false;
+  for (std::size_t i = 0; i < cell_.drives.size() && i < record.actual_counts.size(); ++i) {
+    seen = seen || record.actual_counts[i] != 0;
+    motor[static_cast<Eigen::Index>(i)] =
+        (static_cast<double>(record.actual_counts[i]) - cell_.drives[i].offset_counts) /
+        cell_.drives[i].counts_per_rad();
+  }
+  return seen ? arm_.link_from_motor(motor) : arm_.start_rad();
+}
+
+void Stage::place(const CycleRecord& record, double rendered_s, std::vector<Pose>& links,
+                  std::vector<Pose>& objects) const {
+  tree_.place(joint_angles(record), links);
+  objects.assign(scene_.objects.size(), Pose::Identity());
+  for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+    const auto& motion = scene_.objects[i].motion;
+    if (!motion) continue;
+    if (motion->driven) {
+      objects[i].translation() = changes_.position_m(static_cast<std::int32_t>(i));
+    } else {
+      objects[i] = scenes::script_of(*motion).at(rendered_s);
+    }
+  }
+}
+
+}  // namespace proxarm::view

@@ -1,0 +1,28 @@
+// So many things a second and no more, with some to spare for the beginning: a token bucket.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+
+namespace proxarm::view {
+
+class Budget {
+ public:
+  using Clock = std::chrono::steady_clock;
+  Budget(double per_second, double most) noexcept : per_second_(per_second), most_(most), left_(most) {}
+
+  // False: there is none left at this time.
+  bool spend(Clock::time_point now = Clock::now()) noexcept {
+    left_ = std::min(most_, left_ + per_second_ * std::chrono::duration<double>(now - since_).count());
+    since_ = now;
+    if (left_ < 1.0) return false;
+    left_ -= 1.0;
+    return true;
+  }
+
+ private:
+  double per_second_, most_, left_;
+  Clock::time_point since_ = Clock::now();
+};
+
+}  // namespace proxarm::view

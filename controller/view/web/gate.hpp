@@ -1,0 +1,68 @@
+// Who may see the page, and who may speak to it: decided for each request from its head alone.
+//
+// A port on 127.0.0.1 can be reached by every program and every user of this machine, and by every web page that its
+// browsers have open. What a page from elsewhere can do, and what stops it here:
+//   it names a host of its own that resolves to 127.0.0.1 (DNS rebinding)   Host must be 127.0.0.1 with the port
+//   it sends forms, images, scripts or WebSockets across                    Origin and Sec-Fetch-Site must be ours,
+//                                                                           only GET and HEAD, no bodies
+//   it, or another program, guesses the address                             a secret of 256 bits in the URL; after the
+//                                                                           first load a cookie with another one
+// An origin that was allowed (--allow-origin) may open a WebSocket with one of the protocols for other tools, with the
+// secret in its URL; the page, its files and its own WebSocket are for our origin alone.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace proxarm::view {
+
+// The head of a request. Headers that may stand there once are lists, so that a second one is seen.
+struct RequestHead {
+  std::string method, target;
+  std::vector<std::string> hosts, origins, cookies;
+  std::string fetch_site;  // Sec-Fetch-Site; empty: the browser sends none
+  bool upgrade = false;    // to a WebSocket
+  bool has_body = false;
+};
+
+enum class Answer : std::uint8_t {
+  serve,       // the file at `path`
+  set_cookie,  // with the cookie, and on to the page without the secret in its URL
+  open_page,   // a WebSocket of the page
+  open_tool,   // a WebSocket of another tool
+  refuse,
+};
+
+struct Verdict {
+  Answer answer = Answer::refuse;
+  unsigned status = 403;    // of a refusal
+  const char* reason = "";  // for its text
+  std::string path;
+};
+
+class Gate {
+ public:
+  // Makes the secrets.
+  Gate(std::uint16_t port, std::vector<std::string> allowed_origins);
+
+  [[nodiscard]] Verdict judge(const RequestHead& head) const;
+  // http://127.0.0.1:PORT/?token=…
+  [[nodiscard]] std::string url() const;
+  // The value of Set-Cookie.
+  [[nodiscard]] std::string set_cookie() const;
+  [[nodiscard]] const std::string& token() const noexcept { return token_; }
+
+ private:
+  [[nodiscard]] bool is_known(const RequestHead& head) const;
+  [[nodiscard]] Verdict judge_socket(const RequestHead& head, const std::string& path, bool with_token) const;
+
+  std::string host_, origin_, token_, cookie_name_, cookie_;
+  std::vector<std::string> allowed_;
+};
+
+// Whether `text` is an origin as browsers send it: scheme://host, with a port where it isn't the scheme's own.
+bool is_origin(std::string_view text) noexcept;
+
+}  // namespace proxarm::view

@@ -1,0 +1,65 @@
+// What the connections of a WebServer share. Private to this room.
+#pragma once
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <list>
+#include <memory>
+#include <string>
+
+#include "controller/view/web/budget.hpp"
+#include "controller/view/web/gate.hpp"
+#include "controller/view/web/web_server.hpp"
+
+namespace proxarm::view {
+
+// Reasons stand in web_server.hpp.
+inline constexpr std::size_t most_connections = 64, most_sockets = 16;
+inline constexpr std::size_t longest_head = 8192, longest_message = 1024;
+inline constexpr auto patience =
+    std::chrono::seconds(5);  // with a head that comes, and with a reader who takes nothing
+inline constexpr auto idle_time = std::chrono::seconds(20);  // between two requests on one connection
+
+// A connection as the list of all of them has it.
+class Connection {
+ public:
+  Connection() = default;
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+  virtual ~Connection() = default;
+  virtual void close() = 0;
+  // It has shown the secret or the cookie.
+  bool known = false;
+};
+
+struct ServerShared {
+  ServerShared(boost::asio::io_context& c, std::uint16_t port, const ServerConfig& config)
+      : context(c), gate(port, config.allowed_origins) {}
+
+  boost::asio::io_context& context;
+  Gate gate;
+  Assets assets;
+  WebServer::Finder finder;
+  Channel* page = nullptr;
+  Channel* tools = nullptr;
+  std::list<std::weak_ptr<Connection>> connections;  // the oldest first
+  std::size_t sockets = 0;
+  Budget requests{300.0, 600.0};  // of all connections together
+
+  // Makes room for one more where there are too many. False: all of them show something.
+  bool make_room();
+};
+using SharedPtr = std::shared_ptr<ServerShared>;
+
+using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+
+// Reads requests and answers them until the other side or the server has had enough.
+void serve_http(SharedPtr shared, boost::asio::ip::tcp::socket socket);
+
+// Takes over a connection whose request asked for a WebSocket of `channel`.
+void serve_socket(SharedPtr shared, boost::beast::tcp_stream stream, Request request, Channel& channel);
+
+}  // namespace proxarm::view

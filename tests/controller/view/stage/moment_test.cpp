@@ -1,0 +1,110 @@
+#include "controller/view/stage/moment.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "controller/view/stage/words.hpp"
+
+namespace proxarm::view {
+namespace {
+
+double number_at(const std::string& bytes, std::size_t index) {
+  double number = 0.0;
+  std::memcpy(&number, bytes.data() + 8 * index, sizeof number);
+  return number;
+}
+
+std::size_t place_of(const std::string& field) {
+  const auto& names = field_names();
+  return static_cast<std::size_t>(std::find(names.begin(), names.end(), field) - names.begin());
+}
+
+TEST(Moment, IsOnTheWireWhereItsNamesSay) {
+  Moment moment;
+  moment.record.time_ns = 2'500'000'000;
+  moment.record.proxy_W_m = {0.1, 0.2, 0.3};
+  moment.record.flags = 1u << 25;
+  moment.record.proxy_mass_kg = 3.75;
+  moment.handle_mass_kg = 0.25;
+  models::Pose X = models::Pose::Identity();
+  X.translation() = models::Vec3(1, 2, 3);
+  const std::string bytes = encode_moment(moment, std::vector{X, X}, std::vector{X});
+  ASSERT_EQ(bytes.size(), 8 * (1 + field_names().size()) + 4 * 7 * 3);
+  EXPECT_EQ(number_at(bytes, 0), kind_moment);
+  EXPECT_EQ(number_at(bytes, 1 + place_of("time_s")), 2.5);
+  EXPECT_EQ(number_at(bytes, 1 + place_of("proxy_y")), 0.2);
+  EXPECT_EQ(number_at(bytes, 1 + place_of("flags")), 33554432.0);
+  EXPECT_EQ(number_at(bytes, 1 + place_of("mass_kg")), 4.0);
+  std::array<float, 7> pose{};
+  std::memcpy(pose.data(), bytes.data() + 8 * (1 + field_names().size()), sizeof pose);
+  EXPECT_EQ(pose, (std::array<float, 7>{1, 2, 3, 0, 0, 0, 1}));
+}
+
+TEST(Moment, KeepsThePeaksOfAllCyclesSinceTheLast) {
+  MomentBuilder builder(0.0);
+  EXPECT_TRUE(builder.empty());
+  controller::CycleRecord record;
+  for (const double force : {1.0, 9.0, 2.0}) {
+    record.force_W_N = {0.0, force, 0.0};
+    record.compute_ns = static_cast<std::int64_t>(1000 * force);
+    record.set(controller::RecordFlag::limit_speed, force > 8.0);
+    record.set(controller::RecordFlag::overrun, force > 8.0);
+    builder.add(record, 0.0);
+  }
+  Moment moment = builder.take();
+  EXPECT_EQ(moment.hand_peak_N, 9.0);
+  EXPECT_EQ(moment.compute_peak_us, 9.0);
+  EXPECT_EQ(moment.record.force_W_N[1], 2.0);
+  EXPECT_NE(moment.flags_since & static_cast<std::uint32_t>(controller::RecordFlag::limit_speed), 0U);
+  EXPECT_EQ(moment.overruns, 1U);
+  builder.add(record, 0.0);
+  moment = builder.take();
+  EXPECT_EQ(moment.hand_peak_N, 2.0);
+  EXPECT_EQ(moment.flags_since & static_cast<std::uint32_t>(controller::RecordFlag::limit_speed), 0U);
+  EXPECT_EQ(moment.overruns, 1U);  // of the whole session
+}
+
+TEST(Moment, AHistorySaysHowManyRowsItHas) {
+  std::vector<double> rows;
+  append_fields(rows, {});
+  append_fields(rows, {});
+  const std::string bytes = encode_history(rows);
+  EXPECT_EQ(number_at(bytes, 0), kind_history);
+  EXPECT_EQ(number_at(bytes, 1), 2.0);
+  EXPECT_EQ(bytes.size(), 8 * (2 + 2 * field_names().size()));
+}
+
+TEST(Words, ThereAreSomeForEveryFlagAndPhase) {
+  for (std::uint32_t bit = 0; bit <= 25; ++bit) {
+    if (bit == 9) continue;  // `truth`: not of the session
+    EXPECT_EQ(std::count_if(flag_words().begin(), flag_words().end(),
+                            [&](const FlagWords& f) { return static_cast<std::uint32_t>(f.flag) == 1u << bit; }),
+              1)
+        << bit;
+  }
+  for (std::size_t i = 0; i < controller::phase_count; ++i) {
+    EXPECT_STRNE(phase_words(static_cast<controller::Phase>(i)), "?");
+  }
+}
+
+TEST(Words, AFaultHasItsPlaceAndFigures) {
+  description::Cell cell;
+  cell.drives.resize(3);
+  cell.drives[2].joint = "axis_3";
+  controller::CycleRecord record;
+  EXPECT_EQ(fault_text(record, cell), "");
+  record.fault = controller::Fault::drive_silent;
+  record.fault_where = 2;
+  record.fault_value = 4.0;
+  record.fault_limit = 3.0;
+  record.fault_cycle = 77;
+  const std::string text = fault_text(record, cell);
+  EXPECT_NE(text.find("drive_silent (drive of axis_3)"), std::string::npos) << text;
+  EXPECT_NE(text.find("4 cycles, limit 3"), std::string::npos) << text;
+  EXPECT_NE(text.find("cycle 77"), std::string::npos) << text;
+}
+
+}  // namespace
+}  // namespace proxarm::view
