@@ -167,6 +167,26 @@ void leave_out(CLI::App& app, std::initializer_list<const char*> options) {
   for (const char* option : options) app.remove_option(app.get_option(option));
 }
 
+void add_view_options(CLI::App& app, RunOptions& options) {
+  app.add_flag("--view", options.view,
+               "show the session in a browser, at an address on this machine that is printed; virtual time keeps pace "
+               "with the clock then, and what is shown stays until Ctrl-C");
+  app.add_flag("--view-control", options.view_control,
+               "the same, and let it be changed there, as `proxarm set` and `proxarm hold` do");
+  app.add_option(
+         "--view-port",
+         whole_number("--view-port",
+                      [&](std::uint64_t port) {
+                        if (port < 1024 || port > 65535) {
+                          throw description::SetupError(
+                              {.key = "--view-port", .found = std::to_string(port), .expected = "1024 to 65535"});
+                        }
+                        options.view_port = static_cast<std::uint16_t>(port);
+                      }),
+         "the port of the view on 127.0.0.1 (default: any that is free)")
+      ->type_name("PORT");
+}
+
 void add_run_options(CLI::App& app, RunOptions& options) {
   add_session_options(app, options);
   add_fault_option(app, options);
@@ -218,6 +238,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
   app.add_flag_callback(
       "--no-plot", [&] { options.plot = false; }, "draw no plot");
+  add_view_options(app, options);
   app.add_flag("--json", options.json, "print the summary as one JSON object");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");

@@ -1,3 +1,5 @@
+#include <memory>
+
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
@@ -5,6 +7,7 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_run.hpp"
 #include "controller/command_line/sessions/simulated_run.hpp"
+#include "controller/command_line/sessions/view_process.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -34,7 +37,33 @@ void refuse_for_interfaces(const RunOptions& options) {
 
 }  // namespace
 
-int run_command(const RunOptions& options) {
+namespace {
+
+// What the view asks for of the other options.
+RunOptions with_view(RunOptions options) {
+  options.view = options.view || options.view_control;
+  if (options.view_control && options.control.empty()) options.control = view_control_path();
+  return options;
+}
+
+void refuse_view(const PreparedSession& session, const RunOptions& options) {
+  if (options.view_control && session.impedance()) {
+    throw description::SetupError({.key = "--view-control",
+                                   .found = "the impedance type",
+                                   .expected = "--scheme admittance, or --view, which only looks"});
+  }
+  if (options.view) return;
+  if (options.view_port != 0 || !options.allowed_origins.empty()) {
+    throw description::SetupError({.key = options.view_port != 0 ? "--view-port" : "--allow-origin",
+                                   .found = "no view",
+                                   .expected = "--view with it"});
+  }
+}
+
+}  // namespace
+
+int run_command(const RunOptions& given) {
+  const RunOptions options = with_view(given);
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
   require_usable_start(session);
@@ -43,10 +72,16 @@ int run_command(const RunOptions& options) {
   if (options.bus.simulated()) {
     require_carried(session);
   }
+  refuse_view(session, options);
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);
-  if (options.bus.simulated()) return SimulatedRun(session, options, keeper).run();
-  return run_on_interfaces(session, options, keeper);
+  std::unique_ptr<ViewProcess> view;
+  if (options.view) view = std::make_unique<ViewProcess>(session, options, keeper.box().descriptor());
+  const int status = options.bus.simulated() ? SimulatedRun(session, options, keeper).run()
+                                             : run_on_interfaces(session, options, keeper);
+  if (options.view_control && given.control.empty()) remove_view_control();
+  if (view) view->show_end(status);
+  return status;
 }
 
 }  // namespace proxarm::command_line

@@ -67,8 +67,12 @@ struct RunOptions {
   bool plot = true;
   bool json = false;
   bool force_unstable = false;
-  std::vector<sim::DeviceFault> faults;    // of the simulated devices
-  std::vector<sim::PressedSpan> enabling;  // of the simulated enabling switch
+  bool view = false;                         // show the session in a browser
+  bool view_control = false;                 // and let it be changed there
+  std::uint16_t view_port = 0;               // 0: any that is free
+  std::vector<std::string> allowed_origins;  // of web pages that may look, too
+  std::vector<sim::DeviceFault> faults;      // of the simulated devices
+  std::vector<sim::PressedSpan> enabling;    // of the simulated enabling switch
 };
 
 }  // namespace proxarm::command_line

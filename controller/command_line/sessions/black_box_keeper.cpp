@@ -104,7 +104,8 @@ namespace {
 BlackBoxKeeper::BlackBoxKeeper(const PreparedSession& session, const RunOptions& options)
     : session_(session),
       folder_(fs::absolute(folder_for(options))),
-      box_(shortest_period_s(session, options), frames_per_cycle(session.cell)) {
+      box_(shortest_period_s(session, options), frames_per_cycle(session.cell),
+           options.view ? controller::BlackBox::Memory::by_descriptor : controller::BlackBox::Memory::forked) {
   if (!options.black_box_dir.empty()) controller::SessionWriter(folder_, {}, false);
   void* const memory = mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) refuse_start("the memory");

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <thread>
 
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
@@ -18,6 +19,26 @@ namespace {
 using controller::Cycle;
 using controller::CycleRecord;
 using SteadyClock = std::chrono::steady_clock;
+
+// Virtual time at the pace of the clock on the wall, for somebody who looks: each cycle waits until it is due. It is
+// never late, so nothing is left out, and what is commanded is the same to the bit as without.
+class Spectator {
+ public:
+  explicit Spectator(bool looks) : looks_(looks) {}
+  void wait_for(std::int64_t t_k_ns) {
+    if (!looks_) return;
+    if (!first_ns_) {
+      first_ns_ = t_k_ns;
+      begun_ = SteadyClock::now();
+    }
+    std::this_thread::sleep_until(begun_ + std::chrono::nanoseconds(t_k_ns - *first_ns_));
+  }
+
+ private:
+  bool looks_;
+  std::optional<std::int64_t> first_ns_;
+  SteadyClock::time_point begun_;
+};
 
 // For the last frames to get onto the wire and to the drives: the longest queue of a cycle is through in a millisecond.
 constexpr std::int64_t last_words_ns = 5'000'000;
@@ -81,7 +102,9 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::LatencyHistogram wake_up;
   std::optional<std::int64_t> first_cycle_ns;
+  Spectator spectator(options_.view && !options_.pace);
   const controller::SessionHooks hooks{[&, this](std::int64_t t_k_ns) {
+                                         spectator.wait_for(t_k_ns);
                                          if (!first_cycle_ns) first_cycle_ns = t_k_ns;
                                          wake_up.add(network_.woken_late_ns());
                                          truth_ = far_end_.truth();

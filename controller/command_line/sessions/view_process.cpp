@@ -1,0 +1,199 @@
+#include "controller/command_line/sessions/view_process.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "controller/command_line/live/control_socket.hpp"
+#include "controller/command_line/live/signal_watch.hpp"
+#include "models/base/setup_error.hpp"
+
+extern char** environ;
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using description::SetupError;
+using nlohmann::json;
+
+constexpr int answer_within_ms = 30'000;  // a mesh without a cache may take a while
+// Where the process finds its descriptors.
+constexpr int memory_there = 3, line_there = 4;
+
+[[noreturn]] void refuse(const std::string& found, const std::string& expected, const std::string& advice = "") {
+  throw SetupError({.key = "--view", .found = found, .expected = expected, .advice = advice});
+}
+
+// The process reads the files itself, a second time.
+std::string readable_twice(const fs::path& file, const char* option) {
+  std::error_code error;
+  if (!file.empty() && !fs::is_regular_file(file, error)) {
+    throw SetupError({.key = option,
+                      .found = description::in_quotes(file.string()) + ", which can be read only once",
+                      .expected = "a file, where --view is given",
+                      .advice = "write it to a file first"});
+  }
+  return file.empty() ? "" : fs::absolute(file).lexically_normal().string();
+}
+
+json hello_of(const PreparedSession& session, const RunOptions& options) {
+  const controller::SessionSettings& settings = session.settings;
+  fs::path control;
+  if (options.view_control) control = options.control == "default" ? default_control_path() : options.control;
+  return {{"cell", readable_twice(session.cell.file, "cell")},
+          {"scene", readable_twice(session.scene.file, "--scene")},
+          {"control", control.empty() ? "" : fs::absolute(control).string()},
+          {"port", options.view_port},
+          {"allowed_origins", options.allowed_origins},
+          {"settings",
+           {{"period_s", settings.period_s},
+            {"mass_kg", settings.mass_kg},
+            {"damping_Ns_per_m", settings.damping_Ns_per_m},
+            {"spring_N_per_m", settings.spring_N_per_m},
+            {"impedance", session.impedance()},
+            {"order", settings.order}}}};
+}
+
+// False where nobody reads any more.
+bool send_line(int line, const json& value) {
+  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  return send(line, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
+}
+
+// Up to its end; empty where nothing comes in time.
+std::string read_line(int line) {
+  std::string text;
+  for (char letter = 0; letter != '\n'; text += letter) {
+    pollfd ready{line, POLLIN, 0};
+    const int polled = poll(&ready, 1, answer_within_ms);
+    if (polled < 0 && errno == EINTR) continue;
+    if (polled <= 0 || read(line, &letter, 1) != 1) return "";
+  }
+  return text;
+}
+
+bool has_desktop() {
+  const auto set = [](const char* name) {
+    const char* const value = std::getenv(name);
+    return value != nullptr && *value != '\0';
+  };
+  return isatty(STDERR_FILENO) == 1 && (set("DISPLAY") || set("WAYLAND_DISPLAY"));
+}
+
+}  // namespace
+
+fs::path view_control_path() { return default_control_path().parent_path() / ("view-" + std::to_string(getpid())); }
+
+void remove_view_control() {
+  unlink(view_control_path().c_str());
+  unlink((view_control_path().string() + ".lock").c_str());
+}
+
+ViewProcess::ViewProcess(const PreparedSession& session, const RunOptions& options, int memory) {
+  start(memory);
+  try {
+    greet(session, options);
+  } catch (...) {
+    close(line_);
+    waitpid(child_, nullptr, 0);
+    throw;
+  }
+  std::fprintf(stderr, "proxarm: the view of this session: %s\n", url_.c_str());
+  if (!options.json && has_desktop()) open_browser();
+}
+
+void ViewProcess::start(int memory) {
+  const fs::path program = fs::read_symlink("/proc/self/exe").replace_filename("proxarm-view");
+  std::error_code error;
+  if (!fs::exists(program, error)) {
+    refuse("no program " + program.string(), "it beside proxarm", "in a source tree `./dev run --view` builds it");
+  }
+  std::array<int, 2> ends{};
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    refuse(std::strerror(errno), "a free file descriptor", "see ulimit -n");
+  }
+  // Above where they are wanted, so that none is overwritten before it is copied.
+  const int high_memory = fcntl(memory, F_DUPFD_CLOEXEC, 10), high_line = fcntl(ends[1], F_DUPFD_CLOEXEC, 10);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, high_memory, memory_there);
+  posix_spawn_file_actions_adddup2(&actions, high_line, line_there);
+  // Standard output is the session's own: what reads it to its end must not wait for the view.
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  std::string name = program.string(), mode = "live", first = std::to_string(memory_there),
+              second = std::to_string(line_there);
+  std::array<char*, 5> words{name.data(), mode.data(), first.data(), second.data(), nullptr};
+  const int failed = posix_spawn(&child_, name.c_str(), &actions, nullptr, words.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  for (const int end : {high_memory, high_line, ends[1]}) close(end);
+  line_ = ends[0];
+  if (failed != 0) refuse(name + ": " + std::strerror(failed), "a program that can be started");
+}
+
+void ViewProcess::greet(const PreparedSession& session, const RunOptions& options) {
+  send_line(line_, hello_of(session, options));
+  const json answer = json::parse(read_line(line_), nullptr, false);
+  if (answer.is_object() && answer.contains("url")) {
+    url_ = answer["url"].get<std::string>();
+    return;
+  }
+  if (answer.is_object() && answer.contains("error")) throw SetupError({.message = answer["error"].get<std::string>()});
+  refuse("no answer of the view", "its address");
+}
+
+// By a file that only its owner may read: what is on a command line, every user of the machine may see.
+void ViewProcess::open_browser() const {
+  const fs::path folder = default_control_path().parent_path();
+  mkdir(folder.c_str(), 0700);
+  const fs::path file = folder / ("view-" + std::to_string(getpid()) + ".html");
+  const int made = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (made < 0) return;
+  const std::string text = "<!doctype html><meta http-equiv=\"refresh\" content=\"0;url=" + url_ + "\">\n";
+  const bool whole = write(made, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  close(made);
+  std::string program = "xdg-open", name = file.string();
+  std::array<char*, 3> words{program.data(), name.data(), nullptr};
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
+  }
+  pid_t opener = 0;
+  // Where there is none, the URL has been printed.
+  if (whole) (void)posix_spawnp(&opener, program.c_str(), &actions, nullptr, words.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+}
+
+void ViewProcess::show_end(int exit_status) {
+  if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
+  std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
+  std::atomic<bool> asked{false};
+  SignalWatch signals([&] { asked.store(true); });
+  while (!asked.load() && waitpid(child_, nullptr, WNOHANG) == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+ViewProcess::~ViewProcess() {
+  close(line_);
+  if (child_ > 0) waitpid(child_, nullptr, 0);
+  unlink((default_control_path().parent_path() / ("view-" + std::to_string(getpid()) + ".html")).c_str());
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,42 @@
+// The session's side of the view: starts the process that shows it, tells it what there is to see, and how it ended.
+//
+// That process (command_line/view/live_view.hpp) is another program, so nothing of it is in this one's memory. It maps
+// the black box's memory for reading, which the cycle writes anyway: the cycle does nothing for it. Whether it lives or
+// dies changes nothing here.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+
+namespace proxarm::command_line {
+
+class ViewProcess {
+ public:
+  // `memory`: descriptor of the black box. Starts the process and prints the URL on standard error. No other thread may
+  // run yet. Throws SetupError where it can't be shown.
+  ViewProcess(const PreparedSession& session, const RunOptions& options, int memory);
+  ViewProcess(const ViewProcess&) = delete;
+  ViewProcess& operator=(const ViewProcess&) = delete;
+  ~ViewProcess();  // and what it shows is gone
+
+  // The session is over: tells whoever looks, and lets them look until a signal comes or the process is gone.
+  void show_end(int exit_status);
+
+ private:
+  void start(int memory);
+  void greet(const PreparedSession& session, const RunOptions& options);
+  void open_browser() const;
+
+  std::string url_;
+  int line_ = -1;
+  int child_ = -1;
+};
+
+// The socket that --view-control has where there is no --control: of this session alone.
+std::filesystem::path view_control_path();
+// And what is left of it afterwards.
+void remove_view_control();
+
+}  // namespace proxarm::command_line

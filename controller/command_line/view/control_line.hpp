@@ -1,0 +1,38 @@
+// The way from the page to a session: its control socket, as `proxarm set` uses it. Answers come in the server's
+// thread.
+#pragma once
+
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+
+namespace proxarm::command_line {
+
+class ControlLine {
+ public:
+  using Answered = std::function<void(const std::string& answer)>;
+
+  // `socket` empty: nothing may be asked. `server` must outlive it.
+  ControlLine(std::filesystem::path socket, boost::asio::io_context& server);
+  ControlLine(const ControlLine&) = delete;
+  ControlLine& operator=(const ControlLine&) = delete;
+  ~ControlLine();
+
+  [[nodiscard]] bool open() const noexcept { return !socket_.empty(); }
+  // One after the other, in a thread of its own, since a session may take its time; `answered` gets "ok: …" or
+  // "refused: …". Of more than eight that wait the last is refused.
+  void ask(std::string line, Answered answered);
+
+ private:
+  std::filesystem::path socket_;
+  boost::asio::io_context& server_;
+  boost::asio::io_context asking_{1};
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_;
+  std::size_t waiting_ = 0;  // the server's thread's
+  std::thread thread_;
+};
+
+}  // namespace proxarm::command_line

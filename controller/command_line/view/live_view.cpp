@@ -1,0 +1,192 @@
+#include "controller/command_line/view/live_view.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/streambuf.hpp>
+#include <boost/asio/write.hpp>
+#include <chrono>
+#include <istream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "controller/command_line/live/signal_watch.hpp"
+#include "controller/command_line/view/page_channel.hpp"
+#include "controller/command_line/view/page_files.hpp"
+#include "controller/view/sources/live_source.hpp"
+#include "controller/view/stage/words.hpp"
+#include "controller/view/web/gate.hpp"
+#include "models/base/setup_error.hpp"
+#include "scenes/format/scene_file.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using boost::asio::local::stream_protocol;
+using boost::system::error_code;
+using nlohmann::json;
+
+constexpr auto between_moments = std::chrono::microseconds(16'667);  // 60 a second
+
+view::Stage stage_of(const json& hello) {
+  const json& settings = hello.at("settings");
+  return {description::load_cell(hello.at("cell").get<std::string>()),
+          scenes::load_scene(hello.at("scene").get<std::string>()),
+          {.period_s = settings.at("period_s"),
+           .mass_kg = settings.at("mass_kg"),
+           .damping_Ns_per_m = settings.at("damping_Ns_per_m"),
+           .spring_N_per_m = settings.at("spring_N_per_m"),
+           .impedance = settings.at("impedance"),
+           .order = settings.at("order")}};
+}
+
+view::ServerConfig server_of(const json& hello) {
+  view::ServerConfig config{hello.at("port"), hello.at("allowed_origins")};
+  for (const std::string& origin : config.allowed_origins) {
+    if (view::is_origin(origin)) continue;
+    throw description::SetupError({.key = "--allow-origin",
+                                   .found = description::in_quotes(origin),
+                                   .expected = "an origin as browsers send it, such as https://app.example.org"});
+  }
+  return config;
+}
+
+class LiveView {
+ public:
+  LiveView(boost::asio::io_context& context, stream_protocol::socket& session, const json& hello, int memory)
+      : stage_(stage_of(hello)),
+        source_(memory, stage_),
+        control_(hello.at("control").get<std::string>(), context),
+        page_(control_, [this](view::Socket& socket) { welcome(socket); }),
+        server_(
+            context, server_of(hello), page_files(), [this](const std::string& path) { return mesh(path); }, page_,
+            nullptr),
+        timer_(context),
+        session_(session),
+        context_(context) {}
+
+  [[nodiscard]] std::string url() const { return server_.url(); }
+
+  void run() {
+    listen();
+    timer_.expires_after(between_moments);
+    show();
+    context_.run();
+  }
+
+ private:
+  void welcome(view::Socket& socket) {
+    json stage = json::parse(stage_.describe());
+    stage["mode"] = "live";
+    stage["control"] = control_.open();
+    socket.say(text_of({{"stage", stage}}), false);
+    socket.say(std::make_shared<const std::string>(view::encode_history(source_.history())), true);
+    socket.say(text_of({{"status", status_}}), false);
+    if (last_) socket.show(std::make_shared<const std::string>(source_.encode(*last_)));
+  }
+
+  void show() {
+    timer_.async_wait([this](const error_code& error) {
+      if (error) return;
+      if (source_.advance()) {
+        last_ = source_.take();
+        tell_fault(view::fault_text(last_->record, stage_.cell()));
+        if (!page_.empty()) page_.show(std::make_shared<const std::string>(source_.encode(*last_)));
+      }
+      // A machine that is too slow for 60 a second has fewer, not a backlog.
+      timer_.expires_at(std::max(timer_.expiry() + between_moments, std::chrono::steady_clock::now()));
+      show();
+    });
+  }
+
+  void tell_fault(const std::string& text) {
+    if (status_.at("fault") == text) return;
+    status_["fault"] = text;
+    page_.say(text_of({{"status", status_}}));
+  }
+
+  // The session's later lines, until it falls silent.
+  void listen() {
+    boost::asio::async_read_until(session_, lines_, '\n', [this](const error_code& error, std::size_t) {
+      if (error) {
+        status_["ended"] = "the session's program has ended";
+        page_.say(text_of({{"status", status_}}));
+        server_.stop();
+        context_.stop();
+        return;
+      }
+      std::istream in(&lines_);
+      std::string line;
+      std::getline(in, line);
+      const json said = json::parse(line, nullptr, false);
+      if (said.is_object()) status_.update(said);
+      page_.say(text_of({{"status", status_}}));
+      listen();
+    });
+  }
+
+  view::AssetPtr mesh(const std::string& path) {
+    int link = -1;
+    unsigned index = 0;
+    if (std::sscanf(path.c_str(), "/mesh/object/%3u", &index) != 1 &&
+        std::sscanf(path.c_str(), "/mesh/link/%3d/%3u", &link, &index) != 2) {
+      return nullptr;
+    }
+    try {
+      return std::make_shared<const view::Asset>(
+          view::Asset{"application/octet-stream", stage_.mesh_bytes(link, index), {}});
+    } catch (const description::SetupError&) {
+      return nullptr;  // the page draws what else there is
+    }
+  }
+
+  view::Stage stage_;
+  view::LiveSource source_;
+  ControlLine control_;
+  PageChannel page_;
+  view::WebServer server_;
+  boost::asio::steady_timer timer_;
+  stream_protocol::socket& session_;
+  boost::asio::io_context& context_;
+  boost::asio::streambuf lines_{65536};
+  json status_{{"fault", ""}, {"ended", ""}};
+  std::optional<view::Moment> last_;
+};
+
+std::string first_line(stream_protocol::socket& session) {
+  boost::asio::streambuf text(65536);
+  boost::asio::read_until(session, text, '\n');
+  std::istream in(&text);
+  std::string line;
+  std::getline(in, line);
+  return line;
+}
+
+void reply(stream_protocol::socket& session, const json& answer) {
+  boost::asio::write(session, boost::asio::buffer(*text_of(answer) + "\n"));
+}
+
+}  // namespace
+
+int live_view(int memory, int session) {
+  // Ctrl-C is the session's: it says when this is over. And where processors are scarce, the session goes first.
+  ignore_ending_signals();
+  (void)setpriority(PRIO_PROCESS, 0, 5);
+  boost::asio::io_context context{1};
+  stream_protocol::socket line(context, stream_protocol(), session);
+  std::optional<LiveView> shown;
+  try {
+    shown.emplace(context, line, json::parse(first_line(line)), memory);
+    reply(line, {{"url", shown->url()}});
+  } catch (const std::exception& error) {
+    reply(line, {{"error", error.what()}});
+    return 2;
+  }
+  shown->run();
+  return 0;
+}
+
+}  // namespace proxarm::command_line

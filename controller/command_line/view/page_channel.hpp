@@ -1,0 +1,43 @@
+// What the page and the process say to each other over its WebSocket.
+//
+// To the page: text, JSON with one key: "stage" (view/stage/stage.hpp, and "mode" and "control"), "status", "answer";
+// binary, moments and histories (view/stage/moment.hpp). From the page: JSON {"ask": LINE, "id": N}, a line for the
+// session's control socket, answered by {"answer": {"id": N, "text": …}}.
+#pragma once
+
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "controller/command_line/view/control_line.hpp"
+#include "controller/view/web/web_server.hpp"
+
+namespace proxarm::command_line {
+
+class PageChannel final : public view::Channel {
+ public:
+  // `welcome` gives what a page that opens is told first.
+  using Welcome = std::function<void(view::Socket& socket)>;
+
+  PageChannel(ControlLine& control, Welcome welcome);
+
+  void opened(const view::SocketPtr& socket) override;
+  void received(const view::SocketPtr& socket, std::string_view message, bool binary) override;
+  void closed(const view::SocketPtr& socket) override;
+  [[nodiscard]] std::string choose(const std::vector<std::string>& offered) const override;
+
+  [[nodiscard]] bool empty() const noexcept { return sockets_.empty(); }
+  void show(const view::Bytes& moment);
+  void say(const view::Bytes& text);
+
+ private:
+  ControlLine& control_;
+  Welcome welcome_;
+  std::vector<view::SocketPtr> sockets_;
+};
+
+// A message of JSON.
+view::Bytes text_of(const nlohmann::json& value);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,83 @@
+"""A headless Chromium for the tests of the page, driven by Debian's chromium-driver through python3-selenium."""
+import os
+import pathlib
+import tempfile
+import time
+
+try:
+    from selenium import webdriver
+    from selenium.webdriver.chrome.options import Options
+    from selenium.webdriver.chrome.service import Service
+except ImportError:
+    webdriver = None
+
+CHROMIUM, DRIVER = pathlib.Path("/usr/bin/chromium"), pathlib.Path("/usr/bin/chromedriver")
+PATIENCE_S = 40
+# Where the pictures of a test run are kept for people to look at.
+PICTURES = pathlib.Path(os.environ.get("PROXARM_PICTURES") or pathlib.Path(tempfile.gettempdir()) / "proxarm-pictures")
+
+
+def why_not():
+    """The reason why there is no browser here, or None."""
+    if webdriver is None:
+        return "no python3-selenium"
+    missing = [str(path) for path in (CHROMIUM, DRIVER) if not path.exists()]
+    return f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)" if missing else None
+
+
+class Browser:
+    def __init__(self, width=1280, height=720, dark=False):
+        options = Options()
+        options.binary_location = str(CHROMIUM)
+        self.profile = tempfile.TemporaryDirectory(prefix="proxarm-chromium-")
+        # Drawn by software, as on a machine without a GPU; nothing of the browser's own goes to the network.
+        for word in ("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader-webgl",
+                     "--enable-unsafe-swiftshader",
+                     "--ignore-gpu-blocklist", "--disable-quic", "--no-first-run", "--disable-background-networking",
+                     "--disable-component-update", "--disable-sync", "--hide-scrollbars", "--disable-dev-shm-usage",
+                     "--force-device-scale-factor=1", f"--user-data-dir={self.profile.name}"):
+            options.add_argument(word)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.driver = webdriver.Chrome(service=Service(str(DRIVER)), options=options)
+        self.command("Emulation.setDeviceMetricsOverride",
+                     dict(width=width, height=height, deviceScaleFactor=1, mobile=width < 600))
+        self.command("Emulation.setEmulatedMedia",
+                     dict(features=[dict(name="prefers-color-scheme", value="dark" if dark else "light")]))
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.driver.quit()
+        self.profile.cleanup()
+
+    def command(self, name, values):
+        return self.driver.execute_cdp_cmd(name, values)
+
+    def open(self, url):
+        self.driver.get(url)
+
+    def run(self, script, *arguments):
+        return self.driver.execute_script(script, *arguments)
+
+    def until(self, condition, what, patience_s=PATIENCE_S):
+        """Waits for a condition in JavaScript; returns its value."""
+        end = time.monotonic() + patience_s
+        while time.monotonic() < end:
+            value = self.run(f"return {condition}")
+            if value:
+                return value
+            time.sleep(0.02)
+        raise AssertionError(f"not within {patience_s} s: {what}; console: {self.complaints()}")
+
+    def complaints(self):
+        """What the console has of errors and warnings, but for those that the browser gives for being slow itself."""
+        return [entry["message"] for entry in self.driver.get_log("browser")
+                if entry["level"] in ("SEVERE", "WARNING") and "GPU stall" not in entry["message"]
+                and "GroupMarkerNotSet" not in entry["message"] and "Automatic fallback" not in entry["message"]]
+
+    def picture(self, name):
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        path = PICTURES / f"{name}.png"
+        self.driver.get_screenshot_as_file(str(path))
+        return path
