@@ -288,7 +288,9 @@ class Commands {
     add_orders();
     add_files();
     add_judges();
-    app_.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");  // become_study()
+    // Both are programs of their own: become().
+    app_.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
+    app_.add_subcommand("view", "a recorded session or a black box in the browser");
   }
 
   std::function<int()> chosen;
@@ -442,14 +444,15 @@ int run(int argc, char** argv) {
   return commands.chosen();
 }
 
-// The studies are a program of their own, which a session doesn't wait for when it is built.
-int become_study(std::vector<char*> words) {
-  const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("proxarm-study");
+// A program of its own beside this one, which a session doesn't wait for when it is built, and doesn't have in its
+// memory. Not there: `missing` says what it is for, `builder` what builds it.
+int become(const char* name, std::vector<char*> words, const char* missing, const char* builder) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").replace_filename(name);
   words.push_back(nullptr);
   execv(program.c_str(), words.data() + 1);
-  throw description::SetupError({.found = "no program " + program + ", which measures",
+  throw description::SetupError({.found = "no program " + program + ", which " + missing,
                                  .expected = "it beside proxarm",
-                                 .advice = "in a source tree `./dev study` builds it"});
+                                 .advice = std::string("in a source tree `") + builder + "` builds it"});
 }
 
 }  // namespace
@@ -462,7 +465,9 @@ int main(int argc, char** argv) {
     words.push_back(help.data());
   }
   return command_line::run_program([&] {
-    if (words.size() > 1 && std::string(words[1]) == "study") return become_study(words);
+    const std::string command = words.size() > 1 ? words[1] : "";
+    if (command == "study") return become("proxarm-study", words, "measures", "./dev study");
+    if (command == "view") return become("proxarm-view", words, "shows", "./dev view");
     return run(static_cast<int>(words.size()), words.data());
   });
 }

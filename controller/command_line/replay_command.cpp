@@ -21,16 +21,6 @@ using description::SetupError;
 
 constexpr int other_setpoints = 1;
 
-// Of the record, and nowhere else.
-fs::path file_of(const fs::path& folder, const char* name) {
-  const fs::path relative(name);
-  const bool leaves = relative.is_absolute() || relative.empty() ||
-                      std::find(relative.begin(), relative.end(), fs::path("..")) != relative.end();
-  if (!leaves) return folder / controller::replay_folder / "files" / relative;
-  throw SetupError(
-      {.file = folder.string(), .found = description::in_quotes(name), .expected = "a file of the record"});
-}
-
 // A Modbus line whose answers come out of the record.
 class NoLine final : public fieldbus::ModbusClient {
  public:
@@ -49,9 +39,9 @@ class Replay {
  public:
   explicit Replay(const fs::path& folder)
       : log_(folder / controller::replay_folder / "cycles.bin"),
-        cell_(description::load_cell(file_of(folder, log_.head().cell.data()))),
+        cell_(description::load_cell(controller::recorded_file(folder, log_.head().cell.data()))),
         sensor_(description::load_sensor(cell_.sensor.description)),
-        scene_(scenes::compile(scenes::load_scene(file_of(folder, log_.head().scene.data())))),
+        scene_(scenes::compile(scenes::load_scene(controller::recorded_file(folder, log_.head().scene.data())))),
         network_(log_.head()) {
     const controller::ReplayHead& head = log_.head();
     if (cell_.drives.size() != head.axes || cell_.buses.size() > controller::max_buses) {

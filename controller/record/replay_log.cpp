@@ -83,6 +83,15 @@ fs::path copy_files(const std::vector<fs::path>& files, const fs::path& folder) 
   return common;
 }
 
+fs::path recorded_file(const fs::path& folder, const char* name) {
+  const fs::path relative(name);
+  const bool leaves = relative.is_absolute() || relative.empty() ||
+                      std::find(relative.begin(), relative.end(), fs::path("..")) != relative.end();
+  if (!leaves) return folder / replay_folder / "files" / relative;
+  throw SetupError(
+      {.file = folder.string(), .found = description::in_quotes(name), .expected = "a file of the record"});
+}
+
 // ---- writing
 
 ReplayWriter::ReplayWriter(const fs::path& file, ReplayHead head, std::vector<std::byte> state)
@@ -199,6 +208,19 @@ bool ReplayReader::next(BoxCycle& cycle, std::vector<BoxFrame>& frames) {
   const bool sound = archive(entry, cycle, frames, head_.axes, head_.buses);
   if (!sound || !entry.whole() || entry.bytes() != entry_.size()) refuse("an entry that is damaged");
   return true;
+}
+
+void ReplayReader::go_to(std::streamoff position) {
+  file_.clear();
+  file_.seekg(position);
+}
+
+bool ReplayReader::skip() {
+  std::uint32_t bytes = 0;
+  file_.read(reinterpret_cast<char*>(&bytes), sizeof bytes);
+  if (static_cast<std::size_t>(file_.gcount()) != sizeof bytes || bytes > most_entry_bytes) return false;
+  file_.seekg(bytes, std::ios::cur);
+  return file_.good();
 }
 
 // ---- the network

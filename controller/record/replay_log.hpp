@@ -71,6 +71,9 @@ class ReplayRecorder {
   bool lost_ = false;
 };
 
+// A file of the record (ReplayHead::cell, scene), and nowhere else. Throws SetupError.
+std::filesystem::path recorded_file(const std::filesystem::path& folder, const char* name);
+
 // Reads cycles.bin. Throws SetupError for a file of another kind or of another version.
 class ReplayReader {
  public:
@@ -80,6 +83,11 @@ class ReplayReader {
   // False at the end. The record holds the cycle's number and setpoints only. A last entry that isn't whole counts as
   // the end, since a crash may cut it off.
   bool next(BoxCycle& cycle, std::vector<BoxFrame>& frames);
+  // Where the entry begins that next() reads; and to go back there.
+  [[nodiscard]] std::streamoff position() { return file_.tellg(); }
+  void go_to(std::streamoff position);
+  // Passes over an entry. False at the end.
+  bool skip();
 
  private:
   [[noreturn]] void refuse(const std::string& found) const;

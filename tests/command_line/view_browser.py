@@ -70,6 +70,10 @@ class Browser:
             time.sleep(0.02)
         raise AssertionError(f"not within {patience_s} s: {what}; console: {self.complaints()}")
 
+    def click(self, x, y):
+        for kind in ("mousePressed", "mouseReleased"):
+            self.command("Input.dispatchMouseEvent", dict(type=kind, x=x, y=y, button="left", buttons=1, clickCount=1))
+
     def complaints(self):
         """What the console has of errors and warnings, but for those that the browser gives for being slow itself."""
         return [entry["message"] for entry in self.driver.get_log("browser")

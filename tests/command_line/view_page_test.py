@@ -145,6 +145,29 @@ class Page(ProgramTest):
             rows = list(csv.DictReader(file))
         self.assertIn("holding", {row["phase"] for row in rows})
 
+    def test_a_record_opens_at_the_fault_and_plays(self):
+        self.call("run", "--no-plot", "--record", "session", "--duration", "5s", "--fault", "axis_3:silent@4s")
+        with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:
+            self.opened(browser, session)
+            shown = browser.until("document.getElementById('fault').textContent", "the fault")
+            self.assertIn("drive_silent", shown)
+            at = browser.run("return proxarm.player.at")
+            browser.until("document.querySelectorAll('#frame-table tr').length > 10", "frames of the bus")
+            browser.picture("fault-light")
+            browser.run("proxarm.player.step(-1)")
+            browser.until(f"proxarm.player.asked === {at - 1}", "a cycle back")
+            browser.run("proxarm.player.jump(0, 'contact')")
+            browser.until("document.getElementById('contact-chip').dataset.contact !== 'free'", "the contact")
+            self.assertTrue(browser.run("return document.getElementById('fault').hidden"))
+            box = browser.run("const b = proxarm.player.canvas.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]")
+            browser.click(box[0] + box[2] / 2, box[1] + box[3] / 2)
+            cycles = browser.run("return proxarm.stage.record.cycles")
+            browser.until(f"Math.abs(proxarm.player.at - {cycles} / 2) < {cycles} / 50", "the place that was clicked")
+            browser.run("proxarm.player.speed.value = 2; proxarm.player.toggle()")
+            before = browser.run("return proxarm.player.asked")
+            browser.until(f"proxarm.player.asked > {before} + 100", "that it plays")
+            self.assertEqual(browser.complaints(), [])
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -4,7 +4,6 @@
 #include <poll.h>
 #include <spawn.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,7 +12,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -87,14 +85,6 @@ std::string read_line(int line) {
   return text;
 }
 
-bool has_desktop() {
-  const auto set = [](const char* name) {
-    const char* const value = std::getenv(name);
-    return value != nullptr && *value != '\0';
-  };
-  return isatty(STDERR_FILENO) == 1 && (set("DISPLAY") || set("WAYLAND_DISPLAY"));
-}
-
 }  // namespace
 
 fs::path view_control_path() { return default_control_path().parent_path() / ("view-" + std::to_string(getpid())); }
@@ -114,7 +104,7 @@ ViewProcess::ViewProcess(const PreparedSession& session, const RunOptions& optio
     throw;
   }
   std::fprintf(stderr, "proxarm: the view of this session: %s\n", url_.c_str());
-  if (!options.json && has_desktop()) open_browser();
+  if (!options.json) door_.emplace(url_);
 }
 
 void ViewProcess::start(int memory) {
@@ -136,7 +126,7 @@ void ViewProcess::start(int memory) {
   // Standard output is the session's own: what reads it to its end must not wait for the view.
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  std::string name = program.string(), mode = "live", first = std::to_string(memory_there),
+  std::string name = program.string(), mode = "--live", first = std::to_string(memory_there),
               second = std::to_string(line_there);
   std::array<char*, 5> words{name.data(), mode.data(), first.data(), second.data(), nullptr};
   const int failed = posix_spawn(&child_, name.c_str(), &actions, nullptr, words.data(), environ);
@@ -157,29 +147,6 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
   refuse("no answer of the view", "its address");
 }
 
-// By a file that only its owner may read: what is on a command line, every user of the machine may see.
-void ViewProcess::open_browser() const {
-  const fs::path folder = default_control_path().parent_path();
-  mkdir(folder.c_str(), 0700);
-  const fs::path file = folder / ("view-" + std::to_string(getpid()) + ".html");
-  const int made = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-  if (made < 0) return;
-  const std::string text = "<!doctype html><meta http-equiv=\"refresh\" content=\"0;url=" + url_ + "\">\n";
-  const bool whole = write(made, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  close(made);
-  std::string program = "xdg-open", name = file.string();
-  std::array<char*, 3> words{program.data(), name.data(), nullptr};
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
-  }
-  pid_t opener = 0;
-  // Where there is none, the URL has been printed.
-  if (whole) (void)posix_spawnp(&opener, program.c_str(), &actions, nullptr, words.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-}
-
 void ViewProcess::show_end(int exit_status) {
   if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
   std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
@@ -193,7 +160,6 @@ void ViewProcess::show_end(int exit_status) {
 ViewProcess::~ViewProcess() {
   close(line_);
   if (child_ > 0) waitpid(child_, nullptr, 0);
-  unlink((default_control_path().parent_path() / ("view-" + std::to_string(getpid()) + ".html")).c_str());
 }
 
 }  // namespace proxarm::command_line

@@ -6,8 +6,10 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
+#include "controller/command_line/live/browser.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 
 namespace proxarm::command_line {
@@ -27,9 +29,9 @@ class ViewProcess {
  private:
   void start(int memory);
   void greet(const PreparedSession& session, const RunOptions& options);
-  void open_browser() const;
 
   std::string url_;
+  std::optional<BrowserDoor> door_;
   int line_ = -1;
   int child_ = -1;
 };

@@ -62,8 +62,8 @@ class LiveView {
         control_(hello.at("control").get<std::string>(), context),
         page_(control_, [this](view::Socket& socket) { welcome(socket); }),
         server_(
-            context, server_of(hello), page_files(), [this](const std::string& path) { return mesh(path); }, page_,
-            nullptr),
+            context, server_of(hello), page_files(),
+            [this](const std::string& path) { return mesh_file(stage_, path); }, page_, nullptr),
         timer_(context),
         session_(session),
         context_(context) {}
@@ -126,21 +126,6 @@ class LiveView {
       page_.say(text_of({{"status", status_}}));
       listen();
     });
-  }
-
-  view::AssetPtr mesh(const std::string& path) {
-    int link = -1;
-    unsigned index = 0;
-    if (std::sscanf(path.c_str(), "/mesh/object/%3u", &index) != 1 &&
-        std::sscanf(path.c_str(), "/mesh/link/%3d/%3u", &link, &index) != 2) {
-      return nullptr;
-    }
-    try {
-      return std::make_shared<const view::Asset>(
-          view::Asset{"application/octet-stream", stage_.mesh_bytes(link, index), {}});
-    } catch (const description::SetupError&) {
-      return nullptr;  // the page draws what else there is
-    }
   }
 
   view::Stage stage_;

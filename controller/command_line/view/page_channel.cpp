@@ -12,7 +12,8 @@ view::Bytes text_of(const json& value) {
   return std::make_shared<const std::string>(value.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
-PageChannel::PageChannel(ControlLine& control, Welcome welcome) : control_(control), welcome_(std::move(welcome)) {}
+PageChannel::PageChannel(ControlLine& control, Welcome welcome, Wanted wanted)
+    : control_(control), welcome_(std::move(welcome)), wanted_(std::move(wanted)) {}
 
 void PageChannel::opened(const SocketPtr& socket) {
   sockets_.push_back(socket);
@@ -26,6 +27,7 @@ std::string PageChannel::choose(const std::vector<std::string>& /*offered*/) con
 // Whoever sends what the page doesn't is no page.
 void PageChannel::received(const SocketPtr& socket, std::string_view message, bool binary) {
   const json said = binary ? json() : json::parse(message, nullptr, false);
+  if (wanted_ && said.is_object() && wanted_(*socket, said)) return;
   if (!said.is_object() || said.size() != 2 || !said.contains("ask") || !said["ask"].is_string() ||
       !said.contains("id") || !said["id"].is_number_unsigned()) {
     return socket->drop();

@@ -2,7 +2,7 @@
 //
 // To the page: text, JSON with one key: "stage" (view/stage/stage.hpp, and "mode" and "control"), "status", "answer";
 // binary, moments and histories (view/stage/moment.hpp). From the page: JSON {"ask": LINE, "id": N}, a line for the
-// session's control socket, answered by {"answer": {"id": N, "text": …}}.
+// session's control socket, answered by {"answer": {"id": N, "text": …}}; of a record what play_view.hpp says.
 #pragma once
 
 #include <functional>
@@ -19,8 +19,10 @@ class PageChannel final : public view::Channel {
  public:
   // `welcome` gives what a page that opens is told first.
   using Welcome = std::function<void(view::Socket& socket)>;
+  // Takes what isn't for the control socket. False: no page says that.
+  using Wanted = std::function<bool(view::Socket& socket, const nlohmann::json& said)>;
 
-  PageChannel(ControlLine& control, Welcome welcome);
+  PageChannel(ControlLine& control, Welcome welcome, Wanted wanted = {});
 
   void opened(const view::SocketPtr& socket) override;
   void received(const view::SocketPtr& socket, std::string_view message, bool binary) override;
@@ -34,6 +36,7 @@ class PageChannel final : public view::Channel {
  private:
   ControlLine& control_;
   Welcome welcome_;
+  Wanted wanted_;
   std::vector<view::SocketPtr> sockets_;
 };
 

@@ -127,7 +127,12 @@ export class ContactView extends THREE.Group {
     this.proxy.position.copy(proxy);
     this.tool.position.copy(tool);
     this.leash.geometry.setFromPoints([proxy, tool]);
-    if (moves) this.trail.push(proxy, moment.contact);
+    if (moves) {
+      // What was between two places of a record that lie apart isn't known.
+      if (Math.abs(moment.time_s - this.trail.time) > 0.3 || moment.time_s < this.trail.time) this.trail.clear();
+      this.trail.time = moment.time_s;
+      this.trail.push(proxy, moment.contact);
+    }
 
     const scale = METRES_PER_NEWTON * this.size;
     const force = at(moment, 'contact_force').multiplyScalar(scale);

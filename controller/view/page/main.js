@@ -3,6 +3,7 @@ import { Connection } from './connection.js';
 import { Control } from './control.js';
 import { Keys } from './keys.js';
 import { Panel } from './panel.js';
+import { Player } from './player.js';
 import { Plots } from './plots.js';
 import { toggleTheme } from './theme.js';
 import { World } from './world.js';
@@ -13,7 +14,7 @@ const world = new World(element('picture'), element('labels'));
 const plots = new Plots(element('plots'));
 const panel = new Panel();
 const keys = new Keys();
-let stage = null, built = false, newest = null, control = null;
+let stage = null, built = false, newest = null, control = null, player = null;
 
 const connection = new Connection({
   stage: (value) => {
@@ -24,12 +25,17 @@ const connection = new Connection({
     chip.hidden = false;
     chip.textContent = stage.mode === 'live' ? '● live' : '▮ record';
     if (stage.control) control = new Control(stage, connection);
+    if (stage.record) {
+      chip.textContent = `▮ record ${stage.record.name}`;
+      player = new Player(stage, connection, plots, keys);
+    }
   },
   status: (status) => panel.status(status),
-  history: (rows) => rows.forEach((row) => plots.add(row)),
+  history: (rows) => (player ? player.takeHistory(rows) : rows.forEach((row) => plots.add(row))),
+  frames: (frames) => player?.showFrames(frames),
   moment: (moment) => {
     newest = moment;
-    plots.add(moment);
+    if (player) player.show(moment); else plots.add(moment);
   },
   lost: () => panel.lost(),
 });
@@ -47,6 +53,7 @@ function frame(now) {
     newest = null;
     performance.mark('first-moment');
   }
+  player?.tick(now);
   world.draw();
   plots.draw(now);
 }
@@ -70,4 +77,4 @@ keys.add('d', 'dark or light', toggleTheme);
 keys.add('h', '', () => control?.ask('hold'));
 
 // For tests and for the curious.
-globalThis.proxarm = { world, plots, panel, connection, get stage() { return stage; } };
+globalThis.proxarm = { world, plots, panel, connection, get stage() { return stage; }, get player() { return player; } };

@@ -98,15 +98,15 @@ models::JointVector Stage::joint_angles(const CycleRecord& record) const {
   return seen ? arm_.link_from_motor(motor) : arm_.start_rad();
 }
 
-void Stage::place(const CycleRecord& record, double rendered_s, std::vector<Pose>& links,
-                  std::vector<Pose>& objects) const {
+void Stage::place(const CycleRecord& record, double rendered_s, std::vector<Pose>& links, std::vector<Pose>& objects,
+                  std::span<const Vec3> driven_m) const {
   tree_.place(joint_angles(record), links);
   objects.assign(scene_.objects.size(), Pose::Identity());
   for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
     const auto& motion = scene_.objects[i].motion;
     if (!motion) continue;
     if (motion->driven) {
-      objects[i].translation() = changes_.position_m(static_cast<std::int32_t>(i));
+      objects[i].translation() = driven_m.empty() ? this->driven_m(i) : driven_m[i];
     } else {
       objects[i] = scenes::script_of(*motion).at(rendered_s);
     }

@@ -49,9 +49,13 @@ class Stage {
 
   // Distances that only the scene knows, which the cycle leaves out.
   void complete(controller::CycleRecord& record, double rendered_s) const;
-  // Where links and objects are.
+  // How far an object that is driven is from where the scene describes it, after all that follow() was told.
+  [[nodiscard]] models::Vec3 driven_m(std::size_t object) const noexcept {
+    return changes_.position_m(static_cast<std::int32_t>(object));
+  }
+  // Where links and objects are. `driven_m`: of each object, where it isn't that of the last follow().
   void place(const controller::CycleRecord& record, double rendered_s, std::vector<models::Pose>& links,
-             std::vector<models::Pose>& objects) const;
+             std::vector<models::Pose>& objects, std::span<const models::Vec3> driven_m = {}) const;
   // Angles of the links by the encoders; those of the start before the first feedback.
   [[nodiscard]] models::JointVector joint_angles(const controller::CycleRecord& record) const;
 

@@ -1,0 +1,137 @@
+#include "controller/command_line/view/play_view.hpp"
+
+#include <boost/asio/signal_set.hpp>
+#include <csignal>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "controller/command_line/live/browser.hpp"
+#include "controller/command_line/view/page_channel.hpp"
+#include "controller/command_line/view/page_files.hpp"
+#include "controller/record/replay_log.hpp"
+#include "controller/view/sources/frame_words.hpp"
+#include "controller/view/sources/recorded_session.hpp"
+#include "models/base/setup_error.hpp"
+#include "scenes/format/scene_file.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr std::size_t window_rows = 800, overview_rows = 1200;
+
+view::Stage stage_of(const fs::path& folder) {
+  const controller::ReplayReader log(folder / controller::replay_folder / "cycles.bin");
+  const controller::ReplayHead& head = log.head();
+  const controller::SessionSettings& settings = head.settings;
+  return {description::load_cell(controller::recorded_file(folder, head.cell.data())),
+          scenes::load_scene(controller::recorded_file(folder, head.scene.data())),
+          {.period_s = settings.period_s,
+           .mass_kg = settings.mass_kg,
+           .damping_Ns_per_m = settings.damping_Ns_per_m,
+           .spring_N_per_m = settings.spring_N_per_m,
+           .impedance = settings.scheme == controller::Scheme::impedance,
+           .order = settings.order}};
+}
+
+const char* kind_name(view::RecordedEvent::Kind kind) {
+  constexpr std::array names{"contact", "limit", "phase", "fault"};
+  return names[static_cast<std::size_t>(kind)];
+}
+
+class PlayView {
+ public:
+  PlayView(boost::asio::io_context& context, const ViewOptions& options)
+      : folder_(options.folder),
+        stage_(stage_of(options.folder)),
+        session_(options.folder, stage_),
+        control_({}, context),
+        page_(
+            control_, [this](view::Socket& socket) { welcome(socket); },
+            [this](view::Socket& socket, const json& said) { return give(socket, said); }),
+        server_(
+            context, {options.port, {}}, page_files(),
+            [this](const std::string& path) { return mesh_file(stage_, path); }, page_, nullptr) {}
+
+  [[nodiscard]] std::string url() const { return server_.url(); }
+
+ private:
+  void welcome(view::Socket& socket) {
+    json stage = json::parse(stage_.describe());
+    stage["mode"] = "record";
+    stage["control"] = false;
+    json events = json::array();
+    for (const view::RecordedEvent& event : session_.events()) {
+      events.push_back(
+          {{"kind", kind_name(event.kind)}, {"at", event.at}, {"time_s", event.time_s}, {"text", event.text}});
+    }
+    stage["record"] = {{"name", folder_.filename().string()}, {"cycles", session_.size()},
+                       {"from_s", session_.time_s(0)},        {"to_s", session_.time_s(session_.size() - 1)},
+                       {"open_at", session_.opening()},       {"events", events}};
+    socket.say(text_of({{"stage", stage}}), false);
+    socket.say(history(0, session_.size() - 1, overview_rows), true);
+    show(socket, session_.opening());
+  }
+
+  view::Bytes history(std::size_t from, std::size_t to, std::size_t rows) const {
+    return std::make_shared<const std::string>(view::encode_history(session_.window(from, to, rows)));
+  }
+
+  void show(view::Socket& socket, std::size_t index) {
+    socket.say(text_of({{"status", {{"fault", session_.is_faulted(index) ? session_.fault() : ""}, {"ended", ""}}}}),
+               false);
+    socket.say(std::make_shared<const std::string>(session_.encode(index)), true);
+  }
+
+  void list_frames(view::Socket& socket, std::size_t index) {
+    json list = json::array();
+    for (const controller::BoxFrame& frame : session_.frames(index)) {
+      const view::FrameWords words = view::describe_frame(frame, session_.head(), stage_.cell());
+      list.push_back(
+          {{"bus", words.bus}, {"id", words.id}, {"bytes", words.bytes}, {"from", words.from}, {"words", words.words}});
+    }
+    socket.say(text_of({{"frames", {{"at", index}, {"list", list}}}}), false);
+  }
+
+  bool give(view::Socket& socket, const json& said) {
+    if (said.size() != 1) return false;
+    const auto is_index = [&](const json& value) {
+      return value.is_number_unsigned() && value.get<std::uint64_t>() < session_.size();
+    };
+    const auto& [name, value] = *said.items().begin();
+    if (name == "at" && is_index(value)) {
+      show(socket, value.get<std::size_t>());
+    } else if (name == "frames" && is_index(value)) {
+      list_frames(socket, value.get<std::size_t>());
+    } else if (name == "window" && value.is_array() && value.size() == 2 && is_index(value[0]) && is_index(value[1])) {
+      socket.say(history(value[0].get<std::size_t>(), value[1].get<std::size_t>(), window_rows), true);
+    } else {
+      return false;
+    }
+    return true;
+  }
+
+  fs::path folder_;
+  view::Stage stage_;
+  view::RecordedSession session_;
+  ControlLine control_;
+  PageChannel page_;
+  view::WebServer server_;
+};
+
+}  // namespace
+
+int play_view(const ViewOptions& options) {
+  boost::asio::io_context context{1};
+  PlayView shown(context, options);
+  boost::asio::signal_set signals(context, SIGINT, SIGTERM, SIGHUP);
+  signals.async_wait([&](const boost::system::error_code&, int) { context.stop(); });
+  std::fprintf(stderr, "proxarm: the view of this record, until Ctrl-C: %s\n", shown.url().c_str());
+  const BrowserDoor door(shown.url());
+  context.run();
+  return 0;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,16 @@
+// `proxarm view DIR`: plays a session that was recorded, or a black box, until Ctrl-C.
+//
+// Every page has a place in the record of its own, and asks for what it shows:
+//   {"at": INDEX}             the moment of that cycle
+//   {"frames": INDEX}         {"frames": {"at": INDEX, "list": [{bus, id, bytes, from, words}, …]}}
+//   {"window": [FROM, TO]}    a history of at most 800 rows
+#pragma once
+
+#include "controller/command_line/view/view_options.hpp"
+
+namespace proxarm::command_line {
+
+// Returns the exit status; throws SetupError.
+int play_view(const ViewOptions& options);
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,198 @@
+#include "controller/view/sources/recorded_session.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "controller/view/stage/words.hpp"
+
+namespace proxarm::view {
+namespace {
+
+using controller::CycleRecord;
+using controller::Phase;
+using nlohmann::json;
+
+constexpr std::size_t most_events = 2000;
+constexpr std::int64_t apart_ns = 200'000'000;  // what begins again sooner is the same event
+
+std::vector<std::string> axis_names(const Stage& stage) {
+  std::vector<std::string> names;
+  for (const description::DriveDescription& drive : stage.cell().drives) names.push_back(drive.joint);
+  return names;
+}
+
+std::string text_of_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+std::uint32_t holding_back() {
+  std::uint32_t bits = 0;
+  for (const FlagWords& flag : flag_words()) bits |= flag.holds_back ? static_cast<std::uint32_t>(flag.flag) : 0U;
+  return bits;
+}
+
+std::string words_of(std::uint32_t flags) {
+  std::string text;
+  for (const FlagWords& flag : flag_words()) {
+    if ((flags & static_cast<std::uint32_t>(flag.flag)) == 0) continue;
+    text += (text.empty() ? "" : "; ") + std::string(flag.words);
+  }
+  return text;
+}
+
+}  // namespace
+
+RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& stage)
+    : stage_(stage),
+      log_(folder / controller::replay_folder / "cycles.bin"),
+      signals_(folder / "signals.csv", axis_names(stage)),
+      first_cycle_(signals_.row(0).cycle) {
+  read_fault(folder);
+  find_events();
+  index_frames();
+}
+
+// The last fault that wasn't reset; of a program that died, why there is a black box.
+void RecordedSession::read_fault(const std::filesystem::path& folder) {
+  const json summary = json::parse(text_of_file(folder / "summary.json"), nullptr, false);
+  if (summary.is_object() && summary.contains("faults") && summary["faults"].is_array() && !summary["faults"].empty()) {
+    const json& fault = summary["faults"].back();
+    fault_ = fault.value("text", "");
+    fault_cycle_ = fault.value("cycle", std::uint64_t{0});
+    return;
+  }
+  fault_ = text_of_file(folder / "reason.txt");
+  while (!fault_.empty() && fault_.back() == '\n') fault_.pop_back();
+  fault_cycle_ = signals_.row(size() - 1).cycle;
+  // The box's own figures leave faults out: its reason names the cycle.
+  const std::size_t named = fault_.find(" at cycle ");
+  if (named != std::string::npos) fault_cycle_ = std::strtoull(fault_.c_str() + named + 10, nullptr, 10);
+}
+
+void RecordedSession::find_events() {
+  const std::uint32_t limits = holding_back();
+  CycleRecord last = signals_.row(0);
+  std::int64_t rendered = 0, limited_ns = -apart_ns, touched_ns = -apart_ns;
+  const auto add = [&](RecordedEvent::Kind kind, std::size_t at, const CycleRecord& record, std::string text) {
+    if (events_.size() < most_events) {
+      events_.push_back({kind, at, 1e-9 * static_cast<double>(record.time_ns), std::move(text)});
+    }
+  };
+  fault_at_ = size();
+  rendered_ns_.reserve(size());
+  for (std::size_t i = 0; i < size(); ++i) {
+    const CycleRecord record = signals_.row(i);
+    if (i > 0 && last.phase == Phase::rendering) rendered += record.time_ns - last.time_ns;
+    rendered_ns_.push_back(rendered);
+    if (record.phase != last.phase) add(RecordedEvent::Kind::phase, i, record, phase_words(record.phase));
+    if (record.contact != controller::ContactPhase::free) {
+      if (record.time_ns - touched_ns >= apart_ns) add(RecordedEvent::Kind::contact, i, record, "touches");
+      touched_ns = record.time_ns;
+    }
+    if ((record.flags & limits) != 0) {
+      if (record.time_ns - limited_ns >= apart_ns) {
+        add(RecordedEvent::Kind::limit, i, record, words_of(record.flags & limits));
+      }
+      limited_ns = record.time_ns;
+    }
+    if (!fault_.empty() && fault_at_ == size() && record.cycle >= fault_cycle_) {
+      fault_at_ = i;
+      add(RecordedEvent::Kind::fault, i, record, fault_);
+    }
+    last = record;
+  }
+  const auto first_of = [&](RecordedEvent::Kind kind) {
+    return std::find_if(events_.begin(), events_.end(), [&](const RecordedEvent& e) { return e.kind == kind; });
+  };
+  if (const auto fault = first_of(RecordedEvent::Kind::fault); fault != events_.end()) {
+    opening_ = fault->at;
+  } else if (const auto touch = first_of(RecordedEvent::Kind::contact); touch != events_.end()) {
+    opening_ = touch->at;
+  }
+}
+
+void RecordedSession::index_frames() {
+  const bool driven = std::any_of(stage_.scene().objects.begin(), stage_.scene().objects.end(),
+                                  [](const scenes::Object& o) { return o.motion && o.motion->driven; });
+  if (driven) return follow_driven();
+  for (std::streamoff at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
+}
+
+// Objects go where they were sent, one cycle after the other, as they did in the session.
+void RecordedSession::follow_driven() {
+  controller::BoxCycle cycle;
+  std::vector<controller::BoxFrame> frames;
+  const std::size_t objects = stage_.scene().objects.size();
+  driven_m_.assign(size() * objects, {});
+  for (std::streamoff at = log_.position(); log_.next(cycle, frames); at = log_.position()) {
+    positions_.push_back(at);
+    const std::uint64_t index = cycle.record.cycle - first_cycle_;
+    if (cycle.record.cycle < first_cycle_ || index >= size()) continue;
+    const Moment now = moment(index);
+    stage_.follow(cycle.change, now.record.phase == Phase::rendering, 1e-9 * static_cast<double>(now.record.period_ns));
+    for (std::size_t k = 0; k < objects; ++k) {
+      const models::Vec3 p = stage_.driven_m(k);
+      driven_m_[index * objects + k] = {static_cast<float>(p.x()), static_cast<float>(p.y()),
+                                        static_cast<float>(p.z())};
+    }
+  }
+}
+
+double RecordedSession::time_s(std::size_t index) const {
+  return 1e-9 * static_cast<double>(signals_.row(index).time_ns);
+}
+
+Moment RecordedSession::moment(std::size_t index) const {
+  Moment moment;
+  moment.record = signals_.row(index);
+  moment.handle_mass_kg = stage_.handle_mass_kg();
+  moment.rendered_s = 1e-9 * static_cast<double>(rendered_ns_[index]);
+  const std::size_t before = index > 0 ? index - 1 : index;
+  const std::size_t after = index > 0 ? index : std::min(size() - 1, index + 1);
+  moment.record.period_ns = signals_.row(after).time_ns - signals_.row(before).time_ns;
+  moment.flags_since = moment.record.flags;
+  moment.hand_peak_N = controller::vec3(moment.record.force_W_N).norm();
+  moment.contact_peak_N = controller::vec3(moment.record.contact_force_W_N).norm();
+  return moment;
+}
+
+std::string RecordedSession::encode(std::size_t index) const {
+  const Moment shown = moment(index);
+  std::vector<models::Pose> links, objects;
+  std::vector<models::Vec3> driven;
+  const std::size_t count = stage_.scene().objects.size();
+  for (std::size_t k = 0; k < count && !driven_m_.empty(); ++k) {
+    const auto& p = driven_m_[index * count + k];
+    driven.emplace_back(p[0], p[1], p[2]);
+  }
+  stage_.place(shown.record, shown.rendered_s, links, objects, driven);
+  return encode_moment(shown, links, objects);
+}
+
+std::vector<double> RecordedSession::window(std::size_t from, std::size_t to, std::size_t rows) const {
+  std::vector<double> out;
+  const std::size_t end = std::min(to, size() - 1);
+  const std::size_t step = std::max<std::size_t>(1, (end - std::min(from, end) + 1) / std::max<std::size_t>(1, rows));
+  MomentBuilder builder(stage_.handle_mass_kg());
+  for (std::size_t i = std::min(from, end); i <= end; ++i) {
+    builder.add(signals_.row(i), 1e-9 * static_cast<double>(rendered_ns_[i]));
+    if ((i + 1) % step == 0 || i == end) append_fields(out, builder.take());
+  }
+  return out;
+}
+
+std::vector<controller::BoxFrame> RecordedSession::frames(std::size_t index) {
+  controller::BoxCycle cycle;
+  std::vector<controller::BoxFrame> frames;
+  const std::uint64_t number = first_cycle_ + index;
+  if (number < head().first_cycle || number - head().first_cycle >= positions_.size()) return {};
+  log_.go_to(positions_[number - head().first_cycle]);
+  if (!log_.next(cycle, frames)) frames.clear();
+  return frames;
+}
+
+}  // namespace proxarm::view

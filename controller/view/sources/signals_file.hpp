@@ -1,0 +1,43 @@
+// Reads signals.csv of a record at any place: the rows' places are found once, a row is read when it is asked for.
+//
+// Columns are known by their names, so a record of another version is read as far as its columns go. A last row that
+// isn't whole counts as the end.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "controller/record/cycle_record.hpp"
+
+namespace proxarm::view {
+
+class SignalsFile {
+ public:
+  // `axis_names` as in the cell. Throws SetupError for a file that isn't one of a record's signals.
+  SignalsFile(const std::filesystem::path& file, const std::vector<std::string>& axis_names);
+  SignalsFile(const SignalsFile&) = delete;
+  SignalsFile& operator=(const SignalsFile&) = delete;
+  ~SignalsFile();
+
+  [[nodiscard]] std::size_t size() const noexcept { return rows_.size(); }
+  // All that the file has of a cycle. Precondition: index < size().
+  [[nodiscard]] controller::CycleRecord row(std::size_t index) const;
+
+ private:
+  using Store = void (*)(controller::CycleRecord& record, std::size_t part, std::string_view text);
+  struct Column {
+    Store store = nullptr;  // none: a column that isn't known
+    std::size_t part = 0;   // of a vector, or the axis
+  };
+  [[nodiscard]] Column column_named(std::string_view name, const std::vector<std::string>& axis_names) const;
+
+  std::filesystem::path name_;
+  std::string_view text_;
+  std::vector<Column> columns_;
+  std::vector<std::uint64_t> rows_;  // where each begins
+};
+
+}  // namespace proxarm::view
