@@ -86,7 +86,7 @@ class Shown(ProgramTest):
             self.assertEqual(stage_is_there, 200)
             status, out, _ = session.end()
             self.assertEqual(status, 0)
-            self.assertEqual(json.loads(out)["end"], "duration")
+            self.assertEqual(json.loads(out)["end"]["reason"], "duration")
 
     def test_a_fault_is_told_in_words(self):
         with Session(self.folder, "run", "--view", "--pace", "virtual", "--duration", "2s", "--no-plot", "--fault",
