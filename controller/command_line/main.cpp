@@ -209,15 +209,16 @@ void add_run_options(CLI::App& app, RunOptions& options) {
          "held (default) or free")
       ->type_name("held|free");
   using controller::Passivity;
-  app.add_option("--passivity",
-                 choice<Passivity>("--passivity",
-                                   {{"off", Passivity::off},
-                                    {"observe", Passivity::observe},
-                                    {"auto", Passivity::automatic},
-                                    {"on", Passivity::on}},
-                                   [&](Passivity value) { options.passivity = value; }),
-                 "observe: energies at the hand's and the proxy's port, and oscillations; auto (the default): add damping "
-                 "against those that last; on: against any at once; off: none of it")
+  app.add_option(
+         "--passivity",
+         choice<Passivity>("--passivity",
+                           {{"off", Passivity::off},
+                            {"observe", Passivity::observe},
+                            {"auto", Passivity::automatic},
+                            {"on", Passivity::on}},
+                           [&](Passivity value) { options.passivity = value; }),
+         "observe: energies at the hand's and the proxy's port, and oscillations; auto (the default): add damping "
+         "against those that last; on: against any at once; off: none of it")
       ->type_name("off|observe|auto|on");
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,

@@ -77,13 +77,12 @@ std::vector<Limit> limits(const PreparedSession& session, const LoopModel& loop,
     l.period_s = 0.1 * T;
     l.delay_s -= 0.9 * T;
   });
-  add("the delay of the setpoints' filter (limits.setpoint_bandwidth_Hz)",
-      [&](LoopModel& l, HandModel&) {
-        l.delay_s = std::max(0.0, l.delay_s - filter_s);
-        std::vector<controller::ElasticArm> unfiltered = *l.arms;
-        for (controller::ElasticArm& arm : unfiltered) arm.filter_s = 0.0;
-        l.arms = std::make_shared<const std::vector<controller::ElasticArm>>(unfiltered);
-      });
+  add("the delay of the setpoints' filter (limits.setpoint_bandwidth_Hz)", [&](LoopModel& l, HandModel&) {
+    l.delay_s = std::max(0.0, l.delay_s - filter_s);
+    std::vector<controller::ElasticArm> unfiltered = *l.arms;
+    for (controller::ElasticArm& arm : unfiltered) arm.filter_s = 0.0;
+    l.arms = std::make_shared<const std::vector<controller::ElasticArm>>(unfiltered);
+  });
   add("the sensor's delay", [&](LoopModel& l, HandModel&) { l.delay_s -= sensor_s; });
   add("the drives' lag", [](LoopModel& l, HandModel&) { l.drive_time_constant_s = 0.0; });
   add("the mass after the sensor (handle and hand)", [](LoopModel& l, HandModel& h) {
@@ -136,8 +135,9 @@ int tune_command(const RunOptions& options) {
       1e3 * total_delay_s(session), 1e3 * T, 1e3 * T, 1e3 * filter_s, 1e3 * std::max(0.0, loop.delay_s - T - filter_s),
       1e3 * loop.drive_time_constant_s);
   const auto smallest = smallest_felt(hand, loop), safe = with_margin(hand, loop);
-  std::printf("smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
-              mass_text(smallest).c_str(), loop.handle_mass_kg, mass_text(smallest_felt(hand, start)).c_str());
+  std::printf(
+      "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
+      mass_text(smallest).c_str(), loop.handle_mass_kg, mass_text(smallest_felt(hand, start)).c_str());
   std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
               safe ? ("--mass " + mass_text(safe)).c_str() : "no mass up to 1000 kg",
               safe ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));

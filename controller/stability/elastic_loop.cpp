@@ -84,7 +84,8 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
 
 std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
                                      const std::vector<models::Vec3>& offsets_W) {
-  constexpr double step_m = 0.005;  // no joint turns by the inverse kinematics' 0.01 rad on that, away from singularities
+  constexpr double step_m =
+      0.005;  // no joint turns by the inverse kinematics' 0.01 rad on that, away from singularities
   constexpr double apart_m = 0.05;
   constexpr std::size_t most_poses = 16;
   std::vector<ElasticArm> arms{elastic_arm(arm, arm.start_rad(), cell)};

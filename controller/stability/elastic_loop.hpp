@@ -9,8 +9,8 @@
 //   proxy     A(w) q = w^(age/T) h                                                     as in stability.hpp
 //   sent to   p = q + (H/T)(q − q₁)                                                    with lookahead
 //   filter    x_f of p, critically damped; θ_sent = G x_f + k⁻¹ M G ẍ_f                 (elastic_setpoint.hpp)
-// G = ∂(joint angles)/∂(tool place), orientation held. M has handle and tool in it. Over a period the continuous part is
-// exact, by its matrix exponential; all of it together is one linear map from period to period, whose largest
+// G = ∂(joint angles)/∂(tool place), orientation held. M has handle and tool in it. Over a period the continuous part
+// is exact, by its matrix exponential; all of it together is one linear map from period to period, whose largest
 // eigenvalue tells. For six joints that is a matrix of some 45 rows.
 //
 // What it doesn't know: friction in the gears, which helps; backlash; limits; poses other than its own.
@@ -66,10 +66,10 @@ class ElasticLoop {
   double force_age_periods_;
   int order_;
   bool matched_labels_;
-  Eigen::MatrixXd plant_;           // [φ, φ̇, θ, r, ṙ] over a period
-  Eigen::MatrixXd force_;           // h of [φ, φ̇, θ, r, ṙ]
-  Eigen::MatrixXd twist_;           // k⁻¹ M G
-  Eigen::Index joints_, ages_;      // n, and how many old forces are kept
+  Eigen::MatrixXd plant_;       // [φ, φ̇, θ, r, ṙ] over a period
+  Eigen::MatrixXd force_;       // h of [φ, φ̇, θ, r, ṙ]
+  Eigen::MatrixXd twist_;       // k⁻¹ M G
+  Eigen::Index joints_, ages_;  // n, and how many old forces are kept
 };
 
 }  // namespace proxarm::controller

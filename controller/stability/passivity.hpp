@@ -45,9 +45,9 @@
 // A blow on a wall, a hand that shakes for a moment and gears that ring look the same at first, but end by themselves.
 // An oscillation lasts where it has gone on for lasting_s, pauses up to pause_s included (a wall stops it in every
 // period), and hasn't died away meanwhile. Its amplitude is A with A² = 2⟨x̃²⟩, x̃ the motion behind the same high-pass:
-// ⟨x̃²⟩ must be half of its largest at least. Where it falls to a sixteenth it is over, and what is left begins anew once
-// it no longer falls to half in pause_s. Below felt_m it takes small_lasting_s. Then the loop isn't stable with this
-// grip. Damping::what_lasts begins with it, and acts at once for remembered_s after each oscillation.
+// ⟨x̃²⟩ must be half of its largest at least. Where it falls to a sixteenth it is over, and what is left begins anew
+// once it no longer falls to half in pause_s. Below felt_m it takes small_lasting_s. Then the loop isn't stable with
+// this grip. Damping::what_lasts begins with it, and acts at once for remembered_s after each oscillation.
 //
 // Vectors in W. Neither allocates, locks nor throws; a session without it has none of it.
 #pragma once
@@ -115,8 +115,8 @@ class PassivityObserver {
     for (HighPass* filter : {&force_, &motion_, &place_}) {
       for (Section& section : filter->sections) state(section.s1, section.s2);
     }
-    state(delay_.s1, delay_.s2, release_s_, start_W_, square_, force_square_, spell_.lasted_s, spell_.pause_s, spell_.most,
-          spell_.over, remembered_s_);
+    state(delay_.s1, delay_.s2, release_s_, start_W_, square_, force_square_, spell_.lasted_s, spell_.pause_s,
+          spell_.most, spell_.over, remembered_s_);
     state(h_k1_, h_, tool_k1_, power_, band_, all_, tank_, added_, oscillates_, energies_.hand, energies_.proxy,
           energies_.world, energies_.kinetic, energies_.damping, energies_.added);
   }

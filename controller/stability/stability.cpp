@@ -202,7 +202,8 @@ std::string text(const char* pattern, double value) {
 }  // namespace
 
 double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
-  if (loop.arms && proxy_mass_kg <= heaviest_on_gears_kg) return ElasticLoops(hand, loop).spectral_radius(proxy_mass_kg);
+  if (loop.arms && proxy_mass_kg <= heaviest_on_gears_kg)
+    return ElasticLoops(hand, loop).spectral_radius(proxy_mass_kg);
   return spectral_radius(make_loop(hand, loop), proxy_mass_kg);
 }
 

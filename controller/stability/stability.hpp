@@ -16,15 +16,16 @@
 // coasts: q + s(q − q₁), which is P q with P(w) = 1 + s(1−w). P multiplies the term with (1−β). B and K_v change that
 // point by their share of the acceleration within H alone, and are left out there.
 //
-// With the cell's arm in it (`arms`), whose gears give, eigenvalues are those of elastic_loop.hpp instead, the largest of
-// all its poses. What follows is of C.
+// With the cell's arm in it (`arms`), whose gears give, eigenvalues are those of elastic_loop.hpp instead, the largest
+// of all its poses. What follows is of C.
 //
 // C is linear in M (D-decomposition): C = M X + Y. The masses at which a root lies on the unit circle follow from a
 // sweep over θ, w = exp(−jθ): those where M(θ) = −Y/X is real and positive. Between two neighbours of them stability
 // doesn't change, which makes "the smallest mass above which all are stable" exact, also where the stable masses are
 // several intervals.
 //
-// For set-up: takes some hundred microseconds, with an arm some milliseconds a mass; allocates, never runs in the cycle.
+// For set-up: takes some hundred microseconds, with an arm some milliseconds a mass; allocates, never runs in the
+// cycle.
 #pragma once
 
 #include <functional>

@@ -18,7 +18,9 @@ Vec3 tool(double t, double frequency_Hz, double amplitude_m) {
   return by_will + amplitude_m * std::sin(2.0 * std::numbers::pi * frequency_Hz * t) * Vec3(0.6, 0.0, 0.8);
 }
 
-OscillationWatch::Cycle cycle(bool oscillates, const Vec3& tool_W) { return {.oscillates = oscillates, .tool_W = tool_W}; }
+OscillationWatch::Cycle cycle(bool oscillates, const Vec3& tool_W) {
+  return {.oscillates = oscillates, .tool_W = tool_W};
+}
 
 TEST(OscillationWatch, TellsFrequencyAmplitudeAndTimeWhateverTheHandDoesByWill) {
   for (const double frequency_Hz : {3.5, 8.0, 16.0, 40.0}) {

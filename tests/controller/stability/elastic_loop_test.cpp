@@ -1,5 +1,5 @@
-// The stability check on elastic gears, held against the simulated arm itself: what it takes for unstable swings more and
-// more, and what it takes for stable comes to rest. The story: with rigid links in it, 1.5 kg were stable at any
+// The stability check on elastic gears, held against the simulated arm itself: what it takes for unstable swings more
+// and more, and what it takes for stable comes to rest. The story: with rigid links in it, 1.5 kg were stable at any
 // timestep; the arm swung by 9 mm with 2 kg at 2 ms.
 #include "controller/stability/elastic_loop.hpp"
 
@@ -74,23 +74,25 @@ double left_m(const HandModel& hand, double period_s, double felt_kg) {
 
 TEST(ElasticLoop, FindsTheSmallestMassThatTheSimulatedArmBears) {
   const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
-  for (const HandModel& hand : {HandModel{500.0, 20.0, 1.0}, HandModel{1500.0, 40.0, 0.5}, HandModel{200.0, 10.0, 1.8}}) {
+  for (const HandModel& hand :
+       {HandModel{500.0, 20.0, 1.0}, HandModel{1500.0, 40.0, 0.5}, HandModel{200.0, 10.0, 1.8}}) {
     for (const double period_s : {1e-3, 2e-3, 4e-3}) {
       SCOPED_TRACE(std::to_string(hand.mass_kg) + " kg at " + std::to_string(period_s));
       const auto smallest = smallest_stable_mass(hand, loop_of(cell, period_s));
       ASSERT_TRUE(smallest);
       const double felt_kg = *smallest + cell.tool.mass_kg;
       const double above = left_m(hand, period_s, 1.06 * felt_kg), below = left_m(hand, period_s, 0.75 * felt_kg);
-      std::printf("hand of %.3g kg, %.4g N/m, %.3g ms: %.2f kg; at 1.06 of it a swing of %.2g mm is left, at 0.75 %.2g\n",
-                  hand.mass_kg, hand.stiffness_N_per_m, 1e3 * period_s, felt_kg, 1e3 * above, 1e3 * below);
+      std::printf(
+          "hand of %.3g kg, %.4g N/m, %.3g ms: %.2f kg; at 1.06 of it a swing of %.2g mm is left, at 0.75 %.2g\n",
+          hand.mass_kg, hand.stiffness_N_per_m, 1e3 * period_s, felt_kg, 1e3 * above, 1e3 * below);
       EXPECT_LT(above, 0.05e-3);
       EXPECT_GT(below, 0.3e-3);
     }
   }
 }
 
-// Stiff, well damped gears are rigid ones: the polynomial, with the filter as the two lags that it is, says the same. What
-// is left are the hand's speed, which is a difference there, and the twentieth that elastic loops ask for.
+// Stiff, well damped gears are rigid ones: the polynomial, with the filter as the two lags that it is, says the same.
+// What is left are the hand's speed, which is a difference there, and the twentieth that elastic loops ask for.
 TEST(ElasticLoop, WithStiffGearsIsTheRigidLoop) {
   description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
   for (description::DriveDescription& drive : cell.drives) {

@@ -217,9 +217,9 @@ TEST(Passivity, QuietsAStiffGripThatIsFeltLate) {
         most_m[acts] = std::max(most_m[acts], amplitude);
       }
     }
-    std::printf("%g ms: above 0.5 mm for %.2f s, at most %.1f mm; with passivity %.2f s, %.1f mm; auto %.2f s, %.1f mm\n",
-                1e3 * delay_s, swinging_s[0], 1e3 * most_m[0], swinging_s[1], 1e3 * most_m[1], swinging_s[2],
-                1e3 * most_m[2]);
+    std::printf(
+        "%g ms: above 0.5 mm for %.2f s, at most %.1f mm; with passivity %.2f s, %.1f mm; auto %.2f s, %.1f mm\n",
+        1e3 * delay_s, swinging_s[0], 1e3 * most_m[0], swinging_s[1], 1e3 * most_m[1], swinging_s[2], 1e3 * most_m[2]);
     EXPECT_GT(swinging_s[0], 3.4);
     EXPECT_GT(most_m[0], 10e-3);
     EXPECT_LT(swinging_s[1], 0.5);
