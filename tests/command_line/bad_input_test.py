@@ -76,16 +76,16 @@ class CellFile(ProgramTest):
             self.refuse("mass_kg: 0.25", f"mass_kg: {value}", "default.yaml:12: tool.mass_kg: found " + found, expected)
 
     def test_whole_numbers_stay_in_their_range(self):
-        self.refuse("node: 2", "node: 200", "default.yaml:55: drives[1].node: found 200", "from 1 to 127")
+        self.refuse("node: 2", "node: 200", "default.yaml:56: drives[1].node: found 200", "from 1 to 127")
         self.refuse("node: 2", "node: 0", "found 0", "from 1 to 127")
         self.refuse("bitrate: 1000000", "bitrate: 7", "buses[0].bitrate: found 7", "bit/s")
 
     def test_a_key_that_stands_twice_is_no_choice(self):
-        self.refuse("  leash_m: 0.02\n", "  leash_m: 0.02\n  leash_m: 0.03\n", "default.yaml:210", '"leash_m"', "twice",
+        self.refuse("  leash_m: 0.02\n", "  leash_m: 0.02\n  leash_m: 0.03\n", "default.yaml:216", '"leash_m"', "twice",
                     "line 209")
 
     def test_two_drives_of_a_bus_have_two_nodes(self):
-        self.refuse("node: 2", "node: 1", "default.yaml:55: drives[1].node: found 1", 'bus axes_1_3', '"axis_1"')
+        self.refuse("node: 2", "node: 1", "default.yaml:56: drives[1].node: found 1", 'bus axes_1_3', '"axis_1"')
 
     def test_a_bus_must_be_one_of_the_cells(self):
         self.refuse("bus: sensor", "bus: nobus", 'sensor.bus: found "nobus"', "axes_1_3, axes_4_6 or sensor")
@@ -104,7 +104,7 @@ class CellFile(ProgramTest):
         self.refuse("urdf: ../arms/arm150.urdf", "urdf: lost.urdf", "default.yaml:6: urdf", "lost.urdf", "doesn't exist")
 
     def test_a_joint_that_the_urdf_lacks_is_named_with_those_it_has(self):
-        self.refuse("joint: axis_3", "joint: elbow", 'default.yaml:81: drives[2].joint: found "elbow"', "arm150.urdf",
+        self.refuse("joint: axis_3", "joint: elbow", 'default.yaml:83: drives[2].joint: found "elbow"', "arm150.urdf",
                     "axis_1, axis_2, axis_3")
 
     def test_a_start_outside_of_a_joints_range_is_unreachable(self):
