@@ -185,6 +185,12 @@ void add_view_options(CLI::App& app, RunOptions& options) {
                       }),
          "the port of the view on 127.0.0.1 (default: any that is free)")
       ->type_name("PORT");
+  app.add_option("--allow-origin", options.allowed_origins,
+                 "a web page of this origin, such as https://app.example.org, may look as well, if it knows the "
+                 "address with its token; may be repeated")
+      ->type_name("ORIGIN")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 void add_run_options(CLI::App& app, RunOptions& options) {

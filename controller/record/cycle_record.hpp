@@ -123,7 +123,9 @@ struct CycleRecord {
 
   // The simulation's truth at t_k (flag `truth`).
   Triple true_tool_W_m{};
-  Triple hand_force_W_N{};  // of the hand on the tool
+  Triple hand_force_W_N{};                                  // of the hand on the tool
+  std::array<double, 4> true_tool_q_W{0.0, 0.0, 0.0, 1.0};  // its orientation: x y z w
+  Triple true_acceleration_W_m_per_s2{};
 
   std::int64_t compute_ns = 0;  // wall-clock of the cycle, waiting apart; goes to timing.json alone
 

@@ -1,8 +1,9 @@
 // A recorded session: a folder that holds what went in, what came out and what it was made with.
 //
-//   signals.csv      a row per cycle: forces, p̂, proxy, contact, tool, targets and positions in counts, and the
-//                    simulation's truth where there is one. The first row names columns with units and frames; numbers
-//                    are the shortest that read back to the same double
+//   signals.csv      a row per cycle (signals/signal_columns.hpp). The first row names columns with units and frames;
+//                    numbers are the shortest that read back to the same double
+//   columns.json     unit, frame and meaning of each of them
+//   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
 //   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it
 //   effective.yaml   what the session ran with, every default filled in (and other configuration files by their names)
 //   summary.json     figures that are the same in two runs with the same input (repeatable_json())
@@ -22,6 +23,7 @@
 
 #include "controller/record/cycle_record.hpp"
 #include "controller/report/summary.hpp"
+#include "controller/signals/signal_columns.hpp"
 #include "fieldbus/can/can_frame.hpp"
 
 namespace proxarm::controller {
@@ -36,7 +38,7 @@ class SessionWriter {
   // truth.
   SessionWriter(const std::filesystem::path& folder, const std::vector<std::string>& axis_names, bool with_truth);
 
-  void add(const CycleRecord& record);
+  void add(const CycleRecord& record, const DerivedSignals& derived = {});
   // Time of the frame's last bit on the network's own clock (which is not the records' time: bring-up comes before the
   // first cycle), 0 or later.
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
@@ -79,9 +81,5 @@ class SessionWriter {
   bool with_truth_;
   File signals_, frames_;
 };
-
-// The first row of signals.csv, and one of its rows, without their ends.
-std::string signals_header(const std::vector<std::string>& axis_names, bool with_truth);
-void append_signals(std::string& row, const CycleRecord& record, std::size_t axes, bool with_truth);
 
 }  // namespace proxarm::controller

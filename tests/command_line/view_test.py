@@ -201,6 +201,8 @@ class Refusals(ProgramTest):
                 (("--view",), ("three.module.js", "libjs-three", "apt-get install"), env),
                 (("--view-port", "80"), ("--view-port", "1024 to 65535"), None),
                 (("--view-port", "8080"), ("--view-port", "no view", "--view with it"), None),
+                (("--view", "--allow-origin", "*"), ("--allow-origin", '"*"', "https://"), None),
+                (("--allow-origin", "https://a.example"), ("--allow-origin", "--view with it"), None),
                 (("models/cells/light.yaml", "--view-control"), ("--view-control", "impedance"), None)):
             with self.subTest(arguments):
                 self.assert_refused(self.call("run", *arguments, env=surroundings), *said)

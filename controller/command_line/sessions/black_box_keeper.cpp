@@ -16,6 +16,7 @@
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
+#include "controller/signals/derived_signals.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -177,6 +178,7 @@ void BlackBoxKeeper::write(const std::string& reason) const {
   replay.drain(shared_->head);
   replay.finish();
   controller::SummaryBuilder figures(summary_config(session_));
+  const controller::SignalDeriver deriver(session_.cell);
   BoxCycle cycle;
   std::vector<BoxFrame> frames;
   const auto add_frames = [&] {
@@ -188,7 +190,7 @@ void BlackBoxKeeper::write(const std::string& reason) const {
     if (!box_.read(k, cycle, frames)) continue;
     complete(cycle.record, session_, cycle.rendered_ns);
     figures.add(cycle.record);
-    files.add(cycle.record);
+    files.add(cycle.record, deriver.derive(cycle.record));
     add_frames();
   }
   frames = box_.unfinished();

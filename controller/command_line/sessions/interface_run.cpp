@@ -18,6 +18,7 @@
 #include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
+#include "controller/command_line/sessions/recorded_messages.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
 #include "controller/record/frame_tap.hpp"
 #include "controller/report/latency.hpp"
@@ -63,7 +64,7 @@ class Drain {
  public:
   Drain(controller::SpscRing<CycleRecord>& records, controller::FrameTap& tap, SessionOutput& output,
         std::vector<fieldbus::BitRates> rates, BlackBoxKeeper& keeper, controller::LatencyMeter& meter,
-        controller::ReplayRecorder* replay, std::function<void()> on_failure)
+        controller::ReplayRecorder* replay, RecordedMessages* messages, std::function<void()> on_failure)
       : records_(records),
         tap_(tap),
         output_(output),
@@ -71,6 +72,7 @@ class Drain {
         keeper_(keeper),
         meter_(meter),
         replay_(replay),
+        messages_(messages),
         on_failure_(std::move(on_failure)),
         busy_ns_(rates_.size()),
         begun_ns_(tap.now_ns()),
@@ -118,6 +120,7 @@ class Drain {
     while (records_.pop(record)) output_.add(record);
     meter_.drain();
     if (replay_ != nullptr) replay_->drain(keeper_.head());
+    if (messages_ != nullptr) messages_->drain(keeper_.box());
     controller::TappedFrame tapped;
     while (tap_.frames().pop(tapped)) {
       output_.add_frame(tap_.bus(tapped.bus).name(), tapped.frame, tapped.time_ns);
@@ -134,6 +137,7 @@ class Drain {
   BlackBoxKeeper& keeper_;
   controller::LatencyMeter& meter_;
   controller::ReplayRecorder* replay_;
+  RecordedMessages* messages_;
   std::function<void()> on_failure_;
   std::exception_ptr failure_;  // the thread's; read after it has ended
   std::vector<std::int64_t> busy_ns_;
@@ -162,8 +166,10 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   set_filters(network, parts);
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;
+  std::unique_ptr<RecordedMessages> messages;
   if (!options.record_dir.empty()) {
     replay = std::make_unique<controller::ReplayRecorder>(keeper.box(), options.record_dir, replay_files(session));
+    messages = std::make_unique<RecordedMessages>(options.record_dir, session);
   }
   keeper.set_head(replay_head(session, names_in(tap), indices));
   bring_up_devices(parts);
@@ -176,7 +182,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options);
   controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
   Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get(),
-              [&] { cycle.request_stop(); });
+              messages.get(), [&] { cycle.request_stop(); });
   const SteadyClock::time_point begun = SteadyClock::now();
   controller::SessionTally tally;
   {
@@ -187,6 +193,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   cycle.shut_down();
   drain.finish();
   if (replay) replay->finish();
+  if (messages) messages->finish();
 
   controller::Summary summary = output.summary(cycle, tally.end, signals.cause());
   summary.wall_time_s = wall_s;

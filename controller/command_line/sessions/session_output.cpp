@@ -189,6 +189,7 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, joint_names(session.cell), with_truth);
   writer_->write_file("effective.yaml", effective_config(session));
+  deriver_ = std::make_unique<controller::SignalDeriver>(session.cell);
 }
 
 // Better now than after the run that it was to show. By its name nothing but an earlier plot can be overwritten.
@@ -293,7 +294,7 @@ void SessionOutput::add(CycleRecord record) {
   say_timestep(record);
   builder_.add(record);
   say_oscillation();
-  if (writer_) writer_->add(record);
+  if (writer_) writer_->add(record, deriver_->derive(record));
   if (plot_) plot_->add(record);
   if (progress_.enabled()) {
     const bool rendering = record.phase == controller::Phase::rendering;

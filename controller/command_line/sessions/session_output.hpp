@@ -14,6 +14,7 @@
 #include "controller/report/session_record.hpp"
 #include "controller/report/summary.hpp"
 #include "controller/session/session.hpp"
+#include "controller/signals/derived_signals.hpp"
 
 namespace proxarm::command_line {
 
@@ -58,6 +59,7 @@ class SessionOutput {
   controller::Progress progress_;
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
+  std::unique_ptr<controller::SignalDeriver> deriver_;  // with the writer
   std::int64_t rendered_ns_ = 0;
   std::int64_t told_period_ns_ = 0;  // that the user knows of
   bool told_oscillation_ = false;    // of the present spell

@@ -73,6 +73,7 @@ int SimulatedRun::run() {
     network_.set_observer(
         [this](const fieldbus::WireFrame& wire) { output_.add_frame(wire.bus_name, wire.frame, wire.end_ns); });
     replay_ = std::make_unique<controller::ReplayRecorder>(keeper_.box(), options_.record_dir, replay_files(session_));
+    messages_ = std::make_unique<RecordedMessages>(options_.record_dir, session_);
   }
   far_end_.attach_to(network_);
   far_end_.power_on();
@@ -125,6 +126,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   cycle.shut_down();
   network_.sleep_until(network_.now_ns() + last_words_ns);
   if (replay_) replay_->finish();
+  if (messages_) messages_->finish();
   return output_.finish(summary, keeper_);
 }
 
@@ -134,9 +136,13 @@ void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
     record.set(controller::RecordFlag::truth);
     record.true_tool_W_m = controller::triple(truth_.X_WT.translation());
     record.hand_force_W_N = controller::triple(truth_.hand_force_W);
+    const Eigen::Quaterniond q(truth_.X_WT.linear());
+    record.true_tool_q_W = {q.x(), q.y(), q.z(), q.w()};
+    record.true_acceleration_W_m_per_s2 = controller::triple(truth_.acceleration_W);
     output_.add(record);
   }
   if (replay_) replay_->drain(keeper_.head());
+  if (messages_) messages_->drain(keeper_.box());
 }
 
 }  // namespace proxarm::command_line

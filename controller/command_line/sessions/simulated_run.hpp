@@ -2,6 +2,7 @@
 #pragma once
 
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/sessions/recorded_messages.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
@@ -30,6 +31,7 @@ class SimulatedRun {
   scenes::CompiledScene scene_;
   SessionOutput output_;
   std::unique_ptr<controller::ReplayRecorder> replay_;
+  std::unique_ptr<RecordedMessages> messages_;
   std::int64_t power_on_ns_ = 0;
   sim::Truth truth_;  // at the present cycle's SYNC
 };

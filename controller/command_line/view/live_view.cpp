@@ -16,6 +16,7 @@
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/view/page_channel.hpp"
 #include "controller/command_line/view/page_files.hpp"
+#include "controller/command_line/view/tool_channel.hpp"
 #include "controller/view/sources/live_source.hpp"
 #include "controller/view/stage/words.hpp"
 #include "controller/view/web/gate.hpp"
@@ -61,9 +62,10 @@ class LiveView {
         source_(memory, stage_),
         control_(hello.at("control").get<std::string>(), context),
         page_(control_, [this](view::Socket& socket) { welcome(socket); }),
+        tools_(stage_, control_),
         server_(
             context, server_of(hello), page_files(),
-            [this](const std::string& path) { return mesh_file(stage_, path); }, page_, nullptr),
+            [this](const std::string& path) { return mesh_file(stage_, path); }, page_, &tools_),
         timer_(context),
         session_(session),
         context_(context) {}
@@ -94,6 +96,7 @@ class LiveView {
       if (source_.advance()) {
         last_ = source_.take();
         tell_fault(view::fault_text(last_->record, stage_.cell()));
+        tools_.show(*last_);
         if (!page_.empty()) page_.show(std::make_shared<const std::string>(source_.encode(*last_)));
       }
       // A machine that is too slow for 60 a second has fewer, not a backlog.
@@ -132,6 +135,7 @@ class LiveView {
   view::LiveSource source_;
   ControlLine control_;
   PageChannel page_;
+  ToolChannel tools_;
   view::WebServer server_;
   boost::asio::steady_timer timer_;
   stream_protocol::socket& session_;

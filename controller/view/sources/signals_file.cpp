@@ -87,6 +87,12 @@ constexpr std::array singles{
     Named{"contact_object",
           [](CycleRecord& r, std::size_t, std::string_view t) { r.contact_object = number_of<std::int32_t>(t); }},
     Named{"friction_1", store_value<&CycleRecord::friction>},
+    Named{"proxy_mass_kg", store_value<&CycleRecord::proxy_mass_kg>},
+    Named{"proxy_damping_Ns_per_m", store_value<&CycleRecord::proxy_damping_Ns_per_m>},
+    Named{"energy_hand_J",
+          [](CycleRecord& r, std::size_t, std::string_view t) { r.energies_J.hand = number_of<double>(t); }},
+    Named{"energy_proxy_J",
+          [](CycleRecord& r, std::size_t, std::string_view t) { r.energies_J.proxy = number_of<double>(t); }},
     Named{"proxy_clearance_m", store_value<&CycleRecord::proxy_clearance_m>},
     Named{"tool_clearance_m", store_value<&CycleRecord::tool_clearance_m>}};
 

@@ -86,6 +86,14 @@ void Stage::complete(CycleRecord& record, double rendered_s) const {
   record.tool_clearance_m = clearance_m(record.tool_W_m);
 }
 
+Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {
+  for (std::size_t i = 0; i < links.size() && i < tree_.links().size(); ++i) {
+    if (tree_.links()[i].name != cell_.sensor.link) continue;
+    return links[i] * models::to_pose(cell_.sensor.pose_link) * models::to_pose(cell_.tool.handle_S);
+  }
+  return Pose::Identity();
+}
+
 models::JointVector Stage::joint_angles(const CycleRecord& record) const {
   models::JointVector motor = arm_.start_rad();
   bool seen = false;

@@ -56,6 +56,8 @@ class Stage {
   // Where links and objects are. `driven_m`: of each object, where it isn't that of the last follow().
   void place(const controller::CycleRecord& record, double rendered_s, std::vector<models::Pose>& links,
              std::vector<models::Pose>& objects, std::span<const models::Vec3> driven_m = {}) const;
+  // X_WT, of links that place() has placed.
+  [[nodiscard]] models::Pose tool_pose(std::span<const models::Pose> links) const noexcept;
   // Angles of the links by the encoders; those of the start before the first feedback.
   [[nodiscard]] models::JointVector joint_angles(const controller::CycleRecord& record) const;
 

@@ -31,6 +31,7 @@ const std::vector<FlagWords>& flag_words() {
       {RecordFlag::ramp_in, "ramp_in", "the hand's force is being let in", false},
       {RecordFlag::hands_off, "hands_off", "nobody holds the handle", false},
       {RecordFlag::oscillation, "oscillation", "the arm oscillates: not stable with this hand", false},
+      {RecordFlag::oscillation_lasts, "oscillation_lasts", "the arm has been oscillating for half a second", false},
       {RecordFlag::timestep, "timestep", "the timestep is being changed", false},
       {RecordFlag::sample_held, "sample_held", "a sample of the force sensor is missing", false},
       {RecordFlag::feedback_missing, "feedback_missing", "a drive's feedback is missing", false},

@@ -71,6 +71,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
     write();
   }
   void drop() override { close(); }
+  [[nodiscard]] bool idle() const noexcept override { return !writing_ && waiting_.empty() && !moment_; }
   void close() override {
     error_code ignored;
     timer_.cancel();

@@ -33,6 +33,8 @@ class Socket {
   // In order, all of them; a reader who lets too many come together is dropped.
   virtual void say(Bytes message, bool binary) = 0;
   virtual void drop() = 0;
+  // All that was said and shown has been taken.
+  [[nodiscard]] virtual bool idle() const noexcept = 0;
   // The subprotocol that was agreed on; empty for the page.
   [[nodiscard]] virtual const std::string& protocol() const noexcept = 0;
 };

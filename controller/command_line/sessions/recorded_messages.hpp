@@ -1,0 +1,24 @@
+// session.mcap in the folder of a record, with the stage that it is told on.
+#pragma once
+
+#include <filesystem>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/view/messages/mcap_record.hpp"
+#include "controller/view/stage/stage.hpp"
+
+namespace proxarm::command_line {
+
+class RecordedMessages {
+ public:
+  // Throws SetupError.
+  RecordedMessages(const std::filesystem::path& folder, const PreparedSession& session);
+  void drain(const controller::BoxReader& box) { record_.drain(box); }
+  void finish() { record_.finish(); }
+
+ private:
+  view::Stage stage_;
+  view::McapRecord record_;
+};
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,22 @@
+// What a record has of a cycle beside what the cycle knows of itself: joint angles and torques with their units, and
+// the tool's orientation. Not for the cycle: it takes some microseconds.
+#pragma once
+
+#include "controller/signals/signal_columns.hpp"
+#include "models/arm/arm.hpp"
+#include "models/description/cell.hpp"
+
+namespace proxarm::controller {
+
+class SignalDeriver {
+ public:
+  // The cell must outlive it. Throws SetupError.
+  explicit SignalDeriver(const description::Cell& cell);
+  [[nodiscard]] DerivedSignals derive(const CycleRecord& record) const;
+
+ private:
+  const description::Cell& cell_;
+  models::Arm arm_;
+};
+
+}  // namespace proxarm::controller

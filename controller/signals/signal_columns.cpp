@@ -1,0 +1,246 @@
+#include "controller/signals/signal_columns.hpp"
+
+#include <charconv>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "controller/supervision/fault.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+template <typename Number>
+void append_number(std::string& text, Number value) {
+  std::array<char, 32> digits;
+  const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value);
+  text.append(digits.data(), end);
+}
+
+void append_value(std::string& row, double value) {
+  row += ',';
+  append_number(row, value);
+}
+
+void append_triple(std::string& row, const Triple& values) {
+  for (const double value : values) {
+    row += ',';
+    append_number(row, value);
+  }
+}
+
+// Nanoseconds as seconds, digit by digit: 1250000 is 0.00125.
+void append_seconds(std::string& text, std::int64_t ns, std::size_t least_decimals) {
+  if (ns < 0) text += '-';
+  const std::uint64_t size = ns < 0 ? 0 - static_cast<std::uint64_t>(ns) : static_cast<std::uint64_t>(ns);
+  append_number(text, size / 1'000'000'000);
+  std::string decimals = std::to_string(1'000'000'000 + size % 1'000'000'000).substr(1);
+  while (decimals.size() > least_decimals && decimals.back() == '0') decimals.pop_back();
+  if (!decimals.empty()) text += "." + decimals;
+}
+
+struct FlagName {
+  RecordFlag flag;
+  const char* name;
+};
+// `overrun` is left out because it is of the wall clock, `truth` because the columns say it.
+constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
+                                   {RecordFlag::feedback_missing, "feedback_missing"},
+                                   {RecordFlag::limit_speed, "limit_speed"},
+                                   {RecordFlag::limit_acceleration, "limit_acceleration"},
+                                   {RecordFlag::limit_workspace, "limit_workspace"},
+                                   {RecordFlag::limit_joint, "limit_joint"},
+                                   {RecordFlag::limit_power, "limit_power"},
+                                   {RecordFlag::limit_keep_out, "limit_keep_out"},
+                                   {RecordFlag::limit_joint_speed, "limit_joint_speed"},
+                                   {RecordFlag::limit_joint_acceleration, "limit_joint_acceleration"},
+                                   {RecordFlag::limit_singularity, "limit_singularity"},
+                                   {RecordFlag::limit_following_error, "limit_following_error"},
+                                   {RecordFlag::limit_joint_torque, "limit_joint_torque"},
+                                   {RecordFlag::guard_speed, "guard_speed"},
+                                   {RecordFlag::guard_elbow, "guard_elbow"},
+                                   {RecordFlag::guard_border, "guard_border"},
+                                   {RecordFlag::guard_acceleration, "guard_acceleration"},
+                                   {RecordFlag::limit_leash, "limit_leash"},
+                                   {RecordFlag::limit_orientation, "limit_orientation"},
+                                   {RecordFlag::oscillation, "oscillation"},
+                                   {RecordFlag::oscillation_lasts, "oscillation_lasts"},
+                                   {RecordFlag::timestep, "timestep"},
+                                   {RecordFlag::ramp_in, "ramp_in"},
+                                   {RecordFlag::slowed, "slowed"},
+                                   {RecordFlag::hands_off, "hands_off"}};
+
+void append_flags(std::string& row, const CycleRecord& record) {
+  bool first = true;
+  for (const FlagName& flag : flag_names) {
+    if (!record.has(flag.flag)) continue;
+    if (!first) row += '|';
+    row += flag.name;
+    first = false;
+  }
+}
+
+// What came after the first version of the record.
+void append_more(std::string& row, const CycleRecord& r, std::size_t axes, bool with_truth,
+                 const DerivedSignals& derived) {
+  for (const Fault fault : {r.fault, r.held_for}) {
+    row += ',';
+    if (fault != Fault::none) row += fault_name(fault);
+  }
+  for (const double value : {r.proxy_mass_kg, r.proxy_damping_Ns_per_m, r.energies_J.hand, r.energies_J.proxy}) {
+    append_value(row, value);
+  }
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    derived.torques ? void(row += ',') : append_value(row, derived.target_rad[axis]);
+  }
+  for (std::size_t axis = 0; axis < axes; ++axis) append_value(row, derived.actual_rad[axis]);
+  for (std::size_t axis = 0; axis < axes; ++axis) {
+    derived.torques ? append_value(row, derived.target_Nm[axis]) : void(row += ',');
+  }
+  for (const double value : derived.tool_q_W) append_value(row, value);
+  if (!with_truth) return;
+  if (r.has(RecordFlag::truth)) {
+    for (const double value : r.true_tool_q_W) append_value(row, value);
+    append_triple(row, r.true_acceleration_W_m_per_s2);
+  } else {
+    row += ",,,,,,,";
+  }
+}
+
+// Adds columns one after the other.
+class Columns {
+ public:
+  void add(std::string name, std::string unit, std::string frame, std::string meaning) {
+    all.push_back({std::move(name), std::move(unit), std::move(frame), std::move(meaning)});
+  }
+  // "force_W_x_N": a name, an axis, a unit.
+  void add_vector(const std::string& name, const std::string& unit, const std::string& frame,
+                  const std::string& meaning) {
+    const std::string shown = unit == "m/s²" ? "m_per_s2" : unit;
+    for (const char* axis : {"x", "y", "z"}) add(name + "_" + axis + "_" + shown, unit, frame, meaning + ", " + axis);
+  }
+  void add_orientation(const std::string& name, const std::string& meaning) {
+    for (const char* part : {"x", "y", "z", "w"}) add(name + "_q" + part, "1", "W", meaning + ", quaternion " + part);
+  }
+  void add_axes(const std::vector<std::string>& names, const std::string& end, const std::string& unit,
+                const std::string& meaning) {
+    for (const std::string& name : names) add(name + end, unit, "", meaning);
+  }
+  std::vector<SignalColumn> all;
+};
+
+void add_first(Columns& columns, const std::vector<std::string>& axis_names, bool with_truth) {
+  columns.add("cycle", "1", "", "number of the cycle, k");
+  columns.add("time_s", "s", "", "when the cycle was due, after the first one");
+  columns.add("phase", "", "", "of the supervisor: idle, enabling, taring, rendering, holding, freeing, stopping, …");
+  columns.add("contact", "", "", "free, stick or slip");
+  columns.add("flags", "", "", "what was out of the ordinary, joined by a bar: limits that acted, late samples");
+  columns.add_vector("force_S", "N", "S", "the sensor's reading");
+  columns.add_vector("torque_S", "Nm", "S", "the sensor's reading, about its origin");
+  columns.add_vector("force_W", "N", "W", "the hand's force h(k), bias and tool weight taken off");
+  columns.add_vector("torque_W", "Nm", "W", "the hand's torque about the rendered point");
+  columns.add_vector("p_hat_W", "m", "W", "p̂(k) of (26a): where the proxy would be without the world");
+  columns.add_vector("proxy_W", "m", "W", "q(k) of (26b): where the proxy is");
+  columns.add_vector("contact_force_W", "N", "W", "f(k) of (25a): the world's force on the proxy");
+  columns.add_vector("normal_W", "1", "W", "of the first contact; zero in free motion");
+  columns.add("contacts", "1", "", "how many things press at once");
+  columns.add("contact_object", "1", "", "the first one's index in the scene; −1: none");
+  columns.add("friction_1", "1", "", "its coefficient of friction");
+  columns.add_vector("tool_W", "m", "W", "the rendered point by the encoders");
+  columns.add("proxy_clearance_m", "m", "", "signed distance of the proxy to the nearest surface; below 0: inside");
+  columns.add("tool_clearance_m", "m", "", "of the tool, by the truth where there is one");
+  columns.add_axes(axis_names, "_target_counts", "counts", "sent to the drive in this cycle (607Ah; torques: 6071h)");
+  columns.add_axes(axis_names, "_actual_counts", "counts", "read from the drive (6064h)");
+  if (!with_truth) return;
+  columns.add_vector("true_tool_W", "m", "W", "where the simulated tool is");
+  columns.add_vector("hand_force_W", "N", "W", "the simulated hand's force on the tool");
+}
+
+void add_more(Columns& columns, const std::vector<std::string>& axis_names, bool with_truth) {
+  columns.add("fault", "", "", "that has stopped the arm, by its name");
+  columns.add("held_for", "", "", "the fault that the arm is held for; empty in a hold that somebody asked for");
+  columns.add("proxy_mass_kg", "kg", "", "M of this step; the hand feels the handle's mass with it");
+  columns.add("proxy_damping_Ns_per_m", "Ns/m", "", "B of this step");
+  columns.add("energy_hand_J", "J", "", "that the hand has put in since rendering began");
+  columns.add("energy_proxy_J", "J", "", "that the proxy has taken since then");
+  columns.add_axes(axis_names, "_target_rad", "rad", "commanded: the motor's angle at the joint; m of a linear one");
+  columns.add_axes(axis_names, "_actual_rad", "rad", "measured: the motor's angle at the joint; m of a linear one");
+  columns.add_axes(axis_names, "_target_Nm", "Nm", "commanded torque at the joint, where drives take torques");
+  columns.add_orientation("tool_W", "orientation of the tool by the encoders");
+  if (!with_truth) return;
+  columns.add_orientation("true_tool_W", "orientation of the simulated tool");
+  columns.add_vector("true_acceleration_W", "m/s²", "W", "of the simulated tool");
+}
+
+}  // namespace
+
+std::vector<SignalColumn> signal_columns(const std::vector<std::string>& axis_names, bool with_truth) {
+  Columns columns;
+  add_first(columns, axis_names, with_truth);
+  add_more(columns, axis_names, with_truth);
+  return std::move(columns.all);
+}
+
+std::string signals_header(const std::vector<std::string>& axis_names, bool with_truth) {
+  std::string header;
+  for (const SignalColumn& column : signal_columns(axis_names, with_truth)) {
+    header += (header.empty() ? "" : ",") + column.name;
+  }
+  return header;
+}
+
+std::string columns_json(const std::vector<std::string>& axis_names, bool with_truth) {
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  for (const SignalColumn& column : signal_columns(axis_names, with_truth)) {
+    nlohmann::ordered_json one{{"name", column.name}};
+    if (!column.unit.empty()) one["unit"] = column.unit;
+    if (!column.frame.empty()) one["frame"] = column.frame;
+    one["meaning"] = column.meaning;
+    all.push_back(std::move(one));
+  }
+  return all.dump(1) + "\n";
+}
+
+void append_signals(std::string& row, const CycleRecord& r, std::size_t axes, bool with_truth,
+                    const DerivedSignals& derived) {
+  append_number(row, r.cycle);
+  row += ',';
+  append_seconds(row, r.time_ns, 0);
+  row += ',';
+  row += phase_name(r.phase);
+  row += ',';
+  row += contact_phase_name(r.contact);
+  row += ',';
+  append_flags(row, r);
+  for (const Triple* values : {&r.force_S_N, &r.torque_S_Nm, &r.force_W_N, &r.torque_W_Nm, &r.p_hat_W_m, &r.proxy_W_m,
+                               &r.contact_force_W_N, &r.normal_W}) {
+    append_triple(row, *values);
+  }
+  row += ',';
+  append_number(row, static_cast<int>(r.contact_count));
+  row += ',';
+  append_number(row, r.contact_object);
+  row += ',';
+  append_number(row, r.friction);
+  append_triple(row, r.tool_W_m);
+  for (const double value : {r.proxy_clearance_m, r.tool_clearance_m}) {
+    row += ',';
+    append_number(row, value);
+  }
+  for (const auto* counts : {&r.target_counts, &r.actual_counts}) {
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      row += ',';
+      append_number(row, (*counts)[axis]);
+    }
+  }
+  if (with_truth) {
+    if (r.has(RecordFlag::truth)) {
+      append_triple(row, r.true_tool_W_m);
+      append_triple(row, r.hand_force_W_N);
+    } else {
+      row += ",,,,,,";
+    }
+  }
+  append_more(row, r, axes, with_truth, derived);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,45 @@
+// A session as messages of JSON, for tools that know no proxarm: Foxglove's own schemas where there is one (poses,
+// transforms, the scene), and schemas of ours for forces, contacts, joints and the session's state.
+//
+//   /tool, /proxy      foxglove.PoseInFrame       where they are, in W
+//   /wrench            proxarm.Wrench             the hand's, in W
+//   /contact           proxarm.Contact            the world's force on the proxy, normal, friction, distances
+//   /joint_states      proxarm.JointStates        commanded and measured
+//   /session           proxarm.Session            phase, limits, fault, mass
+//   /tf                foxglove.FrameTransforms   the arm's links in W
+//   /scene             foxglove.SceneUpdate       arm and scene; once, and when objects move
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "controller/view/stage/stage.hpp"
+
+namespace proxarm::view {
+
+enum class Topic : std::uint8_t { tool, proxy, wrench, contact, joint_states, session, transforms, scene };
+inline constexpr std::size_t topic_count = static_cast<std::size_t>(Topic::scene) + 1;
+
+struct TopicDescription {
+  const char* topic;
+  const char* schema;       // its name
+  std::string json_schema;  // its text
+};
+[[nodiscard]] const TopicDescription& describe(Topic topic);
+
+class SessionMessages {
+ public:
+  // `stage` must outlive it.
+  explicit SessionMessages(const Stage& stage) : stage_(stage) {}
+
+  // What a topic has to say of a moment. `links`, `objects`: as Stage::place() has them.
+  [[nodiscard]] std::string message(Topic topic, const Moment& moment, std::span<const models::Pose> links,
+                                    std::span<const models::Pose> objects) const;
+
+ private:
+  const Stage& stage_;
+};
+
+}  // namespace proxarm::view
