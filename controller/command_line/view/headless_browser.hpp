@@ -1,0 +1,42 @@
+// A Chromium without a window, led through a pipe by the DevTools protocol: opens an address, runs JavaScript there, and
+// takes pictures.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+namespace proxarm::command_line {
+
+struct PictureSize {
+  int width = 1280, height = 720;
+};
+
+class HeadlessBrowser {
+ public:
+  // Throws SetupError where there is none, or where it doesn't start.
+  explicit HeadlessBrowser(PictureSize size, bool dark);
+  HeadlessBrowser(const HeadlessBrowser&) = delete;
+  HeadlessBrowser& operator=(const HeadlessBrowser&) = delete;
+  ~HeadlessBrowser();
+
+  void open(const std::string& url);
+  // Until this JavaScript is true. Throws SetupError after half a minute.
+  void wait_for(const std::string& condition);
+  void run(const std::string& script);
+  // A PNG. Throws SetupError where the file can't be written.
+  void save_picture(const std::filesystem::path& file);
+
+ private:
+  void start(const std::filesystem::path& program);
+  void attach(PictureSize size, bool dark);
+  nlohmann::json command(const std::string& method, const nlohmann::json& parameters);
+  std::string read_message();
+
+  std::filesystem::path profile_;
+  int to_ = -1, from_ = -1, child_ = -1;
+  int last_id_ = 0;
+  std::string session_, buffer_;
+};
+
+}  // namespace proxarm::command_line
