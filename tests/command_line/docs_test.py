@@ -9,7 +9,7 @@ PAGES = [SOURCE / "README.md", *sorted((SOURCE / "docs").glob("*.md"))]
 ELSEWHERE = {
     "--view": "stays until Ctrl-C: view_test.py runs it",
     "--bus vcan": "needs a kernel with CAN: tests/vcan runs it",
-    "proxarm view DIR": "stays until Ctrl-C: view_test.py makes some records",
+    "view DIR": "stays until Ctrl-C: view_test.py makes some records",
     "proxarm set ": "needs a session that runs: change_test.py asks one",
     "proxarm replay DIR": "needs a record: replay_test.py makes some",
     "proxarm study ": "takes minutes: study_test.py runs each with --quick",

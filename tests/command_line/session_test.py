@@ -109,7 +109,8 @@ class Record(ProgramTest):
         names, others = (sorted(str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file())
                          for folder in (self.first, self.second))
         self.assertEqual(names, others)
-        self.assertLessEqual({"signals.csv", "frames.log", "effective.yaml", "summary.json", "timing.json"}, set(names))
+        self.assertLessEqual({"signals.csv", "columns.json", "session.mcap", "frames.log", "effective.yaml", "summary.json",
+                              "timing.json"}, set(names))
         for name in names:
             if name != "timing.json":  # wall-clock figures, and nothing else
                 self.assertEqual((self.first / name).read_bytes(), (self.second / name).read_bytes(), name)

@@ -2,6 +2,7 @@
 //
 // Exit status: 0 fine, 2 set-up mistake.
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
@@ -13,11 +14,67 @@
 #include "controller/command_line/entry/program.hpp"
 #include "controller/command_line/view/live_view.hpp"
 #include "controller/command_line/view/play_view.hpp"
+#include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace {
 
 using namespace proxarm;
+
+command_line::PictureSize parse_size(const std::string& text) {
+  command_line::PictureSize size;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%c", &size.width, &size.height, &rest) == 2 && size.width >= 200 &&
+      size.height >= 200 && size.width <= 8000 && size.height <= 8000) {
+    return size;
+  }
+  throw description::SetupError({.key = "--size",
+                                 .found = description::in_quotes(text),
+                                 .expected = "WIDTHxHEIGHT in pixels, 200 to 8000 each, such as 1280x720"});
+}
+
+void add_picture_options(CLI::App& app, command_line::ViewOptions& options) {
+  app.add_option("--snapshot", CLI::callback_t([&](const CLI::results_t& words) {
+                   for (const std::string& word : words) {
+                     options.snapshots_s.push_back(description::parse_duration(word, "--snapshot"));
+                   }
+                   return true;
+                 }),
+                 "a picture instead, of this time in the record, such as 4.5s, drawn by a Chromium without a window; "
+                 "may be repeated")
+      ->type_name("TIME")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--out", options.out, "the picture's file, which ends in .png; of several with a number before that")
+      ->type_name("FILE");
+  app.add_option("--size", CLI::callback_t([&](const CLI::results_t& words) {
+                   options.size = parse_size(words.back());
+                   return true;
+                 }),
+                 "of the picture (default 1280x720)")
+      ->type_name("WxH");
+  app.add_option("--look",
+                 command_line::choice<std::string>("--look",
+                                                   {{"overview", "overview"},
+                                                    {"tool", "tool"},
+                                                    {"top", "top"},
+                                                    {"front", "front"},
+                                                    {"side", "side"}},
+                                                   [&](const std::string& value) { options.look = value; }),
+                 "from where (default overview)")
+      ->type_name("VIEW");
+  app.add_flag("--dark", options.dark, "a dark picture");
+}
+
+void require_picture(const command_line::ViewOptions& options) {
+  if (options.snapshots_s.empty() == options.out.empty() &&
+      (options.out.empty() || options.out.extension() == ".png")) {
+    return;
+  }
+  throw description::SetupError({.key = "--out",
+                                 .found = options.out.empty() ? "none" : description::in_quotes(options.out.string()),
+                                 .expected = "--snapshot TIME and --out FILE.png, or neither"});
+}
 
 void add_options(CLI::App& app, command_line::ViewOptions& options) {
   app.add_option("folder", options.folder, "folder of --record, or of a black box")->required()->type_name("DIR");
@@ -33,6 +90,7 @@ void add_options(CLI::App& app, command_line::ViewOptions& options) {
                                             }),
                  "on 127.0.0.1 (default: any that is free)")
       ->type_name("PORT");
+  add_picture_options(app, options);
 }
 
 int run(const std::vector<std::string>& words, char** argv) {
@@ -51,6 +109,7 @@ int run(const std::vector<std::string>& words, char** argv) {
     if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);
     return command_line::refuse_options(app, "proxarm view", words, error);
   }
+  require_picture(options);
   return command_line::play_view(options);
 }
 

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "controller/command_line/live/browser.hpp"
 #include "controller/command_line/view/page_channel.hpp"
@@ -56,6 +57,16 @@ class PlayView {
             [this](const std::string& path) { return mesh_file(stage_, path); }, page_, nullptr) {}
 
   [[nodiscard]] std::string url() const { return server_.url(); }
+
+  // The cycle that is due at this time, or the last one before it.
+  [[nodiscard]] std::size_t index_at(double time_s) const {
+    std::size_t low = 0, high = session_.size() - 1;
+    while (low < high) {
+      const std::size_t middle = (low + high + 1) / 2;
+      (session_.time_s(middle) <= time_s + 1e-9 ? low : high) = session_.time_s(middle) <= time_s + 1e-9 ? middle : middle - 1;
+    }
+    return low;
+  }
 
  private:
   void welcome(view::Socket& socket) {
@@ -123,9 +134,53 @@ class PlayView {
 
 }  // namespace
 
-int play_view(const ViewOptions& options) {
+namespace {
+
+// "a.png", or of several "a-01.png" …
+fs::path picture_name(const ViewOptions& options, std::size_t index) {
+  if (options.snapshots_s.size() == 1) return options.out;
+  std::array<char, 16> number{};
+  std::snprintf(number.data(), number.size(), "-%02zu", index + 1);
+  fs::path name = options.out;
+  return name.replace_filename(options.out.stem().string() + number.data() + options.out.extension().string());
+}
+
+// The page itself, drawn in a browser without a window while it is served here.
+void take_pictures(const PlayView& shown, const ViewOptions& options) {
+  HeadlessBrowser browser(options.size, options.dark);
+  browser.open(shown.url());
+  browser.wait_for("window.proxarm && performance.getEntriesByName('first-moment').length");
+  browser.run("proxarm.world.drawFine(); proxarm.world.look('" + options.look + "')");
+  for (std::size_t i = 0; i < options.snapshots_s.size(); ++i) {
+    const std::string index = std::to_string(shown.index_at(options.snapshots_s[i]));
+    browser.run("proxarm.player.goTo(" + index + ")");
+    browser.wait_for("proxarm.player.isShown(" + index + ")");
+    browser.save_picture(picture_name(options, i));
+  }
+}
+
+int save_pictures(const ViewOptions& options) {
   boost::asio::io_context context{1};
-  PlayView shown(context, options);
+  const PlayView shown(context, options);
+  std::thread serving([&] { context.run(); });
+  try {
+    take_pictures(shown, options);
+  } catch (...) {
+    context.stop();
+    serving.join();
+    throw;
+  }
+  context.stop();
+  serving.join();
+  return 0;
+}
+
+}  // namespace
+
+int play_view(const ViewOptions& options) {
+  if (!options.snapshots_s.empty()) return save_pictures(options);
+  boost::asio::io_context context{1};
+  const PlayView shown(context, options);
   boost::asio::signal_set signals(context, SIGINT, SIGTERM, SIGHUP);
   signals.async_wait([&](const boost::system::error_code&, int) { context.stop(); });
   std::fprintf(stderr, "proxarm: the view of this record, until Ctrl-C: %s\n", shown.url().c_str());

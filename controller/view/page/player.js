@@ -145,6 +145,12 @@ export class Player {
     this.connection.want({ window: this.window });
   }
 
+  // Whether that cycle is what is to be seen, in the picture as in the plots and the frames.
+  isShown(index) {
+    return this.asked === index && this.shown === index && this.listed === index && this.framesOf === index &&
+      Boolean(this.plots.window) && performance.now() - this.moved > 400;
+  }
+
   // The first one is the whole record, decimated; each later one a window that was asked for.
   takeHistory(rows) {
     if (!this.overview.length) {
@@ -156,6 +162,7 @@ export class Player {
   }
 
   show(moment) {
+    this.shown = this.asked;
     this.time = moment.time_s;
     this.place.textContent = `cycle ${moment.cycle}`;
     this.plots.setPlayhead(moment.time_s);
@@ -164,7 +171,8 @@ export class Player {
     if (this.story.textContent !== text) this.story.textContent = text;
   }
 
-  showFrames({ list }) {
+  showFrames({ at, list }) {
+    this.framesOf = at;
     const body = element('frame-table').tBodies[0];
     body.replaceChildren(...list.map((frame) => {
       const row = document.createElement('tr');

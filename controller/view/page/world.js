@@ -171,6 +171,13 @@ export class World {
     this.resize();
   }
 
+  // For a picture: as fine as the size allows, however long it takes.
+  drawFine() {
+    this.ratioStep = 0;
+    this.adapt = () => {};
+    this.resize();
+  }
+
   placeLabels() {
     const wanted = this.moment ? this.contacts.labels(this.moment) : [];
     const { width, height } = this;

@@ -56,6 +56,18 @@ TEST(SessionRecord, EveryColumnHasAName) {
   }
 }
 
+TEST(SessionRecord, EveryColumnHasAMeaning) {
+  const nlohmann::json columns = nlohmann::json::parse(columns_json(six_axes, true));
+  std::string header;
+  for (const nlohmann::json& column : columns) {
+    header += (header.empty() ? "" : ",") + column.at("name").get<std::string>();
+    EXPECT_FALSE(column.at("meaning").get<std::string>().empty());
+    // A name that ends in a unit has that unit.
+    if (column.at("name").get<std::string>().find("_N") != std::string::npos) EXPECT_TRUE(column.contains("unit"));
+  }
+  EXPECT_EQ(header, signals_header(six_axes, true));
+}
+
 TEST(SessionRecord, WritesARowAsPeopleWouldReadIt) {
   CycleRecord r = some_record(1250);
   r.time_ns = 1'250'500'000;
