@@ -1,6 +1,8 @@
 // Reads an MCAP file with @mcap/core, through its index and then from its beginning to its end; prints what it found.
 import { readFile } from 'node:fs/promises';
-import { McapIndexedReader, McapStreamReader } from '@mcap/core';
+import mcap from '@mcap/core';
+
+const { McapIndexedReader, McapStreamReader } = mcap;
 
 const bytes = new Uint8Array(await readFile(process.argv[2]));
 const readable = {
