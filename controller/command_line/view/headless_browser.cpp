@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <openssl/evp.h>
 #include <array>
 #include <cerrno>
 #include <chrono>
@@ -14,7 +15,6 @@
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <openssl/evp.h>
 #include <sstream>
 #include <thread>
 #include <vector>
@@ -60,9 +60,9 @@ fs::path make_profile() {
 
 std::string decoded(const std::string& base64) {
   std::string bytes(base64.size() / 4 * 3, '\0');
-  const int size = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
-                                   reinterpret_cast<const unsigned char*>(base64.data()),
-                                   static_cast<int>(base64.size()));
+  const int size =
+      EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
+                      reinterpret_cast<const unsigned char*>(base64.data()), static_cast<int>(base64.size()));
   std::size_t padding = 0;
   while (padding < base64.size() && base64[base64.size() - 1 - padding] == '=') ++padding;
   bytes.resize(size > 0 ? static_cast<std::size_t>(size) - padding : 0);
@@ -126,11 +126,10 @@ void HeadlessBrowser::attach(PictureSize size, bool dark) {
     if (target.at("type") == "page") page = target.at("targetId").get<std::string>();
   }
   if (page.empty()) page = command("Target.createTarget", {{"url", "about:blank"}}).at("targetId").get<std::string>();
-  session_ = command("Target.attachToTarget", {{"targetId", page}, {"flatten", true}}).at("sessionId").get<std::string>();
-  command("Emulation.setDeviceMetricsOverride", {{"width", size.width},
-                                                 {"height", size.height},
-                                                 {"deviceScaleFactor", 1},
-                                                 {"mobile", size.width < 600}});
+  session_ =
+      command("Target.attachToTarget", {{"targetId", page}, {"flatten", true}}).at("sessionId").get<std::string>();
+  command("Emulation.setDeviceMetricsOverride",
+          {{"width", size.width}, {"height", size.height}, {"deviceScaleFactor", 1}, {"mobile", size.width < 600}});
   command("Emulation.setEmulatedMedia",
           {{"features", {{{"name", "prefers-color-scheme"}, {"value", dark ? "dark" : "light"}}}}});
 }
@@ -161,7 +160,8 @@ std::string HeadlessBrowser::read_message() {
     std::array<char, 65536> more{};
     const ssize_t got = polled > 0 ? read(from_, more.data(), more.size()) : 0;
     if (got <= 0) {
-      throw SetupError({.key = "--snapshot", .found = "a browser that doesn't answer", .expected = "a Chromium that runs"});
+      throw SetupError(
+          {.key = "--snapshot", .found = "a browser that doesn't answer", .expected = "a Chromium that runs"});
     }
     buffer_.append(more.data(), static_cast<std::size_t>(got));
   }
@@ -198,7 +198,8 @@ void HeadlessBrowser::wait_for(const std::string& condition) {
     if (answer.contains("result") && answer["result"].value("value", false)) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  throw SetupError({.key = "--snapshot", .found = "a page that doesn't draw", .expected = "one that does: is WebGL there?"});
+  throw SetupError(
+      {.key = "--snapshot", .found = "a page that doesn't draw", .expected = "one that does: is WebGL there?"});
 }
 
 void HeadlessBrowser::save_picture(const fs::path& file) {
@@ -207,7 +208,8 @@ void HeadlessBrowser::save_picture(const fs::path& file) {
   out.write(png.data(), static_cast<std::streamsize>(png.size()));
   out.close();
   if (!out || png.empty()) {
-    throw SetupError({.file = file.string(), .key = "--out", .found = "a file that can't be written", .expected = "one that can"});
+    throw SetupError(
+        {.file = file.string(), .key = "--out", .found = "a file that can't be written", .expected = "one that can"});
   }
 }
 

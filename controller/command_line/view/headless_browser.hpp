@@ -1,5 +1,5 @@
-// A Chromium without a window, led through a pipe by the DevTools protocol: opens an address, runs JavaScript there, and
-// takes pictures.
+// A Chromium without a window, led through a pipe by the DevTools protocol: opens an address, runs JavaScript there,
+// and takes pictures.
 #pragma once
 
 #include <filesystem>

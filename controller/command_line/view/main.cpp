@@ -54,13 +54,10 @@ void add_picture_options(CLI::App& app, command_line::ViewOptions& options) {
                  "of the picture (default 1280x720)")
       ->type_name("WxH");
   app.add_option("--look",
-                 command_line::choice<std::string>("--look",
-                                                   {{"overview", "overview"},
-                                                    {"tool", "tool"},
-                                                    {"top", "top"},
-                                                    {"front", "front"},
-                                                    {"side", "side"}},
-                                                   [&](const std::string& value) { options.look = value; }),
+                 command_line::choice<std::string>(
+                     "--look",
+                     {{"overview", "overview"}, {"tool", "tool"}, {"top", "top"}, {"front", "front"}, {"side", "side"}},
+                     [&](const std::string& value) { options.look = value; }),
                  "from where (default overview)")
       ->type_name("VIEW");
   app.add_flag("--dark", options.dark, "a dark picture");

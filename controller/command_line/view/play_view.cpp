@@ -63,7 +63,8 @@ class PlayView {
     std::size_t low = 0, high = session_.size() - 1;
     while (low < high) {
       const std::size_t middle = (low + high + 1) / 2;
-      (session_.time_s(middle) <= time_s + 1e-9 ? low : high) = session_.time_s(middle) <= time_s + 1e-9 ? middle : middle - 1;
+      (session_.time_s(middle) <= time_s + 1e-9 ? low : high) =
+          session_.time_s(middle) <= time_s + 1e-9 ? middle : middle - 1;
     }
     return low;
   }
