@@ -140,7 +140,7 @@ namespace {
 // "a.png", or of several "a-01.png" …
 fs::path picture_name(const ViewOptions& options, std::size_t index) {
   if (options.snapshots_s.size() == 1) return options.out;
-  std::array<char, 16> number{};
+  std::array<char, 24> number{};
   std::snprintf(number.data(), number.size(), "-%02zu", index + 1);
   fs::path name = options.out;
   return name.replace_filename(options.out.stem().string() + number.data() + options.out.extension().string());
