@@ -20,10 +20,10 @@ namespace proxarm::view {
 
 // The head of a request. Headers that may stand there once are lists, so that a second one is seen.
 struct RequestHead {
-  std::string method, target;
-  std::vector<std::string> hosts, origins, cookies;
-  std::string fetch_site;  // Sec-Fetch-Site; empty: the browser sends none
-  bool upgrade = false;    // to a WebSocket
+  std::string method{}, target{};
+  std::vector<std::string> hosts{}, origins{}, cookies{};
+  std::string fetch_site{};  // Sec-Fetch-Site; empty: the browser sends none
+  bool upgrade = false;      // to a WebSocket
   bool has_body = false;
 };
 

@@ -15,7 +15,9 @@ TEST(MappedBox, HasWhatTheCycleWrites) {
     BoxCycle& entry = box.begin(1000 * k);
     entry.record.cycle = static_cast<std::uint64_t>(k);
     entry.rendered_ns = k;
-    box.add({.time_ns = 7 * k});
+    BoxFrame frame;
+    frame.time_ns = 7 * k;
+    box.add(frame);
     box.finish();
   }
   EXPECT_EQ(mapped.cycles(), 12000U);
