@@ -135,7 +135,8 @@ std::string encode_moment(const Moment& moment, std::span<const models::Pose> li
 }
 
 std::string encode_history(std::span<const double> rows) {
-  const std::array head{kind_history, static_cast<double>(rows.size() / field_names().size())};
+  const std::size_t moments = rows.size() / field_names().size();
+  const std::array head{kind_history, static_cast<double>(moments)};
   std::string bytes;
   append<double>(bytes, head);
   append<double>(bytes, rows);
