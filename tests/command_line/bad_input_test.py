@@ -82,7 +82,7 @@ class CellFile(ProgramTest):
 
     def test_a_key_that_stands_twice_is_no_choice(self):
         self.refuse("  leash_m: 0.02\n", "  leash_m: 0.02\n  leash_m: 0.03\n", "default.yaml:216", '"leash_m"', "twice",
-                    "line 209")
+                    "line 215")
 
     def test_two_drives_of_a_bus_have_two_nodes(self):
         self.refuse("node: 2", "node: 1", "default.yaml:56: drives[1].node: found 1", 'bus axes_1_3', '"axis_1"')
