@@ -205,7 +205,7 @@ void HeadlessBrowser::wait_for(const std::string& condition) {
 void HeadlessBrowser::save_picture(const fs::path& file) {
   const std::string png = decoded(command("Page.captureScreenshot", {{"format", "png"}}).at("data").get<std::string>());
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
-  out.write(png.data(), static_cast<std::streamsize>(png.size()));
+  out << png;
   out.close();
   if (!out || png.empty()) {
     throw SetupError(

@@ -81,6 +81,7 @@ McapWriter::McapWriter(const std::filesystem::path& file)
 }
 
 void McapWriter::write(std::string_view bytes) {
+  // cppcheck-suppress danglingTemporaryLifetime  // it lives until the call is over
   file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   at_ += bytes.size();
 }

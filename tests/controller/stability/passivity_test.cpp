@@ -75,14 +75,23 @@ Felt felt(double frequency_Hz, double mass_kg, double damping_Ns_per_m, double a
 }
 
 TEST(Passivity, FindsTheDampingThatTheHandFinds) {
-  for (const double frequency_Hz : {3.5, 5.0, 9.0, 20.0}) {
+  struct Swing {
+    double frequency_Hz, amplitude_m;
+  };
+  // Of forces below 20 N (rms), which would shake as no hand does.
+  for (const auto& [frequency_Hz, amplitude_m] : {Swing{3.5, 0.002}, {5.0, 0.002}, {9.0, 0.001}, {20.0, 0.0003}}) {
     for (const double damping : {-40.0, -5.0, 30.0}) {
       SCOPED_TRACE(std::to_string(frequency_Hz) + " Hz, " + std::to_string(damping) + " Ns/m");
-      const Felt found = felt(frequency_Hz, 4.0, damping, 0.002);
+      const Felt found = felt(frequency_Hz, 4.0, damping, amplitude_m);
       EXPECT_NEAR(found.damping_Ns_per_m, damping, 0.02 * std::abs(damping) + 0.2);  // 2 %: the average's own ripple
       EXPECT_EQ(found.oscillates, damping < 0.0);
     }
   }
+}
+
+TEST(Passivity, AForceThatShakesAsNoHandCanIsAnOscillationWhateverItsPower) {
+  EXPECT_TRUE(felt(12.0, 2.0, 30.0, 0.004).oscillates);   // 32 N rms
+  EXPECT_FALSE(felt(12.0, 2.0, 30.0, 0.002).oscillates);  // 16 N
 }
 
 TEST(Passivity, LetsHandsMoveByWillAndTheSmallestBe) {
