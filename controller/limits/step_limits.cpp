@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "models/geometry/linear_systems.hpp"
+#include "models/arm/held_orientation.hpp"
 
 namespace proxarm::controller {
 
@@ -15,10 +15,7 @@ using models::Vec3;
 
 namespace {
 
-// Rotations count with a length, as in the inverse kinematics. The damping keeps G finite: near a singularity a joint
-// is taken to turn by at most 1/(2λ) = 500 rad per metre, and what it turns more than that, the inverse kinematics
-// stops.
-constexpr double length_m = 0.5;
+// As of joints_per_m(): what a joint turns more than that bound near a singularity, the inverse kinematics stops.
 constexpr double damping_m_per_rad = 1e-3;
 // The share of a joint's speed that the tool's translation may use; the rest is for its rotation and the gears' twist.
 constexpr double speed_share = 0.95;
@@ -151,19 +148,12 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
 
 void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& twist_rad, const models::Jacobian& J_W,
                              StepLimits& out) const noexcept {
-  // G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0]
-  models::Jacobian J = J_W;
-  J.bottomRows<3>() *= length_m;
-  models::Mat6 A = J.lazyProduct(J.transpose());
-  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
-  Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
-  right.topRows<3>().setIdentity();
-  const Eigen::Matrix<double, 6, 3> solved = models::solve_positive_definite(A, right);
+  const models::SmallColumns3 G = models::joints_per_m(J_W);
   const double T = period_s_;
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     const Joint& joint = joints_[i];
     const auto k = static_cast<Eigen::Index>(i);
-    const Vec3 row = solved.transpose() * J.col(k);
+    const Vec3 row = G.row(k);
     const double length = row.norm();
     if (!(length > 1e-9)) continue;
     const auto bit = static_cast<std::uint8_t>(1u << i);

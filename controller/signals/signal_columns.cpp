@@ -16,16 +16,14 @@ void append_number(std::string& text, Number value) {
   text.append(digits.data(), end);
 }
 
-void append_value(std::string& row, double value) {
+template <typename Number>
+void append_value(std::string& row, Number value) {
   row += ',';
   append_number(row, value);
 }
 
 void append_triple(std::string& row, const Triple& values) {
-  for (const double value : values) {
-    row += ',';
-    append_number(row, value);
-  }
+  for (const double value : values) append_value(row, value);
 }
 
 // Nanoseconds as seconds, digit by digit: 1250000 is 0.00125.
@@ -215,22 +213,14 @@ void append_signals(std::string& row, const CycleRecord& r, std::size_t axes, bo
                                &r.contact_force_W_N, &r.normal_W}) {
     append_triple(row, *values);
   }
-  row += ',';
-  append_number(row, static_cast<int>(r.contact_count));
-  row += ',';
-  append_number(row, r.contact_object);
-  row += ',';
-  append_number(row, r.friction);
+  append_value(row, static_cast<int>(r.contact_count));
+  append_value(row, r.contact_object);
+  append_value(row, r.friction);
   append_triple(row, r.tool_W_m);
-  for (const double value : {r.proxy_clearance_m, r.tool_clearance_m}) {
-    row += ',';
-    append_number(row, value);
-  }
+  append_value(row, r.proxy_clearance_m);
+  append_value(row, r.tool_clearance_m);
   for (const auto* counts : {&r.target_counts, &r.actual_counts}) {
-    for (std::size_t axis = 0; axis < axes; ++axis) {
-      row += ',';
-      append_number(row, (*counts)[axis]);
-    }
+    for (std::size_t axis = 0; axis < axes; ++axis) append_value(row, (*counts)[axis]);
   }
   if (with_truth) {
     if (r.has(RecordFlag::truth)) {

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "controller/stability/stability.hpp"
+#include "models/arm/held_orientation.hpp"
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/geometry/eigenvalues.hpp"
-#include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -42,19 +42,6 @@ std::array<double, 5> proxy_polynomial(int order, double M, double BT, double KT
 
 // Of the arm's first mode; what a gear that is rigid rings with, far above all that a loop does.
 constexpr double ringing = 0.03, rigid_Hz = 300.0;
-// Rotations count with a length, and near a singularity joints turn by no more than 1/2λ per metre, as for the limits.
-constexpr double length_m = 0.5, damping_m_per_rad = 1e-3;
-
-// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0]
-MatrixXd joints_per_m(const models::Jacobian& J_W) {
-  MatrixXd J = J_W;
-  J.bottomRows<3>() *= length_m;
-  models::Mat6 A = J * J.transpose();
-  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
-  Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
-  right.topRows<3>().setIdentity();
-  return J.transpose() * models::solve_positive_definite(A, right);
-}
 
 }  // namespace
 
@@ -64,7 +51,7 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
   arm.kinematics(pose_rad, kinematics);
   ElasticArm out{.mass = arm.link_mass_matrix(pose_rad),
                  .jacobian = kinematics.J_W.topRows<3>(),
-                 .joints_per_m = joints_per_m(kinematics.J_W),
+                 .joints_per_m = models::joints_per_m(kinematics.J_W),
                  .stiffness = arm.gear_stiffness_Nm_per_rad(),
                  .damping = VectorXd::Zero(arm.axes())};
   if (cell.limits.setpoint_bandwidth_Hz > 0.0) out.filter_s = 1.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz);

@@ -1,0 +1,13 @@
+// How joints move where the tool keeps its orientation: G = ∂(joint angles)/∂(tool place).
+#pragma once
+
+#include "models/arm/arm.hpp"
+
+namespace proxarm::models {
+
+// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0], a row for each joint. Rotations count with a length of 0.5 m, as in the inverse
+// kinematics. The damping λ = 1e-3 m/rad keeps G finite: near a singularity a joint is taken to turn by at most
+// 1/(2λ) = 500 rad per metre. Doesn't allocate.
+SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept;
+
+}  // namespace proxarm::models
