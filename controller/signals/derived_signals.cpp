@@ -12,11 +12,8 @@ DerivedSignals SignalDeriver::derive(const CycleRecord& record) const {
   for (std::size_t i = 0; i < cell_.drives.size() && i < max_axes; ++i) {
     const description::DriveDescription& drive = cell_.drives[i];
     out.torques = out.torques || drive.mode == "cst";
-    const auto angle = [&](std::int32_t counts) {
-      return (static_cast<double>(counts) - drive.offset_counts) / drive.counts_per_rad();
-    };
-    out.target_rad[i] = angle(record.target_counts[i]);
-    out.actual_rad[i] = angle(record.actual_counts[i]);
+    out.target_rad[i] = drive.angle_rad(record.target_counts[i]);
+    out.actual_rad[i] = drive.angle_rad(record.actual_counts[i]);
     // 6071h: thousandths of the rated torque, by the sense of the counts.
     out.target_Nm[i] = 1e-3 * drive.direction * record.target_counts[i] * drive.rated_torque_Nm;
     motor[static_cast<Eigen::Index>(i)] = out.actual_rad[i];

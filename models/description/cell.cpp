@@ -415,6 +415,10 @@ double DriveDescription::counts_per_rad() const noexcept {
   return direction * counts_per_motor_revolution * gear_ratio / turn;
 }
 
+double DriveDescription::angle_rad(std::int32_t counts) const noexcept {
+  return (static_cast<double>(counts) - offset_counts) / counts_per_rad();
+}
+
 Cell load_cell(const std::filesystem::path& file) { return read_cell(YamlNode::load(file)); }
 
 Cell read_cell(const YamlNode& root) {

@@ -107,7 +107,8 @@ struct DriveDescription {
   std::optional<double> gear_damping_Nms_per_rad;  // for the stability check; none: not known
   SimulatedDrive simulation;
 
-  [[nodiscard]] double counts_per_rad() const noexcept;  // signed by `direction`
+  [[nodiscard]] double counts_per_rad() const noexcept;                // signed by `direction`
+  [[nodiscard]] double angle_rad(std::int32_t counts) const noexcept;  // of the motor, at the joint
   [[nodiscard]] bool on_can() const noexcept { return profile != "modbus"; }
 };
 

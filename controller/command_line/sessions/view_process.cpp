@@ -1,8 +1,6 @@
 #include "controller/command_line/sessions/view_process.hpp"
 
-#include <fcntl.h>
 #include <poll.h>
-#include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,11 +14,10 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "controller/command_line/entry/child_process.hpp"
 #include "controller/command_line/live/control_socket.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
 #include "models/base/setup_error.hpp"
-
-extern char** environ;
 
 namespace proxarm::command_line {
 namespace {
@@ -117,23 +114,15 @@ void ViewProcess::start(int memory) {
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
     refuse(std::strerror(errno), "a free file descriptor", "see ulimit -n");
   }
-  // Above where they are wanted, so that none is overwritten before it is copied.
-  const int high_memory = fcntl(memory, F_DUPFD_CLOEXEC, 10), high_line = fcntl(ends[1], F_DUPFD_CLOEXEC, 10);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, high_memory, memory_there);
-  posix_spawn_file_actions_adddup2(&actions, high_line, line_there);
-  // Standard output is the session's own: what reads it to its end must not wait for the view.
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  std::string name = program.string(), mode = "--live", first = std::to_string(memory_there),
-              second = std::to_string(line_there);
-  std::array<char*, 5> words{name.data(), mode.data(), first.data(), second.data(), nullptr};
-  const int failed = posix_spawn(&child_, name.c_str(), &actions, nullptr, words.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  for (const int end : {high_memory, high_line, ends[1]}) close(end);
+  const ChildProcess child =
+      start_child({program.string(), "--live", std::to_string(memory_there), std::to_string(line_there)},
+                  {memory, ends[1]}, ErrorStream::shared);
+  child_ = child.id;
+  close(ends[1]);
   line_ = ends[0];
-  if (failed != 0) refuse(name + ": " + std::strerror(failed), "a program that can be started");
+  if (child.error != 0) {
+    refuse(program.string() + ": " + std::strerror(child.error), "a program that can be started");
+  }
 }
 
 void ViewProcess::greet(const PreparedSession& session, const RunOptions& options) {

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -17,11 +16,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "controller/command_line/entry/child_process.hpp"
 #include "models/base/setup_error.hpp"
-
-extern char** environ;
 
 namespace proxarm::command_line {
 namespace {
@@ -96,27 +95,16 @@ void HeadlessBrowser::start(const fs::path& program) {
                                  "--user-data-dir=" + profile_.string(),
                                  "about:blank"};
   if (geteuid() == 0) words.insert(words.begin() + 1, "--no-sandbox");  // its sandbox needs another user than root
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
   std::array<int, 2> to{}, from{};
   if (pipe2(to.data(), O_CLOEXEC) != 0 || pipe2(from.data(), O_CLOEXEC) != 0) {
     throw SetupError({.message = std::string("no pipe to the browser: ") + std::strerror(errno)});
   }
-  const int there_in = fcntl(to[0], F_DUPFD_CLOEXEC, 10), there_out = fcntl(from[1], F_DUPFD_CLOEXEC, 10);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
-  }
-  posix_spawn_file_actions_adddup2(&actions, there_in, 3);
-  posix_spawn_file_actions_adddup2(&actions, there_out, 4);
-  const int failed = posix_spawn(&child_, program.c_str(), &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  for (const int end : {there_in, there_out, to[0], from[1]}) close(end);
+  const ChildProcess child = start_child(std::move(words), {to[0], from[1]}, ErrorStream::dropped);
+  child_ = child.id;
+  for (const int end : {to[0], from[1]}) close(end);
   to_ = to[1];
   from_ = from[0];
-  if (failed != 0) throw SetupError({.file = program.string(), .message = std::strerror(failed)});
+  if (child.error != 0) throw SetupError({.file = program.string(), .message = std::strerror(child.error)});
 }
 
 void HeadlessBrowser::attach(PictureSize size, bool dark) {

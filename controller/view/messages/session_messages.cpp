@@ -343,12 +343,9 @@ std::string joints_message(const Stage& stage, const controller::CycleRecord& re
   std::vector<double> commanded, measured;
   for (std::size_t i = 0; i < stage.cell().drives.size() && i < controller::max_axes; ++i) {
     const description::DriveDescription& drive = stage.cell().drives[i];
-    const auto angle = [&](std::int32_t counts) {
-      return (static_cast<double>(counts) - drive.offset_counts) / drive.counts_per_rad();
-    };
     names.push_back(drive.joint);
-    measured.push_back(angle(record.actual_counts[i]));
-    if (drive.mode != "cst") commanded.push_back(angle(record.target_counts[i]));
+    measured.push_back(drive.angle_rad(record.actual_counts[i]));
+    if (drive.mode != "cst") commanded.push_back(drive.angle_rad(record.target_counts[i]));
   }
   std::string text = Text(record.time_ns).add("commanded_rad", commanded).add("measured_rad", measured).end();
   text.pop_back();

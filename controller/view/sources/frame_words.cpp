@@ -61,8 +61,7 @@ std::string value_of(const MappedObject& mapped, std::int64_t value, const Drive
   std::string text = std::to_string(value);
   if (mapped.bits == 32) {
     std::array<char, 32> angle{};
-    std::snprintf(angle.data(), angle.size(), " = %.5f rad",
-                  (static_cast<double>(value) - drive.offset_counts) / drive.counts_per_rad());
+    std::snprintf(angle.data(), angle.size(), " = %.5f rad", drive.angle_rad(static_cast<std::int32_t>(value)));
     text += angle.data();
   } else if (index == 0x6071 || index == 0x6077) {
     text += " ‰";

@@ -99,9 +99,7 @@ models::JointVector Stage::joint_angles(const CycleRecord& record) const {
   bool seen = false;
   for (std::size_t i = 0; i < cell_.drives.size() && i < record.actual_counts.size(); ++i) {
     seen = seen || record.actual_counts[i] != 0;
-    motor[static_cast<Eigen::Index>(i)] =
-        (static_cast<double>(record.actual_counts[i]) - cell_.drives[i].offset_counts) /
-        cell_.drives[i].counts_per_rad();
+    motor[static_cast<Eigen::Index>(i)] = cell_.drives[i].angle_rad(record.actual_counts[i]);
   }
   return seen ? arm_.link_from_motor(motor) : arm_.start_rad();
 }
