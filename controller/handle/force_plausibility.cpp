@@ -11,7 +11,8 @@ using models::Vec3;
 constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
-constexpr double least_growth = 1.45, least_damped_growth = 1.6, most_growth = 2.1, least_time = 0.78, most_time = 1.05;
+constexpr double least_growth = 1.45, least_last_growth = 1.6, least_damped_growth = 1.6, most_growth = 2.1;
+constexpr double least_time = 0.78, most_time = 1.05;
 // A hundred times the noise of a usual sensor: below, ratios of forces say little.
 constexpr double least_force_N = 2.0;
 
@@ -34,7 +35,7 @@ bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noe
     const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
     const double lambda = (std::sqrt(B * B + 4.0 * M * stiffness) - B) / (2.0 * M);
     const double growth = s.force_N[i] / s.force_N[i - 1];
-    const double least = B > M * lambda ? least_damped_growth : least_growth;
+    const double least = B > M * lambda ? least_damped_growth : i == last ? least_last_growth : least_growth;
     if (!(growth >= least && growth <= most_growth)) return false;
     const double took = (s.time_s[i] - s.time_s[i - 1]) * lambda / std::log(2.0);
     if (took < least_time || took > most_time) return false;

@@ -5,7 +5,9 @@
 // distance grow as e^λt, together. So each time the proxy has gone twice as far from where it rested (0.5, 1, 2 … 64
 // mm), for four doublings in a row
 //   the force has grown by a factor of 1.45 to 2.1  (2 for e^λt, less for a bias on top; 2^(n/(n+2)) for a hand's force
-//     that begins as tⁿ: 1.26 as it begins to accelerate the arm, and less later; more for one that the arm yields to)
+//     that begins as tⁿ: 1.26 as it begins to accelerate the arm, and less later; more for one that the arm yields to).
+//     The last of the four 1.6: as a bias counts less and less it comes near 2, and a hand that sets out without a jerk
+//     (n = 3) stays at 1.52
 //     Where damping takes most of the force (B > M λ, as the passivity damping can) 1.6: such a hand's is 2^(n/(n+1)),
 //     1.41 for n = 1 and 1.59 for n = 2. Behind some 800 Ns/m a force that is the wrong way round isn't told from it
 //   the doubling has taken 0.78 to 1.05 of ln 2/λ, with λ > 0 of M λ² + B λ = F/x   (1 for e^λt)

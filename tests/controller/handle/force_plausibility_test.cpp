@@ -79,6 +79,22 @@ TEST(ReversedForce, IsNoneThatAHandMakesHoweverItBegins) { expect_no_hand_is_rev
 // A soak's session: behind a passivity damping of 836 Ns/m a hand of 449 N/m led 6 kg, its force grew by 1.47 to 1.54.
 TEST(ReversedForce, IsNoneThatAHandMakesAgainstDamping) { expect_no_hand_is_reversed(12, 10.0, 2000.0); }
 
+// A soak's session: 281 N/m led 10 kg out of rest. The force of minimum jerk begins as t³, whatever takes hold: it
+// grows by 2^(3/5) = 1.52 each time the way has doubled.
+TEST(ReversedForce, IsNoneThatSetsOutAsTheCubeOfTime) {
+  for (const double rate_N_per_s3 : {30.0, 300.0, 1000.0, 5000.0}) {
+    for (const double mass_kg : {2.0, 4.0, 10.0}) {
+      Moved arm(mass_kg);
+      ReversedForce reversed;
+      for (int k = 0; arm.q.norm() < 0.1; ++k) {
+        const double t = k * T;
+        ASSERT_FALSE(reversed.step(arm.under(Vec3(rate_N_per_s3 * t * t * t, 0.0, 0.0))))
+            << rate_N_per_s3 << " N/s³, " << mass_kg << " kg, " << arm.q.norm() << " m";
+      }
+    }
+  }
+}
+
 TEST(ReversedForce, IsFoundBehindDampingToo) {
   for (const double damping : {20.0, 100.0}) {
     Moved arm(4.0);
