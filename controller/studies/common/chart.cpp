@@ -74,6 +74,17 @@ void place(std::ostream& gp, std::size_t index, int columns, std::size_t count, 
   gp << "set origin " << left << "," << bottom << "\nset size " << width << "," << height << "\n";
 }
 
+// Names below an axis that counts; none: numbers.
+void name_places(std::ostream& gp, const std::vector<std::string>& names) {
+  if (names.empty()) {
+    gp << "set xtics auto\n";
+    return;
+  }
+  gp << "set xtics (";
+  for (std::size_t i = 0; i < names.size(); ++i) gp << (i == 0 ? "" : ", ") << plain(names[i]) << " " << i;
+  gp << ")\nset xrange [-0.5:" << static_cast<double>(names.size()) - 0.5 << "]\n";
+}
+
 }  // namespace
 
 std::string draw(const Chart& chart, const std::filesystem::path& svg) {
@@ -98,6 +109,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
     // Many decades: every other one is labelled.
     gp << (panel.log_y && panel.y_low > 0.0 && panel.y_high / panel.y_low > 1e6 ? "set ytics 100\n"
                                                                                 : "set ytics auto\n");
+    name_places(gp, panel.x_names);
     gp << "set title " << plain(panel.title) << "\nset xlabel " << plain(panel.x_label) << "\nset ylabel "
        << plain(panel.y_label) << "\n";
     if (chart.common_key && i == 0) {

@@ -23,6 +23,7 @@ struct Panel {
   bool key = true;
   double x_low = 0.0, x_high = 0.0;  // equal: as the data are
   double y_low = 0.0, y_high = 0.0;
+  std::vector<std::string> x_names{};  // x counts these, from 0
 };
 
 struct Chart {

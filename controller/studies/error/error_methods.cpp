@@ -18,65 +18,39 @@ using models::Vec3;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Numbers of steps of a motion, from coarse to fine with all ratios between, so that impacts fall anywhere within a
-// step. With at most `instants` steps, each step ends at an instant.
-std::vector<int> step_counts(bool quick) {
-  std::vector<int> counts{4, 5, 6, 10, 12, 15, 20, 30};
+// Numbers of steps of a motion, from coarse to fine; one of them makes steps of 1 ms. With at most `instants` steps,
+// each step ends at an instant.
+std::vector<int> step_counts(const ErrorCase& which, bool quick) {
+  std::vector<int> counts{4, 5, 6, 10, 12, 15, 20, 30, static_cast<int>(std::lround(which.duration_s / 1e-3))};
   for (const int per_instant : {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256}) {
     if (!quick || per_instant <= 32) counts.push_back(instants * per_instant);
   }
+  std::sort(counts.begin(), counts.end());
+  counts.erase(std::unique(counts.begin(), counts.end()), counts.end());
   return counts;
 }
 
-// The world as springs, dampers and friction dampers: what stands for ℳ in the penalty methods.
-class PenaltyWorld {
- public:
-  PenaltyWorld(const ErrorCase& which, const Tuning& tuning)
-      : mu_(which.friction), medium_(which.medium_Ns_per_m), k_(tuning.stiffness_N_per_m) {
-    for (const CaseSurface& surface : which.surfaces) obstacles_.push_back(obstacle_of(surface, 0.0));
-    const double critical = 2.0 * std::sqrt(k_ * which.mass_kg);
-    c_ = tuning.damping_ratio * critical;
-    c_t_ = tuning.friction_slope * critical;
-  }
+// At how many places within a step the motion begins. Fine steps, which take the longest, differ less by it.
+int phase_count(int steps, bool quick) {
+  if (quick) return 5;
+  return steps <= 1920 ? 50 : 10;
+}
 
-  Vec3 operator()(const Vec3& q, const Vec3& v) const noexcept {
-    Vec3 f = Vec3::Zero();
-    for (const auto& obstacle : obstacles_) {
-      const double height = obstacle->distance(q);
-      if (height >= 0.0) continue;
-      const Vec3 n = obstacle->tangent(q, 0).surface.normal();
-      const double v_n = n.dot(v), f_n = std::max(0.0, -k_ * height - c_ * v_n);
-      f += f_n * n;
-      if (mu_ > 0.0) {
-        const Vec3 v_t = v - v_n * n;
-        const double speed = v_t.norm();
-        f -= (c_t_ * speed <= mu_ * f_n ? c_t_ : mu_ * f_n / speed) * v_t;
-      }
-    }
-    if (medium_ > 0.0 && q.x() > 0.0) f -= medium_ * v;
-    return f;
-  }
-
- private:
-  std::vector<std::unique_ptr<models::Obstacle>> obstacles_;
-  double mu_, medium_, k_, c_ = 0.0, c_t_ = 0.0;
-};
-
-// A method under study: a state at time t, and step() to the next sample.
+// A method under study: a state at time t, from t_0 on, and step() to the next sample.
 class Ours {
  public:
-  Ours(const ErrorCase& which, Method method, double T)
+  Ours(const ErrorCase& which, Method method, double T, double t_0)
       : case_(which),
         world_(which.world()),
         proxy_(config(which, method, T), *world_),
         first_(method == order_1),
         T_(T) {
-    const CaseState start = which.exact(0.0);
-    const Vec3 h = which.force(0.0, start.q, start.v);
+    const CaseState start = which.exact(t_0);
+    const Vec3 h = which.force(t_0, start.q, start.v);
     proxy_.start({.q = start.q,
                   .v = start.v,
                   .a = (h + start.f) / which.mass_kg,
-                  .time_s = 0.0,
+                  .time_s = t_0,
                   .contact_established = which.starts_in_contact});
     v_ = start.v;
   }
@@ -110,31 +84,33 @@ class Ours {
 
 class Penalty {
  public:
-  Penalty(const ErrorCase& which, Method method, double T, const Tuning& tuning)
-      : case_(which), world_(which, tuning), method_(method), M_(which.mass_kg), T_(T) {
-    const CaseState start = which.exact(0.0);
+  Penalty(const ErrorCase& which, Method method, double T, double t_0, const Tuning& tuning)
+      : case_(which), world_(which, tuning), method_(method), staggered_(tuning.staggered), M_(which.mass_kg), T_(T) {
+    const CaseState start = which.exact(t_0);
     q_ = start.q;
-    v_ = start.v;
+    v_ = now_ = start.v;
+    if (staggered_) v_ -= 0.5 * T / M_ * (which.force(t_0, q_, v_) + start.f);
   }
   void step(double t) noexcept {
-    const Vec3 h = case_.force(t, q_, v_);
+    const Vec3 h = case_.force(t, q_, now_), before = v_;
     if (method_ == penalty_rk4) {
       runge_kutta(h);
     } else if (method_ == penalty_implicit) {
       implicit_euler(h);
     } else {
-      v_ += T_ / M_ * (h + world_(q_, v_));
+      v_ += T_ / M_ * (h + world_.force(q_, v_));
       q_ += T_ * v_;
     }
+    now_ = staggered_ ? Vec3(1.5 * v_ - 0.5 * before) : v_;
   }
   [[nodiscard]] const Vec3& q() const noexcept { return q_; }
-  [[nodiscard]] Vec3 f() const noexcept { return world_(q_, v_); }
+  [[nodiscard]] Vec3 f() const noexcept { return world_.force(q_, v_); }
   [[nodiscard]] const Vec3& v() const noexcept { return v_; }
-  [[nodiscard]] static double v_label_s(double t) noexcept { return t; }
+  [[nodiscard]] double v_label_s(double t) const noexcept { return staggered_ ? t - 0.5 * T_ : t; }
 
  private:
   void runge_kutta(const Vec3& h) noexcept {
-    const auto a = [&](const Vec3& q, const Vec3& v) -> Vec3 { return (h + world_(q, v)) / M_; };
+    const auto a = [&](const Vec3& q, const Vec3& v) -> Vec3 { return (h + world_.force(q, v)) / M_; };
     const Vec3 v1 = v_, a1 = a(q_, v_);
     const Vec3 v2 = v_ + 0.5 * T_ * a1, a2 = a(q_ + 0.5 * T_ * v1, v2);
     const Vec3 v3 = v_ + 0.5 * T_ * a2, a3 = a(q_ + 0.5 * T_ * v2, v3);
@@ -143,19 +119,14 @@ class Penalty {
     v_ += T_ / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
   }
 
-  // v' = v + T (h + f(q + T v', v'))/M by Newton's method, its Jacobian by differences.
+  // v' = v + T (h + f(q + T v', v'))/M by Newton's method.
   void implicit_euler(const Vec3& h) noexcept {
     Vec3 next = v_;
-    const auto residual = [&](const Vec3& v) -> Vec3 { return v - v_ - T_ / M_ * (h + world_(q_ + T_ * v, v)); };
+    Mat3 slope;
     for (int i = 0; i < 12; ++i) {
-      const Vec3 r = residual(next);
+      const Vec3 r = next - v_ - T_ / M_ * (h + world_.force(q_, T_, next, slope));
       if (r.norm() <= 1e-13 * (1.0 + next.norm())) break;
-      Mat3 J;
-      for (int axis = 0; axis < 3; ++axis) {
-        constexpr double d = 1e-8;
-        J.col(axis) = (residual(next + d * Vec3::Unit(axis)) - r) / d;
-      }
-      next -= J.inverse() * r;
+      next -= (Mat3::Identity() - T_ / M_ * slope).inverse() * r;
     }
     v_ = next;
     q_ += T_ * v_;
@@ -164,20 +135,23 @@ class Penalty {
   const ErrorCase& case_;
   PenaltyWorld world_;
   Method method_;
+  bool staggered_;
   double M_, T_;
   Vec3 q_, v_;
+  Vec3 now_;  // the velocity at the time of q_
 };
 
+// Of a run that begins at t_0.
 template <typename Stepper>
-Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps) {
+Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps, double t_0) {
   const int per_instant = std::max(1, steps / instants), compared = steps / per_instant;
   const double T = which.duration_s / steps, M = which.mass_kg;
   Errors errors;
   double sum_q = 0.0, sum_v = 0.0, rest_s = -1.0, top_speed = 1e-300;
   int counted_v = 0;
   for (int k = 0; k < steps; ++k) {
-    stepper.step(k * T);
-    const double t = (k + 1) * T, speed = stepper.v().norm();
+    stepper.step(t_0 + k * T);
+    const double t = t_0 + (k + 1) * T, speed = stepper.v().norm();
     top_speed = std::max(top_speed, speed);
     if (speed > 1e-3 * top_speed) {
       rest_s = -1.0;
@@ -193,7 +167,7 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps) {
       ++counted_v;
     }
   }
-  const double end = which.duration_s;
+  const double end = t_0 + which.duration_s;
   const CaseState exact = which.exact(end);
   errors.position_m = std::sqrt(sum_q / compared);
   errors.velocity_m_per_s = std::sqrt(sum_v / std::max(1, counted_v));
@@ -204,45 +178,85 @@ Errors errors_of(const ErrorCase& which, Stepper& stepper, int steps) {
   return errors;
 }
 
+double ns_per_step(auto& stepper, double T, int steps) {
+  const auto begun = std::chrono::steady_clock::now();
+  for (int k = 0; k < steps; ++k) stepper.step(k * T);
+  const double ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begun).count();
+  // Never, but what is stepped has to be looked at.
+  return std::isnan(stepper.q().x()) ? infinity : ns / steps;
+}
+
+// Short rounds, a step of (26) and one of the method in turn: what else the machine does meets both.
 template <typename Make>
-double step_time_ns(const ErrorCase& which, Make make, int steps) {
-  double best = infinity;
+void time_steps(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   const double T = which.duration_s / steps;
-  double sink = 0.0;
-  for (int round = 0; round < 15; ++round) {  // short rounds: on a busy machine most are still undisturbed
-    auto stepper = make(T);
-    const auto begun = std::chrono::steady_clock::now();
-    for (int k = 0; k < steps; ++k) stepper.step(k * T);
-    const double ns = std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begun).count();
-    best = std::min(best, ns / steps);
-    sink += stepper.q().x();
+  std::vector<double> shares;
+  run.reference_ns = infinity;
+  for (int round = 0; round < 15; ++round) {
+    Ours reference(which, order_1, T, 0.0);
+    auto stepper = make(T, 0.0);
+    const double reference_ns = ns_per_step(reference, T, steps);
+    shares.push_back(ns_per_step(stepper, T, steps) / reference_ns);
+    run.reference_ns = std::min(run.reference_ns, reference_ns);
   }
-  return std::isnan(sink) ? best * (1.0 + 1e-15) : best;
+  run.of_reference = Spread::of(shares);
+}
+
+double median(const std::vector<Errors>& list, double Errors::*member) {
+  std::vector<double> values;
+  for (const Errors& errors : list) values.push_back(errors.*member);
+  return Spread::of(values).median;
 }
 
 template <typename Make>
 std::vector<MethodRun> runs(const ErrorCase& which, bool quick, Make make) {
   std::vector<MethodRun> list;
-  const double ns = step_time_ns(which, make, quick ? 500 : 2000);
-  for (const int steps : step_counts(quick)) {
-    const double T = which.duration_s / steps;
-    auto stepper = make(T);
-    list.push_back({steps, T, ns, errors_of(which, stepper, steps)});
+  MethodRun run;
+  time_steps(which, make, quick ? 500 : 2000, run);
+  for (const int steps : step_counts(which, quick)) {
+    run.steps = steps;
+    run.period_s = which.duration_s / steps;
+    const int phases = phase_count(steps, quick);
+    std::vector<Errors> errors;
+    std::vector<double> positions;
+    for (int i = 0; i < phases; ++i) {
+      const double t_0 = run.period_s * (i + 0.5) / phases;
+      auto stepper = make(run.period_s, t_0);
+      errors.push_back(errors_of(which, stepper, steps, t_0));
+      positions.push_back(errors.back().position_m);
+    }
+    run.position_m = Spread::of(positions);
+    run.errors = {run.position_m.median, median(errors, &Errors::velocity_m_per_s), median(errors, &Errors::force_N),
+                  median(errors, &Errors::energy_J), median(errors, &Errors::stop_s)};
+    list.push_back(run);
   }
   return list;
 }
 
 }  // namespace
 
+// The nearest of the values, so that it is one that was found, infinity among them.
+Spread Spread::of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const auto at = [&](double share) {
+    return values[static_cast<std::size_t>(std::lround(share * static_cast<double>(values.size() - 1)))];
+  };
+  return {at(0.1), at(0.5), at(0.9)};
+}
+
 std::vector<Tuning> tunings(const ErrorCase& which, Method method, bool quick) {
   if (method <= order_2) return {Tuning{}};
-  if (which.surfaces.empty()) return {Tuning{1e5, 0.0, 1.0}};  // nothing to tune
+  const bool may_stagger = method == penalty_euler || method == penalty_implicit;
+  const std::vector<bool> starts = may_stagger ? std::vector{false, true} : std::vector{false};
+  const bool walls = !which.surfaces.empty(), rubs = which.friction > 0.0;
+  const std::vector<double> ratios = method == ros || !walls ? std::vector{0.0} : std::vector{0.0, 0.3, 1.0};
+  const std::vector<double> slopes = rubs ? std::vector{0.3, 1.0, 3.0} : std::vector{1.0};
+  const double finest = quick ? 1.0 : 0.5, first = walls ? 3.0 : 5.0, last = walls ? 7.01 : 5.0;
   std::vector<Tuning> list;
-  const double finest = quick ? 1.0 : 0.5;
-  for (double decade = 3.0; decade <= 7.01; decade += finest) {
-    for (const double ratio : method == ros ? std::vector<double>{0.0} : std::vector<double>{0.0, 0.3, 1.0}) {
-      for (const double slope : which.friction > 0.0 ? std::vector<double>{0.3, 1.0, 3.0} : std::vector<double>{1.0}) {
-        list.push_back({std::pow(10.0, decade), ratio, slope});
+  for (double decade = first; decade <= last; decade += finest) {
+    for (const double ratio : ratios) {
+      for (const double slope : slopes) {
+        for (const bool staggered : starts) list.push_back({std::pow(10.0, decade), ratio, slope, staggered});
       }
     }
   }
@@ -250,8 +264,8 @@ std::vector<Tuning> tunings(const ErrorCase& which, Method method, bool quick) {
 }
 
 std::vector<MethodRun> run_method(const ErrorCase& which, Method method, const Tuning& tuning, bool quick) {
-  if (method <= order_2) return runs(which, quick, [&](double T) { return Ours(which, method, T); });
-  return runs(which, quick, [&](double T) { return Penalty(which, method, T, tuning); });
+  if (method <= order_2) return runs(which, quick, [&](double T, double t_0) { return Ours(which, method, T, t_0); });
+  return runs(which, quick, [&](double T, double t_0) { return Penalty(which, method, T, t_0, tuning); });
 }
 
 }  // namespace proxarm::studies

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/studies/error/error_cases.hpp"
+#include "controller/studies/error/penalty_world.hpp"
 
 namespace proxarm::studies {
 
@@ -16,13 +17,6 @@ inline constexpr std::array<const char*, method_count> method_names{
 // Instants of a motion at which positions are compared.
 inline constexpr int instants = 60;
 
-// The parameters of a penalty method.
-struct Tuning {
-  double stiffness_N_per_m = 0.0, damping_ratio = 0.0, friction_slope = 1.0;
-
-  bool operator==(const Tuning&) const = default;
-};
-
 // All that a method is tried with on a case.
 std::vector<Tuning> tunings(const ErrorCase& which, Method method, bool quick);
 
@@ -30,11 +24,21 @@ struct Errors {
   double position_m = 0.0, velocity_m_per_s = 0.0, force_N = 0.0, energy_J = 0.0, stop_s = 0.0;
 };
 
+// What a number came to in many trials: the median, and what a tenth and nine tenths of them stay below.
+struct Spread {
+  double low = 0.0, median = 0.0, high = 0.0;
+
+  static Spread of(std::vector<double> values);
+};
+
+// Runs with one timestep, over all phases: where events fall within a step.
 struct MethodRun {
   int steps = 0;
   double period_s = 0.0;
-  double step_ns = 0.0;  // processor time of a step, best of fifteen
-  Errors errors;
+  Errors errors;              // the medians
+  Spread position_m;          // of the position error
+  double reference_ns = 0.0;  // processor time of a step of (26)
+  Spread of_reference;        // that of the method's step as a share of it, measured in turn
 };
 
 // Runs of one method with one tuning, from coarse timesteps to fine ones.

@@ -17,33 +17,46 @@ std::vector<double> targets() {
   return list;
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  const std::size_t n = values.size();
-  return n % 2 == 1 ? values[n / 2] : 0.5 * (values[n / 2 - 1] + values[n / 2]);
+// The run with the least run time for that error; nullptr where none reaches it.
+const Runs* cheapest(const std::vector<const Runs*>& list, double target) {
+  const Runs* best = nullptr;
+  for (const Runs* runs : list) {
+    if (std::isfinite(runs->cost(target)) && (best == nullptr || runs->cost(target) < best->cost(target))) best = runs;
+  }
+  return best;
 }
 
-template <typename Cost>
-double speedup(const Runs& ours, Cost rival_cost) {
-  std::vector<double> ratios;
+Spread speedup(const Runs& ours, const std::vector<const Runs*>& rivals) {
+  std::vector<double> low, middle, high;
   for (const double target : targets()) {
-    const double rival = rival_cost(target), own = ours.cost(target);
-    if (std::isfinite(rival) && std::isfinite(own)) ratios.push_back(rival / own);
+    const Runs* rival = cheapest(rivals, target);
+    const double own = ours.cost(target);
+    if (rival == nullptr || !std::isfinite(own)) continue;
+    const double ratio = rival->cost(target) / own;
+    middle.push_back(ratio);
+    low.push_back(ratio * rival->timing_low / ours.timing_high);
+    high.push_back(ratio * rival->timing_high / ours.timing_low);
   }
-  return median(ratios);
+  if (middle.empty()) return {};
+  return {Spread::of(low).median, Spread::of(middle).median, Spread::of(high).median};
+}
+
+std::vector<const Runs*> penalties(const std::vector<Runs>& list) {
+  std::vector<const Runs*> found;
+  for (const Runs& runs : list) {
+    if (is_penalty(runs)) found.push_back(&runs);
+  }
+  return found;
 }
 
 double tuned_cost(const std::vector<Runs>& list, double target) {
-  double least = infinity;
-  for (const Runs& runs : list) {
-    if (is_penalty(runs)) least = std::min(least, runs.cost(target));
-  }
-  return least;
+  const Runs* best = cheapest(penalties(list), target);
+  return best == nullptr ? infinity : best->cost(target);
 }
 
 bool matches(const Fixed& fixed, const Runs& runs) {
   if (runs.method != fixed.method) return false;
+  if (runs.tuning.staggered != fixed.tuning.staggered) return false;
   // Cases without friction or surfaces have less to tune.
   const bool k = runs.tuning.stiffness_N_per_m == fixed.tuning.stiffness_N_per_m,
              c = runs.tuning.damping_ratio == fixed.tuning.damping_ratio;
@@ -52,35 +65,46 @@ bool matches(const Fixed& fixed, const Runs& runs) {
 
 }  // namespace
 
-double Runs::envelope(std::size_t i) const {
-  double most = error[i];
-  for (std::size_t j = i; j < T.size() && T[j] > 0.499 * T[i]; ++j) most = std::max(most, error[j]);
-  return most;
-}
-
 double Runs::cost(double target) const {
   double least = infinity;
-  for (std::size_t i = 0; i < T.size(); ++i) {
-    if (envelope(i) <= target) least = std::min(least, cost_ns[i]);
-  }
+  for (std::size_t i = T.size(); i-- > 0 && error[i].high <= target;) least = std::min(least, cost_ns[i]);
   return least;
 }
 
+std::size_t Runs::at_1_ms() const {
+  for (std::size_t i = 0; i < T.size(); ++i) {
+    if (std::abs(T[i] - 1e-3) < 1e-9) return i;
+  }
+  throw std::out_of_range("no run with steps of 1 ms of " + method);
+}
+
+// A step's time is its share of that of (26), which was measured in turn with it, times the least that one took.
 RunsByCase collect(const Table& table) {
   RunsByCase all;
-  const std::size_t name = table.column("case"), method = table.column("method"), k = table.column("stiffness_N_per_m"),
-                    ratio = table.column("damping_ratio"), slope = table.column("friction_slope"),
-                    T = table.column("period_s"), steps = table.column("steps"),
-                    error = table.column("position_error_m"), cost = table.column("run_time_ns");
+  std::map<std::string, double> reference_ns;
+  const auto column = [&table](const char* name) { return table.column(name); };
+  const std::size_t name = column("case"), ns = column("reference_step_ns");
   for (std::size_t row = 0; row < table.rows(); ++row) {
+    double& least = reference_ns.emplace(table.text(row, name), infinity).first->second;
+    least = std::min(least, table.number(row, ns));
+  }
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const auto number = [&](const char* key) { return table.number(row, column(key)); };
     std::vector<Runs>& list = all[table.text(row, name)];
-    const Tuning tuning{table.number(row, k), table.number(row, ratio), table.number(row, slope)};
-    const bool same = !list.empty() && list.back().method == table.text(row, method) && list.back().tuning == tuning;
-    if (!same) list.push_back({table.text(row, method), tuning, {}, {}, {}, {}});
-    list.back().T.push_back(table.number(row, T));
-    list.back().steps.push_back(table.number(row, steps));
-    list.back().error.push_back(table.number(row, error));
-    list.back().cost_ns.push_back(table.number(row, cost));
+    const Tuning tuning{number("stiffness_N_per_m"), number("damping_ratio"), number("friction_slope"),
+                        number("staggered") != 0.0};
+    const std::string& method = table.text(row, column("method"));
+    if (list.empty() || list.back().method != method || !(list.back().tuning == tuning)) {
+      list.push_back({.method = method, .tuning = tuning});
+    }
+    Runs& runs = list.back();
+    const double share = number("of_reference");
+    runs.timing_low = number("of_reference_low") / share;
+    runs.timing_high = number("of_reference_high") / share;
+    runs.T.push_back(number("period_s"));
+    runs.steps.push_back(number("steps"));
+    runs.error.push_back({number("position_error_low_m"), number("position_error_m"), number("position_error_high_m")});
+    runs.cost_ns.push_back(number("steps") * share * reference_ns[table.text(row, name)]);
   }
   return all;
 }
@@ -134,18 +158,16 @@ const Runs& best_tuned(const std::vector<Runs>& list) {
   return *best;
 }
 
-double speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals) {
-  return speedup(ours, [&rivals](double target) { return tuned_cost(rivals, target); });
+Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals) {
+  return speedup(ours, penalties(rivals));
 }
 
-double speedup_over(const Runs& ours, const Runs& rival) {
-  return speedup(ours, [&rival](double target) { return rival.cost(target); });
-}
+Spread speedup_over(const Runs& ours, const Runs& rival) { return speedup(ours, {&rival}); }
 
 Fit fit_order(const Runs& runs) {
   std::vector<double> x, y;
   for (std::size_t i = 0; i < runs.T.size(); ++i) {
-    const double e = runs.envelope(i);
+    const double e = runs.error[i].median;
     if (runs.steps[i] < 4 * instants || !(e > 1e-11) || !std::isfinite(e)) continue;
     x.push_back(std::log10(runs.T[i]));
     y.push_back(std::log10(e));

@@ -12,14 +12,18 @@ namespace proxarm::studies {
 
 // The runs of one method with one tuning, from coarse to fine.
 struct Runs {
-  std::string method;
+  std::string method{};
   Tuning tuning;
-  std::vector<double> T, steps, error, cost_ns;
+  std::vector<double> T{}, steps{};
+  std::vector<Spread> error{};
+  std::vector<double> cost_ns{};
+  double timing_low = 1.0, timing_high = 1.0;  // marks of a tenth and nine tenths of the step times, by their median
 
-  // The largest error among this timestep and those up to twofold finer.
-  [[nodiscard]] double envelope(std::size_t i) const;
-  // Run time for an error of at most `target`; infinite where none is that good.
+  // Run time for an error that nine of ten phases keep below `target`, with that timestep and all finer ones; infinite
+  // where none is that good.
   [[nodiscard]] double cost(double target) const;
+  // The run with steps of 1 ms. Throws std::out_of_range where there is none.
+  [[nodiscard]] std::size_t at_1_ms() const;
 };
 
 using RunsByCase = std::map<std::string, std::vector<Runs>>;
@@ -33,7 +37,7 @@ const Runs& runs_of(const std::vector<Runs>& list, const std::string& method);
 
 // A penalty method with one tuning for all cases.
 struct Fixed {
-  std::string method;
+  std::string method{};
   Tuning tuning;
 };
 
@@ -48,9 +52,9 @@ const Runs* fixed_runs(const std::vector<Runs>& list, const Fixed& fixed);
 const Runs& best_tuned(const std::vector<Runs>& list);
 
 // The other methods' run time over ours at equal error, median over the errors that both reach: whatever is best for
-// that error, or one method alone.
-double speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
-double speedup_over(const Runs& ours, const Runs& rival);
+// that error, or one method alone. Low and high: the same with what the step times scatter by against and for us.
+Spread speedup_over_tuned(const Runs& ours, const std::vector<Runs>& rivals);
+Spread speedup_over(const Runs& ours, const Runs& rival);
 
 // Slope of log error over log T, where the error is above rounding, and the rms of what is left, in decades.
 struct Fit {

@@ -1,0 +1,43 @@
+// The world as springs, dampers and friction dampers: what stands for ℳ in the penalty methods of the error study.
+//
+// A wall pushes by its depth and by the speed into it, and never pulls; friction is a damper up to μ f_n. Distances,
+// normals and derivatives are those of the plane or sphere itself, in closed form: nothing is asked that such a method
+// could do without.
+#pragma once
+
+#include <vector>
+
+#include "controller/studies/error/error_cases.hpp"
+
+namespace proxarm::studies {
+
+// The parameters of a penalty method.
+struct Tuning {
+  double stiffness_N_per_m = 0.0, damping_ratio = 0.0, friction_slope = 1.0;
+  // The velocity begins half a step before the position, as leapfrog has it.
+  bool staggered = false;
+
+  bool operator==(const Tuning&) const = default;
+};
+
+class PenaltyWorld {
+ public:
+  PenaltyWorld(const ErrorCase& which, const Tuning& tuning);
+
+  // The force on the tool at q with velocity v.
+  [[nodiscard]] models::Vec3 force(const models::Vec3& q, const models::Vec3& v) const noexcept;
+
+  // The force at q₀ + T v with velocity v, and its derivative by v.
+  [[nodiscard]] models::Vec3 force(const models::Vec3& q_0, double T, const models::Vec3& v,
+                                   models::Mat3& slope) const noexcept;
+
+ private:
+  struct Touch;
+  [[nodiscard]] static Touch touch(const CaseSurface& surface, const models::Vec3& q) noexcept;
+  void press(const Touch& at, double T, const models::Vec3& v, models::Vec3& f, models::Mat3* slope) const noexcept;
+
+  std::vector<CaseSurface> surfaces_;
+  double mu_, medium_, k_, c_ = 0.0, c_t_ = 0.0;
+};
+
+}  // namespace proxarm::studies
