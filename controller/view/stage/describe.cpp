@@ -159,7 +159,7 @@ void put_limits(JsonText& json, const description::CellLimits& limits) {
   json.end();
 }
 
-void put_words(JsonText& json) {
+void put_words(JsonText& json, bool arm_alone) {
   json.begin_object().name("flags").begin_list();
   for (const FlagWords& flag : flag_words()) {
     json.begin_object().add("bit", static_cast<std::uint32_t>(flag.flag)).add("name", flag.name);
@@ -168,7 +168,8 @@ void put_words(JsonText& json) {
   json.end().name("phases").begin_list();
   for (std::size_t i = 0; i < controller::phase_count; ++i) {
     const auto phase = static_cast<controller::Phase>(i);
-    json.begin_object().add("name", controller::phase_name(phase)).add("words", phase_words(phase)).end();
+    const PhaseWords words = arm_alone ? drive_words(phase) : phase_words(phase);
+    json.begin_object().add("name", words.name).add("words", words.words).end();
   }
   json.end().name("contacts").begin_list();
   for (const auto contact :
@@ -200,7 +201,7 @@ std::string Stage::describe() const {
   put_tool(json.name("tool"), cell_, tree_);
   put_scene(json.name("scene"), scene_, compiled_);
   put_limits(json.name("limits"), cell_.limits);
-  put_words(json.name("words"));
+  put_words(json.name("words"), options_.arm_alone);
   json.name("notes").begin_list();
   for (const std::string& note : tree_.notes()) json.value(note);
   json.end().name("settings").begin_object();
