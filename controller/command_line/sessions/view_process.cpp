@@ -140,9 +140,9 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
 
 void ViewProcess::show_end(int exit_status) {
   if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
-  std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   std::atomic<bool> asked{false};
-  SignalWatch signals([&] { asked.store(true); });
+  SignalWatch signals([&] { asked.store(true); });  // before it is offered
+  std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   while (!asked.load() && waitpid(child_, nullptr, WNOHANG) == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
