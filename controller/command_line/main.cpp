@@ -167,12 +167,8 @@ void leave_out(CLI::App& app, std::initializer_list<const char*> options) {
   for (const char* option : options) app.remove_option(app.get_option(option));
 }
 
-void add_view_options(CLI::App& app, RunOptions& options) {
-  app.add_flag("--view", options.view,
-               "show the session in a browser, at an address on this machine that is printed; virtual time keeps pace "
-               "with the clock then, and what is shown stays until Ctrl-C");
-  app.add_flag("--view-control", options.view_control,
-               "the same, and let it be changed there, as `proxarm set` and `proxarm hold` do");
+void add_view_options(CLI::App& app, RunOptions& options, const char* what) {
+  app.add_flag("--view", options.view, what);
   app.add_option(
          "--view-port",
          whole_number("--view-port",
@@ -245,7 +241,11 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--plot", options.plot_file, "write the plot to this SVG file")->type_name("FILE");
   app.add_flag_callback(
       "--no-plot", [&] { options.plot = false; }, "draw no plot");
-  add_view_options(app, options);
+  add_view_options(app, options,
+                   "show the session in a browser, at an address on this machine that is printed; virtual time keeps "
+                   "pace with the clock then, and what is shown stays until Ctrl-C");
+  app.add_flag("--view-control", options.view_control,
+               "the same, and let it be changed there, as `proxarm set` and `proxarm hold` do");
   app.add_flag("--json", options.json, "print the summary as one JSON object");
   app.add_flag("--force-unstable", options.force_unstable,
                "simulation only: run with a mass that is predicted unstable");
@@ -318,6 +318,9 @@ class Commands {
     leave_out(*sim, {"--lookahead"});
     add_fault_option(*sim, sim_);
     add_enabling_option(*sim, sim_);
+    add_view_options(*sim, sim_,
+                     "show the arm in a browser, at an address on this machine that is printed: with drives, hand and "
+                     "the load on the sensor, as its own process knows them, and the scene that --scene names");
   }
 
   void add_bus() {

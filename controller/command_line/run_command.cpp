@@ -52,12 +52,7 @@ void refuse_view(const PreparedSession& session, const RunOptions& options) {
                                    .found = "the impedance type",
                                    .expected = "--scheme admittance, or --view, which only looks"});
   }
-  if (options.view) return;
-  if (options.view_port != 0 || !options.allowed_origins.empty()) {
-    throw description::SetupError({.key = options.view_port != 0 ? "--view-port" : "--allow-origin",
-                                   .found = "no view",
-                                   .expected = "--view with it"});
-  }
+  require_view(options);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sim_view.hpp"
 #include "fieldbus/can/socket_can_network.hpp"
 #include "models/base/setup_error.hpp"
 #include "sim/cell/far_end_process.hpp"
@@ -24,6 +25,9 @@ int sim_command(const RunOptions& options) {
   }
   const PreparedSession session = prepare(options);
   require_enabling_switch(session, options);
+  require_view(options);
+  std::unique_ptr<SimView> view;
+  if (options.view) view = std::make_unique<SimView>(session, options);
   std::atomic<bool> stop{false};
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
@@ -40,6 +44,7 @@ int sim_command(const RunOptions& options) {
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));
   }
+  if (view) view->watch(process.cell());
   SignalWatch signals([&] { stop.store(true); });
   std::fprintf(stderr, "proxarm sim: %s on the wire; Ctrl-C ends it\n", session.cell.name.c_str());
   process.run(stop);

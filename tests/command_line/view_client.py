@@ -26,13 +26,10 @@ class Session:
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
         self.said = ""
         while not (found := URL.search(self.said)):
-            ready, _, _ = select.select([self.process.stderr], [], [], PATIENCE_S)
-            line = self.process.stderr.readline() if ready else ""
-            if not line:
+            if not self.read_line():
                 self.process.kill()
                 out, err = self.process.communicate()
                 raise AssertionError(f"no address of the view: {self.said}{err}{out}")
-            self.said += line
         self.url, self.port, self.token = found[1], int(found[2]), found[3]
 
     def __enter__(self):
@@ -43,26 +40,36 @@ class Session:
 
     def end(self, sent=signal.SIGINT):
         """Ctrl-C until it has ended; returns status, standard output and standard error."""
-        for _ in range(3):
-            if self.process.poll() is None:
+        if self.process.stderr.closed:
+            return self.process.returncode, "", self.said
+        stays = "until Ctrl-C"
+        stayed = stays in self.said
+        if self.process.poll() is None:
+            self.process.send_signal(sent)
+        # A session that is stopped so makes a controlled stop, and its view stays until the next one.
+        while not stayed and (line := self.read_line()):
+            if stays in line:
                 self.process.send_signal(sent)
-            try:
-                out, err = self.process.communicate(timeout=PATIENCE_S)
                 break
-            except subprocess.TimeoutExpired:
-                continue
-            except ValueError:  # has been read already
-                return self.process.returncode, "", self.said
+        try:
+            out, err = self.process.communicate(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
         self.said += err
         return self.process.returncode, out, self.said
 
+    def read_line(self):
+        """The next of standard error; empty at its end, or where none comes."""
+        ready, _, _ = select.select([self.process.stderr], [], [], PATIENCE_S)
+        line = self.process.stderr.readline() if ready else ""
+        self.said += line
+        return line
+
     def until_said(self, words):
         while words not in self.said:
-            ready, _, _ = select.select([self.process.stderr], [], [], PATIENCE_S)
-            line = self.process.stderr.readline() if ready else ""
-            if not line:
+            if not self.read_line():
                 raise AssertionError(f"not said: {words}; but: {self.said}")
-            self.said += line
 
     @property
     def host(self):

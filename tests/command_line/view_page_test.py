@@ -144,6 +144,8 @@ class Page(ProgramTest):
         with open(self.folder / "session" / "signals.csv", newline="") as file:
             rows = list(csv.DictReader(file))
         self.assertIn("holding", {row["phase"] for row in rows})
+        masses = [float(row["proxy_mass_kg"]) for row in rows if row["phase"] == "rendering"]
+        self.assertAlmostEqual(masses[-1] - masses[0], mass - 4.0, places=9)  # felt: with the handle's, before and after
 
     def test_a_record_opens_at_the_fault_and_plays(self):
         self.call("run", "--no-plot", "--record", "session", "--duration", "5s", "--fault", "axis_3:silent@4s")

@@ -194,4 +194,11 @@ void require_nodes_apart(const PreparedSession& session, const std::vector<std::
   }
 }
 
+void require_view(const RunOptions& options) {
+  if (options.view || (options.view_port == 0 && options.allowed_origins.empty())) return;
+  throw description::SetupError({.key = options.view_port != 0 ? "--view-port" : "--allow-origin",
+                                 .found = "no view",
+                                 .expected = "--view with it"});
+}
+
 }  // namespace proxarm::command_line

@@ -12,6 +12,9 @@ void require_usable_start(const PreparedSession& session);
 // Throws SetupError where `--enabling` has no simulated enabling switch that it could press.
 void require_enabling_switch(const PreparedSession& session, const RunOptions& options);
 
+// Throws SetupError where there are options of a view and none is wanted.
+void require_view(const RunOptions& options);
+
 // Which interface carries each bus, checked before any is opened: throws SetupError for two drives with one node.
 void require_nodes_apart(const PreparedSession& session, const std::vector<std::string>& interfaces);
 

@@ -46,12 +46,14 @@ std::string readable_twice(const fs::path& file, const char* option) {
   return file.empty() ? "" : fs::absolute(file).lexically_normal().string();
 }
 
-json hello_of(const PreparedSession& session, const RunOptions& options) {
+json hello_of(const PreparedSession& session, const RunOptions& options, ViewProcess::Shows shows) {
+  const bool arm_alone = shows == ViewProcess::Shows::simulated_arm;
   const controller::SessionSettings& settings = session.settings;
   fs::path control;
   if (options.view_control) control = options.control == "default" ? default_control_path() : options.control;
   return {{"cell", readable_twice(session.cell.file, "cell")},
-          {"scene", readable_twice(session.scene.file, "--scene")},
+          {"scene", arm_alone && options.scene.empty() ? "" : readable_twice(session.scene.file, "--scene")},
+          {"arm_alone", arm_alone},
           {"control", control.empty() ? "" : fs::absolute(control).string()},
           {"port", options.view_port},
           {"allowed_origins", options.allowed_origins},
@@ -91,16 +93,16 @@ void remove_view_control() {
   unlink((view_control_path().string() + ".lock").c_str());
 }
 
-ViewProcess::ViewProcess(const PreparedSession& session, const RunOptions& options, int memory) {
+ViewProcess::ViewProcess(const PreparedSession& session, const RunOptions& options, int memory, Shows shows) {
   start(memory);
   try {
-    greet(session, options);
+    greet(session, options, shows);
   } catch (...) {
     close(line_);
     waitpid(child_, nullptr, 0);
     throw;
   }
-  std::fprintf(stderr, "proxarm: the view of this session: %s\n", url_.c_str());
+  std::fprintf(stderr, "proxarm: the view of this %s: %s\n", shows == Shows::session ? "session" : "arm", url_.c_str());
   if (!options.json) door_.emplace(url_);
 }
 
@@ -125,8 +127,8 @@ void ViewProcess::start(int memory) {
   }
 }
 
-void ViewProcess::greet(const PreparedSession& session, const RunOptions& options) {
-  send_line(line_, hello_of(session, options));
+void ViewProcess::greet(const PreparedSession& session, const RunOptions& options, Shows shows) {
+  send_line(line_, hello_of(session, options, shows));
   const json answer = json::parse(read_line(line_), nullptr, false);
   if (answer.is_object() && answer.contains("url")) {
     url_ = answer["url"].get<std::string>();
@@ -138,9 +140,9 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
 
 void ViewProcess::show_end(int exit_status) {
   if (!send_line(line_, {{"ended", "the session is over"}, {"exit_status", exit_status}})) return;
-  std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   std::atomic<bool> asked{false};
-  SignalWatch signals([&] { asked.store(true); });
+  SignalWatch signals([&] { asked.store(true); });  // before it is offered
+  std::fprintf(stderr, "proxarm: the session is over; its view stays at %s until Ctrl-C\n", url_.c_str());
   while (!asked.load() && waitpid(child_, nullptr, WNOHANG) == 0) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }

@@ -5,6 +5,7 @@
 // dies changes nothing here.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -16,9 +17,14 @@ namespace proxarm::command_line {
 
 class ViewProcess {
  public:
+  enum class Shows : std::uint8_t {
+    session,
+    simulated_arm,  // alone: it knows no proxy, and no scene but the one that --scene names
+  };
+
   // `memory`: descriptor of the black box. Starts the process and prints the URL on standard error. No other thread may
   // run yet. Throws SetupError where it can't be shown.
-  ViewProcess(const PreparedSession& session, const RunOptions& options, int memory);
+  ViewProcess(const PreparedSession& session, const RunOptions& options, int memory, Shows shows = Shows::session);
   ViewProcess(const ViewProcess&) = delete;
   ViewProcess& operator=(const ViewProcess&) = delete;
   ~ViewProcess();  // and what it shows is gone
@@ -28,7 +34,7 @@ class ViewProcess {
 
  private:
   void start(int memory);
-  void greet(const PreparedSession& session, const RunOptions& options);
+  void greet(const PreparedSession& session, const RunOptions& options, Shows shows);
 
   std::string url_;
   std::optional<BrowserDoor> door_;

@@ -32,11 +32,20 @@ using nlohmann::json;
 
 constexpr auto between_moments = std::chrono::microseconds(16'667);  // 60 a second
 
+scenes::Scene scene_of(const json& hello) {
+  const auto file = hello.at("scene").get<std::string>();
+  if (!file.empty()) return scenes::load_scene(file);
+  scenes::Scene none;
+  none.name = "no scene";
+  return none;
+}
+
 view::Stage stage_of(const json& hello) {
   const json& settings = hello.at("settings");
   return {description::load_cell(hello.at("cell").get<std::string>()),
-          scenes::load_scene(hello.at("scene").get<std::string>()),
-          {.period_s = settings.at("period_s"),
+          scene_of(hello),
+          {.arm_alone = hello.at("arm_alone"),
+           .period_s = settings.at("period_s"),
            .mass_kg = settings.at("mass_kg"),
            .damping_Ns_per_m = settings.at("damping_Ns_per_m"),
            .spring_N_per_m = settings.at("spring_N_per_m"),
@@ -82,7 +91,7 @@ class LiveView {
  private:
   void welcome(view::Socket& socket) {
     json stage = json::parse(stage_.describe());
-    stage["mode"] = "live";
+    stage["mode"] = stage_.options().arm_alone ? "arm" : "live";
     stage["control"] = control_.open();
     socket.say(text_of({{"stage", stage}}), false);
     socket.say(std::make_shared<const std::string>(view::encode_history(source_.history())), true);

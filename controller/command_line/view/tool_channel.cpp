@@ -27,9 +27,15 @@ constexpr std::array<Parameter, 3> parameters{{{"mass", "kg"}, {"damping", "Ns/m
 // Channels are numbered from 1, in the order of the topics.
 std::uint32_t channel_of(Topic topic) { return static_cast<std::uint32_t>(topic) + 1; }
 
-json channels() {
+// What the arm alone has nothing to say of.
+bool is_of_controller(Topic topic) {
+  return topic == Topic::proxy || topic == Topic::contact || topic == Topic::session;
+}
+
+json channels(bool arm_alone) {
   json all = json::array();
   for (std::size_t i = 0; i < view::topic_count; ++i) {
+    if (arm_alone && is_of_controller(static_cast<Topic>(i))) continue;
     const view::TopicDescription& topic = view::describe(static_cast<Topic>(i));
     all.push_back({{"id", channel_of(static_cast<Topic>(i))},
                    {"topic", topic.topic},
@@ -95,7 +101,7 @@ void ToolChannel::opened(const SocketPtr& socket) {
                        {"metadata", json::object()},
                        {"sessionId", std::to_string(clock_ns_)}}),
               false);
-  socket->say(text_of({{"op", "advertise"}, {"channels", channels()}}), false);
+  socket->say(text_of({{"op", "advertise"}, {"channels", channels(stage_.options().arm_alone)}}), false);
 }
 
 void ToolChannel::closed(const SocketPtr& socket) {
@@ -144,7 +150,9 @@ void ToolChannel::subscribe(Client& client, const json& subscriptions) {
       continue;
     }
     const auto channel = one["channelId"].get<std::uint64_t>();
-    if (channel < 1 || channel > view::topic_count || client.subscriptions.size() >= most_subscriptions) {
+    if (channel < 1 || channel > view::topic_count ||
+        (stage_.options().arm_alone && is_of_controller(static_cast<Topic>(channel - 1))) ||
+        client.subscriptions.size() >= most_subscriptions) {
       warn(*client.socket, "there is no channel " + std::to_string(channel));
       continue;
     }

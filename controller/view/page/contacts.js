@@ -44,13 +44,15 @@ class Trail extends THREE.Line {
 }
 
 export class ContactView extends THREE.Group {
-  constructor() {
+  // `proxy`: whether there is one, or the arm alone.
+  constructor(proxy = true) {
     super();
     this.name = 'contacts';
     this.size = 1;
     this.makeMaterials();
     this.proxy = new THREE.Mesh(new THREE.SphereBufferGeometry(0.0105, 32, 20), this.materials.proxy);
     this.proxy.name = 'proxy';
+    this.proxy.visible = proxy;
     // The tool is a ring with a cross in it, so that the proxy is seen inside of it.
     this.tool = new THREE.Group();
     this.tool.name = 'tool';

@@ -21,9 +21,11 @@ const connection = new Connection({
     stage = value;
     built = false;
     panel.introduce(stage);
+    plots.introduce(stage);
+    document.body.dataset.mode = stage.mode;
     const chip = element('mode-chip');
     chip.hidden = false;
-    chip.textContent = stage.mode === 'live' ? '● live' : '▮ record';
+    chip.textContent = { live: '● live', arm: '● simulated arm', record: '▮ record' }[stage.mode];
     if (stage.control) control = new Control(stage, connection);
     if (stage.record) {
       chip.textContent = `▮ record ${stage.record.name}`;

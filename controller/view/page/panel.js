@@ -15,7 +15,7 @@ function length(m) {
   return `${(1e6 * m).toFixed(1)} µm`.replace('-', '−');
 }
 
-const FIGURES = [
+const SESSION_FIGURES = [
   ['hand’s force', (m) => `${m.hand_N.toFixed(2)} N`],
   ['force of contact', (m) => (m.contact ? `${m.contact_N.toFixed(2)} N` : '—')],
   ['touches', (m, stage) => (m.contact ? name(stage, m) : 'nothing')],
@@ -28,6 +28,15 @@ const FIGURES = [
   ['timestep', (m) => `${(1e3 * m.period_s).toFixed(2)} ms`],
 ];
 
+// Of the simulated arm alone.
+const ARM_FIGURES = [
+  ['hand’s force', (m) => `${m.hand_N.toFixed(2)} N`],
+  ['load on the sensor', (m) => `${m.sensor_N.toFixed(2)} N`],
+  ['tool, x', (m) => `${m.tool_x.toFixed(4)} m`],
+  ['tool, y', (m) => `${m.tool_y.toFixed(4)} m`],
+  ['tool, z', (m) => `${m.tool_z.toFixed(4)} m`],
+];
+
 function name(stage, moment) {
   const object = stage.scene.objects[moment.object];
   const more = moment.contacts > 1 ? ` + ${moment.contacts - 1}` : '';
@@ -36,18 +45,20 @@ function name(stage, moment) {
 
 export class Panel {
   constructor() {
-    this.cells = FIGURES.map(([label]) => {
-      const term = document.createElement('dt'), value = document.createElement('dd');
-      term.textContent = label;
-      element('figures').append(term, value);
-      return value;
-    });
     this.heldSince = new Map();
     this.written = 0;
   }
 
   introduce(stage) {
     this.stage = stage;
+    this.figures = stage.mode === 'arm' ? ARM_FIGURES : SESSION_FIGURES;
+    element('figures').replaceChildren();
+    this.cells = this.figures.map(([label]) => {
+      const term = document.createElement('dt'), value = document.createElement('dd');
+      term.textContent = label;
+      element('figures').append(term, value);
+      return value;
+    });
     element('scene-name').textContent = stage.scene.name;
     element('cell-name').textContent = `· ${stage.cell}`;
     document.title = `proxarm: ${stage.scene.name}`;
@@ -86,7 +97,7 @@ export class Panel {
     const now = performance.now();
     if (now - this.written < BETWEEN_FIGURES_MS) return;
     this.written = now;
-    FIGURES.forEach(([, text], i) => { this.cells[i].textContent = text(moment, this.stage); });
+    this.figures.forEach(([, text], i) => { this.cells[i].textContent = text(moment, this.stage); });
   }
 
   showFlags(moment) {

@@ -20,7 +20,7 @@ const PHASE_RENDERING = 3;
 const moved = (m, value) => (m.phase >= PHASE_RENDERING ? value : NaN);
 
 // Lines of peaks may leave the plot at its top: a blow of a millisecond would flatten all else.
-const PLOTS = [
+const SESSION_PLOTS = [
   { title: 'force', unit: 'N', least: 5, zero: true, lines: [
     { name: 'peaks', value: (m) => moved(m, m.contact_peak_N), colour: '--soft', dash: 'dotted', peaks: true },
     { name: 'contact', value: (m) => moved(m, m.contact_N), colour: '--stick', dash: 'solid' },
@@ -38,10 +38,25 @@ const PLOTS = [
     live: true, note: (m) => (m.overruns > 0 ? `${m.overruns} overruns` : 'no overrun') },
 ];
 
+// Of the simulated arm alone, whose hand and sensor are what they are whatever its drives do.
+const ARM_PLOTS = [
+  { title: 'force', unit: 'N', least: 5, zero: true, lines: [
+    { name: 'on the sensor', value: (m) => m.sensor_N, colour: '--stick', dash: 'solid' },
+    { name: 'hand', value: (m) => m.hand_N, colour: '--hand', dash: 'dashed' }] },
+  { title: 'tool’s speed', unit: 'mm/s', least: 10, zero: true, lines: [
+    { name: 'tool', value: (m) => m.speed_mm_per_s, colour: '--tool', dash: 'solid' }] },
+  { title: 'mass felt', unit: 'kg', least: 1, zero: true, lines: [
+    { name: 'in free motion', value: (m) => m.felt_kg, colour: '--good', dash: 'solid' }] },
+];
+
 // Mass that the hand feels, by its force over the tool's acceleration along it: a running fit over about half a second of
 // free motion. The tool's place is filtered as the force is, so both are late by the same.
 class FeltMass {
-  constructor() { this.reset(); }
+  // `anyMass`: what is felt isn't known to be a mass, as it is of a proxy.
+  constructor(anyMass = false) {
+    this.anyMass = anyMass;
+    this.reset();
+  }
 
   reset() {
     this.rows = [];
@@ -59,7 +74,7 @@ class FeltMass {
     const keep = Math.exp(-(b.time_s - this.rows[3].time_s) / 0.5);
     this.forceTimesA *= keep;
     this.aTimesA *= keep;
-    if (a.contact === 0 && c.contact === 0 && c.mass_kg > 0 && h1 > 0 && h2 > 0) {
+    if (a.contact === 0 && c.contact === 0 && (this.anyMass || c.mass_kg > 0) && h1 > 0 && h2 > 0) {
       for (const axis of ['x', 'y', 'z']) {
         const p = `tool_${axis}`, f = `force_${axis}`;
         const acceleration = 2 * ((c[p] - b[p]) / h2 - (b[p] - a[p]) / h1) / (h1 + h2);
@@ -71,6 +86,10 @@ class FeltMass {
     const known = this.aTimesA > 0.5 && a.contact === 0 && c.contact === 0;
     return known ? Math.min(200, Math.max(0, this.forceTimesA / this.aTimesA)) : NaN;
   }
+}
+
+function speedBetween(a, b) {
+  return 1e3 * Math.hypot(b.tool_x - a.tool_x, b.tool_y - a.tool_y, b.tool_z - a.tool_z) / (b.time_s - a.time_s);
 }
 
 function niceStep(range, most) {
@@ -283,11 +302,20 @@ class Plot {
 
 export class Plots {
   constructor(parent) {
-    this.plots = PLOTS.map((description) => new Plot(description, parent));
+    this.parent = parent;
+    this.plots = [];
     this.rows = [];
     this.felt = new FeltMass();
     this.drawn = 0;
     onTheme(() => { this.stale = true; });
+  }
+
+  introduce(stage) {
+    const alone = stage.mode === 'arm';
+    this.parent.replaceChildren();
+    this.parent.classList.toggle('three', alone);
+    this.plots = (alone ? ARM_PLOTS : SESSION_PLOTS).map((description) => new Plot(description, this.parent));
+    this.felt = new FeltMass(alone);
   }
 
   // A record has no computing times: they are the machine's.
@@ -301,6 +329,7 @@ export class Plots {
     if (last && moment.time_s <= last.time_s) return;
     const { links, objects, ...row } = moment;
     row.felt_kg = this.felt.of(row);
+    row.speed_mm_per_s = last ? speedBetween(last, row) : NaN;
     this.rows.push(row);
     while (this.rows.length > MOST_ROWS || this.rows[0].time_s < row.time_s - WINDOW_S - 1) this.rows.shift();
     this.stale = true;

@@ -87,7 +87,7 @@ export class World {
     this.middle.z = Math.max(0.2, this.tool.z * 0.93);
     this.arm = new ArmView(stage);
     this.objects = new SceneView(stage, this.tool.clone());
-    this.contacts = new ContactView();
+    this.contacts = new ContactView(stage.mode !== 'arm');
     this.limits = new LimitsView(stage);
     this.scene.add(this.arm, this.objects, this.limits, this.contacts);
     for (const part of this.objects.parts) part.addEventListener('loaded', () => { this.changed = true; });

@@ -88,7 +88,7 @@ void RecordedSession::find_events() {
     const CycleRecord record = signals_.row(i);
     if (i > 0 && last.phase == Phase::rendering) rendered += record.time_ns - last.time_ns;
     rendered_ns_.push_back(rendered);
-    if (record.phase != last.phase) add(RecordedEvent::Kind::phase, i, record, phase_words(record.phase));
+    if (record.phase != last.phase) add(RecordedEvent::Kind::phase, i, record, phase_words(record.phase).words);
     if (record.contact != controller::ContactPhase::free) {
       if (record.time_ns - touched_ns >= apart_ns) add(RecordedEvent::Kind::contact, i, record, "touches");
       touched_ns = record.time_ns;

@@ -1,9 +1,9 @@
 // Stage::describe(): what a page must know once, as JSON.
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "controller/limits/step_limits.hpp"
+#include "controller/view/stage/json_text.hpp"
 #include "controller/view/stage/stage.hpp"
 #include "controller/view/stage/words.hpp"
 
@@ -12,178 +12,203 @@ namespace {
 
 using models::Pose;
 using models::Vec3;
-using nlohmann::json;
 
-json of(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
+void put(JsonText& json, const Vec3& v) { json.begin_list().value(v.x()).value(v.y()).value(v.z()).end(); }
 
-json of(const Pose& X) {
+// As on the wire: x y z and quaternion x y z w.
+void put(JsonText& json, const Pose& X) {
   const Eigen::Quaterniond q(X.linear());
-  const Vec3 p = X.translation();
-  return json::array({p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w()});
+  json.begin_list();
+  for (const double x : {X.translation().x(), X.translation().y(), X.translation().z(), q.x(), q.y(), q.z(), q.w()}) {
+    json.value(x);
+  }
+  json.end();
 }
 
-json of(const scenes::Shape& shape) {
-  json out{{"kind", scenes::kind_of(shape)}};
+// A member of the object under way that is a vector or a pose.
+template <typename Value>
+void add(JsonText& json, const char* name, const Value& value) {
+  put(json.name(name), value);
+}
+
+// A capsule or a cylinder.
+template <typename Round>
+void add_round(JsonText& json, const Round& shape) {
+  add(json, "from", shape.from_m);
+  add(json, "to", shape.to_m);
+  json.add("radius", shape.radius_m).add("inside_out", shape.inside_out);
+}
+
+void put(JsonText& json, const scenes::Shape& shape) {
+  json.begin_object().add("kind", scenes::kind_of(shape));
   if (const auto* plane = std::get_if<scenes::PlaneShape>(&shape)) {
-    out["point"] = of(plane->point_m);
-    out["normal"] = of(plane->normal.normalized());
+    add(json, "point", plane->point_m);
+    add(json, "normal", Vec3(plane->normal.normalized()));
   } else if (const auto* box = std::get_if<scenes::BoxShape>(&shape)) {
-    out["pose"] = of(box->pose_W);
-    out["size"] = of(box->size_m);
-    out["inside_out"] = box->inside_out;
+    add(json, "pose", box->pose_W);
+    add(json, "size", box->size_m);
+    json.add("inside_out", box->inside_out);
   } else if (const auto* sphere = std::get_if<scenes::SphereShape>(&shape)) {
-    out["centre"] = of(sphere->centre_m);
-    out["radius"] = sphere->radius_m;
-    out["inside_out"] = sphere->inside_out;
+    add(json, "centre", sphere->centre_m);
+    json.add("radius", sphere->radius_m).add("inside_out", sphere->inside_out);
   } else if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&shape)) {
-    out.update({{"from", of(capsule->from_m)}, {"to", of(capsule->to_m)}, {"radius", capsule->radius_m}});
-    out["inside_out"] = capsule->inside_out;
+    add_round(json, *capsule);
   } else if (const auto* cylinder = std::get_if<scenes::CylinderShape>(&shape)) {
-    out.update({{"from", of(cylinder->from_m)}, {"to", of(cylinder->to_m)}, {"radius", cylinder->radius_m}});
-    out["inside_out"] = cylinder->inside_out;
+    add_round(json, *cylinder);
   } else if (const auto* mesh = std::get_if<scenes::MeshShape>(&shape)) {
-    out["inside_out"] = mesh->inside_out;
-    out["triangles"] = mesh->mesh ? mesh->mesh->size() : 0;
+    json.add("inside_out", mesh->inside_out).add("triangles", mesh->mesh ? mesh->mesh->size() : 0);
   }
-  return out;
+  json.end();
 }
 
-json of(const scenes::Object& object, std::size_t index, const scenes::CompiledScene& compiled) {
-  json out{{"name", object.name},
-           {"shape", of(object.shape)},
-           {"friction", object.friction},
-           {"friction_can_change", compiled.has_friction(index)},
-           {"moves", object.motion && !object.motion->driven},
-           {"driven", object.motion && object.motion->driven}};
+void put(JsonText& json, const scenes::Object& object, std::size_t index, const scenes::CompiledScene& compiled) {
+  put(json.begin_object().add("name", object.name).name("shape"), object.shape);
+  json.add("friction", object.friction).add("friction_can_change", compiled.has_friction(index));
+  json.add("moves", object.motion && !object.motion->driven).add("driven", object.motion && object.motion->driven);
   if (object.layer) {
-    out["layer"] = {{"thickness", object.layer->thickness_m}, {"stiffness", object.layer->stiffness_N_per_m}};
+    json.name("layer").begin_object().add("thickness", object.layer->thickness_m);
+    json.add("stiffness", object.layer->stiffness_N_per_m).end();
   }
-  if (std::holds_alternative<scenes::MeshShape>(object.shape)) out["mesh"] = "mesh/object/" + std::to_string(index);
-  return out;
+  if (std::holds_alternative<scenes::MeshShape>(object.shape)) {
+    json.add("mesh", "mesh/object/" + std::to_string(index));
+  }
+  json.end();
 }
 
-json of(const scenes::GuideDescription& guide) {
+void put(JsonText& json, const scenes::GuideDescription& guide) {
   constexpr std::array kinds{"line", "plane", "polyline"};
-  json points = json::array();
-  for (const Vec3& p : guide.points_m) points.push_back(of(p));
-  return {{"kind", kinds[static_cast<std::size_t>(guide.kind)]},
-          {"points", points},
-          {"direction", of(guide.direction.normalized())},
-          {"closed", guide.closed},
-          {"friction", guide.friction}};
+  json.begin_object().add("kind", kinds[static_cast<std::size_t>(guide.kind)]).name("points").begin_list();
+  for (const Vec3& p : guide.points_m) put(json, p);
+  json.end();
+  add(json, "direction", Vec3(guide.direction.normalized()));
+  json.add("closed", guide.closed).add("friction", guide.friction).end();
 }
 
-json scene_json(const scenes::Scene& scene, const scenes::CompiledScene& compiled) {
-  json out{{"name", scene.name}, {"objects", json::array()}, {"media", json::array()}};
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) out["objects"].push_back(of(scene.objects[i], i, compiled));
+void put_scene(JsonText& json, const scenes::Scene& scene, const scenes::CompiledScene& compiled) {
+  json.begin_object().add("name", scene.name).name("objects").begin_list();
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) put(json, scene.objects[i], i, compiled);
+  json.end().name("media").begin_list();
   for (const scenes::MediumDescription& medium : scene.media) {
-    out["media"].push_back({{"damping", medium.damping_Ns_per_m},
-                            {"force", medium.force_N},
-                            {"within", medium.within ? of(*medium.within) : json()}});
+    json.begin_object().add("damping", medium.damping_Ns_per_m).add("force", medium.force_N).name("within");
+    medium.within ? put(json, *medium.within) : void(json.null());
+    json.end();
   }
-  out["coulomb_force"] = scene.coulomb_force_N ? json(*scene.coulomb_force_N) : json();
-  out["guide"] = scene.guide ? of(*scene.guide) : json();
-  out["space"] = {
-      {"dimensions", scene.space.dimensions},
-      {"origin", of(scene.space.origin_m)},
-      {"axes",
-       {of(Vec3(scene.space.axes.col(0))), of(Vec3(scene.space.axes.col(1))), of(Vec3(scene.space.axes.col(2)))}}};
-  return out;
+  json.end().name("coulomb_force");
+  scene.coulomb_force_N ? json.value(*scene.coulomb_force_N) : json.null();
+  json.name("guide");
+  scene.guide ? put(json, *scene.guide) : void(json.null());
+  json.name("space").begin_object().add("dimensions", scene.space.dimensions);
+  add(json, "origin", scene.space.origin_m);
+  json.name("axes").begin_list();
+  for (int i = 0; i < 3; ++i) put(json, Vec3(scene.space.axes.col(i)));
+  json.end().end().end();
 }
 
-json of(const models::LinkShape& shape, std::size_t link, std::size_t index) {
-  json out{{"pose", of(shape.X_link)}};
-  if (shape.colour) out["colour"] = *shape.colour;
+void put(JsonText& json, const models::LinkShape& shape, std::size_t link, std::size_t index) {
+  json.begin_object();
+  add(json, "pose", shape.X_link);
+  if (shape.colour) {
+    json.name("colour").begin_list();
+    for (const double part : *shape.colour) json.value(part);
+    json.end();
+  }
   if (const auto* box = std::get_if<models::DrawnBox>(&shape.shape)) {
-    out.update({{"kind", "box"}, {"size", of(box->size_m)}});
+    add(json.add("kind", "box"), "size", box->size_m);
   } else if (const auto* cylinder = std::get_if<models::DrawnCylinder>(&shape.shape)) {
-    out.update({{"kind", "cylinder"}, {"radius", cylinder->radius_m}, {"length", cylinder->length_m}});
+    json.add("kind", "cylinder").add("radius", cylinder->radius_m).add("length", cylinder->length_m);
   } else if (const auto* sphere = std::get_if<models::DrawnSphere>(&shape.shape)) {
-    out.update({{"kind", "sphere"}, {"radius", sphere->radius_m}});
+    json.add("kind", "sphere").add("radius", sphere->radius_m);
   } else {
-    out.update({{"kind", "mesh"}, {"mesh", "mesh/link/" + std::to_string(link) + "/" + std::to_string(index)}});
+    json.add("kind", "mesh").add("mesh", "mesh/link/" + std::to_string(link) + "/" + std::to_string(index));
   }
-  return out;
+  json.end();
 }
 
-json links_json(const models::LinkTree& tree) {
-  json out = json::array();
+void put_links(JsonText& json, const models::LinkTree& tree) {
+  json.begin_list();
   for (std::size_t i = 0; i < tree.links().size(); ++i) {
     const models::DrawnLink& link = tree.links()[i];
-    json shapes = json::array();
-    for (std::size_t k = 0; k < link.shapes.size(); ++k) shapes.push_back(of(link.shapes[k], i, k));
-    out.push_back({{"name", link.name}, {"parent", link.parent}, {"moves", link.drive >= 0}, {"shapes", shapes}});
+    json.begin_object().add("name", link.name).add("parent", link.parent).add("moves", link.drive >= 0);
+    json.name("shapes").begin_list();
+    for (std::size_t k = 0; k < link.shapes.size(); ++k) put(json, link.shapes[k], i, k);
+    json.end().end();
   }
-  return out;
+  json.end();
 }
 
-// Null where a side is open, as limits that aren't given are.
-json box_json(const std::array<double, 3>& low, const std::array<double, 3>& high) {
-  json out{{"min", json::array()}, {"max", json::array()}};
-  bool any = false;
-  for (std::size_t i = 0; i < 3; ++i) {
-    any = any || std::isfinite(low[i]) || std::isfinite(high[i]);
-    out["min"].push_back(std::isfinite(low[i]) ? json(low[i]) : json());
-    out["max"].push_back(std::isfinite(high[i]) ? json(high[i]) : json());
+// Sides that aren't finite are open, and null; a box without any other side is null itself.
+void put_box(JsonText& json, const std::array<double, 3>& low, const std::array<double, 3>& high) {
+  const auto is_border = [](double x) { return std::isfinite(x); };
+  if (std::none_of(low.begin(), low.end(), is_border) && std::none_of(high.begin(), high.end(), is_border)) {
+    json.null();
+    return;
   }
-  return any ? out : json();
+  json.begin_object().name("min").begin_list();
+  for (const double x : low) json.value(x);
+  json.end().name("max").begin_list();
+  for (const double x : high) json.value(x);
+  json.end().end();
 }
 
-json limits_json(const description::CellLimits& limits) {
-  json keep_out = json::array();
-  for (const description::BoxDescription& box : limits.keep_out) keep_out.push_back(box_json(box.min_m, box.max_m));
-  return {{"speed_m_per_s", limits.max_tool_speed_m_per_s},
-          {"force_N", limits.max_force_N},
-          {"power_W", limits.max_power_W},
-          {"leash_m", limits.leash_m},
-          {"keep_out", keep_out},
-          {"workspace", box_json(limits.workspace_min_m, limits.workspace_max_m)}};
+void put_limits(JsonText& json, const description::CellLimits& limits) {
+  json.begin_object().add("speed_m_per_s", limits.max_tool_speed_m_per_s).add("force_N", limits.max_force_N);
+  json.add("power_W", limits.max_power_W).add("leash_m", limits.leash_m).name("keep_out").begin_list();
+  for (const description::BoxDescription& box : limits.keep_out) put_box(json, box.min_m, box.max_m);
+  json.end().name("workspace");
+  put_box(json, limits.workspace_min_m, limits.workspace_max_m);
+  json.end();
 }
 
-json words_json() {
-  json flags = json::array(), phases = json::array();
+void put_words(JsonText& json, bool arm_alone) {
+  json.begin_object().name("flags").begin_list();
   for (const FlagWords& flag : flag_words()) {
-    flags.push_back({{"bit", static_cast<std::uint32_t>(flag.flag)},
-                     {"name", flag.name},
-                     {"words", flag.words},
-                     {"holds_back", flag.holds_back}});
+    json.begin_object().add("bit", static_cast<std::uint32_t>(flag.flag)).add("name", flag.name);
+    json.add("words", flag.words).add("holds_back", flag.holds_back).end();
   }
+  json.end().name("phases").begin_list();
   for (std::size_t i = 0; i < controller::phase_count; ++i) {
     const auto phase = static_cast<controller::Phase>(i);
-    phases.push_back({{"name", controller::phase_name(phase)}, {"words", phase_words(phase)}});
+    const PhaseWords words = arm_alone ? drive_words(phase) : phase_words(phase);
+    json.begin_object().add("name", words.name).add("words", words.words).end();
   }
-  return {{"flags", flags}, {"phases", phases}, {"contacts", {"free", "stick", "slip"}}};
+  json.end().name("contacts").begin_list();
+  for (const auto contact :
+       {controller::ContactPhase::free, controller::ContactPhase::stick, controller::ContactPhase::slip}) {
+    json.value(controller::contact_phase_name(contact));
+  }
+  json.end().end();
 }
 
-json tool_json(const description::Cell& cell, const models::LinkTree& tree) {
+void put_tool(JsonText& json, const description::Cell& cell, const models::LinkTree& tree) {
   const auto& links = tree.links();
   const auto link =
       std::find_if(links.begin(), links.end(), [&](const models::DrawnLink& l) { return l.name == cell.sensor.link; });
   const Pose X_LS = models::to_pose(cell.sensor.pose_link), X_ST = models::to_pose(cell.tool.handle_S);
-  return {{"link", link != links.end() ? link - links.begin() : static_cast<std::ptrdiff_t>(links.size()) - 1},
-          {"sensor", of(X_LS)},
-          {"handle", of(Pose(X_LS * X_ST))},
-          {"mass_kg", cell.tool.mass_kg}};
+  json.begin_object();
+  json.add("link", link != links.end() ? link - links.begin() : static_cast<std::ptrdiff_t>(links.size()) - 1);
+  add(json, "sensor", X_LS);
+  add(json, "handle", Pose(X_LS * X_ST));
+  json.add("mass_kg", cell.tool.mass_kg).end();
 }
 
 }  // namespace
 
 std::string Stage::describe() const {
-  const json out{{"cell", cell_.name},
-                 {"fields", field_names()},
-                 {"links", links_json(tree_)},
-                 {"tool", tool_json(cell_, tree_)},
-                 {"scene", scene_json(scene_, compiled_)},
-                 {"limits", limits_json(cell_.limits)},
-                 {"words", words_json()},
-                 {"notes", tree_.notes()},
-                 {"settings",
-                  {{"period_s", options_.period_s},
-                   {"mass_kg", options_.mass_kg},
-                   {"damping_Ns_per_m", options_.damping_Ns_per_m},
-                   {"spring_N_per_m", options_.spring_N_per_m},
-                   {"impedance", options_.impedance}}}};
-  return out.dump(-1, ' ', false, json::error_handler_t::replace);
+  JsonText json;
+  json.begin_object().add("cell", cell_.name).name("fields").begin_list();
+  for (const std::string& field : field_names()) json.value(field);
+  put_links(json.end().name("links"), tree_);
+  put_tool(json.name("tool"), cell_, tree_);
+  put_scene(json.name("scene"), scene_, compiled_);
+  put_limits(json.name("limits"), cell_.limits);
+  put_words(json.name("words"), options_.arm_alone);
+  json.name("notes").begin_list();
+  for (const std::string& note : tree_.notes()) json.value(note);
+  json.end().name("settings").begin_object();
+  json.add("period_s", options_.period_s).add("mass_kg", options_.mass_kg);
+  json.add("damping_Ns_per_m", options_.damping_Ns_per_m).add("spring_N_per_m", options_.spring_N_per_m);
+  json.add("impedance", options_.impedance).end();
+  return json.end().take();
 }
 
 }  // namespace proxarm::view

@@ -44,6 +44,7 @@ constexpr std::array fields{
     Field{"energy_proxy_J", [](const Moment& m) { return m.record.energies_J.proxy; }},
     Field{"proxy_clearance_m", [](const Moment& m) { return m.record.proxy_clearance_m; }},
     Field{"tool_clearance_m", [](const Moment& m) { return m.record.tool_clearance_m; }},
+    Field{"sensor_N", [](const Moment& m) { return norm(m.record.force_S_N); }},
     Field{"hand_N", [](const Moment& m) { return norm(m.record.force_W_N); }},
     Field{"hand_peak_N", [](const Moment& m) { return m.hand_peak_N; }},
     Field{"contact_N", [](const Moment& m) { return norm(m.record.contact_force_W_N); }},

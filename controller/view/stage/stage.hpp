@@ -20,6 +20,7 @@ namespace proxarm::view {
 
 // What isn't in the files.
 struct StageOptions {
+  bool arm_alone = false;  // without a controller: no proxy, and what is called a phase is how far its drives are
   double period_s = 1e-3;
   double mass_kg = 0.0, damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;  // as the session began
   bool impedance = false;

@@ -39,7 +39,8 @@ const std::vector<FlagWords>& flag_words() {
   return all;
 }
 
-const char* phase_words(Phase phase) noexcept {
+namespace {
+const char* sentence_of(Phase phase) noexcept {
   switch (phase) {
     case Phase::idle:
       return "Waiting to begin";
@@ -63,6 +64,15 @@ const char* phase_words(Phase phase) noexcept {
       return "Over: drives off";
   }
   return "?";
+}
+}  // namespace
+
+PhaseWords phase_words(Phase phase) noexcept { return {controller::phase_name(phase), sentence_of(phase)}; }
+
+PhaseWords drive_words(Phase phase) noexcept {
+  if (phase == Phase::rendering) return {"drives on", "All drives are enabled: the arm goes where they are sent"};
+  if (phase == Phase::enabling) return {"enabling", "Some drives are enabled, others not"};
+  return {"drives off", "No drive is enabled: the brakes hold the arm"};
 }
 
 std::string fault_text(const controller::CycleRecord& record, const description::Cell& cell) {

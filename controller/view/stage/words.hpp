@@ -19,7 +19,13 @@ struct FlagWords {
 [[nodiscard]] const std::vector<FlagWords>& flag_words();
 
 // What the arm does in a phase.
-[[nodiscard]] const char* phase_words(controller::Phase phase) noexcept;
+struct PhaseWords {
+  const char* name;
+  const char* words;
+};
+[[nodiscard]] PhaseWords phase_words(controller::Phase phase) noexcept;
+// What its drives do, of an arm whose controller is elsewhere.
+[[nodiscard]] PhaseWords drive_words(controller::Phase phase) noexcept;
 
 // The fault that stopped the arm or that it is held for, with its place and figures; empty where there is none.
 [[nodiscard]] std::string fault_text(const controller::CycleRecord& record, const description::Cell& cell);

@@ -78,10 +78,12 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
   using Text = http::response<http::string_body>;
 
   void answer() {
-    if (!shared_->requests.spend()) return refuse(429, "too many requests");
     const RequestHead head = head_of(*parser_);
     const Verdict verdict = shared_->gate.judge(head);
-    known = known || verdict.answer != Answer::refuse;
+    const bool stranger = verdict.answer == Answer::refuse;
+    Budget& budget = stranger ? shared_->requests_of_strangers : shared_->requests;
+    if (!budget.spend()) return refuse(429, "too many requests");
+    known = known || !stranger;
     switch (verdict.answer) {
       case Answer::refuse:
         return refuse(verdict.status, verdict.reason);

@@ -47,7 +47,8 @@ struct ServerShared {
   Channel* tools = nullptr;
   std::list<std::weak_ptr<Connection>> connections;  // the oldest first
   std::size_t sockets = 0;
-  Budget requests{300.0, 600.0};  // of all connections together
+  // Of all connections together; who makes noise without the secret takes nothing from those who have it.
+  Budget requests{300.0, 600.0}, requests_of_strangers{300.0, 600.0};
 
   // Makes room for one more where there are too many. False: all of them show something.
   bool make_room();

@@ -85,7 +85,7 @@ TEST(Words, ThereAreSomeForEveryFlagAndPhase) {
         << bit;
   }
   for (std::size_t i = 0; i < controller::phase_count; ++i) {
-    EXPECT_STRNE(phase_words(static_cast<controller::Phase>(i)), "?");
+    EXPECT_STRNE(phase_words(static_cast<controller::Phase>(i)).words, "?");
   }
 }
 

@@ -1,0 +1,82 @@
+"""`proxarm view` from outside: a record or a black box, as the page asks for it."""
+import csv
+import json
+import unittest
+
+from harness import ProgramTest
+from view_client import Session
+
+
+class Records(ProgramTest):
+    def record(self, *arguments):
+        self.call("run", "--no-plot", "--record", "session", "--duration", "5s", *arguments)
+        return self.folder / "session"
+
+    def opened(self, folder):
+        session = Session(self.folder, "view", folder)
+        self.addCleanup(session.end)
+        page = session.open_socket()
+        self.addCleanup(page.close)
+        return page, page.receive_json("stage")
+
+    def test_a_record_opens_at_its_fault_and_any_cycle_can_be_had(self):
+        folder = self.record("--fault", "axis_3:silent@4s")
+        fault = json.loads((folder / "summary.json").read_text())["faults"][0]
+        for played in (folder, folder / "black-box"):
+            with self.subTest(played.name):
+                with open(played / "signals.csv", newline="") as file:
+                    rows = list(csv.DictReader(file))
+                page, stage = self.opened(played)
+                record = stage["record"]
+                self.assertEqual(record["cycles"], len(rows))
+                self.assertEqual(int(rows[record["open_at"]]["cycle"]), fault["cycle"])
+                told = page.receive_json("status")["fault"]
+                self.assertIn("drive_silent (drive of axis_3", told)
+                self.assertEqual(page.receive_moment(stage["fields"])["cycle"], fault["cycle"])
+                self.assertTrue({"contact", "phase", "fault"} <= {event["kind"] for event in record["events"]})
+                for index in (0, 1000, len(rows) - 1):
+                    page.send({"at": index})
+                    moment = page.receive_moment(stage["fields"])
+                    for field, column in (("cycle", "cycle"), ("proxy_x", "proxy_W_x_m"), ("force_y", "force_W_y_N"),
+                                          ("contact_force_x", "contact_force_W_x_N"), ("time_s", "time_s"),
+                                          ("friction", "friction_1"), ("tool_clearance_m", "tool_clearance_m")):
+                        self.assertAlmostEqual(moment[field], float(rows[index][column]), places=9, msg=field)
+
+    def test_the_frames_of_a_cycle_are_decoded(self):
+        page, stage = self.opened(self.record())
+        page.send({"frames": 3000})
+        frames = page.receive_json("frames")
+        self.assertEqual(frames["at"], 3000)
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            row = list(csv.DictReader(file))[3000]
+        said = {(frame["from"], frame["words"]) for frame in frames["list"]}
+        self.assertIn(("controller", "SYNC"), said)
+        for axis in (f"axis_{i}" for i in range(1, 7)):
+            whole = " ".join(words for whose, words in said if whose == axis)
+            self.assertIn(f"position 6064h: {row[axis + '_actual_counts']} = ", whole)
+            self.assertIn("statusword 6041h: ", whole)
+            whole = " ".join(words for whose, words in said if whose == "to " + axis)
+            self.assertIn(f"target position 607Ah: {row[axis + '_target_counts']} = ", whole)
+        self.assertIn(("sensor", "sample"), said)
+
+    def test_what_is_asked_for_beyond_the_record_is_refused(self):
+        folder = self.record()
+        for asked in ({"at": 10 ** 9}, {"at": -1}, {"at": 1.5}, {"window": [0]}, {"window": [0, 10 ** 9]}, {"frames": "1"},
+                      {"at": 1, "frames": 1}, {}):
+            with self.subTest(asked):
+                page, _ = self.opened(folder)
+                page.send(asked)
+                self.assertTrue(page.is_closed())
+
+    def test_what_is_no_record_is_refused(self):
+        self.assert_refused(self.call("view", "."), "cycles.bin", "no such file")
+        self.assert_refused(self.call("view"), "folder is required")
+        folder = self.record()
+        (folder / "signals.csv").write_text("a,b\n1,2\n")
+        self.assert_refused(self.call("view", folder), "signals.csv", "another kind of file")
+        (folder / "signals.csv").write_bytes(b"")
+        self.assert_refused(self.call("view", folder), "signals.csv", "empty")
+
+
+if __name__ == "__main__":
+    unittest.main()
