@@ -1,8 +1,10 @@
 #include "controller/view/stage/stage.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
+#include "controller/signals/clearances.hpp"
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/obstacles.hpp"
 #include "scenes/mesh_files/mesh_file.hpp"
@@ -76,14 +78,8 @@ void Stage::follow(const controller::Change& change, bool rendered, double perio
   if (rendered) changes_.step();
 }
 
-// Order 2's proxy is where it is a period before that of (26): see proxies/bdf2.hpp.
 void Stage::complete(CycleRecord& record, double rendered_s) const {
-  const double later_s = options_.order == 2 ? 1e-9 * static_cast<double>(record.period_ns) : 0.0;
-  const auto clearance_m = [&](const controller::Triple& x_W) {
-    return scenes::clearance_m(scene_, controller::vec3(x_W), rendered_s - later_s, scenes::Driven::left_out);
-  };
-  record.proxy_clearance_m = clearance_m(record.proxy_W_m);
-  record.tool_clearance_m = clearance_m(record.tool_W_m);
+  controller::add_clearances(record, scene_, options_.order, std::llround(1e9 * rendered_s));
 }
 
 Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {
