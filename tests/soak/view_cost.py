@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 """What `--view` costs the cycle: sessions with three viewers, of which one doesn't read, and sessions without, in turn.
 
-    tests/soak/view_cost.py [--pairs 30] [--pace virtual|realtime] [PROXARM]
+    tests/soak/view_cost.py [--pairs 30] [--pace virtual|realtime] [--pin CPU] [PROXARM]
 
 Prints the p99 and the median of the cycle's computing time with and without, and what the view adds: the median over the
-pairs, with the interval that holds it at 95 % (order statistics). For a quiet machine; other load makes it wider.
+pairs, with the interval that holds it at 95 % (order statistics). For a quiet machine; other load makes it wider. --pin gives
+the session's own thread a processor under SCHED_FIFO once it has begun, which keeps other load away; not its viewers.
 """
 import argparse
 import json
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests" / "command_line"))
@@ -31,14 +33,23 @@ def read_on(page):
         pass
 
 
-def without(session_type, folder, words):
-    done = subprocess.run([os.environ["PROXARM_PROGRAM"], *words], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True,
-                          check=True)
-    return json.loads(done.stdout)["compute_us"]
+def pin(process, processor):
+    if processor is not None:
+        os.sched_setaffinity(process, {processor})
+        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(10))
 
 
-def with_viewers(session_type, folder, words):
+def without(session_type, folder, words, processor):
+    process = subprocess.Popen([os.environ["PROXARM_PROGRAM"], *words], cwd=folder, stdin=subprocess.DEVNULL,
+                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    time.sleep(0.1)  # as long as the other way takes to have its address
+    pin(process.pid, processor)
+    return json.loads(process.communicate()[0])["compute_us"]
+
+
+def with_viewers(session_type, folder, words, processor):
     with session_type(folder, *words, "--view") as session:
+        pin(session.process.pid, processor)
         pages = [session.open_socket() for _ in range(3)]
         pages[2].socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # the one that doesn't read
         for page in pages[:2]:
@@ -63,6 +74,7 @@ def main():
     parser.add_argument("program", nargs="?", default=str(ROOT / "build/release/controller/proxarm"))
     parser.add_argument("--pairs", type=int, default=30)
     parser.add_argument("--pace", choices=DURATIONS, default="virtual")
+    parser.add_argument("--pin", type=int)
     options = parser.parse_args()
     os.environ["PROXARM_PROGRAM"] = str(pathlib.Path(options.program).resolve())
     from view_client import Session
@@ -72,7 +84,7 @@ def main():
         for pair in range(options.pairs):
             ways = [("without", without), ("with", with_viewers)]
             for name, way in ways if pair % 2 else reversed(ways):
-                found[name].append(way(Session, folder, words))
+                found[name].append(way(Session, folder, words, options.pin))
     for figure in ("p99", "median"):
         plain = [run[figure] for run in found["without"]]
         added = [a[figure] - b for a, b in zip(found["with"], plain)]
