@@ -1,5 +1,7 @@
 #include "controller/motion/motion.hpp"
 
+#include <array>
+
 #include "controller/motion/admittance_motion.hpp"
 #include "controller/motion/torque_motion.hpp"
 
@@ -11,6 +13,11 @@ void record_world(const WorldStep& step, CycleRecord& record) noexcept {
   record.normal_W = triple(step.normal_W);
   record.contact_object = step.object;
   record.friction = step.friction;
+  static_assert(std::tuple_size_v<decltype(step.others)> == other_contacts);
+  for (std::size_t i = 0; i < other_contacts; ++i) {
+    const WorldStep::Contact& other = step.others[i];
+    record.others[i] = {other.object, other.friction, triple(other.normal_W)};
+  }
   record.proxy_mass_kg = step.mass_kg;
   record.proxy_damping_Ns_per_m = step.damping_Ns_per_m;
   record.contact_count = static_cast<std::uint8_t>(step.contacts);

@@ -50,6 +50,9 @@ enum class RecordFlag : std::uint32_t {
   oscillation_lasts = 1u << 26,
 };
 
+// As signals.csv has it.
+const char* flag_name(RecordFlag flag) noexcept;
+
 // The flag of a limit, and the parameter that holds it ("limits.leash_m").
 struct LimitFlag {
   RecordFlag flag;
@@ -80,6 +83,15 @@ inline models::Vec3 vec3(const Triple& v) noexcept { return {v[0], v[1], v[2]}; 
 
 inline constexpr std::size_t max_axes = 8;
 
+// One that presses beside the first.
+struct OtherContact {
+  std::int32_t object = -1;  // as CycleRecord::contact_object; −1: there is none
+  double friction = 0.0;
+  Triple normal_W{};
+};
+// In free space three normals hold a proxy; what presses beyond that isn't recorded.
+inline constexpr std::size_t other_contacts = 2;
+
 struct CycleRecord {
   std::uint64_t cycle = 0;     // k
   std::int64_t time_ns = 0;    // t_k, as scheduled, from the first cycle of the session
@@ -106,9 +118,10 @@ struct CycleRecord {
   Triple normal_W{};                  // of the first contact; zero when free
   std::int32_t contact_object = -1;   // of the first contact, by its index in the scene; −1 when free
   double friction = 0.0;              // its μ, as it is now
-  Triple tool_W_m{};                  // the rendered point by the encoders, at t_k
-  double proxy_clearance_m = 0.0;     // signed distance of the proxy to the nearest surface; below 0: inside
-  double tool_clearance_m = 0.0;      // of the tool: by the truth where there is one, else by the encoders
+  std::array<OtherContact, other_contacts> others{};
+  Triple tool_W_m{};               // the rendered point by the encoders, at t_k
+  double proxy_clearance_m = 0.0;  // signed distance of the proxy to the nearest surface; below 0: inside
+  double tool_clearance_m = 0.0;   // of the tool: by the truth where there is one, else by the encoders
   std::array<std::int32_t, max_axes> target_counts{};  // 607A sent in this cycle; in torque mode 6071
   std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
 

@@ -7,6 +7,7 @@
 //   x = Uᵀ(q_W − o),   h = Uᵀ h_W,   q_W = q_start + U (x − x_start)
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -23,6 +24,11 @@ namespace proxarm::controller {
 
 // What one step of the proxy did; all in W.
 struct WorldStep {
+  struct Contact {
+    models::Vec3 normal_W = models::Vec3::Zero();
+    std::int32_t object = -1;
+    double friction = 0.0;
+  };
   models::Vec3 q_W = models::Vec3::Zero();      // the new proxy
   models::Vec3 p_hat_W = models::Vec3::Zero();  // p̂: where it would have gone without a world
   models::Vec3 f_W = models::Vec3::Zero();      // the world's force on it, (25a)
@@ -30,6 +36,7 @@ struct WorldStep {
   models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
   std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
   double friction = 0.0;                         // its μ
+  std::array<Contact, 2> others;                 // that press beside it
   int contacts = 0;
   bool slips = false;
   ActiveLimits limits;                                // that held the proxy back
@@ -45,9 +52,12 @@ template <int N>
 void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
                   const Eigen::Matrix<double, 3, N>& basis) noexcept {
   for (const models::Contact<N>& contact : contacts) {
-    if (step.contacts++ == 0) {
+    const int other = step.contacts++ - 1;
+    if (other < 0) {
       step.normal_W = basis * contact.normal;
       step.object = contact.object;
+    } else if (other < static_cast<int>(step.others.size())) {
+      step.others[static_cast<std::size_t>(other)] = {basis * contact.normal, contact.object, 0.0};
     }
     step.slips = step.slips || contact.slips;
   }

@@ -36,43 +36,39 @@ void append_seconds(std::string& text, std::int64_t ns, std::size_t least_decima
   if (!decimals.empty()) text += "." + decimals;
 }
 
-struct FlagName {
-  RecordFlag flag;
-  const char* name;
-};
 // `overrun` is left out because it is of the wall clock, `truth` because the columns say it.
-constexpr FlagName flag_names[] = {{RecordFlag::sample_held, "sample_held"},
-                                   {RecordFlag::feedback_missing, "feedback_missing"},
-                                   {RecordFlag::limit_speed, "limit_speed"},
-                                   {RecordFlag::limit_acceleration, "limit_acceleration"},
-                                   {RecordFlag::limit_workspace, "limit_workspace"},
-                                   {RecordFlag::limit_joint, "limit_joint"},
-                                   {RecordFlag::limit_power, "limit_power"},
-                                   {RecordFlag::limit_keep_out, "limit_keep_out"},
-                                   {RecordFlag::limit_joint_speed, "limit_joint_speed"},
-                                   {RecordFlag::limit_joint_acceleration, "limit_joint_acceleration"},
-                                   {RecordFlag::limit_singularity, "limit_singularity"},
-                                   {RecordFlag::limit_following_error, "limit_following_error"},
-                                   {RecordFlag::limit_joint_torque, "limit_joint_torque"},
-                                   {RecordFlag::guard_speed, "guard_speed"},
-                                   {RecordFlag::guard_elbow, "guard_elbow"},
-                                   {RecordFlag::guard_border, "guard_border"},
-                                   {RecordFlag::guard_acceleration, "guard_acceleration"},
-                                   {RecordFlag::limit_leash, "limit_leash"},
-                                   {RecordFlag::limit_orientation, "limit_orientation"},
-                                   {RecordFlag::oscillation, "oscillation"},
-                                   {RecordFlag::oscillation_lasts, "oscillation_lasts"},
-                                   {RecordFlag::timestep, "timestep"},
-                                   {RecordFlag::ramp_in, "ramp_in"},
-                                   {RecordFlag::slowed, "slowed"},
-                                   {RecordFlag::hands_off, "hands_off"}};
+constexpr std::array written_flags{RecordFlag::sample_held,
+                                   RecordFlag::feedback_missing,
+                                   RecordFlag::limit_speed,
+                                   RecordFlag::limit_acceleration,
+                                   RecordFlag::limit_workspace,
+                                   RecordFlag::limit_joint,
+                                   RecordFlag::limit_power,
+                                   RecordFlag::limit_keep_out,
+                                   RecordFlag::limit_joint_speed,
+                                   RecordFlag::limit_joint_acceleration,
+                                   RecordFlag::limit_singularity,
+                                   RecordFlag::limit_following_error,
+                                   RecordFlag::limit_joint_torque,
+                                   RecordFlag::guard_speed,
+                                   RecordFlag::guard_elbow,
+                                   RecordFlag::guard_border,
+                                   RecordFlag::guard_acceleration,
+                                   RecordFlag::limit_leash,
+                                   RecordFlag::limit_orientation,
+                                   RecordFlag::oscillation,
+                                   RecordFlag::oscillation_lasts,
+                                   RecordFlag::timestep,
+                                   RecordFlag::ramp_in,
+                                   RecordFlag::slowed,
+                                   RecordFlag::hands_off};
 
 void append_flags(std::string& row, const CycleRecord& record) {
   bool first = true;
-  for (const FlagName& flag : flag_names) {
-    if (!record.has(flag.flag)) continue;
+  for (const RecordFlag flag : written_flags) {
+    if (!record.has(flag)) continue;
     if (!first) row += '|';
-    row += flag.name;
+    row += flag_name(flag);
     first = false;
   }
 }
@@ -95,6 +91,11 @@ void append_more(std::string& row, const CycleRecord& r, std::size_t axes, bool 
     derived.torques ? append_value(row, derived.target_Nm[axis]) : void(row += ',');
   }
   for (const double value : derived.tool_q_W) append_value(row, value);
+  for (const OtherContact& other : r.others) {
+    append_value(row, other.object);
+    append_value(row, other.friction);
+    append_triple(row, other.normal_W);
+  }
   if (!with_truth) return;
   if (r.has(RecordFlag::truth)) {
     for (const double value : r.true_tool_q_W) append_value(row, value);
@@ -164,6 +165,12 @@ void add_more(Columns& columns, const std::vector<std::string>& axis_names, bool
   columns.add_axes(axis_names, "_actual_rad", "rad", "measured: the motor's angle at the joint; m of a linear one");
   columns.add_axes(axis_names, "_target_Nm", "Nm", "commanded torque at the joint, where drives take torques");
   columns.add_orientation("tool_W", "orientation of the tool by the encoders");
+  for (std::size_t i = 0; i < other_contacts; ++i) {
+    const std::string number = std::to_string(i + 2);
+    columns.add("contact_object_" + number, "1", "", "of another contact: its index in the scene; −1: none");
+    columns.add("friction_" + number, "1", "", "its coefficient of friction");
+    columns.add_vector("normal_" + number + "_W", "1", "W", "its normal");
+  }
   if (!with_truth) return;
   columns.add_orientation("true_tool_W", "orientation of the simulated tool");
   columns.add_vector("true_acceleration_W", "m/s²", "W", "of the simulated tool");

@@ -8,6 +8,7 @@ import zlib
 
 import view_browser
 from harness import ProgramTest
+from timing_test import bumpy_ball
 from view_client import Session
 
 FIRST_MOMENT = 'window.proxarm && performance.getEntriesByName("first-moment").length > 0'
@@ -76,7 +77,8 @@ class Page(ProgramTest):
         self.assertTrue(any(is_it(*colour) for colour in around), f"{what} at {x}, {y}: {around[24]}")
 
     def test_the_default_run_at_the_touch(self):
-        with view_browser.Browser() as browser, Session(self.folder, "run", "--view", "--no-plot") as session:
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--duration", "60s") as session:
             self.opened(browser, session)
             self.until_time(browser, 4.4)
             names = browser.run("""const found = []; proxarm.world.scene.traverseVisible((o) => found.push(o.name));
@@ -103,9 +105,25 @@ class Page(ProgramTest):
             self.assertEqual(browser.run("return document.getElementById('phase-chip').textContent"), "rendering")
             self.assertEqual(browser.complaints(), [])
 
+    def test_a_mesh_of_328_thousand_triangles_is_shown(self):
+        """As many as a machine without a graphics card draws in time; tests/soak/view_speed.py has how fast."""
+        bumpy_ball(self.folder / "ball.stl")
+        scene = self.written("ball.yaml", "name: ball\nobjects:\n  - mesh: {name: ball, file: ball.stl, friction: 0.3}\n")
+        with view_browser.Browser() as browser, Session(self.folder, "run", "--view", "--no-plot", "--scene", scene) as session:
+            self.opened(browser, session)
+            solid = "proxarm.world.objects.parts[0].getObjectByName('solid')"
+            browser.until(f"{solid} !== undefined", "the mesh")
+            triangles = browser.run(f"return {solid}.geometry.index.count / 3")
+            self.assertTrue(20_000 < triangles <= 80_000, triangles)
+            frames = browser.run("return proxarm.world.frames")
+            browser.until(f"proxarm.world.frames > {frames} + 1", "a picture with it")
+            self.assert_colour(browser.picture("mesh-light"), self.point_of(browser, 1.05, -0.15, 0.6),
+                               lambda r, g, b: g > r + 8 and g > b + 2, "the ball's green")
+            self.assertEqual(browser.complaints(), [])
+
     def test_dark_and_on_a_phone(self):
         with view_browser.Browser(390, 844, dark=True) as browser, \
-                Session(self.folder, "run", "--view", "--no-plot") as session:
+                Session(self.folder, "run", "--view", "--no-plot", "--duration", "60s") as session:
             self.opened(browser, session)
             self.assertEqual(browser.run("return document.documentElement.dataset.theme"), "dark")
             self.until_time(browser, 1.5)
@@ -121,7 +139,7 @@ class Page(ProgramTest):
 
     def test_sliders_change_the_session(self):
         with view_browser.Browser() as browser, \
-                Session(self.folder, "run", "--view-control", "--no-plot", "--record", "session", "--duration", "12s") as session:
+                Session(self.folder, "run", "--view-control", "--no-plot", "--record", "session", "--duration", "60s") as session:
             self.opened(browser, session)
             browser.until(f"{NOW}.phase === 3", "rendering")
             browser.run("""const field = document.getElementById('set-mass'), slider = field.parentElement.firstChild;

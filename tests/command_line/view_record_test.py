@@ -3,7 +3,7 @@ import csv
 import json
 import unittest
 
-from harness import ProgramTest
+from harness import SOURCE, ProgramTest
 from view_client import Session
 
 
@@ -41,6 +41,22 @@ class Records(ProgramTest):
                                           ("contact_force_x", "contact_force_W_x_N"), ("time_s", "time_s"),
                                           ("friction", "friction_1"), ("tool_clearance_m", "tool_clearance_m")):
                         self.assertAlmostEqual(moment[field], float(rows[index][column]), places=9, msg=field)
+
+    def test_each_of_several_contacts_is_told(self):
+        """A foam wall and a table at once."""
+        folder = self.record("--scene", SOURCE / "scenes/soft_corner.yaml", "--hand", SOURCE / "sim/hands/explore.yaml")
+        with open(folder / "signals.csv", newline="") as file:
+            index, row = next((i, row) for i, row in enumerate(csv.DictReader(file)) if row["contacts"] == "2")
+        page, stage = self.opened(folder)
+        page.send({"at": index})
+        while (moment := page.receive_moment(stage["fields"]))["cycle"] != int(row["cycle"]):
+            pass
+        names = [stage["scene"]["objects"][int(moment[object])]["name"] for object in ("object", "object_2")]
+        self.assertEqual(names, ["table", "foam"])
+        self.assertEqual((moment["friction"], moment["friction_2"]), (0.3, 0.5))
+        self.assertEqual([moment[f"normal_2_{axis}"] for axis in "xyz"], [-1.0, 0.0, 0.0])
+        self.assertEqual((int(row["contact_object_2"]), float(row["normal_2_W_x_1"])), (0, -1.0))
+        self.assertEqual(moment["object_3"], -1)
 
     def test_the_frames_of_a_cycle_are_decoded(self):
         page, stage = self.opened(self.record())

@@ -2,7 +2,9 @@
 import json
 import os
 import pathlib
+import pty
 import re
+import select
 import signal
 import socket
 import subprocess
@@ -10,7 +12,7 @@ import time
 import unittest
 
 from harness import ProgramTest, program
-from view_client import PATIENCE_S, Session
+from view_client import PATIENCE_S, URL, Session
 
 QUICK = ("--pace", "virtual", "--duration", "0.5s", "--no-plot")
 PLATE = """name: a plate that is pushed
@@ -190,6 +192,73 @@ class Apart(ProgramTest):
             while pathlib.Path(f"/proc/{view}").exists() and time.monotonic() < until:
                 time.sleep(0.05)
             self.assertFalse(pathlib.Path(f"/proc/{view}").exists())
+
+
+class Desktop(ProgramTest):
+    """With somebody at a terminal and a desktop, the address is opened there; an xdg-open of ours tells how."""
+
+    def setUp(self):
+        super().setUp()
+        for name in ("bin", "runtime"):
+            (self.folder / name).mkdir()
+        opener = self.folder / "bin" / "xdg-open"
+        told = self.folder / "told"
+        opener.write_text(f'#!/bin/sh\n{{ stat -c %a "$1" "$(dirname "$1")"; echo "$#:$1"; cat "$1"; }} > {told}.new\n'
+                          f"mv {told}.new {told}\n")
+        opener.chmod(0o700)
+        self.told = told
+        self.env = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder / "runtime"), "DISPLAY": ":9",
+                    "PATH": f"{opener.parent}:{os.environ['PATH']}"}
+
+    def run_at_a_terminal(self, env, *command):
+        """Returns the address that was said, once the view stays, and the process."""
+        terminal, its_end = pty.openpty()
+        self.addCleanup(os.close, terminal)
+        process = subprocess.Popen(command, cwd=self.folder, stdin=subprocess.DEVNULL, env=env,
+                                   stdout=subprocess.DEVNULL, stderr=its_end, text=True)
+        os.close(its_end)
+        said = b""
+        while b"until Ctrl-C" not in said:
+            ready, _, _ = select.select([terminal], [], [], PATIENCE_S)
+            self.assertTrue(ready, said)
+            said += os.read(terminal, 4096)
+        return URL.search(said.decode())[1], process
+
+    def test_the_address_goes_to_the_browser_and_to_nobody_else(self):
+        url, process = self.run_at_a_terminal(self.env, program(), "run", "--view", *QUICK)
+        until = time.monotonic() + PATIENCE_S
+        while not self.told.exists() and time.monotonic() < until:
+            time.sleep(0.01)
+        modes_of_file, modes_of_folder, words, page = self.told.read_text().splitlines()
+        self.assertEqual((modes_of_file, modes_of_folder), ("600", "700"))
+        count, file = words.split(":", 1)
+        self.assertEqual(count, "1")
+        self.assertNotIn(url[-64:], file, "a command line is for everybody to read")
+        self.assertIn(f"url={url}", page)
+        self.assertTrue(pathlib.Path(file).exists())
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(PATIENCE_S), 0)
+        self.assertFalse(pathlib.Path(file).exists(), "it is gone with the session")
+
+    def test_nothing_is_opened_without_a_desktop(self):
+        env = {name: value for name, value in self.env.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        _, process = self.run_at_a_terminal(env, program(), "run", "--view", *QUICK)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(PATIENCE_S), 0)
+        self.assertFalse(self.told.exists())
+
+    def test_what_others_have_put_there_is_left_alone(self):
+        """A link in place of the file that leads to the address: it is neither followed nor removed."""
+        elsewhere = self.written("elsewhere", "mine")
+        folder = self.folder / "runtime" / "proxarm"
+        folder.mkdir(mode=0o700)
+        script = f'ln -s {elsewhere} {folder}/view-$$.html; exec {program()} "$@"'
+        _, process = self.run_at_a_terminal(self.env, "/bin/sh", "-c", script, "sh", "run", "--view", *QUICK)
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(PATIENCE_S), 0)
+        self.assertEqual(elsewhere.read_text(), "mine")
+        self.assertEqual(len(list(folder.glob("*.html"))), 1)
+        self.assertFalse(self.told.exists())
 
 
 class Refusals(ProgramTest):

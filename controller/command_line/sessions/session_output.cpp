@@ -9,8 +9,8 @@
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
+#include "controller/signals/clearances.hpp"
 #include "models/base/setup_error.hpp"
-#include "scenes/compiler/compile.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -48,15 +48,7 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
 }
 
 void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
-  const auto& tool = record.has(controller::RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
-  // Order 2's proxy is where it is a period before that of (26): see admittance_proxy.hpp.
-  const std::int64_t later_ns = session.settings.order == 2 ? record.period_ns : 0;
-  const double scene_time_s = static_cast<double>(rendered_ns - later_ns) / 1e9;
-  const auto clearance_m = [&](const controller::Triple& x_W) {
-    return scenes::clearance_m(session.scene, controller::vec3(x_W), scene_time_s, scenes::Driven::left_out);
-  };
-  record.proxy_clearance_m = clearance_m(record.proxy_W_m);
-  record.tool_clearance_m = clearance_m(tool);
+  controller::add_clearances(record, session.scene, session.settings.order, rendered_ns);
   if (!session.impedance()) return;
   if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
     record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;

@@ -226,7 +226,7 @@ std::string session_message(const Moment& moment) {
   JsonText json = begin_message(record.time_ns);
   json.add("cycle", record.cycle).add("phase", controller::phase_name(record.phase)).name("flags").begin_list();
   for (const FlagWords& flag : flag_words()) {
-    if ((moment.flags_since & static_cast<std::uint32_t>(flag.flag)) != 0) json.value(flag.name);
+    if ((moment.flags_since & static_cast<std::uint32_t>(flag.flag)) != 0) json.value(controller::flag_name(flag.flag));
   }
   json.end().add("fault", record.fault == controller::Fault::none ? "" : controller::fault_name(record.fault));
   json.add("mass_kg", record.proxy_mass_kg > 0.0 ? record.proxy_mass_kg + moment.handle_mass_kg : 0.0);

@@ -70,11 +70,9 @@ export class ContactView extends THREE.Group {
     this.stick.name = 'stick force';
     this.slip = new Arrow(this.materials.slip, { radius: 0.0045, pieces: 5 });
     this.slip.name = 'slip force';
-    this.normal = new Arrow(this.materials.normal, { radius: 0.0014 });
-    this.normal.name = 'normal';
-    this.makeCone();
+    this.cones = ['', '_2', '_3'].map((end) => this.makeCone(end));
     this.trail = new Trail();
-    this.add(this.trail, this.leash, this.cone, this.normal, this.hand, this.stick, this.slip, this.tool, this.proxy);
+    this.add(this.trail, this.leash, ...this.cones.flatMap((c) => [c.cone, c.normal]), this.hand, this.stick, this.slip, this.tool, this.proxy);
   }
 
   makeMaterials() {
@@ -104,12 +102,14 @@ export class ContactView extends THREE.Group {
     });
   }
 
-  // Of height 1 and radius 1 about z, its tip at the contact; scaled by the coefficient of friction.
-  makeCone() {
+  // Of a contact whose fields have this end: of height 1 and radius 1 about z, its tip at the contact; scaled by the
+  // coefficient of friction.
+  makeCone(end) {
+    const cone = new THREE.Group(), normal = new Arrow(this.materials.normal, { radius: 0.0014 });
+    cone.name = `friction cone${end}`;
+    normal.name = `normal${end}`;
     const sides = 36;
     const geometry = new THREE.ConeBufferGeometry(1, 1, sides, 1, true).rotateX(-Math.PI / 2).translate(0, 0, 0.5);
-    this.cone = new THREE.Group();
-    this.cone.name = 'friction cone';
     const rim = [];
     for (let i = 0; i <= sides; ++i) {
       const a = (2 * Math.PI * i) / sides;
@@ -117,15 +117,28 @@ export class ContactView extends THREE.Group {
     }
     const ribs = [];
     for (let i = 0; i < 8; ++i) ribs.push(new THREE.Vector3(), rim[Math.round((i * sides) / 8)]);
-    this.cone.add(new THREE.Mesh(geometry, this.materials.cone),
+    cone.add(new THREE.Mesh(geometry, this.materials.cone),
       new THREE.Line(new THREE.BufferGeometry().setFromPoints(rim), this.materials.coneEdge),
       new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ribs), this.materials.coneEdge));
-    this.cone.visible = false;
+    cone.visible = false;
+    return { cone, normal, fields: `normal${end}`, friction: `friction${end}` };
+  }
+
+  showCone({ cone, normal, fields, friction }, moment, proxy) {
+    const direction = at(moment, fields), touches = moment.contact !== FREE && direction.lengthSq() > 0.5;
+    const height = CONE_HEIGHT * this.size;
+    normal.setTo(proxy, touches ? direction.clone().multiplyScalar(1.25 * height) : new THREE.Vector3());
+    cone.visible = touches && moment[friction] > 1e-6;
+    if (!cone.visible) return;
+    cone.position.copy(proxy);
+    cone.quaternion.setFromUnitVectors(UP, direction);
+    const radius = Math.min(2.5 * height, moment[friction] * height);
+    cone.scale.set(radius, radius, height);
   }
 
   // `moves`: it is another moment, not the same seen from elsewhere.
   show(moment, moves = true) {
-    const proxy = at(moment, 'proxy'), tool = at(moment, 'tool'), normal = at(moment, 'normal');
+    const proxy = at(moment, 'proxy'), tool = at(moment, 'tool');
     this.proxy.position.copy(proxy);
     this.tool.position.copy(tool);
     this.leash.geometry.setFromPoints([proxy, tool]);
@@ -144,16 +157,7 @@ export class ContactView extends THREE.Group {
     const none = new THREE.Vector3();
     this.stick.setTo(proxy, moment.contact === STICK ? force : none);
     this.slip.setTo(proxy, moment.contact === SLIP ? force : none);
-
-    const touches = moment.contact !== FREE && normal.lengthSq() > 0.5;
-    this.normal.setTo(proxy, touches ? normal.clone().multiplyScalar(CONE_HEIGHT * 1.25 * this.size) : none);
-    this.cone.visible = touches && moment.friction > 1e-6;
-    if (this.cone.visible) {
-      this.cone.position.copy(proxy);
-      this.cone.quaternion.setFromUnitVectors(UP, normal);
-      const height = CONE_HEIGHT * this.size, radius = Math.min(2.5 * height, moment.friction * height);
-      this.cone.scale.set(radius, radius, height);
-    }
+    for (const one of this.cones) this.showCone(one, moment, proxy);
   }
 
   // By the camera's distance from the tool. True: it has changed enough to be drawn anew.
@@ -162,7 +166,7 @@ export class ContactView extends THREE.Group {
     if (Math.abs(size / this.size - 1) < 0.02) return false;
     this.size = size;
     for (const thing of [this.proxy, this.tool]) thing.scale.setScalar(size);
-    for (const arrow of [this.hand, this.stick, this.slip, this.normal]) arrow.setThickness(size);
+    for (const arrow of [this.hand, this.stick, this.slip, ...this.cones.map((c) => c.normal)]) arrow.setThickness(size);
     return true;
   }
 

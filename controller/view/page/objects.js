@@ -16,6 +16,7 @@ function makeMaterials() {
     grid: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.75 }),
     border: new THREE.LineBasicMaterial(),
     edge: new THREE.LineBasicMaterial({ transparent: true, opacity: 0.6 }),
+    skinEdge: new THREE.LineBasicMaterial(),
     guide: new THREE.LineBasicMaterial(),
     free: new THREE.MeshLambertMaterial(),
   };
@@ -25,6 +26,7 @@ function makeMaterials() {
     all.solid.color.set(dark ? 0x4c8f78 : 0x86bda8);
     for (const name of ['cavity', 'sheet']) all[name].color.set(dark ? 0x3f8f73 : 0x6fb59a);
     all.skin.color.set(dark ? 0xd8b04a : 0xe2b64b);
+    all.skinEdge.color.set(dark ? 0xd8b04a : 0x8a6410);
     all.medium.color.set(dark ? 0x7d8fd6 : 0x8b9be0);
     for (const name of ['grid', 'border', 'guide', 'free']) all[name].color.copy(green);
     all.edge.color.set(dark ? 0x9be0c5 : 0x1f5c47);
@@ -110,9 +112,12 @@ function makeObject(object, near, materials) {
     group.add(makePlane(shape, near, materials));
     if (object.layer) {
       // The layer's thickness is the object's own: its outside is where the plane is described.
-      const bottom = new THREE.Mesh(new THREE.PlaneBufferGeometry(PLANE_SIZE, PLANE_SIZE), materials.skin);
-      bottom.position.z = -object.layer.thickness;
-      group.children[0].add(bottom);
+      const geometry = new THREE.BoxBufferGeometry(PLANE_SIZE, PLANE_SIZE, object.layer.thickness);
+      const skin = new THREE.Mesh(geometry, materials.skin);
+      skin.name = 'skin';
+      skin.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry), materials.skinEdge));
+      skin.position.z = -object.layer.thickness / 2;
+      group.children[0].add(skin);
     }
   } else if (shape.kind === 'mesh') {
     fetchMesh(object.mesh).then((geometry) => {

@@ -37,10 +37,12 @@ const ARM_FIGURES = [
   ['tool, z', (m) => `${m.tool_z.toFixed(4)} m`],
 ];
 
+// All that press at once, each named once; the guide comes after the scene's objects.
 function name(stage, moment) {
-  const object = stage.scene.objects[moment.object];
-  const more = moment.contacts > 1 ? ` + ${moment.contacts - 1}` : '';
-  return (object ? object.name : 'an object') + more;
+  const { objects, guide } = stage.scene, some = moment.contacts > 1 ? [moment.object_2, moment.object_3] : [];
+  const names = [moment.object, ...some.slice(0, moment.contacts - 1)].map((index) =>
+    objects[index]?.name ?? (guide && index === objects.length ? 'guide' : 'an object'));
+  return [...new Set(names)].join(', ');
 }
 
 export class Panel {

@@ -31,7 +31,7 @@ const SESSION_PLOTS = [
   { title: 'mass, energy', unit: 'kg · J', least: 1, zero: true, lines: [
     { name: 'wanted', value: (m) => (m.mass_kg > 0 ? m.mass_kg : NaN), colour: '--ink', dash: 'dotted' },
     { name: 'felt', value: (m) => m.felt_kg, colour: '--good', dash: 'solid' },
-    { name: 'hand’s energy', value: (m) => m.energy_hand_J, colour: '--hand', dash: 'dashed' }] },
+    { name: 'energy', value: (m) => m.energy_hand_J, colour: '--hand', dash: 'dashed' }] },
   { title: 'computing a cycle', unit: 'µs', least: 10, zero: true, lines: [
     { name: 'longest', value: (m) => m.compute_peak_us, colour: '--soft', dash: 'dotted', peaks: true },
     { name: 'last', value: (m) => m.compute_us, colour: '--accent', dash: 'solid' }],
@@ -116,6 +116,9 @@ class Plot {
     const ratio = Math.min(2, devicePixelRatio || 1);
     this.canvas.width = Math.round(width * ratio);
     this.canvas.height = Math.round(height * ratio);
+    // Its box may end within a pixel, which would blur it.
+    this.canvas.style.width = `${this.canvas.width / ratio}px`;
+    this.canvas.style.height = `${this.canvas.height / ratio}px`;
     this.ratio = ratio;
     this.width = width;
     this.height = height;

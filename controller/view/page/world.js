@@ -13,7 +13,7 @@ const RATIOS = [1, 0.8, 0.65, 0.5];
 
 // Where to look from, about the middle between arm and tool, or about the tool itself.
 const VIEWS = {
-  overview: { from: [-0.95, -1.85, 0.62], about: 'middle' },
+  overview: { from: [-1.06, -2.07, 0.6], about: 'middle' },
   tool: { from: [-0.28, -0.44, 0.2], about: 'tool' },
   top: { from: [0, -0.001, 2.2], about: 'middle' },
   front: { from: [2.2, 0, 0.05], about: 'middle' },
@@ -84,7 +84,7 @@ export class World {
     for (const part of [this.arm, this.objects, this.contacts, this.limits]) if (part) this.scene.remove(part);
     this.tool.set(...vector(moment, 'tool'));
     this.middle.copy(this.tool).multiplyScalar(0.62);
-    this.middle.z = Math.max(0.2, this.tool.z * 0.93);
+    this.middle.z = Math.max(0.2, this.tool.z * 0.95);
     this.arm = new ArmView(stage);
     this.objects = new SceneView(stage, this.tool.clone());
     this.contacts = new ContactView(stage.mode !== 'arm');

@@ -65,7 +65,7 @@ void store_flags(CycleRecord& record, std::size_t /*part*/, std::string_view tex
   while (!text.empty()) {
     const std::string_view word = text.substr(0, text.find('|'));
     for (const FlagWords& flag : flag_words()) {
-      if (word == flag.name) record.set(flag.flag);
+      if (word == controller::flag_name(flag.flag)) record.set(flag.flag);
     }
     text.remove_prefix(std::min(word.size() + 1, text.size()));
   }
@@ -113,6 +113,37 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
                              NamedVector{"true_tool_W", "m", store_part<&CycleRecord::true_tool_W_m>},
                              NamedVector{"hand_force_W", "N", store_part<&CycleRecord::hand_force_W_N>}};
 
+// "contact_object_2", "friction_2", "normal_2_W_x_1": of one that presses beside the first.
+constexpr std::array<std::string_view, 3> axes_in_names{"_x_", "_y_", "_z_"};
+
+struct OtherColumn {
+  void (*store)(CycleRecord&, std::size_t, std::string_view) = nullptr;
+  std::size_t part = 0;
+};
+
+OtherColumn column_of_other(std::string_view name) {
+  for (std::size_t i = 0; i < controller::other_contacts; ++i) {
+    const std::string number = std::to_string(i + 2);
+    if (name == "contact_object_" + number) {
+      return {
+          [](CycleRecord& r, std::size_t at, std::string_view t) { r.others[at].object = number_of<std::int32_t>(t); },
+          i};
+    }
+    if (name == "friction_" + number) {
+      return {[](CycleRecord& r, std::size_t at, std::string_view t) { r.others[at].friction = number_of<double>(t); },
+              i};
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (name != "normal_" + number + "_W" + std::string(axes_in_names[axis]) + "1") continue;
+      return {[](CycleRecord& r, std::size_t at, std::string_view t) {
+                r.others[at / 3].normal_W[at % 3] = number_of<double>(t);
+              },
+              3 * i + axis};
+    }
+  }
+  return {};
+}
+
 // Without the line's end.
 std::string_view line_at(std::string_view text, std::size_t at) { return text.substr(at, text.find('\n', at) - at); }
 
@@ -122,10 +153,9 @@ SignalsFile::Column SignalsFile::column_named(std::string_view name, const std::
   for (const Named& known : singles) {
     if (name == known.name) return {known.store, 0};
   }
-  constexpr std::array<std::string_view, 3> axes{"_x_", "_y_", "_z_"};
   for (const NamedVector& known : vectors) {
-    for (std::size_t part = 0; part < axes.size(); ++part) {
-      if (name == std::string(known.name) + std::string(axes[part]) + std::string(known.unit))
+    for (std::size_t part = 0; part < axes_in_names.size(); ++part) {
+      if (name == std::string(known.name) + std::string(axes_in_names[part]) + std::string(known.unit))
         return {known.store, part};
     }
   }
@@ -133,7 +163,8 @@ SignalsFile::Column SignalsFile::column_named(std::string_view name, const std::
     if (name == axis_names[axis] + "_target_counts") return {store_count<&CycleRecord::target_counts>, axis};
     if (name == axis_names[axis] + "_actual_counts") return {store_count<&CycleRecord::actual_counts>, axis};
   }
-  return {};
+  const OtherColumn other = column_of_other(name);
+  return {other.store, other.part};
 }
 
 SignalsFile::SignalsFile(const std::filesystem::path& file, const std::vector<std::string>& axis_names) : name_(file) {

@@ -162,7 +162,7 @@ void put_limits(JsonText& json, const description::CellLimits& limits) {
 void put_words(JsonText& json, bool arm_alone) {
   json.begin_object().name("flags").begin_list();
   for (const FlagWords& flag : flag_words()) {
-    json.begin_object().add("bit", static_cast<std::uint32_t>(flag.flag)).add("name", flag.name);
+    json.begin_object().add("bit", static_cast<std::uint32_t>(flag.flag)).add("name", controller::flag_name(flag.flag));
     json.add("words", flag.words).add("holds_back", flag.holds_back).end();
   }
   json.end().name("phases").begin_list();

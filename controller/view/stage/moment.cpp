@@ -111,6 +111,12 @@ const std::vector<std::string>& field_names() {
     for (const VectorField& vector : vectors) {
       for (const char* axis : {"_x", "_y", "_z"}) all.push_back(std::string(vector.name) + axis);
     }
+    for (std::size_t i = 0; i < controller::other_contacts; ++i) {
+      const std::string number = std::to_string(i + 2);
+      all.push_back("object_" + number);
+      all.push_back("friction_" + number);
+      for (const char* axis : {"_x", "_y", "_z"}) all.push_back("normal_" + number + axis);
+    }
     return all;
   }();
   return names;
@@ -121,6 +127,11 @@ void append_fields(std::vector<double>& row, const Moment& moment) {
   for (const VectorField& vector : vectors) {
     const Triple& value = moment.record.*vector.value;
     row.insert(row.end(), value.begin(), value.end());
+  }
+  for (const controller::OtherContact& other : moment.record.others) {
+    row.push_back(other.object);
+    row.push_back(other.friction);
+    row.insert(row.end(), other.normal_W.begin(), other.normal_W.end());
   }
 }
 

@@ -1,8 +1,10 @@
 #include "controller/view/stage/stage.hpp"
 
 #include <algorithm>
-#include <cstring>
+#include <cmath>
 
+#include "controller/signals/clearances.hpp"
+#include "controller/view/stage/mesh_picture.hpp"
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/obstacles.hpp"
 #include "scenes/mesh_files/mesh_file.hpp"
@@ -13,34 +15,6 @@ namespace {
 using controller::CycleRecord;
 using models::Pose;
 using models::Vec3;
-
-// A browser on a small machine still draws this many.
-constexpr std::size_t most_triangles = 2'000'000;
-
-template <typename Number>
-void put(std::string& bytes, Number number) {
-  const std::size_t at = bytes.size();
-  bytes.resize(at + sizeof number);
-  std::memcpy(bytes.data() + at, &number, sizeof number);
-}
-
-// Triangles beyond the most that are drawn are thinned out evenly: a surface with holes shows where it is.
-template <typename Vertices, typename Triangles>
-std::string packed(const Vertices& vertices, const Triangles& triangles, const Vec3& scale) {
-  const std::size_t step = triangles.size() / most_triangles + 1;
-  const std::size_t count = (triangles.size() + step - 1) / step;
-  std::string bytes;
-  bytes.reserve(8 + 12 * vertices.size() + 12 * count);
-  put(bytes, static_cast<std::uint32_t>(vertices.size()));
-  put(bytes, static_cast<std::uint32_t>(count));
-  for (const Vec3& v : vertices) {
-    for (int i = 0; i < 3; ++i) put(bytes, static_cast<float>(v[i] * scale[i]));
-  }
-  for (std::size_t i = 0; i < triangles.size(); i += step) {
-    for (const std::uint32_t corner : triangles[i]) put(bytes, corner);
-  }
-  return bytes;
-}
 
 }  // namespace
 
@@ -58,7 +32,7 @@ std::string Stage::mesh_bytes(int link, std::size_t index) const {
     const auto* const shape =
         index < scene_.objects.size() ? std::get_if<scenes::MeshShape>(&scene_.objects[index].shape) : nullptr;
     if (shape == nullptr || !shape->mesh) throw description::SetupError({.message = "no such mesh"});
-    return packed(shape->mesh->structure().vertices, shape->mesh->structure().triangles, Vec3::Ones());
+    return mesh_picture(shape->mesh->structure().vertices, shape->mesh->structure().triangles, Vec3::Ones());
   }
   const auto& links = tree_.links();
   const auto at = static_cast<std::size_t>(link);
@@ -67,7 +41,7 @@ std::string Stage::mesh_bytes(int link, std::size_t index) const {
                                : nullptr;
   if (mesh == nullptr) throw description::SetupError({.message = "no such mesh"});
   const models::TriangleSoup soup = scenes::read_mesh_file(mesh->file);
-  return packed(soup.vertices, soup.triangles, mesh->scale);
+  return mesh_picture(soup.vertices, soup.triangles, mesh->scale);
 }
 
 void Stage::follow(const controller::Change& change, bool rendered, double period_s) noexcept {
@@ -76,14 +50,8 @@ void Stage::follow(const controller::Change& change, bool rendered, double perio
   if (rendered) changes_.step();
 }
 
-// Order 2's proxy is where it is a period before that of (26): see proxies/bdf2.hpp.
 void Stage::complete(CycleRecord& record, double rendered_s) const {
-  const double later_s = options_.order == 2 ? 1e-9 * static_cast<double>(record.period_ns) : 0.0;
-  const auto clearance_m = [&](const controller::Triple& x_W) {
-    return scenes::clearance_m(scene_, controller::vec3(x_W), rendered_s - later_s, scenes::Driven::left_out);
-  };
-  record.proxy_clearance_m = clearance_m(record.proxy_W_m);
-  record.tool_clearance_m = clearance_m(record.tool_W_m);
+  controller::add_clearances(record, scene_, options_.order, std::llround(1e9 * rendered_s));
 }
 
 Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {

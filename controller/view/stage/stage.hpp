@@ -41,8 +41,7 @@ class Stage {
 
   // All that a page must know once, as JSON: fields of the wire, links, objects, limits, words.
   [[nodiscard]] std::string describe() const;
-  // A mesh of the scene (link < 0) or of a link's shape, for its GPU: uint32 vertices, uint32 triangles, then float
-  // x y z of each vertex and uint32 a b c of each triangle. Throws SetupError.
+  // A mesh of the scene (link < 0) or of a link's shape, as mesh_picture() packs it. Throws SetupError.
   [[nodiscard]] std::string mesh_bytes(int link, std::size_t index) const;
 
   // The same objects move and change as in the cycle: `change` is what it took, `rendered` whether it rendered.

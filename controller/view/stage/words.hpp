@@ -12,7 +12,6 @@ namespace proxarm::view {
 // What holds the arm back, or is otherwise out of the ordinary, while a flag is set.
 struct FlagWords {
   controller::RecordFlag flag;
-  const char* name;  // as in signals.csv
   const char* words;
   bool holds_back;  // it is a limit that acts
 };
