@@ -12,6 +12,7 @@
 #include <istream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/view/page_channel.hpp"
@@ -89,6 +90,11 @@ class LiveView {
   }
 
  private:
+  // Where processors are scarce, the session goes first, once somebody who waited for a picture has one.
+  void step_back() {
+    if (!std::exchange(stepped_back_, true)) (void)setpriority(PRIO_PROCESS, 0, 5);
+  }
+
   void welcome(view::Socket& socket) {
     json stage = json::parse(stage_.describe());
     stage["mode"] = stage_.options().arm_alone ? "arm" : "live";
@@ -97,6 +103,7 @@ class LiveView {
     socket.say(std::make_shared<const std::string>(view::encode_history(source_.history())), true);
     socket.say(text_of({{"status", status_}}), false);
     if (last_) socket.show(std::make_shared<const std::string>(source_.encode(*last_)));
+    step_back();
   }
 
   void show() {
@@ -152,6 +159,7 @@ class LiveView {
   boost::asio::streambuf lines_{65536};
   json status_{{"fault", ""}, {"ended", ""}};
   std::optional<view::Moment> last_;
+  bool stepped_back_ = false;
 };
 
 std::string first_line(stream_protocol::socket& session) {
@@ -170,9 +178,7 @@ void reply(stream_protocol::socket& session, const json& answer) {
 }  // namespace
 
 int live_view(int memory, int session) {
-  // Ctrl-C is the session's: it says when this is over. And where processors are scarce, the session goes first.
-  ignore_ending_signals();
-  (void)setpriority(PRIO_PROCESS, 0, 5);
+  ignore_ending_signals();  // Ctrl-C is the session's: it says when this is over
   boost::asio::io_context context{1};
   stream_protocol::socket line(context, stream_protocol(), session);
   std::optional<LiveView> shown;
