@@ -248,7 +248,7 @@ std::vector<Row> ErrorStudy::run(std::size_t job, const Options& options) const 
       rows.push_back({which.name, std::string(method_names[method]), tuning.stiffness_N_per_m, tuning.damping_ratio,
                       tuning.friction_slope, tuning.staggered ? 1.0 : 0.0, run.period_s, static_cast<double>(run.steps),
                       run.reference_ns, run.of_reference.median, run.of_reference.low, run.of_reference.high,
-                      e.position_m, run.position_m.low, run.position_m.high, e.velocity_m_per_s, e.force_N, e.energy_J,
+                      e.position_m, run.position_low_m, run.position_high_m, e.velocity_m_per_s, e.force_N, e.energy_J,
                       e.stop_s});
     }
   }
@@ -292,9 +292,8 @@ json ErrorStudy::headline(const Table& table, const Options& /*options*/) const 
         {"order_residual_decades", "rms of the fit's residual, in decades of error"},
         {"speedup_over_tuned_penalty",
          "by case and method: run time of the best-tuned other method over ours at equal position error (of nine in "
-         "ten "
-         "phases), median over errors of 1 um to 1 mm that both reach; low and high by how step times scatter; 0 where "
-         "there is none"},
+         "ten phases), median over errors of 1 um to 1 mm that both reach; low and high by how step times scatter; 0 "
+         "where there is none"},
         {"speedup_over_fixed_penalty", "the same against one method and tuning for all cases (fixed_penalty)"},
         {"tuned_penalty", "what was best at 0.1 mm"},
         {"at_1_ms", "position error (median over phases) and time of a step with steps of 1 ms, least over tunings"},

@@ -44,7 +44,10 @@ class OneObstacle final : public GeometricAlgorithm<3> {
   std::size_t count_ = 0;
 };
 
-World inside_sphere(double radius_m) { return std::make_unique<OneObstacle>(obstacle_of({.radius_m = radius_m}, 0.0)); }
+World inside_sphere(double radius_m) {
+  return std::make_unique<OneObstacle>(
+      std::make_unique<models::Sphere>(models::PointCore{Vec3::Zero()}, radius_m, 0.0, true));
+}
 
 // Jacobi's sn, cn, dn of modulus k by descending Landen transformations (Abramowitz and Stegun 16.4, arithmetic-
 // geometric mean).
@@ -280,13 +283,6 @@ ErrorCase hand_wall() {
 }
 
 }  // namespace
-
-std::unique_ptr<models::Obstacle> obstacle_of(const CaseSurface& surface, double friction) {
-  if (surface.radius_m > 0.0) {
-    return std::make_unique<models::Sphere>(models::PointCore{surface.point}, surface.radius_m, friction, true);
-  }
-  return std::make_unique<models::PlaneObstacle>(surface.point, surface.normal, friction);
-}
 
 std::vector<ErrorCase> error_cases() {
   std::vector<ErrorCase> cases;

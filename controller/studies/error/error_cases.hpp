@@ -1,7 +1,7 @@
 // Motions whose exact solution is known: what the error study compares with.
 //
-// Metres, kilograms, newtons, seconds. The surfaces make a 𝒢 for (26), and are asked for distance and normal by
-// the penalty methods that it is compared with.
+// Metres, kilograms, newtons, seconds. Each has its world twice: as 𝒢 for (26), and as surfaces for the penalty methods
+// that it is compared with (penalty_world.hpp).
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "models/geometry/geometric_algorithm.hpp"
-#include "models/obstacles/obstacle.hpp"
+#include "models/geometry/geometry.hpp"
 
 namespace proxarm::studies {
 
@@ -38,9 +38,6 @@ struct CaseSurface {
   models::Vec3 point = models::Vec3::Zero(), normal = models::Vec3::UnitZ();
   double radius_m = 0.0;
 };
-
-// The object that it is.
-std::unique_ptr<models::Obstacle> obstacle_of(const CaseSurface& surface, double friction);
 
 struct CaseState {
   models::Vec3 q = models::Vec3::Zero(), v = models::Vec3::Zero();

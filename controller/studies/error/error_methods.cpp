@@ -202,10 +202,10 @@ void time_steps(const ErrorCase& which, Make make, int steps, MethodRun& run) {
   run.of_reference = Spread::of(shares);
 }
 
-double median(const std::vector<Errors>& list, double Errors::*member) {
+Spread spread(const std::vector<Errors>& list, double Errors::*member) {
   std::vector<double> values;
   for (const Errors& errors : list) values.push_back(errors.*member);
-  return Spread::of(values).median;
+  return Spread::of(values);
 }
 
 template <typename Make>
@@ -218,16 +218,17 @@ std::vector<MethodRun> runs(const ErrorCase& which, bool quick, Make make) {
     run.period_s = which.duration_s / steps;
     const int phases = phase_count(steps, quick);
     std::vector<Errors> errors;
-    std::vector<double> positions;
     for (int i = 0; i < phases; ++i) {
       const double t_0 = run.period_s * (i + 0.5) / phases;
       auto stepper = make(run.period_s, t_0);
       errors.push_back(errors_of(which, stepper, steps, t_0));
-      positions.push_back(errors.back().position_m);
     }
-    run.position_m = Spread::of(positions);
-    run.errors = {run.position_m.median, median(errors, &Errors::velocity_m_per_s), median(errors, &Errors::force_N),
-                  median(errors, &Errors::energy_J), median(errors, &Errors::stop_s)};
+    const Spread position_m = spread(errors, &Errors::position_m);
+    run.position_low_m = position_m.low;
+    run.position_high_m = position_m.high;
+    run.errors = {position_m.median, spread(errors, &Errors::velocity_m_per_s).median,
+                  spread(errors, &Errors::force_N).median, spread(errors, &Errors::energy_J).median,
+                  spread(errors, &Errors::stop_s).median};
     list.push_back(run);
   }
   return list;

@@ -35,8 +35,8 @@ struct Spread {
 struct MethodRun {
   int steps = 0;
   double period_s = 0.0;
-  Errors errors;              // the medians
-  Spread position_m;          // of the position error
+  Errors errors;  // the medians
+  double position_low_m = 0.0, position_high_m = 0.0;
   double reference_ns = 0.0;  // processor time of a step of (26)
   Spread of_reference;        // that of the method's step as a share of it, measured in turn
 };

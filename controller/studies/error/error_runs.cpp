@@ -82,29 +82,32 @@ std::size_t Runs::at_1_ms() const {
 RunsByCase collect(const Table& table) {
   RunsByCase all;
   std::map<std::string, double> reference_ns;
-  const auto column = [&table](const char* name) { return table.column(name); };
-  const std::size_t name = column("case"), ns = column("reference_step_ns");
+  const auto column = [&table](const char* key) { return table.column(key); };
+  const std::size_t name = column("case"), method = column("method"), k = column("stiffness_N_per_m"),
+                    ratio = column("damping_ratio"), slope = column("friction_slope"), staggered = column("staggered"),
+                    T = column("period_s"), steps = column("steps"), ns = column("reference_step_ns"),
+                    share = column("of_reference"), share_low = column("of_reference_low"),
+                    share_high = column("of_reference_high"), error = column("position_error_m"),
+                    error_low = column("position_error_low_m"), error_high = column("position_error_high_m");
   for (std::size_t row = 0; row < table.rows(); ++row) {
     double& least = reference_ns.emplace(table.text(row, name), infinity).first->second;
     least = std::min(least, table.number(row, ns));
   }
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto number = [&](const char* key) { return table.number(row, column(key)); };
+    const auto number = [&table, row](std::size_t at) { return table.number(row, at); };
     std::vector<Runs>& list = all[table.text(row, name)];
-    const Tuning tuning{number("stiffness_N_per_m"), number("damping_ratio"), number("friction_slope"),
-                        number("staggered") != 0.0};
-    const std::string& method = table.text(row, column("method"));
-    if (list.empty() || list.back().method != method || !(list.back().tuning == tuning)) {
-      list.push_back({.method = method, .tuning = tuning});
+    const Tuning tuning{number(k), number(ratio), number(slope), number(staggered) != 0.0};
+    const std::string& its_method = table.text(row, method);
+    if (list.empty() || list.back().method != its_method || !(list.back().tuning == tuning)) {
+      list.push_back({.method = its_method, .tuning = tuning});
     }
     Runs& runs = list.back();
-    const double share = number("of_reference");
-    runs.timing_low = number("of_reference_low") / share;
-    runs.timing_high = number("of_reference_high") / share;
-    runs.T.push_back(number("period_s"));
-    runs.steps.push_back(number("steps"));
-    runs.error.push_back({number("position_error_low_m"), number("position_error_m"), number("position_error_high_m")});
-    runs.cost_ns.push_back(number("steps") * share * reference_ns[table.text(row, name)]);
+    runs.timing_low = number(share_low) / number(share);
+    runs.timing_high = number(share_high) / number(share);
+    runs.T.push_back(number(T));
+    runs.steps.push_back(number(steps));
+    runs.error.push_back({number(error_low), number(error), number(error_high)});
+    runs.cost_ns.push_back(number(steps) * number(share) * reference_ns[table.text(row, name)]);
   }
   return all;
 }
