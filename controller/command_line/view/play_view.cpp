@@ -108,11 +108,13 @@ class PlayView {
   }
 
   bool give(view::Socket& socket, const json& said) {
-    if (said.size() != 1) return false;
+    if (!said.is_object() || said.size() != 1) return false;
     const auto is_index = [&](const json& value) {
       return value.is_number_unsigned() && value.get<std::uint64_t>() < session_.size();
     };
-    const auto& [name, value] = *said.items().begin();
+    const json::const_iterator first = said.begin();
+    const std::string& name = first.key();
+    const json& value = first.value();
     if (name == "at" && is_index(value)) {
       show(socket, value.get<std::size_t>());
     } else if (name == "frames" && is_index(value)) {
