@@ -8,11 +8,17 @@
 #include <vector>
 
 #include "controller/command_line/preparation/run_options.hpp"
+#include "scenes/compiler/check.hpp"
 
 namespace proxarm::command_line {
 
 struct FileOptions {
   std::vector<std::filesystem::path> files;
+};
+
+struct CheckFilesOptions {
+  std::vector<std::filesystem::path> files;
+  scenes::CheckOptions scene;  // how scenes are tried
 };
 
 struct SetOptions {
@@ -48,7 +54,7 @@ int plan_command(const RunOptions& options);
 int scan_command(const ScanOptions& options);      // 1: nothing answers
 int replay_command(const ReplayOptions& options);  // 1: other setpoints
 int set_command(const SetOptions& options);        // of a running session
-int check_command(const FileOptions& options);
+int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);    // 1: not proven

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -23,14 +24,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Assumption 1 for each object and the whole, with the worst figures; null if it doesn't hold.
-const char* check_laws(const scenes::Scene& scene) {
-  bool passed = true;
-  for (const scenes::CheckReport& report : scenes::check_scene(scene)) {
+// Assumption 1 and the laws of each object and the whole, with the worst figures. What the scene is; null if it is
+// wrong.
+const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& options) {
+  auto worst = scenes::CheckVerdict::fine;
+  for (const scenes::CheckReport& report : scenes::check_scene(scene, options)) {
     std::fputs(report.text().c_str(), stdout);
-    passed = passed && report.passed();
+    worst = std::max(worst, report.verdict());
   }
-  return passed ? "scene" : nullptr;
+  switch (worst) {
+    case scenes::CheckVerdict::fine:
+      return "scene";
+    case scenes::CheckVerdict::several_solutions:
+      return "scene, with several solutions";
+    case scenes::CheckVerdict::wrong:
+      break;
+  }
+  return nullptr;
 }
 
 // With the files that it names, and each device as the controller would make it.
@@ -50,7 +60,7 @@ void check_cell(const fs::path& file) {
   controller::make_sensor(cell, description::load_sensor(cell.sensor.description));
 }
 
-const char* check(const fs::path& file) {
+const char* check(const fs::path& file, const scenes::CheckOptions& options) {
   switch (kind_of(file)) {
     case FileKind::cell:
       check_cell(file);
@@ -75,22 +85,23 @@ const char* check(const fs::path& file) {
       return "arm";
     case FileKind::scene:
     case FileKind::unknown:
-      return check_laws(scenes::load_scene(file));
+      return check_laws(scenes::load_scene(file), options);
   }
   return "";
 }
 
 }  // namespace
 
-int check_command(const FileOptions& options) {
+int check_command(const CheckFilesOptions& options) {
   int status = 0;
   for (const fs::path& given : options.files) {
     try {
-      const char* kind = check(user_file(given));
+      const char* kind = check(user_file(given), options.scene);
       if (kind != nullptr) {
         std::printf("%s: fine, %s %s\n", given.c_str(), *kind == 'a' ? "an" : "a", kind);
       } else {
-        std::fprintf(stderr, "proxarm: %s: its forces don't keep Assumption 1; the states are given above\n",
+        std::fprintf(stderr,
+                     "proxarm: %s: it breaks a law; the state is given above, behind \"worst at\" or \"first at\"\n",
                      given.c_str());
         status = set_up_mistake;
       }

@@ -162,6 +162,23 @@ void add_session_options(CLI::App& app, RunOptions& options) {
       ->type_name("BUS");
 }
 
+void add_check_options(CLI::App& app, scenes::CheckOptions& options) {
+  app.add_option("--states", options.states, "random states in which each object of a scene, and the whole, is tried")
+      ->type_name("NUMBER")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000}))
+      ->capture_default_str();
+  app.add_option("--seed", options.seed, "of these states")
+      ->type_name("NUMBER")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--depth",
+                 quantity([](const std::string& w) { return description::parse_length(w, "--depth"); },
+                          [&](double value) { options.deepest_m = value; }),
+                 "how deep states push (default 20mm), a tenth of the least radius at most: deeper in round things "
+                 "there are several solutions")
+      ->type_name("LENGTH");
+}
+
 // What has no effect on a command isn't offered by it.
 void leave_out(CLI::App& app, std::initializer_list<const char*> options) {
   for (const char* option : options) app.remove_option(app.get_option(option));
@@ -384,9 +401,10 @@ class Commands {
                            [this] { return replay_command(replay_); });
     replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
     replay->add_flag("--json", replay_.json, "print the result as one JSON object");
-    add("check", "validate cell, scene, hand and sensor files", [this] { return check_command(check_); })
-        ->add_option("files", check_.files, "files to check")
-        ->required();
+    CLI::App* check = add("check", "whether cell, scene, hand, sensor and other files are fine. Status 2: one isn't",
+                          [this] { return check_command(check_); });
+    check->add_option("files", check_.files, "files to check")->required();
+    add_check_options(*check, check_.scene);
     add("explain", "what a scene compiles to, what is skipped and why", [this] { return explain_command(explain_); })
         ->add_option("scene", explain_.files, "scene file")
         ->required();
@@ -420,7 +438,8 @@ class Commands {
   command_line::ScanOptions scan_;
   command_line::SetOptions set_;
   std::string distance_;
-  command_line::FileOptions check_, explain_;
+  command_line::CheckFilesOptions check_;
+  command_line::FileOptions explain_;
   command_line::ProveOptions prove_;
   command_line::AssessOptions assess_;
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "models/obstacles/edge_contact.hpp"
+
 namespace proxarm::models {
 
 std::array<FlatSurface<3>, 6> BoxObstacle::faces(const Pose& X, const Vec3& size_m) {
@@ -74,7 +76,6 @@ BoxObstacle::Crossing BoxObstacle::cross(const Vec3& q, const Vec3& p) const noe
 Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const noexcept {
   Crossing c = cross(q, p);
   if (!c.any()) return {p, Vec3::UnitZ(), 0, false, false};
-  const Vec3 p_l = local(p);
   if (c.face < 0) {
     // q is inside: out through the face next to it.
     const Vec3 q_l = local(q);
@@ -117,19 +118,39 @@ Obstacle::Step BoxObstacle::step(double K, const Vec3& p, const Vec3& q) const n
   }
   if (best.touches) return best;
 
-  // The proxy would end beside the entered face. If p is past the same edge, nothing holds the proxy; otherwise
-  // friction holds it at the edge.
-  const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(c.face)];
-  const FaceStep<3> s = step_on_layer(entered, mu_, layer_, K, p, q);
-  if (!s.touches) return {p, entered.normal(), 0, false, false};
-  const Vec3 r_l = local(s.r);
-  Vec3 held = s.r;
+  return beside_face(c.face, K, p, q);
+}
+
+// The step would end beside the entered face. If p is past the same edge, nothing holds the proxy; otherwise the edge
+// does, or the corner at the edge's end.
+Obstacle::Step BoxObstacle::beside_face(std::int32_t face, double K, const Vec3& p, const Vec3& q) const noexcept {
+  const FlatSurface<3>& entered = faces_[static_cast<std::size_t>(face)];
+  const StepOnPlanes step{mu_, K, layer_, p, q};
+  const FaceStep<3> s = step.on(entered);
+  const Step free{p, entered.normal(), 0, false, false};
+  if (!s.touches) return free;
+  const int across = face / 2;
+  const Vec3 p_l = local(p), r_l = local(s.r);
+  Vec3 corner = r_l;
+  corner[across] = face % 2 == 0 ? half_[across] : -half_[across];
+  int edge = -1, edges = 0;
   for (int k = 0; k < 3; ++k) {
-    if (k == c.face / 2 || std::abs(r_l[k]) <= half_[k]) continue;
-    if (std::abs(p_l[k]) > half_[k] && (p_l[k] > 0.0) == (r_l[k] > 0.0)) return {p, entered.normal(), 0, false, false};
-    held -= (r_l[k] - std::copysign(half_[k], r_l[k])) * axes_.col(k);
+    if (k == across || std::abs(r_l[k]) <= half_[k]) continue;
+    if (std::abs(p_l[k]) > half_[k] && (p_l[k] > 0.0) == (r_l[k] > 0.0)) return free;
+    corner[k] = std::copysign(half_[k], r_l[k]);
+    edge = k;
+    ++edges;
   }
-  return {held, entered.normal(), c.face, true, false};
+  if (edges == 1) {
+    const int along = 3 - across - edge;
+    const EdgeContact held =
+        hold_at_edge(centre_ + axes_ * corner, entered.normal(), std::copysign(1.0, r_l[edge]) * axes_.col(edge), step);
+    const double at = local(held.r)[along];
+    if (std::abs(at) <= half_[along]) return {held.r, held.normal, face, true, held.slips, held.found};
+    corner[along] = std::copysign(half_[along], at);
+  }
+  const EdgeContact held = hold_at_corner(centre_ + axes_ * corner, mu_, p, q);
+  return {held.r, held.normal, face, true, held.slips};
 }
 
 bool BoxObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {

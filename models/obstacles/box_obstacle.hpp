@@ -2,7 +2,7 @@
 //
 // The proxy is held by the face through which its straight way enters, and slides on it by (4). Beyond the face's edge
 // it is free again: the space around a box isn't convex, so the proxy goes around the box. Where friction would hold a
-// proxy beside the entered face, beyond an edge that p isn't beyond, it is held at that edge.
+// proxy beside the entered face, beyond an edge that p isn't beyond, that edge holds it (edge_contact.hpp).
 #pragma once
 
 #include <array>
@@ -37,6 +37,7 @@ class BoxObstacle final : public Obstacle {
  private:
   struct Crossing;  // of the straight way from q to p with the box
   [[nodiscard]] Crossing cross(const Vec3& q, const Vec3& p) const noexcept;
+  [[nodiscard]] Step beside_face(std::int32_t face, double K, const Vec3& p, const Vec3& q) const noexcept;
   [[nodiscard]] Vec3 local(const Vec3& x) const noexcept { return axes_.transpose() * (x - centre_); }
   [[nodiscard]] double rounding(const Vec3& x) const noexcept;
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/obstacles/edge_contact.hpp"
+
 namespace proxarm::models {
 
 CylinderObstacle::CylinderObstacle(const Vec3& from_m, const Vec3& to_m, double radius_m, double friction,
@@ -102,19 +104,39 @@ Obstacle::Step CylinderObstacle::step(double K, const Vec3& p, const Vec3& q) co
   }
   if (best.touches) return best;
 
-  Step s = alone(c.feature);
-  if (!s.touches) return {p, s.normal, 0, false, false};
-  if (c.feature == side) {
-    const double z = along(s.r), z_p = along(p);
-    if (std::abs(z_p) > half_ && (z_p > 0.0) == (z > 0.0)) return {p, s.normal, 0, false, false};
-    s.r -= (z - std::copysign(half_, z)) * e_;
-  } else {
-    const Vec3 u = radial(s.r);
-    if (radial(p).norm() > R_ && radial(p).dot(u) > 0.0) return {p, s.normal, 0, false, false};
-    s.r -= (1.0 - R_ / u.norm()) * u;
+  return beside_face(c.feature, alone(c.feature), K, p, q);
+}
+
+// The step `s` on the feature by which the proxy enters ends beyond the rim. If p is past the same rim, nothing holds
+// the proxy; otherwise the rim does: each of its points is an edge between the end and the side's tangent plane there.
+Obstacle::Step CylinderObstacle::beside_face(std::int32_t feature, const Step& s, double K, const Vec3& p,
+                                             const Vec3& q) const noexcept {
+  const Step free{p, s.normal, 0, false, false};
+  if (!s.touches) return free;
+  const double z = along(s.r), z_p = along(p);
+  const Vec3 u = radial(s.r);
+  if (feature == side ? std::abs(z_p) > half_ && (z_p > 0.0) == (z > 0.0)
+                      : radial(p).norm() > R_ && radial(p).dot(u) > 0.0) {
+    return free;
   }
-  s.slips = false;
-  return s;
+  // The place on the rim, by its angle from q's towards p's. On its tangent the proxy is drawn on towards p at the
+  // first, and held back towards q at the last.
+  const Vec3 end = std::copysign(1.0, z) * e_, u_q = radial(q), first = (u_q.norm() > 0.0 ? u_q : u).normalized();
+  const Vec3 u_p = radial(p), aside = u_p - first * first.dot(u_p);
+  const Vec3 onward = aside.norm() > 0.0 ? Vec3(aside.normalized()) : e_.cross(first);
+  const StepOnPlanes step{side_.friction(), K, end_[0].layer(), p, q};
+  EdgeContact held{};
+  Vec3 out;
+  const auto drawn_on = [&](double angle) {
+    out = std::cos(angle) * first + std::sin(angle) * onward;
+    const Vec3 rim = middle_ + half_ * end + R_ * out;
+    held = feature == side ? hold_at_edge(rim, out, end, step) : hold_at_edge(rim, end, out, step);
+    return (std::cos(angle) * onward - std::sin(angle) * first).dot(held.r - rim);
+  };
+  const double last = std::atan2(onward.dot(u_p), first.dot(u_p)), nothing = 0.25 * rounding(p);
+  const bool found = false_position(drawn_on, 0.0, last, nothing, 64.0 * nothing) && held.found;
+  held.r += (R_ - std::max(R_, radial(held.r).norm())) * out;  // where the tangent's point isn't quite the rim's
+  return {held.r, held.normal, feature, true, held.slips, found};
 }
 
 bool CylinderObstacle::excludes(const Vec3& q, const Vec3& r) const noexcept {

@@ -1,7 +1,7 @@
 // A solid cylinder with flat ends.
 //
 // It works as a box does: the proxy is held by the side or the end through which it enters, slides there exactly, and
-// is free past the rim. A proxy that would be held by friction beside that face is held at the rim.
+// is free past the rim. A proxy that friction would hold beside that face is held at the rim (edge_contact.hpp).
 #pragma once
 
 #include "models/obstacles/plane_obstacle.hpp"
@@ -36,6 +36,8 @@ class CylinderObstacle final : public Obstacle {
   struct Crossing;
 
   [[nodiscard]] Crossing cross(const Vec3& q, const Vec3& p) const noexcept;
+  [[nodiscard]] Step beside_face(std::int32_t feature, const Step& s, double K, const Vec3& p,
+                                 const Vec3& q) const noexcept;
   [[nodiscard]] double along(const Vec3& x) const noexcept { return e_.dot(x - middle_); }
   [[nodiscard]] Vec3 radial(const Vec3& x) const noexcept { return (x - middle_) - e_ * along(x); }
   [[nodiscard]] double rounding(const Vec3& x) const noexcept;

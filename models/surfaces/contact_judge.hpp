@@ -32,6 +32,21 @@ double rounding_amplification(std::span<const Contact<N>> contacts) {
   return 4.0 / std::max(least, 1e-8);
 }
 
+// How far the proxy slid along contacts that are said to stick, metres. (17) lets such a contact bear any force of its
+// cone because N Nᵀ (r − q) = 0 there; a wall that creeps isn't told by its forces, but by this. Contacts without
+// friction, or of which it isn't known, have nothing that sticks. Arguments as below.
+template <int N, typename Friction, typename Motion>
+double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion motion) {
+  double most = 0.0;
+  for (const Contact<N>& contact : contacts) {
+    const std::optional<double> mu = friction(contact);
+    if (contact.slips || !mu || !(*mu > 0.0)) continue;
+    const Vec3 n = lift<N>(contact.normal), moved = motion(contact);
+    most = std::max(most, (moved - n * n.dot(moved)).norm());
+  }
+  return most;
+}
+
 // The cone of forces that each contact can bear.
 //   size_m                the size of the coordinates that r and q are rounded by
 //   friction(contact)     μ; nullopt if it isn't known: then any force will do that doesn't pull

@@ -203,6 +203,15 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   return all;
 }
 
+// Whether all of the objects are where r is. Pairs and triples are solved on tangent planes, and the plane of a face
+// goes on beyond its edges, where nothing holds a proxy. The tolerance lies between two scales: rounding is smaller for
+// objects of up to a hundred metres, and whoever is held 1e-12 m off a face's edge is held at the edge.
+bool World::all_touch(const Vec3& r, std::span<const std::size_t> contacts) const noexcept {
+  const double nothing = 1e-12 * (1.0 + r.lpNorm<1>());
+  return std::all_of(contacts.begin(), contacts.end(),
+                     [&](std::size_t i) { return std::abs(entries_[i].obstacle->distance(r)) <= nothing; });
+}
+
 StepResult World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates,
                               Choice& choice) const noexcept {
   for (std::size_t c = 0; c < candidates.count; ++c) {
@@ -237,7 +246,7 @@ void World::try_pair(double K, const Vec3& p, const Vec3& q, std::array<std::siz
   SettledPair s = settle(pair, p, q, q, GrooveSearch::first_root);
   // A contact that pulls at the first root may press at another one.
   if (s.settled && !s.groove.found) s = settle(pair, p, q, s.r, GrooveSearch::all_roots);
-  if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !choice.better(p, s.r, 2)) return;
+  if (!s.groove.found || !fits(q, s.r, m, candidates, K, p) || !all_touch(s.r, m) || !choice.better(p, s.r, 2)) return;
   choice.contacts[0] = contact_of(candidates, own[0], s.groove.slips1, s.t_a.surface.normal());
   choice.contacts[1] = contact_of(candidates, own[1], s.groove.slips2, s.t_b.surface.normal());
 }
@@ -275,7 +284,7 @@ void World::try_triple(double K, const Vec3& p, const Vec3& q, const std::array<
     last_move = move;
     t = next;
   }
-  if (!s.found || !fits(q, r, m, candidates, K, p) || !choice.better(p, r, 3)) return;
+  if (!s.found || !fits(q, r, m, candidates, K, p) || !all_touch(r, m) || !choice.better(p, r, 3)) return;
   for (std::size_t j = 0; j < 3; ++j) {
     choice.contacts[j] = contact_of(candidates, own[j], s.slips[j], t[j].surface.normal());
   }
@@ -380,13 +389,18 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
   candidates.around = true;
   if (search(K, p, q, candidates, choice)) return choice.resolved;
   // The tool may be so deep, beyond the radius of a curved surface, that the iteration on tangent planes finds nothing.
-  // The proxy then goes as far as a shorter step leads: the way to p is halved up to six times.
+  // So it may where a far step passes several objects. The proxy then goes as far as a shorter step leads: the way to p
+  // is halved up to six times.
   Vec3 nearer = p;
   for (int k = 0; k < 6 && !choice.found(); ++k) {
     nearer = 0.5 * (nearer + q);
     Candidates fewer;
     add_candidates(K, nearer, q, fewer);
-    if (fewer.count > 0) search(K, nearer, q, fewer, choice);
+    if (fewer.count > 0) {
+      search(K, nearer, q, fewer, choice);
+    } else {
+      choice.improve(p, nearer);  // nothing is in the way so far
+    }
   }
   if (!choice.found()) stay(p, q, candidates, choice);
   return false;

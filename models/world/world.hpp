@@ -85,6 +85,7 @@ class World final : public GeometricAlgorithm<3> {
   [[nodiscard]] bool is_free(const Vec3& q, const Vec3& r) const noexcept;
   bool fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> contacts, Candidates& candidates, double K,
             const Vec3& p) const noexcept;
+  [[nodiscard]] bool all_touch(const Vec3& r, std::span<const std::size_t> contacts) const noexcept;
   [[nodiscard]] bool gets_around(const Obstacle& obstacle, const Vec3& p, const Vec3& q, const Vec3& r) const noexcept;
   StepResult try_singles(double K, const Vec3& p, const Vec3& q, Candidates& candidates, Choice& choice) const noexcept;
   [[nodiscard]] Contact<3> contact_of(const Candidates& candidates, std::size_t candidate, bool slips,

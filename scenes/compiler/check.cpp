@@ -75,9 +75,11 @@ double outside_laws(const State<N>& s, const CheckRegion<N>& region) {
     const auto object = static_cast<std::size_t>(contact.object);
     return N == 1 || object >= region.friction->size() ? 0.0 : (*region.friction)[object];
   };
-  const std::vector<models::ForceCone> cones = models::cones_of_contacts<N>(
-      s.contacts, s.size(), friction, [&](const auto& /*contact*/) { return motion; },
-      [&](double mu, double angle) { tolerance += mu * f.norm() * angle * condition(s); });
+  const auto moved = [&](const auto& /*contact*/) { return motion; };
+  if (models::creep_m<N>(s.contacts, friction, moved) > condition(s) * 64.0 * epsilon * s.size()) return 2.0;
+  const std::vector<models::ForceCone> cones =
+      models::cones_of_contacts<N>(s.contacts, s.size(), friction, moved,
+                                   [&](double mu, double angle) { tolerance += mu * f.norm() * angle * condition(s); });
   return models::in_sum_of_cones(f, cones, tolerance) ? 0.0 : 2.0;
 }
 
@@ -112,6 +114,11 @@ class Checker {
     }
   }
 
+  // The first of its kind is kept.
+  void count(std::int64_t& sum, std::string& first, const State<N>& s, const std::string& more = {}) {
+    if (sum++ == 0) first = s.text() + more;
+  }
+
   Vec<N> start() {
     if (region_.places.empty()) return region_.centre + random_.template in_box<N>(region_.size_m);
     const auto k = static_cast<std::size_t>(random_.uniform(0.0, static_cast<double>(region_.places.size())));
@@ -132,10 +139,7 @@ class Checker {
     if (!s.r.allFinite()) return note(finite, infinity, s);
     report_.in_contact += s.contacts.empty() ? 0 : 1;
     for (const auto& contact : s.contacts) report_.slipping += contact.slips ? 1 : 0;
-    if (region_.soft && s.unresolved) {
-      ++report_.unresolved;
-      return;
-    }
+    if (s.unresolved) return count(report_.unresolved, report_.unresolved_state, s);
 
     if (!region_.acts_without_contact) note(laws, outside_laws(s, region_), s);
     for (int k = 0; k < 3; ++k) other_stiffness(s);
@@ -159,15 +163,14 @@ class Checker {
     // Where both answers keep the laws, Coulomb's law itself has several solutions; the algorithm isn't wrong.
     const bool lawful =
         region_.bends || (region_.friction && !region_.acts_without_contact && !(outside_laws(other, region_) > 1.0));
-    if (!(error <= 1.0) && region_.soft && other.unresolved) {
-      ++report_.unresolved;
-      return;
+    const std::string more = ", κ = " + std::to_string(kappa);
+    if (!(error <= 1.0) && other.unresolved) {
+      return count(report_.unresolved, report_.unresolved_state, s, more);
     }
     if (!(error <= 1.0) && other.r.allFinite() && lawful) {
-      ++report_.several;
-      return;
+      return count(report_.several, report_.several_state, s, more);
     }
-    note(independent, error, s, ", κ = " + std::to_string(kappa));
+    note(independent, error, s, more);
   }
 
   models::GeometricAlgorithm<N>& g_;
@@ -293,30 +296,39 @@ CheckReport check_scene_once(const Scene& scene, const std::vector<Vec3>& places
 
 }  // namespace
 
-bool CheckReport::passed() const noexcept {
-  for (const CheckFigure& figure : figures) {
-    if (figure.failures > 0) return false;
+CheckVerdict CheckReport::verdict() const noexcept {
+  const double allowed = several_allowed * static_cast<double>(states);
+  const auto failed = [](const CheckFigure& figure) { return figure.failures > 0; };
+  if (std::any_of(figures.begin(), figures.end(), failed) || static_cast<double>(unresolved) > allowed) {
+    return CheckVerdict::wrong;
   }
-  return static_cast<double>(std::max(several, unresolved)) <= several_allowed * static_cast<double>(states);
+  return static_cast<double>(several) > allowed ? CheckVerdict::several_solutions : CheckVerdict::fine;
 }
 
 std::string CheckReport::text() const {
   std::ostringstream out;
   out.precision(3);
-  out << subject << ": " << (passed() ? "fine" : "NOT fine") << " in " << states << " states, " << in_contact
-      << " in contact, " << slipping << " slipping contacts";
+  const double allowed = several_allowed * static_cast<double>(states);
+  const auto percent = [this](std::int64_t count) {
+    return 100.0 * static_cast<double>(count) / static_cast<double>(states);
+  };
+  out << subject << ": " << (verdict() == CheckVerdict::wrong ? "WRONG" : "fine") << " in " << states << " states, "
+      << in_contact << " in contact, " << slipping << " slipping contacts";
   if (several > 0) out << ", " << several << " where there are several solutions";
   if (unresolved > 0) out << ", " << unresolved << " without an answer";
   out << "\n";
-  const double allowed = several_allowed * static_cast<double>(states);
   if (static_cast<double>(several) > allowed) {
-    out << "  several solutions in more than " << 100.0 * several_allowed
-        << " % of the states: it is small or sharp against a tool that may be deep in it; more friction makes it "
-           "worse\n";
+    out << "  several solutions in " << percent(several)
+        << " % of the states, where friction leaves open which one it is (more friction, sharper corners: more): a "
+           "session takes one and stays with it; the first at "
+        << several_state << "\n";
   }
   if (static_cast<double>(unresolved) > allowed) {
-    out << "  no answer in more than " << 100.0 * several_allowed
-        << " % of the states: no forces of the layers and of what else acts were found that all agree on\n";
+    out << "  no answer in " << percent(unresolved)
+        << " % of the states: no contacts, or shares of the force among layers, were found that keep all laws; the "
+           "first "
+           "at "
+        << unresolved_state << "\n";
   }
   for (const CheckFigure& figure : figures) {
     out << "  " << figure.what << ": worst " << figure.worst << " of what rounding explains";

@@ -29,7 +29,7 @@ struct CheckOptions {
   // Largest depth of p below q, for any κ. check_scene() limits it to a tenth of the least radius: deeper, curved
   // worlds have several solutions.
   double deepest_m = 0.02;
-  double several_allowed = 0.02;  // largest share of states in which another κ may find another of several solutions
+  double several_allowed = 0.02;  // from this share of the states on several solutions, or no answer, are a verdict
 };
 
 // Where states are sampled, and what is known of the world there.
@@ -57,15 +57,19 @@ struct CheckFigure {
   std::string state;  // the state with the largest error
 };
 
+// Several solutions are no mistake: Coulomb's law leaves open which it is, and the one that is found may depend on K.
+enum class CheckVerdict : std::uint8_t { fine, several_solutions, wrong };
+
 struct CheckReport {
   std::string subject;
   std::int64_t states = 0, in_contact = 0, slipping = 0;
-  std::int64_t several = 0;      // states with several solutions: Coulomb's law leaves them open, so they don't fail
-  std::int64_t unresolved = 0;   // states in which elastic layers share a force and no shares were found
-  double several_allowed = 0.0;  // largest share of either among all states
+  std::int64_t several = 0;                     // states with several solutions
+  std::int64_t unresolved = 0;                  // states in which no answer was found that keeps all laws
+  std::string several_state, unresolved_state;  // the first of each
+  double several_allowed = 0.0;                 // largest share of either among all states
   std::vector<CheckFigure> figures;
 
-  [[nodiscard]] bool passed() const noexcept;
+  [[nodiscard]] CheckVerdict verdict() const noexcept;
   [[nodiscard]] std::string text() const;  // a few lines for a person
 };
 

@@ -409,6 +409,17 @@ class Options(ProgramTest):
         for file in ("own.yaml", "cell.yaml"):
             self.assert_refused(self.call("check", file), "own.yaml:", "settings[0].register", "overlap")
 
+    def test_check_tries_as_many_states_as_it_is_told(self):
+        scene = SOURCE / "scenes/room.yaml"
+        first, again, other = (self.call("check", scene, "--states", "500", "--depth", "3mm", "--seed", seed)
+                               for seed in ("7", "7", "8"))
+        self.assertEqual((first.status, first.out), (0, again.out))
+        self.assertIn("room: fine in 500 states", first.out)
+        self.assertNotEqual(first.out, other.out)
+        for option, value in (("--states", "0"), ("--states", "many"), ("--seed", "-1"), ("--depth", "5"),
+                              ("--depth", "-5mm")):
+            self.assert_refused(self.call("check", scene, option, value), option)
+
     def test_check_reads_dbc_files(self):
         good = self.written("sensor.dbc", 'VERSION ""\nBO_ 291 FORCE: 6 X\n SG_ Fx : 7|16@0- (0.01,0) [-300|300] "N" X\n')
         self.assertEqual(self.call("check", good).status, 0)

@@ -37,9 +37,12 @@ struct ContractOptions {
   double inside_tolerance_m = 1e-12;  // relative to a 1 m scene
   // μ of each contact by object index; a single entry stands for all. Empty: reported contacts aren't checked.
   std::vector<double> friction{};
-  bool near_surface = false;            // q is brought to a surface, and p starts from there
-  double reach_m = 1e300;               // κ is drawn so that ‖f‖/κ stays below this
-  bool soft = false;                    // a layer: a proxy in it doesn't rest without a force
+  bool near_surface = false;  // q is brought to a surface, and p starts from there
+  double reach_m = 1e300;     // κ is drawn so that ‖f‖/κ stays below this
+  bool soft = false;          // a layer: a proxy in it doesn't rest without a force
+  // Far steps among bodies with edges: friction that would hold a proxy beside the face that it enters holds it at the
+  // face's edge, which counts as sticking though the proxy has slid there (models/obstacles/box_obstacle.hpp).
+  bool slides_to_edges = false;
   bool forces_without_contact = false;  // a field or a layer acts on a proxy that touches nothing
   // Where Coulomb's law has several solutions (two faces that can jam, a proxy that flies far into a groove), the one
   // that is found may change with κ. A failure of Assumption 1 is counted apart, not hidden, if both results satisfy
@@ -79,9 +82,13 @@ testing::AssertionResult obeys_17(std::span<const models::Contact<N>> contacts, 
     const auto object = static_cast<std::size_t>(contact.object);
     return N == 1 ? 0.0 : options.friction.size() == 1 ? options.friction[0] : options.friction.at(object);
   };
+  const auto moved = [&](const auto& /*contact*/) { return models::lift<N>(models::Vec<N>(r - q)); };
+  const double creep = models::creep_m<N>(contacts, friction, moved);
+  if (!options.slides_to_edges && creep > options.condition * force_rounding<N>(1.0, p, q, r)) {
+    return testing::AssertionFailure() << "slid by " << creep << " m where it sticks";
+  }
   const std::vector<models::ForceCone> cones = models::cones_of_contacts<N>(
-      contacts, r.norm() + q.norm(), friction,
-      [&](const auto& /*contact*/) { return models::lift<N>(models::Vec<N>(r - q)); },
+      contacts, r.norm() + q.norm(), friction, moved,
       [&](double mu, double angle) { tolerance += mu * K * (r - p).norm() * angle * options.condition; });
   if (models::in_sum_of_cones(models::lift<N>(K * (r - p)), cones, tolerance)) return testing::AssertionSuccess();
   return testing::AssertionFailure() << "force outside what " << contacts.size() << " contacts can bear";

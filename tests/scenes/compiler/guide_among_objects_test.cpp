@@ -307,7 +307,7 @@ TEST(GuideAmongObjects, KeepsTheContract) {
           parse_scene("objects:\n  - " + c.object + "\n  - sphere: {centre_m: [-0.5, 0, 0], radius_m: 0.1}\n" + guide,
                       "guide.yaml");
       for (const auto& report : scenes::check_scene(scene, {.states = states})) {
-        EXPECT_TRUE(report.passed()) << c.name << ", " << guide << report.text();
+        EXPECT_EQ(report.verdict(), scenes::CheckVerdict::fine) << c.name << ", " << guide << report.text();
         EXPECT_GT(report.in_contact, states / 30) << c.name;
       }
     }

@@ -1,0 +1,70 @@
+// A proxy that friction holds at a convex edge, or at a corner, of a solid.
+//
+// Beyond a face's edge there is nothing that its plane could hold. Where a proxy comes from beside an edge, both faces
+// may take it beyond that edge, each on its own plane, though p is inside. The edge itself is what it meets then: of
+// the normals between the faces' two, n(θ) = cos θ n₁ + sin θ n₂, the one counts for which (17) on the plane through
+// the edge ends on the edge. That point moves from beyond the edge on one side to beyond it on the other as θ goes from
+// 0 to 90°, so there is such a θ. There may be several (Coulomb's law leaves that open); the
+// one next to the face that was entered is taken.
+#pragma once
+
+#include <cmath>
+
+#include "models/geometry/geometry.hpp"
+#include "models/surfaces/layer.hpp"
+
+namespace proxarm::models {
+
+struct EdgeContact {
+  Vec3 r;
+  Vec3 normal;  // unit
+  bool slips = false;
+  bool found = true;  // false: r is there, but (17) isn't kept
+};
+
+// What a step is to solve on a plane, whichever it is.
+struct StepOnPlanes {
+  double mu, K;
+  const Layer& layer;
+  const Vec3 &p, &q;
+
+  [[nodiscard]] FaceStep<3> on(const FlatSurface<3>& surface) const noexcept {
+    return step_on_layer(surface, mu, layer, K, p, q);
+  }
+};
+
+// Calls error(x) between low, where it is positive, and high, where it is negative, until it is `nothing` or there are
+// no numbers left between: false position (the Illinois variant), with a bisection every fourth step. False if the
+// errors at the ends have other signs, or if error(x) jumps past zero by more than `near`.
+template <typename Error>
+bool false_position(Error error, double low, double high, double nothing, double near) noexcept {
+  double at_high = error(high);
+  if (!(at_high < 0.0)) return false;
+  double at_low = error(low);
+  if (!(at_low > 0.0)) return false;
+  double now = at_low;
+  int side = 0;
+  for (int k = 0; k < 200; ++k) {
+    double x = (low * at_high - high * at_low) / (at_high - at_low);
+    if (k % 4 == 3 || !(x > low && x < high)) x = 0.5 * (low + high);
+    now = error(x);
+    if (std::abs(now) <= nothing || !(x > low && x < high)) break;
+    const int sign = now > 0.0 ? 1 : -1;
+    (sign > 0 ? low : high) = x;
+    (sign > 0 ? at_low : at_high) = now;
+    if (sign == side) (sign > 0 ? at_high : at_low) *= 0.5;
+    side = sign;
+  }
+  return std::abs(now) <= near;
+}
+
+// At the straight edge through `point` in which two faces meet at a right angle: the solution next to the first face.
+// Precondition: p is behind both faces, and the step on the first ends beyond the edge.
+EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& normal_2,
+                         const StepOnPlanes& step) noexcept;
+
+// At the corner r itself: by the normal at which the corner's force is on the friction cone's edge, against the slip;
+// or it sticks where the way there is the normal. Precondition: r is neither p nor q.
+EdgeContact hold_at_corner(const Vec3& r, double mu, const Vec3& p, const Vec3& q) noexcept;
+
+}  // namespace proxarm::models
