@@ -51,9 +51,9 @@ struct AssessOptions {
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
-int scan_command(const ScanOptions& options);      // 1: nothing answers
-int replay_command(const ReplayOptions& options);  // 1: other setpoints
-int set_command(const SetOptions& options);        // of a running session
+int scan_command(const ScanOptions& options);         // 1: nothing answers
+int replay_command(const ReplayOptions& options);     // 1: other setpoints
+int set_command(const SetOptions& options);           // of a running session
 int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);

@@ -108,7 +108,8 @@ TEST(Section, KeepsTheContract) {
     for (const int dimensions : {1, 2}) {
       const Scene scene = parse_scene(text_of(c, dimensions), "section.yaml");
       for (const auto& report : scenes::check_scene(scene, {.states = scaled(3000, 500)})) {
-        EXPECT_EQ(report.verdict(), scenes::CheckVerdict::fine) << c.name << " in " << dimensions << ": " << report.text();
+        EXPECT_EQ(report.verdict(), scenes::CheckVerdict::fine)
+            << c.name << " in " << dimensions << ": " << report.text();
       }
     }
   }
@@ -145,7 +146,8 @@ void expect_held_by_the_moving_solid(const Case& c) {
   EXPECT_GE(least, -1e-12) << c.name << " in " << N;
   EXPECT_GT(contacts, static_cast<std::size_t>(steps / 100)) << c.name << " in " << N;
   for (const auto& report : scenes::check_scene(scene, {.states = scaled(2000, 300)})) {
-    EXPECT_EQ(report.verdict(), scenes::CheckVerdict::fine) << c.name << " that moves, in " << N << ": " << report.text();
+    EXPECT_EQ(report.verdict(), scenes::CheckVerdict::fine)
+        << c.name << " that moves, in " << N << ": " << report.text();
   }
 }
 
