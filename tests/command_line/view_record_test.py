@@ -57,6 +57,9 @@ class Records(ProgramTest):
         self.assertEqual([moment[f"normal_2_{axis}"] for axis in "xyz"], [-1.0, 0.0, 0.0])
         self.assertEqual((int(row["contact_object_2"]), float(row["normal_2_W_x_1"])), (0, -1.0))
         self.assertEqual(moment["object_3"], -1)
+        for_others = (folder / "session.mcap").read_bytes()
+        self.assertRegex(for_others, rb'"object":"table","contacts":2,"friction":0.3,[^[]*'
+                                     rb'"others":\[\{"object":"foam","friction":0.5,"normal":\{"x":-1(\.0)?,')
 
     def test_the_frames_of_a_cycle_are_decoded(self):
         page, stage = self.opened(self.record())

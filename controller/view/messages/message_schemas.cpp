@@ -120,6 +120,10 @@ constexpr std::string_view contact_schema = R"({
     "friction": @number,
     "force": @vector,
     "normal": @vector,
+    "others": {"type": "array", "items": {
+      "type": "object",
+      "properties": {"object": @text, "friction": @number, "normal": @vector}
+    }},
     "proxy_clearance_m": @number,
     "tool_clearance_m": @number
   }

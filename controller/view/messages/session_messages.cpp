@@ -193,15 +193,27 @@ std::string wrench_message(const controller::CycleRecord& record) {
   return json.end().take();
 }
 
+// By its index in the scene; empty where there is none.
+std::string object_name(const Stage& stage, std::int32_t object) {
+  const auto index = static_cast<std::size_t>(object);
+  return object >= 0 && index < stage.scene().objects.size() ? stage.scene().objects[index].name : std::string();
+}
+
 std::string contact_message(const Stage& stage, const controller::CycleRecord& record) {
-  const auto object = static_cast<std::size_t>(record.contact_object);
-  const bool named = record.contact_object >= 0 && object < stage.scene().objects.size();
   JsonText json = begin_message(record.time_ns);
   json.add("frame_id", "W").add("state", controller::contact_phase_name(record.contact));
-  json.add("object", named ? stage.scene().objects[object].name : std::string());
+  json.add("object", object_name(stage, record.contact_object));
   json.add("contacts", record.contact_count).add("friction", record.friction);
   put(json.name("force"), controller::vec3(record.contact_force_W_N));
   put(json.name("normal"), controller::vec3(record.normal_W));
+  json.name("others").begin_list();
+  for (const controller::OtherContact& other : record.others) {
+    if (other.object < 0) continue;
+    json.begin_object().add("object", object_name(stage, other.object)).add("friction", other.friction);
+    put(json.name("normal"), controller::vec3(other.normal_W));
+    json.end();
+  }
+  json.end();
   json.add("proxy_clearance_m", record.proxy_clearance_m).add("tool_clearance_m", record.tool_clearance_m);
   return json.end().take();
 }
