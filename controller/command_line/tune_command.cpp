@@ -8,6 +8,8 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/trials/mass_trial.hpp"
+#include "controller/report/summary.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -39,6 +41,40 @@ std::optional<double> with_margin(const HandModel& hand, const LoopModel& loop) 
 double round_up(double value) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
   return std::ceil(value / unit * (1.0 - 1e-9)) * unit;
+}
+
+// What came of the advice on the simulated arm. Heavier masses are tried where it isn't steady, a quarter more each
+// time.
+struct TriedAdvice {
+  std::optional<double> mass_kg;  // that is steady; none: of six none was
+  std::string text;
+};
+
+TriedAdvice tried_advice(const PreparedSession& session, double mass_kg) {
+  TriedAdvice out;
+  for (int tries = 0; tries < 6; ++tries, mass_kg = round_up(1.25 * mass_kg)) {
+    std::array<char, 200> text{};
+    bool steady = true;
+    for (const double factor : {1.0, hand_margin}) {
+      const MassTrial trial = try_mass(session, mass_kg, factor);
+      if (trial.steady()) continue;
+      const std::string what =
+          trial.fault.empty() ? "swings: " + oscillation_text(trial.oscillation) : "is stopped by " + trial.fault;
+      std::snprintf(text.data(), text.size(), "%.3g kg%s %s; ", mass_kg,
+                    factor > 1.0 ? " with the stiffer and heavier hand" : "", what.c_str());
+      steady = false;
+      break;
+    }
+    out.text += text.data();
+    if (!steady) continue;
+    std::snprintf(text.data(), text.size(), "%.3g kg is steady for %.3g s, with the stiffer and heavier hand, too",
+                  mass_kg, session.duration_s);
+    out.text += text.data();
+    out.mass_kg = mass_kg;
+    return out;
+  }
+  out.text += "none of these is steady";
+  return out;
 }
 
 std::string mass_text(const std::optional<double>& mass) {
@@ -138,9 +174,11 @@ int tune_command(const RunOptions& options) {
   std::printf(
       "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
       mass_text(smallest).c_str(), loop.handle_mass_kg, mass_text(smallest_felt(hand, start)).c_str());
+  const TriedAdvice tried = safe ? tried_advice(session, round_up(*safe)) : TriedAdvice{};
   std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
-              safe ? ("--mass " + mass_text(safe)).c_str() : "no mass up to 1000 kg",
-              safe ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
+              tried.mass_kg ? ("--mass " + mass_text(tried.mass_kg)).c_str() : "no mass up to 1000 kg",
+              tried.mass_kg ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
+  if (safe) std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
   const auto damping = damping_needed(hand, loop);
   if (!damping) {
     std::printf("damping: not even %.3g Ns/m gives it these margins: shorten the delay\n",
@@ -148,8 +186,12 @@ int tune_command(const RunOptions& options) {
   } else if (*damping > loop.damping_Ns_per_m) {
     LoopModel damped = loop;
     damped.damping_Ns_per_m = *damping;
+    const auto least = with_margin(hand, damped);
     std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", *damping,
-                mass_text(with_margin(hand, damped)).c_str());
+                mass_text(least).c_str());
+    PreparedSession with_damping = session;
+    with_damping.settings.damping_Ns_per_m = *damping;
+    if (least) std::printf("  tried: %s\n", tried_advice(with_damping, round_up(*least)).text.c_str());
   } else {
     std::printf(
         "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "

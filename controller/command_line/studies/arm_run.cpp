@@ -2,14 +2,9 @@
 
 #include <numbers>
 
-#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/session/bring_up.hpp"
-#include "controller/session/session.hpp"
-#include "fieldbus/simulated/simulated_can_network.hpp"
-#include "scenes/compiler/compile.hpp"
-#include "sim/cell/simulated_cell.hpp"
+#include "controller/command_line/trials/quiet_run.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -45,31 +40,13 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
 }  // namespace
 
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
-  const PreparedSession session = session_of(setup);
-  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
-  sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
-  scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         buses_in_order(session.cell));
-  far_end.attach_to(network);
-  far_end.power_on();
-  controller::bring_up(parts);
-  controller::Cycle cycle(std::move(parts), session.settings, session.cell.limits, 64);
   std::vector<studies::ArmSample> samples;
   double rendered_s = 0.0;
-  sim::Truth truth;
-  const controller::SessionHooks hooks{[&](std::int64_t) { truth = far_end.truth(); },
-                                       [&] {
-                                         controller::CycleRecord record;
-                                         while (cycle.records().pop(record)) {
-                                           if (record.phase != controller::Phase::rendering) continue;
-                                           rendered_s += setup.period_s;
-                                           if (rendered_s > setup.settling_s)
-                                             samples.push_back({truth.hand_force_W, truth.X_WT.translation()});
-                                         }
-                                       }};
-  controller::run_session(cycle, network, {session.duration_s}, hooks);
-  cycle.shut_down();
+  run_quietly(session_of(setup), [&](const controller::CycleRecord& record, const sim::Truth& truth) {
+    if (record.phase != controller::Phase::rendering) return;
+    rendered_s += setup.period_s;
+    if (rendered_s > setup.settling_s) samples.push_back({truth.hand_force_W, truth.X_WT.translation()});
+  });
   return samples;
 }
 

@@ -1,4 +1,4 @@
-#include "controller/command_line/sessions/trial_run.hpp"
+#include "controller/command_line/trials/trial_run.hpp"
 
 #include <algorithm>
 #include <cmath>
