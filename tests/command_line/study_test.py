@@ -53,7 +53,8 @@ class Tune(ProgramTest):
     def test_advice_says_what_limits(self):
         outcome = self.call("tune")
         self.assertEqual(outcome.status, 0, outcome.err)
-        for word in ("smallest stable mass", "advice: --mass", "what limits it", "timestep of at most", "handle"):
+        for word in ("smallest stable mass", "advice: --mass", "tried on the simulated arm: ", "is steady for 10 s",
+                     "what limits it", "timestep of at most", "handle"):
             self.assertIn(word, outcome.out)
 
     def test_a_hopeless_loop_is_told_so(self):
