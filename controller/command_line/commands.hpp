@@ -13,6 +13,7 @@ namespace proxarm::command_line {
 
 struct FileOptions {
   std::vector<std::filesystem::path> files;
+  std::filesystem::path scene;  // that cells are held against; empty: their own
 };
 
 struct SetOptions {

@@ -5,6 +5,8 @@
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/arm_urdf.hpp"
@@ -33,8 +35,9 @@ const char* check_laws(const scenes::Scene& scene) {
   return passed ? "scene" : nullptr;
 }
 
-// With the files that it names, and each device as the controller would make it.
-void check_cell(const fs::path& file) {
+// With the files that it names, each device as the controller would make it, and its arm's start in the scene, as `run`
+// judges it.
+void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
   if (!cell.default_hand.empty()) description::require_default_file(cell, "default_hand", cell.default_hand);
@@ -48,12 +51,16 @@ void check_cell(const fs::path& file) {
     }
   }
   controller::make_sensor(cell, description::load_sensor(cell.sensor.description));
+  RunOptions run;
+  run.cell = file;
+  run.scene = scene;
+  require_usable_start(prepare(run));
 }
 
-const char* check(const fs::path& file) {
+const char* check(const fs::path& file, const fs::path& scene) {
   switch (kind_of(file)) {
     case FileKind::cell:
-      check_cell(file);
+      check_cell(file, scene);
       return "cell";
     case FileKind::registers:
       description::load_modbus_drive(file);
@@ -86,7 +93,7 @@ int check_command(const FileOptions& options) {
   int status = 0;
   for (const fs::path& given : options.files) {
     try {
-      const char* kind = check(user_file(given));
+      const char* kind = check(user_file(given), options.scene);
       if (kind != nullptr) {
         std::printf("%s: fine, %s %s\n", given.c_str(), *kind == 'a' ? "an" : "a", kind);
       } else {

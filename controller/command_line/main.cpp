@@ -384,9 +384,10 @@ class Commands {
                            [this] { return replay_command(replay_); });
     replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
     replay->add_flag("--json", replay_.json, "print the result as one JSON object");
-    add("check", "validate cell, scene, hand and sensor files", [this] { return check_command(check_); })
-        ->add_option("files", check_.files, "files to check")
-        ->required();
+    CLI::App* check =
+        add("check", "validate cell, scene, hand and sensor files", [this] { return check_command(check_); });
+    check->add_option("files", check_.files, "files to check")->required();
+    check->add_option("--scene", check_.scene, "the scene that cells are held against (default: each cell's own)");
     add("explain", "what a scene compiles to, what is skipped and why", [this] { return explain_command(explain_); })
         ->add_option("scene", explain_.files, "scene file")
         ->required();
