@@ -107,27 +107,32 @@ void InverseKinematics::set_max_step(const std::array<double, max_axes>& max_ste
   other_max_step_ = Eigen::Map<const JointVector>(config_.max_step_rad.data(), arm_.axes());
 }
 
-// Refreshes kinematics and residuals at result.q; returns the weighted error of what is reached.
-template <int Axes>
+// Refreshes kinematics and residuals at result.q; returns the weighted error of the pose.
 InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   arm_.kinematics(result.q, result.kinematics);
   const Pose& X = result.kinematics.X_WT;
-  Vec3 e_p = X_WT.translation() - X.translation();
+  const Vec3 e_p = X_WT.translation() - X.translation();
   const Vec3 e_R = rotation_vector(X_WT.linear() * X.linear().transpose());
-  const bool place_only = Axes != 6 && !reaches_orientation();
-  if (place_only) e_p = (projection_ * e_p).eval();
   result.position_residual_m = e_p.norm();
   result.rotation_residual_rad = e_R.norm();
   Vec6 e;
   e << e_p, config_.length_m * e_R;
-  if (place_only) e.tail<3>().setZero();
   return e;
+}
+
+// Of that, what is reached: all of it, or the place in the tool's space.
+InverseKinematics::Vec6 InverseKinematics::task_error(Vec6 error, InverseKinematicsResult& result) const noexcept {
+  if (reaches_orientation()) return error;
+  const Vec3 e_p = projection_.lazyProduct(error.head<3>());
+  result.position_residual_m = e_p.norm();
+  error << e_p, Vec3::Zero();
+  return error;
 }
 
 template <int Axes>
 InverseKinematics::TaskJacobian<Axes> InverseKinematics::task_jacobian(
     const ToolKinematics& kinematics) const noexcept {
-  TaskJacobian<Axes> J = kinematics.J_W;
+  TaskJacobian<Axes> J = kinematics.J_W.leftCols<Axes>(arm_.axes());
   J.template bottomRows<3>() *= config_.length_m;
   if (Axes != 6 && !reaches_orientation()) {
     J.template topRows<3>() = projection_.lazyProduct(kinematics.J_W.topRows<3>());
@@ -143,7 +148,7 @@ bool InverseKinematics::arrived(const InverseKinematicsResult& result) const noe
 
 // Newton's method. True if it ended within tolerance and within the step limit; otherwise result.q is where it stopped.
 bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
-  Vec6 e = error<6>(X_WT, result);
+  Vec6 e = error(X_WT, result);
   FactoredMatrix J;
   for (int i = 0;; ++i) {
     const bool there = result.position_residual_m <= config_.position_tolerance_m &&
@@ -156,7 +161,7 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
     if (!(((q - q0).array().abs() <= max_step_.array()).all())) return false;
     result.q = q;
     ++result.iterations;
-    e = error<6>(X_WT, result);
+    e = error(X_WT, result);
   }
   smallest_singular_value(J.inverse(), result.smallest_singular_value_m_per_rad, result.lost_direction_W);
   return true;
@@ -165,14 +170,15 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
 // The same for another number of axes, one step at least: what the task leaves free goes on also where the tool stands.
 bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
                                     InverseKinematicsResult& result) const noexcept {
-  Vec6 e = error<Eigen::Dynamic>(X_WT, result);
+  Vec6 pose_error = error(X_WT, result), e = task_error(pose_error, result);
   for (int i = 0; i == 0 || !arrived(result); ++i) {
     if (i == config_.max_iterations) return false;
-    const JointVector q = next_angles(q0, e, X_WT, result);
+    const JointVector q = next_angles(q0, pose_error, e, result);
     if (!(((q - q0).array().abs() <= other_max_step_.array()).all())) return false;
     result.q = q;
     ++result.iterations;
-    e = error<Eigen::Dynamic>(X_WT, result);
+    pose_error = error(X_WT, result);
+    e = task_error(pose_error, result);
   }
   const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
   const SymmetricEigen eigen = symmetric_eigen(J.lazyProduct(J.transpose()));
@@ -182,7 +188,7 @@ bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
 }
 
 // What the task takes, and as much of the rest as the step limit leaves room for.
-JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& e, const Pose& X_WT,
+JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e,
                                            const InverseKinematicsResult& result) const noexcept {
   const Eigen::Index axes = arm_.axes();
   const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
@@ -191,7 +197,7 @@ JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& e,
     step = prioritized_step(J, e, JointMatrix::Identity(axes, axes), towards_posture(result.q));
   } else {
     const auto U = space_.axes.leftCols(space_.dimensions);
-    const Vec3 e_R = rotation_vector(X_WT.linear() * result.kinematics.X_WT.linear().transpose());
+    const Vec3 e_R = pose_error.tail<3>() / config_.length_m;
     const JointVector turn = turning_weight * result.kinematics.J_W.bottomRows<3>().transpose().lazyProduct(e_R);
     step = prioritized_step(U.transpose().lazyProduct(J.topRows<3>()), U.transpose().lazyProduct(e.head<3>()),
                             turning_cost(result.kinematics.J_W), turn + towards_posture(result.q));
@@ -219,7 +225,11 @@ JointVector InverseKinematics::towards_posture(const JointVector& q) const noexc
 template <int Axes>
 void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,
                                InverseKinematicsResult& result) const noexcept {
-  Vec6 e = error<Axes>(X_WT, result);
+  const auto refreshed_error = [&] {
+    const Vec6 of_pose = error(X_WT, result);
+    return Axes == 6 ? of_pose : task_error(of_pose, result);
+  };
+  Vec6 e = refreshed_error();
   for (int i = 0; i < iterations; ++i) {
     if (arrived(result)) break;
     // J Jᵀ = U S U ᵀ with S = σ², so Δq = Jᵀ U (S + λ²)⁻¹ Uᵀ e.
@@ -241,18 +251,17 @@ void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, 
     bool nearer = false;
     for (int rung = 0; rung < 24 && !nearer; ++rung, lambda2 *= 8.0) {
       const Vec6 damping = (squares.array() + lambda2).inverse().matrix();
-      const Vec6 force = U * projected.cwiseProduct(damping);
-      const Angles<Axes> q = q_before + J.transpose().lazyProduct(force);
+      const Angles<Axes> q = q_before + J.transpose() * (U * projected.cwiseProduct(damping));
       if (!(((q - q0).array().abs() <= box.array()).all())) continue;
       result.q = q;
-      const Vec6 e_new = error<Axes>(X_WT, result);
+      const Vec6 e_new = refreshed_error();
       const double promised = before - lambda2 * projected.cwiseProduct(damping).norm();
       nearer = before - e_new.norm() > quarter * promised;
       if (nearer) e = e_new;
     }
     if (!nearer) {
       result.q = q_before;
-      e = error<Axes>(X_WT, result);
+      e = refreshed_error();
       break;
     }
   }

@@ -98,15 +98,15 @@ class InverseKinematics {
   template <int Axes>
   using Angles = Eigen::Matrix<double, Axes, 1, Eigen::ColMajor, Axes == 6 ? 6 : max_axes, 1>;
 
-  template <int Axes>
   [[nodiscard]] Vec6 error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
+  [[nodiscard]] Vec6 task_error(Vec6 error, InverseKinematicsResult& result) const noexcept;
   template <int Axes>
   [[nodiscard]] TaskJacobian<Axes> task_jacobian(const ToolKinematics& kinematics) const noexcept;
   [[nodiscard]] bool arrived(const InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] bool newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] bool by_priority(const JointVector& q0, const Pose& X_WT,
                                  InverseKinematicsResult& result) const noexcept;
-  [[nodiscard]] JointVector next_angles(const JointVector& q0, const Vec6& e, const Pose& X_WT,
+  [[nodiscard]] JointVector next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e,
                                         const InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] JointVector towards_posture(const JointVector& q) const noexcept;
   template <int Axes>
