@@ -58,7 +58,8 @@ void require_regular(const PreparedSession& session, const models::Arm& arm) {
 
 std::string vector_text(const Vec3& v) {
   char text[80];
-  std::snprintf(text, sizeof text, "[%.6g, %.6g, %.6g]", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);  // no -0
+  const auto rounded = [](double value) { return std::round(1e6 * value) / 1e6 + 0.0; };  // no -0
+  std::snprintf(text, sizeof text, "[%.6g, %.6g, %.6g]", rounded(v.x()), rounded(v.y()), rounded(v.z()));
   return text;
 }
 
