@@ -19,6 +19,8 @@ using Status = InverseKinematicsResult::Status;
 // Of a joint's step, what turning the tool back and the elbow's way may take; and of a joint's range, what is near one
 // of its ends.
 constexpr double rest_share = 0.1, end_share = 0.15;
+// Of the tool's turn against the joints': below, it is let go altogether.
+constexpr double least_turning_weight = 1e-3;
 
 // log of a rotation as rotation vector, |·| ≤ π. Through the quaternion, whose vector part is exact to rounding where
 // the angle is small.
@@ -167,14 +169,15 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   return true;
 }
 
-// The same for another number of axes, one step at least: what the task leaves free goes on also where the tool stands.
+// The same for another number of axes. The rest has its share in the first step, also where the tool stands: it bends the
+// way to the task a little, which the steps after it make good.
 bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
                                     InverseKinematicsResult& result) const noexcept {
   Vec6 pose_error = error(X_WT, result), e = task_error(pose_error, result);
   for (int i = 0; i == 0 || !arrived(result); ++i) {
     if (i == config_.max_iterations) return false;
-    const JointVector q = next_angles(q0, pose_error, e, result);
-    if (!(((q - q0).array().abs() <= other_max_step_.array()).all())) return false;
+    const JointVector q = next_angles(q0, pose_error, e, i == 0, result);
+    if (!within_step(q, q0)) return false;
     result.q = q;
     ++result.iterations;
     pose_error = error(X_WT, result);
@@ -187,26 +190,39 @@ bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
   return true;
 }
 
-// What the task takes, and as much of the rest as the step limit leaves room for.
-JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e,
+// Written so that NaN and infinity, from a singular J, aren't.
+bool InverseKinematics::within_step(const JointVector& q, const JointVector& q0) const noexcept {
+  return ((q - q0).array().abs() <= other_max_step_.array()).all();
+}
+
+// What the task takes, and as much of the rest as the step limit leaves room for. Where holding the orientation takes
+// more than that (a wrist that is stretched), less and less is made of it.
+JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e, bool with_rest,
                                            const InverseKinematicsResult& result) const noexcept {
-  const Eigen::Index axes = arm_.axes();
-  const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
   PrioritizedStep step;
-  if (reaches_orientation()) {
-    step = prioritized_step(J, e, JointMatrix::Identity(axes, axes), towards_posture(result.q));
-  } else {
-    const auto U = space_.axes.leftCols(space_.dimensions);
-    const Vec3 e_R = pose_error.tail<3>() / config_.length_m;
-    const JointVector turn = turning_weight * result.kinematics.J_W.bottomRows<3>().transpose().lazyProduct(e_R);
-    step = prioritized_step(U.transpose().lazyProduct(J.topRows<3>()), U.transpose().lazyProduct(e.head<3>()),
-                            turning_cost(result.kinematics.J_W), turn + towards_posture(result.q));
+  for (double weight = turning_weight; weight > least_turning_weight; weight *= 0.25) {
+    step = step_for(pose_error, e, weight, result);
+    if (reaches_orientation() || within_step(result.q + step.task, q0)) break;
   }
   const JointVector q = result.q + step.task;
   const double most = (step.rest.array().abs() / other_max_step_.array()).maxCoeff();
-  if (!(most > 0.0)) return q;
-  const JointVector with_rest = q + std::min(1.0, rest_share / most) * step.rest;
-  return ((with_rest - q0).array().abs() <= other_max_step_.array()).all() ? with_rest : q;
+  if (!with_rest || !(most > 0.0)) return q;
+  const JointVector rested = q + std::min(1.0, rest_share / most) * step.rest;
+  return within_step(rested, q0) ? rested : q;
+}
+
+PrioritizedStep InverseKinematics::step_for(const Vec6& pose_error, const Vec6& e, double weight,
+                                            const InverseKinematicsResult& result) const noexcept {
+  const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
+  const JointVector posture = towards_posture(result.q);
+  if (reaches_orientation()) {
+    return prioritized_step(J, e, JointMatrix::Identity(arm_.axes(), arm_.axes()), posture);
+  }
+  const auto U = space_.axes.leftCols(space_.dimensions);
+  const Vec3 e_R = pose_error.tail<3>() / config_.length_m;
+  const JointVector turn = weight * result.kinematics.J_W.bottomRows<3>().transpose().lazyProduct(e_R);
+  return prioritized_step(U.transpose().lazyProduct(J.topRows<3>()), U.transpose().lazyProduct(e.head<3>()),
+                          turning_cost(result.kinematics.J_W, weight), turn + posture);
 }
 
 JointVector InverseKinematics::towards_posture(const JointVector& q) const noexcept {

@@ -27,6 +27,7 @@
 #include <optional>
 
 #include "models/arm/arm.hpp"
+#include "models/arm/prioritized_step.hpp"
 #include "models/arm/tool_space.hpp"
 
 namespace proxarm::models {
@@ -106,8 +107,11 @@ class InverseKinematics {
   [[nodiscard]] bool newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] bool by_priority(const JointVector& q0, const Pose& X_WT,
                                  InverseKinematicsResult& result) const noexcept;
-  [[nodiscard]] JointVector next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e,
+  [[nodiscard]] bool within_step(const JointVector& q, const JointVector& q0) const noexcept;
+  [[nodiscard]] JointVector next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e, bool with_rest,
                                         const InverseKinematicsResult& result) const noexcept;
+  [[nodiscard]] PrioritizedStep step_for(const Vec6& pose_error, const Vec6& e, double weight,
+                                         const InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] JointVector towards_posture(const JointVector& q) const noexcept;
   template <int Axes>
   void damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,

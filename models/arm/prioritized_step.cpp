@@ -22,9 +22,9 @@ PrioritizedStep prioritized_step(const JointMatrix& A, const SmallVector& e, con
   return {.task = HA.lazyProduct(force.col(0)), .rest = y - HA.lazyProduct(force.col(1))};
 }
 
-JointMatrix turning_cost(const Jacobian& J_W) noexcept {
+JointMatrix turning_cost(const Jacobian& J_W, double weight) noexcept {
   const auto J_R = J_W.bottomRows<3>();
-  JointMatrix H = turning_weight * J_R.transpose().lazyProduct(J_R);
+  JointMatrix H = weight * J_R.transpose().lazyProduct(J_R);
   H.diagonal().array() += 1.0;
   return H;
 }

@@ -28,6 +28,6 @@ PrioritizedStep prioritized_step(const JointMatrix& A, const SmallVector& e, con
                                  const JointVector& g) noexcept;
 
 // H above, for the arm's Jacobian of T.
-JointMatrix turning_cost(const Jacobian& J_W) noexcept;
+JointMatrix turning_cost(const Jacobian& J_W, double weight = turning_weight) noexcept;
 
 }  // namespace proxarm::models
