@@ -3,6 +3,8 @@
 Each is judged by what a hand would feel: the apparent mass is taken from the simulation's truth, the touch from the
 scene. Five axes are the default arm with its fourth joint fixed, three the SCARA without its last.
 """
+import json
+import math
 import re
 import unittest
 
@@ -167,20 +169,28 @@ class Axes(ProgramTest):
         proven = self.call("prove", cell)
         self.assertEqual(proven.status, 0, proven.out + proven.err)
         self.assertRegex(proven.out, "(?m)^PROVEN")
-        # The arm's elbow turns the other way than the cell says.
+        # The arm's elbow turns the other way than the cell says, and stands where the cell takes it to stand.
+        text = cell.read_text()
+        start_rad = float(re.search(r"start_rad: \[.*, (.*)\]", text)[1])
+        counts_per_rad = 131072 * 100 / (2 * math.pi)
         other = cell.with_name("other.yaml")
-        other.write_text(cell.read_text().replace("direction: -1", "direction: 1"))
+        other.write_text(text.replace("direction: -1", "direction: 1").replace(
+            "offset_counts: 40000", f"offset_counts: {round(40000 - 2 * counts_per_rad * start_rad)}"))
         wrong = self.call("prove", cell, "--arm", other)
         self.assertEqual(wrong.status, 1, wrong.out + wrong.err)
         self.assertRegex(wrong.out, "NOT PROVEN")
-        self.assertIn("elbow", wrong.out)
+        # Its sensor is mounted a quarter turn off.
+        other.write_text(text.replace("pose_link: {position_m: [0, 0, 0.03], rpy_rad: [0, 0, 0]}",
+                                      "pose_link: {position_m: [0, 0, 0.03], rpy_rad: [0, 0, 1.5707963]}"))
+        turned = self.call("prove", cell, "--arm", other)
+        self.assertEqual(turned.status, 1, turned.out + turned.err)
+        self.assertIn("the sensor is turned by -90 degrees about its z axis", turned.out)
 
     def test_what_no_weight_proves_is_refused_with_the_reason(self):
         for cell, reason in (("linear", "linear joint carriage"), ("gantry", "linear joint bridge")):
             self.assert_refused(self.call("prove", SOURCE / f"models/cells/{cell}.yaml"), "prove", reason)
 
     def test_assess_leads_the_bench_in_its_plane(self):
-        import json
         outcome = self.call("assess", SOURCE / "models/cells/bench.yaml", "--poses", "1", "--json")
         self.assertIn(outcome.status, (0, 1), outcome.err)
         found = json.dumps(json.loads(outcome.out))

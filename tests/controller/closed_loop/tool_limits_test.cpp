@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "models/arm/tool_space.hpp"
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 #include "tests/controller/closed_loop/joint_limits.hpp"
 #include "tests/models/surfaces/random_states.hpp"
@@ -92,17 +93,20 @@ Worst judged(const ClosedLoopRig& rig, Counts counts) {
   return worst;
 }
 
-std::string pulling_hand(const tests::ScratchFolder& folder, Random& random) {
+// `follows_m`: how far the tool is counted on to come along before the spring pulls with up to `most_N`.
+std::string pulling_hand(const tests::ScratchFolder& folder, Random& random, double most_N = 190.0,
+                         double follows_m = 0.4, const models::ToolSpace& space = {}) {
   const std::string file = folder / "hand.yaml";
   std::ofstream out(file);
-  const double stiffness = random.log_uniform(100.0, 1000.0), force_N = random.log_uniform(30.0, 190.0);
+  const double stiffness = random.log_uniform(100.0, 1000.0), force_N = random.log_uniform(30.0, most_N);
   out << "name: pulls\nmass_kg: " << random.uniform(0.3, 2.0) << "\nstiffness_N_per_m: " << stiffness
       << "\ndamping_Ns_per_m: " << random.log_uniform(5.0, 60.0) << "\nwaypoints:\n"
       << "  - {time_s: 0.2, offset_m: [0, 0, 0]}\n";
   double time_s = 0.2;
   for (int i = 0; i < 3; ++i) {
     time_s += random.uniform(0.4, 1.2);
-    const Vec3 p = std::min(1.5, random.uniform(0.5, 1.0) * force_N / stiffness + 0.4) * random.direction<3>();
+    const double far_m = std::min(1.5, random.uniform(0.5, 1.0) * force_N / stiffness + follows_m);
+    const Vec3 p = far_m * (space.projection() * random.direction<3>());
     out << "  - {time_s: " << time_s << ", offset_m: [" << p.x() << ", " << p.y() << ", " << p.z() << "]}\n";
   }
   return file;
@@ -191,6 +195,8 @@ TEST(ToolLimits, AreKeptInWhatIsSentAndInWhatTheEncodersSay) {
 // The same of arms that don't have six axes, at the edge of a box and at the end of their reach.
 RigOptions random_pull_of(const char* cell, const tests::ScratchFolder& folder, Random& random) {
   RigOptions options = random_pull(folder, random);
+  const models::ToolSpace space = models::tool_space(models::Arm(description::load_cell(source_file(cell))));
+  options.hand = pulling_hand(folder, random, 80.0, 0.0, space);  // what the bench's drives hold at its full reach
   options.cell = cell;
   options.settings.orientation = OrientationMode::held;
   options.settings.receive_window = 0.55;
@@ -198,7 +204,6 @@ RigOptions random_pull_of(const char* cell, const tests::ScratchFolder& folder, 
   const bool boxed = random.chance(0.5);
   options.edit_cell = [=](description::Cell& edited) {
     edited.limits.max_tool_speed_m_per_s = edited.limits.max_elbow_speed_m_per_s = speed;
-    edited.limits.max_force_N = 1000.0;  // a force that is too large ends a session before it has shown much
     if (!boxed) return;
     const models::Arm arm(edited);
     const Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
