@@ -13,9 +13,8 @@ scenes::Scene reachable_scene(scenes::Scene scene, const description::Cell& cell
   const models::Arm arm(cell);
   const models::ToolSpace reach = models::tool_space(arm);
   if (reach.dimensions == 0 || reach.dimensions == 3) return scene;
-  scene.space = {.dimensions = reach.dimensions,
-                 .origin_m = arm.tool_pose(arm.start_rad()).translation(),
-                 .axes = reach.axes};
+  scene.space = {
+      .dimensions = reach.dimensions, .origin_m = arm.tool_pose(arm.start_rad()).translation(), .axes = reach.axes};
   return scene;
 }
 

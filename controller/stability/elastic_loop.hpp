@@ -66,9 +66,9 @@ class ElasticLoop {
   double force_age_periods_;
   int order_;
   bool matched_labels_;
-  Eigen::MatrixXd plant_;       // [φ, φ̇, θ, r, ṙ] over a period
-  Eigen::MatrixXd force_;       // h of [φ, φ̇, θ, r, ṙ]
-  Eigen::MatrixXd twist_;       // k⁻¹ M G
+  Eigen::MatrixXd plant_;                    // [φ, φ̇, θ, r, ṙ] over a period
+  Eigen::MatrixXd force_;                    // h of [φ, φ̇, θ, r, ṙ]
+  Eigen::MatrixXd twist_;                    // k⁻¹ M G
   Eigen::Index joints_, dimensions_, ages_;  // n, those of the tool's space, and how many old forces are kept
 };
 

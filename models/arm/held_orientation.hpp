@@ -1,5 +1,5 @@
-// How joints move where the tool keeps its orientation: G = ∂(joint angles)/∂(tool place). Arms with fewer than six axes
-// keep as much of it as they can (prioritized_step.hpp).
+// How joints move where the tool keeps its orientation: G = ∂(joint angles)/∂(tool place). Arms with fewer than six
+// axes keep as much of it as they can (prioritized_step.hpp).
 #pragma once
 
 #include "models/arm/arm.hpp"

@@ -169,8 +169,8 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   return true;
 }
 
-// The same for another number of axes. The rest has its share in the first step, also where the tool stands: it bends the
-// way to the task a little, which the steps after it make good.
+// The same for another number of axes. The rest has its share in the first step, also where the tool stands: it bends
+// the way to the task a little, which the steps after it make good.
 bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
                                     InverseKinematicsResult& result) const noexcept {
   Vec6 pose_error = error(X_WT, result), e = task_error(pose_error, result);

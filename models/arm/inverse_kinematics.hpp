@@ -12,7 +12,8 @@
 // are in m/rad.
 //
 // That is of six axes. Others take steps of prioritized_step.hpp instead of Newton's:
-//   fewer   reach the place of T alone, in the space in which T can move (tool_space.hpp), and turn the tool towards the
+//   fewer   reach the place of T alone, in the space in which T can move (tool_space.hpp), and turn the tool towards
+//   the
 //           wanted orientation as far as is possible meanwhile (least squares of log(R_d Rᵀ))
 //   seven   and more reach the whole pose. What is left to them, the elbow's way around, goes towards the posture that
 //           set_posture() gave and away from the ends of the joints' ranges, by
@@ -69,8 +70,8 @@ struct InverseKinematicsResult {
 
 class InverseKinematics {
  public:
-  // The arm is referred to and must live as long. Throws description::SetupError for an arm whose tool can't go straight
-  // in any direction: with fewer axes than the dimensions of its space.
+  // The arm is referred to and must live as long. Throws description::SetupError for an arm whose tool can't go
+  // straight in any direction: with fewer axes than the dimensions of its space.
   explicit InverseKinematics(const Arm& arm, const InverseKinematicsConfig& config = {});
 
   // The hot path: no allocation, no exception; bounded work. `q` are the last angles commanded.
@@ -125,8 +126,8 @@ class InverseKinematics {
   Vec6 max_step_;               // of six axes
   JointVector other_max_step_;  // of another number
   ToolSpace space_;
-  Mat3 projection_;      // onto it
-  int lost_row_;         // which of six ascending singular values is the smallest of what is reached
+  Mat3 projection_;  // onto it
+  int lost_row_;     // which of six ascending singular values is the smallest of what is reached
   JointVector posture_;
 };
 

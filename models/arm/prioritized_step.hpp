@@ -7,8 +7,8 @@
 // (Nakamura, Advanced Robotics, 1991, ch. 4; here by one factorization instead of nested pseudoinverses.)
 //
 // Arms with fewer than six axes reach the tool's place alone (A: its rows) and turn the tool as little as they can:
-// H = E + turning_weight J_RᵀJ_R. A radian of the tool counts ten times a radian of a joint: where the axes can hold the
-// orientation, they do.
+// H = E + turning_weight J_RᵀJ_R. A radian of the tool counts ten times a radian of a joint: where the axes can hold
+// the orientation, they do.
 #pragma once
 
 #include "models/arm/arm.hpp"

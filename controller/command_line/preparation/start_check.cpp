@@ -48,12 +48,13 @@ void require_regular(const PreparedSession& session, const models::Arm& arm) {
   if (smallest >= limit) return;
   char found[160];
   std::snprintf(found, sizeof found, "a singular pose (smallest singular value %.2g m/rad)", smallest);
-  throw SetupError({.file = session.cell.file.string(),
-                    .key = "start_rad",
-                    .found = found,
-                    .expected = "a pose from which the tool can move in all directions, at least " +
-                                description::number_text(limit) + " m/rad",
-                    .advice = arm.axes() < 6 ? "bend the elbow" : "bend the elbow and the wrist, such as axes 3 and 5"});
+  throw SetupError(
+      {.file = session.cell.file.string(),
+       .key = "start_rad",
+       .found = found,
+       .expected = "a pose from which the tool can move in all directions, at least " +
+                   description::number_text(limit) + " m/rad",
+       .advice = arm.axes() < 6 ? "bend the elbow" : "bend the elbow and the wrist, such as axes 3 and 5"});
 }
 
 std::string vector_text(const Vec3& v) {

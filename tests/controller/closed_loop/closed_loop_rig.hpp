@@ -36,7 +36,8 @@ struct RigOptions {
   std::string hand = "sim/hands/touch.yaml";
   SessionSettings settings{};
   double sensor_delay_s = 0.0;
-  std::array<double, models::max_axes> start_error_rad{};  // by which the controller is wrong about where the arm stands
+  std::array<double, models::max_axes>
+      start_error_rad{};                       // by which the controller is wrong about where the arm stands
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
   std::vector<ScheduledChange> changes{};
   std::vector<ScheduledCommand> commands{};

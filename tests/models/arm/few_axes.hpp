@@ -47,8 +47,8 @@ inline description::Cell chain_cell(const ScratchFolder& folder, const std::vect
     urdf += "<joint name=\"joint_" + n + "\" type=\"" + joint.type + "\"><parent link=\"link_" + std::to_string(i - 1) +
             "\"/><child link=\"link_" + n + "\"/><origin xyz=\"" + (i == 1 ? "0" : "0.4") + " 0 0\" rpy=\"" +
             (i == 1 ? turned : joint.rpy) + "\"/><axis xyz=\"" + joint.axis +
-            "\"/><limit lower=\"-2\" upper=\"2\" velocity=\"2\" effort=\"100\"/></joint><link name=\"link_" + n + "\">" +
-            body + "</link>";
+            "\"/><limit lower=\"-2\" upper=\"2\" velocity=\"2\" effort=\"100\"/></joint><link name=\"link_" + n +
+            "\">" + body + "</link>";
   }
   description::Cell cell = shipped_cell("default");
   cell.file = folder.path() / "chain.yaml";
