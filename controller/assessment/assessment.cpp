@@ -16,18 +16,16 @@ using models::Vec3;
 // ISO/TS 15066's spring constants lie between these; 100 N/mm belongs to no region and fills the gap.
 constexpr std::array body_stiffnesses_N_per_m{10e3, 25e3, 50e3, 75e3, 100e3, 150e3};
 
-struct Direction {
-  const char* name;
-  Vec3 along_W;
-};
-const std::array<Direction, 6> directions{Direction{"+x", Vec3::UnitX()}, Direction{"-x", -Vec3::UnitX()},
-                                          Direction{"+y", Vec3::UnitY()}, Direction{"-y", -Vec3::UnitY()},
-                                          Direction{"+z", Vec3::UnitZ()}, Direction{"-z", -Vec3::UnitZ()}};
-
-double worst_mobility(const models::Arm& arm, const models::JointVector& q) {
+// In the tool's space.
+double worst_mobility(const models::Arm& arm, const models::ToolSpace& space, const models::JointVector& q) {
   models::ToolKinematics at;
   arm.kinematics(q, at);
-  return models::smallest_singular_value(at.J_W.topRows<3>());
+  if (space.dimensions == 3) return models::smallest_singular_value(at.J_W.topRows<3>());
+  models::Mat6 squares = models::Mat6::Zero();
+  const auto J = at.J_W.topRows<3>();
+  squares.topLeftCorner<3, 3>() = J.lazyProduct(J.transpose());
+  const models::SymmetricEigen eigen = models::symmetric_eigen(squares);
+  return std::sqrt(std::max(0.0, eigen.values[6 - space.dimensions]));
 }
 
 bool allowed(const description::CellLimits& limits, const Vec3& tool_W) {
@@ -91,7 +89,8 @@ std::vector<std::vector<double>> poses_about_start(const description::Cell& cell
   constexpr double least_share_of_mobility = 0.6;
   constexpr int tries = 1000;
   const models::JointVector& start = arm.start_rad();
-  const double mobility = worst_mobility(arm, start);
+  const models::ToolSpace space = models::tool_space(arm);
+  const double mobility = worst_mobility(arm, space, start);
   std::vector<std::vector<double>> poses{{start.begin(), start.end()}};
   models::Random random(1);
   for (int i = 0; i < tries && static_cast<int>(poses.size()) < count; ++i) {
@@ -103,7 +102,7 @@ std::vector<std::vector<double>> poses_about_start(const description::Cell& cell
       const double to = std::max(start[axis], std::min(start[axis] + reach, range[1] - room));
       q[axis] = random.uniform(from, to);
     }
-    if (worst_mobility(arm, q) < least_share_of_mobility * mobility) continue;
+    if (worst_mobility(arm, space, q) < least_share_of_mobility * mobility) continue;
     if (allowed(cell.limits, arm.tool_pose(q).translation())) poses.emplace_back(q.begin(), q.end());
   }
   return poses;
@@ -146,8 +145,22 @@ ClampFigure clamp_figure(const Body& body, const TrialResult& result) {
   return figure;
 }
 
-Assessment assess(const std::vector<std::vector<double>>& poses_rad, const Thresholds& thresholds,
-                  const ArmTrial& run_trial) {
+std::vector<Direction> directions_of(const models::ToolSpace& space) {
+  std::vector<Direction> directions;
+  for (Eigen::Index i = 0; i < space.dimensions; ++i) {
+    const Vec3 along = space.axes.col(i);
+    std::string name = std::to_string(i + 1);
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if (along == Vec3::Unit(k)) name = std::string(1, "xyz"[k]);
+    }
+    directions.push_back({"+" + name, along});
+    directions.push_back({"-" + name, -along});
+  }
+  return directions;
+}
+
+Assessment assess(const std::vector<std::vector<double>>& poses_rad, const std::vector<Direction>& directions,
+                  const Thresholds& thresholds, const ArmTrial& run_trial) {
   std::set<double> stiffnesses(body_stiffnesses_N_per_m.begin(), body_stiffnesses_N_per_m.end());
   for (const Region& region : thresholds.regions) stiffnesses.insert(region.stiffness_N_per_m);
   Worst worst;

@@ -7,7 +7,8 @@
 //   the arm is stopped (category 0: power off, brakes close; 1: controlled, then off; 2: controlled, drives stay on),
 //   or a body begins: a one-sided spring across the tool's way, in front of something that doesn't give way. It presses
 //   on the handle, where the force sensor feels it, or on the arm in front of the sensor, which doesn't.
-// Each in several poses and along six directions; what is told is the worst.
+// Each in several poses and to both sides along the three axes of W, or along those that the tool can go in where its
+// axes are fewer; what is told is the worst.
 //
 // A simulation of the values that the cell file has under `simulation:`. It certifies nothing.
 #pragma once
@@ -18,6 +19,7 @@
 
 #include "controller/assessment/thresholds.hpp"
 #include "models/arm/arm.hpp"
+#include "models/arm/tool_space.hpp"
 #include "models/description/cell.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -95,7 +97,14 @@ StopFigure stop_figure(const TrialResult& result);
 // Of a trial with a body.
 ClampFigure clamp_figure(const Body& body, const TrialResult& result);
 
-Assessment assess(const std::vector<std::vector<double>>& poses_rad, const Thresholds& thresholds,
-                  const ArmTrial& run_trial);
+// Where a hand leads the tool.
+struct Direction {
+  std::string name;  // "+x"; "+1", "+2" where it isn't along an axis of W
+  models::Vec3 along_W = models::Vec3::UnitX();
+};
+std::vector<Direction> directions_of(const models::ToolSpace& space);
+
+Assessment assess(const std::vector<std::vector<double>>& poses_rad, const std::vector<Direction>& directions,
+                  const Thresholds& thresholds, const ArmTrial& run_trial);
 
 }  // namespace proxarm::assessment

@@ -64,9 +64,11 @@ int assess_command(const AssessOptions& options) {
   const assessment::Thresholds thresholds = assessment::load_thresholds(
       options.thresholds.empty() ? shipped_file("models/thresholds/hands.yaml") : user_file(options.thresholds));
   const int assumed = assume_brakes(session.cell);
-  const auto poses = assessment::poses_about_start(session.cell, models::Arm(session.cell), options.poses);
+  const models::Arm arm(session.cell);
+  const auto poses = assessment::poses_about_start(session.cell, arm, options.poses);
   const assessment::Assessment found =
-      assessment::assess(poses, thresholds, [&](const assessment::Trial& trial) { return run_trial(session, trial); });
+      assessment::assess(poses, assessment::directions_of(models::tool_space(arm)), thresholds,
+                         [&](const assessment::Trial& trial) { return run_trial(session, trial); });
   const assessment::Subject subject = subject_of(session, assumed);
   const std::string text =
       options.run.json ? assessment::json(subject, found, thresholds) : assessment::text(subject, found, thresholds);

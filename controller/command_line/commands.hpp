@@ -18,7 +18,8 @@ struct FileOptions {
 
 struct CheckFilesOptions {
   std::vector<std::filesystem::path> files;
-  scenes::CheckOptions scene;  // how scenes are tried
+  std::filesystem::path scene;  // that cells are held against; empty: their own
+  scenes::CheckOptions states;  // in which scenes are tried
 };
 
 struct SetOptions {

@@ -6,6 +6,8 @@
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/arm_urdf.hpp"
@@ -43,8 +45,9 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
   return nullptr;
 }
 
-// With the files that it names, and each device as the controller would make it.
-void check_cell(const fs::path& file) {
+// With the files that it names, each device as the controller would make it, and its arm's start in the scene, as `run`
+// judges it.
+void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
   if (!cell.default_hand.empty()) description::require_default_file(cell, "default_hand", cell.default_hand);
@@ -58,12 +61,16 @@ void check_cell(const fs::path& file) {
     }
   }
   controller::make_sensor(cell, description::load_sensor(cell.sensor.description));
+  RunOptions run;
+  run.cell = file;
+  run.scene = scene;
+  require_usable_start(prepare(run));
 }
 
-const char* check(const fs::path& file, const scenes::CheckOptions& options) {
+const char* check(const fs::path& file, const CheckFilesOptions& options) {
   switch (kind_of(file)) {
     case FileKind::cell:
-      check_cell(file);
+      check_cell(file, options.scene);
       return "cell";
     case FileKind::registers:
       description::load_modbus_drive(file);
@@ -85,7 +92,7 @@ const char* check(const fs::path& file, const scenes::CheckOptions& options) {
       return "arm";
     case FileKind::scene:
     case FileKind::unknown:
-      return check_laws(scenes::load_scene(file), options);
+      return check_laws(scenes::load_scene(file), options.states);
   }
   return "";
 }
@@ -96,7 +103,7 @@ int check_command(const CheckFilesOptions& options) {
   int status = 0;
   for (const fs::path& given : options.files) {
     try {
-      const char* kind = check(user_file(given), options.scene);
+      const char* kind = check(user_file(given), options);
       if (kind != nullptr) {
         std::printf("%s: fine, %s %s\n", given.c_str(), *kind == 'a' ? "an" : "a", kind);
       } else {

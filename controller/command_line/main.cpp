@@ -404,7 +404,8 @@ class Commands {
     CLI::App* check = add("check", "whether cell, scene, hand, sensor and other files are fine. Status 2: one isn't",
                           [this] { return check_command(check_); });
     check->add_option("files", check_.files, "files to check")->required();
-    add_check_options(*check, check_.scene);
+    check->add_option("--scene", check_.scene, "the scene that cells are held against (default: each cell's own)");
+    add_check_options(*check, check_.states);
     add("explain", "what a scene compiles to, what is skipped and why", [this] { return explain_command(explain_); })
         ->add_option("scene", explain_.files, "scene file")
         ->required();

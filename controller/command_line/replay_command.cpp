@@ -7,6 +7,7 @@
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/record/replay_log.hpp"
 #include "controller/session/bring_up.hpp"
+#include "controller/session/reachable_scene.hpp"
 #include "models/base/setup_error.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
@@ -41,7 +42,8 @@ class Replay {
       : log_(folder / controller::replay_folder / "cycles.bin"),
         cell_(description::load_cell(controller::recorded_file(folder, log_.head().cell.data()))),
         sensor_(description::load_sensor(cell_.sensor.description)),
-        scene_(scenes::compile(scenes::load_scene(controller::recorded_file(folder, log_.head().scene.data())))),
+        scene_(scenes::compile(controller::reachable_scene(
+            scenes::load_scene(controller::recorded_file(folder, log_.head().scene.data())), cell_))),
         network_(log_.head()) {
     const controller::ReplayHead& head = log_.head();
     if (cell_.drives.size() != head.axes || cell_.buses.size() > controller::max_buses) {

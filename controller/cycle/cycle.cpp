@@ -73,7 +73,7 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
 void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
   const ComputeTime timed(parts_.network);
   begin_cycle(t_k_ns);
-  bus_.receive_until(t_k_ns + std::llround(receive_window * settings_.period_s * 1e9), timestep_);
+  bus_.receive_until(t_k_ns + std::llround(settings_.receive_window * settings_.period_s * 1e9), timestep_);
   measure();
   judge(t_k_ns);
   choose_setpoints(t_k_ns);

@@ -33,10 +33,6 @@
 
 namespace proxarm::controller {
 
-// How long a cycle waits for feedback and samples, as a fraction of T; in what is left the setpoints are computed and
-// sent.
-inline constexpr double receive_window = 0.45;
-
 class Cycle {
  public:
   // `record_capacity`: cycles that the ring holds until somebody pops them.

@@ -78,6 +78,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   const models::Pose X_WT = arm_.tool_pose(state_.link_rad);
   state_.q_k1_W = state_.q_k2_W = X_WT.translation();
   arm_.kinematics(state_.link_rad, solution_.kinematics);
+  parts_.inverse.set_posture(state_.link_rad);
   parts_.elastic.start(state_.link_rad);
   state_.link_step_rad.setZero();
   start_guards(target_rad);
@@ -157,7 +158,8 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   if (passivity_) passivity_->archive(state);
   if (empty_handle_) empty_handle_->archive(state);
   if (sent_) sent_->archive(state);
-  state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_, reversed_, straight_);
+  state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_, reversed_, straight_,
+        parts_.inverse.posture());
   archive_fields(state, state_);
   if (state.reading()) arm_.kinematics(state_.link_rad, solution_.kinematics);
 }

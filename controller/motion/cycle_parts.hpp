@@ -68,6 +68,7 @@ struct CycleParts {
 };
 
 // The largest step of each joint in one cycle, at its drive's highest speed.
-std::array<double, 6> max_steps_rad(const std::vector<description::DriveDescription>& drives, double period_s) noexcept;
+std::array<double, models::max_axes> max_steps_rad(const std::vector<description::DriveDescription>& drives,
+                                                   double period_s) noexcept;
 
 }  // namespace proxarm::controller

@@ -205,6 +205,13 @@ std::vector<Station> plan(const description::Cell& cell, const models::Arm& arm,
   require_provable(cell, arm);
   const JointVector pose = best_pose(cell, arm, motor_rad);
   const JointVector changes = shown(cell, arm, pose);
+  if (changes.maxCoeff() < shown_by_weight) {
+    throw description::SetupError(
+        {.file = cell.file.string(),
+         .key = "prove",
+         .found = "joints that all turn about the vertical",
+         .expected = "one at least that turns the tool's weight, by which the rest is judged"});
+  }
   std::vector<Station> stations{{pose}, {pose, Vec3::UnitX()}, {pose, Vec3::UnitY()}};
   for (Eigen::Index i = 0; i < pose.size(); ++i) {
     const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(i)];

@@ -269,7 +269,8 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
 
 // The joints that carry the arm turn faster than the tool's own speed explains.
 bool ToolGuard::folds() const noexcept {
-  const double reach_m = (points_.tool_W - points_.joint_W[first_joint - 1]).norm();
+  const auto base = std::min(first_joint, static_cast<std::size_t>(speed_rad_per_s_.size())) - 1;
+  const double reach_m = (points_.tool_W - points_.joint_W[base]).norm();
   const Eigen::Index carrying = std::min<Eigen::Index>(3, speed_rad_per_s_.size());
   const double fastest = speed_rad_per_s_.head(carrying).cwiseAbs().maxCoeff();
   return reach_m * fastest * period_s_ > folding * steps_[0].norm();

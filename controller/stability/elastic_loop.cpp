@@ -9,6 +9,7 @@
 #include "controller/stability/stability.hpp"
 #include "models/arm/held_orientation.hpp"
 #include "models/arm/inverse_kinematics.hpp"
+#include "models/arm/tool_space.hpp"
 #include "models/geometry/eigenvalues.hpp"
 
 namespace proxarm::controller {
@@ -17,6 +18,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 3, 1>;  // in the tool's space
 
 // exp(A) by Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22, squared s times.
 MatrixXd exponential(MatrixXd A) {
@@ -49,9 +51,12 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
   constexpr double pi = std::numbers::pi;
   models::ToolKinematics kinematics;
   arm.kinematics(pose_rad, kinematics);
+  // Off that space a proxy would be a free mass that no hand moves: neither stable nor there.
+  const models::ToolSpace space = models::tool_space(arm);
+  const auto U = space.axes.leftCols(space.dimensions);
   ElasticArm out{.mass = arm.link_mass_matrix(pose_rad),
-                 .jacobian = kinematics.J_W.topRows<3>(),
-                 .joints_per_m = models::joints_per_m(kinematics.J_W),
+                 .jacobian = U.transpose() * kinematics.J_W.topRows<3>(),
+                 .joints_per_m = models::joints_per_m(kinematics.J_W) * U,
                  .stiffness = arm.gear_stiffness_Nm_per_rad(),
                  .damping = VectorXd::Zero(arm.axes())};
   if (cell.limits.setpoint_bandwidth_Hz > 0.0) out.filter_s = 1.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz);
@@ -75,9 +80,8 @@ std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::
       0.005;  // no joint turns by the inverse kinematics' 0.01 rad on that, away from singularities
   constexpr double apart_m = 0.05;
   constexpr std::size_t most_poses = 16;
+  const models::InverseKinematics inverse(arm);  // refuses what moves no tool
   std::vector<ElasticArm> arms{elastic_arm(arm, arm.start_rad(), cell)};
-  if (arm.axes() != 6) return arms;
-  const models::InverseKinematics inverse(arm);
   const models::Pose start = arm.tool_pose(arm.start_rad());
   models::InverseKinematicsResult solution;
   models::JointVector q = arm.start_rad();
@@ -107,13 +111,13 @@ std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::
 // Where things stand in the state of a period's begin: the plant's [φ, φ̇, θ], the two last setpoints, four proxies,
 // the filter's x_f and ẋ_f, and the forces that were read.
 struct ElasticLoop::State {
-  Index n, ages;
+  Index n, d, ages;
   [[nodiscard]] Index plant() const { return 0; }
   [[nodiscard]] Index sent() const { return 3 * n; }
   [[nodiscard]] Index proxies() const { return 5 * n; }
-  [[nodiscard]] Index filter() const { return 5 * n + 12; }
-  [[nodiscard]] Index forces() const { return 5 * n + 18; }
-  [[nodiscard]] Index size() const { return forces() + 3 * ages; }
+  [[nodiscard]] Index filter() const { return 5 * n + 4 * d; }
+  [[nodiscard]] Index forces() const { return 5 * n + 6 * d; }
+  [[nodiscard]] Index size() const { return forces() + d * ages; }
 };
 
 ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const LoopModel& loop)
@@ -126,7 +130,8 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
       force_age_periods_(std::max(0.0, (loop.delay_s - 2.0 * arm.filter_s) / loop.period_s - 1.0)),
       order_(loop.order),
       matched_labels_(loop.matched_labels),
-      joints_(arm.stiffness.size()) {
+      joints_(arm.stiffness.size()),
+      dimensions_(arm.jacobian.rows()) {
   // Of a quotient of decimals; the newest force, one older to interpolate with, one for order 2's labels.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + 2;
   twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
@@ -168,12 +173,12 @@ void ElasticLoop::make_plant(const HandModel& hand) {
   plant_ = exponential(A * period_s_);
 }
 
-Index ElasticLoop::size() const noexcept { return State{joints_, ages_}.size(); }
+Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_}.size(); }
 
 // One period, from before the reading of the sensor to before the next.
 void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const {
-  const Index n = joints_;
-  const State at{n, ages_};
+  const Index n = joints_, d = dimensions_;
+  const State at{n, d, ages_};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
@@ -183,29 +188,29 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   if (!(time_constant_s_ > 0.0)) z.segment(2 * n, n) = old_sent;  // else a difference of both would stay for ever
   z.segment(3 * n, n) = old_sent;
   z.tail(n) = (last_sent - old_sent) / T;
-  const Eigen::Vector3d h_now = force_ * z;
-  const auto force = [&](Index age) -> Eigen::Vector3d {
-    return age == 0 ? h_now : Eigen::Vector3d(state.segment<3>(at.forces() + 3 * (age - 1)));
+  const Place h_now = force_ * z;
+  const auto force = [&](Index age) -> Place {
+    return age == 0 ? h_now : Place(state.segment(at.forces() + d * (age - 1), d));
   };
   const auto whole = static_cast<Index>(std::floor(force_age_periods_ + 1e-9));
   const double rest = std::max(0.0, force_age_periods_ - static_cast<double>(whole));
-  Eigen::Vector3d h = (1.0 - rest) * force(whole) + rest * force(whole + 1);
+  Place h = (1.0 - rest) * force(whole) + rest * force(whole + 1);
   if (order_ == 2 && matched_labels_) {
     h = 2.0 * h - ((1.0 - rest) * force(whole + 1) + rest * force(std::min(whole + 2, ages_)));
   }
 
   const std::array<double, 5> a = proxy_polynomial(order_, M, damping_ * T, spring_ * T * T);
-  Eigen::Vector3d q = T * T * h;
-  for (Index i = 1; i < 5; ++i) q -= a[static_cast<std::size_t>(i)] * state.segment<3>(at.proxies() + 3 * (i - 1));
+  Place q = T * T * h;
+  for (Index i = 1; i < 5; ++i) q -= a[static_cast<std::size_t>(i)] * state.segment(at.proxies() + d * (i - 1), d);
   q /= a[0];
-  const Eigen::Vector3d p = q + horizon_s_ / T * (q - state.segment<3>(at.proxies()));
+  const Place p = q + horizon_s_ / T * (q - state.segment(at.proxies(), d));
 
   // As in ElasticSetpoint::step.
-  Eigen::Vector3d x = p, v = Eigen::Vector3d::Zero(), acceleration = Eigen::Vector3d::Zero();
+  Place x = p, v = Place::Zero(d), acceleration = Place::Zero(d);
   if (arm_.filter_s > 0.0) {
     const double omega = 1.0 / arm_.filter_s, decay = std::exp(-omega * T);
-    const Eigen::Vector3d e = state.segment<3>(at.filter()) - p, v_1 = state.segment<3>(at.filter() + 3);
-    const Eigen::Vector3d c = v_1 + omega * e;
+    const Place e = state.segment(at.filter(), d) - p, v_1 = state.segment(at.filter() + d, d);
+    const Place c = v_1 + omega * e;
     x = p + decay * (e + T * c);
     v = decay * (v_1 - omega * T * c);
     acceleration = omega * omega * (p - x) - 2.0 * omega * v;
@@ -214,12 +219,12 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   next.head(3 * n) = (plant_ * z).head(3 * n);
   next.segment(at.sent(), n) = arm_.joints_per_m * x + twist_ * acceleration;
   next.segment(at.sent() + n, n) = last_sent;
-  next.segment<3>(at.proxies()) = q;
-  next.segment<9>(at.proxies() + 3) = state.segment<9>(at.proxies());
-  next.segment<3>(at.filter()) = x;
-  next.segment<3>(at.filter() + 3) = v;
-  next.segment<3>(at.forces()) = h_now;
-  next.segment(at.forces() + 3, 3 * (ages_ - 1)) = state.segment(at.forces(), 3 * (ages_ - 1));
+  next.segment(at.proxies(), d) = q;
+  next.segment(at.proxies() + d, 3 * d) = state.segment(at.proxies(), 3 * d);
+  next.segment(at.filter(), d) = x;
+  next.segment(at.filter() + d, d) = v;
+  next.segment(at.forces(), d) = h_now;
+  next.segment(at.forces() + d, d * (ages_ - 1)) = state.segment(at.forces(), d * (ages_ - 1));
 }
 
 double ElasticLoop::spectral_radius(double proxy_mass_kg) const {

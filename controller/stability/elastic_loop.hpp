@@ -32,8 +32,8 @@ struct LoopModel;
 // An arm in a pose, its joints in the order of the drives; what the controller takes it for.
 struct ElasticArm {
   Eigen::MatrixXd mass;                // M of the links and the tool, joint by joint
-  Eigen::MatrixXd jacobian;            // J, 3 rows: of the tool's place
-  Eigen::MatrixXd joints_per_m;        // G, 3 columns
+  Eigen::MatrixXd jacobian;            // J, a row for each dimension of the tool's space: of its place
+  Eigen::MatrixXd joints_per_m;        // G, a column for each of them
   Eigen::VectorXd stiffness, damping;  // k > 0 and d ≥ 0 of each gear
   double filter_s = 0.0;               // 1/ω of the setpoints' filter; 0: none
 };
@@ -66,10 +66,10 @@ class ElasticLoop {
   double force_age_periods_;
   int order_;
   bool matched_labels_;
-  Eigen::MatrixXd plant_;       // [φ, φ̇, θ, r, ṙ] over a period
-  Eigen::MatrixXd force_;       // h of [φ, φ̇, θ, r, ṙ]
-  Eigen::MatrixXd twist_;       // k⁻¹ M G
-  Eigen::Index joints_, ages_;  // n, and how many old forces are kept
+  Eigen::MatrixXd plant_;                    // [φ, φ̇, θ, r, ṙ] over a period
+  Eigen::MatrixXd force_;                    // h of [φ, φ̇, θ, r, ṙ]
+  Eigen::MatrixXd twist_;                    // k⁻¹ M G
+  Eigen::Index joints_, dimensions_, ages_;  // n, those of the tool's space, and how many old forces are kept
 };
 
 }  // namespace proxarm::controller

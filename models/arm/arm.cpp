@@ -139,7 +139,7 @@ Pose to_pose(const description::PoseDescription& d) noexcept {
 
 // ---- set-up ---------------------------------------------------------------------------------------------------------
 
-Arm::Arm(const Cell& cell) {
+Arm::Arm(const Cell& cell) : file_(cell.file.string()) {
   axes_ = static_cast<int>(cell.drives.size());
   if (axes_ < 1 || axes_ > max_axes) {
     throw SetupError({.file = cell.file.string(),
@@ -191,7 +191,7 @@ void Arm::read_chain(const Cell& cell) {
       const Pose A = turn_z_to(Vec3(m.jnt_axis[3 * joint], m.jnt_axis[3 * joint + 1], m.jnt_axis[3 * joint + 2]));
       Link& link = links_[static_cast<std::size_t>(count++)];
       link.drive = static_cast<int>(drive);
-      link.slides = m.jnt_type[joint] == mjJNT_SLIDE;
+      link.slides = slides_[drive] = m.jnt_type[joint] == mjJNT_SLIDE;
       link.fixed = X_before * A;
       X_before = A.inverse();
     }
@@ -471,7 +471,7 @@ double Arm::effective_mass(const JointVector& q, const Vec3& n_W) const noexcept
   return inverse > 0.0 ? 1.0 / inverse : std::numeric_limits<double>::infinity();
 }
 
-TipMass Arm::effective_mass_range(const JointVector& q) const noexcept {
+TipMass Arm::effective_mass_range(const JointVector& q, int dimensions) const noexcept {
   const Eigen::Matrix3d A = mobility(q);
   // The iterative solver: the closed form for 3×3 loses half the digits where eigenvalues are close.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
@@ -481,9 +481,10 @@ TipMass Arm::effective_mass_range(const JointVector& q) const noexcept {
   // An eigenvalue is exact to about n ε times the largest one; below that it says "can't move".
   const double least = 16.0 * std::numeric_limits<double>::epsilon() * values[2];
   tip.min_kg = values[2] > 0.0 ? 1.0 / values[2] : infinite;
-  tip.max_kg = values[0] > least ? 1.0 / values[0] : infinite;
+  const int slowest = 3 - dimensions;
+  tip.max_kg = values[slowest] > least ? 1.0 / values[slowest] : infinite;
   tip.min_direction_W = eigen.eigenvectors().col(2);
-  tip.max_direction_W = eigen.eigenvectors().col(0);
+  tip.max_direction_W = eigen.eigenvectors().col(slowest);
   return tip;
 }
 

@@ -55,12 +55,16 @@ class Arm {
   // between root and sensor, a joint without a drive, a link without inertia.
   explicit Arm(const description::Cell& cell);
 
+  [[nodiscard]] const std::string& file() const noexcept { return file_; }  // the cell's, for messages
   [[nodiscard]] int axes() const noexcept { return axes_; }
   [[nodiscard]] const std::vector<std::string>& joint_names() const noexcept { return joint_names_; }
   [[nodiscard]] const JointVector& lower_rad() const noexcept { return lower_rad_; }
   [[nodiscard]] const JointVector& upper_rad() const noexcept { return upper_rad_; }
   [[nodiscard]] const JointVector& start_rad() const noexcept { return start_rad_; }
   [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept { return gear_stiffness_; }  // 0: rigid
+
+  // A linear axis: its "angle" is in m.
+  [[nodiscard]] bool slides(int drive) const noexcept { return slides_[static_cast<std::size_t>(drive)]; }
 
   // Poses and Jacobian of T and S.
   void kinematics(const JointVector& q, ToolKinematics& out) const noexcept;
@@ -87,7 +91,8 @@ class Arm {
   [[nodiscard]] JointMatrix link_mass_matrix(const JointVector& q) const noexcept;
   // (nᵀ J M⁻¹ Jᵀ n)⁻¹ in kg; infinite where T can't move along the unit vector n.
   [[nodiscard]] double effective_mass(const JointVector& q, const Vec3& n_W) const noexcept;
-  [[nodiscard]] TipMass effective_mass_range(const JointVector& q) const noexcept;
+  // Of an arm whose tool moves in a plane (dimensions: 2) or on a line (1), the range there.
+  [[nodiscard]] TipMass effective_mass_range(const JointVector& q, int dimensions = 3) const noexcept;
 
   // Encoders sit on the motors. Gravity twists gear i by τ_i/k_i, so at rest
   //   q_motor = q + τ_g(q)/k   (motor angles as angles at the joint; k = 0 is a rigid gear)
@@ -123,6 +128,7 @@ class Arm {
   void read_chain(const description::Cell& cell);
   void read_tool(const description::Cell& cell, const Pose& X_nL);
 
+  std::string file_;
   int axes_ = 0;
   std::vector<std::string> joint_names_;
   std::array<Link, max_axes> links_;  // along the chain
@@ -130,6 +136,7 @@ class Arm {
   Pose X_nT_ = Pose::Identity();
   Vec3 gravity_W_ = Vec3::Zero();
   JointVector lower_rad_, upper_rad_, start_rad_, rotor_inertia_, gear_stiffness_;
+  std::array<bool, max_axes> slides_{};  // in the order of the drives
 };
 
 // X of a description: Rz(yaw) Ry(pitch) Rx(roll) and the position.

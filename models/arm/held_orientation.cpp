@@ -1,5 +1,6 @@
 #include "models/arm/held_orientation.hpp"
 
+#include "models/arm/prioritized_step.hpp"
 #include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::models {
@@ -8,9 +9,20 @@ namespace {
 constexpr double length_m = 0.5;
 constexpr double damping_m_per_rad = 1e-3;
 
+// G = H⁻¹J_pᵀ(J_p H⁻¹J_pᵀ + λ²E)⁻¹, with H of prioritized_step.hpp.
+SmallColumns3 joints_of_few_axes(const Jacobian& J_W) noexcept {
+  const SmallColumns3 Jt = J_W.topRows<3>().transpose();
+  const SmallColumns3 HJt = solve_positive_definite(turning_cost(J_W), Jt);
+  SmallMatrix S = Jt.transpose().lazyProduct(HJt);
+  S.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
+  const SmallColumns3 inverse = solve_positive_definite(S, SmallColumns3(SmallColumns3::Identity(3, 3)));
+  return HJt.lazyProduct(inverse);
+}
+
 }  // namespace
 
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept {
+  if (J_W.cols() < 6) return joints_of_few_axes(J_W);
   Jacobian J = J_W;
   J.bottomRows<3>() *= length_m;
   Mat6 A = J.lazyProduct(J.transpose());

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
+#include "models/arm/prioritized_step.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/geometry/eigenvalues.hpp"
 #include "models/geometry/linear_systems.hpp"
@@ -13,6 +15,12 @@ namespace {
 
 using Vec6 = Vec<6>;
 using Status = InverseKinematicsResult::Status;
+
+// Of a joint's step, what turning the tool back and the elbow's way may take; and of a joint's range, what is near one
+// of its ends.
+constexpr double rest_share = 0.1, end_share = 0.15;
+// Of the tool's turn against the joints': below, it is let go altogether.
+constexpr double least_turning_weight = 1e-3;
 
 // log of a rotation as rotation vector, |·| ≤ π. Through the quaternion, whose vector part is exact to rounding where
 // the angle is small.
@@ -43,6 +51,20 @@ void smallest_singular_value(const Mat6& inverse, double& sigma, Vec6& direction
   sigma = gain > 0.0 && std::isfinite(gain) ? 1.0 / gain : 0.0;
 }
 
+void require_straight_ways(const Arm& arm, const ToolSpace& space) {
+  if (space.dimensions > 0 && arm.axes() >= space.dimensions) return;
+  const std::string axes = std::to_string(arm.axes()) + (arm.axes() == 1 ? " axis" : " axes");
+  const char* way = space.dimensions == 0 ? ", and a tool that they don't move"
+                    : arm.axes() == 1     ? ", which leads the tool along a curve"
+                                          : ", which lead the tool over a curved surface";
+  throw description::SetupError(
+      {.file = arm.file(),
+       .key = "drives",
+       .found = axes + way,
+       .expected = "a tool that can go straight: along a line, in a plane or in space",
+       .advice = "one axis must slide, two may both slide or turn about parallel axes, three or more reach any place"});
+}
+
 bool is_pose(const Pose& X) noexcept {
   const Mat3 R = X.linear();
   // No product of poses gets as far as 1e-6 from orthonormal, and a deviation of that size doesn't harm the solution
@@ -70,22 +92,24 @@ void InverseKinematicsConfig::validate() const {
 }
 
 InverseKinematics::InverseKinematics(const Arm& arm, const InverseKinematicsConfig& config)
-    : arm_(arm), config_(config) {
+    : arm_(arm),
+      config_(config),
+      space_(reaches_orientation() ? ToolSpace{} : tool_space(arm)),
+      projection_(space_.projection()),
+      lost_row_(reaches_orientation() ? 0 : 6 - space_.dimensions),
+      posture_(arm.start_rad()) {
   config.validate();
-  if (arm.axes() != 6) {
-    throw description::SetupError({.key = "drives",
-                                   .found = std::to_string(arm.axes()) + " axes",
-                                   .expected = "six, for position and orientation of the tool"});
-  }
+  require_straight_ways(arm, space_);
   set_max_step(config.max_step_rad);
 }
 
-void InverseKinematics::set_max_step(const std::array<double, 6>& max_step_rad) noexcept {
+void InverseKinematics::set_max_step(const std::array<double, max_axes>& max_step_rad) noexcept {
   config_.max_step_rad = max_step_rad;
   max_step_ = Eigen::Map<const Vec6>(config_.max_step_rad.data());
+  other_max_step_ = Eigen::Map<const JointVector>(config_.max_step_rad.data(), arm_.axes());
 }
 
-// Refreshes kinematics and residuals at result.q; returns the weighted error.
+// Refreshes kinematics and residuals at result.q; returns the weighted error of the pose.
 InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   arm_.kinematics(result.q, result.kinematics);
   const Pose& X = result.kinematics.X_WT;
@@ -98,10 +122,30 @@ InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinema
   return e;
 }
 
-Mat6 InverseKinematics::weighted_jacobian(const ToolKinematics& kinematics) const noexcept {
-  Mat6 J = kinematics.J_W.leftCols<6>();
-  J.bottomRows<3>() *= config_.length_m;
+// Of that, what is reached: all of it, or the place in the tool's space.
+InverseKinematics::Vec6 InverseKinematics::task_error(Vec6 error, InverseKinematicsResult& result) const noexcept {
+  if (reaches_orientation()) return error;
+  const Vec3 e_p = projection_.lazyProduct(error.head<3>());
+  result.position_residual_m = e_p.norm();
+  error << e_p, Vec3::Zero();
+  return error;
+}
+
+template <int Axes>
+InverseKinematics::TaskJacobian<Axes> InverseKinematics::task_jacobian(
+    const ToolKinematics& kinematics) const noexcept {
+  TaskJacobian<Axes> J = kinematics.J_W.leftCols<Axes>(arm_.axes());
+  J.template bottomRows<3>() *= config_.length_m;
+  if (Axes != 6 && !reaches_orientation()) {
+    J.template topRows<3>() = projection_.lazyProduct(kinematics.J_W.topRows<3>());
+    J.template bottomRows<3>().setZero();
+  }
   return J;
+}
+
+bool InverseKinematics::arrived(const InverseKinematicsResult& result) const noexcept {
+  return result.position_residual_m <= config_.position_tolerance_m &&
+         (result.rotation_residual_rad <= config_.rotation_tolerance_rad || !reaches_orientation());
 }
 
 // Newton's method. True if it ended within tolerance and within the step limit; otherwise result.q is where it stopped.
@@ -109,10 +153,10 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   Vec6 e = error(X_WT, result);
   FactoredMatrix J;
   for (int i = 0;; ++i) {
-    const bool arrived = result.position_residual_m <= config_.position_tolerance_m &&
-                         result.rotation_residual_rad <= config_.rotation_tolerance_rad;
-    if (!arrived || i == 0) J.factor(weighted_jacobian(result.kinematics));
-    if (arrived) break;
+    const bool there = result.position_residual_m <= config_.position_tolerance_m &&
+                       result.rotation_residual_rad <= config_.rotation_tolerance_rad;
+    if (!there || i == 0) J.factor(task_jacobian<6>(result.kinematics));
+    if (there) break;
     if (i == config_.max_iterations) return false;
     const Vec6 q = result.q + J.solve(e);
     // Written so that NaN and infinity, from a singular J, end here too.
@@ -125,27 +169,96 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   return true;
 }
 
+// The same for another number of axes. The rest has its share in the first step, also where the tool stands: it bends
+// the way to the task a little, which the steps after it make good.
+bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
+                                    InverseKinematicsResult& result) const noexcept {
+  Vec6 pose_error = error(X_WT, result), e = task_error(pose_error, result);
+  for (int i = 0; i == 0 || !arrived(result); ++i) {
+    if (i == config_.max_iterations) return false;
+    const JointVector q = next_angles(q0, pose_error, e, i == 0, result);
+    if (!within_step(q, q0)) return false;
+    result.q = q;
+    ++result.iterations;
+    pose_error = error(X_WT, result);
+    e = task_error(pose_error, result);
+  }
+  const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
+  const SymmetricEigen eigen = symmetric_eigen(J.lazyProduct(J.transpose()));
+  result.smallest_singular_value_m_per_rad = std::sqrt(std::max(0.0, eigen.values[lost_row_]));
+  result.lost_direction_W = eigen.vectors.col(lost_row_);
+  return true;
+}
+
+// Written so that NaN and infinity, from a singular J, aren't.
+bool InverseKinematics::within_step(const JointVector& q, const JointVector& q0) const noexcept {
+  return ((q - q0).array().abs() <= other_max_step_.array()).all();
+}
+
+// What the task takes, and as much of the rest as the step limit leaves room for. Where holding the orientation takes
+// more than that (a wrist that is stretched), less and less is made of it.
+JointVector InverseKinematics::next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e, bool with_rest,
+                                           const InverseKinematicsResult& result) const noexcept {
+  PrioritizedStep step;
+  for (double weight = turning_weight; weight > least_turning_weight; weight *= 0.25) {
+    step = step_for(pose_error, e, weight, result);
+    if (reaches_orientation() || within_step(result.q + step.task, q0)) break;
+  }
+  const JointVector q = result.q + step.task;
+  const double most = (step.rest.array().abs() / other_max_step_.array()).maxCoeff();
+  if (!with_rest || !(most > 0.0)) return q;
+  const JointVector rested = q + std::min(1.0, rest_share / most) * step.rest;
+  return within_step(rested, q0) ? rested : q;
+}
+
+PrioritizedStep InverseKinematics::step_for(const Vec6& pose_error, const Vec6& e, double weight,
+                                            const InverseKinematicsResult& result) const noexcept {
+  const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
+  const JointVector posture = towards_posture(result.q);
+  if (reaches_orientation()) {
+    return prioritized_step(J, e, JointMatrix::Identity(arm_.axes(), arm_.axes()), posture);
+  }
+  const auto U = space_.axes.leftCols(space_.dimensions);
+  const Vec3 e_R = pose_error.tail<3>() / config_.length_m;
+  const JointVector turn = weight * result.kinematics.J_W.bottomRows<3>().transpose().lazyProduct(e_R);
+  return prioritized_step(U.transpose().lazyProduct(J.topRows<3>()), U.transpose().lazyProduct(e.head<3>()),
+                          turning_cost(result.kinematics.J_W, weight), turn + posture);
+}
+
+JointVector InverseKinematics::towards_posture(const JointVector& q) const noexcept {
+  JointVector g = q - posture_;
+  for (int i = 0; i < arm_.axes(); ++i) {
+    const double range = arm_.upper_rad()[i] - arm_.lower_rad()[i], margin = end_share * range;
+    const double above = std::max(0.0, (q[i] - arm_.upper_rad()[i]) / margin + 1.0);
+    const double below = std::max(0.0, (arm_.lower_rad()[i] - q[i]) / margin + 1.0);
+    g[i] += range * (above * above - below * below);
+  }
+  return -config_.posture_share * g;
+}
+
 // Damped steps that stay within ±box of q0. Each takes the least damping with which it stays there and brings the tool
 // nearer by at least a quarter of what J predicts (with less, J says little about where the step ends).
-void InverseKinematics::damped(const Vec6& q0, const Vec6& box, int iterations, const Pose& X_WT,
+template <int Axes>
+void InverseKinematics::damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,
                                InverseKinematicsResult& result) const noexcept {
-  Vec6 e = error(X_WT, result);
+  const auto refreshed_error = [&] {
+    const Vec6 of_pose = error(X_WT, result);
+    return Axes == 6 ? of_pose : task_error(of_pose, result);
+  };
+  Vec6 e = refreshed_error();
   for (int i = 0; i < iterations; ++i) {
-    if (result.position_residual_m <= config_.position_tolerance_m &&
-        result.rotation_residual_rad <= config_.rotation_tolerance_rad) {
-      break;
-    }
+    if (arrived(result)) break;
     // J Jᵀ = U S U ᵀ with S = σ², so Δq = Jᵀ U (S + λ²)⁻¹ Uᵀ e.
-    const Mat6 J = weighted_jacobian(result.kinematics);
-    const SymmetricEigen eigen = symmetric_eigen(J * J.transpose());
+    const TaskJacobian<Axes> J = task_jacobian<Axes>(result.kinematics);
+    const SymmetricEigen eigen = symmetric_eigen(J.lazyProduct(J.transpose()));
     const Vec6 squares = eigen.values.cwiseMax(0.0);
     const Mat6& U = eigen.vectors;
     const Vec6 projected = U.transpose() * e;
-    result.smallest_singular_value_m_per_rad = std::sqrt(squares[0]);
-    result.lost_direction_W = U.col(0);
+    result.smallest_singular_value_m_per_rad = std::sqrt(squares[lost_row_]);
+    result.lost_direction_W = U.col(lost_row_);
     ++result.iterations;
 
-    const Vec6 q_before = result.q;
+    const Angles<Axes> q_before = result.q;
     const double before = e.norm();
     constexpr double quarter = 0.25;
     // σ below 1e-8 σ_max are rounding of J Jᵀ. The ladder reaches from there to far above σ_max, where the step is
@@ -154,17 +267,17 @@ void InverseKinematics::damped(const Vec6& q0, const Vec6& box, int iterations, 
     bool nearer = false;
     for (int rung = 0; rung < 24 && !nearer; ++rung, lambda2 *= 8.0) {
       const Vec6 damping = (squares.array() + lambda2).inverse().matrix();
-      const Vec6 q = q_before + J.transpose() * (U * projected.cwiseProduct(damping));
+      const Angles<Axes> q = q_before + J.transpose() * (U * projected.cwiseProduct(damping));
       if (!(((q - q0).array().abs() <= box.array()).all())) continue;
       result.q = q;
-      const Vec6 e_new = error(X_WT, result);
+      const Vec6 e_new = refreshed_error();
       const double promised = before - lambda2 * projected.cwiseProduct(damping).norm();
       nearer = before - e_new.norm() > quarter * promised;
       if (nearer) e = e_new;
     }
     if (!nearer) {
       result.q = q_before;
-      e = error(X_WT, result);
+      e = refreshed_error();
       break;
     }
   }
@@ -172,7 +285,7 @@ void InverseKinematics::damped(const Vec6& q0, const Vec6& box, int iterations, 
 
 void InverseKinematics::finish(InverseKinematicsResult& result) const noexcept {
   result.out_of_range = false;
-  for (int i = 0; i < 6; ++i) {
+  for (int i = 0; i < arm_.axes(); ++i) {
     result.out_of_range = result.out_of_range || result.q[i] < arm_.lower_rad()[i] || result.q[i] > arm_.upper_rad()[i];
   }
 }
@@ -180,61 +293,72 @@ void InverseKinematics::finish(InverseKinematicsResult& result) const noexcept {
 void InverseKinematics::solve(const JointVector& q, const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
   result.q = q;
   result.iterations = 0;
-  if (q.size() != 6 || !q.allFinite() || !is_pose(X_WT)) {
+  if (q.size() != arm_.axes() || !q.allFinite() || !is_pose(X_WT)) {
     result.status = Status::invalid;
     return;
   }
-  const Vec6 q0 = q;
-  if (newton(q0, X_WT, result)) {
-    result.status = Status::converged;
+  if (arm_.axes() == 6) {
+    solve_for<6>(q, X_WT, result);
   } else {
-    result.q = q;
-    damped(q0, max_step_, config_.max_damped_iterations, X_WT, result);
-    const bool arrived = result.position_residual_m <= config_.position_tolerance_m &&
-                         result.rotation_residual_rad <= config_.rotation_tolerance_rad;
-    // Stopped by the limit: some joint has used up most of it.
-    const bool at_limit = ((result.q - q0).array().abs() > 0.5 * max_step_.array()).any();
-    result.status = arrived                                                                 ? Status::converged
-                    : result.smallest_singular_value_m_per_rad < config_.singular_m_per_rad ? Status::singular
-                    : at_limit                                                              ? Status::limited
-                                                                                            : Status::not_converged;
+    solve_for<Eigen::Dynamic>(q, X_WT, result);
   }
   finish(result);
 }
 
+template <int Axes>
+void InverseKinematics::solve_for(const JointVector& q, const Pose& X_WT,
+                                  InverseKinematicsResult& result) const noexcept {
+  const Angles<Axes> q0 = q;
+  Angles<Axes> most;
+  bool converged = false;
+  if constexpr (Axes == 6) {
+    most = max_step_;
+    converged = newton(q0, X_WT, result);
+  } else {
+    most = other_max_step_;
+    converged = by_priority(q0, X_WT, result);
+  }
+  if (converged) {
+    result.status = Status::converged;
+    return;
+  }
+  result.q = q;
+  damped<Axes>(q0, most, config_.max_damped_iterations, X_WT, result);
+  // Stopped by the limit: some joint has used up most of it.
+  const bool at_limit = ((result.q - q0).array().abs() > 0.5 * most.array()).any();
+  result.status = arrived(result)                                                         ? Status::converged
+                  : result.smallest_singular_value_m_per_rad < config_.singular_m_per_rad ? Status::singular
+                  : at_limit                                                              ? Status::limited
+                                                                                          : Status::not_converged;
+}
+
 std::optional<JointVector> InverseKinematics::solve_anywhere(const Pose& X_WT, const JointVector& q_near) const {
-  if (q_near.size() != 6 || !q_near.allFinite() || !is_pose(X_WT)) return std::nullopt;
+  if (q_near.size() != arm_.axes() || !q_near.allFinite() || !is_pose(X_WT)) return std::nullopt;
   constexpr int starts = 200, iterations = 60;
-  constexpr std::array<int, 6> primes{2, 3, 5, 7, 11, 13};
-  const auto halton = [](int index, int base) {
-    double value = 0.0, digit = 1.0;
-    for (; index > 0; index /= base) value += (digit /= base) * (index % base);
-    return value;
-  };
   std::optional<JointVector> best;
   double best_distance = 0.0;
   for (int start = 0; start < starts; ++start) {
     InverseKinematicsResult result;
     result.q = q_near;
-    for (int i = 0; start > 0 && i < 6; ++i) {
-      const double share = halton(start, primes[static_cast<std::size_t>(i)]);
-      result.q[i] = arm_.lower_rad()[i] + share * (arm_.upper_rad()[i] - arm_.lower_rad()[i]);
+    if (start > 0) result.q = spread_pose(arm_, start);
+    constexpr double anywhere = 20.0;
+    if (arm_.axes() == 6) {
+      damped<6>(result.q, Vec6::Constant(anywhere), iterations, X_WT, result);
+    } else {
+      damped<Eigen::Dynamic>(result.q, JointVector::Constant(arm_.axes(), anywhere), iterations, X_WT, result);
     }
-    const Vec6 from = result.q;
-    damped(from, Vec6::Constant(20.0), iterations, X_WT, result);
-    if (result.position_residual_m > config_.position_tolerance_m ||
-        result.rotation_residual_rad > config_.rotation_tolerance_rad) {
-      continue;
-    }
+    if (!arrived(result)) continue;
     // Full turns don't move the tool: each joint as near to q_near as its range allows.
     bool inside = true;
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < arm_.axes(); ++i) {
       constexpr double turn = 2.0 * std::numbers::pi;
       double& angle = result.q[i];
-      angle -= turn * std::round((angle - q_near[i]) / turn);
-      while (angle > arm_.upper_rad()[i]) angle -= turn;
-      while (angle < arm_.lower_rad()[i]) angle += turn;
-      inside = inside && angle <= arm_.upper_rad()[i];
+      if (!arm_.slides(i)) {
+        angle -= turn * std::round((angle - q_near[i]) / turn);
+        while (angle > arm_.upper_rad()[i]) angle -= turn;
+        while (angle < arm_.lower_rad()[i]) angle += turn;
+      }
+      inside = inside && angle >= arm_.lower_rad()[i] && angle <= arm_.upper_rad()[i];
     }
     const double distance = (result.q - q_near).cwiseAbs().maxCoeff();
     if (inside && (!best || distance < best_distance)) {

@@ -9,7 +9,18 @@
 // with the smallest λ that keeps within the limit: the tool lags in the direction that is being lost, and only there.
 //
 // Rotations count with a length: rows 3..5 of e and J are multiplied by config.length_m, so that all singular values
-// are in m/rad. For arms of six axes.
+// are in m/rad.
+//
+// That is of six axes. Others take steps of prioritized_step.hpp instead of Newton's:
+//   fewer   reach the place of T alone, in the space in which T can move (tool_space.hpp), and turn the tool towards
+//   the
+//           wanted orientation as far as is possible meanwhile (least squares of log(R_d Rᵀ))
+//   seven   and more reach the whole pose. What is left to them, the elbow's way around, goes towards the posture that
+//           set_posture() gave and away from the ends of the joints' ranges, by
+//             g = −posture_share [(q − q_posture) + p(q)]
+//           p is 0 in the middle 70 % of a joint's range and grows with the square from there to the whole range at its
+//           ends. So the elbow goes a way that the tool's determines, and comes back with it.
+// Turning back and the elbow's way take a tenth of each joint's step at most.
 #pragma once
 
 #include <array>
@@ -17,12 +28,14 @@
 #include <optional>
 
 #include "models/arm/arm.hpp"
+#include "models/arm/prioritized_step.hpp"
+#include "models/arm/tool_space.hpp"
 
 namespace proxarm::models {
 
 struct InverseKinematicsConfig {
   // Largest change of each joint in a call, rad. It is never exceeded, apart from rounding in the angle's last place.
-  std::array<double, 6> max_step_rad{0.01, 0.01, 0.01, 0.01, 0.01, 0.01};
+  std::array<double, max_axes> max_step_rad{0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01};
   double length_m = 0.5;  // weighs rotation against translation: about the reach of the wrist and tool
   double position_tolerance_m = 1e-12;
   double rotation_tolerance_rad = 1e-12;
@@ -30,6 +43,7 @@ struct InverseKinematicsConfig {
                                      // turn at 1 rad/s for 10 mm/s at the tool
   int max_iterations = 8;            // of Newton
   int max_damped_iterations = 4;
+  double posture_share = 0.002;  // a call: at 1 kHz the elbow follows in half a second
 
   void validate() const;  // throws description::SetupError
 };
@@ -56,7 +70,8 @@ struct InverseKinematicsResult {
 
 class InverseKinematics {
  public:
-  // The arm is referred to and must live as long. Throws description::SetupError unless it has six axes.
+  // The arm is referred to and must live as long. Throws description::SetupError for an arm whose tool can't go
+  // straight in any direction: with fewer axes than the dimensions of its space.
   explicit InverseKinematics(const Arm& arm, const InverseKinematicsConfig& config = {});
 
   // The hot path: no allocation, no exception; bounded work. `q` are the last angles commanded.
@@ -67,22 +82,53 @@ class InverseKinematics {
   [[nodiscard]] std::optional<JointVector> solve_anywhere(const Pose& X_WT, const JointVector& q_near) const;
 
   // Positive and finite, as the configuration's.
-  void set_max_step(const std::array<double, 6>& max_step_rad) noexcept;
+  void set_max_step(const std::array<double, max_axes>& max_step_rad) noexcept;
   [[nodiscard]] const InverseKinematicsConfig& config() const noexcept { return config_; }
+
+  // What arms with axes to spare keep to: the angles at the start, until others are given. Of six axes, nothing.
+  void set_posture(const JointVector& q) noexcept { posture_ = q; }
+  [[nodiscard]] JointVector& posture() noexcept { return posture_; }
+  // The place and orientation, or the place alone in this space.
+  [[nodiscard]] bool reaches_orientation() const noexcept { return arm_.axes() >= 6; }
+  [[nodiscard]] const ToolSpace& space() const noexcept { return space_; }
 
  private:
   using Vec6 = Vec<6>;
+  // The weighted Jacobian of what is reached: six rows, those of what isn't empty.
+  template <int Axes>
+  using TaskJacobian = Eigen::Matrix<double, 6, Axes, Eigen::ColMajor, 6, Axes == 6 ? 6 : max_axes>;
+  template <int Axes>
+  using Angles = Eigen::Matrix<double, Axes, 1, Eigen::ColMajor, Axes == 6 ? 6 : max_axes, 1>;
 
   [[nodiscard]] Vec6 error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
-  [[nodiscard]] Mat6 weighted_jacobian(const ToolKinematics& kinematics) const noexcept;
+  [[nodiscard]] Vec6 task_error(Vec6 error, InverseKinematicsResult& result) const noexcept;
+  template <int Axes>
+  [[nodiscard]] TaskJacobian<Axes> task_jacobian(const ToolKinematics& kinematics) const noexcept;
+  [[nodiscard]] bool arrived(const InverseKinematicsResult& result) const noexcept;
   [[nodiscard]] bool newton(const Vec6& q0, const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
-  void damped(const Vec6& q0, const Vec6& box, int iterations, const Pose& X_WT,
+  [[nodiscard]] bool by_priority(const JointVector& q0, const Pose& X_WT,
+                                 InverseKinematicsResult& result) const noexcept;
+  [[nodiscard]] bool within_step(const JointVector& q, const JointVector& q0) const noexcept;
+  [[nodiscard]] JointVector next_angles(const JointVector& q0, const Vec6& pose_error, const Vec6& e, bool with_rest,
+                                        const InverseKinematicsResult& result) const noexcept;
+  [[nodiscard]] PrioritizedStep step_for(const Vec6& pose_error, const Vec6& e, double weight,
+                                         const InverseKinematicsResult& result) const noexcept;
+  [[nodiscard]] JointVector towards_posture(const JointVector& q) const noexcept;
+  template <int Axes>
+  void damped(const Angles<Axes>& q0, const Angles<Axes>& box, int iterations, const Pose& X_WT,
               InverseKinematicsResult& result) const noexcept;
+  template <int Axes>
+  void solve_for(const JointVector& q, const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
   void finish(InverseKinematicsResult& result) const noexcept;
 
   const Arm& arm_;
   InverseKinematicsConfig config_;
-  Vec6 max_step_;
+  Vec6 max_step_;               // of six axes
+  JointVector other_max_step_;  // of another number
+  ToolSpace space_;
+  Mat3 projection_;  // onto it
+  int lost_row_;     // which of six ascending singular values is the smallest of what is reached
+  JointVector posture_;
 };
 
 }  // namespace proxarm::models

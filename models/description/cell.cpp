@@ -449,6 +449,7 @@ Cell read_cell(const YamlNode& root) {
   if (const auto supervision = root.find_map("supervision")) cell.supervision = read_supervision(*supervision);
   if (const auto input = root.find_map("enabling_input")) cell.enabling_input = read_enabling(*input, cell);
   if (root.choice_or("profile", "none", {"none", "hand_guiding"}) == "hand_guiding") apply_hand_guiding(root, cell);
+  cell.receive_window = root.number_or("receive_window", cell.receive_window, 0.2, 0.8);
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
   cell.default_scene = absolute_path_or_empty(root, "default_scene");

@@ -179,6 +179,7 @@ struct Cell {
   std::string passivity = "auto";  // "off", "observe", "auto", "on" (--passivity); off with drives that take torques
   SupervisionDescription supervision;
   std::optional<EnablingInputDescription> enabling_input;
+  double receive_window = 0.45;  // of the timestep, in which feedback and samples are taken; then setpoints leave
   double default_period_s = 1e-3;
   double default_mass_kg = 4.0;
   std::string default_scene;  // path, absolute (in the cell's file: relative to its folder); may be empty

@@ -13,6 +13,7 @@ namespace proxarm::models {
 // By Cholesky's decomposition. Precondition: A is symmetric and positive definite.
 Eigen::Matrix<double, 6, 3> solve_positive_definite(const Mat6& A, const Eigen::Matrix<double, 6, 3>& B) noexcept;
 SmallColumns3 solve_positive_definite(const SmallMatrix& A, const SmallColumns3& B) noexcept;
+SmallMatrix solve_positive_definite(const SmallMatrix& A, const SmallMatrix& B) noexcept;
 
 // P A = L U with partial pivoting. A singular A gives results that aren't finite.
 class FactoredMatrix {

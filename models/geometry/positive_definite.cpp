@@ -12,4 +12,6 @@ SmallColumns3 solve_positive_definite(const SmallMatrix& A, const SmallColumns3&
   return A.llt().solve(B);
 }
 
+SmallMatrix solve_positive_definite(const SmallMatrix& A, const SmallMatrix& B) noexcept { return A.llt().solve(B); }
+
 }  // namespace proxarm::models

@@ -315,7 +315,8 @@ Mat3 ArmDynamics::effective_mass_kg() const {
   mj_jac(m, l.data.get(), l.jacobian.data(), nullptr, point_B.data(), l.body);
   M -= (hand_mass_kg_ * l.jacobian.transpose()).lazyProduct(l.jacobian);
   for (const Axis& axis : axes_) M(axis.dof, axis.dof) += axis.rotor_inertia_kg_m2;
-  const Mat3 inverse_B = l.jacobian.lazyProduct(models::solve_positive_definite(M, l.jacobian.transpose()));
+  const Mat3 inverse_B =
+      l.jacobian.lazyProduct(models::solve_positive_definite(M, models::SmallColumns3(l.jacobian.transpose())));
   const Mat3 R_WB = X_WB_.linear();
   return R_WB * inverse_B.inverse() * R_WB.transpose();
 }

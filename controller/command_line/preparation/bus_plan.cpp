@@ -39,7 +39,7 @@ void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
   PlannedFrame heartbeat{.name = "controller's heartbeat", .id = fieldbus::heartbeat_id(drive.master_node)};
   heartbeat.shape.bytes = 1;
   heartbeat.sender = "controller";
-  heartbeat.release = controller::receive_window;
+  heartbeat.release = session.cell.receive_window;
   heartbeat.every_cycles = cycles_of(session, drive.master_heartbeat_ms);
   heartbeat.deadline = cycles_of(session, drive.master_heartbeat_timeout_ms - drive.master_heartbeat_ms);
   bus.frames.push_back(heartbeat);
@@ -124,9 +124,10 @@ class TypicalSensor final : private sim::WrenchSource, private sim::DevicePort {
   std::uniform_real_distribution<double> around_{-1.0, 1.0};
 };
 
-void add_drive(PlannedBus& bus, const description::DriveDescription& drive, double start_rad) {
+void add_drive(PlannedBus& bus, const PreparedSession& session, std::size_t axis) {
+  const description::DriveDescription& drive = session.cell.drives[axis];
   const std::uint8_t node = drive.node;
-  TypicalPdos typical(drive, start_rad);
+  TypicalPdos typical(drive, session.cell.start_rad[axis]);
   PlannedFrame feedback{.name = drive.joint + " TPDO1",
                         .id = fieldbus::pdo_id(fieldbus::PdoDirection::transmit, 1, node)};
   feedback.shape.bytes = fieldbus::padded_length(fieldbus::pdo_bytes(fieldbus::tpdo_mapping(drive)), drive.fd);
@@ -139,7 +140,7 @@ void add_drive(PlannedBus& bus, const description::DriveDescription& drive, doub
   target.shape.fd = target.shape.bit_rate_switch = drive.fd;
   target.typical = typical(target.id, fieldbus::rpdo_mapping(drive));
   target.sender = "controller";
-  target.release = controller::receive_window;
+  target.release = session.cell.receive_window;
   for (const PlannedFrame& frame : {feedback, target}) bus.frames.push_back(frame);
 }
 
@@ -203,13 +204,13 @@ void add_sensor(PlannedBus& bus, const PreparedSession& session) {
   first.sender = "sensor";
   first.after = "sensor poll";
   first.latest_delay_ns = answer_time_ns;
-  first.deadline = controller::receive_window;
+  first.deadline = session.cell.receive_window;
   PlannedFrame second{.name = "sensor gauges 1 3 5", .id = base | 1U};
   second.shape.bytes = 6;
   second.sender = "sensor";
   second.after = "sensor poll";
   second.latest_delay_ns = answer_time_ns;
-  second.deadline = controller::receive_window;
+  second.deadline = session.cell.receive_window;
   first.typical = typical_gauges(session, first, 0);
   second.typical = typical_gauges(session, second, 1);
   for (const PlannedFrame& frame : {poll, first, second}) bus.frames.push_back(frame);
@@ -250,7 +251,7 @@ void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
       frame.after = before;
       if (protocol.poll && i == 0) frame.latest_delay_ns = answer_time_ns;
       if (protocol.streams()) frame.every_cycles = std::max(1, static_cast<int>(cycles));
-      if (protocol.poll) frame.deadline = controller::receive_window;
+      if (protocol.poll) frame.deadline = session.cell.receive_window;
       std::copy_if(typical.begin(), typical.end(), std::back_inserter(frame.typical),
                    [&](const fieldbus::CanFrame& f) { return f.id == frame.id && f.length == frame.shape.bytes; });
       before = frame.name;
@@ -276,7 +277,7 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
       add_sync(bus);
     }
     for (std::size_t axis = 0; axis < session.cell.drives.size(); ++axis) {
-      if (on_it(session.cell.drives[axis])) add_drive(bus, session.cell.drives[axis], session.cell.start_rad[axis]);
+      if (on_it(session.cell.drives[axis])) add_drive(bus, session, axis);
     }
     const auto& enabling = session.cell.enabling_input;
     if (enabling && enabling->bus == own.name && !session.settings.without_enabling_input) {

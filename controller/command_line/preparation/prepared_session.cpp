@@ -9,8 +9,10 @@
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
 #include "controller/session/bring_up.hpp"
+#include "controller/session/reachable_scene.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/arm/arm.hpp"
+#include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 #include "scenes/format/scene_file.hpp"
 
@@ -173,7 +175,7 @@ void choose_scheme(PreparedSession& session, const RunOptions& options) {
 void require_stable_coupling(const PreparedSession& session) {
   const controller::SessionSettings& settings = session.settings;
   const models::Arm arm(session.cell);
-  const models::TipMass tip = arm.effective_mass_range(arm.start_rad());
+  const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), models::tool_space(arm).dimensions);
   controller::ImpedanceConfig config{.stiffness_N_per_m = settings.coupling_stiffness_N_per_m,
                                      .damping_Ns_per_m = settings.coupling_damping_Ns_per_m,
                                      .period_s = settings.period_s};
@@ -299,9 +301,11 @@ PreparedSession prepare(const RunOptions& options) {
   session.scene =
       loaded(chosen(options.scene, session.cell, "default_scene", session.cell.default_scene, "scenes/free.yaml"),
              FileKind::scene, scenes::load_scene);
+  session.scene = controller::reachable_scene(std::move(session.scene), session.cell);
   add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
+  session.settings.receive_window = session.cell.receive_window;
   session.duration_s = options.duration_s;
   set_timestep(session, options, options.period_s.value_or(session.cell.default_period_s));
   choose_scheme(session, options);

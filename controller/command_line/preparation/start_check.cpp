@@ -7,6 +7,7 @@
 
 #include "models/arm/arm.hpp"
 #include "models/arm/inverse_kinematics.hpp"
+#include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/geometry/eigenvalues.hpp"
 #include "scenes/compiler/compile.hpp"
@@ -27,9 +28,10 @@ std::string point_text(const Vec3& point_W) {
   return text;
 }
 
-// In m/rad. Torques render forces at the point alone; positions need the tool's orientation as well.
+// In m/rad. Torques render forces at the point alone; positions need the tool's orientation as well, where there are
+// axes for it.
 double smallest_singular_value(const PreparedSession& session, const models::Arm& arm) {
-  if (session.impedance()) {
+  if (session.impedance() && arm.axes() >= 6) {
     models::ToolKinematics tool;
     arm.kinematics(arm.start_rad(), tool);
     return models::smallest_singular_value(tool.J_W.topRows<3>());
@@ -46,12 +48,49 @@ void require_regular(const PreparedSession& session, const models::Arm& arm) {
   if (smallest >= limit) return;
   char found[160];
   std::snprintf(found, sizeof found, "a singular pose (smallest singular value %.2g m/rad)", smallest);
-  throw SetupError({.file = session.cell.file.string(),
-                    .key = "start_rad",
-                    .found = found,
-                    .expected = "a pose from which the tool can move in all directions, at least " +
-                                description::number_text(limit) + " m/rad",
-                    .advice = "bend the elbow and the wrist, such as axes 3 and 5"});
+  throw SetupError(
+      {.file = session.cell.file.string(),
+       .key = "start_rad",
+       .found = found,
+       .expected = "a pose from which the tool can move in all directions, at least " +
+                   description::number_text(limit) + " m/rad",
+       .advice = arm.axes() < 6 ? "bend the elbow" : "bend the elbow and the wrist, such as axes 3 and 5"});
+}
+
+std::string vector_text(const Vec3& v) {
+  char text[80];
+  const auto rounded = [](double value) { return std::round(1e6 * value) / 1e6 + 0.0; };  // no -0
+  std::snprintf(text, sizeof text, "[%.6g, %.6g, %.6g]", rounded(v.x()), rounded(v.y()), rounded(v.z()));
+  return text;
+}
+
+// What the scene renders must be where the tool can go.
+void require_reachable_space(const PreparedSession& session, const models::Arm& arm, const Vec3& start_W) {
+  constexpr double leaves = 2e-3;  // as what tool_space() takes for a rounded number, and one in the scene
+  const models::ToolSpace reach = models::tool_space(arm);
+  const scenes::Space& space = session.scene.space;
+  const models::Mat3 off = models::Mat3::Identity() - reach.projection();
+  const double beside = (off * space.axes.leftCols(space.dimensions)).colwise().norm().maxCoeff();
+  if (beside < leaves) return;
+  std::string axes = vector_text(reach.axes.col(0));
+  if (reach.dimensions == 2) axes += ", " + vector_text(reach.axes.col(1));
+  const char* kinds[] = {"nowhere", "a line along ", "a plane along "};
+  throw SetupError({.file = session.scene.file.string(),
+                    .key = "dimensions",
+                    .found = std::to_string(space.dimensions) + ", in directions in which the tool of " +
+                             session.cell.file.filename().string() + " (" + std::to_string(arm.axes()) +
+                             (arm.axes() == 1 ? " axis" : " axes") + ") can't move",
+                    .expected = kinds[reach.dimensions] + axes,
+                    .advice = "write `dimensions: " + std::to_string(reach.dimensions) + "` and `space: {origin_m: " +
+                              vector_text(start_W) + ", axes: [" + axes + "]}` into the scene"});
+}
+
+// A hand that turns the tool as it likes needs all of its orientation.
+void require_turning(const PreparedSession& session, const models::Arm& arm) {
+  if (session.settings.orientation == controller::OrientationMode::held || arm.axes() >= 6) return;
+  throw SetupError({.key = "--orientation",
+                    .found = "free, with " + std::to_string(arm.axes()) + (arm.axes() == 1 ? " axis" : " axes"),
+                    .expected = "held: fewer than six axes can't turn the tool as a hand likes"});
 }
 
 // The object that the point is deepest in, as a scene of its own has it.
@@ -147,7 +186,9 @@ void require_allowed(const PreparedSession& session, const models::Vec3& start_W
 void require_usable_start(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   require_regular(session, arm);
+  require_turning(session, arm);
   const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
+  require_reachable_space(session, arm, start_W);
   require_in_space(session, start_W);
   require_outside(session, start_W);
   require_on_guide(session, start_W);

@@ -5,8 +5,9 @@
 
 namespace proxarm::command_line {
 
-// Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for a start pose in a
-// singularity, from which the tool can't move in some direction, and for one inside an object of the scene.
+// Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for axes whose tool
+// can't go straight in any direction, for a start pose in a singularity, from which the tool can't move in some
+// direction, for one inside an object of the scene, and for a scene in dimensions in which the tool can't move.
 void require_usable_start(const PreparedSession& session);
 
 // Throws SetupError where `--enabling` has no simulated enabling switch that it could press.

@@ -10,6 +10,7 @@
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/signals/clearances.hpp"
+#include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -214,17 +215,31 @@ void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
 }
 }  // namespace
 
+namespace {
+// What an arm that hasn't six axes does with them.
+std::string axes_text(int axes, int dimensions) {
+  if (axes == 6) return "";
+  const std::string count = std::to_string(axes) + (axes == 1 ? " axis" : " axes");
+  if (axes > 6) return count + ": place and orientation are held, and the elbow where it began\n";
+  const char* ways[] = {"nowhere", "along a line", "in a plane", "in space"};
+  const bool spare = axes > dimensions;
+  return count + ": the tool moves " + ways[dimensions] + "; its orientation " +
+         (spare ? "is held as far as they can\n" : "follows the arm\n");
+}
+}  // namespace
+
 void SessionOutput::introduce(const controller::CycleParts& parts) const {
   const double mode_Hz = parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad());
   if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
   if (options_.json) return;  // nothing but the summary goes to standard output then
-  const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad());
+  const models::ToolSpace reach = models::tool_space(*parts.arm);
+  const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
               session_.scene.name.c_str(), rendered_text(session_).c_str(), 1e3 * session_.settings.period_s,
               1e3 * total_delay_s(session_));
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
-  std::printf("\n");
+  std::printf("\n%s", axes_text(parts.arm->axes(), reach.dimensions).c_str());
   std::fflush(stdout);
 }
 

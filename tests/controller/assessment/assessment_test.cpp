@@ -103,7 +103,7 @@ TEST(Assess, PutsTheBodyWhereTheToolIsFastestAndTellsTheWorst) {
     return result;
   };
   const Thresholds thresholds{"", "a source", {{"hands", 75e3, 280.0, 140.0}, {"others", 33e3, 1e9, 1e9}}};
-  const Assessment found = assess({{0.0}, {1.0}}, thresholds, arm);
+  const Assessment found = assess({{0.0}, {1.0}}, directions_of({}), thresholds, arm);
   EXPECT_EQ(free_runs, 12);
   EXPECT_EQ(bodies, 12 * 2 * 7) << "six stiffnesses, and the one of a region that has its own";
   ASSERT_EQ(found.stops.size(), 3u);

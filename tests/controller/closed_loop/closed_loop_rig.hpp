@@ -14,6 +14,7 @@
 
 #include "controller/cycle/cycle.hpp"
 #include "controller/session/bring_up.hpp"
+#include "controller/session/reachable_scene.hpp"
 #include "controller/session/session.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/description/cell.hpp"
@@ -35,7 +36,8 @@ struct RigOptions {
   std::string hand = "sim/hands/touch.yaml";
   SessionSettings settings{};
   double sensor_delay_s = 0.0;
-  std::array<double, 6> start_error_rad{};     // by which the controller is wrong about where the arm stands
+  std::array<double, models::max_axes>
+      start_error_rad{};                       // by which the controller is wrong about where the arm stands
   std::array<double, 6> sensor_bias_counts{};  // added to the sensor's own
   std::vector<ScheduledChange> changes{};
   std::vector<ScheduledCommand> commands{};
@@ -57,7 +59,7 @@ class ClosedLoopRig {
         cell(edited(delayed(description::load_cell(source_file(rig.cell)), rig.sensor_delay_s), rig.edit_cell)),
         sensor(biased(description::load_sensor(source_file("models/sensors/ati_net_can_oem.yaml")), rig)),
         hand(edited(description::load_hand(source_file(rig.hand)), rig.edit_hand)),
-        scene(scenes::load_scene(source_file(rig.scene))),
+        scene(reachable_scene(scenes::load_scene(source_file(rig.scene)), cell)),
         compiled(scenes::compile(scene)),
         network(buses_of(cell, rig)),
         far_end(cell, sensor, hand, network.events(), with_faults(rig)) {

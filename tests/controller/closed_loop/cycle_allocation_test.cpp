@@ -126,6 +126,23 @@ TEST(CycleAllocation, IsNoneInTheImpedanceType) {
   EXPECT_GT(played.slip_cycles, 100u);
 }
 
+TEST(CycleAllocation, IsNoneWithTwoAxesNorWithSeven) {
+  RigOptions bench{.duration_s = 6.0,
+                   .cell = "models/cells/bench.yaml",
+                   .scene = "scenes/bench.yaml",
+                   .hand = "sim/hands/bench.yaml"};
+  bench.settings.receive_window = 0.55;
+  Played played;
+  expect_no_allocation(bench, Fault::none, &played);
+  if (IsSkipped()) return;
+  EXPECT_GT(played.slip_cycles, 100u);
+  for (const char* cell : {"models/cells/linear.yaml", "models/cells/scara.yaml", "models/cells/seven.yaml"}) {
+    RigOptions options{.duration_s = 4.0, .cell = cell, .scene = "scenes/free.yaml"};
+    options.settings.receive_window = 0.55;
+    expect_no_allocation(options, Fault::none);
+  }
+}
+
 TEST(CycleAllocation, IsNoneInAFaultAndTheStopAfterIt) {
   expect_no_allocation({.device_faults = {"sensor:silent@1.9s"}}, Fault::sensor_lost);
   expect_no_allocation({.device_faults = {"axis_3:fault=0x4210@1.9s"}}, Fault::drive_fault);

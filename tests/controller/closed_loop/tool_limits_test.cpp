@@ -12,7 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "models/arm/tool_space.hpp"
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
+#include "tests/controller/closed_loop/joint_limits.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 #include "tests/scratch_folder.hpp"
 
@@ -40,8 +42,13 @@ struct Worst {
 
 using Counts = std::array<std::int32_t, max_axes> CycleRecord::*;
 
-// A setpoint is rounded by half a count, about 2e-8 rad: for each end of a step and each of six axes, at a metre or so.
-double rounding_m_per_s(double period_s) { return 2.5e-7 / period_s; }
+// A setpoint is rounded by half a count, for each end of a step and each axis, at a metre or so: 2.4e-7 m with the six
+// of the default cell.
+double rounding_m_per_s(const description::Cell& cell, double period_s) {
+  double sum_m = 0.0;
+  for (const description::DriveDescription& drive : cell.drives) sum_m += 1.0 / std::abs(drive.counts_per_rad());
+  return sum_m / period_s;
+}
 
 bool moves(const CycleRecord& record) { return record.phase >= Phase::rendering && record.phase <= Phase::stopping; }
 
@@ -71,11 +78,11 @@ Worst judged(const ClosedLoopRig& rig, Counts counts) {
     if (moves(record) && moved) {
       const double T = 1e-9 * static_cast<double>(record.time_ns - rig.records[k - 1].time_ns);
       const auto share = [&](const Vec3& a, const Vec3& b, double limit) {
-        return std::max(0.0, (a - b).norm() / T - rounding_m_per_s(T)) / limit;
+        return std::max(0.0, (a - b).norm() / T - rounding_m_per_s(rig.cell, T)) / limit;
       };
       const double tool = share(at.tool_W, before.tool_W, limits.max_tool_speed_m_per_s);
       if (tool > worst.tool) worst.tool = tool, worst.tool_at = k;
-      for (std::size_t i = 2; i < 6; ++i) {
+      for (std::size_t i = 2; i < static_cast<std::size_t>(arm.axes()); ++i) {
         const double elbow = share(at.joint_W[i], before.joint_W[i], limits.max_elbow_speed_m_per_s);
         if (elbow > worst.elbow) worst.elbow = elbow, worst.elbow_at = k;
       }
@@ -86,17 +93,20 @@ Worst judged(const ClosedLoopRig& rig, Counts counts) {
   return worst;
 }
 
-std::string pulling_hand(const tests::ScratchFolder& folder, Random& random) {
+// `follows_m`: how far the tool is counted on to come along before the spring pulls with up to `most_N`.
+std::string pulling_hand(const tests::ScratchFolder& folder, Random& random, double most_N = 190.0,
+                         double follows_m = 0.4, const models::ToolSpace& space = {}) {
   const std::string file = folder / "hand.yaml";
   std::ofstream out(file);
-  const double stiffness = random.log_uniform(100.0, 1000.0), force_N = random.log_uniform(30.0, 190.0);
+  const double stiffness = random.log_uniform(100.0, 1000.0), force_N = random.log_uniform(30.0, most_N);
   out << "name: pulls\nmass_kg: " << random.uniform(0.3, 2.0) << "\nstiffness_N_per_m: " << stiffness
       << "\ndamping_Ns_per_m: " << random.log_uniform(5.0, 60.0) << "\nwaypoints:\n"
       << "  - {time_s: 0.2, offset_m: [0, 0, 0]}\n";
   double time_s = 0.2;
   for (int i = 0; i < 3; ++i) {
     time_s += random.uniform(0.4, 1.2);
-    const Vec3 p = std::min(1.5, random.uniform(0.5, 1.0) * force_N / stiffness + 0.4) * random.direction<3>();
+    const double far_m = std::min(1.5, random.uniform(0.5, 1.0) * force_N / stiffness + follows_m);
+    const Vec3 p = far_m * (space.projection() * random.direction<3>());
     out << "  - {time_s: " << time_s << ", offset_m: [" << p.x() << ", " << p.y() << ", " << p.z() << "]}\n";
   }
   return file;
@@ -179,6 +189,56 @@ TEST(ToolLimits, AreKeptInWhatIsSentAndInWhatTheEncodersSay) {
   // Two sessions, as many as sanitizers run, need not come to a limit.
   if (sessions >= 20) {
     EXPECT_GT(guarded, 100);
+  }
+}
+
+// The same of arms that don't have six axes, at the edge of a box and at the end of their reach.
+RigOptions random_pull_of(const char* cell, const tests::ScratchFolder& folder, Random& random) {
+  RigOptions options = random_pull(folder, random);
+  const models::ToolSpace space = models::tool_space(models::Arm(description::load_cell(source_file(cell))));
+  options.hand = pulling_hand(folder, random, 80.0, 0.0, space);  // what the bench's drives hold at its full reach
+  options.cell = cell;
+  options.settings.orientation = OrientationMode::held;
+  options.settings.receive_window = 0.55;
+  const double speed = random.log_uniform(0.05, 0.5), half_m = random.log_uniform(0.02, 0.4);
+  const bool boxed = random.chance(0.5);
+  options.edit_cell = [=](description::Cell& edited) {
+    edited.limits.max_tool_speed_m_per_s = edited.limits.max_elbow_speed_m_per_s = speed;
+    if (!boxed) return;
+    const models::Arm arm(edited);
+    const Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
+    for (std::size_t i = 0; i < 3; ++i) {
+      edited.limits.workspace_min_m[i] = start_W[static_cast<Eigen::Index>(i)] - half_m;
+      edited.limits.workspace_max_m[i] = start_W[static_cast<Eigen::Index>(i)] + half_m;
+    }
+  };
+  return options;
+}
+
+TEST(ToolLimits, AreKeptByArmsOfAnyNumberOfAxes) {
+  Random random(32);
+  const tests::ScratchFolder folder;
+  for (const char* cell : {"models/cells/linear.yaml", "models/cells/bench.yaml", "models/cells/gantry.yaml",
+                           "models/cells/scara.yaml", "models/cells/seven.yaml"}) {
+    Worst sent, seen;
+    std::map<std::string, int> faults;
+    for (std::int64_t n = 0; n < tests::scaled(6); ++n) {
+      ClosedLoopRig rig(random_pull_of(cell, folder, random));
+      rig.run();
+      sent.note(judged(rig, &CycleRecord::target_counts));
+      seen.note(judged(rig, &CycleRecord::actual_counts));
+      ++faults[fault_name(rig.fault().fault)];
+      testing::expect_within_joint_limits(rig);
+    }
+    std::printf("%s: sent %.6f tool, %.6f elbow, %.3f mm; seen %.4f, %.4f, %.3f mm\n", cell, sent.tool, sent.elbow,
+                1e3 * sent.off_m, seen.tool, seen.elbow, 1e3 * seen.off_m);
+    for (const auto& [name, count] : faults) std::printf("  %s: %d\n", name.c_str(), count);
+    EXPECT_LE(sent.tool, 1.0 + 1e-6) << cell;
+    EXPECT_LE(sent.elbow, 1.0 + 1e-6) << cell;
+    EXPECT_LE(sent.off_m, 1e-4) << cell;
+    EXPECT_LE(seen.tool, 1.05) << cell;
+    EXPECT_LE(seen.elbow, 1.05) << cell;
+    EXPECT_LE(seen.off_m, 1e-4) << cell;
   }
 }
 
