@@ -14,6 +14,7 @@ namespace {
 using description::number_text;
 using description::SetupError;
 
+constexpr std::uint32_t servo_drive = 0x00020192;       // 1000h: CiA 402, of type servo drive
 constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
 
 constexpr const char* period_advice =
@@ -50,7 +51,7 @@ void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
 void append_identity(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
   // The first step is also the one that finds out whether the node is there at all.
   steps.push_back(
-      sdo_expect({0x1000, 0}, 4, drive.device_type, "device type",
+      sdo_expect({0x1000, 0}, 4, drive.device_type.value_or(servo_drive), "device type",
                  "is another device set to this node, or is device_type in the cell's file not this drive's?"));
   steps.push_back(sdo_read({0x1018, 1}, 4, "vendor-ID"));
   steps.push_back(if_present(sdo_read({0x1018, 2}, 4, "product code")));
@@ -198,6 +199,7 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
   }
   if (drive.eds.empty()) return;
   eds_ = std::make_shared<description::EdsFile>(description::load_eds(drive.eds));
+  if (!description_.device_type) description_.device_type = cia402_device_type(*eds_);
   (void)configuration_steps();  // says what doesn't fit
 }
 

@@ -79,6 +79,12 @@ bool is_set_by(const std::vector<SdoStep>& steps, std::uint32_t object) {
 
 }  // namespace
 
+std::optional<std::uint32_t> cia402_device_type(const EdsFile& eds) noexcept {
+  const EdsObject* device_type = eds.find(0x100000);
+  const bool is_drive = device_type != nullptr && device_type->default_value.value_or(0) % 0x10000 == 0x0192;
+  return is_drive ? device_type->default_value : std::nullopt;
+}
+
 std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFile& eds,
                                   const description::DriveDescription& drive) {
   if (eds.node && *eds.node != drive.node) {

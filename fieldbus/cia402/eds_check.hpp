@@ -11,6 +11,8 @@
 
 namespace proxarm::fieldbus {
 
+// The file's default of 1000h where that is a drive by CiA 402 (lower half 0192h).
+[[nodiscard]] std::optional<std::uint32_t> cia402_device_type(const description::EdsFile& eds) noexcept;
 // The steps without those for optional objects that the drive hasn't got, with its identity, and with a DCF's values at
 // the end. Throws SetupError that names the EDS' line and section, or the cell's node where a DCF is another's. Names
 // in the result are the file's: `eds` must outlive it.

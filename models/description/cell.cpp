@@ -230,7 +230,9 @@ DriveDescription read_drive(const YamlNode& node) {
     d.fd = node.boolean_or("fd", false);
     if (node.has("feedback")) d.feedback = read_feedback(node, d);
   }
-  d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
+  if (node.has("device_type")) {
+    d.device_type = static_cast<std::uint32_t>(node.integer("device_type", 0, 0xffffffff));
+  }
   d.counts_per_motor_revolution =
       node.number_or("counts_per_motor_revolution", d.counts_per_motor_revolution, 1.0, 4294967296.0);
   d.gear_ratio = node.number_or("gear_ratio", d.gear_ratio, above(0.0, 1e5));

@@ -88,8 +88,8 @@ struct DriveDescription {
   std::string eds;                 // cia402: path of the maker's EDS or DCF file, absolute; may be empty
   DriveObjects objects;            // cia402
   bool fd = false;                 // cia402: its PDOs are CAN FD frames at the data bitrate
-  std::vector<DriveFeedback> feedback;     // cia402: behind what the controller needs, for the record
-  std::uint32_t device_type = 0x00020192;  // expected in 1000h: CiA 402 servo drive
+  std::vector<DriveFeedback> feedback;       // cia402: behind what the controller needs, for the record
+  std::optional<std::uint32_t> device_type;  // expected in 1000h; none: what `eds` says, or a CiA 402 servo drive's
   double counts_per_motor_revolution = 1048576.0;
   double gear_ratio = 100.0;       // motor revolutions per joint revolution
   int direction = 1;               // +1 or −1: sign of counts against the URDF's joint

@@ -150,7 +150,7 @@ void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_n
     return on_heartbeat(static_cast<std::uint8_t>(frame.id - 0x700), frame, time_ns);
   }
   if (talks() && frame.id == 0x600u + config_.node) return on_sdo(frame, time_ns);
-  if (talks() && frame.id == static_cast<std::uint32_t>(sync_id_->number())) return on_sync(frame, time_ns);
+  if (talks() && frame.id == static_cast<std::uint32_t>(sync_id_->number() & 0x7FF)) return on_sync(frame, time_ns);
   if (state_ != NmtState::operational) return;
   for (auto& receive : receive_) {
     if (receive->pdo.valid() && receive->pdo.identifier() == frame.id) on_receive_pdo(*receive, frame, time_ns);

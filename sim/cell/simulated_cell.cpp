@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "models/base/setup_error.hpp"
+#include "models/files/eds_file.hpp"
 #include "sim/cell/plant_axis.hpp"
 
 namespace proxarm::sim {
@@ -26,15 +27,36 @@ std::int32_t to_i32(double value) noexcept {
   return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), -2147483648.0, 2147483647.0));
 }
 
-DriveDeviceConfig drive_config(const description::DriveDescription& drive, const SimulatedCellConfig& config) {
+// Who it is, by its maker's file: [DeviceInfo], else the defaults of 1018h.
+void take_identity(const description::EdsFile& eds, CanopenSlaveConfig& canopen) {
+  const auto number = [&eds](std::optional<std::uint32_t> of_device, std::uint32_t object) -> std::uint32_t {
+    const description::EdsObject* there = eds.find(object);
+    return of_device.value_or(there == nullptr ? 0 : there->default_value.value_or(0));
+  };
+  canopen.vendor = number(eds.vendor, 0x101801);
+  canopen.product = number(eds.product, 0x101802);
+  canopen.revision = number(eds.revision, 0x101803);
+}
+
+DriveDeviceConfig drive_config(const description::DriveDescription& drive, const description::EdsFile* eds,
+                               const SimulatedCellConfig& config) {
   DriveDeviceConfig c;
   c.canopen.node = drive.node;
   c.canopen.fd = drive.fd;
-  c.canopen.device_type = drive.device_type;
+  constexpr std::uint32_t servo_drive = 0x00020192;  // 1000h
+  const description::EdsObject* type = eds == nullptr ? nullptr : eds->find(0x100000);
+  c.canopen.device_type =
+      drive.device_type.value_or(type == nullptr ? servo_drive : type->default_value.value_or(servo_drive));
   c.canopen.serial = drive.node;
   c.canopen.revision = 0x00010000;
   c.canopen.device_name = "simulated drive of " + drive.joint;
   c.canopen.boot_time_ns = config.drive_boot_time_ns;
+  if (eds != nullptr) take_identity(*eds, c.canopen);
+  c.eds = eds;
+  c.objects = drive.objects;
+  if (const std::uint32_t target = drive.objects.target; target != 0) {
+    (drive.mode == "ip" ? c.interpolated_target : drive.mode == "cst" ? c.torque_target : c.position_target) = target;
+  }
   const double scale = counts_per_rad(drive);
   c.following_error_window_counts = to_u32(following_error_window_rad * scale);
   c.quick_stop_deceleration = to_u32(drive.max_acceleration_rad_per_s2 * scale);
@@ -140,7 +162,9 @@ SimulatedCell::~SimulatedCell() = default;
 void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& config) {
   const description::DriveDescription& drive = cell_.drives[axis];
   const std::size_t bus = bus_index(drive.bus, "drives[" + std::to_string(axis) + "].bus");
-  DriveDeviceConfig device = drive_config(drive, config);
+  std::optional<description::EdsFile> eds;
+  if (!drive.eds.empty()) eds = description::load_eds(drive.eds);
+  DriveDeviceConfig device = drive_config(drive, eds ? &*eds : nullptr, config);
   for (const DeviceFault& fault : faults_) {
     if (fault.device == drive.joint && fault.kind == DeviceFaultKind::device_type) {
       device.canopen.device_type = fault.value;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "sim/devices/eds_objects.hpp"
+
 namespace proxarm::sim {
 
 namespace {
@@ -31,8 +33,9 @@ DriveDevice::DriveDevice(const DriveDeviceConfig& config, ServoAxis& axis, Devic
   add_objects(config);
   add_option_codes();
   add_cyclic_objects(config);
-  slave_.receive_pdo(1).set_default_mapping({0x60400010});
-  slave_.transmit_pdo(1).set_default_mapping({0x60410010});
+  slave_.receive_pdo(1).set_default_mapping({config.objects.controlword << 8 | 0x10});
+  slave_.transmit_pdo(1).set_default_mapping({config.objects.statusword << 8 | 0x10});
+  if (config.eds != nullptr) take_over(*config.eds, config.canopen.node, slave_.dictionary());
 }
 
 void DriveDevice::power_on(std::int64_t time_ns) noexcept {
@@ -63,32 +66,55 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   using enum Access;
   ObjectDictionary& od = slave_.dictionary();
   error_code_ = &od.add(0x603F, 0, unsigned16, read_only, 0, true);
-  controlword_ = &od.add(0x6040, 0, unsigned16, read_write, 0, true);
+  const description::DriveObjects& at = config.objects;
+  controlword_ = &add(at.controlword, unsigned16, read_write, 0, true);
   controlword_->after_write = [this] { on_controlword(); };
-  statusword_ = &od.add(0x6041, 0, unsigned16, read_only, 0, true);
-  mode_ = &od.add(0x6060, 0, integer8, read_write, 0, true);
+  statusword_ = &add(at.statusword, unsigned16, read_only, 0, true);
+  mode_ = &add(at.mode, integer8, read_write, 0, true);
   mode_->before_write = [](std::int64_t mode) {
     return mode == 0 || is_cyclic(mode) ? SdoAbort::none : SdoAbort::invalid_value;
   };
-  mode_display_ = &od.add(0x6061, 0, integer8, read_only, 0, true);
+  mode_display_ = &add(at.mode_display, integer8, read_only, 0, true);
   demand_ = &od.add(0x6062, 0, integer32, read_only, 0, true);
-  position_ = &od.add(0x6064, 0, integer32, read_only, 0, true);
+  position_ = &add(at.position, integer32, read_only, 0, true);
   od.add(0x6065, 0, unsigned32, read_write, config.following_error_window_counts);
   od.add(0x6066, 0, unsigned16, read_write, config.following_error_time_ms);
   velocity_ = &od.add(0x606C, 0, integer32, read_only, 0, true);
-  target_torque_ = &od.add(0x6071, 0, integer16, read_write, 0, true);
+  target_torque_ = &add(config.torque_target, integer16, read_write, 0, true);
   target_torque_->after_write = [this] { target_fresh_ = mode_->number() == cyclic_synchronous_torque; };
   max_torque_ = &od.add(0x6072, 0, unsigned16, read_write, 3000);
   od.add(0x6076, 0, unsigned32, constant, config.rated_torque_mNm);
-  torque_ = &od.add(0x6077, 0, integer16, read_only, 0, true);
+  torque_ = &add(at.torque, integer16, read_only, 0, true);
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
   digital_inputs_ = &od.add(0x60FD, 0, unsigned32, read_only, 0, true);
   std::int64_t supported = 0;
   for (const std::int64_t mode : modes) supported |= std::int64_t{1} << (mode - 1);
-  od.add(0x6502, 0, unsigned32, constant, supported);
+  add(at.supported_modes, unsigned32, constant, supported);
+  add_own_objects(config);
+}
+
+// A maker's dictionary has something else there.
+void DriveDevice::add_own_objects(const DriveDeviceConfig& config) {
+  using enum DataType;
+  using enum Access;
+  if (config.eds != nullptr) {
+    for (ObjectEntry& entry : unlisted_) {
+      entry.type = unsigned8;
+      entry.value.assign(1, 0);
+    }
+    refusal_ = &unlisted_[0];
+    sync_tolerance_ = &unlisted_[1];
+    return sync_tolerance_->set(config.sync_tolerance_periods);
+  }
+  ObjectDictionary& od = slave_.dictionary();
   refusal_ = &od.add(0x2001, 0, unsigned8, read_only, 0, true);
   od.add(0x2010, 0, unsigned8, constant, 1);
-  od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
+  sync_tolerance_ = &od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
+}
+
+ObjectEntry& DriveDevice::add(std::uint32_t address, DataType type, Access access, std::int64_t value, bool mappable) {
+  return slave_.dictionary().add(static_cast<std::uint16_t>(address >> 8), static_cast<std::uint8_t>(address), type,
+                                 access, value, mappable);
 }
 
 // What the drive does by itself. Ramps that this drive doesn't have are refused.
@@ -112,7 +138,7 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   using enum DataType;
   using enum Access;
   ObjectDictionary& od = slave_.dictionary();
-  target_ = &od.add(0x607A, 0, integer32, read_write, 0, true);
+  target_ = &add(config.position_target, integer32, read_write, 0, true);
   target_->after_write = [this] { target_fresh_ = mode_->number() == cyclic_synchronous_position; };
   od.add(0x607D, 0, unsigned8, constant, 2);
   od.add(0x607D, 1, integer32, read_write, config.position_min);
@@ -120,16 +146,15 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   od.add(0x6084, 0, unsigned32, read_write, config.profile_deceleration).minimum = 1;
   od.add(0x6085, 0, unsigned32, read_write, config.quick_stop_deceleration).minimum = 1;
   od.add(0x60C1, 0, unsigned8, constant, 1);
-  od.add(0x60C1, 1, integer32, read_write, 0, true).after_write = [this] {
-    target_fresh_ = mode_->number() == interpolated_position;
-  };
+  interpolated_target_ = &add(config.interpolated_target, integer32, read_write, 0, true);
+  interpolated_target_->after_write = [this] { target_fresh_ = mode_->number() == interpolated_position; };
   od.add(0x60C2, 0, unsigned8, constant, 2);
   const auto not_while_enabled = [this](std::int64_t) {
     return period_fixed_ && state_ == DriveState::operation_enabled ? SdoAbort::not_in_present_device_state
                                                                     : SdoAbort::none;
   };
-  period_value_ = &od.add(0x60C2, 1, unsigned8, read_write, 0);
-  period_index_ = &od.add(0x60C2, 2, integer8, read_write, -3);
+  period_value_ = &add(config.objects.interpolation_value, unsigned8, read_write, 0);
+  period_index_ = &add(config.objects.interpolation_index, integer8, read_write, -3);
   for (ObjectEntry* entry : {period_value_, period_index_}) {
     entry->before_write = not_while_enabled;
     entry->after_write = [this] { set_period(); };
@@ -173,7 +198,7 @@ void DriveDevice::latch_target() {
   if (!fresh) return axis_.stop(deceleration(0x6085), now_ns_);
   const ObjectDictionary& od = slave_.dictionary();
   const std::int64_t low = od.number(0x607D, 1), high = od.number(0x607D, 2);
-  std::int64_t target = interpolates ? od.number(0x60C1, 1) : target_->number();
+  std::int64_t target = (interpolates ? interpolated_target_ : target_)->number();
   target_limited_ = low < high && (target < low || target > high);
   if (target_limited_) target = std::clamp(target, low, high);
   // The first target after the brake has opened must be where the axis is: nothing jumps.
@@ -317,7 +342,7 @@ RefusalReason DriveDevice::refusal() const noexcept {
   const double ratio = static_cast<double>(sum) / interval_count_ / static_cast<double>(period_ns_);
   if (!(ratio > 0.8 && ratio < 1.2)) return RefusalReason::sync_period_mismatch;
   if (mode == cyclic_synchronous_torque) return RefusalReason::none;
-  const std::int64_t target = mode == interpolated_position ? slave_.dictionary().number(0x60C1, 1) : target_->number();
+  const std::int64_t target = (mode == interpolated_position ? interpolated_target_ : target_)->number();
   const std::int64_t distance = std::llabs(target - axis_.position_counts());
   if (distance > following_window_->number()) return RefusalReason::target_far_from_actual;
   return RefusalReason::none;
@@ -356,7 +381,7 @@ void DriveDevice::inject_fault(std::uint16_t code, std::int64_t time_ns) noexcep
 }
 
 void DriveDevice::supervise_sync() {
-  const std::int64_t tolerance = slave_.dictionary().number(0x2010, 1);
+  const std::int64_t tolerance = sync_tolerance_->number();
   if (state_ != DriveState::operation_enabled || tolerance == 0 || last_sync_ns_ == never) return;
   if (now_ns_ - last_sync_ns_ > tolerance * period_ns_) trip(emcy::sync_controller, error_register::communication);
 }

@@ -14,8 +14,11 @@
 // in 6061h, 60C2h isn't set or doesn't match the SYNCs seen, or the target isn't where the axis is.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
+#include "models/description/cell.hpp"
+#include "models/files/eds_file.hpp"
 #include "sim/canopen/canopen_slave.hpp"
 #include "sim/devices/drive_state_machine.hpp"
 #include "sim/devices/servo_axis.hpp"
@@ -32,6 +35,10 @@ struct DriveDeviceConfig {
   std::int32_t position_min = 0, position_max = 0;        // 607Dh; equal: no limit
   std::int64_t brake_release_ns = 30'000'000;             // from enabling to where the target is followed
   std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: not supervised
+  // Where it has something else than the profile says, as index << 8 | sub-index.
+  description::DriveObjects objects{};
+  std::uint32_t position_target = 0x607A00, interpolated_target = 0x60C101, torque_target = 0x607100;
+  const description::EdsFile* eds = nullptr;  // whose dictionary it has (eds_objects.hpp), or its own
 };
 
 // Why operation was refused, 2001h.
@@ -77,6 +84,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void on_reset(std::int64_t time_ns) override;
 
   void add_objects(const DriveDeviceConfig& config);
+  ObjectEntry& add(std::uint32_t address, DataType type, Access access, std::int64_t value, bool mappable = false);
+  void add_own_objects(const DriveDeviceConfig& config);
   void add_option_codes();
   void add_cyclic_objects(const DriveDeviceConfig& config);
   void on_controlword();
@@ -102,14 +111,16 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   ServoAxis& axis_;
   std::int64_t brake_release_ns_;
   std::uint32_t sdo_request_id_;
-  std::int64_t period_ns_ = 0;  // 60C2h; 0: not set
+  std::array<ObjectEntry, 2> unlisted_{};  // instead of 2001h and 2010h:01 in a drive with its maker's dictionary
+  std::int64_t period_ns_ = 0;             // 60C2h; 0: not set
 
   // Entries used in every cycle
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
               *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr,
-              *target_torque_ = nullptr, *max_torque_ = nullptr, *digital_inputs_ = nullptr;
+              *interpolated_target_ = nullptr, *sync_tolerance_ = nullptr, *target_torque_ = nullptr,
+              *max_torque_ = nullptr, *digital_inputs_ = nullptr;
 
   std::int64_t now_ns_ = 0;
   DriveState state_ = DriveState::not_ready_to_switch_on;
