@@ -6,6 +6,7 @@
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
 #include "controller/session/bring_up.hpp"
+#include "fieldbus/cia402/cia402_bring_up.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/arm_urdf.hpp"
 #include "models/base/setup_error.hpp"
@@ -40,14 +41,18 @@ void check_cell(const fs::path& file) {
   if (!cell.default_hand.empty()) description::require_default_file(cell, "default_hand", cell.default_hand);
   const models::Arm arm(cell);
   const std::int64_t period_ns = std::llround(1e9 * cell.default_period_s);
+  std::vector<fieldbus::ServoDrive> servos;
   for (const description::DriveDescription& drive : cell.drives) {
     if (drive.on_can()) {
-      const fieldbus::ServoDrive servo(drive, {.period_ns = period_ns});
+      servos.emplace_back(drive, fieldbus::DriveSettings{.period_ns = period_ns});
     } else {
       const fieldbus::ModbusDrive modbus(drive, description::load_modbus_drive(drive.description), period_ns);
     }
   }
   controller::make_sensor(cell, description::load_sensor(cell.sensor.description));
+  std::vector<fieldbus::DriveSlot> slots;
+  for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
+  for (const std::string& lack : fieldbus::losses_of(slots)) std::printf("%s\n", lack.c_str());
 }
 
 const char* check(const fs::path& file) {

@@ -42,7 +42,7 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
          }),
          "simulated devices only, may be repeated: let one fail, as DEVICE:KIND[=VALUE][@FROM[..UNTIL]], times "
          "counted from power on, some 0.2 s before the first cycle. DEVICE is a joint (KIND: silent, fault=EMCY code, "
-         "device_type=VALUE, heartbeat, sdo, "
+         "device_type=VALUE, lacks=OBJECT, fixed=OBJECT, heartbeat, sdo, "
          "period, power, jammed, ignored, reversed, runaway=rad/s, weak=Nm, offset=rad, stuck) or sensor (KIND: "
          "silent, samples, frozen, half, swapped, duplicated, short, checksum, "
          "saturated, lost=N, status=BITS, "

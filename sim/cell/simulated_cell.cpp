@@ -70,6 +70,24 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   return c;
 }
 
+// A drive that lacks an object, or has it read-only.
+void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
+  const bool is_missing = fault.kind == DeviceFaultKind::object_missing;
+  if (!is_missing && fault.kind != DeviceFaultKind::object_fixed) return;
+  ObjectEntry* entry =
+      dictionary.find(static_cast<std::uint16_t>(fault.value >> 8), static_cast<std::uint8_t>(fault.value));
+  if (entry == nullptr) {
+    throw SetupError({.key = "--fault",
+                      .found = "an object that the simulated drive of " + fault.device + " hasn't",
+                      .expected = "index and sub-index of one that it has, such as 0x600700"});
+  }
+  if (is_missing) {
+    entry->hidden = true;
+  } else {
+    entry->access = Access::read_only;
+  }
+}
+
 }  // namespace
 
 std::vector<fieldbus::SimulatedBusConfig> simulated_buses(const description::Cell& cell) {
@@ -174,6 +192,9 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
   nodes_.push_back(std::make_unique<DeviceNode>(drive.joint, bus, events_, clockwork));
   drives_[axis] = std::make_unique<DriveDevice>(device, *axes_[axis], *nodes_.back());
   nodes_.back()->set_device(*drives_[axis]);
+  for (const DeviceFault& fault : faults_) {
+    if (fault.device == drive.joint) make_otherwise(fault, drives_[axis]->canopen().dictionary());
+  }
 }
 
 // Wired to a drive's inputs, or a node with a message of its own.
