@@ -9,6 +9,7 @@
 #include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/cia402_drive.hpp"
 #include "fieldbus/cia402/eds_check.hpp"
+#include "models/description/homing.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -153,6 +154,11 @@ PeriodSteps ServoDrive::period_steps(std::int64_t from_ns, std::int64_t to_ns) c
   return {value_first ? value : index, value_first ? index : value, sync, timer};
 }
 
+void DriveSettings::stop_without_controller(double within_s) noexcept {
+  master_heartbeat_timeout_ms = static_cast<std::uint16_t>(std::lround(std::floor(1e3 * within_s + 1e-6)));
+  master_heartbeat_ms = static_cast<std::uint16_t>(master_heartbeat_timeout_ms / 3);
+}
+
 void DriveSettings::validate() const {
   const auto refuse_setting = [](const char* key, std::string found, std::string expected, std::string advice = "") {
     throw SetupError(
@@ -169,6 +175,11 @@ void DriveSettings::validate() const {
   if (master_heartbeat_ms < 1 || master_heartbeat_timeout_ms <= master_heartbeat_ms) {
     refuse_setting("master_heartbeat_timeout_ms", std::to_string(master_heartbeat_timeout_ms),
                    "more than the heartbeat's own " + std::to_string(master_heartbeat_ms) + " ms");
+  }
+  constexpr std::uint16_t usual_timeout_ms = 60;
+  if (master_heartbeat_timeout_ms < usual_timeout_ms && master_heartbeat_timeout_ms * 1'000'000LL < 3 * period_ns) {
+    refuse_setting("supervision.bus_loss_stop_s", number_text(1e-3 * master_heartbeat_timeout_ms) + " s",
+                   "at least three timesteps: the heartbeat is sent by the cycle");
   }
   if (drive_heartbeat_ms < 1 || drive_heartbeat_timeout_ms <= drive_heartbeat_ms) {
     refuse_setting("drive_heartbeat_timeout_ms", std::to_string(drive_heartbeat_timeout_ms),
@@ -287,6 +298,12 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
+  if (description_.homing) {
+    steps.push_back(
+        sdo_expect({description::homed_index, description::homed_subindex}, 4, description::homed_token(description_),
+                   "configuration date",
+                   "its encoder is incremental, and it wasn't homed since power on: proxarm calibrate --home"));
+  }
   append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
               settings_.inputs_object, torque_feedback_);
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,

@@ -51,6 +51,9 @@ struct DriveSettings {
   SdoSequenceConfig sdo{};
   std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
 
+  // The drives stop within this time of the controller's last word, whatever else they watch: its heartbeat comes three
+  // times as often.
+  void stop_without_controller(double within_s) noexcept;
   void validate() const;  // throws SetupError
 };
 

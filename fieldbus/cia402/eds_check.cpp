@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "fieldbus/canopen/canopen_object.hpp"
+#include "models/description/homing.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -60,7 +61,9 @@ void check_step(const EdsFile& eds, const SdoStep& step) {
   if (step.kind == SdoStep::Kind::write && !object.writable && step.as_found.empty()) {
     refuse(eds, number_of(step.object), "AccessType", "ro", "one that can be written: " + std::string(step.name));
   }
-  if (step.kind == SdoStep::Kind::expect && object.default_value && (*object.default_value & step.mask) != step.value) {
+  const bool is_kept = step.object.index == description::homed_index;  // what was written there, not the default
+  if (step.kind == SdoStep::Kind::expect && !is_kept && object.default_value &&
+      (*object.default_value & step.mask) != step.value) {
     refuse(eds, number_of(step.object), "DefaultValue", hex_text(*object.default_value, 8),
            hex_text(step.value, 8) + " (" + step.name + ")" + (*step.advice == '\0' ? "" : "; ") + step.advice);
   }

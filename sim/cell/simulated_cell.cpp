@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "models/base/setup_error.hpp"
+#include "models/description/homing.hpp"
 #include "models/files/eds_file.hpp"
 #include "sim/cell/plant_axis.hpp"
 
@@ -48,6 +49,9 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.canopen.device_type =
       drive.device_type.value_or(type == nullptr ? servo_drive : type->default_value.value_or(servo_drive));
   c.canopen.serial = drive.node;
+  c.canopen.stack = drive.simulation.stack == "latching" ? StackBehaviour::latching
+                    : drive.simulation.stack == "lazy"   ? StackBehaviour::lazy
+                                                         : StackBehaviour::strict;
   c.canopen.revision = 0x00010000;
   c.canopen.device_name = "simulated drive of " + drive.joint;
   c.canopen.boot_time_ns = config.drive_boot_time_ns;
@@ -66,6 +70,12 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.position_min = to_i32(std::min(first, second));
   c.position_max = to_i32(std::max(first, second));
   c.brake_release_ns = config.brake_release_ns;
+  if (drive.homing) {
+    const double home = drive.offset_counts + drive.homing->angle_rad * drive.counts_per_rad();
+    c.incremental = {.home_counts = to_i32(home)};
+    c.position_min = to_i32(std::min(first, second) - home);  // by its own zero, once it is homed
+    c.position_max = to_i32(std::max(first, second) - home);
+  }
   if (drive.rated_torque_Nm > 0.0) c.rated_torque_mNm = to_u32(1e3 * drive.rated_torque_Nm / drive.gear_ratio);
   return c;
 }
@@ -188,10 +198,25 @@ void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& confi
       device.canopen.device_type = fault.value;
     }
   }
+  const bool homed = std::any_of(faults_.begin(), faults_.end(), [&](const DeviceFault& fault) {
+    return fault.device == drive.joint && fault.kind == DeviceFaultKind::homed;
+  });
+  if (homed && !drive.homing) {
+    throw SetupError({.key = "--fault",
+                      .found = "homed for " + drive.joint + ", whose encoder is absolute",
+                      .expected = "a drive with `encoder: incremental`"});
+  }
+  if (homed) device.incremental->homed = true;
   Clockwork& clockwork = *this;
   nodes_.push_back(std::make_unique<DeviceNode>(drive.joint, bus, events_, clockwork));
   drives_[axis] = std::make_unique<DriveDevice>(device, *axes_[axis], *nodes_.back());
   nodes_.back()->set_device(*drives_[axis]);
+  if (homed) {
+    ObjectEntry& token =
+        drives_[axis]->canopen().dictionary().at(description::homed_index, description::homed_subindex);
+    token.set(description::homed_token(drive));
+    token.default_value = token.value;
+  }
   for (const DeviceFault& fault : faults_) {
     if (fault.device == drive.joint) make_otherwise(fault, drives_[axis]->canopen().dictionary());
   }

@@ -32,6 +32,7 @@ constexpr KindName kinds[] = {
     {"device_type", can, DeviceFaultKind::device_type, u32},
     {"lacks", can, DeviceFaultKind::object_missing, u24},
     {"fixed", can, DeviceFaultKind::object_fixed, u24},
+    {"homed", can, DeviceFaultKind::homed, none},
     {"heartbeat", can, DeviceFaultKind::heartbeat_lost, none},
     {"sdo", can, DeviceFaultKind::sdo_silent, none},
     {"period", can, DeviceFaultKind::period_fixed, none},
@@ -145,7 +146,7 @@ DeviceFault parse_device_fault(std::string_view text) {
   }
   if (at == std::string_view::npos) return fault;
   constexpr DeviceFaultKind made_so[] = {DeviceFaultKind::device_type, DeviceFaultKind::object_missing,
-                                         DeviceFaultKind::object_fixed};
+                                         DeviceFaultKind::object_fixed, DeviceFaultKind::homed};
   if (std::find(std::begin(made_so), std::end(made_so), fault.kind) != std::end(made_so))
     refuse(all, "no time: a device is what it is from the start");
   const std::size_t dots = times.find("..");

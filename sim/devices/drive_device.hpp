@@ -16,6 +16,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "models/description/cell.hpp"
 #include "models/files/eds_file.hpp"
@@ -25,6 +26,13 @@
 
 namespace proxarm::sim {
 
+// Of a drive with an incremental encoder: it counts from where it was when its power came on, until it is homed (mode
+// 6) at its switch.
+struct IncrementalEncoder {
+  std::int32_t home_counts = 0;  // of the axis, where its switch is
+  bool homed = false;            // before its power came on for us, as it were
+};
+
 struct DriveDeviceConfig {
   CanopenSlaveConfig canopen;
   std::uint32_t following_error_window_counts = 100'000;  // 6065h
@@ -33,6 +41,7 @@ struct DriveDeviceConfig {
   std::uint32_t profile_deceleration = 500'000;           // 6084h, counts/s²: slow-down ramp
   std::uint32_t rated_torque_mNm = 1000;                  // 6076h, of the motor
   std::int32_t position_min = 0, position_max = 0;        // 607Dh; equal: no limit
+  std::optional<IncrementalEncoder> incremental;          // none: absolute
   std::int64_t brake_release_ns = 30'000'000;             // from enabling to where the target is followed
   std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: not supervised
   // Where it has something else than the profile says, as index << 8 | sub-index.
@@ -98,11 +107,20 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void react_to_connection(std::int64_t option, std::uint16_t code);
   [[nodiscard]] RefusalReason refusal() const noexcept;
   [[nodiscard]] bool energised() const noexcept;
+  [[nodiscard]] bool latches() const noexcept { return slave_.config().stack == StackBehaviour::latching; }
   [[nodiscard]] bool brake_open() const noexcept { return powered_ && now_ns_ >= brake_open_ns_; }
   void set_period();
   [[nodiscard]] double deceleration(std::uint16_t object) const noexcept;
   void latch_target();
   void latch_torque();
+  void add_homing_objects();
+  void start_homing();
+  void advance_homing();
+  void power_on_encoder() noexcept;
+  [[nodiscard]] bool homes() const noexcept;
+  // By the drive's own zero.
+  [[nodiscard]] std::int64_t position() const noexcept { return axis_.position_counts() - zero_counts_; }
+  [[nodiscard]] std::int64_t demand() const noexcept { return axis_.demand_counts() - zero_counts_; }
   void supervise_sync();
   void supervise_following_error();
   void publish() noexcept;
@@ -111,6 +129,12 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   ServoAxis& axis_;
   std::int64_t brake_release_ns_;
   std::uint32_t sdo_request_id_;
+  enum class HomingState : std::uint8_t { none, running, attained, failed };
+  std::optional<IncrementalEncoder> incremental_;
+  HomingState homing_ = HomingState::none;
+  double homing_counts_ = 0.0;             // of the axis, where homing has come to
+  std::int64_t homing_ns_ = 0;             // and when
+  std::int64_t zero_counts_ = 0;           // of the axis, where the drive counts from
   std::array<ObjectEntry, 2> unlisted_{};  // instead of 2001h and 2010h:01 in a drive with its maker's dictionary
   std::int64_t period_ns_ = 0;             // 60C2h; 0: not set
 

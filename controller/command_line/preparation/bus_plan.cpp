@@ -35,7 +35,8 @@ void add_sync(PlannedBus& bus) {
 
 // Queued after all setpoints.
 void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
-  const fieldbus::DriveSettings drive;
+  fieldbus::DriveSettings drive;
+  drive.stop_without_controller(session.cell.supervision.bus_loss_stop_s);
   PlannedFrame heartbeat{.name = "controller's heartbeat", .id = fieldbus::heartbeat_id(drive.master_node)};
   heartbeat.shape.bytes = 1;
   heartbeat.sender = "controller";
