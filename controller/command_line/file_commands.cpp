@@ -14,7 +14,9 @@
 #include "models/description/dbc_file.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
+#include "models/description/sensor_sources.hpp"
 #include "models/files/eds_file.hpp"
+#include "models/files/yaml_file.hpp"
 #include "scenes/compiler/check.hpp"
 #include "scenes/compiler/explain.hpp"
 #include "scenes/format/scene_file.hpp"
@@ -55,6 +57,16 @@ void check_cell(const fs::path& file) {
   for (const std::string& lack : fieldbus::losses_of(slots)) std::printf("%s\n", lack.c_str());
 }
 
+void tell_sources(const fs::path& file) {
+  const description::SensorSources said = description::read_sensor_sources(description::YamlNode::load(file));
+  for (const std::string& source : said.sources) std::printf("from: %s\n", source.c_str());
+  if (!said.one_source_only.empty()) {
+    std::printf("not held against a second source: %s\n", said.one_source_only.c_str());
+  } else if (said.sources.empty()) {
+    std::printf("the file doesn't say where its figures are from\n");
+  }
+}
+
 const char* check(const fs::path& file) {
   switch (kind_of(file)) {
     case FileKind::cell:
@@ -71,6 +83,7 @@ const char* check(const fs::path& file) {
       return "list of messages and signals";
     case FileKind::sensor:
       description::load_sensor(file);
+      tell_sources(file);
       return "sensor";
     case FileKind::hand:
       description::load_hand(file);

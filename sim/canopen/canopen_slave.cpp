@@ -111,6 +111,7 @@ void CanopenSlave::enter(NmtState to, std::int64_t time_ns) {
       receive->last_ns = never;
     }
   } else {
+    if (config_.stack == StackBehaviour::lazy) last_sync_ns_ = never;  // watched from the first one on
     for (auto& transmit : transmit_) {
       transmit->last_ns = never;
       transmit->syncs = 0;
