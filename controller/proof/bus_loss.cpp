@@ -57,6 +57,9 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   if (step_ != Step::farewell) heed(t_k_ns);
   act(t_k_ns);
   if (step_ == Step::silent) return;
+  fieldbus::CanFrame heartbeat;
+  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;  // begun in one cycle, they go together
+  heartbeat_was_last_ = same.due(t_k_ns, cycle_, heartbeat);
   bus_.send_setpoints(setpoints_, t_k_ns, cycle_);
   bus_.hand_over();
   last_word_ns_ = t_k_ns;
@@ -94,7 +97,8 @@ void BusLossSession::act(std::int64_t t_k_ns) noexcept {
       supervisor_.handle(Event::tared);
       return go_to(Step::standing, t_k_ns);
     case Step::standing:
-      if (in_step_ns >= standing_ns) go_to(Step::silent, t_k_ns);
+      // Right after a heartbeat: the drives that wait for the next one wait longest then.
+      if (in_step_ns >= standing_ns && heartbeat_was_last_) go_to(Step::silent, t_k_ns);
       return;
     case Step::farewell:
       if (in_step_ns >= farewell_ns) go_to(Step::done, t_k_ns);

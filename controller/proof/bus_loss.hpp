@@ -2,8 +2,9 @@
 // sent any more, and what the drives say is listened to.
 //
 //   enabling, taring, standing for 0.3 s: under the same supervision as any session
-//   silent for a second: no SYNC, no setpoint, no heartbeat, no SDO; frames are only received
-//   farewell: SYNC, heartbeat and controlwords again, until all drives are off, or half a second
+//   silent for a second, from right after a heartbeat on, which is the worst moment: no SYNC, no setpoint, no
+//   heartbeat, no SDO; frames are only received farewell: SYNC, heartbeat and controlwords again, until all drives are
+//   off, or half a second
 // A drive that lets go holds its axis by its brake, or the axis sinks: the same as when a controller dies in a session.
 // run_cycle() neither allocates, locks, throws nor prints.
 #pragma once
@@ -86,7 +87,8 @@ class BusLossSession {
   std::vector<fieldbus::SilenceWatch> watches_;
   Step step_ = Step::waiting;
   std::int64_t since_ns_ = 0, last_word_ns_ = -1;
-  std::int64_t silence_ns_ = -1;  // the last cycle before it began
+  bool heartbeat_was_last_ = false;  // the last cycle sent it
+  std::int64_t silence_ns_ = -1;     // the last cycle before it began
   std::atomic<bool> stop_{false}, asks_for_press_{false};
 };
 
