@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/command_line/commissioning/calibrate_run.hpp"
 #include "controller/command_line/preparation/run_options.hpp"
 #include "scenes/compiler/check.hpp"
 
@@ -41,6 +42,7 @@ struct ProveOptions {
   RunOptions run;
   std::filesystem::path arm;  // cell of the simulated arm; empty: the same
   std::filesystem::path out;  // empty: beside the cell
+  bool bus_loss = false;      // what the drives do when the controller falls silent, and nothing else
 };
 
 struct AssessOptions {
@@ -58,7 +60,8 @@ int set_command(const SetOptions& options);           // of a running session
 int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);
-int prove_command(const ProveOptions& options);    // 1: not proven
-int assess_command(const AssessOptions& options);  // 1: a threshold is exceeded
+int prove_command(const ProveOptions& options);          // 1: not proven
+int calibrate_command(const CalibrateOptions& options);  // 1: poses that don't fit one another
+int assess_command(const AssessOptions& options);        // 1: a threshold is exceeded
 
 }  // namespace proxarm::command_line

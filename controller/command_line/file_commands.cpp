@@ -9,6 +9,7 @@
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/session/bring_up.hpp"
+#include "fieldbus/cia402/cia402_bring_up.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/arm_urdf.hpp"
 #include "models/base/setup_error.hpp"
@@ -16,7 +17,9 @@
 #include "models/description/dbc_file.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
+#include "models/description/sensor_sources.hpp"
 #include "models/files/eds_file.hpp"
+#include "models/files/yaml_file.hpp"
 #include "scenes/compiler/check.hpp"
 #include "scenes/compiler/explain.hpp"
 #include "scenes/format/scene_file.hpp"
@@ -53,9 +56,10 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   if (!cell.default_hand.empty()) description::require_default_file(cell, "default_hand", cell.default_hand);
   const models::Arm arm(cell);
   const std::int64_t period_ns = std::llround(1e9 * cell.default_period_s);
+  std::vector<fieldbus::ServoDrive> servos;
   for (const description::DriveDescription& drive : cell.drives) {
     if (drive.on_can()) {
-      const fieldbus::ServoDrive servo(drive, {.period_ns = period_ns});
+      servos.emplace_back(drive, fieldbus::DriveSettings{.period_ns = period_ns});
     } else {
       const fieldbus::ModbusDrive modbus(drive, description::load_modbus_drive(drive.description), period_ns);
     }
@@ -65,6 +69,19 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   run.cell = file;
   run.scene = scene;
   require_usable_start(prepare(run));
+  std::vector<fieldbus::DriveSlot> slots;
+  for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
+  for (const std::string& lack : fieldbus::losses_of(slots)) std::printf("%s\n", lack.c_str());
+}
+
+void tell_sources(const fs::path& file) {
+  const description::SensorSources said = description::read_sensor_sources(description::YamlNode::load(file));
+  for (const std::string& source : said.sources) std::printf("from: %s\n", source.c_str());
+  if (!said.one_source_only.empty()) {
+    std::printf("not held against a second source: %s\n", said.one_source_only.c_str());
+  } else if (said.sources.empty()) {
+    std::printf("the file doesn't say where its figures are from\n");
+  }
 }
 
 const char* check(const fs::path& file, const CheckFilesOptions& options) {
@@ -83,6 +100,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       return "list of messages and signals";
     case FileKind::sensor:
       description::load_sensor(file);
+      tell_sources(file);
       return "sensor";
     case FileKind::hand:
       description::load_hand(file);

@@ -10,6 +10,8 @@
 #include <initializer_list>
 #include <iostream>
 #include <memory>
+#include <sstream>
+#include <string>
 #include <utility>
 
 #include "controller/command_line/commands.hpp"
@@ -42,7 +44,7 @@ void add_fault_option(CLI::App& app, RunOptions& options) {
          }),
          "simulated devices only, may be repeated: let one fail, as DEVICE:KIND[=VALUE][@FROM[..UNTIL]], times "
          "counted from power on, some 0.2 s before the first cycle. DEVICE is a joint (KIND: silent, fault=EMCY code, "
-         "device_type=VALUE, heartbeat, sdo, "
+         "device_type=VALUE, lacks=OBJECT, fixed=OBJECT, homed, heartbeat, sdo, "
          "period, power, jammed, ignored, reversed, runaway=rad/s, weak=Nm, offset=rad, stuck) or sensor (KIND: "
          "silent, samples, frozen, half, swapped, duplicated, short, checksum, "
          "saturated, lost=N, status=BITS, "
@@ -299,8 +301,51 @@ void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
   app.add_option("--arm", options.arm,
                  "cell file of the simulated arm, where it is another one than the controller takes it for")
       ->type_name("FILE");
+  app.add_flag(
+      "--bus-loss", options.bus_loss,
+      "at standstill the controller falls silent on purpose: how and when each drive stops by itself, kept with "
+      "the cell's proof");
   app.add_option("--out", options.out, "file of the proof (default: beside the cell, CELL.proof)")->type_name("FILE");
   app.add_flag("--json", options.run.json, "print the verdict as one JSON object");
+}
+
+std::vector<double> angles_of(const std::string& text) {
+  std::vector<double> angles;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const auto number = description::strict_number(part);
+    if (!number) throw CLI::ValidationError("--at", "expected angles in rad with commas between, such as 0,0.5,-1");
+    angles.push_back(*number);
+  }
+  return angles;
+}
+
+void add_calibrate_options(CLI::App& app, command_line::CalibrateOptions& options) {
+  add_session_options(app, options.run);
+  leave_out(app, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
+                  "--extra-delay", "--lookahead", "--timestep"});
+  add_fault_option(app, options.run);
+  add_hardware_option(app, options.run);
+  app.add_flag("--without-enabling-input", options.run.settings.without_enabling_input,
+               "leave out the cell's enabling input while drives are homed");
+  app.add_option("--at", CLI::callback_t([&](const CLI::results_t& words) {
+                   for (const std::string& word : words) options.at.push_back(angles_of(word));
+                   return true;
+                 }),
+                 "angles of all joints at their marks, rad, with commas between; repeated: more poses, which must "
+                 "agree (default: "
+                 "start_rad)")
+      ->type_name("RAD,RAD,...")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--tolerance", options.tolerance_rad, "by which the poses may disagree, rad (default 0.01)")
+      ->check(CLI::Range(1e-6, 1.0))
+      ->type_name("RAD");
+  app.add_flag("--home", options.home,
+               "home the drives with incremental encoders, one joint after the other: they move");
+  app.add_option("--arm", options.arm,
+                 "cell file of the simulated arm, where it is another one than the controller takes it for")
+      ->type_name("FILE");
 }
 
 // The commands with their options; the one that was chosen waits in `chosen`.
@@ -425,6 +470,13 @@ class Commands {
                return prove_command(prove_);
              }),
         prove_);
+    add_calibrate_options(
+        *add(
+            "calibrate",
+            "where the encoders' zeros are: by poses that the arm is brought to by hand, or by homing; into the cell's "
+            "file, with a backup. Status 1: the poses don't fit one another",
+            [this] { return command_line::calibrate_command(calibrate_); }),
+        calibrate_);
     add_assess_options(
         *add("assess",
              "stopping times and distances, and clamping forces, of the simulated arm, held against thresholds; "
@@ -442,6 +494,7 @@ class Commands {
   command_line::CheckFilesOptions check_;
   command_line::FileOptions explain_;
   command_line::ProveOptions prove_;
+  command_line::CalibrateOptions calibrate_;
   command_line::AssessOptions assess_;
 };
 

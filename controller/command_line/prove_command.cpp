@@ -1,10 +1,9 @@
-#include <chrono>
 #include <cstdio>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/commissioning/bus_loss_run.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
@@ -41,15 +40,6 @@ void refuse_on_interfaces(const ProveOptions& options) {
                                  .found = "a bus that isn't simulated",
                                  .expected = "--bus sim, where the arm is simulated",
                                  .advice = "on an interface, give it to `proxarm sim`"});
-}
-
-std::string today() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm utc{};
-  gmtime_r(&now, &utc);
-  char text[24];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
-  return text;
 }
 
 // What ended the session before all was read, and brakes that don't hold; empty: nothing.
@@ -94,13 +84,15 @@ int prove_command(const ProveOptions& options) {
   const bool simulated = options.run.bus.simulated();
   if (!simulated) refuse_on_interfaces(options);
   const PreparedSession session = prepared(options.run);
-  proof::require_provable(session.cell, models::Arm(session.cell));
+  if (!options.bus_loss) proof::require_provable(session.cell, models::Arm(session.cell));
   require_enabling_switch(session, options.run);
   ProofOutcome outcome;
+  RunOptions of_arm = options.run;
+  if (!options.arm.empty()) of_arm.cell = options.arm;
+  if (simulated) require_carried(session);
+  const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
+  if (options.bus_loss) return prove_bus_loss(session, prepared(of_arm), options.run, file);
   if (simulated) {
-    require_carried(session);
-    RunOptions of_arm = options.run;
-    if (!options.arm.empty()) of_arm.cell = options.arm;
     outcome = prove_simulated(session, prepared(of_arm), options.run);
   } else {
     outcome = prove_on_interfaces(session, options.run);
@@ -109,11 +101,12 @@ int prove_command(const ProveOptions& options) {
   proof::Verdict verdict;
   if (failure.empty()) verdict = proof::judge(session.cell, models::Arm(session.cell), outcome.readings);
   const bool proven = failure.empty() && verdict.proven;
-  const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
   const std::string told = options.run.json ? json_of(verdict, failure).dump() + "\n" : text_of(verdict, failure);
   std::fputs(told.c_str(), stdout);
   if (!proven) return not_proven;
-  write_proof(file, {cell_sha256(session), outcome.real_arm, today(), "signs, ratios, sensor and brakes proven"});
+  ProofFile proof{cell_sha256(session), outcome.real_arm, today(), "signs, ratios, sensor and brakes proven", true, {}};
+  if (const auto kept = kept_proof(file, proof.cell_sha256, proof.real_arm)) proof.bus_loss = kept->bus_loss;
+  write_proof(file, proof);
   if (!options.run.json) {
     std::printf("proof, on a %s arm: %s\n", outcome.real_arm ? "real" : "simulated", file.c_str());
   }

@@ -151,6 +151,7 @@ struct Summary {
   std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor
   EndSummary end;                          // set by the caller
   std::vector<OrderSummary> idle_orders;   // set by the caller
+  std::vector<std::string> drives_lack;    // what drives haven't got, and what is lost by it; set by the caller
   std::vector<FaultSummary> faults;        // set by the caller
   std::string black_box;                   // its folder, after a fault; set by the caller
   std::vector<NoticeSummary> notices;      // set by the caller

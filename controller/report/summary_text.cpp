@@ -117,6 +117,7 @@ void add_repeatable(Json& json, const Summary& s) {
   json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
   json["end"] = {{"reason", s.end.reason}, {"text", s.end.text}};
   json["idle_orders"] = idle_orders(s);
+  json["drives_lack"] = s.drives_lack;
   json["faults"] = faults(s);
   json["notices"] = Json::array();
   for (const NoticeSummary& notice : s.notices) {
@@ -304,6 +305,7 @@ void tell_events(const Summary& s, Lines& line) {
                          format("at %.3f s, ", t.time_s) + format("%.0f ms without rendering", 1e3 * t.paused_s) +
                          (t.refused.empty() ? "" : "; not taken: " + t.refused));
   }
+  for (const std::string& lack : s.drives_lack) line("lacking", lack);
   for (const OrderSummary& order : s.idle_orders) {
     line("order without effect", order.order + format(" at %.4g s: ", order.time_s) + order.refused);
   }

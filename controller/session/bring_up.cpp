@@ -26,23 +26,24 @@ std::size_t index_of(const description::Cell& cell, const std::string& bus) {
   return static_cast<std::size_t>(found - cell.buses.begin());
 }
 
-fieldbus::DriveSettings drive_settings(const SessionSettings& settings) {
+fieldbus::DriveSettings drive_settings(const description::Cell& cell, const SessionSettings& settings) {
   fieldbus::DriveSettings drive;
   drive.period_ns = std::llround(settings.period_s * 1e9);
+  drive.stop_without_controller(cell.supervision.bus_loss_stop_s);
   drive.heartbeat_in_operation = false;  // it could cost the last setpoint of a bus its deadline: docs/design.md
   return drive;
 }
 
 // Each bus that has drives, once.
 std::vector<DriveBus> drive_buses(const std::vector<fieldbus::DriveSlot>& drives) {
-  const fieldbus::DriveSettings defaults;
   std::vector<DriveBus> buses;
   for (const fieldbus::DriveSlot& slot : drives) {
     const bool known = std::any_of(buses.begin(), buses.end(), [&](const DriveBus& b) { return b.bus == slot.bus; });
     if (known) continue;
     buses.push_back(
         {slot.bus, fieldbus::SyncProducer(),
-         fieldbus::HeartbeatProducer(defaults.master_node, std::int64_t{defaults.master_heartbeat_ms} * 1'000'000)});
+         fieldbus::HeartbeatProducer(slot.drive->settings().master_node,
+                                     std::int64_t{slot.drive->settings().master_heartbeat_ms} * 1'000'000)});
   }
   return buses;
 }
@@ -69,7 +70,7 @@ void watch_following(fieldbus::DriveSettings& settings, const description::Drive
 std::unique_ptr<fieldbus::ServoDrive> make_can_drive(const description::Cell& cell,
                                                      const description::DriveDescription& drive,
                                                      const SessionSettings& settings) {
-  fieldbus::DriveSettings own = drive_settings(settings);
+  fieldbus::DriveSettings own = drive_settings(cell, settings);
   const bool has_inputs = cell.enabling_input && cell.enabling_input->drive == drive.joint;
   if (has_inputs && !settings.without_enabling_input) own.inputs_object = cell.enabling_input->object;
   watch_following(own, drive, cell.limits.following_error_rad);

@@ -48,6 +48,7 @@ void check_frame(const PlannedBus& bus, const PlannedFrame& frame) {
                (frame.shape.fd ? "CAN FD frame" : "classic CAN frame (at most 8)"));
   }
   if (frame.shape.fd && bus.data_bitrate == 0) refuse(bus, frame, "CAN FD on a classic bus");
+  if (frame.every_ns < 0) refuse(bus, frame, "every_ns must be 0 or more");
   if (frame.every_cycles < 1) refuse(bus, frame, "every_cycles must be 1 or more");
   if (!(frame.release >= 0.0 && frame.release <= 1.0)) refuse(bus, frame, "release must be from 0 to 1");
   if (!(frame.deadline > 0.0)) refuse(bus, frame, "deadline must be above 0");
@@ -98,16 +99,27 @@ void check(const PlannedBus& bus, std::int64_t period_ns) {
   check_pairs(bus);
 }
 
+// How often in one cycle at most, and on average.
+int most_in_a_cycle(const PlannedFrame& frame, std::int64_t period_ns) {
+  return frame.every_ns > 0 ? static_cast<int>((period_ns + frame.every_ns - 1) / frame.every_ns) : 1;
+}
+
+double mean_in_a_cycle(const PlannedFrame& frame, std::int64_t period_ns) {
+  if (frame.every_ns > 0) return static_cast<double>(period_ns) / static_cast<double>(frame.every_ns);
+  return 1.0 / frame.every_cycles;
+}
+
 void add_up(const PlannedBus& bus, BusPlan& plan) {
   const BitRates rates{bus.bitrate, bus.data_bitrate};
   double mean_ns = 0.0;
   for (const PlannedFrame& frame : bus.frames) {
     const WireBits worst = worst_wire_bits(frame.shape), least = minimum_wire_bits(frame.shape);
-    plan.worst_bits += worst.total();
-    plan.least_bits += least.total();
-    plan.worst_ns += wire_time_ns(worst, rates);
-    plan.least_ns += wire_time_ns(least, rates);
-    mean_ns += static_cast<double>(wire_time_ns(worst, rates)) / frame.every_cycles;
+    const int most = most_in_a_cycle(frame, plan.period_ns);
+    plan.worst_bits += most * worst.total();
+    plan.least_bits += most * least.total();
+    plan.worst_ns += most * wire_time_ns(worst, rates);
+    plan.least_ns += most * wire_time_ns(least, rates);
+    mean_ns += static_cast<double>(wire_time_ns(worst, rates)) * mean_in_a_cycle(frame, plan.period_ns);
   }
   const auto period_ns = static_cast<double>(plan.period_ns);
   plan.worst_load = static_cast<double>(plan.worst_ns) / period_ns;
@@ -136,7 +148,7 @@ void add_up_typical(const PlannedBus& bus, BusPlan& plan) {
   std::mt19937 random(1);
   double sum_ns = 0.0;
   for (const PlannedFrame& frame : bus.frames) {
-    sum_ns += typical_ns(frame, {bus.bitrate, bus.data_bitrate}, random) / frame.every_cycles;
+    sum_ns += typical_ns(frame, {bus.bitrate, bus.data_bitrate}, random) * mean_in_a_cycle(frame, plan.period_ns);
   }
   plan.typical_load = sum_ns / static_cast<double>(plan.period_ns);
 }
@@ -164,8 +176,9 @@ void bound_responses(const PlannedBus& bus, BusPlan& plan) {
     out.wire_ns = wire_time_ns(worst_wire_bits(frame.shape), rates);
     out.response_ns = windows[i].response_ns;
     out.finish_ns = windows[i].any_time ? windows[i].response_ns : windows[i].finish_ns;
-    out.deadline_ns = std::llround(frame.deadline * static_cast<double>(plan.period_ns)) *
-                      (windows[i].any_time ? frame.every_cycles : 1);
+    const std::int64_t every_ns =
+        frame.every_ns > 0 ? frame.every_ns : plan.period_ns * (windows[i].any_time ? frame.every_cycles : 1);
+    out.deadline_ns = std::llround(frame.deadline * static_cast<double>(every_ns));
     out.bounded = windows[i].bounded;
     plan.frames.push_back(std::move(out));
   }

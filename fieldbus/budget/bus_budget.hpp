@@ -47,6 +47,7 @@ struct PlannedFrame {
   std::int64_t latest_delay_ns = 0;  // below delay_ns: the same as delay_ns
   bool any_time = false;             // queued at any moment, not in step with the cycle: heartbeats, SDO, emergencies
   int every_cycles = 1;              // once in so many cycles
+  std::int64_t every_ns = 0;  // any_time: by a clock of its own, such as a sensor's that streams; 0: by every_cycles
 
   double deadline =
       1.0;            // latest end, as a fraction of the period after the cycle's start (any_time: after its queuing)

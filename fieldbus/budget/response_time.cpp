@@ -69,13 +69,16 @@ class Analysis {
         if (triggers_[m] < 0) continue;
         frames_[m].any_time = frames_[m].any_time || frames_[trigger(m)].any_time;
         frames_[m].every_cycles = std::max(frames_[m].every_cycles, frames_[trigger(m)].every_cycles);
+        frames_[m].every_ns = std::max(frames_[m].every_ns, frames_[trigger(m)].every_ns);
       }
     }
   }
 
   // Its place in the cycle is known, though it may not come in each.
   [[nodiscard]] bool in_step(std::size_t k) const { return !frames_[k].any_time; }
-  [[nodiscard]] std::int64_t every_ns(std::size_t k) const { return period_ns_ * frames_[k].every_cycles; }
+  [[nodiscard]] std::int64_t every_ns(std::size_t k) const {
+    return frames_[k].every_ns > 0 ? frames_[k].every_ns : period_ns_ * frames_[k].every_cycles;
+  }
 
   [[nodiscard]] FrameWindow release_of(std::size_t m) const {
     const PlannedFrame& frame = frames_[m];

@@ -51,28 +51,42 @@ std::uint32_t mapping_entry(const MappedObject& mapped) noexcept {
          mapped.bits;
 }
 
+// Where a drive's mapping is its maker's, it is taken if it is what is wanted. A transmit PDO may carry more behind
+// that, which nobody reads; a receive PDO that is synchronous but not cyclic (type 0) acts at the same SYNC.
 std::vector<SdoStep> pdo_steps(const PdoConfiguration& pdo) {
   check(pdo);
   const bool receive = pdo.direction == PdoDirection::receive;
   const std::uint16_t communication = communication_index(pdo.direction, pdo.number);
   const std::uint16_t mapping = mapping_index(pdo.direction, pdo.number);
+  const auto objects = static_cast<std::uint8_t>(pdo.mapping.size());
+  std::vector<std::uint32_t> counts{objects};
+  for (std::uint32_t more = objects + 1U; !receive && more <= 8; ++more) counts.push_back(more);
   std::vector<SdoStep> steps;
-  steps.push_back(cob_id_step(pdo.direction, pdo.number, does_not_exist | pdo.id,
-                              receive ? "RPDO COB-ID (disable)" : "TPDO COB-ID (disable)"));
-  steps.push_back(sdo_write({mapping, 0}, 1, 0, receive ? "RPDO mapping (clear)" : "TPDO mapping (clear)"));
+  steps.push_back(or_found(cob_id_step(pdo.direction, pdo.number, does_not_exist | pdo.id,
+                                       receive ? "RPDO COB-ID (disable)" : "TPDO COB-ID (disable)"),
+                           {pdo.id}));
+  steps.push_back(
+      or_found(sdo_write({mapping, 0}, 1, 0, receive ? "RPDO mapping (clear)" : "TPDO mapping (clear)"), counts));
   std::uint8_t sub = 0;
   for (const MappedObject& mapped : pdo.mapping) {
-    steps.push_back(sdo_write({mapping, ++sub}, 4, mapping_entry(mapped), receive ? "RPDO mapping" : "TPDO mapping"));
-  }
-  steps.push_back(sdo_write({mapping, 0}, 1, sub, receive ? "RPDO mapping (objects)" : "TPDO mapping (objects)"));
-  steps.push_back(sdo_write({communication, 2}, 1, pdo.transmission_type,
-                            receive ? "RPDO transmission type" : "TPDO transmission type"));
-  if (pdo.event_timer_ms > 0) {
-    steps.push_back(if_present(sdo_write({communication, 5}, 2, pdo.event_timer_ms,
-                                         receive ? "RPDO event timer (timeout)" : "TPDO event timer")));
+    const std::uint32_t entry = mapping_entry(mapped);
+    steps.push_back(
+        or_found(sdo_write({mapping, ++sub}, 4, entry, receive ? "RPDO mapping" : "TPDO mapping"), {entry}));
   }
   steps.push_back(
-      cob_id_step(pdo.direction, pdo.number, pdo.id, receive ? "RPDO COB-ID (enable)" : "TPDO COB-ID (enable)"));
+      or_found(sdo_write({mapping, 0}, 1, sub, receive ? "RPDO mapping (objects)" : "TPDO mapping (objects)"), counts));
+  steps.push_back(or_found(sdo_write({communication, 2}, 1, pdo.transmission_type,
+                                     receive ? "RPDO transmission type" : "TPDO transmission type"),
+                           receive ? std::vector<std::uint32_t>{pdo.transmission_type, 0}
+                                   : std::vector<std::uint32_t>{pdo.transmission_type}));
+  if (pdo.event_timer_ms > 0) {
+    steps.push_back(if_present(sdo_write({communication, 5}, 2, pdo.event_timer_ms,
+                                         receive ? "RPDO event timer (timeout)" : "TPDO event timer"),
+                               "its RPDO timer doesn't stop it when the setpoints end; the heartbeat does"));
+  }
+  steps.push_back(or_found(
+      cob_id_step(pdo.direction, pdo.number, pdo.id, receive ? "RPDO COB-ID (enable)" : "TPDO COB-ID (enable)"),
+      {pdo.id}));
   return steps;
 }
 
@@ -81,6 +95,8 @@ SdoStep disable_pdo_step(PdoDirection direction, std::uint8_t number, std::uint8
       if_present(cob_id_step(direction, number, does_not_exist | pdo_id(direction, number, node),
                              direction == PdoDirection::receive ? "unused RPDO COB-ID" : "unused TPDO COB-ID"));
   step.mask = does_not_exist;  // which identifier an unused one keeps doesn't matter
+  // One that can't be disabled is nothing to worry about where only the controller could send it.
+  if (direction == PdoDirection::transmit) step.as_found = {step.value};
   return step;
 }
 

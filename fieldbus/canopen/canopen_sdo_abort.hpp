@@ -15,10 +15,16 @@ inline constexpr std::uint32_t invalid_block_size = 0x05040002;
 inline constexpr std::uint32_t invalid_sequence_number = 0x05040003;
 inline constexpr std::uint32_t crc_error = 0x05040004;
 inline constexpr std::uint32_t out_of_memory = 0x05040005;
+inline constexpr std::uint32_t unsupported_access = 0x06010000;
+inline constexpr std::uint32_t write_of_read_only = 0x06010002;
 inline constexpr std::uint32_t object_missing = 0x06020000;
+inline constexpr std::uint32_t not_mappable = 0x06040041;
 inline constexpr std::uint32_t length_mismatch = 0x06070010;
 inline constexpr std::uint32_t sub_index_missing = 0x06090011;
 inline constexpr std::uint32_t general_error = 0x08000000;
+inline constexpr std::uint32_t not_transferable = 0x08000020;
+inline constexpr std::uint32_t local_control = 0x08000021;
+inline constexpr std::uint32_t device_state = 0x08000022;
 }  // namespace sdo_abort
 
 // The standard's sentence; "unknown abort code" for any other number.

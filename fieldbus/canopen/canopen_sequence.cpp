@@ -51,6 +51,16 @@ SdoStep if_present(SdoStep step) {
   return step;
 }
 
+SdoStep if_present(SdoStep step, const char* lost) {
+  step.lost = lost;
+  return if_present(std::move(step));
+}
+
+SdoStep or_found(SdoStep step, std::vector<std::uint32_t> values) {
+  step.as_found = std::move(values);
+  return step;
+}
+
 SdoSequence::SdoSequence(CanBus& bus, std::uint8_t node, std::string bus_name, std::string device,
                          std::vector<SdoStep> steps, const SdoSequenceConfig& config)
     : client_(bus, node, config.client),
@@ -68,6 +78,7 @@ void SdoSequence::start(std::int64_t now_ns) {
 void SdoSequence::begin_step(std::int64_t now_ns) {
   step_begun_ns_ = now_ns;
   attempt_ = 0;
+  as_found_ = false;
   ask(steps_[next_].kind == SdoStep::Kind::write, now_ns);
 }
 
@@ -138,6 +149,10 @@ void SdoSequence::on_value(std::int64_t now_ns) {
   std::copy(data.begin(), data.end(), bytes.begin());
   const std::uint32_t value = read_u32_le(bytes.data()) & size_mask(step.bytes);
   const bool fits = step.kind == SdoStep::Kind::read || (value & step.mask) == (step.value & step.mask);
+  if (step.kind == SdoStep::Kind::write && (as_found_ || !fits)) {
+    take_as_found(value, now_ns);
+    return;
+  }
   if (!fits && step.kind == SdoStep::Kind::expect && now_ns - step_begun_ns_ < step.patience_ns) {
     again_at_ns_ = now_ns + config_.pause_ns;
     return;
@@ -146,16 +161,62 @@ void SdoSequence::on_value(std::int64_t now_ns) {
     const std::uint32_t shown_mask = step.mask & size_mask(step.bytes);
     std::string expected = value_text(step.value, step.bytes);
     if (shown_mask != size_mask(step.bytes)) expected += " in the bits " + hex_text(shown_mask, 2 * step.bytes);
-    std::string advice = step.advice;
-    if (advice.empty() && step.kind == SdoStep::Kind::write) {
-      advice =
-          "the drive took the value without an error but kept another; is it limited or locked by the maker's tool?";
-    }
-    fail(value_text(value, step.bytes), std::move(expected), std::move(advice));
+    fail(value_text(value, step.bytes), std::move(expected), step.advice);
     return;
   }
   values_.push_back({step, value, true});
   advance(now_ns);
+}
+
+// What can't be written, or stays what it was: fine if it is what is wanted or fits as well.
+void SdoSequence::take_as_found(std::uint32_t value, std::int64_t now_ns) {
+  const SdoStep& step = steps_[next_];
+  const auto is = [&](std::uint32_t wanted) { return ((value ^ wanted) & step.mask & size_mask(step.bytes)) == 0; };
+  const bool fits = is(step.value) || std::any_of(step.as_found.begin(), step.as_found.end(), is);
+  const bool may_be_anything = as_found_ && step.is_optional && step.as_found.empty();
+  if (!fits && !may_be_anything) {
+    std::string expected = value_text(step.value, step.bytes);
+    for (const std::uint32_t other : step.as_found) {
+      if (other != step.value) expected += " or " + value_text(other, step.bytes);
+    }
+    const std::uint32_t shown_mask = step.mask & size_mask(step.bytes);
+    if (shown_mask != size_mask(step.bytes)) expected += " in the bits " + hex_text(shown_mask, 2 * step.bytes);
+    fail(value_text(value, step.bytes) + (as_found_ ? ", which can't be written" : ""), std::move(expected),
+         as_found_ ? "set it by the maker's tool, if that can"
+                   : "the drive took the value without an error but kept another; is it limited or locked by the "
+                     "maker's tool?");
+    return;
+  }
+  fixed_ += (fixed_.empty() ? "" : ", ") + to_string(step.object);
+  if (!is(step.value) && *step.lost != '\0') {
+    lose(to_string(step.object) + " is " + value_text(value, step.bytes) + " and can't be set to " +
+         value_text(step.value, step.bytes) + ": " + step.lost);
+  }
+  values_.push_back({step, value, true});
+  advance(now_ns);
+}
+
+void SdoSequence::lose(const std::string& text) {
+  if (std::find(losses_.begin(), losses_.end(), text) == losses_.end()) losses_.push_back(text);
+}
+
+std::vector<std::string> SdoSequence::losses() const {
+  std::vector<std::string> all = losses_;
+  if (!fixed_.empty()) all.push_back("can't be written and taken as found, because it fits: " + fixed_);
+  return all;
+}
+
+// A write that the node refuses because of what the object is, not because of the value.
+bool SdoSequence::looks_at_what_is_there(std::uint32_t code, std::int64_t now_ns) {
+  constexpr std::uint32_t refusals[] = {sdo_abort::unsupported_access, sdo_abort::write_of_read_only,
+                                        sdo_abort::not_transferable, sdo_abort::local_control, sdo_abort::device_state};
+  const SdoStep& step = steps_[next_];
+  const bool is_refusal = std::find(std::begin(refusals), std::end(refusals), code) != std::end(refusals);
+  if (!writing_ || !is_refusal || (step.as_found.empty() && !step.is_optional)) return false;
+  as_found_ = true;
+  attempt_ = 0;
+  ask(false, now_ns);
+  return true;
 }
 
 void SdoSequence::on_failure(std::int64_t now_ns) {
@@ -178,10 +239,13 @@ void SdoSequence::on_failure(std::int64_t now_ns) {
       answered_ever_ = true;
       if (step.is_optional && (code == sdo_abort::object_missing || code == sdo_abort::sub_index_missing)) {
         missing_.push_back(to_string(step.object) + " " + step.name);
+        if (*step.lost != '\0') lose("no " + to_string(step.object) + ": " + step.lost);
         values_.push_back({step, 0, false});
         advance(now_ns);
         return;
       }
+      if (looks_at_what_is_there(code, now_ns)) return;
+      failed_abort_ = code;
       fail(describe_sdo_abort(code),
            writing_ ? "to write " + value_text(step.value, step.bytes) : std::string("to read the object"),
            step.advice);

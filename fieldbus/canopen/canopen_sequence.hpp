@@ -28,7 +28,11 @@ struct SdoStep {
   const char* name = "";            // "modes of operation", for the message
   const char* advice = "";          // what the user can do where it differs; "" for the usual
   bool is_optional = false;         // a node without the object is noted in missing(), not refused
-  std::int64_t patience_ns = 0;     // expect: read again until it holds or this long has passed
+  const char* lost = "";            // what is lost without it, or with another value; for losses()
+  // write: what may be found where the node doesn't let it be written, or keeps what it has; under `mask`. Empty: an
+  // optional one may have any value then, another is refused.
+  std::vector<std::uint32_t> as_found{};
+  std::int64_t patience_ns = 0;  // expect: read again until it holds or this long has passed
 };
 
 // For the tables: the usual steps in one line each.
@@ -37,6 +41,10 @@ struct SdoStep {
                                  const char* advice = "", std::uint32_t mask = 0xFFFFFFFF);
 [[nodiscard]] SdoStep sdo_write(ObjectAddress object, std::uint8_t bytes, std::uint32_t value, const char* name);
 [[nodiscard]] SdoStep if_present(SdoStep step);  // for objects that the standard leaves to the maker
+// The same, with what is lost where it isn't there.
+[[nodiscard]] SdoStep if_present(SdoStep step, const char* lost);
+// A write that may stay undone where one of these is found.
+[[nodiscard]] SdoStep or_found(SdoStep step, std::vector<std::uint32_t> values);
 
 struct SdoSequenceConfig {
   SdoClientConfig client{};
@@ -68,6 +76,11 @@ class SdoSequence {
   [[nodiscard]] std::optional<std::uint32_t> value_of(ObjectAddress object) const noexcept;  // the last one read
   // Optional steps that the node hasn't the object for, as "1006h:00 communication cycle period".
   [[nodiscard]] const std::vector<std::string>& missing() const noexcept { return missing_; }
+  // What the node lacks in words, a line each: what is lost by it, and which objects were taken as they were found.
+  [[nodiscard]] std::vector<std::string> losses() const;
+  // After a problem: the step that failed, and the abort code if it was one (else 0).
+  [[nodiscard]] const SdoStep& failed_step() const noexcept { return steps_[next_]; }
+  [[nodiscard]] std::uint32_t failed_abort() const noexcept { return failed_abort_; }
   [[nodiscard]] std::int64_t wake_ns(std::int64_t now_ns) const noexcept;
 
  private:
@@ -77,6 +90,9 @@ class SdoSequence {
   void on_answer(std::int64_t now_ns);
   void on_value(std::int64_t now_ns);
   void on_failure(std::int64_t now_ns);
+  [[nodiscard]] bool looks_at_what_is_there(std::uint32_t code, std::int64_t now_ns);
+  void take_as_found(std::uint32_t value, std::int64_t now_ns);
+  void lose(const std::string& text);
   void fail(std::string found, std::string expected, std::string advice);
 
   SdoClient client_;
@@ -94,6 +110,10 @@ class SdoSequence {
   std::int64_t again_at_ns_ = -1;  // a pause runs; −1: none
   std::vector<Value> values_;
   std::vector<std::string> missing_;
+  std::vector<std::string> losses_;
+  std::string fixed_;      // objects that were taken as found, joined by commas
+  bool as_found_ = false;  // this step couldn't be written, and is read
+  std::uint32_t failed_abort_ = 0;
   std::optional<description::SetupProblem> problem_;
 };
 

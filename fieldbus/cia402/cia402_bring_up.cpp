@@ -84,9 +84,20 @@ DriveIdentity identity_of(const SdoSequence& sequence) {
           value(0x1018, 4), value(0x6502, 0), sequence.missing()};
 }
 
-// The same exchange with every drive, side by side.
+// Whether a drive's exchange ended at feedback that it hasn't got and that can be left out; then all begin anew.
+bool some_feedback_given_up(Slots drives, const std::vector<SdoSequence>& sequences) {
+  bool given_up = false;
+  for (std::size_t i = 0; i < sequences.size(); ++i) {
+    if (!sequences[i].problem()) continue;
+    if (drives[i].drive->give_up_feedback(sequences[i].failed_step(), sequences[i].failed_abort())) given_up = true;
+  }
+  return given_up;
+}
+
+// The same exchange with every drive, side by side. nullopt: something was given up, so that it must be done again.
 template <class StepsOf>
-std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler, StepsOf steps_of) {
+std::optional<std::vector<DriveIdentity>> try_to_configure(CanNetwork& network, Slots drives,
+                                                           const FrameHandler& handler, StepsOf steps_of) {
   std::vector<SdoSequence> sequences;
   sequences.reserve(drives.size());
   for (const DriveSlot& slot : drives) {
@@ -120,11 +131,23 @@ std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const Fr
     }
     return done ? pump_done : wake_ns;
   });
+  if (some_feedback_given_up(drives, sequences)) return std::nullopt;
   throw_problems(drives, sequences);
   for (std::size_t i = 0; i < drives.size(); ++i) refuse_restart(*drives[i].drive, boot_ups[i]);
   std::vector<DriveIdentity> identities;
-  for (const SdoSequence& sequence : sequences) identities.push_back(identity_of(sequence));
+  for (std::size_t i = 0; i < drives.size(); ++i) {
+    identities.push_back(identity_of(sequences[i]));
+    drives[i].drive->note_losses(sequences[i].losses());
+  }
   return identities;
+}
+
+// Each time feedback becomes less, so it ends.
+template <class StepsOf>
+std::vector<DriveIdentity> configure(CanNetwork& network, Slots drives, const FrameHandler& handler, StepsOf steps_of) {
+  for (;;) {
+    if (auto identities = try_to_configure(network, drives, handler, steps_of)) return *identities;
+  }
 }
 
 void wait_for_state(CanNetwork& network, Slots drives, const FrameHandler& handler, NmtState state,
@@ -159,6 +182,24 @@ std::string describe(const DriveIdentity& identity) {
     separator = ", ";
   }
   return text;
+}
+
+std::vector<std::string> losses_of(Slots drives) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> by_text;
+  for (const DriveSlot& slot : drives) {
+    for (const std::string& loss : slot.drive->losses()) {
+      auto known = std::find_if(by_text.begin(), by_text.end(), [&](const auto& entry) { return entry.first == loss; });
+      if (known == by_text.end()) known = by_text.insert(known, {loss, {}});
+      known->second.push_back(slot.drive->description().joint);
+    }
+  }
+  std::vector<std::string> lines;
+  for (const auto& [loss, joints] : by_text) {
+    std::string line = joints.size() == 1 ? "drive of " : "drives of ";
+    for (const std::string& joint : joints) line += (&joint == &joints.front() ? "" : ", ") + joint;
+    lines.push_back(line + ": " + loss);
+  }
+  return lines;
 }
 
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, Slots drives, const FrameHandler& other) {

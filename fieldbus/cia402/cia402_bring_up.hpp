@@ -40,6 +40,9 @@ struct DriveIdentity {
 
 [[nodiscard]] std::string describe(const DriveIdentity& identity);
 
+// What the drives lack, a line each: "drives of axis_1, axis_2: no 6007h:00: …".
+[[nodiscard]] std::vector<std::string> losses_of(std::span<const DriveSlot> drives);
+
 // Frames that aren't the drives' go to `other`. Two drives with one node on one bus are refused (one interface may
 // carry several of the cell's buses). The drives' start_cycle() is called at the end.
 std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const DriveSlot> drives,

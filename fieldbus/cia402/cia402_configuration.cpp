@@ -1,12 +1,15 @@
 // What a CiA 402 drive is told before the cycle, and what is said of it in words.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 
 #include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/canopen/canopen_sdo_abort.hpp"
 #include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/cia402_drive.hpp"
 #include "fieldbus/cia402/eds_check.hpp"
+#include "models/description/homing.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -14,6 +17,7 @@ namespace {
 using description::number_text;
 using description::SetupError;
 
+constexpr std::uint32_t servo_drive = 0x00020192;       // 1000h: CiA 402, of type servo drive
 constexpr std::int64_t mode_patience_ns = 500'000'000;  // 6061h follows 6060h when the drive gets round to it
 
 constexpr const char* period_advice =
@@ -50,7 +54,7 @@ void append(std::vector<SdoStep>& steps, const std::vector<SdoStep>& more) {
 void append_identity(std::vector<SdoStep>& steps, const description::DriveDescription& drive) {
   // The first step is also the one that finds out whether the node is there at all.
   steps.push_back(
-      sdo_expect({0x1000, 0}, 4, drive.device_type, "device type",
+      sdo_expect({0x1000, 0}, 4, drive.device_type.value_or(servo_drive), "device type",
                  "is another device set to this node, or is device_type in the cell's file not this drive's?"));
   steps.push_back(sdo_read({0x1018, 1}, 4, "vendor-ID"));
   steps.push_back(if_present(sdo_read({0x1018, 2}, 4, "product code")));
@@ -64,7 +68,7 @@ void append_identity(std::vector<SdoStep>& steps, const description::DriveDescri
 
 // Quiet first: nothing but what the cycle needs may be on the bus.
 void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescription& drive, std::uint16_t timeout_ms,
-                 std::uint32_t inputs_object) {
+                 std::uint32_t inputs_object, bool torque_feedback) {
   const std::uint8_t node = drive.node;
   for (std::uint8_t number = 2; number <= 4; ++number) {
     steps.push_back(disable_pdo_step(PdoDirection::receive, number, node));
@@ -83,7 +87,7 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .transmission_type = every_sync,
                            .event_timer_ms = 0,
                            .fd = drive.fd,
-                           .mapping = tpdo_mapping(drive)}));
+                           .mapping = tpdo_mapping(drive, torque_feedback)}));
   if (inputs_object == 0) return;
   append(steps, pdo_steps({.direction = PdoDirection::transmit,
                            .number = 2,
@@ -105,8 +109,8 @@ void append_torque(std::vector<SdoStep>& steps, const description::DriveDescript
   steps.push_back(if_present(sdo_write({0x6080, 0}, 4, static_cast<std::uint32_t>(std::ceil(rpm)), "max motor speed")));
 }
 
-// What the drive does when we are gone or when it is told to stop. 1016h and 6007h are a must, since they are what
-// stops the arm when the controller dies; the others have defaults in the standard that stop it too.
+// What the drive does when we are gone or when it is told to stop. 1016h is a must, since it is what stops the arm when
+// the controller dies; the others have defaults in the standard that stop it too.
 void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings) {
   const std::uint32_t consumer =
       static_cast<std::uint32_t>(settings.master_node) << 16 | settings.master_heartbeat_timeout_ms;
@@ -115,7 +119,10 @@ void append_reactions(std::vector<SdoStep>& steps, const DriveSettings& settings
   steps.push_back(sdo_write({0x1016, 1}, 4, consumer, "consumer heartbeat time (of the controller)"));
   steps.push_back(sdo_write({0x1017, 0}, 2, settings.drive_heartbeat_ms, "producer heartbeat time"));
   steps.push_back(if_present(sdo_write({0x1029, 1}, 1, 0, "error behaviour (communication error: pre-operational)")));
-  steps.push_back(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"));
+  // Where it is the maker's: a fault or no voltage stops the arm, too. 0, no action, is refused.
+  steps.push_back(or_found(if_present(sdo_write({0x6007, 0}, 2, 3, "abort connection option code (quick stop)"),
+                                      "how it stops without the controller is its own affair"),
+                           {3, 1, 2}));
   steps.push_back(if_present(sdo_write({0x605A, 0}, 2, 2, "quick stop option code (quick-stop ramp, then disabled)")));
   steps.push_back(if_present(sdo_write({0x605B, 0}, 2, 1, "shutdown option code (slow down, then disable)")));
   steps.push_back(if_present(sdo_write({0x605C, 0}, 2, 1, "disable operation option code (slow down, then disable)")));
@@ -147,6 +154,11 @@ PeriodSteps ServoDrive::period_steps(std::int64_t from_ns, std::int64_t to_ns) c
   return {value_first ? value : index, value_first ? index : value, sync, timer};
 }
 
+void DriveSettings::stop_without_controller(double within_s) noexcept {
+  master_heartbeat_timeout_ms = static_cast<std::uint16_t>(std::lround(std::floor(1e3 * within_s + 1e-6)));
+  master_heartbeat_ms = static_cast<std::uint16_t>(master_heartbeat_timeout_ms / 3);
+}
+
 void DriveSettings::validate() const {
   const auto refuse_setting = [](const char* key, std::string found, std::string expected, std::string advice = "") {
     throw SetupError(
@@ -163,6 +175,11 @@ void DriveSettings::validate() const {
   if (master_heartbeat_ms < 1 || master_heartbeat_timeout_ms <= master_heartbeat_ms) {
     refuse_setting("master_heartbeat_timeout_ms", std::to_string(master_heartbeat_timeout_ms),
                    "more than the heartbeat's own " + std::to_string(master_heartbeat_ms) + " ms");
+  }
+  constexpr std::uint16_t usual_timeout_ms = 60;
+  if (master_heartbeat_timeout_ms < usual_timeout_ms && master_heartbeat_timeout_ms * 1'000'000LL < 3 * period_ns) {
+    refuse_setting("supervision.bus_loss_stop_s", number_text(1e-3 * master_heartbeat_timeout_ms) + " s",
+                   "at least three timesteps: the heartbeat is sent by the cycle");
   }
   if (drive_heartbeat_ms < 1 || drive_heartbeat_timeout_ms <= drive_heartbeat_ms) {
     refuse_setting("drive_heartbeat_timeout_ms", std::to_string(drive_heartbeat_timeout_ms),
@@ -183,6 +200,7 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
       mode_(mode_of(drive)),
       tpdo_bytes_(pdo_bytes(tpdo_mapping(drive))),
       rpdo_bytes_(pdo_bytes(rpdo_mapping(drive))),
+      torque_feedback_(mode_.torque),
       scale_(drive),
       heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
   if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
@@ -198,7 +216,58 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
   }
   if (drive.eds.empty()) return;
   eds_ = std::make_shared<description::EdsFile>(description::load_eds(drive.eds));
-  (void)configuration_steps();  // says what doesn't fit
+  if (!description_.device_type) description_.device_type = cia402_device_type(*eds_);
+  leave_out_what_eds_lacks();
+  EdsLosses losses;
+  (void)steps_by_eds(profile_steps(), *eds_, description_, &losses);  // says what doesn't fit
+  losses_.insert(losses_.end(), losses.missing.begin(), losses.missing.end());
+  fixed_by_eds_ = losses.fixed;
+}
+
+void ServoDrive::leave_out_what_eds_lacks() {
+  for (const MappedObject& object : tpdo_mapping(description_)) {
+    const bool is_needed = object.object == object_address(description_.objects.statusword) ||
+                           object.object == object_address(description_.objects.position);
+    if (!is_needed && !can_send(*eds_, object)) lose_feedback(object);
+  }
+}
+
+void ServoDrive::lose_feedback(const MappedObject& object) {
+  const bool is_torque = object.object == object_address(description_.objects.torque);
+  if (is_torque) torque_feedback_ = false;
+  std::erase_if(description_.feedback, [&](const description::DriveFeedback& feedback) {
+    return object_address(feedback.object) == object.object;
+  });
+  tpdo_bytes_ = pdo_bytes(tpdo_mapping(description_, torque_feedback_));
+  const char* name = is_torque ? "no torque feedback" : "no such feedback in the record";
+  losses_.push_back("no " + to_string(object.object) + " in its TPDO: " + name);
+}
+
+bool ServoDrive::give_up_feedback(const SdoStep& failed, std::uint32_t abort_code) {
+  constexpr std::uint32_t refusals[] = {sdo_abort::object_missing, sdo_abort::sub_index_missing,
+                                        sdo_abort::not_mappable};
+  if (std::find(std::begin(refusals), std::end(refusals), abort_code) == std::end(refusals)) return false;
+  const auto mapping = tpdo_mapping(description_, torque_feedback_);
+  constexpr std::uint16_t first_transmit_mapping = 0x1A00;
+  if (failed.object.index != first_transmit_mapping || failed.object.sub <= 2) return false;
+  if (failed.object.sub > mapping.size()) return false;
+  lose_feedback(mapping[failed.object.sub - 1U]);
+  return true;
+}
+
+void ServoDrive::note_losses(const std::vector<std::string>& losses) {
+  fixed_by_eds_.clear();
+  for (const std::string& loss : losses) {
+    if (std::find(losses_.begin(), losses_.end(), loss) == losses_.end()) losses_.push_back(loss);
+  }
+}
+
+std::vector<std::string> ServoDrive::losses() const {
+  std::vector<std::string> all = losses_;
+  if (!fixed_by_eds_.empty()) {
+    all.push_back("can't be written by its file and taken as found, because it fits: " + fixed_by_eds_);
+  }
+  return all;
 }
 
 // 6071h holds thousandths of the rated torque, in 16 bits.
@@ -229,8 +298,14 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
   const auto period = *interpolation_period(settings_.period_ns);
   std::vector<SdoStep> steps;
   append_identity(steps, description_);
+  if (description_.homing) {
+    steps.push_back(
+        sdo_expect({description::homed_index, description::homed_subindex}, 4, description::homed_token(description_),
+                   "configuration date",
+                   "its encoder is incremental, and it wasn't homed since power on: proxarm calibrate --home"));
+  }
   append_pdos(steps, description_, rpdo_timeout_ms(settings_, settings_.period_ns, mode_.torque),
-              settings_.inputs_object);
+              settings_.inputs_object, torque_feedback_);
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_value), 1, period.units,
                             "interpolation time period value"));
   steps.push_back(sdo_write(object_address(description_.objects.interpolation_index), 1, as_u8(period.exponent),
@@ -244,7 +319,8 @@ std::vector<SdoStep> ServoDrive::profile_steps() const {
     steps.push_back(if_present(sdo_write({0x6085, 0}, 4, *ramp, "quick stop deceleration")));
   }
   steps.push_back(if_present(
-      sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window")));
+      sdo_write({0x6065, 0}, 4, *scale_.size_counts(settings_.following_error_window_rad), "following error window"),
+      "it has no such window of its own, so only the controller watches whether it follows"));
   steps.push_back(if_present(sdo_write({0x6066, 0}, 2, settings_.following_error_time_ms, "following error time out")));
   if (mode_.torque) append_torque(steps, description_);
   steps.push_back(sdo_write(object_address(description_.objects.mode), 1, mode_.number, "modes of operation"));

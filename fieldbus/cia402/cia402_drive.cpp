@@ -78,7 +78,7 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
   if (fresh_) ++repeated_tpdos_;
   statusword_ = read_u16_le(&frame.data[0]);
   actual_counts_ = read_i32_le(&frame.data[2]);
-  if (mode_.torque) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
+  if (torque_feedback_) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
   cycles_without_tpdo_ = 0;
   fresh_ = heard_ = true;
 

@@ -51,6 +51,9 @@ struct DriveSettings {
   SdoSequenceConfig sdo{};
   std::int64_t nmt_timeout_ns = 2'000'000'000;  // for a change of NMT state to show in the drive's heartbeat
 
+  // The drives stop within this time of the controller's last word, whatever else they watch: its heartbeat comes three
+  // times as often.
+  void stop_without_controller(double within_s) noexcept;
   void validate() const;  // throws SetupError
 };
 
@@ -71,6 +74,13 @@ class ServoDrive final : public CyclicDrive {
   // ---- set-up ----
   // By the profile, and by the drive's EDS where it has one (eds_check.hpp).
   [[nodiscard]] std::vector<SdoStep> configuration_steps() const;
+  // After configuration_steps() was answered: what was lost, by the drive itself. Not for the cycle.
+  void note_losses(const std::vector<std::string>& losses);
+  // A transmit PDO that the drive doesn't take: true where that is for feedback which nothing depends on. It is left
+  // out from now on, and configuration_steps() are others.
+  bool give_up_feedback(const SdoStep& failed, std::uint32_t abort_code);
+  // What the drive lacks, and what is lost by it, a line each; by its EDS, and once it has been configured by itself.
+  [[nodiscard]] std::vector<std::string> losses() const;
   // What is left to write once it is in operational.
   [[nodiscard]] std::vector<SdoStep> operation_steps() const;
   // From one period to another, in the order in which they are written; of 60C2h the part comes first with which the
@@ -111,7 +121,7 @@ class ServoDrive final : public CyclicDrive {
   [[nodiscard]] bool torque_mode() const noexcept { return mode_.torque; }
   // 6071h and 6077h, thousandths of the rated torque; the latter as torque at the joint, too.
   [[nodiscard]] std::int16_t target_torque() const noexcept { return target_torque_; }
-  [[nodiscard]] std::int16_t actual_torque() const noexcept { return actual_torque_; }
+  [[nodiscard]] std::int16_t actual_torque() const noexcept { return actual_torque_; }  // 0 without torque feedback
   [[nodiscard]] double actual_torque_Nm() const noexcept { return actual_torque_ / torque_per_Nm_; }
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
@@ -142,11 +152,14 @@ class ServoDrive final : public CyclicDrive {
   void archive(StateArchive& state) noexcept override {
     state(heartbeat_, goal_, state_, fault_, statusword_, controlword_, actual_counts_, target_counts_,
           boot_ups_at_start_, cycles_without_tpdo_, held_, held_pending_, cycling_, old_fault_, fresh_, heard_,
-          following_, emergency_, emergencies_, repeated_tpdos_, target_torque_, actual_torque_, torque_per_Nm_);
+          following_, emergency_, emergencies_, repeated_tpdos_, target_torque_, actual_torque_, torque_per_Nm_,
+          tpdo_bytes_, torque_feedback_);
   }
 
  private:
   void set_up_torque();
+  void lose_feedback(const MappedObject& object);
+  void leave_out_what_eds_lacks();
   [[nodiscard]] std::vector<SdoStep> profile_steps() const;
   bool decode_tpdo(const CanFrame& frame) noexcept;
   void judge_state(bool was_enabled) noexcept;
@@ -157,6 +170,9 @@ class ServoDrive final : public CyclicDrive {
   std::shared_ptr<const description::EdsFile> eds_;  // may be none
   CyclicMode mode_;
   std::uint8_t tpdo_bytes_, rpdo_bytes_;
+  bool torque_feedback_;  // in TPDO1
+  std::vector<std::string> losses_;
+  std::string fixed_by_eds_;  // until the drive itself has been asked
   CountScale scale_;
   double torque_per_Nm_ = 1.0;  // signed
   HeartbeatConsumer heartbeat_;

@@ -27,10 +27,10 @@ std::vector<MappedObject> rpdo_mapping(const description::DriveDescription& driv
           {object_address(target), static_cast<std::uint8_t>(mode.torque ? 16 : 32)}};
 }
 
-std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& drive) {
+std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& drive, bool torque_feedback) {
   std::vector<MappedObject> mapping{{object_address(drive.objects.statusword), 16},
                                     {object_address(drive.objects.position), 32}};
-  if (mode_of(drive).torque) mapping.push_back({object_address(drive.objects.torque), 16});
+  if (mode_of(drive).torque && torque_feedback) mapping.push_back({object_address(drive.objects.torque), 16});
   for (const description::DriveFeedback& more : drive.feedback) {
     mapping.push_back({object_address(more.object), more.bits});
   }

@@ -34,7 +34,8 @@ struct CyclicMode {
 [[nodiscard]] const CyclicMode& mode_of(const description::DriveDescription& drive) noexcept;
 
 [[nodiscard]] std::vector<MappedObject> rpdo_mapping(const description::DriveDescription& drive);
-[[nodiscard]] std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& drive);
+[[nodiscard]] std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& drive,
+                                                     bool torque_feedback = true);
 [[nodiscard]] std::uint8_t pdo_bytes(const std::vector<MappedObject>& mapping) noexcept;
 
 }  // namespace proxarm::fieldbus

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "fieldbus/canopen/canopen_object.hpp"
+#include "models/description/homing.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -57,10 +58,12 @@ bool is_mapping(ObjectAddress object) noexcept {
 void check_step(const EdsFile& eds, const SdoStep& step) {
   const EdsObject& object = require(eds, number_of(step.object), 8 * step.bytes, step.name);
   if (!object.readable) refuse(eds, number_of(step.object), "AccessType", "wo", "one that can be read back");
-  if (step.kind == SdoStep::Kind::write && !object.writable) {
+  if (step.kind == SdoStep::Kind::write && !object.writable && step.as_found.empty()) {
     refuse(eds, number_of(step.object), "AccessType", "ro", "one that can be written: " + std::string(step.name));
   }
-  if (step.kind == SdoStep::Kind::expect && object.default_value && (*object.default_value & step.mask) != step.value) {
+  const bool is_kept = step.object.index == description::homed_index;  // what was written there, not the default
+  if (step.kind == SdoStep::Kind::expect && !is_kept && object.default_value &&
+      (*object.default_value & step.mask) != step.value) {
     refuse(eds, number_of(step.object), "DefaultValue", hex_text(*object.default_value, 8),
            hex_text(step.value, 8) + " (" + step.name + ")" + (*step.advice == '\0' ? "" : "; ") + step.advice);
   }
@@ -71,6 +74,39 @@ void check_step(const EdsFile& eds, const SdoStep& step) {
   }
 }
 
+// Of an object that can't be written: its default, where the file says it.
+std::optional<std::uint32_t> fixed_value(const EdsObject& object, std::uint8_t node) noexcept {
+  if (object.default_offset) return *object.default_offset + node;
+  return object.default_value;
+}
+
+// What the drive is found to have there must be one of the values that fit.
+void require_found(const EdsFile& eds, const SdoStep& step, std::uint8_t node) {
+  const auto value = fixed_value(*eds.find(number_of(step.object)), node);
+  if (!value) return;  // the drive itself will be asked
+  const auto is = [&](std::uint32_t fits) { return ((*value ^ fits) & step.mask) == 0; };
+  if (is(step.value) || std::any_of(step.as_found.begin(), step.as_found.end(), is)) return;
+  std::string expected;
+  for (const std::uint32_t fits : step.as_found) {
+    expected += (expected.empty() ? "" : " or ") + hex_text(fits, 2 * step.bytes);
+  }
+  refuse(eds, number_of(step.object), "DefaultValue", hex_text(*value, 2 * step.bytes) + ", which can't be written",
+         expected + ": " + step.name);
+}
+
+// A loss by an optional object that isn't there, or can't be written; empty: none.
+std::string loss_of(const EdsObject* there, const SdoStep& step, std::uint8_t node) {
+  if (*step.lost == '\0') return "";
+  if (there == nullptr) return "no " + to_string(step.object) + ": " + step.lost;
+  const auto value = fixed_value(*there, node);
+  if (value && ((*value ^ step.value) & step.mask) == 0) return "";
+  return to_string(step.object) + " can't be written: " + step.lost;
+}
+
+void lose(std::vector<std::string>& losses, const std::string& text) {
+  if (!text.empty() && std::find(losses.begin(), losses.end(), text) == losses.end()) losses.push_back(text);
+}
+
 bool is_set_by(const std::vector<SdoStep>& steps, std::uint32_t object) {
   return std::any_of(steps.begin(), steps.end(), [&](const SdoStep& step) {
     return step.kind == SdoStep::Kind::write && number_of(step.object) == object;
@@ -79,8 +115,20 @@ bool is_set_by(const std::vector<SdoStep>& steps, std::uint32_t object) {
 
 }  // namespace
 
+std::optional<std::uint32_t> cia402_device_type(const EdsFile& eds) noexcept {
+  const EdsObject* device_type = eds.find(0x100000);
+  const bool is_drive = device_type != nullptr && device_type->default_value.value_or(0) % 0x10000 == 0x0192;
+  return is_drive ? device_type->default_value : std::nullopt;
+}
+
+bool can_send(const EdsFile& eds, const MappedObject& mapped) {
+  const EdsObject* there = eds.find(number_of(mapped.object));
+  if (there == nullptr) return false;
+  return require(eds, number_of(mapped.object), mapped.bits, "what the PDO carries").mappable;
+}
+
 std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFile& eds,
-                                  const description::DriveDescription& drive) {
+                                  const description::DriveDescription& drive, EdsLosses* losses) {
   if (eds.node && *eds.node != drive.node) {
     throw SetupError({.file = eds.file.string(),
                       .key = "[DeviceComissioning] NodeID",
@@ -91,8 +139,16 @@ std::vector<SdoStep> steps_by_eds(const std::vector<SdoStep>& steps, const EdsFi
   for (SdoStep step : steps) {
     const EdsObject* there = eds.find(number_of(step.object));
     const bool can = there != nullptr && (there->writable || step.kind != SdoStep::Kind::write);
-    if (step.is_optional && !can) continue;
+    if (step.is_optional && (there == nullptr || (!can && step.as_found.empty()))) {
+      if (losses != nullptr) lose(losses->missing, loss_of(there, step, drive.node));
+      continue;
+    }
     check_step(eds, step);
+    if (!can) {
+      require_found(eds, step, drive.node);
+      if (losses != nullptr) losses->fixed += (losses->fixed.empty() ? "" : ", ") + to_string(step.object);
+      if (losses != nullptr && step.is_optional) lose(losses->missing, loss_of(there, step, drive.node));
+    }
     const std::pair<ObjectAddress, std::optional<std::uint32_t>> identity[] = {{{0x1018, 1}, eds.vendor},
                                                                                {{0x1018, 2}, eds.product}};
     for (const auto& [object, value] : identity) {

@@ -142,7 +142,27 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.velocity_feedforward = node.number_or("velocity_feedforward", s.velocity_feedforward, 0.0, 1.0);
   s.acceleration_feedforward = node.number_or("acceleration_feedforward", s.acceleration_feedforward, 0.0, 1.0);
   s.servo_rate_Hz = node.number_or("servo_rate_Hz", s.servo_rate_Hz, 1000.0, 1e5);
+  s.stack = node.choice_or("stack", s.stack, {"strict", "latching", "lazy"});
   return s;
+}
+
+// Where the encoder is incremental, and only there.
+std::optional<HomingDescription> read_homing(const YamlNode& node, const DriveDescription& drive) {
+  const bool incremental = node.choice_or("encoder", "absolute", {"absolute", "incremental"}) == "incremental";
+  const auto map = node.find_map("homing");
+  if (incremental && !map) throw node.error_at("homing", "a map: an incremental encoder has no zero until it is homed");
+  if (!incremental && map) throw node.error_at("encoder", "incremental, where there is `homing`");
+  if (!map) return std::nullopt;
+  if (!drive.on_can()) throw node.error_at("encoder", "absolute: drives on Modbus can't be homed from here");
+  HomingDescription homing;
+  homing.method = static_cast<int>(map->integer("method", -128, 127));
+  homing.speed_rad_per_s = map->number("speed_rad_per_s", above(0.0, drive.max_speed_rad_per_s));
+  homing.slow_speed_rad_per_s = map->number("slow_speed_rad_per_s", above(0.0, homing.speed_rad_per_s));
+  homing.acceleration_rad_per_s2 =
+      map->number("acceleration_rad_per_s2", above(0.0, drive.max_acceleration_rad_per_s2));
+  homing.angle_rad = map->number("angle_rad", drive.range_rad[0] - 1.0, drive.range_rad[1] + 1.0);
+  homing.timeout_s = map->number_or("timeout_s", homing.timeout_s, 1.0, 600.0);
+  return homing;
 }
 
 // 607A and 6064 are 32-bit: the whole range must fit them.
@@ -230,7 +250,9 @@ DriveDescription read_drive(const YamlNode& node) {
     d.fd = node.boolean_or("fd", false);
     if (node.has("feedback")) d.feedback = read_feedback(node, d);
   }
-  d.device_type = static_cast<std::uint32_t>(node.integer_or("device_type", d.device_type, 0, 0xffffffff));
+  if (node.has("device_type")) {
+    d.device_type = static_cast<std::uint32_t>(node.integer("device_type", 0, 0xffffffff));
+  }
   d.counts_per_motor_revolution =
       node.number_or("counts_per_motor_revolution", d.counts_per_motor_revolution, 1.0, 4294967296.0);
   d.gear_ratio = node.number_or("gear_ratio", d.gear_ratio, above(0.0, 1e5));
@@ -247,6 +269,7 @@ DriveDescription read_drive(const YamlNode& node) {
   check_counts(node, d);
   d.max_speed_rad_per_s = node.number("max_speed_rad_per_s", above(0.0, 100.0));
   d.max_acceleration_rad_per_s2 = node.number("max_acceleration_rad_per_s2", above(0.0, 1e4));
+  d.homing = read_homing(node, d);
   d.rotor_inertia_kg_m2 = node.number("rotor_inertia_kg_m2", 0.0, 1e5);
   d.position_bandwidth_Hz = node.number_or("position_bandwidth_Hz", 100.0, 1.0, 10000.0);
   d.gear_stiffness_Nm_per_rad = node.number_or("gear_stiffness_Nm_per_rad", 0.0, 0.0, 1e9);

@@ -62,6 +62,17 @@ struct SimulatedDrive {
   double velocity_feedforward = 1.0;      // of the interpolated setpoint
   double acceleration_feedforward = 1.0;
   double servo_rate_Hz = 4000.0;
+  std::string stack = "strict";  // "strict", "latching", "lazy": sim/canopen/stack_behaviour.hpp
+};
+
+// How a drive with an incremental encoder finds its zero after power on: its own homing, CiA 402's mode 6.
+struct HomingDescription {
+  int method = 0;                        // 6098h
+  double speed_rad_per_s = 0.0;          // 6099h:01, towards the switch or stop; at the joint
+  double slow_speed_rad_per_s = 0.0;     // 6099h:02, towards the zero
+  double acceleration_rad_per_s2 = 0.0;  // 609Ah
+  double angle_rad = 0.0;                // of the joint where the zero is; its counts there go to 607Ch
+  double timeout_s = 60.0;
 };
 
 // Objects that a CANopen drive has elsewhere than the profile CiA 402 says, as index << 8 | sub-index.
@@ -88,8 +99,8 @@ struct DriveDescription {
   std::string eds;                 // cia402: path of the maker's EDS or DCF file, absolute; may be empty
   DriveObjects objects;            // cia402
   bool fd = false;                 // cia402: its PDOs are CAN FD frames at the data bitrate
-  std::vector<DriveFeedback> feedback;     // cia402: behind what the controller needs, for the record
-  std::uint32_t device_type = 0x00020192;  // expected in 1000h: CiA 402 servo drive
+  std::vector<DriveFeedback> feedback;       // cia402: behind what the controller needs, for the record
+  std::optional<std::uint32_t> device_type;  // expected in 1000h; none: what `eds` says, or a CiA 402 servo drive's
   double counts_per_motor_revolution = 1048576.0;
   double gear_ratio = 100.0;       // motor revolutions per joint revolution
   int direction = 1;               // +1 or −1: sign of counts against the URDF's joint
@@ -97,13 +108,14 @@ struct DriveDescription {
   std::array<double, 2> range_rad{};
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
-  double rated_torque_Nm = 0.0;            // mode cst: 6076h times the gear ratio, what 1000 in 6071h is at the joint
-  double max_torque_Nm = 0.0;              // mode cst: what the joint may be asked for; others: what the drive has at
-                                           // the joint, which its setpoints are kept to; 0: not said
-  double rotor_inertia_kg_m2 = 0.0;        // reflected to the joint
-  double position_bandwidth_Hz = 100.0;    // of the drive's position loop, as its maker or a test states it: the lag
-                                           // that the stability check counts on
-  double gear_stiffness_Nm_per_rad = 0.0;  // 0: taken as rigid; used to compensate gravity's deflection
+  double rated_torque_Nm = 0.0;             // mode cst: 6076h times the gear ratio, what 1000 in 6071h is at the joint
+  double max_torque_Nm = 0.0;               // mode cst: what the joint may be asked for; others: what the drive has at
+                                            // the joint, which its setpoints are kept to; 0: not said
+  std::optional<HomingDescription> homing;  // of an incremental encoder; none: an absolute one
+  double rotor_inertia_kg_m2 = 0.0;         // reflected to the joint
+  double position_bandwidth_Hz = 100.0;     // of the drive's position loop, as its maker or a test states it: the lag
+                                            // that the stability check counts on
+  double gear_stiffness_Nm_per_rad = 0.0;   // 0: taken as rigid; used to compensate gravity's deflection
   std::optional<double> gear_damping_Nms_per_rad;  // for the stability check; none: not known
   SimulatedDrive simulation;
 

@@ -14,7 +14,13 @@ namespace {
 constexpr std::size_t max_bytes = 4U << 20, max_messages = 4096, max_signals = 512;
 constexpr int max_bytes_of_message = 64;  // of CAN FD
 constexpr std::uint32_t extended_bit = 0x80000000U, unassigned_id = 0xC0000000U;
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 constexpr std::string_view unassigned_name = "VECTOR__INDEPENDENT_SIG_MSG";
+
+// What may follow a section whose ';' is missing.
+constexpr std::string_view known_sections[] = {"BO_",          "SG_",         "CM_",       "VAL_",
+                                               "VAL_TABLE_",   "BA_",         "BA_DEF_",   "BA_DEF_DEF_",
+                                               "SIG_VALTYPE_", "SG_MUL_VAL_", "BO_TX_BU_", "SIG_GROUP_"};
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -30,6 +36,7 @@ class Reader {
  public:
   Reader(std::string_view text, const std::filesystem::path& file) : rest_(text), file_(file) {
     unassigned_.bytes = max_bytes_of_message;
+    if (rest_.starts_with(byte_order_mark)) rest_.remove_prefix(byte_order_mark.size());
     advance();
   }
 
@@ -57,8 +64,10 @@ class Reader {
   }
 
   void advance() {
+    first_in_line_ = false;
     while (!rest_.empty() && (rest_[0] == ' ' || rest_[0] == '\t' || rest_[0] == '\r' || rest_[0] == '\n')) {
       line_ += rest_[0] == '\n' ? 1 : 0;
+      first_in_line_ = first_in_line_ || rest_[0] == '\n';
       rest_.remove_prefix(1);
     }
     if (rest_.empty()) return take(Token::Kind::end, 0);
@@ -142,13 +151,56 @@ class Reader {
       return read_or_note(dbc, [&] { read_signal(*current(dbc)); });
     }
     if (name == "SIG_VALTYPE_") return read_type(dbc);
+    if (name == "BA_") read_long_name(dbc);
     if (name == "VERSION") return void(string("the version, in quotes"));
     if (name == "NS_") return skip_new_symbols();
     if (name == "BS_" || name == "BU_") return skip_line(line);
-    while (token_.kind != Token::Kind::end && !at_sign(';')) advance();
-    if (token_.kind == Token::Kind::end)
-      return dbc.remarks.emplace_back(error("';', which ends " + name).what()), void();
+    skip_section(dbc, name);
+  }
+
+  // To its ';'. One that isn't there swallows nothing of what follows.
+  void skip_section(DbcFile& dbc, const std::string& name) {
+    while (token_.kind != Token::Kind::end && !at_sign(';') && !(first_in_line_ && begins_known_section())) advance();
+    if (!at_sign(';')) {
+      dbc.remarks.emplace_back(error("';', which ends " + name).what());
+      return;
+    }
     sign(';');
+  }
+
+  [[nodiscard]] bool begins_known_section() const {
+    return token_.kind == Token::Kind::word &&
+           std::find(std::begin(known_sections), std::end(known_sections), token_.text) != std::end(known_sections);
+  }
+
+  // BA_ "SystemSignalLongSymbol" SG_ 256 Fx_of_the_sen "Fx_of_the_sensor_at_the_flange": a name that was cut to 32
+  // characters. The rest of it, and what isn't that, is for skip_section().
+  void read_long_name(DbcFile& dbc) {
+    if (token_.kind != Token::Kind::string) return;
+    const bool of_signal = token_.text == "SystemSignalLongSymbol",
+               of_message = token_.text == "SystemMessageLongSymbol";
+    if (!of_signal && !of_message) return;
+    advance();
+    if (token_.kind != Token::Kind::word) return;
+    advance();
+    const auto number = token_.kind == Token::Kind::number ? strict_integer(token_.text) : std::nullopt;
+    if (!number) return;
+    advance();
+    std::string_view cut;
+    if (of_signal) {
+      if (token_.kind != Token::Kind::word) return;
+      cut = token_.text;
+      advance();
+    }
+    if (token_.kind != Token::Kind::string || token_.text.size() > 128) return;
+    for (DbcMessage& message : dbc.messages) {
+      const std::uint32_t id = message.id | (message.extended ? extended_bit : 0U);
+      if (*number != std::int64_t{id}) continue;
+      if (of_message) message.long_name = std::string(token_.text);
+      for (DbcSignal& signal : message.signals) {
+        if (of_signal && signal.name == cut) signal.long_name = std::string(token_.text);
+      }
+    }
   }
 
   // The message that signals belong to.
@@ -167,11 +219,7 @@ class Reader {
       if (DbcMessage* message = current(dbc); message != nullptr && message->mistake.empty()) {
         message->mistake = mistake.what();
       }
-      int line = token_.line;
-      while (token_.kind != Token::Kind::end && !(token_.line != line && begins_section())) {
-        line = token_.line;
-        advance();
-      }
+      while (token_.kind != Token::Kind::end && !(first_in_line_ && begins_section())) advance();
     }
   }
 
@@ -250,14 +298,23 @@ class Reader {
     (void)number("the highest value");
     sign(']');
     signal.unit = std::string(string("the unit, in quotes"));
-    (void)word("a receiver's name");
-    while (at_sign(',')) {
-      advance();
-      (void)word("a receiver's name");
-    }
-    if (message.find(signal.name) != nullptr) throw error("a signal that isn't there yet: " + signal.name);
+    skip_receivers();
+    // Branches of a multiplexer may use a name again; none of them is a sensor's.
+    const DbcSignal* same = message.find(signal.name);
+    if (same != nullptr && same->multiplexed && signal.multiplexed) return;
+    if (same != nullptr) throw error("a signal that isn't there yet: " + signal.name);
     if (message.signals.size() >= max_signals) throw error("no more than 512 signals in a message");
     message.signals.push_back(std::move(signal));
+  }
+
+  // With commas between, blanks, or none at all.
+  void skip_receivers() {
+    bool goes_on = !first_in_line_;
+    while (goes_on && (token_.kind == Token::Kind::word || at_sign(','))) {
+      const bool comma = at_sign(',');
+      advance();
+      goes_on = comma || !first_in_line_;
+    }
   }
 
   // Intel: `start` is the lowest bit. Motorola: the highest, numbered as bit 7 .. 0 of byte 0, then bit 15 .. 8 of byte
@@ -301,18 +358,22 @@ class Reader {
   const std::filesystem::path& file_;
   Token token_;
   int line_ = 1;
+  bool first_in_line_ = false;  // token_ is
 };
 
 }  // namespace
 
 const DbcSignal* DbcMessage::find(std::string_view signal) const noexcept {
-  const auto found = std::find_if(signals.begin(), signals.end(), [&](const DbcSignal& s) { return s.name == signal; });
+  const auto found = std::find_if(signals.begin(), signals.end(), [&](const DbcSignal& s) {
+    return s.name == signal || (!s.long_name.empty() && s.long_name == signal);
+  });
   return found == signals.end() ? nullptr : &*found;
 }
 
 const DbcMessage* DbcFile::find(std::string_view message) const noexcept {
-  const auto found =
-      std::find_if(messages.begin(), messages.end(), [&](const DbcMessage& m) { return m.name == message; });
+  const auto found = std::find_if(messages.begin(), messages.end(), [&](const DbcMessage& m) {
+    return m.name == message || (!m.long_name.empty() && m.long_name == message);
+  });
   return found == messages.end() ? nullptr : &*found;
 }
 

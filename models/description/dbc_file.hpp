@@ -21,15 +21,16 @@ namespace proxarm::description {
 
 struct DbcSignal {
   std::string name;
-  NumberField number;  // its first byte in its frame
-  int length = 0;      // bits as stated; more than 32 can be read past, but not used: then number.bits is 32
+  std::string long_name;  // that an editor cut to 32 characters; else empty
+  NumberField number;     // its first byte in its frame
+  int length = 0;         // bits as stated; more than 32 can be read past, but not used: then number.bits is 32
   bool multiplexed = false;
   double factor = 1.0, offset = 0.0;
   std::string unit;
 };
 
 struct DbcMessage {
-  std::string name;
+  std::string name, long_name;
   std::uint32_t id = 0;
   bool extended = false;  // bit 31 in the file
   std::uint8_t bytes = 0;

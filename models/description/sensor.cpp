@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "models/description/sensor_sources.hpp"
 #include "models/files/yaml_file.hpp"
 
 namespace proxarm::description {
@@ -70,6 +71,17 @@ SensorSimulation read_simulation(const YamlNode& node) {
 
 }  // namespace
 
+SensorSources read_sensor_sources(const YamlNode& root) {
+  constexpr std::size_t longest = 400;
+  SensorSources sources;
+  if (root.has("sources")) {
+    for (const YamlNode& source : root.list("sources", 1, 16)) sources.sources.push_back(source.as_string());
+  }
+  sources.one_source_only = root.string_or("one_source_only", "");
+  if (sources.one_source_only.size() > longest) throw root.error_at("one_source_only", "at most 400 characters");
+  return sources;
+}
+
 SensorDescription load_sensor(const std::filesystem::path& file) { return read_sensor(YamlNode::load(file)); }
 
 SensorDescription read_sensor(const YamlNode& root) {
@@ -86,6 +98,7 @@ SensorDescription read_sensor(const YamlNode& root) {
   } else {
     sensor.simulation = read_simulation(root.map("simulation"));
   }
+  static_cast<void>(read_sensor_sources(root));
   root.finish();
   return sensor;
 }

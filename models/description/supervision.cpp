@@ -46,6 +46,7 @@ SupervisionDescription read_supervision(const YamlNode& node) {
   s.brake_release = node.string_or("brake_release", "");
   if (s.brake_release.size() > 120) throw node.error_at("brake_release", "at most 120 characters");
   s.monitored_standstill = node.boolean_or("monitored_standstill", s.monitored_standstill);
+  s.bus_loss_stop_s = node.number_or("bus_loss_stop_s", s.bus_loss_stop_s, 0.006, 1.0);
   const auto reactions = node.find_map("reactions");
   if (!reactions) return s;
   for (const ReactionChoice& choice : reaction_choices()) {

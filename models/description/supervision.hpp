@@ -52,7 +52,8 @@ struct SupervisionDescription {
   double empty_handle_N = 0.1;    // below this for half a second nobody is there
   double max_bias_drift_N = 0.5;  // by which the sensor's bias may go while nobody is there
   bool monitored_standstill = false;
-  std::string brake_release;                     // how a person opens the brakes by hand; empty: not at all
+  double bus_loss_stop_s = 0.06;  // within which each drive on CAN stops by itself when the controller is gone
+  std::string brake_release;      // how a person opens the brakes by hand; empty: not at all
   std::map<std::string, std::string> reactions;  // by the fault's name; a choice of reaction_choices()
 };
 

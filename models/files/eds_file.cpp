@@ -40,15 +40,26 @@ DataType data_type(std::int64_t number) noexcept {
   return {};
 }
 
-// "$NODEID+0x180", either way round, for a node that is known.
+// "$NODEID+0x180", in any case and order, with spaces or in brackets, for a node that is known: a sum in which $NODEID
+// comes once.
 std::optional<std::int64_t> relative_value(const std::string& text, int node) {
-  const std::size_t plus = text.find('+');
-  std::string rest = lower(text);
-  const std::size_t name = rest.find("$nodeid");
-  rest = name == 0 ? (plus == std::string::npos ? "0" : rest.substr(plus + 1)) : rest.substr(0, plus);
-  const IniFile offset("[x]\nvalue=" + rest, "");
-  const auto number = offset.number("x", "value", 0, u32);
-  return number ? std::optional(*number + node) : std::nullopt;
+  std::string sum = lower(text);
+  std::erase_if(sum, [](unsigned char c) { return std::isspace(c) != 0; });
+  if (sum.size() > 2 && sum.front() == '(' && sum.back() == ')') sum = sum.substr(1, sum.size() - 2);
+  std::int64_t total = 0;
+  int nodes = 0;
+  std::istringstream terms(sum + "+0");
+  for (std::string term; std::getline(terms, term, '+');) {
+    if (term == "$nodeid") {
+      total += node;
+      ++nodes;
+      continue;
+    }
+    const auto number = IniFile("[x]\nvalue=" + term, "").number("x", "value", 0, u32);
+    if (!number) return std::nullopt;
+    total += *number;
+  }
+  return nodes == 1 ? std::optional(total) : std::nullopt;
 }
 
 // A value of an object as its bits. Signed ones come as decimals, or as the bits of the type or of a wider one.
@@ -136,7 +147,8 @@ class Reader {
     if (!compact) return;
     first.bits = 8;
     first.writable = first.mappable = false;
-    first.default_value = first.value = std::nullopt;
+    first.default_value = first.value = first.default_offset = std::nullopt;
+    first.low = first.high = std::nullopt;
     for (std::uint32_t sub = 1; sub <= static_cast<std::uint32_t>(alike); ++sub) eds_.objects[address + sub] = object;
   }
 
@@ -159,10 +171,40 @@ class Reader {
     object.writable = access != "ro" && access != "const";
     object.mappable = ini_.number(section, "PDOMapping", 0, 1).value_or(0) == 1;
     try {
-      object.default_value = value_of(ini_, section, "DefaultValue", type, std::nullopt);
+      read_default(object, section, type);
     } catch (const SetupError& error) {
       eds_.remarks.push_back(error.what());
     }
+    try {
+      read_limits(object, section, type);
+    } catch (const SetupError& error) {
+      eds_.remarks.push_back(error.what());
+    }
+  }
+
+  void read_default(EdsObject& object, const std::string& section, const DataType& type) {
+    const std::string text = ini_.text(section, "DefaultValue");
+    if (type.bits == 0) {
+      object.default_text = text.substr(0, 80);
+    } else if (type.bits <= 32 && lower(text).find("$nodeid") != std::string::npos) {
+      object.default_offset = value_of(ini_, section, "DefaultValue", type, 0);
+    } else {
+      object.default_value = value_of(ini_, section, "DefaultValue", type, std::nullopt);
+    }
+  }
+
+  // Two equal ones are how some tools write that there are none.
+  void read_limits(EdsObject& object, const std::string& section, const DataType& type) {
+    if (type.number == real32) return;
+    const auto limit = [&](const char* key) -> std::optional<std::int64_t> {
+      const auto bits = value_of(ini_, section, key, type, std::nullopt);
+      if (!bits) return std::nullopt;
+      const std::int64_t wrap = std::int64_t{1} << type.bits;
+      return type.is_signed && *bits >= wrap / 2 ? *bits - wrap : std::int64_t{*bits};
+    };
+    object.low = limit("LowLimit");
+    object.high = limit("HighLimit");
+    if (object.low && object.high && *object.low >= *object.high) object.low = object.high = std::nullopt;
   }
 
   // What a DCF sets. That it can't be read is no mistake of one object: the drive wouldn't be set as the file says.

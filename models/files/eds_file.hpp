@@ -28,6 +28,9 @@ struct EdsObject {
   int bits = 0;  // of its data type; 0: none of 1 to 64 bits, a text for instance
   bool readable = true, writable = true, mappable = false;
   std::optional<std::uint32_t> default_value, value;  // value: what a DCF wants
+  std::optional<std::uint32_t> default_offset;        // instead of default_value: what is added to the node's number
+  std::string default_text;                           // of an object without bits: a text
+  std::optional<std::int64_t> low, high;              // limits, where both make sense
   int line = 0;                                       // of its section
   std::string mistake;                                // what is wrong with it, with file and line; else empty
 };

@@ -65,6 +65,13 @@ void read_value(IniFile::Section& section, std::string_view entry, int line) {
 
 IniFile::IniFile(std::string_view text, const std::filesystem::path& file) : file_(file) {
   if (text.size() > most_bytes) throw SetupError({.file = file.string(), .expected = "a file of at most 4 MB"});
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+    throw SetupError({.file = file.string(),
+                      .line = 1,
+                      .found = "a text in UTF-16",
+                      .expected = "one in UTF-8, ASCII or Latin-1",
+                      .advice = "save it so by an editor"});
+  }
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   Section* section = nullptr;
   for (int line = 1; !text.empty(); ++line) {

@@ -65,6 +65,9 @@ void CanopenSlave::add_communication_objects() {
   od.add(0x1018, 3, unsigned32, constant, config_.revision);
   od.add(0x1018, 4, unsigned32, constant, config_.serial);
   od.add(0x1019, 0, unsigned8, constant, 0);
+  od.add(0x1020, 0, unsigned8, constant, 2);
+  od.add(0x1020, 1, unsigned32, read_write, 0);
+  od.add(0x1020, 2, unsigned32, read_write, 0);
   od.add(0x1029, 0, unsigned8, constant, 1);
   od.add(0x1029, 1, unsigned8, read_write, 0).maximum = 2;
   od.add(0x1200, 0, unsigned8, constant, 2);
@@ -108,6 +111,7 @@ void CanopenSlave::enter(NmtState to, std::int64_t time_ns) {
       receive->last_ns = never;
     }
   } else {
+    if (config_.stack == StackBehaviour::lazy) last_sync_ns_ = never;  // watched from the first one on
     for (auto& transmit : transmit_) {
       transmit->last_ns = never;
       transmit->syncs = 0;
@@ -150,7 +154,7 @@ void CanopenSlave::on_frame(const fieldbus::CanFrame& frame, std::int64_t time_n
     return on_heartbeat(static_cast<std::uint8_t>(frame.id - 0x700), frame, time_ns);
   }
   if (talks() && frame.id == 0x600u + config_.node) return on_sdo(frame, time_ns);
-  if (talks() && frame.id == static_cast<std::uint32_t>(sync_id_->number())) return on_sync(frame, time_ns);
+  if (talks() && frame.id == static_cast<std::uint32_t>(sync_id_->number() & 0x7FF)) return on_sync(frame, time_ns);
   if (state_ != NmtState::operational) return;
   for (auto& receive : receive_) {
     if (receive->pdo.valid() && receive->pdo.identifier() == frame.id) on_receive_pdo(*receive, frame, time_ns);
@@ -178,7 +182,9 @@ void CanopenSlave::on_sync(const fieldbus::CanFrame& frame, std::int64_t time_ns
     return;
   }
   last_sync_ns_ = time_ns;
+  clear_error(emcy::communication, time_ns);
   if (state_ == NmtState::operational) {
+    if (config_.stack == StackBehaviour::lazy) check_receive_pdos(time_ns, true, false);
     for (auto& receive : receive_) {
       if (receive->waiting) receive->pdo.unpack(receive->data);
       receive->waiting = false;
@@ -202,7 +208,7 @@ void CanopenSlave::on_receive_pdo(Receive& receive, const fieldbus::CanFrame& fr
   }
   clear_error(emcy::pdo_too_short, time_ns);
   receive.last_ns = time_ns;
-  clear_error(emcy::rpdo_timeout, time_ns);  // also one from before the PDO was configured anew
+  if (!latches()) clear_error(emcy::rpdo_timeout, time_ns);  // also one from before the PDO was configured anew
   receive.overdue = false;
   const std::int64_t window_ns = sync_window_->number() * 1'000;
   if (!receive.pdo.synchronous()) return receive.pdo.unpack(frame.bytes());
@@ -218,8 +224,18 @@ void CanopenSlave::on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& fra
     consumer.last_ns = time_ns;
     consumer.lost = false;
   }
-  if (std::none_of(consumers_.begin(), consumers_.end(), [](const Consumer& c) { return c.lost; })) {
-    clear_error(emcy::heartbeat_lost, time_ns);
+  if (hears_all() && !latches()) clear_error(emcy::heartbeat_lost, time_ns);
+}
+
+bool CanopenSlave::hears_all() const noexcept {
+  return std::none_of(consumers_.begin(), consumers_.end(), [](const Consumer& c) { return c.lost; });
+}
+
+void CanopenSlave::acknowledge(std::int64_t time_ns) noexcept {
+  if (!latches()) return;
+  if (hears_all()) clear_error(emcy::heartbeat_lost, time_ns);
+  if (std::none_of(receive_.begin(), receive_.end(), [](const auto& r) { return r->overdue; })) {
+    clear_error(emcy::rpdo_timeout, time_ns);
   }
 }
 
@@ -241,7 +257,9 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
   if (time_ns - last_sdo_ns_ > sdo_timeout) sdo_.reset();
   check_heartbeats(time_ns);
   if (state_ != NmtState::operational) return;
-  check_receive_pdos(time_ns);
+  const bool lazy = config_.stack == StackBehaviour::lazy;
+  check_receive_pdos(time_ns, !lazy, true);
+  if (lazy) check_sync(time_ns);
   if (state_ == NmtState::operational) transmit_events(time_ns);
 }
 
@@ -256,9 +274,17 @@ void CanopenSlave::check_heartbeats(std::int64_t time_ns) {
   }
 }
 
-void CanopenSlave::check_receive_pdos(std::int64_t time_ns) {
+// A lazy stack's: told, and nothing else.
+void CanopenSlave::check_sync(std::int64_t time_ns) {
+  const std::int64_t period_ns = dictionary_.number(0x1006) * 1'000;
+  if (period_ns == 0 || last_sync_ns_ == never || time_ns - last_sync_ns_ <= period_ns + period_ns / 2) return;
+  raise_error(emcy::communication, error_register::communication, time_ns);
+}
+
+void CanopenSlave::check_receive_pdos(std::int64_t time_ns, bool synchronous, bool others) {
   for (auto& receive : receive_) {
     const std::int64_t limit_ns = receive->pdo.event_timer_ns();
+    if (!(receive->pdo.synchronous() ? synchronous : others)) continue;
     if (limit_ns == 0 || !receive->pdo.valid() || receive->overdue || receive->last_ns == never) continue;
     if (time_ns - receive->last_ns <= limit_ns) continue;
     receive->overdue = true;

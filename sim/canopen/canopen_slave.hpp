@@ -21,6 +21,7 @@
 #include "sim/canopen/object_dictionary.hpp"
 #include "sim/canopen/sdo_server.hpp"
 #include "sim/canopen/slave_pdo.hpp"
+#include "sim/canopen/stack_behaviour.hpp"
 
 namespace proxarm::sim {
 
@@ -66,6 +67,7 @@ struct CanopenSlaveConfig {
   std::uint32_t device_type = 0;
   std::uint32_t vendor = 0, product = 0, revision = 0, serial = 0;  // 1018h
   std::string device_name;
+  StackBehaviour stack = StackBehaviour::strict;
   bool fd = false;                            // its PDOs are CAN FD frames at the data bitrate
   std::int64_t boot_time_ns = 20'000'000;     // from power or reset to the boot-up frame
   std::int64_t sdo_answer_time_ns = 100'000;  // the firmware's time from a request to its answer
@@ -92,6 +94,8 @@ class CanopenSlave final : public BusDevice {
   void raise_error(std::uint16_t code, std::uint8_t register_bits, std::int64_t time_ns) noexcept;
   void clear_error(std::uint16_t code, std::int64_t time_ns) noexcept;
   [[nodiscard]] bool has_error(std::uint16_t code) const noexcept;
+  // A fault reset: errors of the connection that a latching stack has kept go, if their cause has.
+  void acknowledge(std::int64_t time_ns) noexcept;
 
   // Faults for tests: no heartbeat leaves any more; SDO requests stay unanswered.
   void mute_heartbeat(bool mute) noexcept { heartbeat_muted_ = mute; }
@@ -140,7 +144,10 @@ class CanopenSlave final : public BusDevice {
   void on_receive_pdo(Receive& receive, const fieldbus::CanFrame& frame, std::int64_t time_ns);
   void on_heartbeat(std::uint8_t node, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
   void check_heartbeats(std::int64_t time_ns);
-  void check_receive_pdos(std::int64_t time_ns);
+  void check_receive_pdos(std::int64_t time_ns, bool synchronous, bool others);
+  void check_sync(std::int64_t time_ns);
+  [[nodiscard]] bool latches() const noexcept { return config_.stack == StackBehaviour::latching; }
+  [[nodiscard]] bool hears_all() const noexcept;  // no heartbeat that it watches is lost
   void transmit_events(std::int64_t time_ns) noexcept;
   void transmit_on_sync(std::int64_t time_ns) noexcept;
   void transmit(Transmit& transmit, const std::array<std::uint8_t, 64>& data, std::int64_t time_ns) noexcept;

@@ -12,8 +12,8 @@ constexpr std::uint32_t key_of(std::uint16_t index, std::uint8_t subindex) noexc
 }
 
 bool is_signed(DataType type) noexcept {
-  return type == DataType::integer8 || type == DataType::integer16 || type == DataType::integer32 ||
-         type == DataType::integer64;
+  const auto number = static_cast<std::uint16_t>(type);
+  return (number >= 0x02 && number <= 0x04) || number == 0x10 || (number >= 0x12 && number <= 0x15);
 }
 
 std::int64_t decode(DataType type, std::span<const std::uint8_t> bytes) noexcept {
@@ -35,11 +35,25 @@ std::size_t size_of(DataType type) noexcept {
     case DataType::integer16:
     case DataType::unsigned16:
       return 2;
+    case DataType::integer24:
+    case DataType::unsigned24:
+      return 3;
     case DataType::integer32:
     case DataType::unsigned32:
+    case DataType::real32:
       return 4;
+    case DataType::integer40:
+    case DataType::unsigned40:
+      return 5;
+    case DataType::integer48:
+    case DataType::unsigned48:
+      return 6;
+    case DataType::integer56:
+    case DataType::unsigned56:
+      return 7;
     case DataType::integer64:
     case DataType::unsigned64:
+    case DataType::real64:
       return 8;
     case DataType::visible_string:
     case DataType::octet_string:
@@ -115,13 +129,19 @@ std::int64_t ObjectDictionary::number(std::uint16_t index, std::uint8_t subindex
   return entry == nullptr ? 0 : entry->number();
 }
 
+bool ObjectDictionary::shows(std::uint16_t index) const noexcept {
+  for (auto entry = entries_.lower_bound(key_of(index, 0)); entry != entries_.end(); ++entry) {
+    if (entry->second.index != index) return false;
+    if (!entry->second.hidden) return true;
+  }
+  return false;
+}
+
 SdoAbort ObjectDictionary::find_for_access(std::uint16_t index, std::uint8_t subindex,
                                            const ObjectEntry*& entry) const noexcept {
   entry = find(index, subindex);
-  if (entry != nullptr) return SdoAbort::none;
-  const auto first = entries_.lower_bound(key_of(index, 0));
-  const bool index_exists = first != entries_.end() && first->second.index == index;
-  return index_exists ? SdoAbort::subindex_does_not_exist : SdoAbort::object_does_not_exist;
+  if (entry != nullptr && !entry->hidden) return SdoAbort::none;
+  return shows(index) ? SdoAbort::subindex_does_not_exist : SdoAbort::object_does_not_exist;
 }
 
 SdoAbort ObjectDictionary::read(std::uint16_t index, std::uint8_t subindex, const ObjectEntry*& entry) const noexcept {

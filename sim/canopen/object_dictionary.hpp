@@ -62,10 +62,20 @@ enum class DataType : std::uint16_t {
   unsigned8 = 0x0005,
   unsigned16 = 0x0006,
   unsigned32 = 0x0007,
+  real32 = 0x0008,
   visible_string = 0x0009,
   octet_string = 0x000A,
   domain = 0x000F,
+  integer24 = 0x0010,
+  real64 = 0x0011,
+  integer40 = 0x0012,
+  integer48 = 0x0013,
+  integer56 = 0x0014,
   integer64 = 0x0015,
+  unsigned24 = 0x0016,
+  unsigned40 = 0x0018,
+  unsigned48 = 0x0019,
+  unsigned56 = 0x001A,
   unsigned64 = 0x001B,
 };
 
@@ -78,6 +88,7 @@ struct ObjectEntry {
   DataType type = DataType::unsigned32;
   Access access = Access::read_write;
   bool pdo_mappable = false;
+  bool hidden = false;                      // the device has it for itself: nobody on the network finds it
   std::vector<std::uint8_t> value;          // present value; of fixed length unless a string or domain
   std::vector<std::uint8_t> default_value;  // after a reset
   std::size_t max_length = 0;               // strings and domains: longest value accepted
@@ -104,9 +115,14 @@ class ObjectDictionary {
 
   [[nodiscard]] ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) noexcept;
   [[nodiscard]] const ObjectEntry* find(std::uint16_t index, std::uint8_t subindex) const noexcept;
+  // All of them, for whoever builds the device.
+  [[nodiscard]] std::map<std::uint32_t, ObjectEntry>& entries() noexcept { return entries_; }
   // An entry that is known to be there.
   [[nodiscard]] ObjectEntry& at(std::uint16_t index, std::uint8_t subindex = 0);
   [[nodiscard]] std::int64_t number(std::uint16_t index, std::uint8_t subindex = 0) const noexcept;  // 0 if not there
+
+  // Whether the network finds anything under this index.
+  [[nodiscard]] bool shows(std::uint16_t index) const noexcept;
 
   // Access from the network. `read` gives the entry, `write` takes the bytes over when everything about them is right.
   [[nodiscard]] SdoAbort read(std::uint16_t index, std::uint8_t subindex, const ObjectEntry*& entry) const noexcept;

@@ -92,8 +92,8 @@ SdoAbort SlavePdo::resolve(std::uint32_t object, Mapped& mapped) const noexcept 
     return SdoAbort::none;
   }
   const ObjectEntry* found = dictionary_.find(index, subindex);
-  if (found == nullptr) {
-    return dictionary_.find(index, 0) == nullptr ? SdoAbort::object_does_not_exist : SdoAbort::subindex_does_not_exist;
+  if (found == nullptr || found->hidden) {
+    return dictionary_.shows(index) ? SdoAbort::subindex_does_not_exist : SdoAbort::object_does_not_exist;
   }
   const bool writable = found->access == Access::read_write || found->access == Access::write_only;
   const bool fits = direction_ == Direction::receive ? writable : found->access != Access::write_only;

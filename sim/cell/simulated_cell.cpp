@@ -5,6 +5,8 @@
 #include <cstdlib>
 
 #include "models/base/setup_error.hpp"
+#include "models/description/homing.hpp"
+#include "models/files/eds_file.hpp"
 #include "sim/cell/plant_axis.hpp"
 
 namespace proxarm::sim {
@@ -26,15 +28,39 @@ std::int32_t to_i32(double value) noexcept {
   return static_cast<std::int32_t>(std::clamp(std::nearbyint(value), -2147483648.0, 2147483647.0));
 }
 
-DriveDeviceConfig drive_config(const description::DriveDescription& drive, const SimulatedCellConfig& config) {
+// Who it is, by its maker's file: [DeviceInfo], else the defaults of 1018h.
+void take_identity(const description::EdsFile& eds, CanopenSlaveConfig& canopen) {
+  const auto number = [&eds](std::optional<std::uint32_t> of_device, std::uint32_t object) -> std::uint32_t {
+    const description::EdsObject* there = eds.find(object);
+    return of_device.value_or(there == nullptr ? 0 : there->default_value.value_or(0));
+  };
+  canopen.vendor = number(eds.vendor, 0x101801);
+  canopen.product = number(eds.product, 0x101802);
+  canopen.revision = number(eds.revision, 0x101803);
+}
+
+DriveDeviceConfig drive_config(const description::DriveDescription& drive, const description::EdsFile* eds,
+                               const SimulatedCellConfig& config) {
   DriveDeviceConfig c;
   c.canopen.node = drive.node;
   c.canopen.fd = drive.fd;
-  c.canopen.device_type = drive.device_type;
+  constexpr std::uint32_t servo_drive = 0x00020192;  // 1000h
+  const description::EdsObject* type = eds == nullptr ? nullptr : eds->find(0x100000);
+  c.canopen.device_type =
+      drive.device_type.value_or(type == nullptr ? servo_drive : type->default_value.value_or(servo_drive));
   c.canopen.serial = drive.node;
+  c.canopen.stack = drive.simulation.stack == "latching" ? StackBehaviour::latching
+                    : drive.simulation.stack == "lazy"   ? StackBehaviour::lazy
+                                                         : StackBehaviour::strict;
   c.canopen.revision = 0x00010000;
   c.canopen.device_name = "simulated drive of " + drive.joint;
   c.canopen.boot_time_ns = config.drive_boot_time_ns;
+  if (eds != nullptr) take_identity(*eds, c.canopen);
+  c.eds = eds;
+  c.objects = drive.objects;
+  if (const std::uint32_t target = drive.objects.target; target != 0) {
+    (drive.mode == "ip" ? c.interpolated_target : drive.mode == "cst" ? c.torque_target : c.position_target) = target;
+  }
   const double scale = counts_per_rad(drive);
   c.following_error_window_counts = to_u32(following_error_window_rad * scale);
   c.quick_stop_deceleration = to_u32(drive.max_acceleration_rad_per_s2 * scale);
@@ -44,8 +70,32 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
   c.position_min = to_i32(std::min(first, second));
   c.position_max = to_i32(std::max(first, second));
   c.brake_release_ns = config.brake_release_ns;
+  if (drive.homing) {
+    const double home = drive.offset_counts + drive.homing->angle_rad * drive.counts_per_rad();
+    c.incremental = {.home_counts = to_i32(home)};
+    c.position_min = to_i32(std::min(first, second) - home);  // by its own zero, once it is homed
+    c.position_max = to_i32(std::max(first, second) - home);
+  }
   if (drive.rated_torque_Nm > 0.0) c.rated_torque_mNm = to_u32(1e3 * drive.rated_torque_Nm / drive.gear_ratio);
   return c;
+}
+
+// A drive that lacks an object, or has it read-only.
+void make_otherwise(const DeviceFault& fault, ObjectDictionary& dictionary) {
+  const bool is_missing = fault.kind == DeviceFaultKind::object_missing;
+  if (!is_missing && fault.kind != DeviceFaultKind::object_fixed) return;
+  ObjectEntry* entry =
+      dictionary.find(static_cast<std::uint16_t>(fault.value >> 8), static_cast<std::uint8_t>(fault.value));
+  if (entry == nullptr) {
+    throw SetupError({.key = "--fault",
+                      .found = "an object that the simulated drive of " + fault.device + " hasn't",
+                      .expected = "index and sub-index of one that it has, such as 0x600700"});
+  }
+  if (is_missing) {
+    entry->hidden = true;
+  } else {
+    entry->access = Access::read_only;
+  }
 }
 
 }  // namespace
@@ -140,16 +190,36 @@ SimulatedCell::~SimulatedCell() = default;
 void SimulatedCell::add_drive(std::size_t axis, const SimulatedCellConfig& config) {
   const description::DriveDescription& drive = cell_.drives[axis];
   const std::size_t bus = bus_index(drive.bus, "drives[" + std::to_string(axis) + "].bus");
-  DriveDeviceConfig device = drive_config(drive, config);
+  std::optional<description::EdsFile> eds;
+  if (!drive.eds.empty()) eds = description::load_eds(drive.eds);
+  DriveDeviceConfig device = drive_config(drive, eds ? &*eds : nullptr, config);
   for (const DeviceFault& fault : faults_) {
     if (fault.device == drive.joint && fault.kind == DeviceFaultKind::device_type) {
       device.canopen.device_type = fault.value;
     }
   }
+  const bool homed = std::any_of(faults_.begin(), faults_.end(), [&](const DeviceFault& fault) {
+    return fault.device == drive.joint && fault.kind == DeviceFaultKind::homed;
+  });
+  if (homed && !drive.homing) {
+    throw SetupError({.key = "--fault",
+                      .found = "homed for " + drive.joint + ", whose encoder is absolute",
+                      .expected = "a drive with `encoder: incremental`"});
+  }
+  if (homed) device.incremental->homed = true;
   Clockwork& clockwork = *this;
   nodes_.push_back(std::make_unique<DeviceNode>(drive.joint, bus, events_, clockwork));
   drives_[axis] = std::make_unique<DriveDevice>(device, *axes_[axis], *nodes_.back());
   nodes_.back()->set_device(*drives_[axis]);
+  if (homed) {
+    ObjectEntry& token =
+        drives_[axis]->canopen().dictionary().at(description::homed_index, description::homed_subindex);
+    token.set(description::homed_token(drive));
+    token.default_value = token.value;
+  }
+  for (const DeviceFault& fault : faults_) {
+    if (fault.device == drive.joint) make_otherwise(fault, drives_[axis]->canopen().dictionary());
+  }
 }
 
 // Wired to a drive's inputs, or a node with a message of its own.

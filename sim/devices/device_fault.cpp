@@ -1,5 +1,6 @@
 #include "sim/devices/device_fault.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -13,7 +14,7 @@ namespace {
 using description::SetupError;
 
 constexpr unsigned can = 1, modbus = 2, drives = can | modbus, sensor = 4;  // FaultyDevice
-constexpr std::uint64_t none = 0, u16 = 0xFFFF, u32 = 0xFFFFFFFF, last_channel = 5;
+constexpr std::uint64_t none = 0, u16 = 0xFFFF, u24 = 0xFFFFFF, u32 = 0xFFFFFFFF, last_channel = 5;
 using ParseAmount = double (*)(std::string_view text, std::string_view option);
 
 struct KindName {
@@ -29,6 +30,9 @@ constexpr KindName kinds[] = {
     {"silent", drives, DeviceFaultKind::drive_silent, none},
     {"fault", can, DeviceFaultKind::drive_fault, u16},
     {"device_type", can, DeviceFaultKind::device_type, u32},
+    {"lacks", can, DeviceFaultKind::object_missing, u24},
+    {"fixed", can, DeviceFaultKind::object_fixed, u24},
+    {"homed", can, DeviceFaultKind::homed, none},
     {"heartbeat", can, DeviceFaultKind::heartbeat_lost, none},
     {"sdo", can, DeviceFaultKind::sdo_silent, none},
     {"period", can, DeviceFaultKind::period_fixed, none},
@@ -141,7 +145,10 @@ DeviceFault parse_device_fault(std::string_view text) {
     fault.value = parse_value(all, what.substr(equals + 1), found->most);
   }
   if (at == std::string_view::npos) return fault;
-  if (fault.kind == DeviceFaultKind::device_type) refuse(all, "no time: a device is what it is from the start");
+  constexpr DeviceFaultKind made_so[] = {DeviceFaultKind::device_type, DeviceFaultKind::object_missing,
+                                         DeviceFaultKind::object_fixed, DeviceFaultKind::homed};
+  if (std::find(std::begin(made_so), std::end(made_so), fault.kind) != std::end(made_so))
+    refuse(all, "no time: a device is what it is from the start");
   const std::size_t dots = times.find("..");
   fault.from_ns = parse_time_ns(times.substr(0, dots));
   if (dots != std::string_view::npos) fault.until_ns = parse_time_ns(times.substr(dots + 2));

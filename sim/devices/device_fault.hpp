@@ -22,6 +22,9 @@ enum class DeviceFaultKind : std::uint8_t {
   drive_silent,    // "silent": its bus connection is gone both ways; the firmware runs on
   drive_fault,     // "fault": trips with EMCY code VALUE
   device_type,     // "device_type": 1000h is VALUE; always, no times
+  object_missing,  // "lacks": it has no object VALUE (index << 8 | sub-index); always, no times
+  object_fixed,    // "fixed": object VALUE can't be written; always, no times
+  homed,           // "homed": with an incremental encoder, it was homed before; always, no times
   heartbeat_lost,  // "heartbeat": no heartbeat leaves
   sdo_silent,      // "sdo": SDO requests stay unanswered
   period_fixed,    // "period": refuses another 60C2h while operation is enabled

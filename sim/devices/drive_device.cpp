@@ -4,12 +4,16 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "sim/devices/eds_objects.hpp"
+
 namespace proxarm::sim {
 
 namespace {
 
 constexpr std::int64_t interpolated_position = 7, cyclic_synchronous_position = 8, cyclic_synchronous_torque = 10;
 constexpr std::int64_t modes[] = {interpolated_position, cyclic_synchronous_position, cyclic_synchronous_torque};
+constexpr std::int64_t homing_mode = 6;
+constexpr std::uint16_t homing_start = 1U << 4;          // of the controlword, in mode 6
 constexpr std::uint16_t interpolation_active = 1U << 4;  // of the controlword, in mode 7
 
 bool is_cyclic(std::int64_t mode) noexcept {
@@ -27,12 +31,15 @@ DriveDevice::DriveDevice(const DriveDeviceConfig& config, ServoAxis& axis, Devic
     : slave_(config.canopen, *this, port),
       axis_(axis),
       brake_release_ns_(config.brake_release_ns),
-      sdo_request_id_(0x600u + config.canopen.node) {
+      sdo_request_id_(0x600u + config.canopen.node),
+      incremental_(config.incremental) {
   add_objects(config);
   add_option_codes();
   add_cyclic_objects(config);
-  slave_.receive_pdo(1).set_default_mapping({0x60400010});
-  slave_.transmit_pdo(1).set_default_mapping({0x60410010});
+  if (incremental_) add_homing_objects();
+  slave_.receive_pdo(1).set_default_mapping({config.objects.controlword << 8 | 0x10});
+  slave_.transmit_pdo(1).set_default_mapping({config.objects.statusword << 8 | 0x10});
+  if (config.eds != nullptr) take_over(*config.eds, config.canopen.node, slave_.dictionary());
 }
 
 void DriveDevice::power_on(std::int64_t time_ns) noexcept {
@@ -52,6 +59,7 @@ void DriveDevice::on_time(std::int64_t time_ns) noexcept {
   supervise_sync();
   supervise_following_error();
   if (stopping_ && axis_.at_rest()) finish_stop();
+  advance_homing();
   publish();
   slave_.on_time(time_ns);
 }
@@ -63,32 +71,57 @@ void DriveDevice::add_objects(const DriveDeviceConfig& config) {
   using enum Access;
   ObjectDictionary& od = slave_.dictionary();
   error_code_ = &od.add(0x603F, 0, unsigned16, read_only, 0, true);
-  controlword_ = &od.add(0x6040, 0, unsigned16, read_write, 0, true);
+  const description::DriveObjects& at = config.objects;
+  controlword_ = &add(at.controlword, unsigned16, read_write, 0, true);
   controlword_->after_write = [this] { on_controlword(); };
-  statusword_ = &od.add(0x6041, 0, unsigned16, read_only, 0, true);
-  mode_ = &od.add(0x6060, 0, integer8, read_write, 0, true);
-  mode_->before_write = [](std::int64_t mode) {
-    return mode == 0 || is_cyclic(mode) ? SdoAbort::none : SdoAbort::invalid_value;
+  statusword_ = &add(at.statusword, unsigned16, read_only, 0, true);
+  mode_ = &add(at.mode, integer8, read_write, 0, true);
+  mode_->before_write = [incremental = incremental_.has_value()](std::int64_t mode) {
+    const bool can_home = incremental && mode == homing_mode;
+    return mode == 0 || can_home || is_cyclic(mode) ? SdoAbort::none : SdoAbort::invalid_value;
   };
-  mode_display_ = &od.add(0x6061, 0, integer8, read_only, 0, true);
+  mode_display_ = &add(at.mode_display, integer8, read_only, 0, true);
   demand_ = &od.add(0x6062, 0, integer32, read_only, 0, true);
-  position_ = &od.add(0x6064, 0, integer32, read_only, 0, true);
+  position_ = &add(at.position, integer32, read_only, 0, true);
   od.add(0x6065, 0, unsigned32, read_write, config.following_error_window_counts);
   od.add(0x6066, 0, unsigned16, read_write, config.following_error_time_ms);
   velocity_ = &od.add(0x606C, 0, integer32, read_only, 0, true);
-  target_torque_ = &od.add(0x6071, 0, integer16, read_write, 0, true);
+  target_torque_ = &add(config.torque_target, integer16, read_write, 0, true);
   target_torque_->after_write = [this] { target_fresh_ = mode_->number() == cyclic_synchronous_torque; };
   max_torque_ = &od.add(0x6072, 0, unsigned16, read_write, 3000);
   od.add(0x6076, 0, unsigned32, constant, config.rated_torque_mNm);
-  torque_ = &od.add(0x6077, 0, integer16, read_only, 0, true);
+  torque_ = &add(at.torque, integer16, read_only, 0, true);
   following_error_ = &od.add(0x60F4, 0, integer32, read_only, 0, true);
   digital_inputs_ = &od.add(0x60FD, 0, unsigned32, read_only, 0, true);
   std::int64_t supported = 0;
   for (const std::int64_t mode : modes) supported |= std::int64_t{1} << (mode - 1);
-  od.add(0x6502, 0, unsigned32, constant, supported);
+  if (incremental_) supported |= std::int64_t{1} << (homing_mode - 1);
+  add(at.supported_modes, unsigned32, constant, supported);
+  add_own_objects(config);
+}
+
+// A maker's dictionary has something else there.
+void DriveDevice::add_own_objects(const DriveDeviceConfig& config) {
+  using enum DataType;
+  using enum Access;
+  if (config.eds != nullptr) {
+    for (ObjectEntry& entry : unlisted_) {
+      entry.type = unsigned8;
+      entry.value.assign(1, 0);
+    }
+    refusal_ = &unlisted_[0];
+    sync_tolerance_ = &unlisted_[1];
+    return sync_tolerance_->set(config.sync_tolerance_periods);
+  }
+  ObjectDictionary& od = slave_.dictionary();
   refusal_ = &od.add(0x2001, 0, unsigned8, read_only, 0, true);
   od.add(0x2010, 0, unsigned8, constant, 1);
-  od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
+  sync_tolerance_ = &od.add(0x2010, 1, unsigned8, read_write, config.sync_tolerance_periods);
+}
+
+ObjectEntry& DriveDevice::add(std::uint32_t address, DataType type, Access access, std::int64_t value, bool mappable) {
+  return slave_.dictionary().add(static_cast<std::uint16_t>(address >> 8), static_cast<std::uint8_t>(address), type,
+                                 access, value, mappable);
 }
 
 // What the drive does by itself. Ramps that this drive doesn't have are refused.
@@ -112,7 +145,7 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   using enum DataType;
   using enum Access;
   ObjectDictionary& od = slave_.dictionary();
-  target_ = &od.add(0x607A, 0, integer32, read_write, 0, true);
+  target_ = &add(config.position_target, integer32, read_write, 0, true);
   target_->after_write = [this] { target_fresh_ = mode_->number() == cyclic_synchronous_position; };
   od.add(0x607D, 0, unsigned8, constant, 2);
   od.add(0x607D, 1, integer32, read_write, config.position_min);
@@ -120,21 +153,72 @@ void DriveDevice::add_cyclic_objects(const DriveDeviceConfig& config) {
   od.add(0x6084, 0, unsigned32, read_write, config.profile_deceleration).minimum = 1;
   od.add(0x6085, 0, unsigned32, read_write, config.quick_stop_deceleration).minimum = 1;
   od.add(0x60C1, 0, unsigned8, constant, 1);
-  od.add(0x60C1, 1, integer32, read_write, 0, true).after_write = [this] {
-    target_fresh_ = mode_->number() == interpolated_position;
-  };
+  interpolated_target_ = &add(config.interpolated_target, integer32, read_write, 0, true);
+  interpolated_target_->after_write = [this] { target_fresh_ = mode_->number() == interpolated_position; };
   od.add(0x60C2, 0, unsigned8, constant, 2);
   const auto not_while_enabled = [this](std::int64_t) {
     return period_fixed_ && state_ == DriveState::operation_enabled ? SdoAbort::not_in_present_device_state
                                                                     : SdoAbort::none;
   };
-  period_value_ = &od.add(0x60C2, 1, unsigned8, read_write, 0);
-  period_index_ = &od.add(0x60C2, 2, integer8, read_write, -3);
+  period_value_ = &add(config.objects.interpolation_value, unsigned8, read_write, 0);
+  period_index_ = &add(config.objects.interpolation_index, integer8, read_write, -3);
   for (ObjectEntry* entry : {period_value_, period_index_}) {
     entry->before_write = not_while_enabled;
     entry->after_write = [this] { set_period(); };
   }
   following_window_ = &od.at(0x6065);
+}
+
+// ---- Homing
+
+void DriveDevice::add_homing_objects() {
+  using enum DataType;
+  using enum Access;
+  ObjectDictionary& od = slave_.dictionary();
+  od.add(0x607C, 0, integer32, read_write, 0);
+  od.add(0x6098, 0, integer8, read_write, 0);
+  od.add(0x6099, 0, unsigned8, constant, 2);
+  od.add(0x6099, 1, unsigned32, read_write, 0);
+  od.add(0x6099, 2, unsigned32, read_write, 0);
+  od.add(0x609A, 0, unsigned32, read_write, 0);
+}
+
+// What it counts from then: CiA 402 has no position from before.
+void DriveDevice::power_on_encoder() noexcept {
+  homing_ = HomingState::none;
+  if (!incremental_) return;
+  zero_counts_ = incremental_->homed ? incremental_->home_counts : axis_.position_counts();
+}
+
+bool DriveDevice::homes() const noexcept { return mode_->number() == homing_mode && incremental_.has_value(); }
+
+// Methods 1 to 34 find a switch, a stop or an index pulse, and all of them the same place here.
+void DriveDevice::start_homing() {
+  const std::int64_t method = slave_.dictionary().number(0x6098);
+  const bool known = method >= 1 && method <= 34 && slave_.dictionary().number(0x6099, 1) > 0;
+  homing_ = known ? HomingState::running : HomingState::failed;
+  homing_counts_ = axis_.position_counts();
+  homing_ns_ = now_ns_;
+}
+
+void DriveDevice::advance_homing() {
+  if (homing_ != HomingState::running) return;
+  if (state_ != DriveState::operation_enabled || stopping_) {
+    homing_ = HomingState::failed;
+    return;
+  }
+  const double elapsed_s = 1e-9 * static_cast<double>(now_ns_ - homing_ns_);
+  homing_ns_ = now_ns_;
+  if (!brake_open() || elapsed_s <= 0.0) return;
+  const double home = incremental_->home_counts;
+  const double step = elapsed_s * static_cast<double>(slave_.dictionary().number(0x6099, 1));
+  homing_counts_ += std::clamp(home - homing_counts_, -step, step);
+  axis_.set_interpolation_period_ns(std::llround(1e9 * elapsed_s));
+  axis_.set_target(static_cast<std::int32_t>(homing_counts_), now_ns_);
+  const double settled_counts = std::max(1.0, 0.02 * static_cast<double>(following_window_->number()));
+  if (homing_counts_ != home || std::abs(axis_.position_counts() - home) > settled_counts) return;
+  zero_counts_ = incremental_->home_counts + slave_.dictionary().number(0x607C);  // the zero is off the home by 607Ch
+  homing_ = HomingState::attained;
 }
 
 // ---- SYNC
@@ -164,6 +248,7 @@ void DriveDevice::latch_torque() {
 // Position limits (607Dh) cut the target; with 607Ah at its old value because no PDO came, the axis slows down instead.
 void DriveDevice::latch_target() {
   if (mode_->number() == cyclic_synchronous_torque) return latch_torque();
+  if (homes()) return;
   const bool interpolates = mode_->number() == interpolated_position;
   const bool valid = !interpolates || (controlword_->number() & interpolation_active) != 0;
   const bool fresh = target_fresh_ && valid;
@@ -173,25 +258,24 @@ void DriveDevice::latch_target() {
   if (!fresh) return axis_.stop(deceleration(0x6085), now_ns_);
   const ObjectDictionary& od = slave_.dictionary();
   const std::int64_t low = od.number(0x607D, 1), high = od.number(0x607D, 2);
-  std::int64_t target = interpolates ? od.number(0x60C1, 1) : target_->number();
+  std::int64_t target = (interpolates ? interpolated_target_ : target_)->number();
   target_limited_ = low < high && (target < low || target > high);
   if (target_limited_) target = std::clamp(target, low, high);
   // The first target after the brake has opened must be where the axis is: nothing jumps.
-  if (!target_taken_ && std::llabs(target - axis_.position_counts()) > following_window_->number()) {
+  if (!target_taken_ && std::llabs(target - position()) > following_window_->number()) {
     return trip(emcy::following_error, error_register::profile_specific);
   }
   target_taken_ = true;
   axis_.set_interpolation_period_ns(period_ns_);
-  axis_.set_target(static_cast<std::int32_t>(target), now_ns_);
+  axis_.set_target(static_cast<std::int32_t>(target + zero_counts_), now_ns_);
   following_ = !target_limited_;
 }
 
 // Values for whoever reads them next, by PDO or SDO.
 void DriveDevice::publish() noexcept {
-  const std::int32_t position = axis_.position_counts(), demand = axis_.demand_counts();
-  position_->set(position);
-  demand_->set(demand);
-  following_error_->set(powered_ ? std::int64_t{demand} - position : 0);
+  position_->set(position());
+  demand_->set(demand());
+  following_error_->set(powered_ ? demand() - position() : 0);
   const double speed = axis_.speed_counts_per_s();
   velocity_->set(
       static_cast<std::int64_t>(std::isfinite(speed) ? std::clamp(speed, -2147483648.0, 2147483647.0) : 0.0));
@@ -206,6 +290,12 @@ std::uint16_t DriveDevice::statusword() const noexcept {
   if (nmt == NmtState::operational) word |= 0x0200u;
   if (refusal_->number() != 0) word |= 0x0080u;
   if (powered_ && (target_limited_ || axis_.limited())) word |= 0x0800u;
+  if (homes()) {
+    if (homing_ != HomingState::running) word |= 0x0400u;
+    if (homing_ == HomingState::attained) word |= 0x1000u;
+    if (homing_ == HomingState::failed) word |= 0x2000u;
+    return static_cast<std::uint16_t>(word);
+  }
   if (following_ && state_ == DriveState::operation_enabled) word |= 0x1000u;
   if (following_error_since_ns_ != never) word |= 0x2000u;
   return static_cast<std::uint16_t>(word);
@@ -215,6 +305,7 @@ std::uint16_t DriveDevice::statusword() const noexcept {
 
 void DriveDevice::on_controlword() {
   const auto word = static_cast<std::uint16_t>(controlword_->number());
+  const bool starts_homing = homes() && (word & homing_start) != 0 && (controlword_before_ & homing_start) == 0;
   const DriveCommand command = decode_controlword(word, controlword_before_);
   controlword_before_ = word;
   if (command == DriveCommand::disable_voltage && is_moving_state(state_) && stopping_) {
@@ -229,6 +320,7 @@ void DriveDevice::on_controlword() {
     if (transition.number != 3 || command != DriveCommand::enable_operation) break;
   }
   if (command != DriveCommand::enable_operation) refusal_->set(0);
+  if (starts_homing && state_ == DriveState::operation_enabled) start_homing();
 }
 
 void DriveDevice::execute(DriveTransition transition) {
@@ -255,6 +347,7 @@ void DriveDevice::execute(DriveTransition transition) {
       return begin_stop(DriveState::switch_on_disabled, 12, ramp);
     }
     case 15:
+      slave_.acknowledge(now_ns_);
       if (slave_.has_error(emcy::heartbeat_lost) || slave_.has_error(emcy::rpdo_timeout)) {
         // The cause is still there: the connection must be back first, so the timers must have seen it again.
         return;
@@ -309,6 +402,7 @@ void DriveDevice::finish_stop() { enter(after_stop_, after_stop_transition_); }
 RefusalReason DriveDevice::refusal() const noexcept {
   if (slave_.state() != NmtState::operational) return RefusalReason::not_operational;
   const std::int64_t mode = mode_display_->number();
+  if (mode == homing_mode && incremental_) return RefusalReason::none;
   if (!is_cyclic(mode)) return RefusalReason::mode_not_displayed;
   if (period_ns_ <= 0) return RefusalReason::interpolation_period_not_set;
   if (interval_count_ < 3) return RefusalReason::no_sync;
@@ -317,8 +411,8 @@ RefusalReason DriveDevice::refusal() const noexcept {
   const double ratio = static_cast<double>(sum) / interval_count_ / static_cast<double>(period_ns_);
   if (!(ratio > 0.8 && ratio < 1.2)) return RefusalReason::sync_period_mismatch;
   if (mode == cyclic_synchronous_torque) return RefusalReason::none;
-  const std::int64_t target = mode == interpolated_position ? slave_.dictionary().number(0x60C1, 1) : target_->number();
-  const std::int64_t distance = std::llabs(target - axis_.position_counts());
+  const std::int64_t target = (mode == interpolated_position ? interpolated_target_ : target_)->number();
+  const std::int64_t distance = std::llabs(target - position());
   if (distance > following_window_->number()) return RefusalReason::target_far_from_actual;
   return RefusalReason::none;
 }
@@ -356,8 +450,9 @@ void DriveDevice::inject_fault(std::uint16_t code, std::int64_t time_ns) noexcep
 }
 
 void DriveDevice::supervise_sync() {
-  const std::int64_t tolerance = slave_.dictionary().number(0x2010, 1);
-  if (state_ != DriveState::operation_enabled || tolerance == 0 || last_sync_ns_ == never) return;
+  const std::int64_t tolerance = sync_tolerance_->number();
+  const bool lazy = slave_.config().stack == StackBehaviour::lazy;
+  if (state_ != DriveState::operation_enabled || lazy || homes() || tolerance == 0 || last_sync_ns_ == never) return;
   if (now_ns_ - last_sync_ns_ > tolerance * period_ns_) trip(emcy::sync_controller, error_register::communication);
 }
 
@@ -384,6 +479,7 @@ void DriveDevice::on_communication_lost(std::uint16_t code, std::int64_t time_ns
 
 // 6007h: 0 nothing, 1 fault, 2 disable voltage, 3 quick stop.
 void DriveDevice::react_to_connection(std::int64_t option, std::uint16_t code) {
+  if (latches() && code != emcy::communication) return trip(code, error_register::communication);
   if (state_ != DriveState::operation_enabled || stopping_) return;
   if (option == 1) return trip(code, error_register::communication);
   if (option == 2) return enter(DriveState::switch_on_disabled, 9);
@@ -403,6 +499,7 @@ void DriveDevice::on_nmt_state(NmtState from, NmtState to, std::int64_t time_ns)
 void DriveDevice::on_reset(std::int64_t time_ns) {
   now_ns_ = time_ns;
   power_off();
+  power_on_encoder();
   state_ = DriveState::not_ready_to_switch_on;
   last_transition_ = 0;
   controlword_before_ = 0;

@@ -14,13 +14,24 @@
 // in 6061h, 60C2h isn't set or doesn't match the SYNCs seen, or the target isn't where the axis is.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 
+#include "models/description/cell.hpp"
+#include "models/files/eds_file.hpp"
 #include "sim/canopen/canopen_slave.hpp"
 #include "sim/devices/drive_state_machine.hpp"
 #include "sim/devices/servo_axis.hpp"
 
 namespace proxarm::sim {
+
+// Of a drive with an incremental encoder: it counts from where it was when its power came on, until it is homed (mode
+// 6) at its switch.
+struct IncrementalEncoder {
+  std::int32_t home_counts = 0;  // of the axis, where its switch is
+  bool homed = false;            // before its power came on for us, as it were
+};
 
 struct DriveDeviceConfig {
   CanopenSlaveConfig canopen;
@@ -30,8 +41,13 @@ struct DriveDeviceConfig {
   std::uint32_t profile_deceleration = 500'000;           // 6084h, counts/s²: slow-down ramp
   std::uint32_t rated_torque_mNm = 1000;                  // 6076h, of the motor
   std::int32_t position_min = 0, position_max = 0;        // 607Dh; equal: no limit
+  std::optional<IncrementalEncoder> incremental;          // none: absolute
   std::int64_t brake_release_ns = 30'000'000;             // from enabling to where the target is followed
   std::uint8_t sync_tolerance_periods = 3;                // 2010h:01; 0: not supervised
+  // Where it has something else than the profile says, as index << 8 | sub-index.
+  description::DriveObjects objects{};
+  std::uint32_t position_target = 0x607A00, interpolated_target = 0x60C101, torque_target = 0x607100;
+  const description::EdsFile* eds = nullptr;  // whose dictionary it has (eds_objects.hpp), or its own
 };
 
 // Why operation was refused, 2001h.
@@ -77,6 +93,8 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void on_reset(std::int64_t time_ns) override;
 
   void add_objects(const DriveDeviceConfig& config);
+  ObjectEntry& add(std::uint32_t address, DataType type, Access access, std::int64_t value, bool mappable = false);
+  void add_own_objects(const DriveDeviceConfig& config);
   void add_option_codes();
   void add_cyclic_objects(const DriveDeviceConfig& config);
   void on_controlword();
@@ -89,11 +107,20 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   void react_to_connection(std::int64_t option, std::uint16_t code);
   [[nodiscard]] RefusalReason refusal() const noexcept;
   [[nodiscard]] bool energised() const noexcept;
+  [[nodiscard]] bool latches() const noexcept { return slave_.config().stack == StackBehaviour::latching; }
   [[nodiscard]] bool brake_open() const noexcept { return powered_ && now_ns_ >= brake_open_ns_; }
   void set_period();
   [[nodiscard]] double deceleration(std::uint16_t object) const noexcept;
   void latch_target();
   void latch_torque();
+  void add_homing_objects();
+  void start_homing();
+  void advance_homing();
+  void power_on_encoder() noexcept;
+  [[nodiscard]] bool homes() const noexcept;
+  // By the drive's own zero.
+  [[nodiscard]] std::int64_t position() const noexcept { return axis_.position_counts() - zero_counts_; }
+  [[nodiscard]] std::int64_t demand() const noexcept { return axis_.demand_counts() - zero_counts_; }
   void supervise_sync();
   void supervise_following_error();
   void publish() noexcept;
@@ -102,14 +129,22 @@ class DriveDevice final : public BusDevice, private CanopenApplication {
   ServoAxis& axis_;
   std::int64_t brake_release_ns_;
   std::uint32_t sdo_request_id_;
-  std::int64_t period_ns_ = 0;  // 60C2h; 0: not set
+  enum class HomingState : std::uint8_t { none, running, attained, failed };
+  std::optional<IncrementalEncoder> incremental_;
+  HomingState homing_ = HomingState::none;
+  double homing_counts_ = 0.0;             // of the axis, where homing has come to
+  std::int64_t homing_ns_ = 0;             // and when
+  std::int64_t zero_counts_ = 0;           // of the axis, where the drive counts from
+  std::array<ObjectEntry, 2> unlisted_{};  // instead of 2001h and 2010h:01 in a drive with its maker's dictionary
+  std::int64_t period_ns_ = 0;             // 60C2h; 0: not set
 
   // Entries used in every cycle
   ObjectEntry *controlword_ = nullptr, *statusword_ = nullptr, *target_ = nullptr, *position_ = nullptr,
               *demand_ = nullptr, *velocity_ = nullptr, *following_error_ = nullptr, *torque_ = nullptr,
               *mode_ = nullptr, *mode_display_ = nullptr, *error_code_ = nullptr, *refusal_ = nullptr,
               *period_value_ = nullptr, *period_index_ = nullptr, *following_window_ = nullptr,
-              *target_torque_ = nullptr, *max_torque_ = nullptr, *digital_inputs_ = nullptr;
+              *interpolated_target_ = nullptr, *sync_tolerance_ = nullptr, *target_torque_ = nullptr,
+              *max_torque_ = nullptr, *digital_inputs_ = nullptr;
 
   std::int64_t now_ns_ = 0;
   DriveState state_ = DriveState::not_ready_to_switch_on;

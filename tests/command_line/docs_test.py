@@ -87,6 +87,21 @@ class Docs(ProgramTest):
         for column in columns:
             self.assertTrue(any(re.fullmatch(pattern, column) for pattern in patterns), column)
 
+    def test_every_key_of_a_cell_that_is_read_stands_in_its_reference(self):
+        text = (SOURCE / "docs/files.md").read_text()
+        text = text[text.index("### Every key"):text.index("## Hand files")]
+        named = set(re.findall(r"`([a-z_A-Z0-9]+)`", text))
+        getters = ("number|number_or|integer|integer_or|boolean_or|string|string_or|choice|choice_or|vec3|vec3_or|numbers|map|find_map|"
+                   "list|has|existing_file|at")
+        read = set()
+        for source in ("cell.cpp", "supervision.cpp"):
+            code = (SOURCE / "models/description" / source).read_text()
+            read |= set(re.findall(rf"(?:->|\.)(?:{getters})\(\s*\"(\w+)\"", code))
+            read |= set(re.findall(r"(?:read_name|pose_or_identity|bandwidth_or|read_object|absolute_path_or_empty)\(\w+, \"(\w+)\"", code))
+        read -= {"min", "max"}
+        self.assertGreater(len(read), 90)
+        self.assertEqual(read - named, set(), "read, but not described")
+
     def test_the_screen_of_the_readme_is_the_programs(self):
         # All but what depends on the machine; "..." stands for lines that are left out.
         [shown] = [text for page, text in blocks("") if text.startswith("arm150 default cell, scene wall")

@@ -35,7 +35,8 @@ void add_sync(PlannedBus& bus) {
 
 // Queued after all setpoints.
 void add_heartbeat(PlannedBus& bus, const PreparedSession& session) {
-  const fieldbus::DriveSettings drive;
+  fieldbus::DriveSettings drive;
+  drive.stop_without_controller(session.cell.supervision.bus_loss_stop_s);
   PlannedFrame heartbeat{.name = "controller's heartbeat", .id = fieldbus::heartbeat_id(drive.master_node)};
   heartbeat.shape.bytes = 1;
   heartbeat.sender = "controller";
@@ -226,13 +227,11 @@ PlannedFrame described_frame(const description::SensorProtocol& protocol, std::u
   return frame;
 }
 
-// A polled sensor answers within the receive window. One that streams isn't in step with the cycle; where it sends
-// several samples per cycle they follow each other.
+// A polled sensor answers within the receive window. One that streams has a clock of its own, whatever the timestep is,
+// and a sample's frames follow one another.
 void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
   const description::SensorProtocol& protocol = *session.sensor.described;
   const std::uint32_t base_id = session.cell.sensor.base_id;
-  const double cycles = protocol.streams() ? 1.0 / (session.settings.period_s * protocol.rate_Hz) : 1.0;
-  const int samples = protocol.streams() ? static_cast<int>(std::ceil(1.0 / std::min(cycles, 1.0) - 1e-9)) : 1;
   std::string before;
   const std::vector<fieldbus::CanFrame> typical = TypicalSensor{}(session.sensor, base_id);
   if (protocol.poll) {
@@ -242,21 +241,19 @@ void add_described_sensor(PlannedBus& bus, const PreparedSession& session) {
     poll.sender = "controller";
     bus.frames.push_back(poll);
   }
-  for (int sample = 0; sample < samples; ++sample) {
-    for (std::size_t i = 0; i < protocol.frames.size(); ++i) {
-      PlannedFrame frame =
-          described_frame(protocol, protocol.wire_id(protocol.frames[i].id, base_id), protocol.frames[i].bytes);
-      frame.name = "sensor frame " + std::to_string(i + 1) + (samples > 1 ? " of " + std::to_string(sample + 1) : "");
-      frame.any_time = protocol.streams() && before.empty();
-      frame.after = before;
-      if (protocol.poll && i == 0) frame.latest_delay_ns = answer_time_ns;
-      if (protocol.streams()) frame.every_cycles = std::max(1, static_cast<int>(cycles));
-      if (protocol.poll) frame.deadline = session.cell.receive_window;
-      std::copy_if(typical.begin(), typical.end(), std::back_inserter(frame.typical),
-                   [&](const fieldbus::CanFrame& f) { return f.id == frame.id && f.length == frame.shape.bytes; });
-      before = frame.name;
-      bus.frames.push_back(frame);
-    }
+  for (std::size_t i = 0; i < protocol.frames.size(); ++i) {
+    PlannedFrame frame =
+        described_frame(protocol, protocol.wire_id(protocol.frames[i].id, base_id), protocol.frames[i].bytes);
+    frame.name = "sensor frame " + std::to_string(i + 1);
+    frame.any_time = protocol.streams() && before.empty();
+    frame.after = before;
+    if (protocol.poll && i == 0) frame.latest_delay_ns = answer_time_ns;
+    if (protocol.streams()) frame.every_ns = std::llround(1e9 / protocol.rate_Hz);
+    if (protocol.poll) frame.deadline = session.cell.receive_window;
+    std::copy_if(typical.begin(), typical.end(), std::back_inserter(frame.typical),
+                 [&](const fieldbus::CanFrame& f) { return f.id == frame.id && f.length == frame.shape.bytes; });
+    before = frame.name;
+    bus.frames.push_back(frame);
   }
 }
 

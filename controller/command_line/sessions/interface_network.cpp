@@ -10,10 +10,14 @@ controller::BusIndices indices_in(const fieldbus::SocketCanNetwork& network, std
   return indices;
 }
 
-void set_filters(fieldbus::SocketCanNetwork& network, const controller::CycleParts& parts) {
+void set_filters(fieldbus::SocketCanNetwork& network, const controller::CycleParts& parts,
+                 const std::function<std::vector<std::uint32_t>(std::size_t bus)>& more) {
   for (std::size_t bus = 0; bus < network.bus_count(); ++bus) {
     std::vector<fieldbus::CanFilter> filters;
-    for (const std::uint32_t id : controller::wanted_ids(parts, bus)) {
+    std::vector<std::uint32_t> ids = controller::wanted_ids(parts, bus);
+    const std::vector<std::uint32_t> others = more(bus);
+    ids.insert(ids.end(), others.begin(), others.end());
+    for (const std::uint32_t id : ids) {
       const bool extended = (id & fieldbus::extended_id_flag) != 0;
       const std::uint32_t mask = extended ? 0x1FFFFFFF : 0x7FF;
       filters.push_back({.id = id & mask, .mask = mask, .extended = extended});

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,7 +16,12 @@ namespace proxarm::command_line {
 controller::BusIndices indices_in(const fieldbus::SocketCanNetwork& network, std::size_t buses);
 
 // Lets through only what the parts want.
-void set_filters(fieldbus::SocketCanNetwork& network, const controller::CycleParts& parts);
+// `more`: identifiers that are wanted besides, by bus.
+void set_filters(
+    fieldbus::SocketCanNetwork& network, const controller::CycleParts& parts,
+    const std::function<std::vector<std::uint32_t>(std::size_t bus)>& more = [](std::size_t) {
+      return std::vector<std::uint32_t>{};
+    });
 
 // Throws SetupError that adds what can be done without these interfaces: the arm can still be simulated in this
 // process.

@@ -10,6 +10,7 @@
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/signals/clearances.hpp"
+#include "fieldbus/cia402/cia402_bring_up.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -318,6 +319,7 @@ void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& fr
 Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end, const EndingCause& cause) {
   Summary summary = builder_.finish();
   summary.end = end_summary(end, cause, session_, summary.rendered_time_s);
+  summary.drives_lack = fieldbus::losses_of(cycle.parts().can_drives);
   // A medium takes its share along the surface, too, which the ratio would count as friction.
   if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {

@@ -242,11 +242,11 @@ TEST_F(Cia402BringUpTest, SaysEachAbortInTheStandardsWords) {
       {0x08000024, "no data available"},
       {0x0BADC0DE, "unknown abort code"}};
   for (const auto& [code, wording] : rows) {
-    three.aborts[{0x6007, 0}] = code;
+    three.aborts[{0x1016, 1}] = code;
     char head[32];
     std::snprintf(head, sizeof head, "SDO abort %08X: ", code);
     has(refusal(),
-        "bus axes_3, node 3, object 6007h:00 abort connection option code (quick stop): drive of axis_3: "
+        "bus axes_3, node 3, object 1016h:01 consumer heartbeat time (of the controller): drive of axis_3: "
         "found " +
             std::string(head) + wording);
     EXPECT_EQ(three.state, 0x7F) << "nothing is enabled";

@@ -1,0 +1,134 @@
+#include "controller/command_line/commissioning/offsets.hpp"
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <regex>
+#include <sstream>
+
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using description::SetupError;
+
+std::string read_text(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  if (!in) throw SetupError({.file = file.string(), .message = "can't be read"});
+  return text.str();
+}
+
+void write_text(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.flush();
+  if (!out) throw SetupError({.file = file.string(), .message = "can't be written"});
+}
+
+// Where `joint: NAME` ends in the text, a comment apart; npos: nowhere.
+std::size_t end_of_joint(const std::string& text, const std::string& joint, std::size_t from) {
+  const std::regex key(R"((^|[\s{,-])joint:\s*["']?)" + joint + R"(["']?(?=[\s,}#]|$))");
+  std::smatch match;
+  std::size_t at = from;
+  while (std::regex_search(text.begin() + static_cast<std::ptrdiff_t>(at), text.end(), match, key)) {
+    const std::size_t begin = at + static_cast<std::size_t>(match.position(0));
+    const std::size_t line = text.rfind('\n', begin + 1);
+    const std::string before = text.substr(line + 1, begin - line);
+    at = begin + static_cast<std::size_t>(match.length(0));
+    if (before.find('#') == std::string::npos) return at;
+  }
+  return std::string::npos;
+}
+
+// The next drive's, or the end.
+std::size_t end_of_drive(const std::string& text, std::size_t from) {
+  static const std::regex next(R"((^|\n)\s*-\s*\{?\s*joint:|\n[A-Za-z_])");
+  std::smatch match;
+  if (!std::regex_search(text.begin() + static_cast<std::ptrdiff_t>(from), text.end(), match, next)) return text.size();
+  return from + static_cast<std::size_t>(match.position(0));
+}
+
+fs::path backup_of(const fs::path& file) {
+  for (int number = 1; number < 1000; ++number) {
+    const fs::path backup = file.string() + ".before-calibration" + (number == 1 ? "" : "-" + std::to_string(number));
+    std::error_code ignored;
+    if (!fs::exists(backup, ignored)) return backup;
+  }
+  throw SetupError({.file = file.string(), .message = "a thousand backups are there already"});
+}
+
+}  // namespace
+
+std::int32_t offset_by(const description::DriveDescription& drive, double angle_rad, std::int32_t counts) {
+  const double offset = std::nearbyint(counts - angle_rad * drive.counts_per_rad());
+  if (std::abs(offset) <= std::numeric_limits<std::int32_t>::max()) return static_cast<std::int32_t>(offset);
+  throw SetupError({.key = "offset_counts of " + drive.joint,
+                    .found = description::number_text(offset),
+                    .expected = "a number of 32 bits; are gear_ratio and counts_per_motor_revolution right?"});
+}
+
+double off_by(const description::DriveDescription& drive, std::int32_t offset, double angle_rad, std::int32_t counts) {
+  return (static_cast<double>(counts) - offset) / drive.counts_per_rad() - angle_rad;
+}
+
+std::string with_offsets(const std::string& text, const description::Cell& cell,
+                         const std::vector<std::int32_t>& offsets) {
+  std::string changed = text;
+  std::size_t from = changed.find("drives:");
+  for (std::size_t i = 0; i < cell.drives.size(); ++i) {
+    const std::string value = std::to_string(offsets[i]);
+    const std::size_t joint = from == std::string::npos ? from : end_of_joint(changed, cell.drives[i].joint, from);
+    if (joint == std::string::npos) {
+      throw SetupError({.file = cell.file.string(),
+                        .key = "drives",
+                        .found = "no line `joint: " + cell.drives[i].joint + "`",
+                        .expected = "one, to write offset_counts behind it"});
+    }
+    static const std::regex key(R"(offset_counts:\s*[-+0-9A-Fa-fx]+)");
+    const std::string block = changed.substr(joint, end_of_drive(changed, joint) - joint);
+    std::smatch match;
+    if (std::regex_search(block, match, key)) {
+      changed.replace(joint + static_cast<std::size_t>(match.position(0)), static_cast<std::size_t>(match.length(0)),
+                      "offset_counts: " + value);
+    } else {
+      const std::size_t line = changed.rfind('\n', joint - 1) + 1;
+      const std::string head = changed.substr(line, joint - line);
+      const bool flow = head.find('{') != std::string::npos;
+      const std::string indent(head.find("joint:"), ' ');
+      changed.insert(joint, flow ? ", offset_counts: " + value : "\n" + indent + "offset_counts: " + value);
+    }
+    from = joint;
+  }
+  return changed;
+}
+
+fs::path write_offsets(const description::Cell& cell, const std::vector<std::int32_t>& offsets) {
+  const std::string before = read_text(cell.file);
+  const fs::path fresh = cell.file.string() + ".calibrating";
+  write_text(fresh, with_offsets(before, cell, offsets));
+  try {
+    const description::Cell written = description::load_cell(fresh);
+    for (std::size_t i = 0; i < offsets.size(); ++i) {
+      if (written.drives.size() == offsets.size() && written.drives[i].offset_counts == offsets[i]) continue;
+      throw SetupError({.file = cell.file.string(),
+                        .key = "offset_counts of " + cell.drives[i].joint,
+                        .message = "can't be changed in this file; write it by hand",
+                        .expected = std::to_string(offsets[i])});
+    }
+  } catch (const SetupError&) {
+    std::error_code ignored;
+    fs::remove(fresh, ignored);
+    throw;
+  }
+  const fs::path backup = backup_of(cell.file);
+  write_text(backup, before);
+  fs::rename(fresh, cell.file);
+  return backup;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,95 @@
+// What each drive does when the controller dies, tried on purpose: at standstill, with the drives enabled, nothing is
+// sent any more, and what the drives say is listened to.
+//
+//   enabling, taring, standing for 0.3 s: under the same supervision as any session
+//   silent for a second, from right after a heartbeat on, which is the worst moment: no SYNC, no setpoint, no
+//   heartbeat, no SDO; frames are only received farewell: SYNC, heartbeat and controlwords again, until all drives are
+//   off, or half a second
+// A drive that lets go holds its axis by its brake, or the axis sinks: the same as when a controller dies in a session.
+// run_cycle() neither allocates, locks, throws nor prints.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "controller/cycle/bus_image.hpp"
+#include "controller/cycle/cycle_recorder.hpp"
+#include "controller/cycle/fault_monitor.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "controller/motion/measurement.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/alarm.hpp"
+#include "controller/supervision/supervisor.hpp"
+#include "fieldbus/cia402/silence_watch.hpp"
+
+namespace proxarm::proof {
+
+// Of one drive on CAN.
+struct OwnStop {
+  std::string joint;
+  double reacts_s = -1.0;  // after the controller's last word; below zero: nothing was seen
+  double off_s = -1.0;     // its statusword says that it is off; below zero: it didn't say so
+  std::string signs;       // what it said, in words
+  bool off_at_last = false;
+};
+
+class BusLossSession {
+ public:
+  // The drives have been asked for words (silence_watch.hpp).
+  BusLossSession(controller::CycleParts parts, const controller::SessionSettings& settings,
+                 const description::Cell& cell);
+  BusLossSession(const BusLossSession&) = delete;
+  BusLossSession& operator=(const BusLossSession&) = delete;
+
+  void run_cycle(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] bool done() const noexcept { return step_ == Step::done; }
+  // Nothing is to be sent, and a late cycle is no matter.
+  [[nodiscard]] bool silent() const noexcept { return step_ == Step::silent; }
+  void shut_down() noexcept { bus_.shut_down(); }
+  void request_stop() noexcept { stop_.store(true); }  // any thread
+  // The switch is to be let go and pressed.
+  [[nodiscard]] bool asks_for_press() const noexcept { return asks_for_press_.load(); }
+
+  // ---- after the last cycle
+  // Empty where it didn't come to the silence.
+  [[nodiscard]] std::vector<OwnStop> own_stops() const;
+  [[nodiscard]] const controller::FaultReport& fault() const noexcept {
+    return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
+  }
+
+ private:
+  enum class Step : std::uint8_t { waiting, enabling, taring, standing, silent, farewell, done };
+  class NoListener final : public controller::FrameListener {
+   public:
+    bool on_frame(std::size_t /*bus*/, const fieldbus::CanFrame& /*frame*/) noexcept override { return false; }
+  };
+
+  void heed(std::int64_t t_k_ns) noexcept;
+  void act(std::int64_t t_k_ns) noexcept;
+  void wait_for_drives(std::int64_t t_k_ns) noexcept;
+  void listen(std::int64_t until_ns) noexcept;
+  void go_to(Step step, std::int64_t t_k_ns) noexcept;
+  void send_nmt(fieldbus::NmtCommand command) noexcept;
+
+  controller::CycleParts parts_;
+  controller::SessionSettings settings_;
+  std::uint64_t cycle_ = 0;
+  controller::Supervisor supervisor_;
+  controller::Alarm alarm_;
+  controller::CycleRecorder recorder_;
+  controller::BusImage bus_;
+  controller::Measurement measurement_;
+  controller::FaultMonitor faults_;
+  NoListener listener_;
+  controller::Setpoints setpoints_;
+  std::vector<fieldbus::SilenceWatch> watches_;
+  Step step_ = Step::waiting;
+  std::int64_t since_ns_ = 0, last_word_ns_ = -1;
+  bool heartbeat_was_last_ = false;  // the last cycle sent it
+  std::int64_t silence_ns_ = -1;     // the last cycle before it began
+  std::atomic<bool> stop_{false}, asks_for_press_{false};
+};
+
+}  // namespace proxarm::proof

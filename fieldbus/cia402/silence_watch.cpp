@@ -1,0 +1,104 @@
+#include "fieldbus/cia402/silence_watch.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "fieldbus/can/byte_order.hpp"
+#include "fieldbus/canopen/canopen_pdo.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+constexpr std::uint8_t words_pdo = 3;  // TPDO2 may be the enabling input's
+constexpr std::uint16_t words_every_ms = 5, heartbeat_every_ms = 10;
+constexpr std::uint8_t on_change = 255;
+
+std::vector<SdoStep> words_steps(const ServoDrive& drive) {
+  std::vector<SdoStep> steps{sdo_write({0x1017, 0}, 2, heartbeat_every_ms, "producer heartbeat time")};
+  const PdoConfiguration words{.direction = PdoDirection::transmit,
+                               .number = words_pdo,
+                               .id = pdo_id(PdoDirection::transmit, words_pdo, drive.node()),
+                               .transmission_type = on_change,
+                               .event_timer_ms = words_every_ms,
+                               .mapping = {{object_address(drive.description().objects.statusword), 16}}};
+  for (const SdoStep& step : pdo_steps(words)) steps.push_back(if_present(step));
+  return steps;
+}
+
+}  // namespace
+
+void ask_for_words(CanNetwork& network, std::span<const DriveSlot> drives) {
+  std::vector<SdoSequence> sequences;
+  sequences.reserve(drives.size());
+  for (const DriveSlot& slot : drives) {
+    sequences.emplace_back(network.bus(slot.bus), slot.drive->node(), slot.drive->description().bus,
+                           "drive of " + slot.drive->description().joint, words_steps(*slot.drive),
+                           slot.drive->settings().sdo);
+    sequences.back().start(network.now_ns());
+  }
+  const FrameHandler on_frame = [&](std::size_t bus, const TimedFrame& received) {
+    for (std::size_t i = 0; i < sequences.size(); ++i) {
+      if (drives[i].bus != bus) continue;
+      if (sequences[i].on_frame(received.frame, received.time_ns)) return;
+      if (drives[i].drive->on_frame(received.frame, received.time_ns)) return;
+    }
+  };
+  constexpr std::int64_t forever = std::numeric_limits<std::int64_t>::max();
+  pump_frames(network, forever, on_frame, [&](std::int64_t now_ns) {
+    std::int64_t wake_ns = forever;
+    bool done = true;
+    for (SdoSequence& sequence : sequences) {
+      sequence.poll(now_ns);
+      if (sequence.finished()) continue;
+      done = false;
+      wake_ns = std::min(wake_ns, sequence.wake_ns(now_ns));
+    }
+    return done ? pump_done : wake_ns;
+  });
+}
+
+std::uint32_t SilenceWatch::wanted_id() const noexcept { return pdo_id(PdoDirection::transmit, words_pdo, node_); }
+
+void SilenceWatch::react(std::int64_t time_ns) noexcept {
+  if (reacted_ns_ < 0) reacted_ns_ = time_ns;
+}
+
+void SilenceWatch::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept {
+  if (frame.extended || frame.remote || frame.error) return;
+  if (Emergency emergency; decode_emcy(frame, time_ns, node_, emergency)) {
+    if (emergency.code == 0) return;
+    if (emcy_ == 0) emcy_ = emergency.code;
+    // What a drive warns of and carries on with isn't its stop (8100h of a stack that misses SYNC): its state says
+    // more.
+    constexpr std::uint16_t communication = 0x8100;
+    if (emergency.code != communication) react(time_ns);
+  } else if (frame.id == heartbeat_id(node_) && frame.length == 1) {
+    const auto state = static_cast<NmtState>(frame.data[0]);
+    if (state == NmtState::operational) return;
+    nmt_ = state;
+    react(time_ns);
+  } else if (frame.id == wanted_id() && frame.length >= 2) {
+    const std::uint16_t word = read_u16_le(frame.data.data());
+    const DriveState state = decode_state(word);
+    if (state == DriveState::operation_enabled) return;
+    statusword_ = word;
+    react(time_ns);
+    const bool moves = state == DriveState::quick_stop_active || state == DriveState::fault_reaction_active;
+    if (!moves && off_ns_ < 0) off_ns_ = time_ns;
+  }
+}
+
+std::string SilenceWatch::signs() const {
+  std::string text;
+  const auto add = [&text](const std::string& more) { text += (text.empty() ? "" : ", ") + more; };
+  if (emcy_ != 0) {
+    add("EMCY " + hex_text(emcy_, 4).substr(2) + "h (" + std::string(emcy_text(emcy_)) + ")");
+  }
+  if (statusword_ != 0) {
+    add(std::string(to_string(decode_state(statusword_))) + " (statusword " + hex_text(statusword_, 4) + ")");
+  }
+  if (nmt_ != NmtState::operational) add("NMT " + std::string(to_string(nmt_)));
+  return text.empty() ? "nothing" : text;
+}
+
+}  // namespace proxarm::fieldbus
