@@ -318,13 +318,19 @@ void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& reco
 
 // ---- getting free
 
+// What of a force can move the tool: the plane or line of an arm with few axes carries the rest.
+Vec3 AdmittanceMotion::moving_force_W(const Vec3& force_W) const noexcept {
+  const models::ToolSpace& space = parts_.inverse.space();
+  return space.dimensions == 3 ? force_W : Vec3(space.projection() * force_W);
+}
+
 // Away from what was touched last; where nothing was, to where the hand pushes.
 bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& measured) noexcept {
   if (command.order == Order::release) {
     parts_.release->start_release();
     return true;
   }
-  const Vec3& force_W = measured.hand_W.force;
+  const Vec3 force_W = moving_force_W(measured.hand_W.force);
   Vec3 n_W = state_.last_normal_W;
   if (n_W.isZero(0.0) && force_W.norm() > pinning_force_N) n_W = force_W.normalized();
   if (n_W.isZero(0.0) || !(command.value > 0.0)) return false;
@@ -334,7 +340,7 @@ bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& m
 }
 
 bool AdmittanceMotion::start_yielding(const Measured& measured) noexcept {
-  const Vec3& force_W = measured.hand_W.force;
+  const Vec3 force_W = moving_force_W(measured.hand_W.force);
   if (!force_W.allFinite() || force_W.norm() < Release::yielded_N) return false;
   start(measured, Beginning::freeing);
   parts_.release->start_yield(state_.q_k1_W, force_W);
@@ -342,7 +348,7 @@ bool AdmittanceMotion::start_yielding(const Measured& measured) noexcept {
 }
 
 bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
-  const Vec3& hand_W = cycle.measured.hand_W.force;
+  const Vec3 hand_W = moving_force_W(cycle.measured.hand_W.force);
   make_limits(cycle);
   const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
   const Vec3 h_W = parts_.release->force_W(state_.q_k1_W, v_W, hand_W);

@@ -97,6 +97,7 @@ class AdmittanceMotion final : public Motion {
   void let_force_in(CycleRecord& record) noexcept;
   [[nodiscard]] models::Wrench acting_wrench_W(const MotionCycle& cycle) noexcept;
   void judge_force(const MotionCycle& cycle, const models::Vec3& v_W, bool empty) noexcept;
+  [[nodiscard]] models::Vec3 moving_force_W(const models::Vec3& force_W) const noexcept;
   void advance_proxy(const models::Vec3& q_W) noexcept;
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;

@@ -87,6 +87,7 @@ void InverseKinematicsConfig::validate() const {
   check("position_tolerance_m", position_tolerance_m, 1.0);
   check("rotation_tolerance_rad", rotation_tolerance_rad, 1.0);
   check("singular_m_per_rad", singular_m_per_rad, 1.0);
+  check("posture_share", posture_share, 1.0);
   check("max_iterations", max_iterations, 1000);
   check("max_damped_iterations", max_damped_iterations, 1000);
 }

@@ -12,15 +12,14 @@
 // are in m/rad.
 //
 // That is of six axes. Others take steps of prioritized_step.hpp instead of Newton's:
-//   fewer   reach the place of T alone, in the space in which T can move (tool_space.hpp), and turn the tool towards
-//   the
-//           wanted orientation as far as is possible meanwhile (least squares of log(R_d Rᵀ))
-//   seven   and more reach the whole pose. What is left to them, the elbow's way around, goes towards the posture that
-//           set_posture() gave and away from the ends of the joints' ranges, by
+//   fewer   reach the place of T alone, in the space in which T can move (tool_space.hpp), and turn the tool
+//           towards the wanted orientation as far as is possible meanwhile (least squares of log(R_d Rᵀ))
+//   seven   and more reach the whole pose. What is left to them, the elbow's way around, goes towards the posture
+//           that set_posture() gave and away from the ends of the joints' ranges, by
 //             g = −posture_share [(q − q_posture) + p(q)]
-//           p is 0 in the middle 70 % of a joint's range and grows with the square from there to the whole range at its
-//           ends. So the elbow goes a way that the tool's determines, and comes back with it.
-// Turning back and the elbow's way take a tenth of each joint's step at most.
+//           p is 0 in the middle 70 % of a joint's range, and grows with the square from there to the whole range
+//           at its ends. So the elbow's way is determined by the tool's, and the elbow comes back with it.
+// Turning back and the elbow's way take a tenth of each joint's step at most, in the first of a call's steps.
 #pragma once
 
 #include <array>

@@ -3,6 +3,7 @@
 Each is judged by what a hand would feel: the apparent mass is taken from the simulation's truth, the touch from the
 scene. Five axes are the default arm with its fourth joint fixed, three the SCARA without its last.
 """
+import csv
 import json
 import math
 import re
@@ -89,6 +90,23 @@ class Axes(ProgramTest):
 
         self.for_each(judge)
 
+    def test_a_released_bench_keeps_to_its_plane(self):
+        # The hand pulls sideways, where nothing moves, with up to 50 N: the proxy used to follow it as far as the leash.
+        hand = self.written("aside.yaml", "mass_kg: 1.0\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\nwaypoints:\n"
+                            "  - {time_s: 0.5, offset_m: [0, 0, 0]}\n  - {time_s: 2, offset_m: [0.05, 0.1, 0]}\n"
+                            "  - {time_s: 6, offset_m: [0.1, 0.1, 0.05]}\n")
+        record = self.folder / "record"
+        self.ended_well(SOURCE / "models/cells/bench.yaml", "--hand", hand, "--record", record, "--do", "hold@2s", "--do",
+                        "release@3s", "--do", "hold@5s", "--do", "resume@6s", "--duration", "3s")
+        with open(record / "signals.csv") as file:
+            rows = list(csv.DictReader(file))
+        freed = [row for row in rows if row["phase"] == "freeing"]
+        self.assertGreater(len(freed), 1000)
+        for axis, least, most in (("x", 0.005, 1.0), ("y", 0.0, 1e-6)):
+            values = [float(row[f"proxy_W_{axis}_m"]) for row in freed]
+            self.assertGreaterEqual(max(values) - min(values), least, axis)
+            self.assertLessEqual(max(values) - min(values), most, axis)
+
     def test_the_bench_has_the_loads_that_its_plan_says(self):
         plan_test.Plan.assert_agrees(self, [SOURCE / "models/cells/bench.yaml"])
         plan_test.Plan.assert_agrees(self, [SOURCE / "models/cells/bench.yaml", "--timestep", "2ms"])
@@ -109,6 +127,17 @@ class Axes(ProgramTest):
         self.assert_refused(self.call("run", self.changed("models/cells/bench.yaml",
                                                           ("receive_window: 0.55", "receive_window: 0.95"))),
                             "receive_window", "0.95")
+
+    def test_the_bench_with_its_switch_fits_and_runs(self):
+        # As docs/first-bus.md has it: a copy, and this line at its end.
+        line = "enabling_input: {drive: shoulder, bit: 16}"
+        self.assertIn(f"echo '{line}' >> models/cells/mine.yaml", (SOURCE / "docs/first-bus.md").read_text())
+        bench = self.copies() / "models/cells/bench.yaml"
+        mine = bench.with_name("mine.yaml")
+        mine.write_text(bench.read_text() + line + "\n")
+        self.assertEqual(self.call("check", mine).status, 0)
+        self.assertIn("\n  fits\n", self.call("plan", mine).out)
+        self.assertGreaterEqual(self.ended_well(mine)["contacts"], 1)
 
     def test_check_says_what_run_would_refuse(self):
         copies = self.copies()

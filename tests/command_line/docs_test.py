@@ -9,6 +9,8 @@ PAGES = [SOURCE / "README.md", *sorted((SOURCE / "docs").glob("*.md"))]
 ELSEWHERE = {
     "--view": "stays until Ctrl-C: view_test.py runs it",
     "--bus vcan": "needs a kernel with CAN: tests/vcan runs it",
+    "models/cells/mine.yaml": "somebody's own copy: axes_test.py makes one",
+    "--bus can0": "needs an interface",
     "view DIR": "stays until Ctrl-C: view_test.py makes some records",
     "proxarm set ": "needs a session that runs: change_test.py asks one",
     "proxarm replay DIR": "needs a record: replay_test.py makes some",

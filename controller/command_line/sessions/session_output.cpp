@@ -217,7 +217,7 @@ void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
 }  // namespace
 
 namespace {
-// What an arm that hasn't six axes does with them.
+// What an arm that hasn't six axes does with them where its drives take positions.
 std::string axes_text(int axes, int dimensions) {
   if (axes == 6) return "";
   const std::string count = std::to_string(axes) + (axes == 1 ? " axis" : " axes");
@@ -240,7 +240,8 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
               1e3 * total_delay_s(session_));
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
-  std::printf("\n%s", axes_text(parts.arm->axes(), reach.dimensions).c_str());
+  std::printf("\n");
+  if (!session_.impedance()) std::printf("%s", axes_text(parts.arm->axes(), reach.dimensions).c_str());
   std::fflush(stdout);
 }
 
