@@ -38,6 +38,12 @@ std::optional<std::int64_t> parse(std::string_view value) {
   return negative ? -size : size;
 }
 
+// Of a stranger's file: without control characters, which a terminal would obey.
+std::string printable(std::string_view name) {
+  const std::string quoted = in_quotes(name.substr(0, 80));
+  return quoted.substr(1, quoted.size() - 2);
+}
+
 void note_mistake(IniFile::Section& section, std::string mistake, int line) {
   if (!section.mistake.empty()) return;
   section.mistake = std::move(mistake);
@@ -55,9 +61,10 @@ void read_value(IniFile::Section& section, std::string_view entry, int line) {
   if (is_new) {
     section.lines[key] = line;
   } else if (found->second != value) {
-    note_mistake(section,
-                 key + " comes twice, here with another value than in line " + std::to_string(section.lines[key]),
-                 line);
+    note_mistake(
+        section,
+        printable(key) + " comes twice, here with another value than in line " + std::to_string(section.lines[key]),
+        line);
   }
 }
 
@@ -122,7 +129,7 @@ SetupError IniFile::error(const std::string& section, const std::string& key, st
   }
   return SetupError({.file = file_.string(),
                      .line = line,
-                     .key = "[" + section + "] " + key,
+                     .key = "[" + printable(section) + "] " + printable(key),
                      .found = std::move(found),
                      .expected = std::move(expected)});
 }

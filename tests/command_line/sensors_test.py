@@ -86,6 +86,27 @@ class OtherSensors(ProgramTest):
         one_bus = self.call("plan", self.cell_with("aidin_aft200"), "--bus", "vcan0", "--timestep", "4ms")
         self.assertIn("outrank SYNC: sensor frame 1", one_bus.out)
 
+    def test_a_sensor_that_streams_is_planned_by_its_own_clock_at_any_timestep(self):
+        # Two frames of 135 us a millisecond, alone on their bus: 27 %, whatever the timestep is.
+        for timestep in ("1ms", "3ms", "5ms", "10ms", "20ms"):
+            with self.subTest(timestep):
+                outcome = self.call("plan", self.cell_with("aidin_aft200"), "--timestep", timestep)
+                self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
+                of_sensor = outcome.out[outcome.out.index("sensor: 1 Mbit/s"):]
+                self.assertIn("at most 27 %", of_sensor)
+                self.assertEqual(of_sensor.count("sensor frame 1 "), 1)
+        outcome = self.call("run", self.cell_with("aidin_aft200"), "--timestep", "10ms", "--mass", "60", "--duration", "0.5s")
+        self.assertNotIn("can't carry", outcome.err)
+
+    def test_check_tells_where_a_files_figures_are_from(self):
+        sensors = SOURCE / "models/sensors"
+        for file in sorted(sensors.glob("*.yaml")):
+            outcome = self.call("check", file)
+            self.assertEqual(outcome.status, 0, outcome.err)
+            self.assertIn("from: ", outcome.out, file.name)
+        self.assertIn("not held against a second source: ", self.call("check", sensors / "wacoh_dynpick.yaml").out)
+        self.assertNotIn("second source", self.call("check", sensors / "robotiq_ft300.yaml").out)
+
     def test_a_mistake_in_the_file_is_named_with_its_line(self):
         text = (SOURCE / "models/sensors/onrobot_hex.yaml").read_text()
         outcome = self.call("run", self.cell_with("onrobot_hex", text.replace("byte: 18", "byte: 21")))

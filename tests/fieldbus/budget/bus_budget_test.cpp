@@ -443,5 +443,32 @@ TEST(BusBudget, BracketsTheLoadOfARunningBus) {
   EXPECT_GE(load, plan.least_load);
 }
 
+// A chain of copies of it, one for each that comes in a cycle, gave no bound from 5 ms on.
+TEST(BusBudget, AStreamByItsOwnClockStandsOnceAndFitsAtAnyTimestep) {
+  PlannedBus bus{.name = "sensor",
+                 .frames = {{.name = "first",
+                             .id = 1,
+                             .shape = {.bytes = 8},
+                             .sender = "sensor",
+                             .any_time = true,
+                             .every_ns = 1'000'000},
+                            {.name = "second",
+                             .id = 2,
+                             .shape = {.bytes = 8},
+                             .sender = "sensor",
+                             .after = "first",
+                             .every_ns = 1'000'000}}};
+  for (const std::int64_t period_ms : {1, 3, 5, 10, 20, 100}) {
+    const BusPlan plan = plan_bus(bus, period_ms * 1'000'000);
+    EXPECT_TRUE(plan.fits) << period_ms;
+    EXPECT_NEAR(plan.mean_worst_load, 0.27, 1e-9) << "two frames of 135 bits at worst in 1000";
+    EXPECT_EQ(plan.frames[1].deadline_ns, 1'000'000) << "before the next sample";
+  }
+  bus.frames[0].every_ns = bus.frames[1].every_ns = 250'000;
+  EXPECT_FALSE(plan_bus(bus, 1'000'000).fits) << "1080 bits in 1000";
+  bus.frames[0].every_ns = -1;
+  EXPECT_THROW((void)plan_bus(bus, 1'000'000), description::SetupError);
+}
+
 }  // namespace
 }  // namespace proxarm::fieldbus

@@ -169,6 +169,12 @@ TEST(EdsVariants, WholeFilesOfOtherKindsAreRefused) {
   EXPECT_THAT(refusal(std::string("\xFF\xFE[\0D\0", 6)), HasSubstr("own.eds:1: found a text in UTF-16"));
   EXPECT_THAT(refusal("<?xml version=\"1.0\"?><ISO15745ProfileContainer/>"), HasSubstr("own.eds:1: "))
       << "the XML format of CiA 311";
+  // A terminal would obey what stands in a key; the fuzzer found it.
+  const std::string obeyed = refusal(
+      "[DeviceInfo]\n[2000]\nParameterName=x\nObjectType=8\nDataType=7\nAccessType=rw\nCompactSubObj=1\n[2000Value]\n"
+      "\x1b[31m=1\n");
+  EXPECT_THAT(obeyed, HasSubstr("\\x1b[31m: found no such sub-index"));
+  EXPECT_EQ(obeyed.find('\x1b'), std::string::npos);
   EXPECT_THAT(refusal("[DeviceInfo"), HasSubstr("own.eds:1: "));
   EXPECT_THAT(refusal(std::string(4'000'001, '[')), HasSubstr("4 MB"));
 }
