@@ -81,6 +81,12 @@ void append_pdos(std::vector<SdoStep>& steps, const description::DriveDescriptio
                            .event_timer_ms = timeout_ms,
                            .fd = drive.fd,
                            .mapping = rpdo_mapping(drive)}));
+  // The last torque acts until this timer runs out: a drive without it would go on for as long as the heartbeat lasts.
+  if (mode_of(drive).torque) {
+    for (SdoStep& step : steps) {
+      if (step.object == ObjectAddress{0x1400, 5}) step.is_optional = false;
+    }
+  }
   append(steps, pdo_steps({.direction = PdoDirection::transmit,
                            .number = 1,
                            .id = pdo_id(PdoDirection::transmit, 1, node),

@@ -92,6 +92,8 @@ class LackingDrive(ProgramTest):
         self.assert_refused(self.call("run", "--fault", "axis_3:fixed=0x160000"), "axis_3", "1600h:00",
                             "which can't be written", "(2)")
         self.assertIn("no 1400h:05: its RPDO timer doesn't stop it", self.lacking("--fault", "axis_1:lacks=0x140005")[0])
+        # A torque would act on until the heartbeat is lost.
+        self.assert_refused(self.call("run", "models/cells/light.yaml", "--fault", "turn:lacks=0x140005"), "turn", "1400h:05")
         self.assert_refused(self.call("run", "--fault", "axis_1:lacks=0x101601"), "axis_1", "1016h:01")
         self.assert_refused(self.call("run", "--fault", "axis_1:lacks=0x123401"), "--fault", "axis_1", "0x600700")
         self.assert_refused(self.call("run", "--fault", "axis_1:lacks=0x600700@2s"), "no time")
