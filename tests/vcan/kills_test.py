@@ -1,0 +1,88 @@
+"""Controllers that are killed again and again, with drives whose stacks stop them in different ways.
+
+The bench on one interface, `simulation: {stack: strict, latching or lazy}`. After each SIGKILL at a random moment of
+rendering every drive must fault within what the cell promises (`supervision.bus_loss_stop_s`, 60 ms), the next
+controller must come up, and a clean end must leave no EMCY. Times are candump's, from the last SYNC on.
+"""
+import os
+import random
+import re
+import signal
+import time
+from pathlib import Path
+
+import two_processes as two
+
+CELLS = Path(__file__).resolve().parents[2] / "models/cells"
+NODES = (1, 2)
+KILLS = int(os.environ.get("PROXARM_KILLS", "50"))
+PROMISED_US = 60_000
+# The last heartbeat left up to a period before the last SYNC's cycle ended; the drives look every 2 ms at most.
+SLACK_US = 3_000
+SYNC_LOST, HEARTBEAT_LOST = bytes([0x00, 0x87]), bytes([0x30, 0x81])
+
+
+class Kills(two.VcanTestCase):
+    def cell(self, stack):
+        text = re.sub(r"(\n +simulation:\n)( +)", rf"\1\2stack: {stack}\n\2", (CELLS / "bench.yaml").read_text())
+        for path in ("../arms", "../sensors", "../../scenes", "../../sim"):
+            text = text.replace(f" {path}/", f" {(CELLS / path).resolve()}/")
+        self.assertEqual(text.count(f"stack: {stack}"), len(NODES))
+        file = self.folder / "bench.yaml"
+        file.write_text(text)
+        return file
+
+    def killed(self, cell, chance, code):
+        """From the last SYNC to the EMCY by which each drive stops."""
+        with two.candump("vcan0") as witness:
+            with two.controller("vcan0", "60s", None, cell) as run:
+                time.sleep(chance.uniform(0.8, 2.5))
+                run.send(signal.SIGKILL)
+                self.assertEqual(run.wait(), -signal.SIGKILL, run.errors() + run.output())
+            time.sleep(0.2)
+            seen = two.frames_of(witness)
+        syncs = [f.time_us for f in seen if f.id == two.SYNC]
+        self.assertGreater(len(syncs), 100, "it rendered")
+        stops = {}
+        for node in NODES:
+            told = [f for f in two.of_node(seen, two.EMCY, node) if f.time_us > syncs[-1]]
+            stops[node] = next((f.time_us - syncs[-1] for f in told if f.data[:2] == code), None)
+            self.assertIsNotNone(stops[node], f"node {node}: {told}")
+        return stops
+
+    def ended(self, cell):
+        with two.candump("vcan0") as witness:
+            with two.controller("vcan0", "0.3s", None, cell) as run:
+                self.assertEqual(run.wait(), 0, run.errors() + run.output())
+            time.sleep(0.2)
+            seen = two.frames_of(witness)
+        last_sync = [f.time_us for f in seen if f.id == two.SYNC][-1]
+        for node in NODES:
+            self.assertEqual([f for f in two.of_node(seen, two.EMCY, node) if f.time_us >= last_sync], [])
+
+    def assert_stops(self, stack, code, within_us):
+        chance, cell = random.Random(stack), self.cell(stack)
+        slowest = 0
+        # A hand that leads goes on while nobody renders, and the next controller couldn't tare.
+        with two.simulated_arm("vcan0", cell, "--hand", two.write_hand(self.folder, "at_rest")) as arm:
+            for kill in range(KILLS):
+                for node, stop_us in self.killed(cell, chance, code).items():
+                    self.assertLessEqual(stop_us, within_us, f"node {node}, kill {kill}")
+                    slowest = max(slowest, stop_us)
+                if kill % 10 == 9:
+                    self.ended(cell)
+            self.assertEqual(arm.stop(), 0, arm.errors())
+        print(f"  {stack}: {KILLS} kills, slowest {slowest / 1000:.2f} ms")
+
+    def test_strict_drives_stop_when_sync_is_missing(self):
+        self.assert_stops("strict", SYNC_LOST, 5_000)
+
+    def test_latching_drives_stop_and_are_reset(self):
+        self.assert_stops("latching", SYNC_LOST, 5_000)
+
+    def test_lazy_drives_stop_by_the_heartbeat(self):
+        self.assert_stops("lazy", HEARTBEAT_LOST, PROMISED_US + SLACK_US)
+
+
+if __name__ == "__main__":
+    two.main()
