@@ -165,6 +165,27 @@ class Page(ProgramTest):
         masses = [float(row["proxy_mass_kg"]) for row in rows if row["phase"] == "rendering"]
         self.assertAlmostEqual(masses[-1] - masses[0], mass - 4.0, places=9)  # felt: with the handle's, before and after
 
+    def test_fields_follow_whoever_changes_something(self):
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view-control", "--control", "ear", "--no-plot", "--duration", "60s") as session:
+            self.opened(browser, session)
+            browser.until(f"{NOW}.phase === 3", "rendering")
+            field = "document.getElementById('set-damping')"
+            self.assertEqual(self.call("set", "--control", "ear", "damping=8Ns/m").status, 0)
+            browser.until(f"{field}.value === '8'", "what a terminal has set")
+            browser.run("location.reload()")
+            browser.until(FIRST_MOMENT, "the page anew")
+            self.assertEqual(browser.run(f"return {field}.value"), "8")
+            # Somebody writes there while another one sets it: what is written stays, and goes its way.
+            browser.run(f"{field}.focus(); {field}.value = '0'; {field}.dispatchEvent(new Event('input'))")
+            self.assertEqual(self.call("set", "--control", "ear", "damping=4Ns/m").status, 0)
+            browser.until(f"{NOW}.damping_Ns_per_m >= 4 && {NOW}.damping_Ns_per_m < 8", "what was set meanwhile")
+            self.assertEqual(browser.run(f"return {field}.value"), "0")
+            browser.run(f"{field}.dispatchEvent(new Event('change'))")
+            browser.until("document.getElementById('answer').textContent === 'ok: damping=0Ns/m'", "back to the first value")
+            browser.until(f"{field}.value === '0' && {NOW}.damping_Ns_per_m < 4", "the damping that was written")
+            self.assertEqual(browser.complaints(), [])
+
     def test_a_record_opens_at_the_fault_and_plays(self):
         self.call("run", "--no-plot", "--record", "session", "--duration", "5s", "--fault", "axis_3:silent@4s")
         with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:

@@ -289,6 +289,41 @@ class Refusals(ProgramTest):
 
 
 class Control(ProgramTest):
+    def test_every_page_has_what_the_session_is_set_to(self):
+        """Fields took the values of the start, and never followed: a second page, or one that was loaded anew, lied."""
+        scene = self.written("plate.yaml", PLATE)
+        with Session(self.folder, "run", "--view-control", "--no-plot", "--control", "ear", "--scene", scene, "--duration",
+                     "60s") as session:
+            first, second = session.open_socket(), session.open_socket()
+            fields = first.receive_json("stage")["fields"]
+            self.assertEqual(second.receive_json("stage")["settings"]["friction"], [0.3, 0.2])
+            while first.receive_moment(fields)["phase"] < 3:
+                pass
+
+            def told(page, name, value):
+                """The settings of the message that brings this value."""
+                while (settings := page.receive_json("settings"))[name] != value:
+                    pass
+                return settings
+
+            first.send({"ask": "spring=50N/m", "id": 1})
+            self.assertEqual(first.receive_json("answer")["text"], "ok: spring=50N/m")
+            for page in (first, second):
+                told(page, "spring_N_per_m", 50.0)
+            # The terminal's way, which no page has asked for.
+            done = self.call("set", "--control", "ear", "wall.friction=0.5", "plate.position_m=0,0.05,0")
+            self.assertEqual(done.status, 0, done.err)
+            self.assertEqual(self.call("set", "--control", "ear", "damping=5Ns/m").status, 0)
+            self.assertEqual(self.call("set", "--control", "ear", "timestep=2ms").status, 0)
+            for page in (first, second):
+                settings = told(page, "period_s", 0.002)
+                self.assertEqual(settings["friction"], [0.5, 0.2])
+                self.assertEqual(settings["position_m"][1], [0.0, 0.05, 0.0])
+                self.assertEqual(settings["damping_Ns_per_m"], 5.0)
+            late = session.open_socket().receive_json("stage")["settings"]
+            self.assertEqual(late, settings)
+            self.assertAlmostEqual(late["mass_kg"], 4.0, places=12)
+
     def test_changes_and_orders_are_those_of_the_socket(self):
         runtime = self.folder / "runtime"
         runtime.mkdir()

@@ -65,6 +65,17 @@ view::ServerConfig server_of(const json& hello) {
   return config;
 }
 
+json settings_of(const view::PresentSettings& settings) {
+  json places = json::array();
+  for (const models::Vec3& p : settings.position_m) places.push_back({p.x(), p.y(), p.z()});
+  return {{"period_s", settings.period_s},
+          {"mass_kg", settings.mass_kg},
+          {"damping_Ns_per_m", settings.damping_Ns_per_m},
+          {"spring_N_per_m", settings.spring_N_per_m},
+          {"friction", settings.friction},
+          {"position_m", places}};
+}
+
 class LiveView {
  public:
   LiveView(boost::asio::io_context& context, stream_protocol::socket& session, const json& hello, int memory)
@@ -72,7 +83,7 @@ class LiveView {
         source_(memory, stage_),
         control_(hello.at("control").get<std::string>(), context),
         page_(control_, [this](view::Socket& socket) { welcome(socket); }),
-        tools_(stage_, control_),
+        tools_(stage_, source_.settings(), control_),
         server_(
             context, server_of(hello), page_files(),
             [this](const std::string& path) { return mesh_file(stage_, path); }, page_, &tools_),
@@ -99,6 +110,7 @@ class LiveView {
     json stage = json::parse(stage_.describe());
     stage["mode"] = stage_.options().arm_alone ? "arm" : "live";
     stage["control"] = control_.open();
+    stage["settings"] = settings_of(source_.settings());
     socket.say(text_of({{"stage", stage}}), false);
     socket.say(std::make_shared<const std::string>(view::encode_history(source_.history())), true);
     socket.say(text_of({{"status", status_}}), false);
@@ -113,6 +125,7 @@ class LiveView {
         last_ = source_.take();
         tell_fault(view::fault_text(last_->record, stage_.cell()));
         tools_.show(*last_);
+        if (source_.have_settings_changed()) page_.say(text_of({{"settings", settings_of(source_.settings())}}));
         if (!page_.empty()) page_.show(std::make_shared<const std::string>(source_.encode(*last_)));
       }
       // A machine that is too slow for 60 a second has fewer, not a backlog.

@@ -77,12 +77,8 @@ bool same(const std::vector<models::Pose>& a, const std::vector<models::Pose>& b
 
 }  // namespace
 
-ToolChannel::ToolChannel(const view::Stage& stage, ControlLine& control)
-    : stage_(stage), control_(control), messages_(stage), spring_N_per_m_(stage.options().spring_N_per_m) {
-  last_.record.proxy_mass_kg = stage.options().mass_kg - stage.handle_mass_kg();
-  last_.record.proxy_damping_Ns_per_m = stage.options().damping_Ns_per_m;
-  last_.handle_mass_kg = stage.handle_mass_kg();
-}
+ToolChannel::ToolChannel(const view::Stage& stage, const view::PresentSettings& settings, ControlLine& control)
+    : stage_(stage), settings_(settings), control_(control), messages_(stage) {}
 
 std::string ToolChannel::choose(const std::vector<std::string>& offered) const {
   for (const char* known : protocols) {
@@ -162,16 +158,21 @@ void ToolChannel::subscribe(Client& client, const json& subscriptions) {
 }
 
 double ToolChannel::value_of(const std::string& name) const {
-  if (name == "mass") return last_.record.proxy_mass_kg + last_.handle_mass_kg;
-  return name == "damping" ? last_.record.proxy_damping_Ns_per_m : spring_N_per_m_;
+  if (name == "mass") return settings_.mass_kg;
+  return name == "damping" ? settings_.damping_Ns_per_m : settings_.spring_N_per_m;
 }
 
 void ToolChannel::send_parameters(Client& client, const std::set<std::string>& names, const std::string& id) {
-  json values = json::array();
+  std::map<std::string, double> values;
   for (const Parameter& parameter : parameters) {
-    if (!names.contains(parameter.name)) continue;
-    values.push_back({{"name", parameter.name}, {"value", value_of(parameter.name)}, {"type", "float64"}});
+    if (names.contains(parameter.name)) values[parameter.name] = value_of(parameter.name);
   }
+  send_values(client, values, id);
+}
+
+void ToolChannel::send_values(Client& client, const std::map<std::string, double>& all, const std::string& id) {
+  json values = json::array();
+  for (const auto& [name, value] : all) values.push_back({{"name", name}, {"value", value}, {"type", "float64"}});
   json answer{{"op", "parameterValues"}, {"parameters", values}};
   if (!id.empty()) answer["id"] = id;
   client.socket->say(text_of(answer), false);
@@ -198,12 +199,10 @@ void ToolChannel::set_parameter(const SocketPtr& socket, const std::string& name
                  const auto client = std::find_if(clients_.begin(), clients_.end(),
                                                   [&](const Client& c) { return c.socket == socket; });
                  if (client == clients_.end()) return;
-                 if (answer.compare(0, 4, "ok: ") != 0) {
-                   warn(*socket, answer);
-                 } else if (name == "spring") {
-                   spring_N_per_m_ = value;
-                 }
-                 if (!id.empty()) send_parameters(*client, {name}, id);
+                 // What is taken holds from one of the next cycles on.
+                 const bool taken = answer.compare(0, 4, "ok: ") == 0;
+                 if (!taken) warn(*socket, answer);
+                 if (!id.empty()) send_values(*client, {{name, taken ? value : value_of(name)}}, id);
                });
 }
 
@@ -221,10 +220,6 @@ void ToolChannel::show(const view::Moment& given) {
   if (clock_ns_ == 0) {
     const auto now = std::chrono::system_clock::now().time_since_epoch();
     clock_ns_ = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count() - given.record.time_ns;
-  }
-  if (given.record.proxy_mass_kg > 0.0) {
-    last_.record.proxy_mass_kg = given.record.proxy_mass_kg;
-    last_.record.proxy_damping_Ns_per_m = given.record.proxy_damping_Ns_per_m;
   }
   if (clients_.empty()) return;
   tell_changes();

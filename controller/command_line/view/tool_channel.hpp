@@ -16,14 +16,15 @@
 
 #include "controller/command_line/view/control_line.hpp"
 #include "controller/view/messages/session_messages.hpp"
+#include "controller/view/stage/present_settings.hpp"
 #include "controller/view/web/web_server.hpp"
 
 namespace proxarm::command_line {
 
 class ToolChannel final : public view::Channel {
  public:
-  // Both must outlive it.
-  ToolChannel(const view::Stage& stage, ControlLine& control);
+  // All must outlive it.
+  ToolChannel(const view::Stage& stage, const view::PresentSettings& settings, ControlLine& control);
 
   void opened(const view::SocketPtr& socket) override;
   void received(const view::SocketPtr& socket, std::string_view message, bool binary) override;
@@ -44,17 +45,17 @@ class ToolChannel final : public view::Channel {
   bool obey(Client& client, const nlohmann::json& said);
   void subscribe(Client& client, const nlohmann::json& subscriptions);
   void send_parameters(Client& client, const std::set<std::string>& names, const std::string& id);
+  static void send_values(Client& client, const std::map<std::string, double>& values, const std::string& id);
   void set_parameters(Client& client, const nlohmann::json& parameters, const std::string& id);
   void set_parameter(const view::SocketPtr& socket, const std::string& name, double value, const std::string& id);
   void tell_changes();
   [[nodiscard]] double value_of(const std::string& name) const;
 
   const view::Stage& stage_;
+  const view::PresentSettings& settings_;
   ControlLine& control_;
   view::SessionMessages messages_;
   std::vector<Client> clients_;
-  view::Moment last_;
-  double spring_N_per_m_;
   std::array<double, 3> told_{};  // of the parameters, to those who watch them
   std::int64_t clock_ns_ = 0;     // of the machine, at the session's first cycle
   std::vector<models::Pose> links_, objects_;

@@ -11,26 +11,30 @@ const ORDERS = [
   ['reset', 'after a fault: enable the drives again, into a hold', 'reset'],
 ];
 
-// Sliders of masses and stiffnesses are logarithmic: a step is a share.
+const number = (value) => String(Number(value.toPrecision(9)));
+
+// `of`: what the session is set to. Sliders of masses and stiffnesses are logarithmic: a step is a share.
 function parametersOf(stage) {
-  const { settings } = stage;
   const all = [
-    { name: 'mass', label: 'mass felt', unit: 'kg', low: 0.5, high: 50, log: true, value: settings.mass_kg },
-    { name: 'damping', label: 'damping', unit: 'Ns/m', low: 0, high: 100, value: settings.damping_Ns_per_m },
-    { name: 'spring', label: 'spring to the start', unit: 'N/m', low: 0, high: 1000, value: settings.spring_N_per_m },
-    { name: 'timestep', label: 'timestep', unit: 'ms', low: 1, high: 4, step: 1, value: 1e3 * settings.period_s },
+    { name: 'mass', label: 'mass felt', unit: 'kg', low: 0.5, high: 50, log: true, of: (s) => number(s.mass_kg) },
+    { name: 'damping', label: 'damping', unit: 'Ns/m', low: 0, high: 100, of: (s) => number(s.damping_Ns_per_m) },
+    { name: 'spring', label: 'spring to the start', unit: 'N/m', low: 0, high: 1000, of: (s) => number(s.spring_N_per_m) },
+    { name: 'timestep', label: 'timestep', unit: 'ms', low: 1, high: 4, step: 1, of: (s) => number(1e3 * s.period_s) },
   ];
-  for (const object of stage.scene.objects) {
+  stage.scene.objects.forEach((object, i) => {
     if (object.friction_can_change) {
       all.push({ name: `${object.name}.friction`, label: `friction of ${object.name}`, unit: '', low: 0, high: 1.5,
-                 value: object.friction });
+                 of: (s) => number(s.friction[i]) });
     }
     if (object.driven) {
-      all.push({ name: `${object.name}.position_m`, label: `place of ${object.name}, x,y,z`, unit: 'm', text: '0,0,0' });
+      all.push({ name: `${object.name}.position_m`, label: `place of ${object.name}, x,y,z`, unit: 'm', vector: true,
+                 of: (s) => s.position_m[i].map(number).join() });
     }
-  }
+  });
   return all;
 }
+
+const SETTLED_MS = 3000;  // after a change was taken, until what the session says of itself counts again
 
 const STEPS = 1000;
 const toSlider = (p, value) =>
@@ -52,7 +56,16 @@ export class Control {
       button.addEventListener('click', () => this.ask(line));
       return button;
     }));
-    element('parameters').replaceChildren(...parametersOf(stage).map((parameter) => this.makeParameter(parameter)));
+    this.settings = stage.settings;
+    this.fields = parametersOf(stage).map((parameter) => this.makeField(parameter));
+    element('parameters').replaceChildren(...this.fields.map((field) => field.box));
+  }
+
+  // What the session is set to now, whoever changed it.
+  follow(settings) {
+    const before = this.settings;
+    this.settings = settings;
+    for (const { parameter, show } of this.fields) if (parameter.of(settings) !== parameter.of(before)) show();
   }
 
   async ask(line) {
@@ -63,41 +76,56 @@ export class Control {
     return !refused;
   }
 
-  // A field with its slider. What is refused goes back to what is.
-  makeParameter(parameter) {
+  // A field with its slider: show() has them say what is, but for one that somebody is changing.
+  makeField(parameter) {
     const box = document.createElement('div'), row = document.createElement('div');
     box.className = 'parameter';
     const label = document.createElement('label'), field = document.createElement('input');
-    const slider = parameter.text === undefined ? document.createElement('input') : null;
+    const slider = parameter.vector ? null : document.createElement('input');
     field.type = 'text';
     field.id = `set-${parameter.name}`;
     field.inputMode = 'decimal';
-    field.value = parameter.text ?? String(parameter.value);
     label.htmlFor = field.id;
     label.textContent = parameter.label;
     const unit = document.createElement('span');
     unit.textContent = parameter.unit;
     label.append(unit);
-    let present = field.value;
-    const send = async () => {
-      const wanted = field.value.trim();
-      if (wanted === present) return;
-      if (await this.ask(`${parameter.name}=${wanted}${parameter.text === undefined ? parameter.unit : ''}`)) {
-        present = wanted;
-      }
-      field.value = present;
-      if (slider) slider.value = String(toSlider(parameter, Number(present)));
+    let changing = false, sending = false;
+    const show = () => {
+      if (changing) return;
+      field.value = parameter.of(this.settings);
+      if (slider) slider.value = String(toSlider(parameter, Number(field.value)));
     };
+    const send = async () => {
+      sending = true;
+      const wanted = field.value.trim();
+      const taken = await this.ask(`${parameter.name}=${wanted}${parameter.vector ? '' : parameter.unit}`);
+      changing = sending = false;
+      // What is taken holds from one of the next cycles on; what is refused goes back to what is.
+      if (taken) setTimeout(show, SETTLED_MS); else show();
+    };
+    field.addEventListener('input', () => { changing = true; });
     field.addEventListener('change', send);
+    const leave = () => {
+      if (sending) return;
+      changing = false;
+      show();
+    };
+    field.addEventListener('blur', leave);
+    field.addEventListener('keydown', (event) => { if (event.key === 'Escape') leave(); });
     if (slider) {
-      Object.assign(slider, { type: 'range', min: '0', max: String(STEPS), value: String(toSlider(parameter, Number(present))) });
+      Object.assign(slider, { type: 'range', min: '0', max: String(STEPS) });
       slider.setAttribute('aria-label', parameter.label);
-      slider.addEventListener('input', () => { field.value = String(fromSlider(parameter, Number(slider.value))); });
+      slider.addEventListener('input', () => {
+        changing = true;
+        field.value = String(fromSlider(parameter, Number(slider.value)));
+      });
       slider.addEventListener('change', send);
       row.append(slider);
     }
     row.append(field);
     box.append(label, row);
-    return box;
+    show();
+    return { parameter, box, show };
   }
 }

@@ -33,6 +33,7 @@ const connection = new Connection({
     }
   },
   status: (status) => panel.status(status),
+  settings: (settings) => control?.follow(settings),
   history: (rows) => (player ? player.takeHistory(rows) : rows.forEach((row) => plots.add(row))),
   frames: (frames) => player?.showFrames(frames),
   moment: (moment) => {

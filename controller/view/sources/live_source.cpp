@@ -10,7 +10,7 @@ constexpr std::size_t most_rows = 1300;  // a little more than 20 s of 60 a seco
 }  // namespace
 
 LiveSource::LiveSource(int descriptor, Stage& stage)
-    : box_(descriptor), stage_(stage), builder_(stage.handle_mass_kg()) {}
+    : box_(descriptor), stage_(stage), builder_(stage.handle_mass_kg()), settings_(stage) {}
 
 bool LiveSource::advance() {
   const std::uint64_t end = box_.cycles();
@@ -21,7 +21,9 @@ bool LiveSource::advance() {
     if (!box_.read(next_, cycle_)) continue;
     const controller::CycleRecord& record = cycle_.record;
     const bool rendered = record.phase == controller::Phase::rendering;
-    stage_.follow(cycle_.change, rendered, 1e-9 * static_cast<double>(record.period_ns));
+    const double period_s = 1e-9 * static_cast<double>(record.period_ns);
+    stage_.follow(cycle_.change, rendered, period_s);
+    settings_changed_ = settings_.follow(cycle_.change, period_s) || settings_changed_;
     builder_.add(record, 1e-9 * static_cast<double>(cycle_.rendered_ns));
     any = true;
   }
