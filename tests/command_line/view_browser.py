@@ -1,8 +1,11 @@
 """A headless Chromium for the tests of the page, driven by Debian's chromium-driver through python3-selenium."""
+import base64
 import os
 import pathlib
 import tempfile
 import time
+
+from harness import SOURCE
 
 try:
     from selenium import webdriver
@@ -14,7 +17,7 @@ except ImportError:
 CHROMIUM, DRIVER = pathlib.Path("/usr/bin/chromium"), pathlib.Path("/usr/bin/chromedriver")
 PATIENCE_S = 40
 # Where the pictures of a test run are kept for people to look at.
-PICTURES = pathlib.Path(os.environ.get("PROXARM_PICTURES") or pathlib.Path(tempfile.gettempdir()) / "proxarm-pictures")
+PICTURES = pathlib.Path(os.environ.get("PROXARM_PICTURES") or SOURCE / "build" / "pictures")
 
 
 def why_not():
@@ -74,11 +77,23 @@ class Browser:
         for kind in ("mousePressed", "mouseReleased"):
             self.command("Input.dispatchMouseEvent", dict(type=kind, x=x, y=y, button="left", buttons=1, clickCount=1))
 
+    def press(self, key, code=None, text=None, modifiers=0):
+        """A key, as DevTools names it; what it types where it types something."""
+        more = dict(text=text) if text else {}
+        for kind in ("keyDown", "keyUp"):
+            self.command("Input.dispatchKeyEvent", dict(type=kind, key=key, code=code or key, modifiers=modifiers, **more))
+
     def complaints(self):
         """What the console has of errors and warnings, but for those that the browser gives for being slow itself."""
         return [entry["message"] for entry in self.driver.get_log("browser")
                 if entry["level"] in ("SEVERE", "WARNING") and "GPU stall" not in entry["message"]
                 and "GroupMarkerNotSet" not in entry["message"] and "Automatic fallback" not in entry["message"]]
+
+    def small_picture(self, path, left, top, width, height):
+        """A part of the page at a quarter of its size."""
+        clip = dict(x=left, y=top, width=width, height=height, scale=0.25)
+        path.write_bytes(base64.b64decode(self.command("Page.captureScreenshot", dict(format="png", clip=clip))["data"]))
+        return path
 
     def picture(self, name):
         PICTURES.mkdir(parents=True, exist_ok=True)

@@ -1,18 +1,30 @@
 """The page of the view in a real browser: what stands in its scene graph, and what is to be seen in its pixels."""
 import csv
 import os
+import re
 import struct
 import time
 import unittest
 import zlib
 
 import view_browser
-from harness import ProgramTest
+from harness import SOURCE, ProgramTest
 from timing_test import bumpy_ball
 from view_client import Session
 
 FIRST_MOMENT = 'window.proxarm && performance.getEntriesByName("first-moment").length > 0'
 NOW = "proxarm.plots.rows[proxarm.plots.rows.length - 1]"
+
+# A region of each kind that a medium may be within.
+REGIONS = """name: regions
+media:
+  - viscous: {damping_Ns_per_m: 20, within: {plane: {point_m: [0.7, 0, 0.5], normal: [0, 0, 1]}}}
+  - viscous: {damping_Ns_per_m: 20, within: {box: {centre_m: [0.9, 0.3, 0.6], size_m: [0.1, 0.2, 0.3]}}}
+  - viscous: {damping_Ns_per_m: 20, within: {sphere: {centre_m: [0.9, 0, 0.8], radius_m: 0.1}}}
+  - viscous: {damping_Ns_per_m: 20, within: {capsule: {from_m: [0.6, -0.3, 0.6], to_m: [0.8, -0.3, 0.6], radius_m: 0.05}}}
+  - viscous: {damping_Ns_per_m: 20, within: {cylinder: {from_m: [0.6, 0.3, 0.6], to_m: [0.8, 0.3, 0.6], radius_m: 0.05}}}
+  - viscous: {damping_Ns_per_m: 1}
+"""
 
 
 def pixels(path):
@@ -101,9 +113,39 @@ class Page(ProgramTest):
             self.assert_colour(picture, self.point_of(browser, 0.0, 0.0, 0.1),
                                lambda r, g, b: abs(r - g) < 40 and 60 < g < 250, "the arm's foot")
             self.assert_colour(picture, (200, 160), lambda r, g, b: min(r, g, b) > 205, "nothing beside the arm")
+            self.assert_everything_is_readable(browser)
             self.assertEqual(browser.run("return document.getElementById('control').hidden"), True)
             self.assertEqual(browser.run("return document.getElementById('phase-chip').textContent"), "rendering")
             self.assertEqual(browser.complaints(), [])
+
+    def assert_everything_is_readable(self, browser):
+        """Each plot has the names of all its lines within its width, and no button lies over the arm."""
+        for told, wanted, ends, width in browser.run("""
+                return proxarm.plots.plots.filter((plot) => plot.width).map((plot) => [
+                  plot.head.slice(1).map((piece) => piece.text), plot.description.lines.map((line) => line.name),
+                  Math.max(...plot.head.map((piece) => piece.x + piece.width)), plot.width]);"""):
+            self.assertEqual(told[:len(wanted)], wanted)
+            self.assertLessEqual(ends, width)
+        heads = browser.run("return proxarm.plots.plots.map((plot) => plot.head?.map((piece) => piece.text))")
+        if any("computing" in (head or [""])[0] for head in heads if head):
+            self.assertRegex(heads[3][-1], r"^(no overrun|\d+ overruns)$")
+        top, bottom, above, below = browser.run("""
+            const { world } = proxarm, box = world.canvas.getBoundingClientRect(), point = world.middle.clone();
+            let top = Infinity, bottom = -Infinity;
+            world.arm.traverse((part) => {
+              if (!part.isMesh) return;
+              const { position } = part.geometry.attributes;
+              for (let i = 0; i < position.count; ++i) {
+                point.fromBufferAttribute(position, i).applyMatrix4(part.matrixWorld).project(world.camera);
+                const y = box.top + (0.5 - point.y / 2) * box.height;
+                top = Math.min(top, y);
+                bottom = Math.max(bottom, y);
+              }
+            });
+            const edges = (id) => document.getElementById(id).getBoundingClientRect();
+            return [top, bottom, edges('views').bottom, edges('legend').top];""")
+        self.assertGreater(top, above, "the arm begins below the buttons")
+        self.assertLess(bottom, below, "and ends above the legend")
 
     def test_a_mesh_of_328_thousand_triangles_is_shown(self):
         """As many as a machine without a graphics card draws in time; tests/soak/view_speed.py has how fast."""
@@ -121,18 +163,149 @@ class Page(ProgramTest):
                                lambda r, g, b: g > r + 8 and g > b + 2, "the ball's green")
             self.assertEqual(browser.complaints(), [])
 
+    def test_all_shipped_scenes_are_drawn(self):
+        scenes = sorted((SOURCE / "scenes").glob("*.yaml"))
+        self.assertGreater(len(scenes), 10)
+        scenes.append(self.written("regions.yaml", REGIONS))
+        with view_browser.Browser() as browser:
+            for scene in scenes:
+                with self.subTest(scene.stem), Session(self.folder, "run", "--view", "--no-plot", "--pace", "virtual",
+                                                       "--duration", "3s", "--scene", scene) as session:
+                    session.until_said("until Ctrl-C")
+                    self.opened(browser, session)
+                    stage = browser.run("return proxarm.stage.scene")
+                    browser.until("proxarm.world.frames > 1", "a picture")
+                    for kind in ("mesh", "plane"):
+                        of_kind = sum(o["shape"]["kind"] == kind for o in stage["objects"])
+                        name = {"mesh": "solid", "plane": "sheet"}[kind]
+                        browser.until(f"""{of_kind} <= (() => {{ let n = 0;
+                            proxarm.world.objects.traverse((o) => {{ n += o.name === '{name}'; }}); return n; }})()""",
+                                      f"each {kind}")
+                    regions = browser.run("return proxarm.world.objects.children.filter((o) => o.name === 'medium').length")
+                    self.assertEqual(regions, sum(medium["within"] is not None for medium in stage["media"]))
+                    notes = browser.run("return document.getElementById('notes').textContent")
+                    everywhere = sum(medium["within"] is None for medium in stage["media"])
+                    self.assertEqual(notes.count("everywhere: "), everywhere + (stage["coulomb_force"] is not None))
+                    # What acted before the last cycle isn't told for good.
+                    self.assertEqual(browser.run("return document.querySelectorAll('#held-back li').length"), 0)
+                    self.assertEqual(browser.run("return document.getElementById('mode-chip').textContent"), "○ over")
+                    # Nothing is drawn where nothing is: before rendering there is no proxy, and no way from it.
+                    far = browser.run("""return Math.max(...proxarm.world.contacts.trail.points.map(([p]) =>
+                                             p.distanceTo(proxarm.world.tool)))""")
+                    self.assertLess(far, 0.5)
+                    browser.run("proxarm.world.drawFine()")
+                    browser.until("!proxarm.world.changed", "a fine picture")
+                    browser.picture(f"scene-{scene.stem}")
+                    rows, step = pixels(browser.small_picture(self.folder / "small.png", 0, 80, 980, 440))
+                    colours = {bytes(row[at:at + 3]) for row in rows for at in range(0, len(row), step)}
+                    self.assertGreater(len(colours), 200, "a picture that isn't blank")
+                    self.assertEqual(browser.complaints(), [])
+
+    def test_keys_do_what_the_mouse_does(self):
+        with view_browser.Browser() as browser, \
+                Session(self.folder, "run", "--view", "--no-plot", "--pace", "virtual", "--duration", "2s") as session:
+            session.until_said("until Ctrl-C")
+            self.opened(browser, session)
+            camera = "proxarm.world.camera.position.toArray()"
+            distance = "proxarm.world.camera.position.distanceTo(proxarm.world.orbit.target)"
+            before, far = browser.run(f"return [{camera}, {distance}]")
+            browser.press("ArrowRight")
+            turned = browser.run(f"return {camera}")
+            self.assertGreater(sum(abs(a - b) for a, b in zip(before, turned)), 0.05)
+            self.assertAlmostEqual(turned[2], before[2], places=9)
+            self.assertAlmostEqual(browser.run(f"return {distance}"), far, places=9)
+            browser.press("ArrowUp")
+            self.assertGreater(browser.run(f"return {camera}")[2], before[2])
+            browser.press("+")
+            self.assertLess(browser.run(f"return {distance}"), far)
+            target = browser.run("return proxarm.world.orbit.target.toArray()")
+            browser.press("ArrowRight", modifiers=8)
+            self.assertNotEqual(browser.run("return proxarm.world.orbit.target.toArray()"), target)
+            browser.press("?")
+            shown = browser.run("return document.getElementById('help').innerText")
+            for words in ("orbit", "closer", "further away", "follow the tool"):
+                self.assertIn(words, shown)
+            self.assertNotIn("hold: ", shown, "without --view-control")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_a_button_with_the_focus_keeps_its_keys(self):
+        """A record's keys took the space and the arrows of whoever walks through the page by Tab."""
+        self.call("run", "--no-plot", "--record", "session", "--duration", "4s")
+        with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:
+            self.opened(browser, session)
+            at = browser.run("return proxarm.player.at")
+            browser.run("document.querySelector('[title^=\"a cycle on\"]').focus()")
+            browser.press(" ", "Space", " ")
+            self.assertEqual(browser.run("return [proxarm.player.at, proxarm.player.playing]"), [at + 1, False])
+            browser.press("ArrowLeft")
+            self.assertEqual(browser.run("return proxarm.player.at"), at + 1)
+            # Who clicks goes on with the page's keys.
+            box = browser.run("const b = document.querySelector('[title^=\"a cycle on\"]').getBoundingClientRect(); "
+                              "return [b.left + 5, b.top + 5]")
+            browser.click(*box)
+            browser.until(f"proxarm.player.at === {at} + 2", "a click")
+            browser.press("ArrowLeft")
+            self.assertLess(browser.run("return proxarm.player.at"), at)
+            browser.press(" ", "Space", " ")
+            self.assertTrue(browser.run("return proxarm.player.playing"))
+
+    def test_what_a_record_tells_is_of_its_cycle(self):
+        """A limit was told for 0.7 s after a jump to where none acts, and in pictures of such a moment."""
+        self.call("run", "--no-plot", "--record", "session", "--duration", "5s", "--fault", "axis_3:silent@4s")
+        with open(self.folder / "session" / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        with view_browser.Browser() as browser, Session(self.folder, "view", "session") as session:
+            self.opened(browser, session)
+            self.assert_everything_is_readable(browser)
+            words = {flag["name"]: flag["words"] for flag in browser.run("return proxarm.stage.words.flags")}
+
+            def told_at(index):
+                browser.run(f"proxarm.player.goTo({index})")
+                browser.until(f"proxarm.panel.moment.cycle === {rows[index]['cycle']} && !proxarm.panel.newFlags", "that cycle")
+                return browser.run("return [...document.querySelectorAll('#held-back li')].map((item) => item.textContent)")
+
+            last = [i for i in range(1, len(rows)) if rows[i]["flags"] != rows[i - 1]["flags"]]
+            some = last[:: max(1, len(last) // 12)]
+            told = {}
+            for index in [i + back for i in some for back in (0, -1)]:
+                told[index] = told_at(index)
+                self.assertEqual(told[index], [text for name, text in words.items()
+                                               if name in re.findall(r"\w+", rows[index]["flags"])], index)
+                figure = browser.run("return document.querySelector('#figures dd').textContent")
+                force = sum(float(rows[index][f"force_W_{axis}_N"]) ** 2 for axis in "xyz") ** 0.5
+                self.assertAlmostEqual(float(figure.split()[0]), force, delta=0.006, msg="figures of the same cycle")
+            self.assertTrue(any(told.values()) and not all(told.values()), "with limits and without")
+
+    def phone(self, dark):
+        theme = "dark" if dark else "light"
+        with view_browser.Browser(390, 844, dark=dark) as browser, \
+                Session(self.folder, "run", "--view-control", "--no-plot", "--duration", "60s") as session:
+            self.opened(browser, session)
+            self.assertEqual(browser.run("return document.documentElement.dataset.theme"), theme)
+            self.until_time(browser, 1.5)
+            wide = browser.run("return [document.documentElement.scrollWidth, innerWidth]")
+            self.assertLessEqual(wide[0], wide[1], "nothing sticks out at the side")
+            self.assert_everything_is_readable(browser)
+            rows, step = pixels(browser.picture(f"phone-{theme}"))
+            mean = sum(sum(row[0::step]) for row in rows) / sum(len(row) // step for row in rows)
+            (self.assertLess if dark else self.assertGreater)(mean, 90 if dark else 180)
+            browser.run("document.getElementById('plots').scrollIntoView({ block: 'end' })")
+            time.sleep(0.3)
+            browser.picture(f"phone-{theme}-below")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_on_a_phone_in_the_light(self):
+        self.phone(dark=False)
+
     def test_dark_and_on_a_phone(self):
+        self.phone(dark=True)
+
+    def test_the_other_theme_by_a_button(self):
         with view_browser.Browser(390, 844, dark=True) as browser, \
                 Session(self.folder, "run", "--view", "--no-plot", "--duration", "60s") as session:
             self.opened(browser, session)
             self.assertEqual(browser.run("return document.documentElement.dataset.theme"), "dark")
-            self.until_time(browser, 1.5)
-            wide = browser.run("return [document.documentElement.scrollWidth, innerWidth]")
-            self.assertLessEqual(wide[0], wide[1], "nothing sticks out at the side")
             self.assertGreaterEqual(browser.run("return proxarm.world.canvas.getBoundingClientRect().height"), 300)
-            rows, step = pixels(browser.picture("phone-dark"))
-            mean = sum(sum(row[0::step]) for row in rows) / sum(len(row) // step for row in rows)
-            self.assertLess(mean, 90)
             browser.run("document.getElementById('theme').click()")
             browser.until("document.documentElement.dataset.theme === 'light'", "light")
             self.assertEqual(browser.complaints(), [])

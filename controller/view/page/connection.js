@@ -6,6 +6,9 @@
 const KIND_MOMENT = 1, KIND_HISTORY = 2;
 const POSE_FLOATS = 7;
 
+// Of a controller; before it there is no proxy yet, and the sensor isn't tared.
+export const PHASE_RENDERING = 3;
+
 export class Connection {
   constructor(handlers) {
     this.handlers = handlers;

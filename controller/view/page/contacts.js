@@ -2,7 +2,7 @@
 import * as THREE from './three/build/three.module.js';
 import { UP, Arrow } from './shapes.js';
 import { colour, onTheme } from './theme.js';
-import { vector } from './connection.js';
+import { PHASE_RENDERING, vector } from './connection.js';
 
 // At a distance of one metre; from further away everything here is drawn larger, so that it keeps its size in the picture.
 const METRES_PER_NEWTON = 0.0075;
@@ -48,11 +48,11 @@ export class ContactView extends THREE.Group {
   constructor(proxy = true) {
     super();
     this.name = 'contacts';
+    this.withProxy = proxy;
     this.size = 1;
     this.makeMaterials();
     this.proxy = new THREE.Mesh(new THREE.SphereBufferGeometry(0.0105, 32, 20), this.materials.proxy);
     this.proxy.name = 'proxy';
-    this.proxy.visible = proxy;
     // The tool is a ring with a cross in it, so that the proxy is seen inside of it.
     this.tool = new THREE.Group();
     this.tool.name = 'tool';
@@ -136,15 +136,23 @@ export class ContactView extends THREE.Group {
     cone.scale.set(radius, radius, height);
   }
 
+  // Where forces act: at the proxy, or at the tool while there is none.
+  proxyOf(moment) {
+    return at(moment, this.withProxy && moment.phase >= PHASE_RENDERING ? 'proxy' : 'tool');
+  }
+
   // `moves`: it is another moment, not the same seen from elsewhere.
   show(moment, moves = true) {
-    const proxy = at(moment, 'proxy'), tool = at(moment, 'tool');
+    const there = this.withProxy && moment.phase >= PHASE_RENDERING;
+    const tool = at(moment, 'tool'), proxy = this.proxyOf(moment);
+    this.proxy.visible = this.leash.visible = there;
     this.proxy.position.copy(proxy);
     this.tool.position.copy(tool);
     this.leash.geometry.setFromPoints([proxy, tool]);
     if (moves) {
       // What was between two places of a record that lie apart isn't known.
       if (Math.abs(moment.time_s - this.trail.time) > 0.3 || moment.time_s < this.trail.time) this.trail.clear();
+      if (!there) this.trail.clear();
       this.trail.time = moment.time_s;
       this.trail.push(proxy, moment.contact);
     }
@@ -172,7 +180,7 @@ export class ContactView extends THREE.Group {
 
   // What is written beside the arrows.
   labels(moment) {
-    const proxy = at(moment, 'proxy'), out = [], scale = METRES_PER_NEWTON * this.size;
+    const proxy = this.proxyOf(moment), out = [], scale = METRES_PER_NEWTON * this.size;
     if (moment.contact !== FREE) {
       out.push({ name: 'contact', at: proxy.clone().add(at(moment, 'contact_force').multiplyScalar(scale)),
                  text: `${moment.contact_N.toFixed(1)} N`, colour: moment.contact === SLIP ? '--slip' : '--stick', beside: [-78, -40] });

@@ -26,7 +26,10 @@ const connection = new Connection({
     const chip = element('mode-chip');
     chip.hidden = false;
     chip.textContent = { live: '● live', arm: '● simulated arm', record: '▮ record' }[stage.mode];
-    if (stage.control) control = new Control(stage, connection);
+    if (stage.control) {
+      control = new Control(stage, connection);
+      keys.add('h', 'hold: stop the arm, its drives enabled', () => control.ask('hold'));
+    }
     if (stage.record) {
       chip.textContent = `▮ record ${stage.record.name}`;
       player = new Player(stage, connection, plots, keys);
@@ -37,6 +40,8 @@ const connection = new Connection({
   history: (rows) => (player ? player.takeHistory(rows) : rows.forEach((row) => plots.add(row))),
   frames: (frames) => player?.showFrames(frames),
   moment: (moment) => {
+    // What acted in a moment that is overtaken is told with the next one.
+    if (newest && !player) moment.flags_since = (moment.flags_since | newest.flags_since) >>> 0;
     newest = moment;
     if (player) player.show(moment); else plots.add(moment);
   },
@@ -57,6 +62,7 @@ function frame(now) {
     performance.mark('first-moment');
   }
   player?.tick(now);
+  panel.tick(now, Boolean(player) && !player.playing);
   world.draw();
   plots.draw(now);
 }
@@ -77,7 +83,16 @@ for (const [key, view] of [['0', 'overview'], ['1', 'top'], ['2', 'front'], ['3'
 }
 keys.add('f', 'follow the tool', () => setFollow(!world.follow));
 keys.add('d', 'dark or light', toggleTheme);
-keys.add('h', '', () => control?.ask('hold'));
+const TURN = Math.PI / 36, SHIFT = 0.04, CLOSER = 0.9;  // of a key that is pressed once
+for (const [key, aside, up] of [['ArrowLeft', -1, 0], ['ArrowRight', 1, 0], ['ArrowUp', 0, 1], ['ArrowDown', 0, -1]]) {
+  const move = (event) => (event.shiftKey ? world.shift(SHIFT * aside, SHIFT * up) : world.turn(TURN * aside, TURN * up));
+  keys.add(key, '', move);
+  keys.addFor(element('picture'), key, move);  // in a record, whose player takes two of them elsewhere
+}
+keys.explain('orbit; with Shift: move (in a record: once the picture was clicked)', '← → ↑ ↓');
+keys.add('+', 'closer', () => world.zoom(CLOSER));
+keys.add('=', '', () => world.zoom(CLOSER));
+keys.add('-', 'further away', () => world.zoom(1 / CLOSER), '−');
 
 // For tests and for the curious.
 globalThis.proxarm = { world, plots, panel, connection, get stage() { return stage; }, get player() { return player; } };

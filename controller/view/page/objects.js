@@ -3,7 +3,7 @@ import * as THREE from './three/build/three.module.js';
 import { UP, Arrow, capsuleGeometry, cylinderGeometry, fetchMesh, lineOf, placeBetween, setPose, vec } from './shapes.js';
 import { colour, isDark, onTheme } from './theme.js';
 
-const PLANE_SIZE = 1.1, PLANE_CELL = 0.1, HATCH = 0.045;
+const PLANE_SIZE = 1.1, PLANE_CELL = 0.1, HATCH = 0.045, MEDIUM_DEPTH = 0.2;
 
 // Materials whose colours follow the theme.
 function makeMaterials() {
@@ -38,19 +38,34 @@ function segments(points, material) {
   return new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(points), material);
 }
 
-// A square of the plane about where the tool is. Hatching lies on the side that is solid, an arrow on the free one.
-function makePlane(shape, near, materials) {
+// At the point of a plane that is nearest to the tool, z along its normal.
+function atPlane(shape, near) {
   const normal = vec(shape.normal), point = vec(shape.point);
   const group = new THREE.Group();
-  const centre = near.clone().addScaledVector(normal, -near.clone().sub(point).dot(normal));
-  group.position.copy(centre);
+  group.position.copy(near).addScaledVector(normal, -near.clone().sub(point).dot(normal));
   // Upright planes have an upright grid: x of the square lies level.
   const level = new THREE.Vector3().crossVectors(UP, normal);
   if (level.lengthSq() < 1e-6) level.set(1, 0, 0).addScaledVector(normal, -normal.x);
   level.normalize();
   const steep = new THREE.Vector3().crossVectors(normal, level);
   group.quaternion.setFromRotationMatrix(new THREE.Matrix4().makeBasis(level, steep, normal));
+  return group;
+}
 
+// A medium's region that a plane ends: some depth of it.
+function makeHalfSpace(shape, near, materials) {
+  const group = atPlane(shape, near);
+  const slab = new THREE.Mesh(new THREE.BoxBufferGeometry(PLANE_SIZE, PLANE_SIZE, MEDIUM_DEPTH), materials.medium);
+  slab.name = 'solid';
+  slab.position.z = -MEDIUM_DEPTH / 2;
+  slab.add(new THREE.LineSegments(new THREE.EdgesGeometry(slab.geometry), materials.edge));
+  group.add(slab);
+  return group;
+}
+
+// A square of the plane about where the tool is. Hatching lies on the side that is solid, an arrow on the free one.
+function makePlane(shape, near, materials) {
+  const group = atPlane(shape, near);
   const half = PLANE_SIZE / 2, lines = [], hatch = [];
   for (let x = -half; x <= half + 1e-9; x += PLANE_CELL) {
     lines.push(new THREE.Vector3(x, -half, 0), new THREE.Vector3(x, half, 0));
@@ -121,7 +136,7 @@ function makeObject(object, near, materials) {
     }
   } else if (shape.kind === 'mesh') {
     fetchMesh(object.mesh).then((geometry) => {
-      const mesh = new THREE.Mesh(geometry, materials.solid);
+      const mesh = new THREE.Mesh(geometry, shape.inside_out ? materials.cavity : materials.solid);
       mesh.name = 'solid';
       group.add(mesh);
       group.dispatchEvent({ type: 'loaded' });
@@ -166,8 +181,8 @@ export class SceneView extends THREE.Group {
     this.parts = stage.scene.objects.map((object) => makeObject(object, near, materials));
     if (this.parts.length) this.add(...this.parts);
     for (const medium of stage.scene.media) {
-      if (!medium.within || medium.within.kind === 'plane' || medium.within.kind === 'mesh') continue;
-      const group = new THREE.Group();
+      if (!medium.within) continue;  // everywhere: the panel says so
+      const group = medium.within.kind === 'plane' ? makeHalfSpace(medium.within, near, materials) : new THREE.Group();
       group.name = 'medium';
       addSolid(group, medium.within, materials.medium, materials, false);
       this.add(group);

@@ -1,6 +1,7 @@
 // What the session is doing, in words and figures.
 
-const MOMENTARY_MS = 700;  // for how long a limit that acted is still told: shorter can't be read
+const MOMENTARY_MS = 700;  // for how long a limit that acted is still told while time runs: shorter can't be read
+const JUMP_S = 0.3;        // between two moments of a record that don't follow each other
 
 const BETWEEN_FIGURES_MS = 100;
 
@@ -45,6 +46,17 @@ function name(stage, moment) {
   return [...new Set(names)].join(', ');
 }
 
+// What of the scene has no place that could be drawn.
+function everywhere(scene) {
+  const notes = scene.media.filter((medium) => !medium.within).map((medium) => {
+    const parts = [medium.damping ? `damping of ${medium.damping} Ns/m` : '',
+      medium.force ? `dry friction of ${medium.force} N` : ''].filter(Boolean);
+    return `everywhere: ${parts.join(' and ')}`;
+  });
+  if (scene.coulomb_force !== null) notes.push(`everywhere: dry friction of ${scene.coulomb_force} N`);
+  return notes;
+}
+
 export class Panel {
   constructor() {
     this.heldSince = new Map();
@@ -64,7 +76,7 @@ export class Panel {
     element('scene-name').textContent = stage.scene.name;
     element('cell-name').textContent = `· ${stage.cell}`;
     document.title = `proxarm: ${stage.scene.name}`;
-    element('notes').replaceChildren(...stage.notes.map((note) => {
+    element('notes').replaceChildren(...[...everywhere(stage.scene), ...stage.notes].map((note) => {
       const item = document.createElement('li');
       item.textContent = note;
       return item;
@@ -78,15 +90,27 @@ export class Panel {
     const how = status.exit_status === undefined ? '' : ` (exit status ${status.exit_status})`;
     element('ended').hidden = !status.ended;
     element('ended').textContent = status.ended + how;
+    if (status.ended) this.end();
+  }
+
+  // What is shown stays as it was in the last cycle.
+  end() {
+    this.over = true;
+    element('mode-chip').textContent = '○ over';
   }
 
   lost() {
     element('ended').hidden = false;
     element('ended').textContent = 'The connection is gone: the session’s program has ended.';
+    this.end();
   }
 
   show(moment) {
     const { words } = this.stage;
+    const since_s = this.moment ? moment.time_s - this.moment.time_s : 0;
+    if (since_s < 0 || since_s > JUMP_S) this.heldSince.clear();
+    this.moment = moment;
+    this.newFlags = this.newFigures = true;
     const phase = words.phases[moment.phase], contact = words.contacts[moment.contact];
     element('phase-chip').textContent = phase.name;
     element('phase-chip').dataset.phase = phase.name;
@@ -94,20 +118,28 @@ export class Panel {
     element('contact-chip').textContent = { free: 'free', stick: '■ sticks', slip: '▶ slips' }[contact];
     element('contact-chip').dataset.contact = contact;
     element('clock').textContent = `${moment.time_s.toFixed(2)} s`;
-    this.showFlags(moment);
-    // Figures that change faster can't be read.
-    const now = performance.now();
-    if (now - this.written < BETWEEN_FIGURES_MS) return;
-    this.written = now;
-    this.figures.forEach(([, text], i) => { this.cells[i].textContent = text(moment, this.stage); });
   }
 
-  showFlags(moment) {
-    const now = performance.now();
-    for (const flag of this.stage.words.flags) {
-      if (Math.floor(moment.flags_since / flag.bit) % 2 === 1) this.heldSince.set(flag.bit, now);
-    }
-    const told = this.stage.words.flags.filter((flag) => now - (this.heldSince.get(flag.bit) ?? -1e9) < MOMENTARY_MS);
+  // Once per frame of the browser. `ofRecord`: the moment is one cycle of a record, which is told as it was, however
+  // long it is looked at; so is a session's last one.
+  tick(now, ofRecord) {
+    if (!this.moment) return;
+    const still = ofRecord || this.over;
+    this.showFlags(now, still);
+    // Figures that change faster can't be read.
+    if (!this.newFigures || (!still && now - this.written < BETWEEN_FIGURES_MS)) return;
+    this.newFigures = false;
+    this.written = now;
+    this.figures.forEach(([, text], i) => { this.cells[i].textContent = text(this.moment, this.stage); });
+  }
+
+  showFlags(now, still) {
+    const { flags } = this.stage.words, set = still ? this.moment.flags : this.moment.flags_since;
+    const acts = (flag) => Math.floor(set / flag.bit) % 2 === 1;
+    if (still) this.heldSince.clear();
+    if (!still && this.newFlags) for (const flag of flags.filter(acts)) this.heldSince.set(flag.bit, now);
+    this.newFlags = false;
+    const told = flags.filter((flag) => acts(flag) || now - (this.heldSince.get(flag.bit) ?? -1e9) < MOMENTARY_MS);
     const key = told.map((flag) => flag.bit).join();
     if (key === this.toldKey) return;
     this.toldKey = key;

@@ -1,11 +1,14 @@
 // The last 20 s in four plots: forces, the way to the nearest surface, mass and energy, the cycle's computing time.
 // While something is touched the ground is shaded: plain where it sticks, hatched where it slips.
+import { PHASE_RENDERING } from './connection.js';
 import { colour, onTheme } from './theme.js';
 
 const WINDOW_S = 20;
 const MOST_ROWS = 1500;
 const STICK = 1, SLIP = 2;
 const LEFT = 46, RIGHT = 10, TOP = 24, BOTTOM = 20;
+const HEAD_LEFT = 10, HEAD_ROW = 16, SAMPLE = 20;  // of what stands above the lines
+const HEAD_FONT = '600 12px system-ui, "DejaVu Sans", sans-serif', FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 
 // Distances reach from a hand's width down to micrometres, on both sides of the surface: linear below LINEAR_MM,
 // logarithmic beyond.
@@ -15,8 +18,6 @@ const BENT_TICKS_MM = [-10, -1, -0.1, 0, 0.1, 1, 10, 100];
 
 const DASH = { solid: [], dashed: [7, 4], dotted: [2, 3] };
 
-// Before rendering there is no proxy yet, and the sensor isn't tared.
-const PHASE_RENDERING = 3;
 const moved = (m, value) => (m.phase >= PHASE_RENDERING ? value : NaN);
 
 // Lines of peaks may leave the plot at its top: a blow of a millisecond would flatten all else.
@@ -166,19 +167,21 @@ class Plot {
     return out;
   }
 
-  draw(rows, from, to, playhead) {
+  // `headRows`: for how many rows of a head there is room, at least as many as layHead() has said.
+  draw(rows, from, to, playhead, headRows) {
     const c = this.context;
     if (!this.width || !this.height) return;
+    this.top = TOP + (headRows - 1) * HEAD_ROW;
     c.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     c.clearRect(0, 0, this.width, this.height);
     const [low, high] = this.range(rows);
     const x = (t) => LEFT + ((t - from) / (to - from)) * (this.width - LEFT - RIGHT);
-    const y = (v) => this.height - BOTTOM - ((v - low) / (high - low)) * (this.height - TOP - BOTTOM);
+    const y = (v) => this.height - BOTTOM - ((v - low) / (high - low)) * (this.height - this.top - BOTTOM);
     this.shade(rows, x);
     this.axes(low, high, from, to, x, y);
     c.save();
     c.beginPath();
-    c.rect(LEFT, TOP - 2, this.width - LEFT - RIGHT, this.height - TOP - BOTTOM + 4);
+    c.rect(LEFT, this.top - 2, this.width - LEFT - RIGHT, this.height - this.top - BOTTOM + 4);
     c.clip();
     for (const line of this.description.lines) this.line(line, rows, x, y);
     c.restore();
@@ -186,15 +189,15 @@ class Plot {
       c.strokeStyle = colour('--ink');
       c.setLineDash([]);
       c.beginPath();
-      c.moveTo(x(playhead), TOP - 4);
+      c.moveTo(x(playhead), this.top - 4);
       c.lineTo(x(playhead), this.height - BOTTOM);
       c.stroke();
     }
-    this.title(rows);
+    this.drawHead();
   }
 
   shade(rows, x) {
-    const c = this.context, top = TOP, height = this.height - TOP - BOTTOM;
+    const c = this.context, { top } = this, height = this.height - top - BOTTOM;
     const fills = { [STICK]: colour('--shade-stick'), [SLIP]: this.hatching() };
     let i = 0;
     while (i < rows.length) {
@@ -232,7 +235,7 @@ class Plot {
 
   axes(low, high, from, to, x, y) {
     const c = this.context;
-    c.font = '11px system-ui, "DejaVu Sans", sans-serif';
+    c.font = FONT;
     c.lineWidth = 1;
     c.setLineDash([]);
     c.strokeStyle = colour('--line');
@@ -272,34 +275,48 @@ class Plot {
     c.stroke();
   }
 
-  // The title, and each line's name behind a piece of it.
-  title(rows) {
+  // The title, each line's name behind a piece of it, and the note: in as many rows as that takes, which it returns.
+  layHead(rows) {
     const c = this.context, { title, unit, lines, note } = this.description;
+    let x = HEAD_LEFT, row = 0;
+    this.head = [];
+    const put = (text, font, line) => {
+      c.font = font;
+      const width = c.measureText(text).width + (line ? SAMPLE + 5 : 0);
+      if (this.head.length && x + width > this.width - 4) {
+        x = HEAD_LEFT;
+        ++row;
+      }
+      this.head.push({ text, font, line, x, row, width });
+      x += width + 12;
+    };
+    put(`${title}, ${unit}`, HEAD_FONT);
+    for (const line of lines) put(line.name, FONT, line);
+    const text = note && rows.length ? note(rows[rows.length - 1]) : '';
+    if (text) put(text, FONT);
+    return row + 1;
+  }
+
+  drawHead() {
+    const c = this.context;
     c.textBaseline = 'middle';
     c.textAlign = 'left';
-    c.font = '600 12px system-ui, "DejaVu Sans", sans-serif';
-    c.fillStyle = colour('--ink');
-    const head = `${title}, ${unit}`;
-    c.fillText(head, 10, 12);
-    let at = 10 + c.measureText(head).width + 14;
-    c.font = '11px system-ui, "DejaVu Sans", sans-serif';
-    for (const line of lines) {
-      const width = c.measureText(line.name).width;
-      if (at + 24 + width > this.width) break;
-      c.strokeStyle = colour(line.colour);
-      c.lineWidth = 2;
-      c.setLineDash(DASH[line.dash]);
-      c.beginPath();
-      c.moveTo(at, 12);
-      c.lineTo(at + 20, 12);
-      c.stroke();
-      c.setLineDash([]);
-      c.fillStyle = colour('--soft');
-      c.fillText(line.name, at + 25, 12);
-      at += 25 + width + 12;
+    c.lineWidth = 2;
+    for (const { text, font, line, x, row } of this.head) {
+      const y = 12 + row * HEAD_ROW;
+      if (line) {
+        c.strokeStyle = colour(line.colour);
+        c.setLineDash(DASH[line.dash]);
+        c.beginPath();
+        c.moveTo(x, y);
+        c.lineTo(x + SAMPLE, y);
+        c.stroke();
+      }
+      c.font = font;
+      c.fillStyle = colour(font === HEAD_FONT ? '--ink' : '--soft');
+      c.fillText(text, line ? x + SAMPLE + 5 : x, y);
     }
-    const text = note && rows.length ? note(rows[rows.length - 1]) : '';
-    if (text && at + c.measureText(text).width < this.width) c.fillText(text, at, 12);
+    c.setLineDash([]);
   }
 }
 
@@ -361,9 +378,11 @@ export class Plots {
     const to = this.window ? this.window.to : Math.max(WINDOW_S, newest);
     const from = this.window ? this.window.from : to - WINDOW_S;
     const rows = this.rows.filter((row) => row.time_s >= from - 0.1 && row.time_s <= to + 0.1);
+    const shown = this.plots.filter((plot) => plot.width && plot.height);
+    const headRows = Math.max(1, ...shown.map((plot) => plot.layHead(rows)));
     for (const plot of this.plots) {
       plot.stale = false;
-      plot.draw(rows, from, to, this.playhead);
+      plot.draw(rows, from, to, this.playhead, headRows);
     }
   }
 }

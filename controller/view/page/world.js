@@ -20,6 +20,9 @@ const VIEWS = {
   side: { from: [0, -2.2, 0.05], about: 'middle' },
 };
 
+const BAR_PX = 46;         // the buttons above, the legend below
+const USED_HEIGHT = 0.87;  // what the default arm takes of the picture's height in the overview
+
 function drawnBySoftware() {
   const context = document.createElement('canvas').getContext('webgl');
   const details = context && context.getExtension('WEBGL_debug_renderer_info');
@@ -40,7 +43,7 @@ export class World {
     this.camera = new THREE.PerspectiveCamera(38, 1, 0.01, 60);
     this.camera.up.set(0, 0, 1);
     this.orbit = new OrbitControls(this.camera, canvas);
-    this.orbit.enableKeys = false;
+    this.orbit.enableKeys = false;  // keys.js has them all
     this.orbit.minDistance = 0.08;
     this.orbit.maxDistance = 12;
     this.orbit.addEventListener('change', () => { this.changed = true; });
@@ -90,6 +93,7 @@ export class World {
     this.contacts = new ContactView(stage.mode !== 'arm');
     this.limits = new LimitsView(stage);
     this.scene.add(this.arm, this.objects, this.limits, this.contacts);
+    this.resize();
     for (const part of this.objects.parts) part.addEventListener('loaded', () => { this.changed = true; });
     this.look('overview');
   }
@@ -97,10 +101,43 @@ export class World {
   look(name) {
     const view = VIEWS[name];
     const about = view.about === 'tool' ? this.tool : this.middle;
-    // A narrow picture needs more distance for the same width.
+    // A narrow picture needs more distance for the same width, and so does a low one, since the buttons and the legend
+    // take of its height.
     const narrow = Math.max(1, 1.35 / Math.max(0.3, this.camera.aspect));
+    const low = Math.max(1, USED_HEIGHT / Math.max(0.3, 1 - (2 * BAR_PX) / this.height));
     this.orbit.target.copy(about);
-    this.camera.position.copy(about).add(new THREE.Vector3(...view.from).multiplyScalar(view.about === 'tool' ? 1 : narrow));
+    this.camera.position.copy(about).add(new THREE.Vector3(...view.from).multiplyScalar(view.about === 'tool' ? 1 : Math.max(narrow, low)));
+    this.orbit.update();
+    this.changed = true;
+  }
+
+  // Keys do what dragging does: round the middle of the picture, by angles;
+  turn(aside, up) {
+    const way = this.camera.position.clone().sub(this.orbit.target), far = way.length();
+    const round = Math.atan2(way.y, way.x) + aside, most = Math.PI / 2 - 1e-3;
+    const steep = Math.min(most, Math.max(-most, Math.asin(way.z / far) + up));
+    way.set(Math.cos(steep) * Math.cos(round), Math.cos(steep) * Math.sin(round), Math.sin(steep)).multiplyScalar(far);
+    this.moveCamera(way);
+  }
+
+  // nearer or further, by a factor of the distance;
+  zoom(factor) {
+    const way = this.camera.position.clone().sub(this.orbit.target);
+    const far = Math.min(this.orbit.maxDistance, Math.max(this.orbit.minDistance, factor * way.length()));
+    this.moveCamera(way.setLength(far));
+  }
+
+  // aside and up, by shares of the distance.
+  shift(aside, up) {
+    const way = this.camera.position.clone().sub(this.orbit.target), far = way.length();
+    for (const [axis, share] of [[0, aside], [1, up]]) {
+      this.orbit.target.addScaledVector(new THREE.Vector3().setFromMatrixColumn(this.camera.matrix, axis), share * far);
+    }
+    this.moveCamera(way);
+  }
+
+  moveCamera(fromTarget) {
+    this.camera.position.copy(this.orbit.target).add(fromTarget);
     this.orbit.update();
     this.changed = true;
   }
