@@ -7,6 +7,7 @@ const WINDOW_S = 20;
 const MOST_ROWS = 1500;
 const STICK = 1, SLIP = 2;
 const LEFT = 46, RIGHT = 10, TOP = 24, BOTTOM = 20;
+const TEXT_HEIGHT = 11;
 const HEAD_LEFT = 10, HEAD_ROW = 16, SAMPLE = 20;  // of what stands above the lines
 const HEAD_FONT = '600 12px system-ui, "DejaVu Sans", sans-serif', FONT = '11px system-ui, "DejaVu Sans", sans-serif';
 
@@ -242,13 +243,17 @@ class Plot {
     c.fillStyle = colour('--soft');
     c.textAlign = 'right';
     c.textBaseline = 'middle';
+    let last = Infinity;
     for (const [value, text] of this.ticks(low, high)) {
       const at = Math.round(y(value)) + 0.5;
       c.beginPath();
       c.moveTo(LEFT, at);
       c.lineTo(this.width - RIGHT, at);
       c.stroke();
+      // In a low plot, figures about zero would lie over it.
+      if (value !== 0 && (Math.abs(at - y(0)) < TEXT_HEIGHT || Math.abs(at - last) < TEXT_HEIGHT)) continue;
       c.fillText(text, LEFT - 5, at);
+      last = at;
     }
     c.textAlign = 'center';
     c.textBaseline = 'top';

@@ -21,7 +21,7 @@ const VIEWS = {
 };
 
 const BAR_PX = 46;         // the buttons above, the legend below
-const USED_HEIGHT = 0.87;  // what the default arm takes of the picture's height in the overview
+const USED_HEIGHT = 0.91;  // what the default arm takes of the picture's height in the overview, with room for an elbow that rises
 
 function drawnBySoftware() {
   const context = document.createElement('canvas').getContext('webgl');
