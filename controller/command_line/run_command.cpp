@@ -58,7 +58,7 @@ void refuse_view(const PreparedSession& session, const RunOptions& options) {
 }  // namespace
 
 int run_command(const RunOptions& given) {
-  const RunOptions options = with_view(given);
+  RunOptions options = with_view(given);
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
   require_usable_start(session);
@@ -71,7 +71,10 @@ int run_command(const RunOptions& given) {
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);
   std::unique_ptr<ViewProcess> view;
-  if (options.view) view = std::make_unique<ViewProcess>(session, options, keeper.box().descriptor());
+  if (options.view) {
+    view = std::make_unique<ViewProcess>(session, options, keeper.box().descriptor());
+    options.view_place = view->place();
+  }
   const int status = options.bus.simulated() ? SimulatedRun(session, options, keeper).run()
                                              : run_on_interfaces(session, options, keeper);
   if (options.view_control && given.control.empty()) remove_view_control();

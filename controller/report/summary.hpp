@@ -86,6 +86,13 @@ struct NoticeSummary {
   std::uint64_t times = 0, cycles = 0;
 };
 
+// The view of the session, on 127.0.0.1.
+struct ViewSummary {
+  std::uint16_t port = 0;
+  std::size_t most_viewers = 0;
+  bool may_change = false;  // with --view-control
+};
+
 struct ComputeTime {
   double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns, below 1 ms
 };
@@ -154,6 +161,7 @@ struct Summary {
   std::vector<std::string> drives_lack;    // what drives haven't got, and what is lost by it; set by the caller
   std::vector<FaultSummary> faults;        // set by the caller
   std::string black_box;                   // its folder, after a fault; set by the caller
+  std::optional<ViewSummary> view;         // set by the caller; absent: there was none
   std::vector<NoticeSummary> notices;      // set by the caller
   std::vector<TimestepSummary> timesteps;
   bool from_truth = false;

@@ -83,6 +83,14 @@ Json passivity(const std::optional<PassivitySummary>& summary) {
           {"felt_damping_min_Ns_per_m", summary->felt_damping_min_Ns_per_m}};
 }
 
+Json view(const std::optional<ViewSummary>& summary) {
+  if (!summary) return nullptr;
+  return {{"address", "127.0.0.1"},
+          {"port", summary->port},
+          {"most_viewers", summary->most_viewers},
+          {"may_change", summary->may_change}};
+}
+
 void add_repeatable(Json& json, const Summary& s) {
   json["bus_load"] = Json::object();
   for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
@@ -170,6 +178,7 @@ std::string summary_json(const Summary& s) {
   add_timing(json, s);
   add_repeatable(json, s);
   if (!s.black_box.empty()) json["black_box"] = s.black_box;
+  json["view"] = view(s.view);
   return json.dump();
 }
 
@@ -293,6 +302,12 @@ void tell_limits(const Summary& s, Lines& line) {
   }
 }
 
+std::string view_text(const std::optional<ViewSummary>& view) {
+  if (!view) return "none; no network port";
+  return "127.0.0.1:" + std::to_string(view->port) + ", " + std::to_string(view->most_viewers) +
+         " viewers at most, who may " + (view->may_change ? "change the session, too" : "only look");
+}
+
 // What happened.
 void tell_events(const Summary& s, Lines& line) {
   for (const NoticeSummary& notice : s.notices) {
@@ -326,6 +341,7 @@ std::string summary_text(const Summary& s) {
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");
   line("figures from", s.from_truth ? "the simulation's truth" : "sensor and encoders");
   line("setpoints (SHA-256)", s.setpoint_sha256);
+  line("view", view_text(s.view));
   tell_events(s, line);
   return line.text();
 }

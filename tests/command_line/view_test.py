@@ -20,6 +20,9 @@ objects:
   - plane: {name: wall, point_m: [0.9, 0, 0.6], normal: [-1, 0, 0], friction: 0.3}
   - box: {name: plate, centre_m: [0.5, 0.4, 0.6], size_m: [0.05, 0.1, 0.1], friction: 0.2, motion: {driven: true}}
 """
+# Of a session: C and C++, MuJoCo and what it stands on, meshes, cells, Modbus, hashes. Nothing of a web server.
+LIBRARIES = {"ld-linux-x", "libc", "libm", "libgcc_s", "libstdc", "libmujoco", "libccd", "libqhull_r", "liblodepng",
+             "libtinyxml", "libassimp", "libdraco", "libminizip", "libz", "libyaml-cpp", "libmodbus", "libcrypto"}
 
 
 def processes_of(pid):
@@ -125,38 +128,69 @@ class Shown(ProgramTest):
 
 class Apart(ProgramTest):
     def test_without_the_flag_there_is_nothing_of_it(self):
-        """No listener, no process, no library, no descriptor."""
-        process = subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "5s", "--no-plot"], cwd=self.folder,
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        """What the session has, by itself and in full: two threads, these libraries, no socket, and the keeper of the black
+        box; and the same beside a view."""
+        process = subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "20s", "--no-plot"], cwd=self.folder,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         try:
             time.sleep(1.5)
-            self.assertEqual(listeners(process.pid), [])
             self.assertEqual(sorted(processes_of(process.pid).values()), ["proxarm-box"])
-            for child in processes_of(process.pid):
-                self.assertEqual(listeners(child), [])
-            without = set(self.libraries(process.pid))
-            threads = len(list(pathlib.Path(f"/proc/{process.pid}/task").iterdir()))
-            memory = [os.readlink(fd) for fd in pathlib.Path(f"/proc/{process.pid}/fd").iterdir()]
-            self.assertFalse([name for name in memory if "memfd" in name])
+            for one in (process.pid, *processes_of(process.pid)):
+                self.assertEqual(self.sockets(one), [])
+                self.assertEqual(listeners(one), [])
+                self.assertFalse([name for name in self.descriptors(one) if "memfd" in name])
+                # Those of the instruments, in builds with them, and no other.
+                unknown = {re.match(r"[a-z_]+(-[a-z]+)*", name)[0] for name in self.libraries(one)} - LIBRARIES
+                self.assertEqual({name for name in unknown if not re.fullmatch("lib([atl]|ub)san", name)}, set())
+            if not os.environ.get("PROXARM_SLOW_BUILD"):
+                self.assertEqual(self.threads(process.pid), ["proxarm", "proxarm"])  # the cycle; signals
+            without = self.libraries(process.pid)
+            threads = self.threads(process.pid)
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait()
+            out, _ = process.communicate()
+        self.assertIn("\n  view:                     none; no network port\n", out)
+        # Nothing of the server is in the program either.
+        for words in (b"beast", b"Sec-WebSocket", b"three.module", b"text/html"):
+            self.assertNotIn(words, pathlib.Path(program()).read_bytes(), words)
         with Session(self.folder, "run", "--view", "--duration", "20s", "--no-plot") as session:
             time.sleep(1.0)
             self.assertEqual(sorted(processes_of(session.process.pid).values()), ["proxarm-box", "proxarm-view"])
-            # The session itself has no more threads, libraries or listeners with it.
             self.assertEqual(listeners(session.process.pid), [])
-            self.assertEqual(set(self.libraries(session.process.pid)), without)
-            self.assertEqual(len(list(pathlib.Path(f"/proc/{session.process.pid}/task").iterdir())), threads)
+            self.assertEqual(len(self.sockets(session.process.pid)), 1)  # to the view, which tells where it is
+            self.assertEqual(self.libraries(session.process.pid), without)
+            self.assertEqual(self.threads(session.process.pid), threads)
             view = next(pid for pid, name in processes_of(session.process.pid).items() if name == "proxarm-view")
             self.assertEqual(listeners(view), [("0100007F", session.port)])  # 127.0.0.1, and no other
             maps = pathlib.Path(f"/proc/{view}/maps").read_text()
             box = [line.split()[1] for line in maps.splitlines() if "proxarm-black-box" in line]
             self.assertEqual(box, ["r--s"])
+            out = session.end()[1]
+        self.assertIn(f"\n  view:                     127.0.0.1:{session.port}, 16 viewers at most, who may only look\n", out)
+
+    def test_the_summary_for_programs_has_the_view(self):
+        self.assertIsNone(json.loads(self.call("run", "--json", *QUICK).out)["view"])
+        with Session(self.folder, "run", "--view-control", "--json", *QUICK) as session:
+            session.until_said("until Ctrl-C")
+            self.assertEqual(json.loads(session.end()[1])["view"], {"address": "127.0.0.1", "port": session.port,
+                                                                    "most_viewers": 16, "may_change": True})
 
     @staticmethod
     def libraries(pid):
-        return re.findall(r"(/\S+\.so\S*)$", pathlib.Path(f"/proc/{pid}/maps").read_text(), re.MULTILINE)
+        """The file names of the libraries that a process has mapped."""
+        maps = pathlib.Path(f"/proc/{pid}/maps").read_text()
+        return sorted(set(re.findall(r"/([^/\s]+\.so\S*)$", maps, re.MULTILINE)))
+
+    @staticmethod
+    def threads(pid):
+        return [(task / "comm").read_text().strip() for task in pathlib.Path(f"/proc/{pid}/task").iterdir()]
+
+    @staticmethod
+    def descriptors(pid):
+        return [os.readlink(fd) for fd in pathlib.Path(f"/proc/{pid}/fd").iterdir()]
+
+    def sockets(self, pid):
+        return [name for name in self.descriptors(pid) if name.startswith("socket:")]
 
     def test_setpoints_are_the_same_to_the_bit(self):
         arguments = ("run", "--json", "--no-plot", "--duration", "4s")

@@ -41,6 +41,12 @@ class BusMapping {
   std::map<std::string, std::string> by_bus_;
 };
 
+// Where a view listens, on 127.0.0.1, and how many may look at once.
+struct ViewPlace {
+  std::uint16_t port = 0;
+  std::size_t most_viewers = 0;
+};
+
 struct RunOptions {
   std::filesystem::path cell;   // empty: the default cell
   std::filesystem::path scene;  // empty: the cell's
@@ -71,6 +77,7 @@ struct RunOptions {
   bool view_control = false;                 // and let it be changed there
   std::uint16_t view_port = 0;               // 0: any that is free
   std::vector<std::string> allowed_origins;  // of web pages that may look, too
+  std::optional<ViewPlace> view_place;       // of the view that runs; absent: there is none
   std::vector<sim::DeviceFault> faults;      // of the simulated devices
   std::vector<sim::PressedSpan> enabling;    // of the simulated enabling switch
 };

@@ -353,6 +353,9 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
   progress_.clear();
   // Faults that were reset come first.
   const bool ended_by_fault = !summary.faults.empty() && !summary.faults.back().was_reset;
+  if (options_.view_place) {
+    summary.view = {options_.view_place->port, options_.view_place->most_viewers, options_.view_control};
+  }
   if (keeper.finish(ended_by_fault ? summary.faults.back().text : "")) summary.black_box = keeper.folder().string();
   if (options_.json) {
     std::printf("%s\n", controller::summary_json(summary).c_str());

@@ -132,6 +132,7 @@ void ViewProcess::greet(const PreparedSession& session, const RunOptions& option
   const json answer = json::parse(read_line(line_), nullptr, false);
   if (answer.is_object() && answer.contains("url")) {
     url_ = answer["url"].get<std::string>();
+    place_ = {answer.at("port").get<std::uint16_t>(), answer.at("most_viewers").get<std::size_t>()};
     return;
   }
   if (answer.is_object() && answer.contains("error")) throw SetupError({.message = answer["error"].get<std::string>()});

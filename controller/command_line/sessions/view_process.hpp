@@ -29,6 +29,8 @@ class ViewProcess {
   ViewProcess& operator=(const ViewProcess&) = delete;
   ~ViewProcess();  // and what it shows is gone
 
+  [[nodiscard]] const ViewPlace& place() const noexcept { return place_; }
+
   // The session is over: tells whoever looks, and lets them look until a signal comes or the process is gone.
   void show_end(int exit_status);
 
@@ -37,6 +39,7 @@ class ViewProcess {
   void greet(const PreparedSession& session, const RunOptions& options, Shows shows);
 
   std::string url_;
+  ViewPlace place_;
   std::optional<BrowserDoor> door_;
   int line_ = -1;
   int child_ = -1;

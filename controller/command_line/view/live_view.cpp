@@ -92,6 +92,7 @@ class LiveView {
         context_(context) {}
 
   [[nodiscard]] std::string url() const { return server_.url(); }
+  [[nodiscard]] std::uint16_t port() const { return server_.port(); }
 
   void run() {
     listen();
@@ -197,7 +198,7 @@ int live_view(int memory, int session) {
   std::optional<LiveView> shown;
   try {
     shown.emplace(context, line, json::parse(first_line(line)), memory);
-    reply(line, {{"url", shown->url()}});
+    reply(line, {{"url", shown->url()}, {"port", shown->port()}, {"most_viewers", view::most_viewers}});
   } catch (const std::exception& error) {
     reply(line, {{"error", error.what()}});
     return 2;

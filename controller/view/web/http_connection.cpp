@@ -100,7 +100,7 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
   }
 
   void open(Channel& channel) {
-    if (shared_->sockets >= most_sockets) return refuse(503, "as many as can be shown it look already");
+    if (shared_->sockets >= most_viewers) return refuse(503, "as many as can be shown it look already");
     stream_.expires_never();
     serve_socket(shared_, std::move(stream_), parser_->release(), channel);
   }

@@ -17,7 +17,7 @@
 namespace proxarm::view {
 
 // Reasons stand in web_server.hpp.
-inline constexpr std::size_t most_connections = 64, most_sockets = 16;
+inline constexpr std::size_t most_connections = 64;
 inline constexpr std::size_t longest_head = 8192, longest_message = 1024;
 inline constexpr auto patience =
     std::chrono::seconds(5);  // with a head that comes, and with a reader who takes nothing

@@ -76,6 +76,8 @@ WebServer::~WebServer() {
 
 std::string WebServer::url() const { return state_->shared->gate.url(); }
 
+std::uint16_t WebServer::port() const { return state_->acceptor.local_endpoint().port(); }
+
 void WebServer::stop() {
   error_code ignored;
   state_->acceptor.close(ignored);

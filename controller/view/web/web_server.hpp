@@ -20,6 +20,9 @@ namespace proxarm::view {
 
 using Bytes = std::shared_ptr<const std::string>;
 
+// WebSockets at once.
+inline constexpr std::size_t most_viewers = 16;
+
 // One open WebSocket, as those who talk through it see it.
 class Socket {
  public:
@@ -75,6 +78,7 @@ class WebServer {
 
   // With the token.
   [[nodiscard]] std::string url() const;
+  [[nodiscard]] std::uint16_t port() const;
   // Closes all connections; none is accepted any more.
   void stop();
 

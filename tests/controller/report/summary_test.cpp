@@ -253,6 +253,8 @@ TEST(Summary, JsonHasTheKeysThatProgramsReadAndOnlyRepeatableOnesInTheRecord) {
         "friction_ratio_error", "pulling_force_max_N", "faults", "setpoint_sha256"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
+  EXPECT_TRUE(json["view"].is_null());
+  EXPECT_NE(summary_text(s).find("view:                     none; no network port\n"), std::string::npos);
   EXPECT_EQ(json["bus_load"]["axes_1_3"], 0.745);
   EXPECT_EQ(json["faults"][0]["fault"], "sensor_lost");
   EXPECT_EQ(json["faults"][0]["cycle"], 17);
@@ -261,6 +263,10 @@ TEST(Summary, JsonHasTheKeysThatProgramsReadAndOnlyRepeatableOnesInTheRecord) {
   slower.wall_time_s = 9.0;
   slower.compute_us.max = 777.0;
   slower.overruns = 3;
+  slower.view = {.port = 8088, .most_viewers = 16, .may_change = true};
+  EXPECT_EQ(nlohmann::json::parse(summary_json(slower))["view"]["port"], 8088);
+  EXPECT_NE(summary_text(slower).find("127.0.0.1:8088, 16 viewers at most, who may change the session"),
+            std::string::npos);
   EXPECT_EQ(repeatable_json(s), repeatable_json(slower));
   EXPECT_NE(timing_json(s), timing_json(slower));
 }
