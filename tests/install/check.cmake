@@ -11,6 +11,18 @@ function(run)
 endfunction()
 
 run(${CMAKE_COMMAND} --install ${build} --prefix ${folder}/prefix)
+
+# What the view serves and what cells, scenes and hands are read from: every file is there, whatever its name ends in.
+get_filename_component(source ${CMAKE_CURRENT_LIST_DIR}/../.. ABSOLUTE)
+file(GLOB_RECURSE shipped RELATIVE ${source} ${source}/controller/view/page/* ${source}/models/cells/*.yaml
+     ${source}/scenes/*.yaml ${source}/scenes/meshes/* ${source}/sim/hands/*.yaml)
+list(FILTER shipped INCLUDE REGEX "\\.[a-z]+$")
+foreach(file IN LISTS shipped)
+  if(NOT EXISTS ${folder}/prefix/share/proxarm/${file})
+    message(FATAL_ERROR "${file} isn't installed")
+  endif()
+endforeach()
+
 run(${CMAKE_COMMAND} -G Ninja -S ${CMAKE_CURRENT_LIST_DIR}/own_world -B ${folder}/own_world
     -D CMAKE_PREFIX_PATH=${folder}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_BUILD_TYPE=Debug)
 run(${CMAKE_COMMAND} --build ${folder}/own_world)
