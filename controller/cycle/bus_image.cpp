@@ -32,9 +32,11 @@ BusImage::BusImage(CycleParts& parts, CycleRecorder& recorder, Alarm& alarm)
       recorder_(recorder),
       alarm_(alarm),
       outboxes_(parts.network.bus_count()),
-      status_(parts.network.bus_count()) {}
+      status_(parts.network.bus_count()),
+      goodbye_(parts.can_drives) {}
 
 void BusImage::begin(std::int64_t t_k_ns) noexcept {
+  begun_ns_ = t_k_ns;
   fieldbus::CanFrame frame;
   for (DriveBus& bus : parts_.drive_buses) send(bus.bus, bus.sync.next());
   if (parts_.sensor->poll(t_k_ns, frame)) send(parts_.sensor_bus, frame);
@@ -96,6 +98,7 @@ std::span<const fieldbus::BusStatus> BusImage::read_status() noexcept {
 
 void BusImage::send_setpoints(const Setpoints& setpoints, std::int64_t t_k_ns, std::uint64_t cycle) noexcept {
   sends_torques_ = setpoints.kind == Setpoints::Kind::torques_Nm;
+  cycle_ = cycle;
   fieldbus::CanFrame frame;
   for (std::size_t i = 0; i < parts_.drives.size(); ++i) {
     const double value = setpoints.values[static_cast<Eigen::Index>(i)];
@@ -156,10 +159,46 @@ void BusImage::forget_faults() noexcept {
   for (DriveOnBus& axis : parts_.drives) axis.drive.forget_fault();
 }
 
-void BusImage::shut_down() noexcept {
-  fieldbus::shut_down_drives(parts_.can_drives,
-                             [this](std::size_t bus, const fieldbus::CanFrame& frame) noexcept { send(bus, frame); });
-  hand_over();
+void BusImage::shut_down(std::int64_t period_ns) noexcept {
+  if (begun_ns_ >= 0 && !parts_.can_drives.empty()) say_goodbye(period_ns);
+  fieldbus::leave_operational(parts_.network, parts_.can_drives);
+}
+
+void BusImage::say_goodbye(std::int64_t period_ns) noexcept {
+  goodbye_.begin(begun_ns_);
+  for (std::int64_t t_ns = begun_ns_ + period_ns; !goodbye_.done(t_ns); t_ns += period_ns) {
+    parts_.network.sleep_until(t_ns);
+    for (DriveBus& bus : parts_.drive_buses) (void)parts_.network.bus(bus.bus).send(bus.sync.next());
+    for (const fieldbus::DriveSlot& slot : parts_.can_drives) slot.drive->on_sync(t_ns);
+    listen_until(t_ns + period_ns / 2);
+    send_last_words(t_ns);
+  }
+}
+
+void BusImage::send_last_words(std::int64_t t_ns) noexcept {
+  ++cycle_;
+  fieldbus::CanFrame frame;
+  for (const fieldbus::DriveSlot& slot : parts_.can_drives) {
+    if (slot.drive->encode_rpdo(frame)) (void)parts_.network.bus(slot.bus).send(frame);
+  }
+  for (DriveBus& bus : parts_.drive_buses) {
+    if (bus.heartbeat.due(t_ns, cycle_, frame)) (void)parts_.network.bus(bus.bus).send(frame);
+  }
+  for (std::size_t bus = 0; goodbye_.next_request(t_ns, bus, frame);) (void)parts_.network.bus(bus).send(frame);
+}
+
+void BusImage::listen_until(std::int64_t deadline_ns) noexcept {
+  fieldbus::TimedFrame received;
+  do {
+    for (std::size_t bus = 0; bus < parts_.network.bus_count(); ++bus) {
+      while (parts_.network.bus(bus).receive(received)) {
+        if (goodbye_.on_frame(bus, received.frame)) continue;
+        for (const fieldbus::DriveSlot& slot : parts_.can_drives) {
+          if (slot.bus == bus && slot.drive->on_frame(received.frame, received.time_ns)) break;
+        }
+      }
+    }
+  } while (parts_.network.wait_for_frame(deadline_ns));
 }
 
 void BusImage::write_record(CycleRecord& record) const noexcept {

@@ -20,6 +20,7 @@
 #include "controller/motion/cycle_parts.hpp"
 #include "controller/motion/setpoints.hpp"
 #include "controller/supervision/alarm.hpp"
+#include "fieldbus/cia402/cia402_goodbye.hpp"
 
 namespace proxarm::controller {
 
@@ -46,8 +47,9 @@ class BusImage {
   // The first drive that hasn't, or −1.
   [[nodiscard]] std::int32_t first_drive_on() const noexcept;
   void forget_faults() noexcept;
-  // Drives back to NMT pre-operational.
-  void shut_down() noexcept;
+  // After the last cycle: goes on with SYNC, controlwords and heartbeat, a period at a time, until each drive that is
+  // off no longer waits for them (cia402_goodbye.hpp), 0.3 s at most; then drives back to NMT pre-operational.
+  void shut_down(std::int64_t period_ns) noexcept;
 
   // What was sent and what came in, for the record and for the black box.
   void write_record(CycleRecord& record) const noexcept;
@@ -68,12 +70,19 @@ class BusImage {
   [[nodiscard]] bool everything_received() const noexcept;
   void hand_over(std::size_t first_bus, std::size_t end_bus) noexcept;
   void note_sent(std::size_t bus, std::int64_t handed_over_ns) noexcept;
+  // Of the time after the last cycle: no fault, nor anything for the record, comes of it.
+  void say_goodbye(std::int64_t period_ns) noexcept;
+  void send_last_words(std::int64_t t_ns) noexcept;
+  void listen_until(std::int64_t deadline_ns) noexcept;
 
   CycleParts& parts_;
   CycleRecorder& recorder_;
   Alarm& alarm_;
   std::vector<Outbox> outboxes_;             // by bus; empty between cycles
   std::vector<fieldbus::BusStatus> status_;  // by bus
+  fieldbus::Goodbye goodbye_;
+  std::int64_t begun_ns_ = -1;  // the last cycle's t_k; below zero: there was none
+  std::uint64_t cycle_ = 0;     // counts on while saying goodbye: the heartbeat goes with it
   bool sends_torques_ = false;
 };
 

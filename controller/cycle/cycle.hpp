@@ -69,7 +69,7 @@ class Cycle {
   // All that a cycle leaves to the next one: with it and what the cycles are given, a replay gives the same setpoints.
   void archive(fieldbus::StateArchive& state) noexcept;
   // After the last cycle: drives back to NMT pre-operational. Never fails.
-  void shut_down() noexcept { bus_.shut_down(); }
+  void shut_down() noexcept { bus_.shut_down(period_ns()); }
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
   [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {

@@ -17,6 +17,7 @@
 #include "controller/cycle/bus_image.hpp"
 #include "controller/cycle/cycle_recorder.hpp"
 #include "controller/cycle/fault_monitor.hpp"
+#include "controller/cycle/timestep_change.hpp"
 #include "controller/motion/cycle_parts.hpp"
 #include "controller/motion/measurement.hpp"
 #include "controller/rendering/session_settings.hpp"
@@ -47,7 +48,7 @@ class BusLossSession {
   [[nodiscard]] bool done() const noexcept { return step_ == Step::done; }
   // Nothing is to be sent, and a late cycle is no matter.
   [[nodiscard]] bool silent() const noexcept { return step_ == Step::silent; }
-  void shut_down() noexcept { bus_.shut_down(); }
+  void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
   void request_stop() noexcept { stop_.store(true); }  // any thread
   // The switch is to be let go and pressed.
   [[nodiscard]] bool asks_for_press() const noexcept { return asks_for_press_.load(); }

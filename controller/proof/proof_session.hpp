@@ -17,6 +17,7 @@
 #include "controller/cycle/bus_image.hpp"
 #include "controller/cycle/cycle_recorder.hpp"
 #include "controller/cycle/fault_monitor.hpp"
+#include "controller/cycle/timestep_change.hpp"
 #include "controller/motion/cycle_parts.hpp"
 #include "controller/motion/measurement.hpp"
 #include "controller/proof/proof.hpp"
@@ -44,7 +45,7 @@ class ProofSession {
   [[nodiscard]] bool needs_plan() const noexcept;
   void begin_plan();
   [[nodiscard]] bool done() const noexcept { return supervisor_.phase() == controller::Phase::done; }
-  void shut_down() noexcept { bus_.shut_down(); }
+  void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
 
   // ---- any thread
   void request_stop() noexcept { stop_.store(true); }

@@ -11,7 +11,29 @@ constexpr std::int64_t retry_ns = 200'000;  // about two frames at 1 Mbit/s: whe
 
 constexpr std::uint8_t command_of(const CanFrame& frame) noexcept { return frame.data[0] >> 5; }
 
+CanFrame request_about(std::uint8_t node, ObjectAddress object, std::uint8_t command) noexcept {
+  CanFrame frame;
+  frame.id = SdoClient::request_id(node);
+  frame.length = 8;
+  frame.data[0] = command;
+  write_u16_le(&frame.data[1], object.index);
+  frame.data[3] = object.sub;
+  return frame;
+}
+
 }  // namespace
+
+CanFrame expedited_download(std::uint8_t node, ObjectAddress object, std::uint8_t bytes, std::uint32_t value) noexcept {
+  CanFrame frame = request_about(node, object, static_cast<std::uint8_t>(0x23 | (4 - bytes) << 2));
+  write_u32_le(&frame.data[4], value);
+  return frame;
+}
+
+CanFrame upload_request(std::uint8_t node, ObjectAddress object) noexcept { return request_about(node, object, 0x40); }
+
+bool names_object(const CanFrame& frame, ObjectAddress object) noexcept {
+  return frame.length >= 4 && read_u16_le(&frame.data[1]) == object.index && frame.data[3] == object.sub;
+}
 
 SdoClient::SdoClient(CanBus& bus, std::uint8_t node, const SdoClientConfig& config)
     : bus_(bus), node_(node), config_(config) {
@@ -99,10 +121,7 @@ CanFrame SdoClient::request(std::uint8_t command) const noexcept {
 }
 
 CanFrame SdoClient::object_request(std::uint8_t command) const noexcept {
-  CanFrame frame = request(command);
-  write_u16_le(&frame.data[1], object_.index);
-  frame.data[3] = object_.sub;
-  return frame;
+  return request_about(node_, object_, command);
 }
 
 std::int64_t SdoClient::wake_ns(std::int64_t now_ns) const noexcept {
@@ -132,10 +151,6 @@ void SdoClient::poll(std::int64_t now_ns) {
 
 // ---- answers ----
 
-bool SdoClient::names_object(const CanFrame& frame) const noexcept {
-  return frame.length >= 4 && read_u16_le(&frame.data[1]) == object_.index && frame.data[3] == object_.sub;
-}
-
 bool SdoClient::on_frame(const CanFrame& frame, std::int64_t now_ns) {
   if (frame.id != answer_id(node_) || frame.extended || frame.remote || frame.error) return false;
   if (finished() || frame.length < 1) {
@@ -148,7 +163,7 @@ bool SdoClient::on_frame(const CanFrame& frame, std::int64_t now_ns) {
   if (!is_segment && command_of(frame) == 4) {
     // A node that aborts names the object, or nothing at all; another object's abort is a late answer.
     const bool nameless = frame.length >= 4 && read_u16_le(&frame.data[1]) == 0;
-    if (frame.length >= 8 && (names_object(frame) || nameless)) {
+    if (frame.length >= 8 && (names_object(frame, object_) || nameless)) {
       finish(SdoOutcome::aborted_by_server, read_u32_le(&frame.data[4]));
     } else {
       ++stale_answers_;
@@ -210,7 +225,7 @@ void SdoClient::complete_upload() {
 }
 
 void SdoClient::on_upload_initiate(const CanFrame& frame) {
-  if (command_of(frame) != 2 || !names_object(frame)) {
+  if (command_of(frame) != 2 || !names_object(frame, object_)) {
     ++stale_answers_;  // a late answer to a transfer that was given up
     return;
   }
@@ -267,7 +282,7 @@ void SdoClient::on_upload_segment(const CanFrame& frame) {
 // ---- expedited and segmented download ----
 
 void SdoClient::on_download_initiate(const CanFrame& frame) {
-  if (command_of(frame) != 3 || !names_object(frame)) {
+  if (command_of(frame) != 3 || !names_object(frame, object_)) {
     ++stale_answers_;
     return;
   }

@@ -47,6 +47,13 @@ struct SdoClientConfig {
 // CRC-16 of block transfers: x¹⁶ + x¹² + x⁵ + 1, start 0, not reflected. The string "123456789" gives 31C3.
 [[nodiscard]] std::uint16_t sdo_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc = 0) noexcept;
 
+// Requests of one frame, for who keeps account of the answers himself, as the cycle must. `bytes`: 1 to 4.
+[[nodiscard]] CanFrame expedited_download(std::uint8_t node, ObjectAddress object, std::uint8_t bytes,
+                                          std::uint32_t value) noexcept;
+[[nodiscard]] CanFrame upload_request(std::uint8_t node, ObjectAddress object) noexcept;
+// Whether an answer is about this object.
+[[nodiscard]] bool names_object(const CanFrame& frame, ObjectAddress object) noexcept;
+
 class SdoClient {
  public:
   SdoClient(CanBus& bus, std::uint8_t node, const SdoClientConfig& config = {});
@@ -94,7 +101,6 @@ class SdoClient {
   void send(const CanFrame& frame);
   [[nodiscard]] CanFrame request(std::uint8_t command) const noexcept;
   [[nodiscard]] CanFrame object_request(std::uint8_t command) const noexcept;
-  [[nodiscard]] bool names_object(const CanFrame& frame) const noexcept;
 
   void on_upload_initiate(const CanFrame& frame);
   void on_upload_segment(const CanFrame& frame);

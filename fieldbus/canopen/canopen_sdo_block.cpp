@@ -26,7 +26,7 @@ std::uint16_t sdo_crc(std::span<const std::uint8_t> bytes, std::uint16_t crc) no
 // ---- download: the server says how many segments it takes at once, and up to where it got them ----
 
 void SdoClient::on_block_download_initiate(const CanFrame& frame) {
-  if (command_of(frame) != 5 || (frame.data[0] & 3) != 0 || frame.length < 5 || !names_object(frame)) {
+  if (command_of(frame) != 5 || (frame.data[0] & 3) != 0 || frame.length < 5 || !names_object(frame, object_)) {
     ++stale_answers_;
     return;
   }
@@ -111,7 +111,7 @@ void SdoClient::on_block_download_end(const CanFrame& frame) {
 // ---- upload: we say how many segments we take at once, and up to where we got them ----
 
 void SdoClient::on_block_upload_initiate(const CanFrame& frame) {
-  if (command_of(frame) != 6 || (frame.data[0] & 1) != 0 || !names_object(frame)) {
+  if (command_of(frame) != 6 || (frame.data[0] & 1) != 0 || !names_object(frame, object_)) {
     ++stale_answers_;
     return;
   }

@@ -5,6 +5,7 @@
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/can/frame_pump.hpp"
 #include "fieldbus/canopen/canopen_object.hpp"
+#include "fieldbus/canopen/canopen_sdo.hpp"
 #include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/cia402_state.hpp"
 #include "models/base/setup_error.hpp"
@@ -14,7 +15,7 @@ namespace {
 
 using description::SetupError;
 
-constexpr std::uint32_t to_server = 0x600, from_server = 0x580;
+constexpr std::uint32_t from_server = 0x580;
 constexpr std::uint8_t last_node = 127;
 
 struct Reading {
@@ -27,17 +28,6 @@ constexpr Reading readings[] = {
     {{0x6502, 0}, &ScannedNode::supported_modes}, {{0x6061, 0}, &ScannedNode::mode},
     {{0x6041, 0}, &ScannedNode::statusword},
 };
-
-// Initiate SDO upload (CiA 301): 40, index low, index high, sub-index, four bytes of zero.
-CanFrame upload_request(std::uint8_t node, ObjectAddress object) {
-  CanFrame frame;
-  frame.id = to_server + node;
-  frame.length = 8;
-  frame.data[0] = 0x40;
-  write_u16_le(&frame.data[1], object.index);
-  frame.data[3] = object.sub;
-  return frame;
-}
 
 struct Answer {
   bool aborted = false;

@@ -234,20 +234,4 @@ bool is_switched_off(const ServoDrive& drive) noexcept {
   }
 }
 
-// CiA 301, 7.2.4.3.3: an expedited download, four bytes with their number given.
-CanFrame stop_consuming_frame(std::uint8_t node) noexcept {
-  CanFrame frame;
-  frame.id = SdoClient::request_id(node);
-  frame.length = 8;
-  frame.data[0] = 0x23;
-  frame.data[1] = 0x16;
-  frame.data[2] = 0x10;
-  frame.data[3] = 1;
-  return frame;
-}
-
-void shut_down_drives(CanNetwork& network, Slots drives) noexcept {
-  shut_down_drives(drives, [&](std::size_t bus, const CanFrame& frame) { (void)network.bus(bus).send(frame); });
-}
-
 }  // namespace proxarm::fieldbus

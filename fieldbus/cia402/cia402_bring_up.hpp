@@ -3,7 +3,7 @@
 //   std::vector<ServoDrive> drives;  ...
 //   bring_up_drives(network, slots);      // NMT pre-operational, identity, SDO written and read back, NMT start
 //   ... the cycle: SYNC, heartbeat, PDOs; the power state machine runs in it ...
-//   shut_down_drives(network, slots);     // a goodbye, once the drives are switched off
+//   leave_operational(network, slots);    // after the last words (cia402_goodbye.hpp)
 //
 // Blocks until done, at most a few seconds; throws SetupError that names bus, node, object, what was found and
 // expected. Nothing is enabled here: that takes controlwords, which only the cycle sends.
@@ -49,21 +49,4 @@ std::vector<DriveIdentity> bring_up_drives(CanNetwork& network, std::span<const 
                                            const FrameHandler& other = {});
 // Whether its last word was that it has no power; it then needs nobody to watch over it.
 [[nodiscard]] bool is_switched_off(const ServoDrive& drive) noexcept;
-// Writes 0 to 1016h:01 by SDO, so that the drive no longer waits for the controller's heartbeat.
-[[nodiscard]] CanFrame stop_consuming_frame(std::uint8_t node) noexcept;
-
-// Doesn't wait and doesn't fail: there is nothing left to do if it can't be sent. `send(bus, frame)`, noexcept.
-// A drive that is off stops watching the heartbeat, which ends now: else each end would leave an EMCY 8130h and, with
-// drives that keep it, a fault. One that isn't off goes on watching, and stops by itself.
-template <typename Send>
-void shut_down_drives(std::span<const DriveSlot> drives, Send&& send) noexcept {
-  for (const DriveSlot& slot : drives) {
-    if (is_switched_off(*slot.drive)) send(slot.bus, stop_consuming_frame(slot.drive->node()));
-  }
-  for (const DriveSlot& slot : drives) {
-    send(slot.bus, nmt_frame(NmtCommand::enter_pre_operational, slot.drive->node()));
-  }
-}
-void shut_down_drives(CanNetwork& network, std::span<const DriveSlot> drives) noexcept;
-
 }  // namespace proxarm::fieldbus

@@ -9,18 +9,7 @@ namespace proxarm::fieldbus {
 namespace {
 
 CanFrame request(std::uint8_t node, const PeriodStep& step, bool write) noexcept {
-  CanFrame frame;
-  frame.id = SdoClient::request_id(node);
-  frame.length = 8;
-  frame.data[0] = write ? static_cast<std::uint8_t>(0x23 | (4 - step.bytes) << 2) : std::uint8_t{0x40};
-  write_u16_le(&frame.data[1], step.object.index);
-  frame.data[3] = step.object.sub;
-  if (write) write_u32_le(&frame.data[4], step.value);
-  return frame;
-}
-
-bool names(const CanFrame& frame, ObjectAddress object) noexcept {
-  return read_u16_le(&frame.data[1]) == object.index && frame.data[3] == object.sub;
+  return write ? expedited_download(node, step.object, step.bytes, step.value) : upload_request(node, step.object);
 }
 
 }  // namespace
@@ -124,7 +113,7 @@ bool PeriodExchange::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
 void PeriodExchange::on_answer(std::size_t drive, const CanFrame& frame) noexcept {
   Node& node = nodes_[drive];
   const PeriodStep step = step_of(drive);
-  if (!names(frame, step.object)) return;
+  if (!names_object(frame, step.object)) return;
   const unsigned command = frame.data[0] >> 5;
   if (command == 4) {
     node.waiting = Waiting::nothing;

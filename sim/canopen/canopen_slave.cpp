@@ -256,10 +256,10 @@ void CanopenSlave::on_time(std::int64_t time_ns) noexcept {
   }
   if (time_ns - last_sdo_ns_ > sdo_timeout) sdo_.reset();
   check_heartbeats(time_ns);
-  if (state_ != NmtState::operational) return;
   const bool lazy = config_.stack == StackBehaviour::lazy;
+  if (lazy && talks()) check_sync(time_ns);
+  if (state_ != NmtState::operational) return;
   check_receive_pdos(time_ns, !lazy, true);
-  if (lazy) check_sync(time_ns);
   if (state_ == NmtState::operational) transmit_events(time_ns);
 }
 

@@ -9,8 +9,8 @@
 //             kept one of SYNC (its pull request 220).
 //   lazy      an RPDO's timer is looked at when a SYNC has come, for synchronous RPDOs: CANopenNode's CO_RPDO_process()
 //             (301/CO_PDO.c) looks at such an RPDO only where a SYNC came. A dead controller sends none, so the
-//             heartbeat consumer alone stops the drive. A missing SYNC is told (EMCY 8100h, after 1.5 times 1006h) and
-//             stops nothing.
+//             heartbeat consumer alone stops the drive. A missing SYNC is told (EMCY 8100h, after 1.5 times 1006h, in
+//             pre-operational as well, as CO_SYNC_process() does) and stops nothing.
 #pragma once
 
 #include <cstdint>

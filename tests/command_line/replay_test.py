@@ -113,6 +113,34 @@ class Replay(ProgramTest):
         self.assert_same(record, cycles=summary["cycles"])
 
 
+# The box holds the last 10 to 11 s: from the third second on, in the middle of a motion or of a contact.
+FROM_THE_MIDDLE = {
+    "order 2": ("--order", "2"),
+    "order 2 on a groove": ("--order", "2", "--scene", "@scenes/groove.yaml"),
+    "2 ms": ("--timestep", "2ms", "--mass", "8"),
+    "damping and spring": ("--damping", "20", "--spring", "50"),
+    "passivity": ("--passivity", "on", "--hand", "@sim/hands/stiff_grip.yaml"),
+    "late sensor": ("--extra-delay", "4ms", "--mass", "8"),
+    "lookahead": ("--mass", "10", "--lookahead", "auto"),
+    "free orientation": ("--orientation", "free"),
+    "a sweep in free space": ("--scene", "@scenes/free.yaml", "--hand", "@sim/hands/sweep.yaml"),
+    "elastic layers": ("--scene", "@scenes/soft_corner.yaml"),
+    "a medium": ("--scene", "@scenes/honey.yaml"),
+    "a guide among objects": ("--scene", "@scenes/guided_insertion.yaml"),
+    "a driven plate": ("--scene", "@scenes/moving_plate.yaml"),
+    "a driven mesh": ("--scene", "@scenes/moving_mesh.yaml"),
+    "a room": ("--scene", "@scenes/room.yaml"),
+    "two axes": ("@models/cells/bench.yaml",),
+    "seven axes": ("@models/cells/seven.yaml",),
+    "a rail on Modbus": ("@models/cells/rail.yaml",),
+    "torques": ("@models/cells/light.yaml",),
+    "changes": ("--set", "mass=8@1s", "--set", "damping=10@6s", "--set", "spring=20@8s"),
+    "a change of timestep": ("--set", "timestep=2ms@11s"),
+    "a hold": ("--do", "hold@1.5s", "--do", "resume@6s"),
+    "a release": ("--do", "hold@1s", "--do", "release@1.5s", "--do", "hold@7s", "--do", "resume@8s"),
+}
+
+
 class BlackBox(ProgramTest):
     assert_same = Replay.assert_same
 
@@ -134,6 +162,17 @@ class BlackBox(ProgramTest):
         self.assertGreaterEqual(len(rows) - 1, cycles)
         self.assertGreater((box / "frames.log").read_text().count(" 181#"), 10000)
         self.assertIn("mass_kg: 4", (box / "effective.yaml").read_text())
+
+    def test_every_kind_of_session_goes_on_from_its_middle(self):
+        """All that a cycle leaves to the next one is in the archive: a member that was forgotten there would begin anew in
+        the middle, and the setpoints would be others. One session for each part that has a state of its own."""
+        for name, arguments in FROM_THE_MIDDLE.items():
+            with self.subTest(name):
+                shipped = [str(SOURCE / a[1:]) if a.startswith("@") else a for a in arguments]
+                self.box_of(*shipped, "--duration", "20s", "--fault", "sensor:silent@13s")
+                cycles, first = self.assert_same("proxarm-black-box")
+                self.assertGreater(first, 500)
+                self.assertGreater(cycles, 4000)
 
     def test_lies_in_the_record_or_where_it_was_told_to(self):
         self.box_of("--duration", "1s", "--record", "session", "--fault", "sensor:silent@800ms")

@@ -3,7 +3,6 @@
 What candump sees is held against `proxarm plan`: the same frames, and the load that it says, by the lengths of these
 frames on a wire (a virtual one has no bit timing).
 """
-import hashlib
 import json
 import struct
 import subprocess
@@ -49,10 +48,7 @@ class Bench(two.VcanTestCase):
         self.assertAlmostEqual(summary["apparent_mass_kg"] / summary["wanted_mass_kg"], 1.0, delta=0.05)
         # The hash of the summary out of nothing but the wire: targets of both nodes, cycle by cycle.
         targets = [[struct.unpack("<Hi", f.data)[1] for f in two.of_node(seen, two.RPDO, node)] for node in NODES]
-        digest = hashlib.sha256()
-        for cycle in zip(*targets, strict=True):
-            digest.update(struct.pack("<2i", *cycle))
-        self.assertEqual(digest.hexdigest(), summary["setpoint_sha256"])
+        self.assertEqual(two.sha256_of_counts(targets, summary["cycles"]), summary["setpoint_sha256"])
         # While it rendered: between the first second and the last half.
         syncs = [f.time_us for f in seen if f.id == two.SYNC]
         self.assertLess(max(abs(b - a - period_us) for a, b in zip(syncs, syncs[1:])), 10)
@@ -62,6 +58,9 @@ class Bench(two.VcanTestCase):
         self.assertEqual({f.id for f in during}, names)
         bits = sum(plan_test.bits_on_the_wire(f.id, False, f.data) for f in during)
         on_the_wire = bits / (last - first)  # µs at 1 Mbit/s
+        print(f"  {timestep}: {100 * on_the_wire:.2f} % of 1 Mbit/s seen, {100 * load['typical']:.2f} % planned; "
+              f"{summary['apparent_mass_kg']:.3f} kg felt of {summary['wanted_mass_kg']:.3f}, "
+              f"tool {1e6 * summary['tool_penetration_touch_max_m']:.1f} µm deep at the touch")
         self.assertLess(abs(on_the_wire - load["typical"]), 0.01, f"{on_the_wire:.4f} seen, {load} planned")
         self.assertLessEqual(on_the_wire, load["most"])
         # Each cycle: SYNC, a poll and its two answers, and of each drive its feedback and its setpoint.

@@ -120,11 +120,12 @@ class PythonCiA402Drive(two.VcanTestCase):
             summary = json.loads(run.output())
         self.assertEqual(summary["faults"], [])
         self.assertEqual(drive.controlwords[:3], [0x06, 0x07, 0x0F])
-        self.assertIn(drive.controlwords[-1], (0x00, 0x06))
-        self.assertNotEqual(drive.state, ENABLED)
+        self.assertEqual(drive.controlwords[-2:], [0x06, 0x00])
+        self.assertEqual(drive.state, SWITCH_ON_DISABLED)
         self.assertGreater(len(drive.positions), 500, "a target in every cycle")
         self.assertLess(max(abs(b - a) for a, b in zip(drive.positions, drive.positions[1:])), 1000)
-        # 60C2h: 1 · 10⁻³ s. 1016h: node 127, 60 ms; none before it is set, and none in the end. 6060h: mode 8. PDO1: 6040h and 607Ah; 6041h and 6064h.
+        # 60C2h: 1 · 10⁻³ s. 1016h: node 127, 60 ms; none before it is set, and none in the end. 6060h: mode 8.
+        # PDO1: 6040h and 607Ah; 6041h and 6064h.
         self.assertEqual((drive.written[0x60C2, 1], drive.written[0x60C2, 2]), (1, 0xFD))
         self.assertEqual(drive.heartbeats, [0, 0x007F003C, 0])
         self.assertEqual(drive.written[0x6060, 0], 8)

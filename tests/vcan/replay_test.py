@@ -89,7 +89,7 @@ class CanplayerAsTheFarEnd(two.VcanTestCase):
             summary = json.loads(run.output())
             self.assertEqual(summary["held_samples"], 0, "every sample came in its cycle")
             seen = two.frames_of(witness)
-            self.assertEqual(two.setpoints_sha256(seen), summary["setpoint_sha256"])
+            self.assertEqual(two.setpoints_sha256(seen, summary), summary["setpoint_sha256"])
             return summary, seen
 
     def play_sensor(self, logs):

@@ -70,12 +70,20 @@ def setpoints(frames):
     return [[struct.unpack("<Hi", f.data)[1] for f in of_node(frames, RPDO, node)] for node in NODES]
 
 
-def setpoints_sha256(frames):
-    """The summary's setpoint_sha256, from nothing but frames: int32 little-endian, axis order, every cycle."""
+def sha256_of_counts(targets, cycles):
+    """Of lists of counts, one per axis: int32 little-endian, axis order, each of so many cycles. What an axis was sent
+    after them is the goodbye, in which drives that are off are told where they are."""
+    if any(len(counts) < cycles for counts in targets):
+        raise ValueError(f"{cycles} cycles, but only {min(map(len, targets))} targets")
     digest = hashlib.sha256()
-    for cycle in zip(*setpoints(frames), strict=True):
-        digest.update(struct.pack("<6i", *cycle))
+    for cycle in list(zip(*targets, strict=True))[:cycles]:
+        digest.update(struct.pack(f"<{len(targets)}i", *cycle))
     return digest.hexdigest()
+
+
+def setpoints_sha256(frames, summary):
+    """The summary's setpoint_sha256, from nothing but frames and the number of cycles."""
+    return sha256_of_counts(setpoints(frames), summary["cycles"])
 
 
 class Process:

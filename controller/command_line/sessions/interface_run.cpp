@@ -188,9 +188,9 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   {
     const RealtimeThread realtime;
     tally = controller::run_session(cycle, tap, session_length(session, options), {});
+    cycle.shut_down();
   }
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
-  cycle.shut_down();
   drain.finish();
   if (replay) replay->finish();
   if (messages) messages->finish();

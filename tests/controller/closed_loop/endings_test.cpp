@@ -150,6 +150,8 @@ TEST_P(Endings, LeaveNoEmcyWhenTheyAreCleanAndAlwaysLetTheNextSessionBegin) {
 
     begin();
     if (HasFatalFailure()) return;
+    // A stack that watches SYNC in pre-operational, too, misses it from 1006h's set-up to the first one (8100h).
+    emergencies.clear();
     const auto axis = static_cast<std::size_t>(i) % rig.cell.drives.size();
     rig.far_end.drive(axis).inject_fault(0x4210, rig.network.now_ns());
     end();

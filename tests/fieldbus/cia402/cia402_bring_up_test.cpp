@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "fieldbus/cia402/cia402_goodbye.hpp"
 #include "models/base/setup_error.hpp"
 #include "tests/fieldbus/canopen/table_node.hpp"
 
@@ -322,7 +323,7 @@ TEST_F(Cia402BringUpTest, RefusesTwoDrivesWithOneNodeOnOneBus) {
 TEST_F(Cia402BringUpTest, TakesDrivesOutOfOperationalAtTheEnd) {
   bring_up();
   network.bus(0).sent.clear();
-  shut_down_drives(network, slots);
+  leave_operational(network, slots);
   EXPECT_EQ(network.bus(0).sent, (std::vector<std::string>{"000#8001", "000#8002"}));
   EXPECT_EQ(one.state, 0x7F);
 }

@@ -7,38 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/fieldbus/can/scripted_network.hpp"
+#include "tests/fieldbus/cia402/described_drive.hpp"
+
 namespace proxarm::fieldbus {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
-
-description::DriveDescription drive_of(std::uint8_t node) {
-  description::DriveDescription drive;
-  drive.joint = "axis_" + std::to_string(node);
-  drive.bus = "one";
-  drive.node = node;
-  drive.profile = "cia402";
-  drive.mode = "csp";
-  drive.counts_per_motor_revolution = 4096.0;
-  drive.gear_ratio = 100.0;
-  drive.direction = 1;
-  drive.range_rad = {-3.0, 3.0};
-  drive.max_speed_rad_per_s = 1.0;
-  drive.max_acceleration_rad_per_s2 = 10.0;
-  return drive;
-}
-
-std::string text_of(const CanFrame& frame) {
-  std::string text;
-  char part[8];
-  std::snprintf(part, sizeof part, "%03X#", frame.id);
-  text += part;
-  for (std::size_t i = 0; i < frame.length; ++i) {
-    std::snprintf(part, sizeof part, "%02X", frame.data[i]);
-    text += part;
-  }
-  return text;
-}
 
 CanFrame answer(std::uint8_t node, const std::array<std::uint8_t, 8>& bytes) {
   CanFrame frame;

@@ -9,6 +9,7 @@
 
 #include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "fieldbus/cia402/cia402_goodbye.hpp"
 #include "fieldbus/sensors/ati_net_can_oem.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/base/setup_error.hpp"
@@ -157,7 +158,7 @@ TEST_F(SimulatedDrives, AreBroughtUpEnabledMovedAndSwitchedOff) {
   for (ServoDrive& drive : drives) drive.request(DriveGoal::switched_off);
   for (int k = 0; k < 100; ++k) cycle();
   for (const ServoDrive& drive : drives) EXPECT_EQ(drive.state(), DriveState::switch_on_disabled) << drive.describe();
-  shut_down_drives(*network, slots);
+  leave_operational(*network, slots);
   network->sleep_until(network->now_ns() + 10 * ms);
   for (std::size_t i = 0; i < drives.size(); ++i) {
     EXPECT_EQ(far_end->drive(i).canopen().state(), sim::NmtState::pre_operational);

@@ -3,9 +3,11 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 
 #include "fieldbus/canopen/canopen_heartbeat.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "fieldbus/cia402/cia402_goodbye.hpp"
 #include "fieldbus/sensors/ati_net_can_oem.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/base/setup_error.hpp"
@@ -43,7 +45,7 @@ struct MasterAndDrives : ::testing::Test {
     return "";
   }
   // One cycle of 1 ms as the master's users run it.
-  void cycle() {
+  void cycle(const std::function<void(std::size_t, const fieldbus::CanFrame&)>& other = {}) {
     const std::int64_t t = network->now_ns();
     for (std::size_t bus = 0; bus < 2; ++bus) {
       network->bus(bus).send(testing::from_text("080#"));
@@ -56,6 +58,7 @@ struct MasterAndDrives : ::testing::Test {
         for (const auto& slot : slots) {
           if (slot.bus == bus) slot.drive->on_frame(timed.frame, timed.time_ns);
         }
+        if (other) other(bus, timed.frame);
       }
     }
     for (const auto& slot : slots) {
@@ -65,6 +68,17 @@ struct MasterAndDrives : ::testing::Test {
       if (slot.drive->encode_rpdo(frame)) network->bus(slot.bus).send(frame);
     }
     network->sleep_until(t + ms);
+  }
+
+  // As the cycle's owner does it after the last cycle.
+  void say_goodbye() {
+    fieldbus::Goodbye goodbye(slots);
+    goodbye.begin(network->now_ns());
+    while (!goodbye.done(network->now_ns())) {
+      fieldbus::CanFrame frame;
+      for (std::size_t bus = 0; goodbye.next_request(network->now_ns(), bus, frame);) network->bus(bus).send(frame);
+      cycle([&](std::size_t bus, const fieldbus::CanFrame& said) { (void)goodbye.on_frame(bus, said); });
+    }
   }
 
   description::Cell cell = description::load_cell(source / "models/cells/default.yaml");
@@ -113,7 +127,7 @@ TEST_F(MasterAndDrives, ComeUpTogetherMoveAndSwitchOff) {
   for (auto& drive : drives) drive.request(fieldbus::DriveGoal::switched_off);
   for (int i = 0; i < 200; ++i) cycle();
   for (std::size_t i = 0; i < drives.size(); ++i) EXPECT_EQ(far_end->drive(i).state(), DriveState::switch_on_disabled);
-  fieldbus::shut_down_drives(*network, slots);
+  fieldbus::leave_operational(*network, slots);
   network->sleep_until(network->now_ns() + 10 * ms);
   for (std::size_t i = 0; i < drives.size(); ++i) {
     EXPECT_EQ(far_end->drive(i).canopen().state(), NmtState::pre_operational);
@@ -133,7 +147,8 @@ TEST_F(MasterAndDrives, AreLeftWithoutAWordOfAFaultWhenTheyWereOffAndStopByThems
       for (auto& drive : drives) drive.request(fieldbus::DriveGoal::switched_off);
       for (int i = 0; i < 200; ++i) cycle();
     }
-    fieldbus::shut_down_drives(*network, slots);
+    say_goodbye();
+    fieldbus::leave_operational(*network, slots);
     network->sleep_until(network->now_ns() + 500 * ms);
     int emergencies = 0;
     fieldbus::TimedFrame received;

@@ -1,0 +1,90 @@
+#include "fieldbus/cia402/cia402_goodbye.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "fieldbus/can/byte_order.hpp"
+#include "fieldbus/canopen/canopen_nmt.hpp"
+#include "fieldbus/canopen/canopen_sdo.hpp"
+
+namespace proxarm::fieldbus {
+namespace {
+
+// In the order in which they are written: a missing heartbeat trips more drives than a missing SYNC.
+constexpr std::array<ObjectAddress, 2> watched_by_the_drive = {{{0x1016, 1}, {0x1006, 0}}};
+
+constexpr std::int64_t ms = 1'000'000;
+// Most drives need two periods from ready to switch on (no power) to switch on disabled; one that stays is told then.
+constexpr std::int64_t patience_ns = 100 * ms;
+// Drives answer within some milliseconds; a lost frame isn't worth more.
+constexpr std::int64_t answer_timeout_ns = 50 * ms;
+// For all of them, whatever they do. Six drives on one bus take some 30 ms.
+constexpr std::int64_t limit_ns = 300 * ms;
+
+}  // namespace
+
+Goodbye::Goodbye(std::span<const DriveSlot> drives) : drives_(drives.begin(), drives.end()), nodes_(drives.size()) {}
+
+void Goodbye::begin(std::int64_t now_ns) noexcept {
+  begun_ns_ = now_ns;
+  std::fill(nodes_.begin(), nodes_.end(), Node());
+}
+
+bool Goodbye::is_off(const ServoDrive& drive, std::int64_t now_ns) const noexcept {
+  if (drive.state() == DriveState::ready_to_switch_on) return now_ns - begun_ns_ >= patience_ns;
+  return is_switched_off(drive);
+}
+
+bool Goodbye::is_busy(std::size_t bus) const noexcept {
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (drives_[i].bus == bus && nodes_[i].waiting) return true;
+  }
+  return false;
+}
+
+bool Goodbye::next_request(std::int64_t now_ns, std::size_t& bus, CanFrame& frame) noexcept {
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    Node& node = nodes_[i];
+    if (node.waiting && now_ns >= node.deadline_ns) {
+      node.waiting = false;
+      ++node.step;
+    }
+    const ServoDrive& drive = *drives_[i].drive;
+    if (node.step >= watched_by_the_drive.size() || is_busy(drives_[i].bus) || !is_off(drive, now_ns)) continue;
+    bus = drives_[i].bus;
+    frame = expedited_download(drive.node(), watched_by_the_drive[node.step], 4, 0);
+    node.waiting = true;
+    node.deadline_ns = now_ns + answer_timeout_ns;
+    return true;
+  }
+  return false;
+}
+
+// A confirmation and an abort end a step alike.
+bool Goodbye::on_frame(std::size_t bus, const CanFrame& frame) noexcept {
+  if (frame.extended || frame.remote || frame.error) return false;
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (drives_[i].bus != bus || frame.id != SdoClient::answer_id(drives_[i].drive->node())) continue;
+    Node& node = nodes_[i];
+    if (node.waiting && frame.length == 8 && names_object(frame, watched_by_the_drive[node.step])) {
+      node.waiting = false;
+      ++node.step;
+    }
+    return true;
+  }
+  return false;
+}
+
+bool Goodbye::done(std::int64_t now_ns) const noexcept {
+  return now_ns - begun_ns_ >= limit_ns || std::all_of(nodes_.begin(), nodes_.end(), [](const Node& node) {
+           return node.step >= watched_by_the_drive.size();
+         });
+}
+
+void leave_operational(CanNetwork& network, std::span<const DriveSlot> drives) noexcept {
+  for (const DriveSlot& slot : drives) {
+    (void)network.bus(slot.bus).send(nmt_frame(NmtCommand::enter_pre_operational, slot.drive->node()));
+  }
+}
+
+}  // namespace proxarm::fieldbus
