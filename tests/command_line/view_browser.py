@@ -2,8 +2,10 @@
 import base64
 import os
 import pathlib
+import struct
 import tempfile
 import time
+import zlib
 
 from harness import SOURCE
 
@@ -26,6 +28,39 @@ def why_not():
         return "no python3-selenium"
     missing = [str(path) for path in (CHROMIUM, DRIVER) if not path.exists()]
     return f"no {' and no '.join(missing)} (Debian packages chromium, chromium-driver)" if missing else None
+
+
+def pixels(path):
+    """A PNG of 8-bit RGB(A) as rows of bytes and its bytes per pixel; by the standard library alone."""
+    data = path.read_bytes()
+    at, packed, width, colours = 8, b"", 0, 0
+    while at < len(data):
+        length, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"IHDR":
+            width, _, _, colours = struct.unpack_from(">IIBB", data, at + 8)
+        elif kind == b"IDAT":
+            packed += data[at + 8:at + 8 + length]
+        at += 12 + length
+    step = {2: 3, 6: 4}[colours]
+    raw, rows, before = zlib.decompress(packed), [], bytearray(width * step)
+    for start in range(0, len(raw), width * step + 1):
+        method, row = raw[start], bytearray(raw[start + 1:start + 1 + width * step])
+        for i in range(len(row)):
+            left, up = (row[i - step] if i >= step else 0), before[i]
+            corner = before[i - step] if i >= step else 0
+            if method == 1:
+                row[i] = (row[i] + left) & 255
+            elif method == 2:
+                row[i] = (row[i] + up) & 255
+            elif method == 3:
+                row[i] = (row[i] + (left + up) // 2) & 255
+            elif method == 4:
+                guess = left + up - corner
+                near = min((abs(guess - left), 0, left), (abs(guess - up), 1, up), (abs(guess - corner), 2, corner))
+                row[i] = (row[i] + near[2]) & 255
+        rows.append(row)
+        before = row
+    return rows, step
 
 
 class Browser:

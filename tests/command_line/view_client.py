@@ -3,6 +3,7 @@ import base64
 import http.client
 import json
 import os
+import pathlib
 import re
 import select
 import signal
@@ -71,6 +72,17 @@ class Session:
             if not self.read_line():
                 raise AssertionError(f"not said: {words}; but: {self.said}")
 
+    def view_process(self):
+        """The process identifier of the view's server."""
+        children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+        return next(pid for pid in children if pathlib.Path(f"/proc/{pid}/comm").read_text() == "proxarm-view\n")
+
+    @staticmethod
+    def sockets(pid):
+        """How many a process has open."""
+        links = pathlib.Path(f"/proc/{pid}/fd").iterdir()
+        return sum(os.readlink(link).startswith("socket:") for link in links)
+
     @property
     def host(self):
         return f"127.0.0.1:{self.port}"
@@ -112,8 +124,12 @@ class Refused(Exception):
 class WebSocket:
     """RFC 6455 from the client's side; `send_frame` sends whatever it is told."""
 
-    def __init__(self, session, target, host=None, **headers):
-        self.socket = socket.create_connection(("127.0.0.1", session.port), timeout=PATIENCE_S)
+    def __init__(self, session, target, host=None, receive_buffer=None, **headers):
+        self.socket = socket.socket()
+        if receive_buffer:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self.socket.settimeout(PATIENCE_S)
+        self.socket.connect(("127.0.0.1", session.port))
         lines = [f"GET {target} HTTP/1.1", f"Host: {host or session.host}", "Upgrade: websocket", "Connection: Upgrade",
                  "Sec-WebSocket-Version: 13", "Sec-WebSocket-Key: " + base64.b64encode(os.urandom(16)).decode()]
         lines += [f"{name.replace('_', '-')}: {value}" for name, value in headers.items() if value is not None]

@@ -1,8 +1,10 @@
 """`proxarm view` from outside: a record or a black box, as the page asks for it."""
 import csv
 import json
+import os
 import unittest
 
+import view_browser
 from harness import SOURCE, ProgramTest
 from view_client import Session
 
@@ -95,6 +97,53 @@ class Records(ProgramTest):
         self.assert_refused(self.call("view", folder), "signals.csv", "another kind of file")
         (folder / "signals.csv").write_bytes(b"")
         self.assert_refused(self.call("view", folder), "signals.csv", "empty")
+
+
+
+class Snapshots(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        self.call("run", "--no-plot", "--record", "session", "--duration", "4s")
+
+    @unittest.skipUnless(view_browser.CHROMIUM.exists(), "no chromium")
+    @unittest.skipIf(os.environ.get("PROXARM_SLOW_BUILD"), "a browser beside sanitizers has no time to draw")
+    def test_pictures_are_saved(self):
+        done = self.call("view", "session", "--snapshot", "1s", "--snapshot", "3.9s", "--out", "x.png", "--size", "640x480")
+        self.assertEqual(done.status, 0, done.err)
+        seen = []
+        for name in ("x-01.png", "x-02.png"):
+            rows, step = view_browser.pixels(self.folder / name)
+            self.assertEqual((len(rows[0]) // step, len(rows)), (640, 480))
+            colours = {bytes(row[at:at + 3]) for row in rows[::3] for at in range(0, len(row), 3 * step)}
+            self.assertGreater(len(colours), 100, "a picture that isn't blank")
+            seen.append(rows)
+        self.assertNotEqual(*seen)
+        dark = self.call("view", "session", "--snapshot", "1s", "--out", "dark.png", "--size", "640x480", "--dark", "--look", "tool")
+        self.assertEqual(dark.status, 0, dark.err)
+        rows, step = view_browser.pixels(self.folder / "dark.png")
+        mean = lambda picture: sum(sum(row[::step]) for row in picture) / sum(len(row) // step for row in picture)
+        self.assertLess(mean(rows), 90)
+        self.assertGreater(mean(seen[0]), 170)
+
+    def test_without_a_browser_that_is_said(self):
+        words = ("view", "session", "--snapshot", "1s", "--out", "x.png")
+        nothing = self.folder / "bin"
+        nothing.mkdir()
+        env = {**os.environ, "PATH": str(nothing)}
+        self.assert_refused(self.call(*words, env=env), "no chromium on the PATH", "apt-get install chromium")
+        # Something of that name that isn't one, or ends at once.
+        browser = nothing / "chromium"
+        browser.write_text("#!/bin/sh\nexit 1\n")
+        browser.chmod(0o755)
+        self.assert_refused(self.call(*words, env=env), "--snapshot", "a browser that ")
+        self.assertFalse((self.folder / "x.png").exists())
+
+    def test_mistakes_are_told(self):
+        self.assert_refused(self.call("view", "session", "--snapshot", "1s"), "--out", "none")
+        self.assert_refused(self.call("view", "session", "--out", "x.png"), "--out", "--snapshot TIME")
+        self.assert_refused(self.call("view", "session", "--snapshot", "1s", "--out", "x.jpg"), "--out", "x.jpg")
+        self.assert_refused(self.call("view", "session", "--snapshot", "soon", "--out", "x.png"), "--snapshot", "soon")
+        self.assert_refused(self.call("view", "session", "--snapshot", "1s", "--out", "x.png", "--size", "10x10"), "--size")
 
 
 if __name__ == "__main__":

@@ -303,6 +303,39 @@ class Security(ProgramTest):
         self.assertIn("refused: this page may only look", answer["text"])
 
 
+
+class SlowReader(ProgramTest):
+    def test_who_takes_nothing_is_dropped_and_the_others_notice_nothing(self):
+        """A page and a tool that never read, with little room in their kernel's buffers."""
+        with Session(self.folder, "run", "--view", "--no-plot", "--duration", "120s") as session:
+            view = session.view_process()
+            page = session.open_socket()
+            fields = page.receive_json("stage")["fields"]
+            page.receive_moment(fields)
+            time.sleep(0.3)  # the request for the cookie is closed by now
+            without = session.sockets(view)
+            slow = [session.open_socket(receive_buffer=4096)]
+            slow.append(session.open_socket(f"/?token={session.token}", receive_buffer=4096, Sec_WebSocket_Protocol=TOOLS))
+            slow[1].send({"op": "subscribe", "subscriptions": [{"id": i, "channelId": i} for i in range(1, 9)]})
+            moments = [page.receive_moment(fields)]
+            arrivals = [time.monotonic()]
+            while session.sockets(view) != without + 2 and arrivals[-1] < arrivals[0] + 2:
+                moments.append(page.receive_moment(fields))
+                arrivals.append(time.monotonic())
+            self.assertEqual(session.sockets(view), without + 2)
+            # What a kernel holds for who doesn't read is full after some seconds; five more, and it is over.
+            while session.sockets(view) > without and arrivals[-1] < arrivals[0] + 3 * PATIENCE_S:
+                moments.append(page.receive_moment(fields))
+                arrivals.append(time.monotonic())
+            self.assertEqual(session.sockets(view), without, f"after {arrivals[-1] - arrivals[0]:.0f} s")
+            self.assertGreater(arrivals[-1] - arrivals[0], 4.0, "nobody is dropped for a moment's rest")
+            gaps = [b["time_s"] - a["time_s"] for a, b in zip(moments, moments[1:])]
+            self.assertLess(max(gaps), 1.0, "moments as before, to who reads")
+            self.assertGreater(len(moments) / (arrivals[-1] - arrivals[0]), 20)
+            for one in slow:
+                self.assertTrue(one.is_closed())
+
+
 class Flood(ProgramTest):
     def test_who_floods_without_the_secret_locks_nobody_out(self):
         with Session(self.folder, "run", "--view", "--no-plot", "--duration", "60s") as session:
