@@ -10,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -104,6 +105,8 @@ void HeadlessBrowser::start(const fs::path& program) {
   for (const int end : {to[0], from[1]}) close(end);
   to_ = to[1];
   from_ = from[0];
+  // A browser that ends at once is a mistake to be told; writing to it would end this program first.
+  (void)std::signal(SIGPIPE, SIG_IGN);
   if (child.error != 0) throw SetupError({.file = program.string(), .message = std::strerror(child.error)});
 }
 
