@@ -155,7 +155,9 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
   }
-  if (settings_.max_repeated_samples > 0 && sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
+  // A gauge at its rail repeats one reading without being stuck: in a hold nobody needs it.
+  if (settings_.max_repeated_samples > 0 && !sample.saturated &&
+      sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.channel_repeats, fieldbus::ChannelWatch::most_repeats);
   }
   const double force_N = measured.hand_W.force.norm();
