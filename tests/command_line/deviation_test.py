@@ -127,10 +127,12 @@ class Deviations(harness.ProgramTest):
         for fault in ("axis_1:jammed", "axis_2:jammed", "axis_2:ignored", "axis_3:ignored", "axis_1:stuck",
                       "axis_3:stuck"):
             with self.subTest(f"{fault}, somebody"):
-                names, after, _, _, _ = self.judged("somebody", fault)
+                names, after, _, _, went = self.judged("somebody", fault)
                 # A drive that stops dead at speed goes back by more than it may.
                 self.assertEqual(names, {"drive_deviates" if fault == "axis_2:ignored" else "drive_blocked"})
                 self.assertLessEqual(after, BLOCKED_S + 0.1)
+                # All that the tool goes from the fault on, where the hand would have led it by 0.1 m.
+                self.assertLessEqual(went, MOST_M)
             with self.subTest(f"{fault}, nobody"):
                 names, _, _, _, went = self.judged("nobody", fault)
                 self.assertLessEqual(names, {"drive_blocked"})
