@@ -75,6 +75,12 @@ class Cycle {
   [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {
     return requests_.commands.script();
   }
+  [[nodiscard]] std::span<const ScheduledChange> scheduled_changes() const noexcept {
+    return requests_.changes.script();
+  }
+  [[nodiscard]] std::span<const ScheduledTimestep> scheduled_timesteps() const noexcept {
+    return requests_.timesteps.script();
+  }
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return state_.rendered_cycles; }
   [[nodiscard]] std::int64_t rendered_ns() const noexcept { return state_.rendered_ns; }
   // From the last cycle to the next one.

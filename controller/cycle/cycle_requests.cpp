@@ -124,7 +124,9 @@ void Cycle::take_change() noexcept {
   if (!requests_.changes.take(state_.rendered_ns, change)) return;
   recorder_.entry().change = change;
   timestep_.wait_again();
-  if (change.period_s != 0.0 && change.period_s != settings_.period_s) return;
+  if (change.period_s != 0.0 && change.period_s != settings_.period_s) {
+    return requests_.changes.note_refusal("the timestep that it was checked for wasn't taken");
+  }
   motion_->set(change);
   look_ahead(change.parameter == Parameter::lookahead ? change.value : change.horizon_s);
 }

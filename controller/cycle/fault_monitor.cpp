@@ -17,7 +17,7 @@ constexpr double implausible_speeds = 4.0;
 void FaultMonitor::judge_encoders(const Measured& measured, Phase entered) noexcept {
   judge_joints(measured, entered);
   judge_following(measured, entered);
-  judge_tool(measured.tool_W, entered);
+  judge_tool(measured, entered);
 }
 
 void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcept {
@@ -51,10 +51,10 @@ void FaultMonitor::judge_following(const Measured& measured, Phase entered) noex
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, verdict.joint, verdict.value_rad, verdict.limit_rad);
 }
 
-void FaultMonitor::judge_tool(const models::Vec3& tool_W, Phase entered) noexcept {
+void FaultMonitor::judge_tool(const Measured& measured, Phase entered) noexcept {
   if (!tool_) return;
   if (entered < Phase::rendering || entered > Phase::stopping) return tool_->start();
-  const ToolVerdict verdict = tool_->step(tool_W, settings_.period_s);
+  const ToolVerdict verdict = tool_->step(measured.tool_W, measured.elbow_moved_m, settings_.period_s);
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, -1, verdict.value, verdict.limit);
 }
 
@@ -155,7 +155,9 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
   }
-  if (settings_.max_repeated_samples > 0 && sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
+  // A gauge at its rail repeats one reading without being stuck: in a hold nobody needs it.
+  if (settings_.max_repeated_samples > 0 && !sample.saturated &&
+      sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.channel_repeats, fieldbus::ChannelWatch::most_repeats);
   }
   const double force_N = measured.hand_W.force.norm();

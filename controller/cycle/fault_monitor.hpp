@@ -91,7 +91,7 @@ class FaultMonitor {
 
   void judge_joints(const Measured& measured, Phase entered) noexcept;
   void judge_following(const Measured& measured, Phase entered) noexcept;
-  void judge_tool(const models::Vec3& tool_W, Phase entered) noexcept;
+  void judge_tool(const Measured& measured, Phase entered) noexcept;
   void judge_enabling(const EnablingInput* enabling) noexcept;
   void judge_standstill(const JudgedCycle& cycle) noexcept;
   void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;

@@ -1,5 +1,7 @@
 #include "controller/motion/measurement.hpp"
 
+#include <algorithm>
+
 namespace proxarm::controller {
 namespace {
 
@@ -22,6 +24,8 @@ Measurement::Measurement(std::span<const DriveOnBus> drives, const fieldbus::For
   now.motor_rad = now.link_rad = now.drive_target_rad = arm.start_rad();
   now.moved_rad = now.jump_rad = now.unheard_cycles = now.feedback_period_s = zero;
   state_.stale_cycles = zero;
+  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer, and all are archived
+  arm.points(now.link_rad, points_);
 }
 
 void Measurement::take() noexcept {
@@ -31,7 +35,20 @@ void Measurement::take() noexcept {
   arm_.kinematics(now.link_rad, kinematics_);
   now.tool_W = kinematics_.X_WT.translation();
   now.R_WS = kinematics_.X_WS.linear();
+  place_elbow();
   read_sensor();
+}
+
+// The joints whose speed the guard of the setpoints bounds (tool_guard.hpp): the first two hardly move.
+void Measurement::place_elbow() noexcept {
+  constexpr std::size_t first_joint = 2;
+  const auto before_W = points_.joint_W;
+  arm_.points(state_.measured.link_rad, points_);
+  double& moved_m = state_.measured.elbow_moved_m;
+  moved_m = 0.0;
+  for (std::size_t i = first_joint; i < static_cast<std::size_t>(arm_.axes()); ++i) {
+    moved_m = std::max(moved_m, (points_.joint_W[i] - before_W[i]).norm());
+  }
 }
 
 void Measurement::read_encoders() noexcept {

@@ -41,6 +41,7 @@ struct Measured {
   std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and that take targets
 
   models::Vec3 tool_W = models::Vec3::Zero();
+  double elbow_moved_m = 0.0;  // since the cycle before: the furthest of the joints from the third on
   models::Mat3 R_WS = models::Mat3::Identity();
 
   // By the sensor.
@@ -76,6 +77,7 @@ class Measurement {
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
     state(compensation_);
+    for (models::Vec3& place_W : points_.joint_W) state(place_W);
   }
 
  private:
@@ -86,6 +88,7 @@ class Measurement {
   };
 
   void read_encoders() noexcept;
+  void place_elbow() noexcept;
   void read_sensor() noexcept;
 
   std::span<const DriveOnBus> drives_;
@@ -94,6 +97,7 @@ class Measurement {
   WrenchCompensation compensation_;
   double period_s_;
   models::ToolKinematics kinematics_;  // of the links
+  models::ArmPoints points_;           // of the links
   State state_;
 };
 

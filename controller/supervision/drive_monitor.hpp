@@ -7,7 +7,8 @@
 //                   5 mm at the tool. The drive goes where nobody sent it: it runs off, goes the wrong way, can't hold
 //                   the arm's weight, or its encoder is off. It can't be asked to stop (stop category 0).
 //   drive_blocked   |d| > ε/2 for half a second in which θ stays within ε/2 of one place: setpoints wait for it, and it
-//                   doesn't come. It is jammed, doesn't heed its setpoints, or its encoder is stuck.
+//                   doesn't come. It is jammed, doesn't heed its setpoints, or its encoder is stuck. Setpoints that
+//                   the hand makes swing about it pass it again and again, for which |d| counts 50 ms longer.
 // Where the joint is behind because its setpoints went on, away stays zero; where the setpoints stand and it goes off,
 // d is what it is away. That tells both apart without the motor's torque. Times need not be of one piece: a twentieth
 // of the time in which it isn't so counts against them, so that a joint that swings about its setpoints with the hand,
@@ -76,6 +77,7 @@ class DriveMonitor {
     models::JointVector away_s;         // for how long that is more than ε
     models::JointVector behind_s;       // for how long |d| is more than ε/2, from ...
     models::JointVector behind_at_rad;  // ... one place
+    models::JointVector passing_s;      // since |d| was more than ε/2
     std::uint8_t known = 0;             // drives that have been followed up to now
   };
 

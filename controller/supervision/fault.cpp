@@ -138,6 +138,10 @@ constexpr std::array texts{
               "a joint moved while the arm was to stand, by its encoder", "rad away",
               "look for a drive that runs off, an encoder that is off, or a load that the drive can't hold, before "
               "anybody comes near"},
+    FaultText{
+        Fault::elbow_too_fast, "elbow_too_fast", Reaction::stop_0,
+        "the elbow or the wrist is faster than it was told to be, by the encoders", "m/s",
+        "look for a drive that runs off, a slipping brake, a wrong gear ratio or encoder before anybody comes near"},
 };
 
 const FaultText& text_of(Fault fault) noexcept {

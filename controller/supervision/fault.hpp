@@ -55,8 +55,9 @@ enum class Fault : std::uint8_t {
   enabling_not_pressed,  // it wasn't let go and pressed within enabling_timeout_s of the start: nothing moves
   enabling_squeezed,     // a switch with three positions was squeezed through
   standstill_left,       // a joint moves, by its encoder, where the arm is to stand
+  elbow_too_fast,        // by the encoders the elbow or the wrist is faster than its limit, though no setpoint is
 };
-inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::standstill_left) + 1;
+inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::elbow_too_fast) + 1;
 
 // What the arm does; each one does more than the one before.
 enum class Reaction : std::uint8_t {

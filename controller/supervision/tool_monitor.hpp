@@ -1,10 +1,12 @@
-// What the encoders say of the tool, held against the cell's limits: independent of what is commanded.
+// What the encoders say of the tool and the elbow, held against the cell's limits: independent of what is commanded.
 //
 // The guard of the setpoints keeps what is sent within all limits. So a tool that by the encoders isn't within them is
 // moved by something else: a drive that runs off, an encoder or a gear ratio that lies, a brake that slips.
 //
 //   tool_too_fast   over the last W = 20 ms the tool has come further than
 //                     1.2 vW + v(mT + 2 t_f) + 0.1 mm,   v = limits.max_tool_speed_m_per_s
+//   elbow_too_fast  the same of the joints from the third on, with limits.max_elbow_speed_m_per_s: the sum of what the
+//                   furthest of them has gone in each cycle of W
 //   tool_off_limits it is further out of limits.workspace_m, or deeper in a zone of limits.keep_out_m, than 2 mm
 //
 // The fifth more is for drives that overshoot (5 % are seen, tests/controller/closed_loop). A drive whose feedback was
@@ -42,9 +44,9 @@ class ToolMonitor {
 
   // Where the arm begins to move.
   void start() noexcept { count_ = 0; }
-  // Each cycle in which it may move: the tool by the encoders. With another period the window begins where it is now:
-  // places of the old one are older than they count.
-  ToolVerdict step(const models::Vec3& tool_W, double period_s) noexcept;
+  // Each cycle in which it may move: the tool by the encoders, and how far the elbow has gone since the cycle before.
+  // With another period the window begins where it is now: places of the old one are older than they count.
+  ToolVerdict step(const models::Vec3& tool_W, double elbow_moved_m, double period_s) noexcept;
   // How far p is off limits, m; below zero: within them.
   [[nodiscard]] double off_limits(const models::Vec3& p) const noexcept;
   void archive(fieldbus::StateArchive& state) noexcept;
@@ -52,12 +54,17 @@ class ToolMonitor {
  private:
   static constexpr std::size_t most_places = 80;  // down to 0.25 ms; below that, a shorter time is looked at
 
+  [[nodiscard]] double most_way_m(double speed_m_per_s, double window_s, double period_s) const noexcept;
+  [[nodiscard]] ToolVerdict judge_speeds(const models::Vec3& tool_W, std::uint32_t window,
+                                         double period_s) const noexcept;
+
   description::CellLimits limits_;
   double missed_cycles_, feedback_s_;
-  std::array<models::Vec3, most_places> places_;  // a ring
-  std::uint32_t count_ = 0;                       // since start()
-  double allowed_m_ = 0.0;                        // off limits at the start
-  double period_s_ = 0.0;                         // of the places
+  std::array<models::Vec3, most_places> places_;     // of the tool: a ring
+  std::array<double, most_places> elbow_moved_m_{};  // to where it was in each of these cycles: a ring
+  std::uint32_t count_ = 0;                          // since start()
+  double allowed_m_ = 0.0;                           // off limits at the start
+  double period_s_ = 0.0;                            // of the places
 };
 
 }  // namespace proxarm::controller

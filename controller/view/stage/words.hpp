@@ -2,20 +2,15 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "controller/record/cycle_record.hpp"
+#include "controller/record/flag_words.hpp"
 #include "models/description/cell.hpp"
 
 namespace proxarm::view {
 
-// What holds the arm back, or is otherwise out of the ordinary, while a flag is set.
-struct FlagWords {
-  controller::RecordFlag flag;
-  const char* words;
-  bool holds_back;  // it is a limit that acts
-};
-[[nodiscard]] const std::vector<FlagWords>& flag_words();
+using controller::flag_words;
+using controller::FlagWords;
 
 // What the arm does in a phase.
 struct PhaseWords {
