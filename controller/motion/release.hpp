@@ -24,14 +24,14 @@ class Release {
  public:
   static constexpr double mass_kg = 10.0;               // M; with b it makes a time constant of 50 ms
   static constexpr double damping_Ns_per_m = 200.0;     // b
-  static constexpr double acceleration_m_per_s2 = 0.5;  // a, the deceleration of backing off
+  static constexpr double acceleration_m_per_s2 = 0.5;  // a, of backing off; both to speed up and to brake
   static constexpr double resisted_N = 50.0;            // backing off ends when the hand resists by this much more
   static constexpr double longest_back_off_m = 0.2;
   static constexpr double longest_yield_m = 0.02;
   static constexpr double yielded_N = 20.0;      // yielding ends below this force
   static constexpr double relief_way_m = 0.005;  // the distance within which the force must fall
   static constexpr double relief_share =
-      0.15;  // by this share of itself; on 10 N/mm, 500 N fall by 50 N, less than these 75 N
+      0.15;  // by this share of itself: 500 N by 75 N; on 10 N/mm they fall by 50 N only
 
   Release(const SessionSettings& settings, double speed_m_per_s);
 
