@@ -12,8 +12,8 @@ namespace {
 
 constexpr double behind_share = 0.5;  // of following_error_rad
 constexpr double forgetting = 0.05;
-constexpr int fewest_cycles = 5;  // in which a drive is away: one of them may be a frame that came late
-// Of the torque that accelerates a drive's rotor as it must be able to.
+constexpr int fewest_cycles = 5;  // for drive_deviates; a single cycle may be due to a late frame
+// The share of the torque that a drive needs to accelerate its rotor as it must be able to.
 constexpr double holding_share = 0.1;
 
 double counted(double time_s, bool is_so, double period_s) noexcept {
@@ -54,7 +54,7 @@ void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   state_.away_rad[i] = state_.away_s[i] = state_.behind_s[i] = 0.0;
 }
 
-// What it is away is no more than what it is outside: its way within the envelope doesn't count.
+// `away` is at most the distance outside of the envelope; motion within it doesn't count.
 void DriveMonitor::watch(Eigen::Index i, const DriveReports& now, bool waits, double period_s) noexcept {
   const double theta = now.reported_rad[i], d = envelope_.outside_rad(i, theta);
   const double moved = theta - std::exchange(state_.last_rad[i], theta), away = state_.away_rad[i] + moved;

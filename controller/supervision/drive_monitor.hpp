@@ -1,26 +1,28 @@
-// What each drive reports of its position, held against what it was sent: a drive that deviates is a fault.
+// Compares each drive's reported position with the setpoints that it was sent. A drive that deviates is a fault.
 //
-// A drive that follows is within the envelope of its setpoints (setpoint_envelope.hpp). With θ what it reports, d how
-// far θ is outside of that, ε = limits.following_error_rad, and while d isn't zero:
-//   away    how far θ has moved away from the envelope since it left it; moving back counts against it
-//   drive_deviates  away > ε for 20 ms (five cycles at least), or > 5ε, or what all joints are away makes more than
-//                   5 mm at the tool. The drive goes where nobody sent it: it runs off, goes the wrong way, can't hold
-//                   the arm's weight, or its encoder is off. It can't be asked to stop (stop category 0).
-//   drive_blocked   |d| > ε/2 for half a second in which θ stays within ε/2 of one place: setpoints wait for it, and it
-//                   doesn't come. It is jammed, doesn't heed its setpoints, or its encoder is stuck.
-// Where the joint is behind because its setpoints went on, away stays zero; where the setpoints stand and it goes off,
-// d is what it is away. That tells both apart without the motor's torque. Times need not be of one piece: a twentieth
-// of the time in which it isn't so counts against them, so that a joint that swings about its setpoints with the hand,
-// as a drive of the wrong sign does, or about which they swing, is found as well.
+// A drive that follows is within the envelope of its setpoints (setpoint_envelope.hpp). Let θ be its report, d the
+// distance of θ outside of the envelope, and ε = limits.following_error_rad. While d isn't zero:
+//   away    how far θ has moved away from the envelope since it left it; motion back is subtracted
+//   drive_deviates  away > ε for 20 ms (at least five cycles), or away > 5ε, or the `away` of all joints together make
+//                   more than 5 mm at the tool. The drive moves where it wasn't sent: it runs off, moves the wrong way,
+//                   can't hold the arm's weight, or its encoder is off. It can't be relied on to stop (stop category
+//                   0).
+//   drive_blocked   |d| > ε/2 for half a second in which θ stays within ε/2 of one place. Its setpoint waits, but the
+//                   drive doesn't come: it is jammed, ignores its setpoints, or its encoder is stuck.
+// If a joint is behind because its setpoints have moved on, `away` stays zero. If its setpoints stand and the joint
+// moves off, `away` equals d. This tells the two apart without the motor's torque. The times need not be contiguous: a
+// twentieth of the time in which the condition doesn't hold is subtracted. A joint is thus found, too, if it oscillates
+// about its setpoints with the hand, as with a wrong sign, or if its setpoints oscillate about it.
 //
-// Drives that follow are away by up to 0.024 mrad in the shipped scenes. At their torque's limit they catch up with
-// what they lagged and overshoot. Of 400 random sessions of the tests, with hands of up to a kilonewton, two end by
-// that: one whose axis 5 was jammed at 0.8 rad/s for 3.4 ms and then ran past its setpoint by more than 5 mrad, and one
-// at 4 ms that a hand of 519 N made swing by 8 mrad.
+// In the shipped scenes drives that follow are away by up to 0.024 mrad. At their torque's limit they lag, catch up and
+// overshoot. Of 400 random sessions of the tests, with hands of up to a kilonewton, two end for that reason: one whose
+// axis 5 was jammed at 0.8 rad/s for 3.4 ms and then ran past its setpoint by more than 5 mrad, and one at 4 ms in
+// which a hand of 519 N made a joint oscillate by 8 mrad.
 //
-// A hand explains that a joint doesn't follow if its torque about that joint, Jᵀh, holds it back with at least a tenth
-// of what the drive has: J_r a, for it must be able to accelerate its rotor by its a. Then drive_blocked waits for
-// five seconds instead of half a one. For the default cell that takes 174 Nm about its base, 220 N at 0.8 m.
+// A hand may be why a joint doesn't follow: if its torque about that joint, Jᵀh, holds the joint back with at least a
+// tenth of the torque that the drive must have. That is J_r a, which accelerates its rotor's inertia J_r by its limit
+// a. Then drive_blocked waits for five seconds instead of half a second. In the default cell this takes 174 Nm about
+// the base, or 220 N at 0.8 m.
 //
 // Nothing allocates, locks or throws after construction.
 #pragma once
@@ -40,11 +42,11 @@ namespace proxarm::controller {
 inline constexpr double away_at_once = 5.0;  // of following_error_rad
 inline constexpr double deviates_m = 5e-3, deviates_s = 0.02, blocked_s = 0.5, held_by_hand_s = 5.0;
 
-// Of one cycle; joint vectors and bits in the order of the drives.
+// The reports of one cycle; joint vectors and bits in the order of the drives.
 struct DriveReports {
   const models::JointVector& reported_rad;  // by the motors' encoders
-  const models::JointVector& link_rad;      // of the links, by these
-  const models::JointVector& setpoint_rad;  // the last one that each was sent
+  const models::JointVector& link_rad;      // by the same encoders
+  const models::JointVector& setpoint_rad;  // the last one sent to each drive
   const models::JointVector& feedback_period_s;
   std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and that take setpoints
   models::Wrench hand_W;                  // about the rendered point
@@ -58,11 +60,11 @@ struct DriveVerdict {
 
 class DriveMonitor {
  public:
-  // `arm` must outlive this.
+  // Precondition: `arm` outlives this object.
   DriveMonitor(const models::Arm& arm, std::vector<description::DriveDescription> drives, double following_error_rad);
 
-  // Each cycle in which drives may take setpoints. `waits`: setpoints may be waiting for a joint (the arm is rendering
-  // or freed), so that one that is behind is blocked.
+  // To be called in each cycle in which drives may take setpoints. `waits`: setpoints may be waiting for a joint (the
+  // arm is rendering or being freed), so a joint that is behind is blocked.
   DriveVerdict step(const DriveReports& now, bool waits, double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
@@ -72,11 +74,11 @@ class DriveMonitor {
  private:
   struct State {
     models::JointVector last_rad;       // reported
-    models::JointVector away_rad;       // with the sign of d
-    models::JointVector away_s;         // for how long that is more than ε
-    models::JointVector behind_s;       // for how long |d| is more than ε/2, from ...
-    models::JointVector behind_at_rad;  // ... one place
-    std::uint8_t known = 0;             // drives that have been followed up to now
+    models::JointVector away_rad;       // `away`, with the sign of d
+    models::JointVector away_s;         // time with |away| > ε
+    models::JointVector behind_s;       // time with |d| > ε/2 ...
+    models::JointVector behind_at_rad;  // ... at this place
+    std::uint8_t known = 0;             // drives that have been watched since they began to follow
   };
 
   void begin(Eigen::Index i, const DriveReports& now) noexcept;

@@ -19,7 +19,7 @@ ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double period_s) noexc
   const auto window = static_cast<std::uint32_t>(cycles);
   ToolVerdict verdict;
   if (count_ > 0) {
-    // Less than a window after the start: from the start.
+    // Less than a window after the start, the distance is measured from the start.
     const models::Vec3& before_W = places_[(count_ - std::min(count_, window)) % most_places];
     const double way_m = (tool_W - before_W).norm(), v = limits_.max_tool_speed_m_per_s;
     const double most_m =
@@ -29,7 +29,7 @@ ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double period_s) noexc
     }
   }
   places_[count_ % most_places] = tool_W;
-  // Which of them is the oldest is all that it is for.
+  // The count only has to tell which place is the oldest.
   count_ = count_ + 1 < 2 * most_places ? count_ + 1 : most_places;
   if (verdict.fault == Fault::none && off_m > allowed_m_ + off_limits_m) {
     verdict = {Fault::tool_off_limits, 1e3 * off_m, 1e3 * (allowed_m_ + off_limits_m)};
