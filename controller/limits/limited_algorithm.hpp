@@ -63,8 +63,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   static constexpr int most_jumps = 6;                  // if Newton converges, it takes two or three
   static constexpr int most_sweeps = 3000;              // per step in all, some 50 ns each
   static constexpr double tolerance_m = 1e-11;          // of r − l: 10 nm/s at 1 kHz
-  static constexpr double nudge_m =
-      1e-9;  // of p: at this size, differences of 𝒢 (rounded to 1e-16 m) have seven digits
+  static constexpr double nudge_m = 1e-9;  // of p; 𝒢's rounding of 1e-16 m leaves differences seven digits
 
   struct Step {
     double K;
