@@ -10,17 +10,17 @@
 //
 // - Speed: ‖q − q₁‖ ≤ vT, with v the smaller of limits.max_tool_speed_m_per_s and max_power_W/‖h‖. The latter bounds
 //   the power that the arm gives to or takes from the hand.
-// Acceleration: it is that of the commanded point, behind the filter of the setpoints (elastic_setpoint.hpp) with the
-// state x, v: ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A wall that is met more slowly than a·e/ω (0.34 m/s with
-// the default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
-// Borders at distance d: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border decreases with the distance, slowly
-// enough that braking straight along the present velocity satisfies all borders at once: from u ≤ d/(T + v/a) and a
-// deceleration of a follows (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so the commanded point keeps
-// convex borders, too.
-// A keep-out box acts as the half-space of the face that is furthest from being crossed. The commanded point lags by
-// 2v/ω (some millimetres) and may cut the box's corners by that much, so boxes need that much room around them.
-// Joints: with G = ∂(joint angles)/∂(tool position), orientation held, joint i moves by G_i·(q − q₁). Near a
-// singularity G_i grows along the direction that is being lost, and the tool slows down in that direction alone.
+// - Acceleration: it is that of the commanded point, behind the filter of the setpoints (elastic_setpoint.hpp) with the
+//   state x, v: ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A wall that is met more slowly than a·e/ω (e = 2.718…;
+//   0.34 m/s with the default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
+// - Borders at distance d: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border decreases with the distance, slowly
+//   enough that braking straight along the present velocity satisfies all borders at once: from u ≤ d/(T + v/a) and a
+//   deceleration of a follows (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so the commanded point keeps
+//   convex borders, too.
+// - A keep-out box acts as the half-space of the face that is furthest from being crossed. The commanded point lags by
+//   2v/ω (some millimetres) and may cut the box's corners by that much, so boxes need that much room around them.
+// - Joints: with G = ∂(joint angles)/∂(tool position), orientation held, joint i moves by G_i·(q − q₁). Near a
+//   singularity G_i grows along the direction that is being lost, and the tool slows down in that direction alone.
 #pragma once
 
 #include <array>

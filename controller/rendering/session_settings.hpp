@@ -26,10 +26,9 @@ struct SessionSettings {
   Scheme scheme = Scheme::admittance;
   double coupling_stiffness_N_per_m = 750.0;  // impedance type: K and B of the virtual coupling
   double coupling_damping_Ns_per_m = 8.0;
-  double period_s = 1e-3;  // T, the timestep of the cycle
-  double receive_window =
-      0.45;              // share of T in which feedback and samples are received; setpoints are sent in the rest
-  double mass_kg = 4.0;  // what the hand feels, tool behind the sensor included
+  double period_s = 1e-3;         // T, the timestep of the cycle
+  double receive_window = 0.45;   // share of T in which feedback and samples are received
+  double mass_kg = 4.0;           // what the hand feels, tool behind the sensor included
   double damping_Ns_per_m = 0.0;  // B, virtual damping against the world at rest
   double spring_N_per_m = 0.0;    // K_v, to the start position
   int order = 1;                  // 1: (26); 2: BDF2 (bdf2.hpp)
