@@ -5,8 +5,9 @@
 namespace proxarm::controller {
 namespace {
 
-// With this time constant, and at most so fast. A sensor that warms up drifts by 0.01 N/s; a hand that presses less
-// than 0.35 N more in a second is taken for drift, until it has pressed by max_bias_drift_N.
+// The bias follows the reading at rest as a low-pass with the time constant bias_s, and at most at the rate
+// bias_N_per_s. A sensor that warms up drifts by 0.01 N/s. A hand that increases its pressure by less than 0.35 N in a
+// second is taken for drift, until it presses by max_bias_drift_N.
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
 // A torque's bias counts as the force that makes it at this lever: about a handle's length.
 constexpr double bias_lever_m = 0.1;

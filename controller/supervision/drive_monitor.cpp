@@ -56,7 +56,7 @@ void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   state_.passing_s[i] = passing_s;
 }
 
-// What it is away is no more than what it is outside: its way within the envelope doesn't count.
+// `away` is at most the distance outside of the envelope; motion within it doesn't count.
 void DriveMonitor::watch(Eigen::Index i, const DriveReports& now, bool waits, double period_s) noexcept {
   const double theta = now.reported_rad[i], d = envelope_.outside_rad(i, theta);
   const double moved = theta - std::exchange(state_.last_rad[i], theta), away = state_.away_rad[i] + moved;

@@ -16,8 +16,8 @@ constexpr const char* unconfirmed =
     "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
     "off";
 
-// One row per fault: the reaction, what was seen, and what to do. The text of what was seen may hold a %s for the place
-// and %.4g for value and limit. Faults that only a start can have say that nothing has moved.
+// One row per fault: the reaction, what was seen, and what to do. The text of what was seen may contain %s for the
+// place and %.4g for value and limit. The texts of faults that only occur at a start say that nothing has moved.
 struct FaultText {
   Fault fault;
   const char* name;
@@ -25,7 +25,7 @@ struct FaultText {
   const char* cause;
   const char* unit;  // of value and limit; nullptr: no figures
   const char* advice;
-  const char* did = nullptr;  // nullptr: by the reaction
+  const char* did = nullptr;  // what the arm did; nullptr: as the reaction says
 };
 
 constexpr std::array texts{

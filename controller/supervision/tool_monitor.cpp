@@ -25,7 +25,7 @@ ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double elbow_moved_m, 
   elbow_moved_m_[count_ % most_places] = elbow_moved_m;
   ToolVerdict verdict = judge_speeds(tool_W, window, period_s);
   places_[count_ % most_places] = tool_W;
-  // Which of them is the oldest is all that it is for.
+  // The count only has to tell which place is the oldest.
   count_ = count_ + 1 < 2 * most_places ? count_ + 1 : most_places;
   if (verdict.fault == Fault::none && off_m > allowed_m_ + off_limits_m) {
     verdict = {Fault::tool_off_limits, 1e3 * off_m, 1e3 * (allowed_m_ + off_limits_m)};

@@ -1,4 +1,4 @@
-// What a session's flags, phases and faults mean, in words for people who look at it.
+// Texts that explain a session's flags, phases and faults to people.
 #pragma once
 
 #include <string>
@@ -18,10 +18,10 @@ struct PhaseWords {
   const char* words;
 };
 [[nodiscard]] PhaseWords phase_words(controller::Phase phase) noexcept;
-// What its drives do, of an arm whose controller is elsewhere.
+// The state of the drives, for an arm whose controller is elsewhere.
 [[nodiscard]] PhaseWords drive_words(controller::Phase phase) noexcept;
 
-// The fault that stopped the arm or that it is held for, with its place and figures; empty where there is none.
+// The fault that stopped the arm or for which it is held, with its place and figures; empty if there is none.
 [[nodiscard]] std::string fault_text(const controller::CycleRecord& record, const description::Cell& cell);
 
 }  // namespace proxarm::view
