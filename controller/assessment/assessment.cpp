@@ -13,10 +13,10 @@ namespace {
 
 using models::Vec3;
 
-// ISO/TS 15066's spring constants lie between these; 100 N/mm belongs to no region and fills the gap.
+// The spring constants of ISO/TS 15066 lie in this range. 100 N/mm belongs to no body region and fills a gap.
 constexpr std::array body_stiffnesses_N_per_m{10e3, 25e3, 50e3, 75e3, 100e3, 150e3};
 
-// In the tool's space.
+// The worst mobility over the directions of the tool's space.
 double worst_mobility(const models::Arm& arm, const models::ToolSpace& space, const models::JointVector& q) {
   models::ToolKinematics at;
   arm.kinematics(q, at);
@@ -43,7 +43,7 @@ const Sample& fastest(const TrialResult& result) {
   });
 }
 
-// The worst of all poses and directions, one figure for each category and for each body.
+// The worst figures over all poses and directions: one for each stop category and one for each body.
 class Worst {
  public:
   void take(const StopFigure& figure) {
@@ -85,7 +85,7 @@ class Worst {
 }  // namespace
 
 std::vector<std::vector<double>> poses_about_start(const description::Cell& cell, const models::Arm& arm, int count) {
-  constexpr double reach = 0.4;  // of each joint from the start, in rad or m
+  constexpr double reach = 0.4;  // of each joint from its start, in rad or m
   constexpr double least_share_of_mobility = 0.6;
   constexpr int tries = 1000;
   const models::JointVector& start = arm.start_rad();
@@ -130,7 +130,7 @@ ClampFigure clamp_figure(const Body& body, const TrialResult& result) {
   for (const Sample& sample : result.samples) {
     figure.left_N = 0.0;
     const double depth_m = (sample.tool_W - body.surface_W).dot(body.normal_W);
-    // Before the body is there, the tool is on its outer side.
+    // Until the body is there, the tool is on its outer side.
     if (depth_m <= 0.0) continue;
     if (touched_s < 0.0) {
       touched_s = sample.time_s;

@@ -44,7 +44,7 @@ std::string brakes(const Subject& s) {
               s.assumed_brakes, s.assumed_brake_share, 1e3 * s.assumed_brake_delay_s);
 }
 
-// What a force of this body is held against; nullptr: nothing.
+// The body region whose thresholds this body's force is compared with; nullptr if there is none.
 const Region* region_of(const ClampFigure& clamp, const Thresholds& thresholds) {
   for (const Region& region : thresholds.regions) {
     if (region.stiffness_N_per_m == clamp.stiffness_N_per_m) return &region;

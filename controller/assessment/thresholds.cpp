@@ -5,7 +5,7 @@
 namespace proxarm::assessment {
 namespace {
 
-// From softer than any tissue to harder than a skull, and from what is hardly felt to what breaks bones.
+// From softer than any tissue to harder than a skull, and from hardly felt to bone-breaking.
 constexpr description::Range stiffness_range = description::between(1.0, 1000.0);
 constexpr description::Range force_range = description::between(1.0, 10'000.0);
 constexpr double per_mm = 1000.0;  // N/m in a N/mm

@@ -1,11 +1,11 @@
-// Forces that a body region may bear, as a file states them with its source.
+// Forces that a body region may bear, read from a file that names their source.
 //
 //   source: "…"                    # standard, year, table, and where it was read; printed with each figure
 //   regions:
 //     - {name: hands and fingers, stiffness_N_per_mm: 75, quasi_static_N: 140, transient_N: 280}
 //
-// A region is judged against a body of its own stiffness. Pressures aren't: they are a matter of the parts' shapes,
-// which a cell file doesn't have.
+// A region is judged against a body of its own stiffness. Pressures aren't judged, since they depend on the shapes of
+// the parts, which a cell file doesn't have.
 #pragma once
 
 #include <filesystem>
@@ -18,7 +18,7 @@ struct Region {
   std::string name;
   double stiffness_N_per_m = 0.0;
   double transient_N = 0.0;     // in the first half second of a contact
-  double quasi_static_N = 0.0;  // later
+  double quasi_static_N = 0.0;  // after that
 };
 
 struct Thresholds {
@@ -27,10 +27,10 @@ struct Thresholds {
   std::vector<Region> regions;
 };
 
-// A contact counts as quasi-static from here on, in seconds after its beginning.
+// A contact counts as quasi-static from this time after its beginning on, in seconds.
 inline constexpr double quasi_static_from_s = 0.5;
 
-// Throws SetupError, with file, line and key.
+// Throws SetupError, which names file, line and key.
 Thresholds load_thresholds(const std::filesystem::path& file);
 
 }  // namespace proxarm::assessment

@@ -64,7 +64,7 @@ void check_cell(const fs::path& file, const fs::path& scene) {
       const fieldbus::ModbusDrive modbus(drive, description::load_modbus_drive(drive.description), period_ns);
     }
   }
-  controller::make_sensor(cell, description::load_sensor(cell.sensor.description));
+  controller::make_sensor(cell, description::load_sensor(cell.sensor.description, cell.sensor.choices));
   RunOptions run;
   run.cell = file;
   run.scene = scene;

@@ -208,9 +208,16 @@ void add_view_options(CLI::App& app, RunOptions& options, const char* what) {
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+void add_arm_option(CLI::App& app, std::filesystem::path& arm) {
+  app.add_option("--arm", arm,
+                 "cell file of the simulated arm, where it is another one than the controller takes it for")
+      ->type_name("FILE");
+}
+
 void add_run_options(CLI::App& app, RunOptions& options) {
   add_session_options(app, options);
   add_fault_option(app, options);
+  add_arm_option(app, options.arm);
   add_enabling_option(app, options);
   add_supervision_options(app, options);
   app.add_option("--pace",
@@ -298,9 +305,7 @@ void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
   add_fault_option(app, options.run);
   add_enabling_option(app, options.run);
   add_hardware_option(app, options.run);
-  app.add_option("--arm", options.arm,
-                 "cell file of the simulated arm, where it is another one than the controller takes it for")
-      ->type_name("FILE");
+  add_arm_option(app, options.arm);
   app.add_flag(
       "--bus-loss", options.bus_loss,
       "at standstill the controller falls silent on purpose: how and when each drive stops by itself, kept with "
@@ -343,9 +348,7 @@ void add_calibrate_options(CLI::App& app, command_line::CalibrateOptions& option
       ->type_name("RAD");
   app.add_flag("--home", options.home,
                "home the drives with incremental encoders, one joint after the other: they move");
-  app.add_option("--arm", options.arm,
-                 "cell file of the simulated arm, where it is another one than the controller takes it for")
-      ->type_name("FILE");
+  add_arm_option(app, options.arm);
 }
 
 // The commands with their options; the one that was chosen waits in `chosen`.

@@ -41,7 +41,7 @@ class Replay {
   explicit Replay(const fs::path& folder)
       : log_(folder / controller::replay_folder / "cycles.bin"),
         cell_(description::load_cell(controller::recorded_file(folder, log_.head().cell.data()))),
-        sensor_(description::load_sensor(cell_.sensor.description)),
+        sensor_(description::load_sensor(cell_.sensor.description, cell_.sensor.choices)),
         scene_(scenes::compile(controller::reachable_scene(
             scenes::load_scene(controller::recorded_file(folder, log_.head().scene.data())), cell_))),
         network_(log_.head()) {

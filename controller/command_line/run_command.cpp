@@ -15,6 +15,12 @@ namespace proxarm::command_line {
 namespace {
 
 void refuse_for_interfaces(const RunOptions& options) {
+  if (!options.arm.empty()) {
+    throw description::SetupError({.key = "--arm",
+                                   .found = "a bus that isn't simulated",
+                                   .expected = "--bus sim, where the arm is simulated",
+                                   .advice = "on an interface, give it to `proxarm sim`"});
+  }
   if (!options.faults.empty()) {
     throw description::SetupError({.key = "--fault",
                                    .found = "a bus that isn't simulated",
@@ -38,6 +44,24 @@ void refuse_for_interfaces(const RunOptions& options) {
 }  // namespace
 
 namespace {
+
+// What is simulated: the session's own cell, or another one that is wired as it is.
+PreparedSession prepared_arm(const PreparedSession& session, RunOptions options) {
+  if (options.arm.empty()) return session;
+  options.cell = options.arm;
+  PreparedSession arm = prepare(options);
+  const auto names = [](const description::Cell& cell) {
+    std::string all;
+    for (const auto& bus : cell.buses) all += bus.name + " ";
+    for (const auto& drive : cell.drives) all += drive.joint + "/" + drive.bus + " ";
+    return all;
+  };
+  if (names(arm.cell) == names(session.cell)) return arm;
+  throw description::SetupError({.file = arm.cell.file.string(),
+                                 .key = "--arm",
+                                 .found = "other buses or joints than those of " + session.cell.file.string(),
+                                 .expected = "the same: a wrong direction, gear, link or sensor is what it is for"});
+}
 
 // What the view asks for of the other options.
 RunOptions with_view(RunOptions options) {
@@ -75,8 +99,9 @@ int run_command(const RunOptions& given) {
     view = std::make_unique<ViewProcess>(session, options, keeper.box().descriptor());
     options.view_place = view->place();
   }
-  const int status = options.bus.simulated() ? SimulatedRun(session, options, keeper).run()
-                                             : run_on_interfaces(session, options, keeper);
+  const int status = options.bus.simulated()
+                         ? SimulatedRun(session, prepared_arm(session, options), options, keeper).run()
+                         : run_on_interfaces(session, options, keeper);
   if (options.view_control && given.control.empty()) remove_view_control();
   if (view) view->show_end(status);
   return status;

@@ -1,4 +1,4 @@
-// The time of this machine that goes by from its making on, without what the network waits for frames.
+// A stopwatch of computing time: it runs from construction on and leaves out the time waited for frames.
 #pragma once
 
 #include <chrono>

@@ -13,7 +13,7 @@ bool renders_torques(const CycleParts& parts) noexcept {
   return std::holds_alternative<std::unique_ptr<TorqueRendering>>(parts.rendering);
 }
 
-// Who drives back a device that takes torques is as fast as he likes.
+// A device that takes torques is driven back by a hand as fast as the hand likes, so the tool's speed isn't monitored.
 std::optional<ToolMonitor> tool_monitor(const CycleParts& parts, const SessionSettings& settings,
                                         const description::CellLimits& limits) {
   if (renders_torques(parts)) return {};
@@ -34,7 +34,7 @@ std::optional<StandstillMonitor> standstill_monitor(const CycleParts& parts, con
   return StandstillMonitor(parts.arm->axes(), limits.following_error_rad);
 }
 
-// What a torque can't do, a stop does: nothing is held or slowed there.
+// With torques, an arm can neither hold nor be slowed: these reactions become stops.
 Reactions reactions_for(const CycleParts& parts) {
   Reactions reactions = reactions_of(parts.supervision);
   if (!renders_torques(parts)) return reactions;
@@ -45,7 +45,7 @@ Reactions reactions_for(const CycleParts& parts) {
   return reactions;
 }
 
-// Why this session keeps its timestep, or nullptr.
+// Returns why this session keeps its timestep, or nullptr if it can change.
 const char* fixed_timestep(const CycleParts& parts) noexcept {
   if (renders_torques(parts)) return "the impedance type's torques are made for one timestep";
   if (!parts.modbus_lines.empty()) return "what is on a Modbus line keeps the timestep of the start";
@@ -118,8 +118,8 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
   enter(supervisor_.phase(), t_k_ns);
 }
 
-// A phase that begins has its say in the same cycle, so that a fault found on the way still stops on this one; unless
-// the setpoints are made already.
+// If the phase changes while the setpoints are chosen, the new phase acts in the same cycle, so that a fault found here
+// stops the arm without delay. The exception is a cycle whose setpoints are made already.
 void Cycle::choose_setpoints(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (supervisor_.phase() == state_.entered_phase) return;
@@ -179,8 +179,8 @@ void Cycle::end_cycle() noexcept {
   ++state_.cycle;
 }
 
-// For an arm that stands. What was commanded, measured and rendered stays as it is; what is made of T is made anew, and
-// what is counted in cycles back from now is counted in the new ones.
+// Precondition: the arm stands. What was commanded, measured and rendered stays as it is. What depends on T is computed
+// anew, and past times that are counted in cycles are converted to the new ones.
 void Cycle::apply(const Timestep& timestep) noexcept {
   const double ratio = settings_.period_s / timestep.period_s;
   settings_.max_missed_samples = timestep.max_missed_samples;
@@ -192,14 +192,14 @@ void Cycle::apply(const Timestep& timestep) noexcept {
   look_ahead(timestep.horizon_s);
 }
 
-// Negative: as it is.
+// A negative horizon leaves the present one as it is.
 void Cycle::look_ahead(double horizon_s) noexcept {
   if (!(horizon_s >= 0.0)) return;
   settings_.horizon_s = horizon_s;
   motion_->set({.parameter = Parameter::lookahead, .value = horizon_s});
 }
 
-// The timestep comes first, since what follows is of it.
+// The timestep comes first, since all that follows depends on it.
 void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   Timestep now = timestep_of(settings_);
   archive_fields(state, now);

@@ -1,4 +1,4 @@
-// One period of the session, the same lines on hardware, on vcan, in-process and in tests; only bus and clock differ.
+// One period of the session: the same lines on hardware, on vcan, in-process and in tests; only bus and clock differ.
 //
 //   t_k        SYNC on every drive bus, then the sensor's poll
 //   … 0.45 T   receive, until every drive's TPDO and the sensor's sample are in
@@ -6,9 +6,9 @@
 //
 // The setpoints are latched by the drives at SYNC k+1 and, with their interpolation over the period, reached at k+2.
 //
-// run_cycle() neither allocates, locks, throws nor prints; all that it touches was built before. One thread calls it.
-// Each stage is a part of its own (BusImage, Measurement, FaultMonitor, Motion, TimestepChange, CycleRecorder), and
-// Cycle is what connects them: which phase the session is in, and what a phase does.
+// run_cycle() neither allocates, locks, throws nor prints; all that it touches is built before. Precondition: one
+// thread calls it. Each stage is a part of its own (BusImage, Measurement, FaultMonitor, Motion, TimestepChange,
+// CycleRecorder). Cycle connects them: it knows which phase the session is in, and what that phase does.
 #pragma once
 
 #include <array>
@@ -35,13 +35,13 @@ namespace proxarm::controller {
 
 class Cycle {
  public:
-  // `record_capacity`: cycles that the ring holds until somebody pops them.
+  // `record_capacity`: the number of records that the ring holds until somebody pops them.
   Cycle(CycleParts parts, const SessionSettings& settings, const description::CellLimits& limits,
         std::size_t record_capacity);
   Cycle(const Cycle&) = delete;
   Cycle& operator=(const Cycle&) = delete;
 
-  // One period, begun at t_k.
+  // Runs one period, which begins at t_k.
   void run_cycle(std::int64_t t_k_ns) noexcept;
 
   // ---- any thread
@@ -49,39 +49,46 @@ class Cycle {
   void request_stop() noexcept { status_.request_stop(); }
   [[nodiscard]] bool stop_requested() const noexcept { return status_.stop_requested(); }
 
-  // ---- one thread each: who asks, and who takes the records
-  // Changes that have been checked; one is taken per cycle of rendering or of a hold.
+  // ---- one thread for each: the one that asks, and the one that takes the records
+  // Changes of parameters, already checked. One is taken per cycle of rendering or of a hold.
   [[nodiscard]] Requests<Change>& changes() noexcept { return requests_.changes; }
-  // Another T, only where all drives are on CAN and take positions: the arm stops, the drives are told, rendering goes
-  // on. A request waits until the arm is rendering or in a hold.
+  // Changes of the timestep: only if all drives are on CAN and take positions. The arm stops, the drives are told, and
+  // rendering goes on. A request waits until the arm is rendering or in a hold.
   [[nodiscard]] Requests<Timestep>& timesteps() noexcept { return requests_.timesteps; }
-  // In any phase. A command that the phase has no use for is dropped; CycleStatus::refusal() tells before asking
-  // whether it would be.
+  // Commands are taken in any phase. One that the phase has no use for is dropped; CycleStatus::refusal() tells
+  // beforehand whether it would be.
   [[nodiscard]] Requests<Command>& commands() noexcept { return requests_.commands; }
-  // The records of the cycles, for whoever writes files.
+  // The records of the cycles, for the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return recorder_.records(); }
 
   // ---- the loop's owner, between cycles
-  // Before the first cycle. From then on each cycle's inputs and outputs are also written to `box`.
+  // Precondition: no cycle has run. From then on each cycle's inputs and outputs are also written to `box`.
   void write_to(CycleBox& box) noexcept { recorder_.write_to(box); }
-  // This many cycles in a row were late.
+  // Tells the next cycle how many cycles in a row were late.
   void report_overruns(std::uint32_t in_a_row) noexcept { overruns_in_a_row_ = in_a_row; }
-  // All that a cycle leaves to the next one: with it and what the cycles are given, a replay gives the same setpoints.
+  // Archives all state that a cycle leaves to the next one. From it and the recorded inputs, a replay computes the same
+  // setpoints.
   void archive(fieldbus::StateArchive& state) noexcept;
-  // After the last cycle: drives back to NMT pre-operational. Never fails.
+  // Precondition: the last cycle has run. The drives go back to NMT pre-operational. Never fails.
   void shut_down() noexcept { bus_.shut_down(period_ns()); }
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
   [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {
     return requests_.commands.script();
   }
+  [[nodiscard]] std::span<const ScheduledChange> scheduled_changes() const noexcept {
+    return requests_.changes.script();
+  }
+  [[nodiscard]] std::span<const ScheduledTimestep> scheduled_timesteps() const noexcept {
+    return requests_.timesteps.script();
+  }
   [[nodiscard]] std::uint64_t rendered_cycles() const noexcept { return state_.rendered_cycles; }
   [[nodiscard]] std::int64_t rendered_ns() const noexcept { return state_.rendered_ns; }
-  // From the last cycle to the next one.
+  // The time from the last cycle to the next one.
   [[nodiscard]] std::int64_t period_ns() const noexcept { return ns_of(settings_.period_s); }
-  // After the last cycle: whether every drive has said that it doesn't hold its axis any more.
+  // Whether every drive has reported, after the last cycle, that it no longer holds its axis.
   [[nodiscard]] bool drives_off() const noexcept { return bus_.drives_off(); }
-  // Faults that were reset, the latest eight, the oldest of them first; and how many there were.
+  // The latest eight of the faults that were reset, oldest first; and the number of all that were.
   [[nodiscard]] std::span<const FaultReport> past_faults() const noexcept { return past_faults_.latest(); }
   [[nodiscard]] std::uint64_t past_fault_count() const noexcept { return past_faults_.count(); }
   [[nodiscard]] const CycleParts& parts() const noexcept { return parts_; }
@@ -92,7 +99,7 @@ class Cycle {
     Requests<Timestep> timesteps{4};
     Requests<Command> commands{16};
   };
-  // Of the session, between cycles.
+  // The session's state between cycles.
   struct State {
     Phase entered_phase = Phase::idle;  // the phase that enter() was last called for
     std::int64_t phase_since_ns = 0;
@@ -101,10 +108,10 @@ class Cycle {
     std::uint64_t rendered_cycles = 0;
     std::int64_t rendered_ns = 0;
     bool tared = false;
-    bool wants_resume = false;  // out of this hold: the enabling input was pressed anew, or somebody asked for it
-    Command awaits_rest;        // release or back_off, in a hold in which the arm still moves
-    bool yields = false;        // stopped for a force, it backs off from what presses
-    bool yielded = false;       // it has
+    bool wants_resume = false;  // to leave this hold: the enabling input was pressed anew, or somebody asked for it
+    Command awaits_rest;        // an order to release or back off, given in a hold while the arm still moves
+    bool yields = false;        // stopped because of a force, the arm backs off from what presses
+    bool yielded = false;       // it has done so
     std::int64_t yields_since_ns = 0;
   };
 
@@ -149,7 +156,7 @@ class Cycle {
   void supervise_hold(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool may_move() const noexcept;
   [[nodiscard]] bool stands_in_hold() const noexcept;
-  // How many cycles last for `time_s`.
+  // The number of cycles that `time_s` lasts, rounded up.
   [[nodiscard]] std::uint64_t cycles_of(double time_s) const noexcept;
 
   CycleParts parts_;

@@ -8,9 +8,9 @@ namespace {
 
 // How long the drives may take to switch off before the session ends with Fault::drive_not_disabled.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
-// 20 mm at 0.05 m/s, as soon as it has got that fast, are 0.5 s.
+// A yield of 20 mm at 0.05 m/s takes 0.5 s, the acceleration included; this is twice as long.
 constexpr std::int64_t longest_yield_ns = 1'000'000'000;
-// For so long after the last fault that slows, the tool stays slow.
+// The tool stays slow until this time after the last fault with the reaction `slow`.
 constexpr double clear_of_slow_s = 0.5;
 
 }  // namespace
@@ -37,7 +37,7 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
   }
 }
 
-// After stop_0 the power goes at once (goal `none`); otherwise the drives ramp down by themselves.
+// After stop_0 the drives lose power at once (goal `none`); otherwise they ramp down by themselves.
 fieldbus::DriveGoal Cycle::goal_in(Phase phase) const noexcept {
   if (phase < Phase::disabling) return fieldbus::DriveGoal::operation_enabled;
   const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == Reaction::stop_0;
@@ -136,7 +136,7 @@ void Cycle::run_out(std::int64_t t_k_ns) noexcept {
   }
 }
 
-// An arm that was stopped because it presses too hard would go on pressing, with its brakes closed.
+// The arm was stopped because it presses too hard. With closed brakes it would go on pressing, so it yields first.
 void Cycle::yield(std::int64_t t_k_ns) noexcept {
   const bool over = motion_->free(motion_cycle());
   if (!over && may_yield() && t_k_ns - state_.yields_since_ns <= longest_yield_ns) return;

@@ -2,7 +2,7 @@
 
 namespace proxarm::controller {
 
-// The box reuses its oldest entry: what that cycle was asked for must not be replayed with this one.
+// The box reuses its oldest entry, which is cleared: a replay must not repeat the requests of that old cycle here.
 void CycleRecorder::begin_entry(std::int64_t t_k_ns) noexcept {
   record_ = {};
   entry_ = &box_->begin(t_k_ns);

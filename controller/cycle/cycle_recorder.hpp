@@ -1,4 +1,5 @@
-// What a cycle leaves behind: its record, which goes through a ring to whoever writes files, and the black box' entry.
+// What a cycle leaves behind: a record, which goes through a ring to the thread that writes files, and an entry of the
+// black box.
 //
 // A session without a black box writes to one that keeps nothing, so the cycle never asks whether there is one. Nothing
 // here allocates, locks or throws after construction.
@@ -16,16 +17,16 @@ namespace proxarm::controller {
 
 class CycleRecorder {
  public:
-  // `capacity`: cycles whose records the ring holds until somebody pops them.
+  // `capacity`: the number of records that the ring holds until somebody pops them.
   explicit CycleRecorder(std::size_t capacity) : records_(capacity), entry_(&no_box_.begin(0)) {}
   CycleRecorder(const CycleRecorder&) = delete;
   CycleRecorder& operator=(const CycleRecorder&) = delete;
 
-  // Before the first cycle.
+  // Precondition: no cycle has run.
   void write_to(CycleBox& box) noexcept { box_ = &box; }
 
-  // A cycle begins with an empty record and an empty entry. `archive(StateArchive&)` writes the cycle's whole state
-  // where the black box has one due.
+  // Begins a cycle with an empty record and an empty entry. If the black box has a state due, `archive(StateArchive&)`
+  // writes the cycle's whole state.
   template <typename Archive>
   void begin(std::int64_t t_k_ns, Archive&& archive) noexcept {
     if (const std::span<std::byte> room = box_->state_room(); !room.empty()) {
@@ -48,14 +49,14 @@ class CycleRecorder {
   void add_status(std::size_t bus, const fieldbus::BusStatus& status) noexcept {
     if (bus < max_buses) entry_->buses[bus] = {status.state, status.receive_overflows};
   }
-  // The record and the entry are whole.
+  // Ends the cycle: the record and the entry are complete.
   void finish() noexcept;
 
   // For the thread that writes files.
   [[nodiscard]] SpscRing<CycleRecord>& records() noexcept { return records_; }
 
  private:
-  // Keeps nothing.
+  // A black box that keeps nothing.
   class NoBox final : public CycleBox {
    public:
     [[nodiscard]] BoxCycle& begin(std::int64_t /*t_k_ns*/) noexcept override { return entry_; }

@@ -1,4 +1,4 @@
-// What the cycle is asked for, by the enabling input, by commands, by changes of parameters and of the timestep, and
+// What the cycle is asked for (by the enabling input, by commands, by changes of parameters and of the timestep), and
 // when it may do it.
 #include <cmath>
 #include <utility>
@@ -8,7 +8,7 @@
 namespace proxarm::controller {
 namespace {
 
-// For so long what the arm was held for must be gone before it may move again.
+// The arm may move again when the cause of its hold has been gone for this time.
 constexpr double clear_of_cause_s = 0.1;
 
 }  // namespace
@@ -56,13 +56,13 @@ void Cycle::heed_enabling_input(std::int64_t t_k_ns) noexcept {
 
 // ---- commands
 
-// A command of the script that does nothing is told of when the session has ended.
+// If a command of the script does nothing, its refusal is kept, to be reported when the session has ended.
 void Cycle::take_command(std::int64_t t_k_ns) noexcept {
   Command command;
   if (!requests_.commands.take(t_k_ns - state_.first_cycle_ns, command)) return;
   recorder_.entry().command = command;
   const char* refusal = status_.refusal(command.order);
-  state_.awaits_rest = {};  // an order takes back the one before
+  state_.awaits_rest = {};  // an order replaces the one before
   obey(command);
   if (refusal == nullptr && command.order == Order::back_off && supervisor_.phase() != Phase::freeing &&
       !awaits_rest()) {
@@ -95,7 +95,7 @@ void Cycle::obey(const Command& command) noexcept {
   }
 }
 
-// Whoever is pinned doesn't wait for the arm to stand before he is to be released: the order does.
+// A person who is pinned doesn't have to repeat the order: while the arm still moves, the order waits until it stands.
 void Cycle::start_freeing(const Command& command) noexcept {
   if (supervisor_.phase() != Phase::holding || !may_move() || timestep_.under_way()) return;
   state_.wants_resume = false;
@@ -116,7 +116,7 @@ void Cycle::reset() noexcept {
 // ---- parameters and timestep
 
 void Cycle::take_change() noexcept {
-  // The timestep that comes first is the one that it was checked for.
+  // A change that was checked for another timestep waits for the timestep change before it.
   const Change* const due = requests_.changes.due(state_.rendered_ns);
   const bool of_another = due != nullptr && due->period_s != 0.0 && due->period_s != settings_.period_s;
   if (of_another && (timestep_.under_way() || requests_.timesteps.due(state_.rendered_ns) != nullptr)) return;
@@ -124,7 +124,9 @@ void Cycle::take_change() noexcept {
   if (!requests_.changes.take(state_.rendered_ns, change)) return;
   recorder_.entry().change = change;
   timestep_.wait_again();
-  if (change.period_s != 0.0 && change.period_s != settings_.period_s) return;
+  if (change.period_s != 0.0 && change.period_s != settings_.period_s) {
+    return requests_.changes.note_refusal("the timestep that it was checked for wasn't taken");
+  }
   motion_->set(change);
   look_ahead(change.parameter == Parameter::lookahead ? change.value : change.horizon_s);
 }

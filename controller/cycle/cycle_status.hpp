@@ -1,8 +1,8 @@
 // What other threads may know of a running cycle, and the one thing that any of them may ask of it: to stop.
 //
-// Each figure is an atomic of its own, written once per cycle by show(). Two that are read one after the other may be
-// of different cycles; answered_timesteps() alone is written last, so whoever reads it sees the figures of that cycle
-// or of a later one.
+// Each figure is an atomic of its own, written once per cycle by show(). Two figures that are read one after the other
+// may therefore be of different cycles. answered_timesteps() is the exception: it is written last, so whoever reads it
+// first then sees the other figures of that cycle or of a later one.
 #pragma once
 
 #include <atomic>
@@ -13,40 +13,40 @@
 
 namespace proxarm::controller {
 
-// Of one cycle.
+// The figures of one cycle.
 struct ShownCycle {
   Phase phase = Phase::idle;
   double period_s = 0.0;              // T, from this cycle to the next one
   bool changes_timestep = false;      // T is being changed
-  bool pressed = true;                // the enabling input is, or there is none
-  bool cause_lasts = false;           // what the arm is held for is still there
-  bool timesteps_answered = true;     // none of the timesteps that were asked for is under way
-  std::uint32_t asked_timesteps = 0;  // how many were taken from the thread that asks
+  bool pressed = true;                // the enabling input is pressed, or there is none
+  bool cause_lasts = false;           // what the arm is held for still lasts
+  bool timesteps_answered = true;     // no change of the timestep that was asked for is under way
+  std::uint32_t asked_timesteps = 0;  // number taken from the asking thread
 };
 
 class CycleStatus {
  public:
-  // `fixed_timestep`: why this session keeps its timestep, or nullptr: it can be changed.
+  // `fixed_timestep`: why this session keeps its timestep, or nullptr if it can be changed.
   CycleStatus(double period_s, const char* fixed_timestep) noexcept
       : fixed_timestep_(fixed_timestep), period_s_(period_s) {}
 
-  // The cycle's, at its end.
+  // Called by the cycle, at its end.
   void show(const ShownCycle& cycle) noexcept;
 
   // ---- any thread ----
   // Asks for a controlled stop at the next cycle.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] bool stop_requested() const noexcept { return stop_requested_.load(std::memory_order_relaxed); }
-  // Why an order would do nothing now; nullptr: it would do something.
+  // Why an order would do nothing now; nullptr if it would do something.
   [[nodiscard]] const char* refusal(Order order) const noexcept;
-  // This session has one timestep for good.
+  // Whether this session always keeps its timestep.
   [[nodiscard]] bool keeps_timestep() const noexcept { return fixed_timestep_ != nullptr; }
-  // Why the timestep can't be changed now; nullptr: it can.
+  // Why the timestep can't be changed now; nullptr if it can.
   [[nodiscard]] const char* timestep_refusal() const noexcept;
   [[nodiscard]] Phase phase() const noexcept { return phase_.load(std::memory_order_relaxed); }
   [[nodiscard]] double period_s() const noexcept { return period_s_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool changes_timestep() const noexcept { return changes_timestep_.load(std::memory_order_relaxed); }
-  // How many of the timesteps that a thread asked for are over, taken or not.
+  // How many of the timesteps that a thread asked for have been answered, whether they were taken or refused.
   [[nodiscard]] std::uint32_t answered_timesteps() const noexcept {
     return answered_timesteps_.load(std::memory_order_acquire);
   }

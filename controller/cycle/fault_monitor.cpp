@@ -9,7 +9,7 @@ namespace proxarm::controller {
 namespace {
 
 constexpr std::uint32_t late_sample = 16, late_limit = 8 * late_sample;
-// How much faster than its joint an encoder may seem to be; gears that ring make it a little faster.
+// An encoder may seem faster than its joint by this factor. Gears that oscillate make it a little faster.
 constexpr double implausible_speeds = 4.0;
 
 }  // namespace
@@ -17,7 +17,7 @@ constexpr double implausible_speeds = 4.0;
 void FaultMonitor::judge_encoders(const Measured& measured, Phase entered) noexcept {
   judge_joints(measured, entered);
   judge_following(measured, entered);
-  judge_tool(measured.tool_W, entered);
+  judge_tool(measured, entered);
 }
 
 void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcept {
@@ -35,7 +35,7 @@ void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcep
   }
 }
 
-// From when each drive takes setpoints.
+// A drive is judged from when it takes setpoints.
 void FaultMonitor::judge_following(const Measured& measured, Phase entered) noexcept {
   if (!drives_follow_) return;
   const bool judged = entered >= Phase::enabling && entered <= Phase::stopping;
@@ -51,15 +51,16 @@ void FaultMonitor::judge_following(const Measured& measured, Phase entered) noex
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, verdict.joint, verdict.value_rad, verdict.limit_rad);
 }
 
-void FaultMonitor::judge_tool(const models::Vec3& tool_W, Phase entered) noexcept {
+void FaultMonitor::judge_tool(const Measured& measured, Phase entered) noexcept {
   if (!tool_) return;
   if (entered < Phase::rendering || entered > Phase::stopping) return tool_->start();
-  const ToolVerdict verdict = tool_->step(tool_W, settings_.period_s);
+  const ToolVerdict verdict = tool_->step(measured.tool_W, measured.elbow_moved_m, settings_.period_s);
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, -1, verdict.value, verdict.limit);
 }
 
 void FaultMonitor::judge(const JudgedCycle& cycle) noexcept {
-  // After a gap in time drives and sensor have gone silent or stopped, too: the gap is why, and is latched first.
+  // After a gap in the loop's time, drives and sensor have gone silent or stopped, too. The gap is the cause, so its
+  // fault is latched first.
   if (cycle.overruns_in_a_row > settings_.max_overruns) {
     alarm_.raise(Fault::overrun, -1, cycle.overruns_in_a_row, settings_.max_overruns);
   }
@@ -137,7 +138,7 @@ void FaultMonitor::judge_sensor(const JudgedCycle& cycle) noexcept {
   state_.missed_samples = cycle.measured.sample_is_new ? 0 : state_.missed_samples + 1;
   judge_lateness(!cycle.telling && state_.missed_samples >= std::max(1u, most / 3));
   if (state_.missed_samples > most) {
-    // A counter that stands still makes each sample an old one: the sensor is there, and frozen.
+    // If the sensor's counter stands still, each of its samples counts as old: the sensor answers, but is frozen.
     const bool frozen = cycle.sample.repeats > most;
     alarm_.raise(frozen ? Fault::sensor_frozen : Fault::sensor_lost, -1, state_.missed_samples, most);
   }
@@ -155,7 +156,9 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (settings_.max_repeated_samples > 0 && sample.repeats > settings_.max_repeated_samples) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.repeats, settings_.max_repeated_samples);
   }
-  if (settings_.max_repeated_samples > 0 && sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
+  // A gauge at its rail repeats one reading without being stuck: in a hold nobody needs it.
+  if (settings_.max_repeated_samples > 0 && !sample.saturated &&
+      sample.channel_repeats > fieldbus::ChannelWatch::most_repeats) {
     return alarm_.raise(Fault::sensor_frozen, -1, sample.channel_repeats, fieldbus::ChannelWatch::most_repeats);
   }
   const double force_N = measured.hand_W.force.norm();
@@ -165,7 +168,8 @@ void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {
   if (drift_N > bounds_.max_bias_drift_N) alarm_.raise(Fault::sensor_drifts, -1, drift_N, bounds_.max_bias_drift_N);
 }
 
-// A person who is pinned may press a gauge to its rail: what leads to a hold, a hold and backing off do without force.
+// A person who is pinned may drive a strain gauge into saturation. A hold, what leads to it, and backing off don't need
+// the force, so they go on.
 bool FaultMonitor::needs_force(const JudgedCycle& cycle) const noexcept {
   switch (supervisor_.phase()) {
     case Phase::holding:

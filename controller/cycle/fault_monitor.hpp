@@ -1,10 +1,11 @@
 // Judges, cycle by cycle, what came from the devices and when: buses, drives, sensor, enabling input, the loop itself.
 //
-// What is wrong is raised as a fault (fault.hpp); what the arm then does is the supervisor's. What the motion finds out
-// by itself (a leash that is too long, a proxy that isn't finite) isn't judged here.
+// It raises faults (fault.hpp); how the arm reacts is up to the supervisor. What the motion finds out by itself (a
+// leash that is too long, a proxy that isn't finite) isn't judged here.
 //
-// A sample counts as late from a third of max_missed_samples on. Lateness is a score in sixteenths of a sample: each
-// late cycle adds 16, each in time takes 1, and above eight samples, where more than one in 17 is late, it is a fault.
+// A sample counts as late from max_missed_samples/3 cycles without one on. Lateness is scored in sixteenths of a
+// sample: each late cycle adds 16, each other one subtracts 1. The score therefore grows if more than one cycle in 17
+// is late; above eight samples (128) it is a fault.
 //
 // Nothing allocates, locks or throws after construction.
 #pragma once
@@ -31,20 +32,20 @@
 
 namespace proxarm::controller {
 
-// What one cycle has to be judged by.
+// All that a cycle is judged by.
 struct JudgedCycle {
   const Measured& measured;
   const fieldbus::ForceSample& sample;           // the sensor's latest
-  const EnablingInput* enabling = nullptr;       // null: there is none
+  const EnablingInput* enabling = nullptr;       // null if there is none
   std::span<const fieldbus::BusStatus> buses{};  // by their index in the network
   std::uint32_t overruns_in_a_row = 0;
-  bool telling = false;    // SDO answers are on the buses: a drive's own frame may come later by one of theirs
-  bool tared = false;      // the sensor was, so drives that are enabled are enabled anew
-  bool stands = false;     // the arm is to stand still
-  bool backs_off = false;  // where the arm is freed, it goes along a direction that is set
+  bool telling = false;    // SDO answers are on the buses and may delay a drive's TPDO by one frame
+  bool tared = false;      // the sensor has been tared, so this is no first enabling
+  bool stands = false;     // the arm is meant to stand still
+  bool backs_off = false;  // while it is freed, the arm moves in a direction that is set
 };
 
-// Beyond which a reading isn't believed.
+// Readings beyond these bounds aren't believed.
 struct ForceBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;
@@ -52,8 +53,9 @@ struct ForceBounds {
 
 class FaultMonitor {
  public:
-  // `drives_follow` and `tool`: none where drives take torques, so that a hand moves the arm as it likes. All but these
-  // and `bounds` must outlive this; T and what is counted in cycles may change in `settings`.
+  // `drives_follow` and `tool` are nullopt if the drives take torques, since a hand then moves the arm as it likes.
+  // Precondition: all arguments but these two and `bounds` outlive this object. T, and what is counted in cycles, may
+  // change in `settings`.
   FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ForceBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
                std::optional<DriveMonitor> drives_follow = {},
@@ -67,13 +69,13 @@ class FaultMonitor {
         drives_follow_(std::move(drives_follow)),
         standstill_(std::move(standstill)) {}
 
-  // An encoder can't be where its joint can't have come to since it was last heard, nor a drive far from what it was
-  // told. `entered`: the phase of the cycle before; without drives that hold it the arm may be moved by hand, and isn't
-  // judged.
+  // Judges whether an encoder's position can have been reached since its last report, and whether a drive is near what
+  // it was told. `entered`: the phase of the cycle before. In phases in which no drive holds the arm, it may be moved
+  // by hand and isn't judged.
   void judge_encoders(const Measured& measured, Phase entered) noexcept;
   void judge(const JudgedCycle& cycle) noexcept;
 
-  // After a reset: what was wrong before no longer counts. `buses` as in judge().
+  // After a reset, what was wrong before no longer counts. `buses` as in judge().
   void forget(std::span<const fieldbus::BusStatus> buses) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
@@ -85,13 +87,13 @@ class FaultMonitor {
  private:
   struct State {
     std::uint32_t missed_samples = 0;                         // in a row
-    std::uint32_t late_score = 0;                             // see above
-    std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count
+    std::uint32_t late_score = 0;                             // see the file's head
+    std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count as a fault
   };
 
   void judge_joints(const Measured& measured, Phase entered) noexcept;
   void judge_following(const Measured& measured, Phase entered) noexcept;
-  void judge_tool(const models::Vec3& tool_W, Phase entered) noexcept;
+  void judge_tool(const Measured& measured, Phase entered) noexcept;
   void judge_enabling(const EnablingInput* enabling) noexcept;
   void judge_standstill(const JudgedCycle& cycle) noexcept;
   void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;

@@ -1,4 +1,4 @@
-// Whoever is interested in what comes in beside process data.
+// An interface for whoever takes other frames than process data.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace proxarm::controller {
 
-// Takes frames that are neither the sensor's nor a drive's process data; true: it was one of its own.
+// Takes frames that are neither the sensor's nor a drive's process data. Returns true if the frame was meant for it.
 class FrameListener {
  public:
   FrameListener() = default;

@@ -1,4 +1,4 @@
-// The faults of a session that were reset, the latest eight of them.
+// The faults of a session that were reset: the latest eight, and the number of all.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +18,11 @@ class PastFaults {
     kept_[std::min<std::size_t>(count_, kept_.size() - 1)] = report;
     ++count_;
   }
-  // The oldest first.
+  // The latest eight, oldest first.
   [[nodiscard]] std::span<const FaultReport> latest() const noexcept {
     return std::span(kept_).first(std::min<std::size_t>(count_, kept_.size()));
   }
-  // All that there were.
+  // The number of all.
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
 
  private:

@@ -1,8 +1,8 @@
-// What a running cycle is asked for, of one kind: by a script, each at its time, and by another thread through a ring.
+// Requests of one kind to a running cycle: by a script, each at its time, and by another thread through a ring.
 //
-// The script goes first. At most one request is taken per call of take(), so that each has a cycle of its own.
-// schedule() is called before the first cycle, push() by one thread at any time, the rest by the cycle alone, which
-// neither allocates, locks nor waits here.
+// The script goes first. Each call of take() takes at most one request, so that each has a cycle of its own.
+// Precondition: schedule() is called before the first cycle, push() and room() by one thread, and the rest by the cycle
+// alone. The cycle neither allocates, locks nor waits here.
 #pragma once
 
 #include <cstddef>
@@ -21,18 +21,18 @@ class Requests {
  public:
   explicit Requests(std::size_t capacity) : ring_(capacity) {}
 
-  // In the order of their times.
+  // Precondition: `script` is sorted by time.
   void schedule(std::vector<Scheduled<T>> script) { script_ = std::move(script); }
-  // False: too many wait already, and this one is dropped.
+  // Returns false if too many requests are waiting, and drops this one.
   bool push(const T& request) noexcept { return ring_.push(request); }
-  // By whoever pushes: that many pushes succeed.
+  // How many pushes are certain to succeed. To be called by the thread that pushes.
   [[nodiscard]] std::size_t room() noexcept { return ring_.room(); }
 
-  // The request of the script whose time has come; nullptr: none has. It stays until take() takes it.
+  // The script's next request if its time has come, else nullptr. It stays until take() takes it.
   [[nodiscard]] const T* due(std::int64_t now_ns) const noexcept {
     return next_ < script_.size() && script_[next_].at_ns <= now_ns ? &script_[next_].request : nullptr;
   }
-  // The script's request that is due, or else the oldest of the other thread. False: there is none.
+  // Takes the script's request that is due, or else the oldest one of the other thread. Returns false if there is none.
   bool take(std::int64_t now_ns, T& out) noexcept {
     scripted_ = nullptr;
     if (due(now_ns) != nullptr) {
@@ -45,7 +45,7 @@ class Requests {
     ++taken_from_thread_;
     return true;
   }
-  // Why the request that was taken last did nothing, or nullptr; kept for those of the script.
+  // Notes why the request that was taken last did nothing (nullptr: it did). Only the script's refusals are kept.
   void note_refusal(const char* refusal) noexcept {
     if (scripted_ != nullptr) scripted_->refusal = refusal;
   }
@@ -56,8 +56,8 @@ class Requests {
  private:
   SpscRing<T> ring_;
   std::vector<Scheduled<T>> script_;
-  std::size_t next_ = 0;              // of the script
-  Scheduled<T>* scripted_ = nullptr;  // the one that was taken last, if it is of the script
+  std::size_t next_ = 0;              // index of the script's next request
+  Scheduled<T>* scripted_ = nullptr;  // the request taken last, if it is of the script
   std::uint32_t taken_from_thread_ = 0;
 };
 

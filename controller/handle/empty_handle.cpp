@@ -9,23 +9,24 @@ namespace {
 using models::Vec3;
 
 constexpr double filter_s = 0.015;
-// Of σ_f: 8 in one of three axes come once in 1e15 samples.
+// In multiples of σ_f (noise) and of σ/√n (tare). One of three axes exceeds 8 σ_f once in 1e15 samples.
 constexpr double noise_deviations = 8.0, tare_deviations = 4.0;
-// How long a hand may need no force: at speed in a narrow band, at rest in the wide one.
+// For how long, or how far, a hand may need no force: while it moves, in the narrow band; at rest, in the wide one.
 constexpr double calm_way_m = 0.02, shortest_calm_s = 0.06;
 constexpr double quiet_way_m = 0.04, shortest_quiet_s = 0.5;
 constexpr double longest_s = 1.5;
 constexpr double leaving = 1.5;
-// For so long the handle may ring from an acceleration of the arm (its first mode, 15 Hz, twice).
+// After an acceleration of the arm the handle may oscillate for two periods of its first mode (15 Hz).
 constexpr double ringing_s = 0.1;
-// 4 m/s² stop 0.45 m/s within 5 cm; a handle of 0.25 kg then reads 1 N. They come within 0.05 s, so that a hand that
-// was taken for none feels a pull, not a jerk.
+// At 4 m/s² the proxy stops from 0.45 m/s within 5 cm, and a handle of 0.25 kg reads 1 N. The braking force rises
+// within 0.05 s, so that a hand which was taken for absent feels a pull, not a jerk.
 constexpr double braking_m_per_s2 = 4.0, braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
-// Of a force that led the handle: what the tool behind the sensor does as the arm is braked, and its gears ring.
+// As a share of the force that led the handle: what the tool behind the sensor adds while the arm is braked and its
+// gears oscillate.
 constexpr double led_share = 0.2;
-// How fast that force is followed meanwhile.
+// While the handle is empty, that force is followed with this time constant and at most at this rate.
 constexpr double followed_s = 0.1, followed_N_per_s = 2.0;
-// Below 0.1 mm/s for half a second: what the arm does by itself is over.
+// The arm's own motion is over when it has been slower than 0.1 mm/s for half a second.
 constexpr double rest_m_per_s = 1e-4, rest_time_s = 0.5;
 
 }  // namespace
@@ -35,14 +36,15 @@ EmptyHandle::EmptyHandle(const EmptyHandleConfig& config, double period_s) noexc
 
 void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
 
-// A torque counts as the force that would make it at the lever.
+// The size of the hand's wrench. A torque counts as the force that would make it at the lever.
 double EmptyHandle::size_N() const noexcept {
   const double force_N = (state_.wrench_W.force - state_.bias_W).norm();
   if (!(config_.lever_m > 0.0)) return force_N;
   return std::max(force_N, state_.wrench_W.torque.norm() / config_.lever_m);
 }
 
-// A bias that led the handle is still there, and goes on; the sensor's, that the cycle keeps, takes it over.
+// A bias that led the handle is still there and keeps drifting, so it is followed here until the sensor's bias, which
+// the cycle tracks, has taken it over.
 void EmptyHandle::follow() noexcept {
   State& s = state_;
   if (!s.led) return;
@@ -65,7 +67,8 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   const double sigma_f = signs.noise_N * std::sqrt(std::min(1.0, signs.sample_cycles * T / (2.0 * filter_s)));
   const double sigma_mean = signs.tare_samples > 0.0 ? signs.noise_N / std::sqrt(signs.tare_samples) : 0.0;
   double noise_band = noise_deviations * sigma_f + tare_deviations * sigma_mean;
-  // Somebody moved the handle during the tare, or the sensor filters by itself: how much of this is noise isn't known.
+  // Somebody moved the handle during the tare, or the sensor filters its samples. How much of σ is noise isn't known
+  // then.
   if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
   const double band = std::max(config_.band_N, noise_band);
   follow();
@@ -82,7 +85,7 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
       way_.start();
     }
   } else {
-    // What was noise during the tare may have been a hand's motion: then nothing is known of it.
+    // What looked like noise during the tare may have been a hand's motion, so nothing is known of the noise.
     const double noise_N = signs.noise_is_white ? signs.noise_N : 0.0;
     s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, noise_N, T});
     if (s.led) s.bias_W = way_.line_W();

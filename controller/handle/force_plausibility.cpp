@@ -7,20 +7,20 @@ namespace {
 
 using models::Vec3;
 
-// Below that speed the proxy rests: a hand that holds still trembles as fast.
+// The proxy rests below this speed; a hand that holds still trembles as fast.
 constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
 constexpr double least_growth = 1.45, least_last_growth = 1.6, least_damped_growth = 1.6, most_growth = 2.1;
 constexpr double least_time = 0.78, most_time = 1.05;
-// A hundred times the noise of a usual sensor: below, ratios of forces say little.
+// A hundred times the noise of a usual sensor. Ratios of smaller forces say little.
 constexpr double least_force_N = 2.0;
 
-// Of the straight line.
+// For the straight line:
 constexpr double near_m = 1e-3, far_m = 1e-2;
-// It is looked at every 30 samples: looked at each time, a good line would be given up by chance now and then.
+// The line is tested every 30 samples. If it were tested at each one, chance would reject a good line now and then.
 constexpr double looks = 30.0, deviations = 3.0;
-// Of the jump. A fifth: the tool behind the sensor rings as the arm starts.
+// For the jump. The share of a fifth allows for the tool behind the sensor, which oscillates as the arm starts.
 constexpr double jump_s = 0.03, jump_share = 0.2, jump_noises = 20.0;
 constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.15, speed_gain = 1.5;
 
@@ -30,7 +30,7 @@ bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noe
   const State& s = state_;
   if (last < doublings || s.force_N[last] < least_force_N) return false;
   for (std::size_t i = last + 1 - doublings; i <= last; ++i) {
-    // λ of M λ² + B λ = F/x.
+    // λ solves M λ² + B λ = F/x.
     const double M = now.mass_kg, B = now.damping_Ns_per_m;
     const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
     const double lambda = (std::sqrt(B * B + 4.0 * M * stiffness) - B) / (2.0 * M);
@@ -68,7 +68,7 @@ void StraightForce::add(const ForceAndMotion& now) noexcept {
   state_.fit.add(now.force_W, now.period_s);
 }
 
-// What the force was 30 ms after the handle was empty, it is still to a fifth.
+// Whether the force is still, to within a fifth, what it was 30 ms after the handle was empty.
 bool StraightForce::jumped(const ForceAndMotion& now, bool empty, double noise_N) noexcept {
   State& s = state_;
   if (empty) {
@@ -93,7 +93,7 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
   }
   s.judged = s.judged && now.free;
   if (jumped(now, empty, noise_N)) return true;
-  // While it is empty the bias follows, which bends the line.
+  // While the handle is empty, the bias is followed, which bends the line.
   if (!s.judged || empty) {
     s.fit.n = 0.0;
     return false;

@@ -1,25 +1,30 @@
-// Forces that no hand makes, told by the motion that follows them.
+// Detects forces that no hand makes, by the motion that follows them.
 //
-// ReversedForce: the sensor's sign, its mounting (turned by half a turn) or a joint's direction is wrong. A hand holds
-// the handle by a stiffness; where the arm moves the wrong way that pushes it on, M ẍ + B ẋ = +K x: from rest force and
-// distance grow as e^λt, together. So each time the proxy has gone twice as far from where it rested (0.5, 1, 2 … 64
-// mm), for four doublings in a row
-//   the force has grown by a factor of 1.45 to 2.1  (2 for e^λt, less for a bias on top; 2^(n/(n+2)) for a hand's force
-//     that begins as tⁿ: 1.26 as it begins to accelerate the arm, and less later; more for one that the arm yields to).
-//     The last of the four 1.6: as a bias counts less and less it comes near 2, and a hand that sets out without a jerk
-//     (n = 3) stays at 1.52
-//     Where damping takes most of the force (B > M λ, as the passivity damping can) 1.6: such a hand's is 2^(n/(n+1)),
-//     1.41 for n = 1 and 1.59 for n = 2. Behind some 800 Ns/m a force that is the wrong way round isn't told from it
-//   the doubling has taken 0.78 to 1.05 of ln 2/λ, with λ > 0 of M λ² + B λ = F/x   (1 for e^λt)
-// Measured with grips of 150 to 1500 N/m: factors 1.50 to 1.99, times 0.82 to 0.99; of hands of a hundred random
-// sessions none has both.
+// ReversedForce: the sensor's sign, its mounting (turned by 180 degrees) or a joint's direction is wrong. A hand holds
+// the handle like a spring of stiffness K. If the arm moves the wrong way, this spring drives it on: M ẍ + B ẋ = +K x,
+// so that from rest both force and distance grow as e^λt. The motion is judged each time the distance from the place of
+// rest has doubled (0.5, 1, 2 … 64 mm). The force is reversed if four doublings in a row satisfy both conditions:
 //
-// StraightForce: nobody held the handle, and now its force leads the arm away along a straight line in time, as a
-// sensor's bias does that drifts or has jumped. A hand's force bends as the handle moves. Straight: what is left in the
-// noisiest axis beside the straight line has the variance that the noise had during the tare, to within three standard
-// deviations of such an estimate, for 10 mm, at a force of 30 standard deviations of the noise (10, where it stays
-// constant to 15 %). Or it has jumped: 30 ms after the handle was empty it is there, and keeps to a fifth for 10 mm. A
-// hand needs 50 ms and more, and yields.
+//   1. The force has grown by a factor of 1.45 to 2.1, and in the last of the four by at least 1.6. For e^λt the factor
+//      is 2; a bias on top of the force makes it less, but counts less and less. A hand whose force begins as tⁿ makes
+//      2^(n/(n+2)): 1.26 for n = 1, when it begins to accelerate the arm, and less later; 1.52 for n = 3, when it sets
+//      out without a jerk. A force to which the arm yields makes more.
+//      Where damping takes most of the force (B > M λ, as the passivity damping can), the least factor is 1.6, since
+//      such a hand makes 2^(n/(n+1)): 1.41 for n = 1 and 1.59 for n = 2. Above some 800 Ns/m a reversed force can't be
+//      told from a hand's.
+//   2. The doubling has taken 0.78 to 1.05 of ln 2/λ (1 for e^λt), where λ > 0 solves M λ² + B λ = F/x.
+//
+// Measured for reversed forces, with grips of 150 to 1500 N/m: factors of 1.50 to 1.99 and times of 0.82 to 0.99. Among
+// a hundred random sessions no hand satisfies both conditions.
+//
+// StraightForce: nobody held the handle, and then a force leads the arm away that is a straight line in time, as a
+// sensor's bias makes that drifts or has jumped. A hand's force bends as the handle moves. Two signs are judged:
+//   straight   The residuals about the line, in the noisiest axis, have the variance that the noise had during the
+//              tare, to within three standard deviations of that estimate, over a distance of 10 mm. The force is at
+//              least 30 standard deviations of the noise. (10, if it is constant to 15 % and the speed has grown by
+//              half.)
+//   a jump     The force is there 30 ms after the handle was empty, and stays the same to a fifth for 10 mm. A hand
+//              needs 50 ms or more to build up its force, and it yields.
 #pragma once
 
 #include <array>
@@ -30,32 +35,32 @@
 
 namespace proxarm::controller {
 
-// The hand's force as it is measured, and the proxy that it moved in the step before.
+// The hand's force as it is measured, and the proxy after the last step.
 struct ForceAndMotion {
   const models::Vec3& force_W;
   const models::Vec3& q_W;
   const models::Vec3& v_W;
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;
   double period_s = 0.0;
-  bool free = true;  // nothing is touched
+  bool free = true;  // the proxy touches nothing
 };
 
 class ReversedForce {
  public:
   void start() noexcept { state_ = {}; }
-  // True: this force is the wrong way round.
+  // Returns true if the force is reversed.
   bool step(const ForceAndMotion& now) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
 
  private:
   static constexpr std::size_t marks = 8;
   struct State {
-    models::Vec3 rest_W = models::Vec3::Zero();  // where the proxy rested
-    std::array<double, marks> force_N{};         // when it was 0.5 mm · 2^i from there
-    std::array<double, marks> time_s{};          // since it rested
-    double passed = 0.0;                         // marks so far
+    models::Vec3 rest_W = models::Vec3::Zero();  // where the proxy rested last
+    std::array<double, marks> force_N{};         // at the distance 0.5 mm · 2^i from rest_W
+    std::array<double, marks> time_s{};          // from rest to that distance
+    double passed = 0.0;                         // number of marks passed so far
     double since_s = 0.0;
-    bool judged = false;  // it rested, and has touched nothing since
+    bool judged = false;  // the proxy has rested, and has touched nothing since
   };
   [[nodiscard]] bool grows(std::size_t last, const ForceAndMotion& now) const noexcept;
 
@@ -65,18 +70,19 @@ class ReversedForce {
 class StraightForce {
  public:
   void start() noexcept { state_ = {}; }
-  // `empty`: nobody holds the handle; noise_N: of a sample, per axis. True: no hand makes this force.
+  // `empty`: nobody holds the handle. noise_N: the standard deviation of a sample, per axis. Returns true if no hand
+  // makes this force.
   bool step(const ForceAndMotion& now, bool empty, double noise_N) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
 
  private:
   struct State {
-    models::Vec3 rest_W = models::Vec3::Zero();  // where the empty handle was last
+    models::Vec3 rest_W = models::Vec3::Zero();  // where the handle was empty last
     LineFit fit;
     double first_speed_m_per_s = 0.0;
-    models::Vec3 jump_W = models::Vec3::Zero();  // the force soon after the handle was empty
-    double left_s = 0.0;                         // since then
-    bool keeps = false;                          // it is that still
+    models::Vec3 jump_W = models::Vec3::Zero();  // the force 30 ms after the handle was empty
+    double left_s = 0.0;                         // time since the handle was empty
+    bool keeps = false;                          // the force is still jump_W to within a fifth
     bool judged = false;
   };
   [[nodiscard]] bool jumped(const ForceAndMotion& now, bool empty, double noise_N) noexcept;

@@ -1,4 +1,4 @@
-// The straight line in time through a force, by least squares in each axis of W:  h = a + b t.
+// Fits a straight line in time to a force, h = a + b t, by least squares in each axis of W.
 #pragma once
 
 #include <cmath>
@@ -7,9 +7,9 @@
 
 namespace proxarm::controller {
 
-// The samples since the line began, as sums; plain, to be archived with what it belongs to. Empty: n = 0.
+// The sums over the samples since the line began. A plain struct, archived with its owner. Empty: n = 0.
 struct LineFit {
-  models::Vec3 first_W = models::Vec3::Zero();  // the force with which the line begins; all sums are less it
+  models::Vec3 first_W = models::Vec3::Zero();  // the first force; subtracted in all sums
   models::Vec3 h = models::Vec3::Zero(), th = models::Vec3::Zero(), hh = models::Vec3::Zero();
   double n = 0.0, t = 0.0, tt = 0.0;
 
@@ -26,15 +26,15 @@ struct LineFit {
   }
 };
 
-// Of three samples and more, which came once in period_s.
+// The line's figures. Precondition: at least three samples, one every period_s.
 struct FittedLine {
   models::Vec3 end_W;        // the line at the last sample
-  models::Vec3 risen_W;      // since the first
-  models::Vec3 variance_N2;  // of the samples beside it
-  double deviation = 0.0;    // standard deviation of these variances, in parts of them
+  models::Vec3 risen_W;      // the line's rise since the first sample
+  models::Vec3 variance_N2;  // of the residuals
+  double deviation = 0.0;    // relative standard deviation of this estimate of the variance
 };
 
-// b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,  what is left: (Σhh − a Σh − b Σth)/(n − 2).
+// b = (n Σth − Σt Σh)/(n Σtt − (Σt)²),  a = (Σh − b Σt)/n,  residual variance: (Σhh − a Σh − b Σth)/(n − 2).
 inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
   const models::Vec3 b = (s.n * s.th - s.t * s.h) / (s.n * s.tt - s.t * s.t);
   const models::Vec3 a = (s.h - b * s.t) / s.n;
@@ -45,8 +45,8 @@ inline FittedLine fitted(const LineFit& s, double period_s) noexcept {
           .deviation = std::sqrt(2.0 / (s.n - 2.0))};
 }
 
-// The samples leave the line by more than noise of this standard deviation does, to within so many standard deviations
-// of the variance's estimate, and by more than `swing_N` beside it. What isn't a number bends.
+// Whether the residuals exceed noise of the standard deviation `noise_N`, to within `deviations` standard deviations of
+// the variance's estimate, and a motion of `swing_N` besides. A variance that is NaN counts as bent.
 inline bool bends(const FittedLine& line, double noise_N, double deviations, double swing_N = 0.0) noexcept {
   return !(line.variance_N2.maxCoeff() <= noise_N * noise_N * (1.0 + deviations * line.deviation) + swing_N * swing_N);
 }

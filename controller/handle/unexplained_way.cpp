@@ -8,13 +8,14 @@ namespace {
 
 using models::Vec3;
 
-// Twice this, and what it takes to brake, are within the 5 cm that an arm may go with nobody at the handle.
+// An arm with nobody at the handle may move 5 cm: twice this distance, and the braking distance.
 constexpr double longest_way_m = 0.02;
-// Looked at each time, a good line would be given up by chance now and then.
+// The line is tested every 10 samples. If it were tested at each one, chance would reject a good line now and then.
 constexpr double looks = 10.0, deviations = 4.0;
-// Of the force. A hand of 100 N/m changes by 2 N on the way allowed; the tool's swing is 6 % at first and dies out.
+// As a share of the force. A hand of 100 N/m changes its force by 2 N over the allowed distance; the oscillation of the
+// tool behind the sensor is 6 % of the force at first and decays.
 constexpr double share = 0.02;
-// Of a sensor that says nothing of its noise.
+// The noise that is assumed if the sensor's isn't known.
 constexpr double least_noise_N = 0.005;
 constexpr double rest_m_per_s = 0.01, seen_s = 0.02;
 constexpr double small_N = 1.5, same_share = 0.2, accelerated_share = 0.5, long_s = 1.0;

@@ -1,18 +1,21 @@
-// How far a force has led the handle without showing that it is a hand's.
+// How far a force has led the handle without any sign of being a hand's.
 //
-// A hand is an impedance: what it does changes with the motion that it makes, and it trembles. A sensor's bias doesn't
-// know of the motion: it stays what it is, or goes along a straight line in time. So the force is held against the
-// straight line through it since it was last seen to bend (least squares, in each axis of W). It bends where the
-// variance beside the line is more than
+// A hand is an impedance: its force changes with the motion that it makes, and it trembles. A sensor's bias doesn't
+// depend on the motion: it is constant, or a straight line in time. So the force is compared with a straight line
+// (least squares, in each axis of W), fitted to all samples since the force last bent. It bends if the residual
+// variance is more than
 //   σ² (1 + d √(2/(n − 2))) + (s F)²
-// with σ the sensor's noise, n the samples, d the deviations of such an estimate that chance is granted, and s F a
-// share of the force for the tool behind the sensor, which swings as the arm starts. Nobody leads a handle that has
-// gone 20 mm along a force that hasn't bent on that way, and
-//   began from rest (v₀ ≤ 10 mm/s, and what the force makes of the mass until its begin is seen), and is less than
-//     1.5 N or stays the same to a fifth: a bias that drifts or has jumped
-//   or has led it for a second, and accelerated it by half of what it would in free space at least
-// A hand that is in motion is straight for a tenth of a second now and then, and one without tremor that begins to pull
-// is for half a second, with some newtons.
+// σ is the sensor's noise, n the number of samples, d the number of standard deviations of that estimate that are left
+// to chance, and s F a share of the force for the tool behind the sensor, which oscillates as the arm starts. Nobody
+// leads the handle if the force hasn't bent while the handle moved 20 mm, and either of these holds:
+//
+//   - The line began at rest (v₀ ≤ 10 mm/s plus what the force adds to the speed until its beginning is seen), and the
+//     force is less than 1.5 N: a bias that drifts or has jumped.
+//   - The force has accelerated the proxy by at least half as much as in free space. Besides, the line began at rest
+//     and changed by at most a fifth (a bias that has jumped), or it has lasted for a second.
+//
+// A moving hand's force is straight for a tenth of a second now and then. That of a hand without tremor which begins to
+// pull is straight for half a second, at some newtons.
 //
 // Neither allocates, locks nor throws.
 #pragma once
@@ -23,9 +26,9 @@
 
 namespace proxarm::controller {
 
-// Of one cycle in which somebody may hold the handle.
+// The force and motion of one cycle in which somebody may hold the handle.
 struct LedHandle {
-  const models::Vec3& force_W;  // as it is read, bias and tool weight taken off
+  const models::Vec3& force_W;  // without bias and tool weight
   const models::Vec3& v_W;      // of the proxy
   double mass_kg = 0.0;
   double noise_N = 0.0;  // σ
@@ -35,7 +38,8 @@ struct LedHandle {
 class UnexplainedWay {
  public:
   void start() noexcept { state_ = {}; }
-  // Each such cycle. True: no hand led it here. Then line_W() is what is read without one.
+  // To be called in each such cycle. Returns true if no hand led the handle here; line_W() is then the force that is
+  // read without a hand.
   bool step(const LedHandle& now) noexcept;
   [[nodiscard]] const models::Vec3& line_W() const noexcept { return line_W_; }
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
@@ -43,14 +47,14 @@ class UnexplainedWay {
  private:
   struct State {
     LineFit fit;
-    models::Vec3 way_W = models::Vec3::Zero();      // gone since the line began
-    models::Vec3 first_v_W = models::Vec3::Zero();  // when the line began
+    models::Vec3 way_W = models::Vec3::Zero();      // moved since the line began
+    models::Vec3 first_v_W = models::Vec3::Zero();  // the velocity when the line began
   };
   void add(const LedHandle& now) noexcept;
   [[nodiscard]] bool leads(const LedHandle& now, const FittedLine& line) const noexcept;
 
   State state_;
-  models::Vec3 line_W_ = models::Vec3::Zero();  // the line's end when it was last looked at
+  models::Vec3 line_W_ = models::Vec3::Zero();  // the line's end when it was last tested
 };
 
 }  // namespace proxarm::controller

@@ -2,12 +2,12 @@
 //
 //   min ½‖x − y‖²   over   n_i·x ≤ b_i,  ‖x − c_j‖ ≤ r_j
 //
-// is decided by at most N of the sets, the active ones:
+// The solution is determined by at most N of the sets, the active ones:
 //   y − x = Σ λ_i g_i,  λ_i ≥ 0,  g_i: outward unit normal of set i at x
-// They are found by an active-set method, as linear programs of low dimension are solved (Sharir and Welzl 1992). The
-// set that the present point is furthest outside of joins the active ones. Of these at most N + 1 candidates, every
-// choice of at most N that includes the new one is tried (7 in space), and one of them is optimal for all. Each
-// exchange increases the distance from y, so no active set comes twice.
+// They are found by an active-set method, in the way that linear programs of low dimension are solved (Sharir and Welzl
+// 1992). The set that the present point violates most joins the active ones. Of these at most N + 1 candidates, every
+// subset of at most N that includes the new one is tried (7 in space), and one of them is optimal for all candidates.
+// Each exchange increases the distance from y, so no active set occurs twice.
 //
 // All lengths in m. Nothing allocates, locks or throws.
 #pragma once
@@ -46,7 +46,7 @@ class LimitSets {
     flat_count_ = plane_count_;
   }
 
-  // Walls, which nearest() takes for half-spaces as well: −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
+  // Walls, which nearest() treats as half-spaces, too: −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
   static constexpr std::size_t most_walls = 6;
   void clear_walls() noexcept { flat_count_ = plane_count_; }
   void add_wall(const V& point, const V& normal) noexcept {
@@ -66,21 +66,21 @@ class LimitSets {
     return true;
   }
 
-  // A point of the sets, and what decides it.
+  // A point of the sets, and the sets that determine it.
   struct Nearest {
     Nearest() noexcept { basis.fill(V::Zero()); }
 
     V x = V::Zero();
     std::array<std::size_t, N> members{};  // the active sets: index as in violation()
     std::array<V, N> basis;                // orthonormal; spans their normals at x
-    std::size_t count = 0;                 // of both
+    std::size_t count = 0;                 // of members and basis
     double bend = 0.0;                     // Σ λ_j/r_j over the active balls
-    V shift = V::Zero();                   // −Σ λ_i g_i over the limits among them, not the walls
-    bool exact = false;                    // false: what Dykstra's algorithm left, without members
+    V shift = V::Zero();                   // −Σ λ_i g_i over the active limits, walls left out
+    bool exact = false;                    // false: the result of Dykstra's algorithm, without members
     ActiveLimits active;
 
-    // ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j), from y − x = Σ λ_i g_i with the active sets kept: along the sets'
-    // common surface each ball's normal turns by 1/r_j.
+    // ∂x/∂y v = (E − Σ e eᵀ) v / (1 + Σ λ_j/r_j). This follows from y − x = Σ λ_i g_i with the active sets kept: along
+    // their common surface, each ball's normal turns by 1/r_j per unit of length.
     [[nodiscard]] V derivative(const V& v) const noexcept {
       V along = v;
       for (std::size_t i = 0; i < count; ++i) along -= basis[i].dot(v) * basis[i];
@@ -88,8 +88,8 @@ class LimitSets {
     }
   };
 
-  // The sets' point nearest to y. Where no choice of active sets is found, because the sets have no point in common or
-  // nearly none, Dykstra's algorithm gives the point, in at most `sweeps` sweeps; those that it makes are subtracted.
+  // The sets' point nearest to y. If no choice of active sets is found, because the sets have no point in common or
+  // nearly none, Dykstra's algorithm computes the point in at most `sweeps` sweeps; those made are subtracted.
   [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) const noexcept {
     Nearest result;
     result.exact = decide(y, with_soft, result);
@@ -100,11 +100,11 @@ class LimitSets {
     return result;
   }
 
-  // Draws x back into the sets, along the straight line to where braking leads (to q₁, where that is in them). For an x
-  // that the alternation of contacts and limits, or Dykstra's algorithm, left outside.
+  // Moves x back into the sets along the straight line to the point that braking leads to (or to q₁, if that is in the
+  // sets). For an x that the alternation of contacts and limits, or Dykstra's algorithm, has left outside.
   [[nodiscard]] V draw_back(const V& x, bool with_soft) const noexcept {
     V base = V::Zero();
-    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, acceleration's, decides
+    for (std::size_t i = 0; i < hard_count_; ++i) {  // the last ball, that of the acceleration, determines the point
       const double off = (base - hard_[i].centre).norm();
       if (off > hard_[i].radius_m) base = hard_[i].centre + hard_[i].radius_m / off * (base - hard_[i].centre);
     }
@@ -121,8 +121,8 @@ class LimitSets {
 
  private:
   static constexpr double sweep_tolerance_m = 1e-13;
-  static constexpr int most_exchanges = 60;  // of active sets; some 3 are common
-  static constexpr double parallel = 1e-12;  // sine of the angle between normals that make no corner
+  static constexpr int most_exchanges = 60;  // of active sets; about 3 are usual
+  static constexpr double parallel = 1e-12;  // sine of the angle below which normals count as parallel
 
   // Sets by number: planes, hard balls, soft balls.
   [[nodiscard]] std::size_t size(bool with_soft) const noexcept {
@@ -162,8 +162,8 @@ class LimitSets {
     return false;
   }
 
-  // The point nearest to y of the sets that were active before and of `added`, which is active now. The smallest
-  // choices are tried first.
+  // The point nearest to y of the sets that were active before and of `added`, which is active now. Small subsets are
+  // tried first.
   bool exchange(const V& y, const Nearest& before, std::size_t added, Nearest& result) const noexcept {
     for (std::size_t others = 0; others < N && others <= before.count; ++others) {
       for (unsigned choice = 0; choice < 1u << before.count; ++choice) {
@@ -184,8 +184,8 @@ class LimitSets {
     return false;
   }
 
-  // The point nearest to y on the borders of all of result.members. False where there is none, or where it isn't the
-  // nearest point of the sets themselves (some λ < 0).
+  // The point nearest to y on the borders of all of result.members. False if there is none, or if it isn't the nearest
+  // point of the sets themselves (some λ < 0).
   bool nearest_of_all(const V& y, Nearest& result) const noexcept {
     // Two spheres meet in the plane of a circle: all balls but the first are replaced by such planes.
     std::array<V, N> e;
@@ -221,7 +221,7 @@ class LimitSets {
       return x;
     };
     result.x = onto_flats(y);
-    V outwards = V::Zero();  // of the sphere, for one of no radius
+    V outwards = V::Zero();  // the normal of a sphere whose radius is zero
     if (sphere != nullptr) {
       const V centre = onto_flats(sphere->centre);
       const double left2 = sphere->radius_m * sphere->radius_m - (centre - sphere->centre).squaredNorm();
@@ -234,8 +234,7 @@ class LimitSets {
     return presses(y, outwards, result);
   }
 
-  // Gram-Schmidt: n·x = b without the part that the equations e_k·x = offset_k before it contain. False where nothing
-  // is left.
+  // Gram-Schmidt: n·x = b less the part that the former equations e_k·x = offset_k imply. False if nothing is left.
   static bool orthogonal(V& normal, double& bound, const std::array<V, N>& e, const std::array<double, N>& offset,
                          std::size_t count) noexcept {
     for (std::size_t k = 0; k < count; ++k) {
@@ -250,7 +249,7 @@ class LimitSets {
     return true;
   }
 
-  // y − x = Σ λ_i g_i by a QR decomposition of the g_i; false where a λ_i is negative.
+  // Solves y − x = Σ λ_i g_i by a QR decomposition of the g_i. False if a λ_i is negative.
   bool presses(const V& y, const V& outwards, Nearest& result) const noexcept {
     std::array<std::array<double, N>, N> R{};
     std::array<double, N> lambda{};
@@ -288,9 +287,9 @@ class LimitSets {
     }
   }
 
-  // The projection by Dykstra's algorithm of alternating projections. The hard balls come last, so that a result which
-  // hasn't converged yet satisfies those. `active`: the sets whose force isn't zero. `sweeps`: how many sweeps may
-  // still be made; those made are subtracted.
+  // The projection by Dykstra's algorithm of alternating projections (Boyle and Dykstra 1986). The hard balls come
+  // last, so that a result which hasn't converged satisfies at least those. `active`: the sets whose force isn't zero.
+  // `sweeps`: how many sweeps may still be made; those made are subtracted.
   V project(V x, bool with_soft, ActiveLimits& active, int& sweeps) const noexcept {
     std::array<V, 2> soft{}, hard{};
     std::array<double, StepLimits::max_planes> pushed{};  // along the planes' normals, ≥ 0
@@ -330,7 +329,7 @@ class LimitSets {
   static bool inside(const LimitBall<N>& ball, const V& x, double tolerance_m) noexcept {
     return (x - ball.centre).norm() <= ball.radius_m + tolerance_m;
   }
-  // The largest t ≤ 1 for which base + t d is in the ball, with base in it: ‖base − c + t d‖² = r².
+  // The largest t ≤ 1 for which base + t d is in the ball: ‖base − c + t d‖² = r². Precondition: base is in the ball.
   static double way_within(const LimitBall<N>& ball, const V& base, const V& d) noexcept {
     const V from = base - ball.centre;
     const double a = d.squaredNorm(), b = from.dot(d);
@@ -341,7 +340,7 @@ class LimitSets {
   static void note(const LimitBall<N>& ball, const V& correction, ActiveLimits& active) noexcept {
     if (correction != V::Zero()) active.set(ball.limit);
   }
-  // A ball's intersection with the scene's line or plane through q₁; a point where the ball doesn't reach it.
+  // A ball's intersection with the scene's line or plane through q₁; a point if the ball doesn't reach it.
   static LimitBall<N> cut(const LimitBall<3>& ball, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     const V centre = basis.transpose() * ball.centre;
     const double off2 = (ball.centre - basis * centre).squaredNorm();

@@ -1,19 +1,21 @@
-// A 𝒢 that keeps within a step's limits: q(k) minimises ‖q − p̂‖ over contacts ∩ limits.
+// A 𝒢 that keeps a step's limits: q(k) minimises ‖q − p̂‖ over contacts ∩ limits.
 //
-// Two maps are to agree. The contacts answer a force λ of the limits with their own force, friction included. The
-// limits project the point that the contacts' force leads to (P):
-//   r = 𝒢(κ, p̂ + λ/κ, q₁),   l = P(r − λ/κ),   to be found: λ with r = l
+// Two maps have to agree. The contacts answer a force λ of the limits with their own force, friction included. The
+// limits project (P) the point that the contacts' force leads to. To be found is the λ with r = l:
+//   r = 𝒢(κ, p̂ + λ/κ, q₁),   l = P(r − λ/κ)
 // λ = κ (l − (r − λ/κ)) is then in the limits' normal cone at r. A normal cone doesn't depend on κ, and neither does 𝒢
-// (Assumption 1), so the whole doesn't. A step counts as solved only where r = l holds within rounding, whichever of
-// these methods finds it:
-//   free      nothing touches: λ/κ = P(p̂) − p̂
-//   joined    contacts as half-spaces among the limits, friction held: exact at once without friction on flat surfaces
-//   Newton    semismooth, on r(λ) − l(λ), with differences of 𝒢 and the active limits as derivative: friction, media
-//   in turn   λ/κ ← l − (r − λ/κ), block Gauss-Seidel, from where the others start again now and then
-// Where contacts and limits have no point in common, the contacts give way: q is the limits' point that is nearest to
-// what the contacts allow. Where the limits alone have none, the soft ones (leash, power) give way.
+// (Assumption 1), so the combined map doesn't. A step counts as solved only if r = l holds within rounding, whichever
+// of these methods finds it:
+//   free      without contact: λ/κ = P(p̂) − p̂
+//   joined    contacts become half-spaces among the limits, with friction held: exact at once on flat surfaces without
+//             friction
+//   Newton    semismooth Newton (Qi and Sun 1993) on r(λ) − l(λ), with finite differences of 𝒢 and the active limits as
+//             its derivative: for friction and media
+//   in turn   block Gauss-Seidel, λ/κ ← l − (r − λ/κ), from which the others are restarted now and then
+// If contacts and limits have no point in common, the contacts give way: q is the limits' point nearest to what the
+// contacts allow. If the limits alone have no point in common, the soft ones (leash, power) give way.
 //
-// A step that no limit touches is the 𝒢's own to the bit. Neither allocates, locks nor throws.
+// A step that no limit touches is that of the 𝒢 itself, to the bit. Neither allocates, locks nor throws.
 #pragma once
 
 #include <array>
@@ -24,7 +26,7 @@
 
 namespace proxarm::controller {
 
-// Contacts with a limit have this number as their object; whoever counts contacts with the scene skips it.
+// The object number of contacts with a limit; code that counts contacts with the scene skips it.
 inline constexpr std::int32_t limit_object = -2;
 
 template <int N>
@@ -32,11 +34,11 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
  public:
   using V = models::Vec<N>;
 
-  // `inner` must outlive this.
+  // Precondition: `inner` outlives this object.
   explicit LimitedAlgorithm(models::GeometricAlgorithm<N>& inner) : inner_(&inner) {}
 
-  // Called before each step, with the sets around q₁ = q(k−1). That is the true q(k−1), although a step of order 2 may
-  // start from another point.
+  // Precondition: called before each step, with the sets around q₁ = q(k−1). That is the true q(k−1), although a step
+  // of order 2 may start from another point.
   void set_limits(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis, const V& q_k1) noexcept;
 
   V operator()(double K, const V& p, const V& q) noexcept override;
@@ -47,7 +49,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
     return {contacts_.data(), count_};
   }
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return inner_->unresolved_steps(); }
-  // True for the contacts' squeezing alone: a proxy that a limit leaves inside of an object shows in active().
+  // True only if contacts squeeze the proxy. A proxy that a limit leaves inside of an object shows in active().
   [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
 
   // λ/κ of the last call: the limits' force on the proxy is κ times this.
@@ -57,11 +59,11 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
 
  private:
   static constexpr int most_turns = 300;
-  static constexpr int few_joins = 3, most_joins = 10;  // with friction; without, one is enough
-  static constexpr int most_jumps = 6;                  // where Newton gets there, two or three do
-  static constexpr int most_sweeps = 3000;              // of a step in all, some 50 ns each
+  static constexpr int few_joins = 3, most_joins = 10;  // with friction; without, one suffices
+  static constexpr int most_jumps = 6;                  // if Newton converges, it takes two or three
+  static constexpr int most_sweeps = 3000;              // per step in all, some 50 ns each
   static constexpr double tolerance_m = 1e-11;          // of r − l: 10 nm/s at 1 kHz
-  static constexpr double nudge_m = 1e-9;  // of p: 𝒢, rounded to some 1e-16 m, differs by that to seven digits
+  static constexpr double nudge_m = 1e-9;  // of p; 𝒢's rounding of 1e-16 m leaves differences seven digits
 
   struct Step {
     double K;
@@ -69,7 +71,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
     bool with_soft = true;
     int sweeps = most_sweeps;
   };
-  // Where the limits' shift of p leads.
+  // A trial: the limits' shift of p, and where it leads.
   struct Try {
     V shift, r;
     typename LimitSets<N>::Nearest l;  // relative to q₁
@@ -86,23 +88,24 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
 
   V solve(double K, const V& p, const V& q, const V& free) noexcept;
 
-  // A flat contact without friction is a half-space, as limits are: the solution is then the projection onto both.
+  // A flat contact without friction is a half-space, as limits are, so the solution is the projection onto both.
   // Friction is held as it was at the last r, and curved surfaces are replaced by their tangent planes there.
   enum class Joined : std::uint8_t { settled, unsettled, apart };  // apart: the two have no point in common
   Joined join(Step& step, Try& now, int most) noexcept;
 
-  // The part of a contact force that the contacts' normals don't span: friction.
+  // The part of a contact force that isn't in the span of the contacts' normals: friction.
   [[nodiscard]] V across_contacts(V force) const noexcept;
 
   // Semismooth Newton on r = l, with differences of 𝒢 and the projector of the active limits as derivatives:
-  //   F(s) = r(s) − P(r(s) − s) = o,   dF = [(E − P′) R + P′] ds,   R = ∂r/∂s
-  // The active limits and contacts are determined anew at each iterate. False where that doesn't converge.
+  //   F(s) = r(s) − P(r(s) − s) = 0,   dF = [(E − P′) R + P′] ds,   R = ∂r/∂s
+  // The active limits and contacts are determined anew at each iterate. False if it doesn't converge.
   bool jump(Step& step, Try& now) noexcept;
 
   V take(const Try& solution) noexcept;
 
-  // The result where r = l has no solution. If the free space is convex, the straight way from q₁, which is in both, to
-  // what the contacts allow passes through no object. Where q₁ is outside of the limits, the contacts give way.
+  // The result if r = l has no solution. q₁ is in both sets, so if the free space is convex, the straight line from q₁
+  // to the point that the contacts allow passes through no object. If q₁ is outside of the limits, the contacts give
+  // way.
   V give_way(Step& step, const Try& last) noexcept;
 
   void gather_contacts() noexcept;
@@ -118,7 +121,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
   std::size_t count_ = 0;
 };
 
-// For the dimensions of scenes; anything else isn't needed.
+// Instantiated for the dimensions of scenes; no others are needed.
 extern template class LimitedAlgorithm<1>;
 extern template class LimitedAlgorithm<2>;
 extern template class LimitedAlgorithm<3>;

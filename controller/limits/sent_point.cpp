@@ -11,7 +11,7 @@ using models::Vec3;
 namespace {
 
 constexpr double tolerance_m = 1e-11;  // 10 nm/s at 1 kHz, as in limited_algorithm.hpp
-constexpr int most_sweeps = 300;       // of Dykstra's algorithm, where the sets have hardly a point in common
+constexpr int most_sweeps = 300;       // of Dykstra's algorithm, if the sets have hardly a point in common
 
 }  // namespace
 
@@ -76,14 +76,14 @@ void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits&
   state_.c_k1_W += way;
 }
 
-// So that it has come to q_W at this velocity: 2/ω behind it.
+// Starts the filter as if it had come to q_W at this velocity: 2/ω behind it.
 void SentPoint::start_filter(const Vec3& q_W, const Vec3& velocity_W) noexcept {
   state_.v_W = velocity_W;
   state_.x_W = q_W;
   if (omega_rad_per_s_ > 0.0) state_.x_W -= 2.0 / omega_rad_per_s_ * velocity_W;
 }
 
-// As ElasticSetpoint::step() has it for the links' angles.
+// As in ElasticSetpoint::step(), which filters the links' angles.
 void SentPoint::filter(const Vec3& q_W) noexcept {
   if (!(omega_rad_per_s_ > 0.0)) return;
   const double omega = omega_rad_per_s_, T = period_s_;

@@ -1,17 +1,17 @@
-// The point that the arm is sent to, where that isn't the proxy itself but where the proxy is going to be (lookahead).
+// The point that the arm is sent to with lookahead: not the proxy itself, but where the proxy is going to be.
 //
 //   p(k)    where the proxy will be a horizon H after q(k), if it coasts there (rendering/lookahead.hpp)
 //   c(k) = the point of the limits' sets around c(k−1) that is nearest to p(k) + o(k)
 //
 // Nothing in c jumps:
-// - H goes to the wanted horizon by at most `horizon_rate` seconds per second: at the speed v, that moves c by no more
-//   than that share of v.
-// - Damping and spring act within H, so p would jump when one of them, or the mass that they act on, changes. o takes
-//   that up: in the cycle of the change c goes on with its last velocity, and what p is beside it fades with
-//   `fading_s`.
-// - c follows p as fast as the sets allow; p is made anew in each cycle, so nothing winds up.
-// The proxy keeps within the same limits as without lookahead. Their acceleration is that of a commanded point, behind
-// the setpoints' filter, so here the proxy has such a filter of its own: x, v of step_limits.hpp, as if the arm were
+//   - H moves to the wanted horizon at `horizon_rate` seconds per second at most. At the speed v this moves c by no
+//     more than that share of v.
+//   - Damping and spring act within H, so p would jump when one of them, or the mass, changes. The offset o compensates
+//     for this: in the cycle of the change c goes on with its last velocity, and its offset from p then fades with
+//     `fading_s`.
+//   - c follows p as fast as the sets allow. p is computed anew in each cycle, so nothing winds up.
+// The proxy keeps the same limits as without lookahead. The limit of acceleration is one of a commanded point behind
+// the setpoints' filter, so the proxy has such a filter of its own here (x, v of step_limits.hpp), as if the arm were
 // sent to the proxy.
 //
 // All in W. Nothing allocates, locks or throws.
@@ -28,27 +28,27 @@ namespace proxarm::controller {
 
 class SentPoint {
  public:
-  // A hundredth of the tool's speed is what a hand doesn't feel; 8 ms take 0.8 s.
+  // A hand doesn't feel a hundredth of the tool's speed. A change by 8 ms takes 0.8 s.
   static constexpr double horizon_rate = 0.01;
-  // Three of the setpoint filter's time constants at 10 Hz: the filter doesn't feel what fades more slowly.
+  // Three time constants of a setpoints' filter of 10 Hz, so that the filter hardly reacts to the fading.
   static constexpr double fading_s = 0.05;
 
   SentPoint(const description::CellLimits& limits, double horizon_s, double period_s);
 
   void set_period(double period_s) noexcept;
-  // Finite, ≥ 0; anything else changes nothing.
+  // Precondition: finite and ≥ 0; anything else changes nothing.
   void want(double horizon_s) noexcept;
-  // A parameter that p depends on changes with the next step.
+  // A parameter that p depends on changes with the next step, so o takes up the difference.
   void take_up_change() noexcept { state_.changes = true; }
 
-  // At rest at q_W; the horizon stays.
+  // Starts at rest at q_W; the horizon stays.
   void start(const models::Vec3& q_W) noexcept;
-  // The arm couldn't follow: goes on from c_W with this velocity. Returns where the proxy is then, which is `ahead_s`
-  // behind.
+  // The arm couldn't follow: c goes on from c_W with this velocity. Returns the proxy's position then, which is
+  // `ahead_s` behind.
   [[nodiscard]] models::Vec3 resume(const models::Vec3& c_W, const models::Vec3& velocity_W, double ahead_s) noexcept;
-  // One period of H, before the proxy's step.
+  // Advances H by one period. Precondition: called before the proxy's step.
   void advance_horizon() noexcept;
-  // The proxy has taken its step to q_W, which the scene leads to predicted_W; `limits` are the sets around c(k−1).
+  // The proxy has stepped to q_W, and the scene leads it to predicted_W. `limits`: the sets around c(k−1).
   void step(const models::Vec3& q_W, const models::Vec3& predicted_W, const StepLimits& limits) noexcept;
 
   [[nodiscard]] double horizon_s() const noexcept { return state_.horizon_s; }
@@ -57,7 +57,7 @@ class SentPoint {
   // x and v of the proxy's own filter.
   [[nodiscard]] const models::Vec3& filtered_W() const noexcept { return state_.x_W; }
   [[nodiscard]] const models::Vec3& filtered_velocity_W() const noexcept { return state_.v_W; }
-  // What held c back in the last step.
+  // The limits that were active in the last step.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -68,7 +68,7 @@ class SentPoint {
  private:
   struct State {
     models::Vec3 c_k1_W = models::Vec3::Zero(), c_k2_W = models::Vec3::Zero();
-    models::Vec3 beside_W = models::Vec3::Zero();  // o
+    models::Vec3 beside_W = models::Vec3::Zero();  // the offset o
     models::Vec3 x_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();
     double horizon_s = 0.0, wanted_s = 0.0;
     bool changes = false;

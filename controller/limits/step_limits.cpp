@@ -15,12 +15,13 @@ using models::Vec3;
 
 namespace {
 
-// As of joints_per_m(): what a joint turns more than that bound near a singularity, the inverse kinematics stops.
+// The damping of joints_per_m(). Near a singularity it bounds the joints' motion; what they would turn beyond, the
+// inverse kinematics limits.
 constexpr double damping_m_per_rad = 1e-3;
 // The share of a joint's speed that the tool's translation may use; the rest is for its rotation and the gears' twist.
 constexpr double speed_share = 0.95;
-// The share of the tool's speed that is commanded: elastic gears add some 7 % where the hand pulls the arm along at the
-// limit.
+// The share of the tool's speed limit that is commanded. Elastic gears add some 7 % when the hand pulls the arm along
+// at the limit.
 constexpr double commanded_share = 0.9;
 
 void add_plane(StepLimits& out, const LimitPlane<3>& plane) noexcept {
@@ -120,7 +121,7 @@ void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexc
 void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out) const noexcept {
   const double T = period_s_;
   const double share = T / (T + limits_.max_tool_speed_m_per_s / limits_.max_tool_acceleration_m_per_s2);
-  // A point that is outside already may not go further out.
+  // A point that is already outside may not go further out.
   const auto room = [&](double d) { return borders == Borders::walls ? d : std::max(0.0, share * d); };
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -170,7 +171,7 @@ void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& tw
   }
 }
 
-// The same for the tool's translation alone, which is all that torques render: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
+// The same for the tool's translation alone, as torques render it: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
 void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
                                   StepLimits& out) const noexcept {
   models::Mat3 A = J_W.topRows<3>().lazyProduct(J_W.topRows<3>().transpose());

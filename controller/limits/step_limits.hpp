@@ -1,26 +1,26 @@
-// What the proxy may do in one step, as convex sets around where it is: safety as geometry.
+// The limits of one step of the proxy, as convex sets around its position: safety as geometry.
 //
 //   ball        ‖q − c‖ ≤ r       speed, acceleration, power, leash
 //   half-space  n·(q − q₁) ≤ b    workspace, keep-out zones, joint ranges, joint speeds
 //
 // The proxy's next position is the point of contacts ∩ sets that is nearest to p̂, found in one solve
-// (limited_algorithm.hpp). Where not all can be satisfied, they give way in this order: friction, contact, leash and
+// (limited_algorithm.hpp). If not all can be satisfied, they give way in this order: friction, contact, leash and
 // power. Ranges, speeds and the acceleration never do. The limited q becomes q(k−1), so nothing winds up behind a
 // limit.
 //
 // - Speed: ‖q − q₁‖ ≤ vT, with v the smaller of limits.max_tool_speed_m_per_s and max_power_W/‖h‖. The latter bounds
 //   the power that the arm gives to or takes from the hand.
-// - Acceleration, of the commanded point, that is behind the filter of the setpoints (elastic_setpoint.hpp), whose
-//   state is x, v: ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A wall met slower than a·e/ω (0.34 m/s with the
-//   default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
-// - Borders at distance d: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border falls with the distance, slowly
-//   enough that braking straight along the present velocity satisfies all borders at once: with u ≤ d/(T + v/a) and
-//   deceleration a, (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so what is commanded keeps within convex
-//   borders too.
-// - A keep-out box acts as the half-space of the face that is furthest from being crossed. The commanded point lags
-//   behind by 2v/ω (some millimetres) and may cut the box's corners by that: boxes need that much room around them.
+// - Acceleration: it is that of the commanded point, behind the filter of the setpoints (elastic_setpoint.hpp) with the
+//   state x, v: ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A wall that is met more slowly than a·e/ω (e = 2.718…;
+//   0.34 m/s with the default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
+// - Borders at distance d: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border decreases with the distance, slowly
+//   enough that braking straight along the present velocity satisfies all borders at once: from u ≤ d/(T + v/a) and a
+//   deceleration of a follows (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so the commanded point keeps
+//   convex borders, too.
+// - A keep-out box acts as the half-space of the face that is furthest from being crossed. The commanded point lags by
+//   2v/ω (some millimetres) and may cut the box's corners by that much, so boxes need that much room around them.
 // - Joints: with G = ∂(joint angles)/∂(tool position), orientation held, joint i moves by G_i·(q − q₁). Near a
-//   singularity G_i grows along the direction that is being lost, and the tool slows down along that direction alone.
+//   singularity G_i grows along the direction that is being lost, and the tool slows down in that direction alone.
 #pragma once
 
 #include <array>
@@ -47,14 +47,14 @@ enum class Limit : std::uint16_t {
   joint_acceleration = 1u << 6,
   speed = 1u << 7,
   acceleration = 1u << 8,
-  singularity = 1u << 9,       // inverse kinematics stopped short
-  following_error = 1u << 10,  // a drive doesn't follow: its setpoint waits for it
-  joint_torque = 1u << 11,     // impedance type: what is rendered is cut
-  // Setpoints that the last guard has changed (controller/setpoints/tool_guard.hpp), whatever was wanted above:
+  singularity = 1u << 9,       // inverse kinematics didn't converge
+  following_error = 1u << 10,  // a drive doesn't follow, and its setpoint waits for it
+  joint_torque = 1u << 11,     // impedance type: the rendered force is reduced
+  // Changes that the last guard has made to setpoints (controller/setpoints/tool_guard.hpp):
   guard_speed = 1u << 12,         // of the tool
   guard_elbow = 1u << 13,         // speed of elbow or wrist
   guard_border = 1u << 14,        // workspace or keep-out zones
-  guard_acceleration = 1u << 15,  // of the tool or the elbow, while they get faster
+  guard_acceleration = 1u << 15,  // of tool or elbow, while they get faster
 };
 
 inline constexpr std::array all_limits{
@@ -63,13 +63,13 @@ inline constexpr std::array all_limits{
     Limit::acceleration, Limit::singularity, Limit::following_error,    Limit::joint_torque,
     Limit::guard_speed,  Limit::guard_elbow, Limit::guard_border,       Limit::guard_acceleration};
 
-// The parameter that holds a limit: "limits.leash_m", "drives[].range_rad".
+// The parameter that sets a limit: "limits.leash_m", "drives[].range_rad".
 const char* limit_parameter(Limit limit) noexcept;
 
-// What was active in a cycle.
+// The limits that were active in a cycle.
 struct ActiveLimits {
-  std::uint16_t kinds = 0;  // Limit
-  std::uint8_t axes = 0;    // joints whose own limits were, as bits
+  std::uint16_t kinds = 0;  // bits of Limit
+  std::uint8_t axes = 0;    // joints whose own limits were active, as bits
 
   void set(Limit limit, std::uint8_t axis_bits = 0) noexcept {
     kinds = static_cast<std::uint16_t>(kinds | static_cast<std::uint16_t>(limit));
@@ -95,12 +95,12 @@ struct LimitPlane {
   double bound_m = 0.0;
   Limit limit = Limit::workspace;
   std::uint8_t axis_bits = 0;
-  double share = 0.0;  // of a way towards it by which the bound of the step after it falls; of a speed, none
+  double share = 0.0;  // share of a step towards it by which its bound shrinks for the next step; 0 for a speed
 };
 
 struct StepLimits {
   static constexpr std::size_t max_planes = 40;
-  std::array<LimitBall<3>, 2> soft{};  // leash, power: may be given up
+  std::array<LimitBall<3>, 2> soft{};  // leash, power: these may give way
   std::size_t soft_count = 0;
   std::array<LimitPlane<3>, max_planes> planes{};
   std::size_t plane_count = 0;
@@ -113,8 +113,8 @@ struct StepStart {
   models::Vec3 q_k1_W = models::Vec3::Zero(), q_k2_W = models::Vec3::Zero();
   models::Vec3 filtered_W = models::Vec3::Zero(), filtered_velocity_W = models::Vec3::Zero();  // x, v above
   models::Vec3 measured_W = models::Vec3::Zero();
-  double force_N = 0.0;                                                // of the hand
-  double max_speed_m_per_s = std::numeric_limits<double>::infinity();  // of the tool, where lower than the cell's
+  double force_N = 0.0;                                                // the hand's
+  double max_speed_m_per_s = std::numeric_limits<double>::infinity();  // the tool's, if lower than the cell's
 };
 
 class StepLimiter {
@@ -123,15 +123,16 @@ class StepLimiter {
               double period_s);
 
   void set_period(double period_s) noexcept { period_s_ = period_s; }
-  // The sets of one step. `joint_rad`: angles of the links at q₁; `twist_rad`: by how much each motor is ahead of its
-  // link; `J_W`: of T at joint_rad. Neither allocates nor throws.
+  // Makes the sets of one step. `joint_rad`: angles of the links at q₁; `twist_rad`: by how much each motor is ahead of
+  // its link; `J_W`: of T at joint_rad. Neither allocates nor throws.
   void make(const StepStart& start, const models::JointVector& joint_rad, const models::JointVector& twist_rad,
             const models::Jacobian& J_W, StepLimits& out) const noexcept;
-  // The sets around the point that the arm is sent to, where that isn't the proxy (sent_point.hpp): `start` has it as
-  // q_k1_W and q_k2_W. The planes of the joints are those of `of_proxy`, which make() has made for the same angles.
+  // Makes the sets around the point that the arm is sent to, if that isn't the proxy (sent_point.hpp); `start` holds it
+  // as q_k1_W and q_k2_W. Precondition: make() has made `of_proxy` for the same angles; the planes of the joints are
+  // taken from it.
   void make_sent(const StepStart& start, const StepLimits& of_proxy, StepLimits& out) const noexcept;
-  // For the impedance type: the borders alone, as walls for a proxy whose tool is at q_W. The tool isn't slowed down
-  // ahead of them; one that is pushed through a border is pushed back.
+  // Impedance type: makes only the borders, as walls for a proxy whose tool is at q_W. They don't slow the tool before
+  // them, but push it back if it is pushed through.
   void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,
                   StepLimits& out) const noexcept;
 

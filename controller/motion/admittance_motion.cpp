@@ -10,18 +10,18 @@ using models::Vec3;
 
 namespace {
 
-// The leash is a set that steps are solved for, to 1e-9 m and better.
+// Each step keeps the proxy within the leash's set, to 1e-9 m or better; this margin is well above that.
 constexpr double leash_tolerance_m = 1e-6;
-// By which the tool's speed limit goes down and up, at most a quarter of the acceleration that the cell allows: so that
-// the sets of speed and acceleration always have points in common.
+// The tool's speed limit changes by at most this deceleration or acceleration, and by at most a quarter of the
+// acceleration that the cell allows. The sets of speed and of acceleration therefore always have points in common.
 constexpr double speed_limit_m_per_s2 = 1.0;
-// The hand's force that shows where to back off to, where nothing was touched.
+// If nothing was touched, the hand's force shows the direction to back off in; it must exceed this.
 constexpr double pinning_force_N = 5.0;
-// Of the tool's speed, what is wanted at most: as the proxy's (step_limits.cpp).
+// The largest share of the tool's speed limit that is commanded: the same as for the proxy (step_limits.cpp).
 constexpr double commanded_share = 0.9;
-// A two-hundred-and-fiftieth of a step that is cut is some micrometres.
+// 2⁻⁸ of a step that is shortened is some micrometres.
 constexpr int bisections = 8;
-// Where a torque turns the tool, it shows a hand as the force does that makes it at a handle's length.
+// A torque that turns the tool counts as the force that makes it at this lever, the length of a handle.
 constexpr double torque_lever_m = 0.1;
 
 Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
@@ -100,7 +100,8 @@ void AdmittanceMotion::start_guards(const JointVector& target_rad) noexcept {
   envelope_.start(target_rad);
 }
 
-// From each joint's last speed, in the time that the slowest of them needs at its own deceleration.
+// Every joint decelerates from its last speed in the same time: the longest that any joint needs at its own
+// deceleration.
 void AdmittanceMotion::start_run_out() noexcept {
   double stop_s = period_s_;
   for (Eigen::Index i = 0; i < guard_.speed_rad_per_s().size(); ++i) {
@@ -134,7 +135,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   tool_guard_.set_period(period_s);
 }
 
-// What the prediction makes of another mass, damping or spring is another point: the arm comes to it slowly.
+// With another mass, damping or spring the prediction yields another point, to which the arm moves slowly.
 void AdmittanceMotion::set(const Change& change) noexcept {
   parts_.world->set(change);
   if (!sent_) return;
@@ -198,7 +199,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   return true;
 }
 
-// The sets of this step, around the proxy and what is commanded behind the filter of the setpoints.
+// Makes the sets that limit this step: around the proxy, and around the motion commanded behind the setpoints' filter.
 void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
   limit_speed(cycle);
   arm_.kinematics(parts_.elastic.link_rad(), filtered_);
@@ -219,30 +220,31 @@ void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
   if (sent_) make_sent_limits(sent);
 }
 
-// Around the point that the arm is sent to. The proxy's acceleration is held against a filter of its own, this one's
-// against the arm's.
+// Makes the sets around the point that the arm is sent to. The arm's acceleration limits this point; the proxy's
+// acceleration is limited against a filter of its own.
 void AdmittanceMotion::make_sent_limits(StepStart start) noexcept {
   start.q_k1_W = sent_->c_k1_W();
   start.q_k2_W = sent_->c_k2_W();
   limiter_.make_sent(start, step_limits_, sent_limits_);
 }
 
-// The point that the arm is sent to: where the proxy comes to if it coasts. With the hand's force held it would come
-// ½H²h/M further; the hand's own mass, which the sensor sees at the handle, feeds just that back, so the arm's elastic
-// modes stay calm up to half as long a horizon only (docs/design.md has the figures).
+// The arm is sent to the point where the proxy would be after the horizon H if it coasted. If the hand's force h were
+// held meanwhile, the proxy would be ½H²h/M further. That term is left out, because the sensor at the handle also
+// measures the inertia of the hand's own mass, which the term would feed back: the arm's elastic modes would then stay
+// calm only up to half as long a horizon (docs/design.md has the figures).
 void AdmittanceMotion::send_ahead() noexcept {
   sent_->advance_horizon();
   sent_->step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), sent_limits_);
   active_.add(sent_->active());
 }
 
-// The arm is at c_W and goes on from there: so does the proxy, which is behind it by what it looks ahead.
+// The arm goes on from c_W. So does the proxy, which is behind c_W by the distance that is looked ahead.
 void AdmittanceMotion::go_on_from(const Vec3& c_W, const Vec3& velocity_W) noexcept {
   const Vec3 q_W = sent_ ? sent_->resume(c_W, velocity_W, ahead_s()) : c_W;
   state_.q_k2_W = state_.q_k1_W = world().resume(q_W, velocity_W);
 }
 
-// The tool's speed limit of this cycle. Where it stands, a lower one holds at once.
+// Moves the tool's speed limit towards the one wanted in this cycle. While the tool stands, a lower one holds at once.
 void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   const double most = limits_.max_tool_speed_m_per_s;
   double wanted = cycle.slowed ? std::min(supervision_.slow_speed_m_per_s, most) : most;
@@ -254,7 +256,7 @@ void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   cycle.record.set(RecordFlag::slowed, !state_.freeing && limit < most);
 }
 
-// A larger share of the hand's force from cycle to cycle, over ramp_in_s.
+// Raises the share of the hand's force that reaches the proxy linearly from 0 to 1 over ramp_in_s.
 void AdmittanceMotion::let_force_in(CycleRecord& record) noexcept {
   if (state_.force_share >= 1.0) return;
   const double ramp_s = supervision_.ramp_in_s;
@@ -262,7 +264,7 @@ void AdmittanceMotion::let_force_in(CycleRecord& record) noexcept {
   record.set(RecordFlag::ramp_in, state_.force_share < 1.0);
 }
 
-// The hand's, as far as it is let in; where nobody is, what brakes the proxy.
+// The hand's wrench times the share that is let in; a braking force if nobody holds the handle.
 models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   const models::Wrench hand_W{state_.force_share * measured.hand_W.force, state_.force_share * measured.hand_W.torque};
@@ -284,7 +286,7 @@ models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexc
   return {empty_handle_->braking_force_W(state_.mass_kg, v_W), Vec3::Zero()};
 }
 
-// Whether a hand can have made this force, by the motion that it made.
+// Judges whether a hand can have made this force, given the motion that followed.
 void AdmittanceMotion::judge_force(const MotionCycle& cycle, const Vec3& v_W, bool empty) noexcept {
   const SensorBias& bias = cycle.measured.bias;
   const ForceAndMotion now{.force_W = cycle.measured.hand_W.force,
@@ -318,13 +320,14 @@ void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& reco
 
 // ---- getting free
 
-// What of a force can move the tool: the plane or line of an arm with few axes carries the rest.
+// The part of a force that can move the tool. In an arm with few axes, which moves in a plane or along a line, the
+// structure carries the rest.
 Vec3 AdmittanceMotion::moving_force_W(const Vec3& force_W) const noexcept {
   const models::ToolSpace& space = parts_.inverse.space();
   return space.dimensions == 3 ? force_W : Vec3(space.projection() * force_W);
 }
 
-// Away from what was touched last; where nothing was, to where the hand pushes.
+// The tool backs off from the object touched last, or in the direction of the hand's push if nothing was touched.
 bool AdmittanceMotion::prepare_freeing(const Command& command, const Measured& measured) noexcept {
   if (command.order == Order::release) {
     parts_.release->start_release();
@@ -367,8 +370,8 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 
 // ---- from the proxy to the setpoints
 
-// Where the arm can't go all the way to the proxy's pose (a singularity, the end of its reach), the proxy stays where
-// the arm is.
+// If the arm can't reach the proxy's pose (because of a singularity, or at the end of its reach), the proxy is set back
+// to where the arm gets.
 void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   models::Pose X_WT = models::Pose::Identity();
   X_WT.translation() = sent_W();
@@ -389,10 +392,11 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   move_motors(parts_.elastic.step(state_.link_rad), cycle.measured);
 }
 
-// Where inverse kinematics stops short, its step is the joints' largest, from one cycle to the next and to any side:
-// the tool would go by millimetres. The step is drawn back, towards what braking all joints together would make of the
-// last one, until joints accelerate no more than half of what they may (the rest is for the gears' twist) and the tool
-// goes no further than the proxy would have gone, and a period's acceleration.
+// If inverse kinematics doesn't converge, its step may be as large as the joints' speeds allow and may change direction
+// from cycle to cycle, so the tool would jump by millimetres. The step is therefore interpolated towards the one that
+// brakes all joints together, until two bounds hold. Each joint uses at most half of its acceleration (the rest is left
+// for the twist of the gears). The tool goes no further than to the point that the arm is sent to, plus what the tool's
+// acceleration allows in a period.
 void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& reached_k1_W) noexcept {
   const double T = period_s_;
   const JointVector& step_k1 = state_.link_step_rad;
@@ -400,7 +404,7 @@ void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& 
   for (Eigen::Index i = 0; i < most_change.size(); ++i) {
     most_change[i] = 0.5 * drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2 * T * T;
   }
-  const double cycles = step_k1.cwiseAbs().cwiseQuotient(most_change).maxCoeff();  // until it rests
+  const double cycles = step_k1.cwiseAbs().cwiseQuotient(most_change).maxCoeff();  // periods until all joints rest
   const JointVector brakes = cycles > 1.0 ? JointVector(link_k1_rad + (1.0 - 1.0 / cycles) * step_k1) : link_k1_rad;
   const JointVector way = solution_.q - brakes;
   double too_far = 1.0;
@@ -437,18 +441,19 @@ void AdmittanceMotion::move_motors(const JointVector& motor_rad, const Measured&
   if (held_back || blocked != 0 || guard_.lag_rad() > limits_.following_error_rad) wind_back(blocked);
 }
 
-// The joints whose drives are blocked, as bits. Such a drive is told to go a little further than it is, not more, and
-// all the others wait with it: so little is wound up that nothing snaps when it comes free. What a drive that follows
-// is behind grows with its speed: its setpoint is on the way to it and back.
+// Returns the joints whose drives are blocked, as bits. A blocked drive is commanded at most a little ahead of its
+// reported position, and all other joints wait. The gears are thus wound up so little that nothing snaps when the drive
+// comes free. The room around the report grows with speed, because a drive that follows its setpoint reports it with a
+// lag: the setpoint on its way to the drive, and the answer on its way back.
 //
-// What a drive reports never leads its setpoint anywhere. With θ the report, r the room around it, w what is wanted and
-// [l, h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp), it is told
-//   c = clamp(w, θ − r, θ + r), but within [min(l, w), max(h, w)]
-// θ is between l and h for a joint that has jammed, so that its setpoint brakes and comes back to it: c = θ ± r. Where
-// θ is anywhere else, since the encoder or the drive lies, c is w or a place where the joint has been sent before.
-// Nobody at the handle: w is the last setpoint, for proxy and filter go on from that, and so l = h = w = c stands,
-// whatever θ does. Somebody at the handle: c goes no further than w, which the hand made. So no sequence of reports
-// moves the arm by more than it has come within the lag, and without a hand by nothing.
+// A false report must not lead the setpoint anywhere. Let θ be the report, r the room around it, w the wanted setpoint
+// and [l, h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp). The command is
+//     c = clamp(clamp(w, θ − r, θ + r), min(l, w), max(h, w))
+// If the joint has jammed, θ is between l and h, so c = θ ± r: the setpoint brakes and comes back to the joint. If θ is
+// outside, the encoder or the drive reports a false position, and c is w or a place to which the joint was sent before.
+// If nobody is at the handle, proxy and filter go on from the last setpoint, which is therefore w; so l = h = w = c
+// stays constant, whatever θ does. If somebody is, c goes no further than w, which the hand has made. No sequence of
+// reports therefore moves the arm by more than it has moved within the lag, and without a hand none moves it at all.
 std::uint8_t AdmittanceMotion::find_blocked(const JointVector& motor_rad, const Measured& measured,
                                             JointVector& wanted_rad) noexcept {
   std::uint8_t blocked = 0;
@@ -473,7 +478,7 @@ std::uint8_t AdmittanceMotion::find_blocked(const JointVector& motor_rad, const 
   return blocked;
 }
 
-// Of a blocked joint the envelope stays what it was.
+// The envelope of a blocked joint isn't updated.
 void AdmittanceMotion::follow_setpoints(const Measured& measured, std::uint8_t blocked) noexcept {
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
     if ((blocked & 1u << i) != 0) continue;
@@ -482,8 +487,8 @@ void AdmittanceMotion::follow_setpoints(const Measured& measured, std::uint8_t b
   }
 }
 
-// The last word on what the drives are told, in whatever phase: each joint's limits, then the tool's and the elbow's.
-// True: the latter held something back.
+// The one place where setpoints become final, in every phase. Each joint's limits are applied first, then those of the
+// tool and of the elbow. Returns true if the latter held something back.
 bool AdmittanceMotion::make_final(const JointVector& wanted_rad, double max_speed_m_per_s) noexcept {
   active_.add(guard_.step(wanted_rad));
   const ActiveLimits held_back = tool_guard_.step(guard_.target_rad(), max_speed_m_per_s);
@@ -493,8 +498,8 @@ bool AdmittanceMotion::make_final(const JointVector& wanted_rad, double max_spee
   return true;
 }
 
-// Filter and proxy go on from what was commanded: nothing of what couldn't be followed is caught up later. A blocked
-// joint's setpoint may have been fast, and comes to rest where it was told to.
+// Filter and proxy go on from what was commanded, so motion that couldn't be followed isn't caught up later. The
+// setpoint of a blocked joint may have moved fast; that joint goes on at rest.
 void AdmittanceMotion::wind_back(std::uint8_t blocked) noexcept {
   const JointVector& speed = guard_.speed_rad_per_s();
   guard_.follow_from_here(blocked);

@@ -1,14 +1,14 @@
-// The admittance type: the hand's force moves a proxy, and the arm's motors follow it.
+// Motion of the admittance type: the hand's force moves a proxy, and the arm's motors follow it.
 //
 //   force ─▶ proxy (26) in the scene, within limits ─▶ inverse kinematics ─▶ elastic gears ─▶ guards ─▶ setpoints
 //             ▲                                                                                  │
 //             └────────── wind_back(): from what was commanded, where it couldn't be followed ───┘
 //
-// With lookahead, inverse kinematics gets the point where the proxy is going to be instead (sent_point.hpp); proxy,
-// record and reports stay what they are.
+// With lookahead, inverse kinematics gets a predicted position of the proxy instead of the present one
+// (sent_point.hpp). Records and reports still tell of the proxy itself.
 //
-// Each of these has a history of its own; this class alone starts them, winds them back and gives them another T, and
-// always all together. make_final() is the one place where setpoints become final.
+// Each of these stages has a history of its own. Only this class starts them, winds them back and changes their T, and
+// it does so to all of them together. make_final() is the one place where setpoints become final.
 #pragma once
 
 #include <cstdint>
@@ -68,21 +68,21 @@ class AdmittanceMotion final : public Motion {
   void archive(fieldbus::StateArchive& state) noexcept override;
 
  private:
-  // Between cycles; the history of proxy, filter and guard is in theirs.
+  // What lasts from cycle to cycle. The histories of proxy, filter and guards are in their own objects.
   struct State {
     models::Vec3 q_k1_W = models::Vec3::Zero();         // the proxy of the last cycle
     models::Vec3 q_k2_W = models::Vec3::Zero();         // and of the one before
-    models::JointVector link_rad;                       // of the links for q_k1: inverse kinematics goes on from there
-    models::JointVector link_step_rad;                  // by which they went in the last period
-    models::JointVector run_out_rad_per_s;              // of each joint, when the run-out began
-    double run_out_share = 1.0;                         // of it that is left
-    double run_out_per_cycle = 1.0;                     // by which that shrinks
-    double force_share = 1.0;                           // of the hand's force that is let in
-    double speed_limit_m_per_s = 0.0;                   // of the tool
-    models::Vec3 last_normal_W = models::Vec3::Zero();  // of the last contact; zero: there was none
-    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // of the proxy's last step
-    bool touches = false;                               // it did
-    bool freeing = false;                               // it moves without the scene
+    models::JointVector link_rad;                       // of the links, for q_k1; inverse kinematics starts from here
+    models::JointVector link_step_rad;                  // the links' last step
+    models::JointVector run_out_rad_per_s;              // each joint's speed when the run-out began
+    double run_out_share = 1.0;                         // the share of that speed that is left
+    double run_out_per_cycle = 1.0;                     // by which the share shrinks in each cycle
+    double force_share = 1.0;                           // the share of the hand's force that is let in
+    double speed_limit_m_per_s = 0.0;                   // the tool's present speed limit
+    models::Vec3 last_normal_W = models::Vec3::Zero();  // the normal of the last contact; zero: there was none
+    double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // those of the proxy's last step
+    bool touches = false;                               // the proxy's last step ended in contact
+    bool freeing = false;                               // the tool is being freed: it moves without the scene
   };
 
   [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
@@ -90,7 +90,7 @@ class AdmittanceMotion final : public Motion {
   void make_sent_limits(StepStart start) noexcept;
   void send_ahead() noexcept;
   [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
-  // The horizon; none while the arm gets free, where nobody feels a mass.
+  // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
   void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
@@ -116,22 +116,22 @@ class AdmittanceMotion final : public Motion {
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
   double period_s_;
-  std::optional<PassivityObserver> passivity_;  // none: not wanted
-  std::optional<EmptyHandle> empty_handle_;     // none: the proxy coasts
+  std::optional<PassivityObserver> passivity_;  // nullopt: not wanted
+  std::optional<EmptyHandle> empty_handle_;     // nullopt: the proxy coasts
   ReversedForce reversed_;
   StraightForce straight_;
   StepLimiter limiter_;
-  std::optional<SentPoint> sent_;  // none: the arm is sent to the proxy
+  std::optional<SentPoint> sent_;  // nullopt: the arm is sent to the proxy itself
   JointGuard guard_;
   ToolGuard tool_guard_;
-  SetpointEnvelope envelope_;  // of a blocked joint: as it was before
+  SetpointEnvelope envelope_;  // of the setpoints; a blocked joint's is frozen
   State state_;
 
-  // Of this cycle.
+  // The values of this cycle:
   StepLimits step_limits_;
-  StepLimits sent_limits_;                    // around the point that the arm is sent to, with lookahead
-  models::ToolKinematics filtered_;           // of the links as they are commanded, behind the filter
-  models::InverseKinematicsResult solution_;  // for the proxy
+  StepLimits sent_limits_;                    // around the point that the arm is sent to (with lookahead)
+  models::ToolKinematics filtered_;           // of the links as commanded, behind the filter
+  models::InverseKinematicsResult solution_;  // for the pose that the arm is sent to
 };
 
 }  // namespace proxarm::controller

@@ -1,4 +1,4 @@
-// All that a cycle works on, built and configured before the first one (session/bring_up.hpp).
+// All that a cycle works on; it is built and configured before the first one (session/bring_up.hpp).
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@
 
 namespace proxarm::controller {
 
-// An axis' drive, on CAN or on a Modbus line.
+// The drive of an axis, on CAN or on a Modbus line.
 struct DriveOnBus {
   static constexpr std::size_t no_bus = static_cast<std::size_t>(-1);
 
@@ -35,7 +35,7 @@ struct DriveOnBus {
   std::size_t bus;               // index in the network; no_bus: on a Modbus line
 };
 
-// A bus with drives: they get SYNC and the controller's heartbeat.
+// A bus with drives, which get SYNC and the controller's heartbeat.
 struct DriveBus {
   std::size_t bus;
   fieldbus::SyncProducer sync;
@@ -51,17 +51,18 @@ struct AdmittanceParts {
   std::unique_ptr<Release> release;
 };
 
-// Drives stand in the order of the arm's joints.
+// All parts of a cycle. Drives stand in the order of the arm's joints.
 struct CycleParts {
   fieldbus::CanNetwork& network;
   std::vector<DriveOnBus> drives;
-  std::vector<fieldbus::DriveSlot> can_drives;  // those of the drives that are on CAN; with torques, all of them
+  std::vector<fieldbus::DriveSlot> can_drives;  // those drives that are on CAN; all of them if they take torques
   std::vector<DriveBus> drive_buses;
   std::unique_ptr<fieldbus::ForceSensor> sensor;
-  std::size_t sensor_bus;                                           // DriveOnBus::no_bus: on a Modbus line
-  std::vector<std::unique_ptr<fieldbus::ModbusLine>> modbus_lines;  // their workers end before drives and sensor do
-  std::unique_ptr<models::Arm> arm;  // in one place for good: whatever knows the arm refers to it
-  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // and thereby the type
+  std::size_t sensor_bus;  // DriveOnBus::no_bus: on a Modbus line
+  std::vector<std::unique_ptr<fieldbus::ModbusLine>>
+      modbus_lines;                  // declared after drives and sensor: its workers end first
+  std::unique_ptr<models::Arm> arm;  // on the heap, since others keep references to it
+  std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // its alternative is the session's type
   WrenchCompensation compensation;
   std::optional<EnablingInput> enabling;
   description::SupervisionDescription supervision;

@@ -1,10 +1,13 @@
 #include "controller/motion/measurement.hpp"
 
+#include <algorithm>
+
 namespace proxarm::controller {
 namespace {
 
-// With this time constant, and at most so fast. A sensor that warms up drifts by 0.01 N/s; a hand that presses less
-// than 0.35 N more in a second is taken for drift, until it has pressed by max_bias_drift_N.
+// The bias follows the reading at rest as a low-pass with the time constant bias_s, and at most at the rate
+// bias_N_per_s. A sensor that warms up drifts by 0.01 N/s. A hand that increases its pressure by less than 0.35 N in a
+// second is taken for drift, until it presses by max_bias_drift_N.
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
 // A torque's bias counts as the force that makes it at this lever: about a handle's length.
 constexpr double bias_lever_m = 0.1;
@@ -22,6 +25,8 @@ Measurement::Measurement(std::span<const DriveOnBus> drives, const fieldbus::For
   now.motor_rad = now.link_rad = now.drive_target_rad = arm.start_rad();
   now.moved_rad = now.jump_rad = now.unheard_cycles = now.feedback_period_s = zero;
   state_.stale_cycles = zero;
+  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer, and all are archived
+  arm.points(now.link_rad, points_);
 }
 
 void Measurement::take() noexcept {
@@ -31,7 +36,20 @@ void Measurement::take() noexcept {
   arm_.kinematics(now.link_rad, kinematics_);
   now.tool_W = kinematics_.X_WT.translation();
   now.R_WS = kinematics_.X_WS.linear();
+  place_elbow();
   read_sensor();
+}
+
+// The joints whose speed the guard of the setpoints bounds (tool_guard.hpp): the first two hardly move.
+void Measurement::place_elbow() noexcept {
+  constexpr std::size_t first_joint = 2;
+  const auto before_W = points_.joint_W;
+  arm_.points(state_.measured.link_rad, points_);
+  double& moved_m = state_.measured.elbow_moved_m;
+  moved_m = 0.0;
+  for (std::size_t i = first_joint; i < static_cast<std::size_t>(arm_.axes()); ++i) {
+    moved_m = std::max(moved_m, (points_.joint_W[i] - before_W[i]).norm());
+  }
 }
 
 void Measurement::read_encoders() noexcept {

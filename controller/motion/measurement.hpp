@@ -1,12 +1,12 @@
-// Where the arm is by its encoders, and what the hand does by the sensor: what a cycle knows before it decides.
+// Where the arm is, by its encoders, and what the hand does, by the sensor: all that a cycle knows before it decides.
 //
-// Encoders sit on the motors. Gravity twists the gears; the twist of the last cycle is right to within a cycle's change
-// of it, so the links are at
+// Encoders sit on the motors, and gravity twists the gears between motors and links. The twist of the last cycle is
+// used, which is off by its change in one cycle at most. So the links are at
 //   q(k) = θ(k) − (θ_g(q(k−1)) − q(k−1)),   θ_g: motor angles that hold the arm at rest (Arm::motor_from_link)
-// How fast a joint moves is a low-pass over two periods of its drive's feedback, since drives on Modbus answer more
-// seldom than the cycle asks.
+// A joint's speed is a low-pass over two feedback periods of its drive, since drives on Modbus answer less often than
+// the cycle asks.
 //
-// Where there is no new sample the last one counts on. Nothing allocates, locks or throws after construction.
+// If there is no new sample, the last one is used again. Nothing allocates, locks or throws after construction.
 #pragma once
 
 #include <cstdint>
@@ -20,72 +20,77 @@
 
 namespace proxarm::controller {
 
-// What taring the sensor has told of it, and what its bias did since.
+// What taring the sensor has shown of its noise and bias, and how the bias has drifted since.
 struct SensorBias {
   double noise_N = 0.0;        // standard deviation of a sample, in the noisiest axis
-  bool noise_is_white = true;  // nobody moved the handle meanwhile
-  double samples = 0.0;        // that the bias is the mean of
-  double sample_cycles = 1.0;  // from one to the next
-  double drift_N = 0.0;        // by which it has gone while nobody held the handle
+  bool noise_is_white = true;  // each sample is independent of the one before: nobody moved the handle
+  double samples = 0.0;        // the number of samples that the bias is the mean of
+  double sample_cycles = 1.0;  // cycles from one sample to the next
+  double drift_N = 0.0;        // how far the bias has drifted while nobody held the handle
 };
 
-// Of one cycle. Joint vectors are in the order of the arm's joints, bits of joints too.
+// The measurements of one cycle. Joint vectors and bits of joints are in the order of the arm's joints.
 struct Measured {
-  // By the encoders.
+  // By the encoders:
   models::JointVector motor_rad, link_rad;
-  models::JointVector moved_rad;          // of the motors, per cycle, as far as the drives' answers tell
-  models::JointVector jump_rad;           // of the motors, since the cycle before
-  models::JointVector unheard_cycles;     // that came before this one without an answer of the drive
-  models::JointVector feedback_period_s;  // of each drive; 0: it answers every cycle
-  models::JointVector drive_target_rad;   // where each drive was last told to be; unless it follows, where it is
-  std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and that take targets
+  models::JointVector moved_rad;          // change of the motors' angles per cycle, low-pass of the drives' answers
+  models::JointVector jump_rad;           // change of the motors' angles since the cycle before
+  models::JointVector unheard_cycles;     // cycles without an answer of the drive, up to this one
+  models::JointVector feedback_period_s;  // of each drive; 0: it answers in every cycle
+  models::JointVector drive_target_rad;   // each drive's last setpoint; its position if it takes none
+  std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and drives that take setpoints
 
   models::Vec3 tool_W = models::Vec3::Zero();
+  double elbow_moved_m = 0.0;  // since the cycle before: the furthest of the joints from the third on
   models::Mat3 R_WS = models::Mat3::Identity();
 
-  // By the sensor.
+  // By the sensor:
   bool sample_is_new = false;
   models::Wrench reading_S;
   SensorBias bias;
-  models::Wrench hand_W;  // bias and tool weight taken off, about the rendered point
+  models::Wrench hand_W;  // without bias and the tool's weight, about the rendered point
 
   [[nodiscard]] Eigen::Index axes() const noexcept { return motor_rad.size(); }
 };
 
 class Measurement {
  public:
-  // All but the compensation must outlive this.
+  // Precondition: all but the compensation outlive this object.
   Measurement(std::span<const DriveOnBus> drives, const fieldbus::ForceSensor& sensor, const models::Arm& arm,
               const WrenchCompensation& compensation, double period_s);
 
-  // After all that this cycle receives.
+  // Precondition: everything that this cycle receives has been received.
   void take() noexcept;
   [[nodiscard]] const Measured& now() const noexcept { return state_.measured; }
 
-  // Averages the reading of this cycle, where it is a new one, for the sensor's bias; the arm is at rest.
+  // Adds this cycle's reading, if it is new, to the average that becomes the sensor's bias. Precondition: the arm is at
+  // rest.
   void add_tare_sample() noexcept;
   [[nodiscard]] double tare_spread_N() const noexcept { return compensation_.tare_spread_N(); }
   // Takes the average as the bias, from this cycle on.
   void finish_tare() noexcept;
 
-  // Nobody holds the handle, and this is what its wrench is read as: it goes into the bias by and by.
+  // Precondition: nobody holds the handle. The hand's wrench as it is read, rest_W, is then bias, and is added to it
+  // gradually.
   void follow_bias(const models::Wrench& rest_W) noexcept;
 
-  // T of the cycles to come; what is counted in cycles is counted in the new ones.
+  // The period of the cycles to come. What is counted in cycles is converted to the new ones.
   void set_period(double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
     state(compensation_);
+    for (models::Vec3& place_W : points_.joint_W) state(place_W);
   }
 
  private:
   struct State {
     Measured measured;
-    models::JointVector stale_cycles;  // since each drive's position came
+    models::JointVector stale_cycles;  // cycles since each drive's last position
     double tare_cycles = 0.0;
   };
 
   void read_encoders() noexcept;
+  void place_elbow() noexcept;
   void read_sensor() noexcept;
 
   std::span<const DriveOnBus> drives_;
@@ -94,6 +99,7 @@ class Measurement {
   WrenchCompensation compensation_;
   double period_s_;
   models::ToolKinematics kinematics_;  // of the links
+  models::ArmPoints points_;           // of the links
   State state_;
 };
 

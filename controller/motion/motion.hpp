@@ -1,11 +1,12 @@
-// What the drives are told, and all of its history: the one class that starts, moves, stops and winds back whatever
-// lies between the hand's force and the setpoints. It knows no bus.
+// What the drives are told, and all of its history. This is the one class that starts, moves, stops and winds back
+// whatever lies between the hand's force and the setpoints. It knows no bus.
 //
-//   AdmittanceMotion   force in, motor angles out: proxy (26), limits, inverse kinematics, elastic gears, guards of
-//   joints and tool TorqueMotion       position in, joint torques out: (23)
+//   AdmittanceMotion   force in, motor angles out: the proxy (26), limits, inverse kinematics, elastic gears, guards
+//                      of joints and tool
+//   TorqueMotion       position in, joint torques out: (23)
 //
-// The cycle calls one of "each cycle" by its phase, and those of "between" when a phase begins or somebody asks for
-// something. All of it is noexcept and allocates, locks and prints nothing.
+// In each cycle the caller calls one function of "each cycle", chosen by the phase. It calls those of "between" when a
+// phase begins or when somebody asks for something. All of them are noexcept; none allocates, locks or prints.
 #pragma once
 
 #include <cstdint>
@@ -24,19 +25,19 @@
 
 namespace proxarm::controller {
 
-// What a step is given, and where it says what it did.
+// What a step is given, and where it reports what it did.
 struct MotionCycle {
   const Measured& measured;
-  bool slowed = false;  // the tool keeps below the speed of the reaction "slow"
+  bool slowed = false;  // the tool keeps below the speed of the reaction `slow`
   Alarm& alarm;
   CycleRecord& record;
 };
 
-// Where rendering begins from.
+// Where rendering starts from.
 enum class Beginning : std::uint8_t {
   first,     // the sensor has been tared
-  resuming,  // out of a hold. The tool may have been led into an object meanwhile: slowly out of it
-  freeing,   // out of a hold, without the scene
+  resuming,  // from a hold; if somebody moved the tool into an object meanwhile, it leaves it slowly
+  freeing,   // from a hold, without the scene
 };
 
 class Motion {
@@ -51,45 +52,46 @@ class Motion {
     active_ = {};
     made_setpoints_ = false;
   }
-  // Drives are being enabled: one that takes setpoints already, while others don't yet, stays where it is.
+  // Drives are being enabled. A drive that already takes setpoints stays where it is until the others do, too.
   virtual void wait_for_drives(const Measured& measured) noexcept = 0;
-  // The drives stand, and the sensor is tared.
+  // The drives are enabled and the arm stands still while the sensor is tared.
   virtual void stand(const Measured& measured) noexcept = 0;
-  // True: the world has gone on by a period.
+  // Takes one step of rendering. Returns true if the world has advanced by a period.
   virtual bool render(const MotionCycle& cycle) noexcept = 0;
-  // Slowly and without the scene. True: it is over.
+  // Moves slowly and without the scene. Returns true when this is over.
   virtual bool free(const MotionCycle& cycle) noexcept = 0;
-  // Every joint keeps its share of the last motion while that shrinks to nothing.
+  // Every joint keeps its share of the last motion while the speed shrinks to zero.
   virtual void run_out() noexcept = 0;
 
   // ---- between
-  // At rest, where the setpoints are.
+  // Precondition: the arm is at rest at the last setpoints.
   virtual void start(const Measured& measured, Beginning beginning) noexcept = 0;
   virtual void start_run_out() noexcept = 0;
-  // Release or back_off: what free() is to do. False: nothing says which way.
+  // Prepares what free() does after the order release or back_off. Returns false if no direction can be told.
   virtual bool prepare_freeing(const Command& command, const Measured& measured) noexcept = 0;
-  // Away from what presses on the tool of an arm that stands: what free() is to do then. False: little does.
+  // Prepares free() to back off from what presses on the tool. Precondition: the arm stands. Returns false if little
+  // presses.
   virtual bool start_yielding(const Measured& /*measured*/) noexcept { return false; }
   virtual void set(const Change& change) noexcept = 0;
-  // T of the cycles to come; the arm stands. What was commanded and rendered stays as it is.
+  // The period of the cycles to come. Precondition: the arm stands. What was commanded and rendered stays as it is.
   virtual void set_period(double period_s) noexcept = 0;
 
   // ---- asked
   [[nodiscard]] virtual Setpoints setpoints() const noexcept = 0;
-  // Whether it can stand with drives enabled, which holds, and all that leads out of them, need.
+  // Whether the arm can stand with its drives enabled. Holds need this, and so does all that leads out of them.
   [[nodiscard]] virtual bool can_hold() const noexcept = 0;
-  // Run out, and at rest.
+  // The run-out has ended, and the arm is at rest.
   [[nodiscard]] virtual bool stands() const noexcept = 0;
   [[nodiscard]] virtual bool backs_off() const noexcept = 0;
-  // Nobody holds the handle, and the proxy has come to rest: what is read as the hand's wrench is the sensor's bias.
-  // Null: somebody may be there.
+  // The hand's wrench as it is read while nobody holds the handle and the proxy has come to rest: all of it is the
+  // sensor's bias. Null if somebody may be holding the handle.
   [[nodiscard]] virtual const models::Wrench* resting_wrench_W() const noexcept { return nullptr; }
-  // Nobody holds the handle, and the cell wants a hold then.
+  // Nobody holds the handle, and the cell asks for a hold in this case.
   [[nodiscard]] virtual bool wants_hold() const noexcept { return false; }
   [[nodiscard]] virtual const models::Vec3& proxy_W() const noexcept = 0;
-  // Which limits were active in this cycle.
+  // The limits that were active in this cycle.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
-  // This cycle's setpoints are made: a second step would be one of twice the speed.
+  // This cycle's setpoints are made already. A second step in the same cycle would double the speed.
   [[nodiscard]] bool made_setpoints() const noexcept { return made_setpoints_; }
 
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
@@ -99,13 +101,14 @@ class Motion {
   bool made_setpoints_ = false;
 };
 
-// What a step of the world leaves in the record.
+// Writes what a step of the world did to the record.
 void record_world(const WorldStep& step, CycleRecord& record) noexcept;
 
-// The descriptions of these drives.
+// Returns the descriptions of these drives.
 std::vector<description::DriveDescription> descriptions(const std::vector<DriveOnBus>& drives);
 
-// Of the type that `parts` are for, and with them.
+// Builds the Motion of the session's type and moves CycleParts::rendering into it. Precondition: `parts.arm` outlives
+// the result.
 std::unique_ptr<Motion> make_motion(CycleParts& parts, const SessionSettings& settings,
                                     const description::CellLimits& limits);
 

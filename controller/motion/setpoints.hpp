@@ -1,4 +1,4 @@
-// What a motion makes and the drives are sent.
+// The setpoints: what a motion makes and what the drives are sent.
 #pragma once
 
 #include <cstdint>

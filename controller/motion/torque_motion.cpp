@@ -15,7 +15,7 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
   state_.torque_Nm = JointVector::Zero(arm.axes());
 }
 
-// Where the device stands when the first brake opens.
+// Anchors the device where it stands until its first drive is enabled and its brake opens.
 void TorqueMotion::hold(const Measured& measured) noexcept {
   if (measured.following == 0) rendering_->anchor(measured.link_rad);
   state_.torque_Nm = rendering_->hold(measured.link_rad).torque_Nm;
@@ -25,7 +25,7 @@ void TorqueMotion::start(const Measured& measured, Beginning /*beginning*/) noex
   rendering_->start(measured.link_rad);
 }
 
-// A device that is driven back must not run away: it may be as fast as its joints may.
+// A device that a hand drives back must not run away; it may be as fast as its joints may.
 bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {

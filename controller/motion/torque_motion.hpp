@@ -1,6 +1,6 @@
-// The impedance type: joint torques for where the tool is (torque_rendering.hpp). Until rendering they hold the tool
-// where it stands. A stop is the drives' own, from whatever torque on their slow-down ramp (6084h), so nothing runs out
-// here, and nothing is ever held.
+// Motion of the impedance type: joint torques that follow from the tool's position (torque_rendering.hpp). Until
+// rendering begins, the torques hold the tool where it stands. A stop is left to the drives, which bring any torque to
+// zero on their slow-down ramp (6084h). This class therefore has no run-out and no hold.
 #pragma once
 
 #include <memory>
@@ -27,7 +27,7 @@ class TorqueMotion final : public Motion {
   void start_run_out() noexcept override {}
   bool prepare_freeing(const Command& /*command*/, const Measured& /*measured*/) noexcept override { return false; }
   void set(const Change& /*change*/) noexcept override {}
-  void set_period(double /*period_s*/) noexcept override {}  // it has one for good
+  void set_period(double /*period_s*/) noexcept override {}  // torques are made for one timestep
 
   [[nodiscard]] Setpoints setpoints() const noexcept override {
     return {Setpoints::Kind::torques_Nm, state_.torque_Nm};

@@ -42,7 +42,8 @@ void WrenchCompensation::finish_tare() noexcept {
   drift_S_ = {};
 }
 
-// Σ(x − x₁)² − n (x̄ − x₁)², over n − 1: about the first sample, so that nothing is lost by a large bias.
+// The variance, (Σ(x − x₁)² − n (x̄ − x₁)²)/(n − 1). Sums are taken about the first sample x₁, so that a large bias
+// costs no digits.
 Vec3 WrenchCompensation::tare_variance_S() const noexcept {
   const double n = tare_samples();
   const Vec3 mean = tare_sum_S_.force / n - tare_first_S_;
@@ -54,8 +55,10 @@ double WrenchCompensation::noise_N() const noexcept {
   return std::sqrt(std::max(0.0, tare_variance_S().maxCoeff()));
 }
 
-// Von Neumann's ratio, Σ(xᵢ₊₁ − xᵢ)² over twice the variance: 1 for white noise, to within 1/√n; (ωT)²/2 for a motion
-// at ω, 2 % at 30 Hz and 1 ms; 1 − e^(−T/τ) behind a first-order filter, 0.5 at 110 Hz and 1 ms.
+// Von Neumann's ratio (J. von Neumann, Distribution of the ratio of the mean square successive difference to the
+// variance, 1941), here Σ(xᵢ₊₁ − xᵢ)² over twice the sum of squares Σ(xᵢ − x̄)². It is 1 to within 1/√n for white
+// noise. For a motion at ω it is (ωT)²/2, which is 2 % at 30 Hz and 1 ms. Behind a first-order filter it is 1 −
+// e^(−T/τ), which is 0.5 at 110 Hz and 1 ms.
 bool WrenchCompensation::noise_is_white() const noexcept {
   if (tare_count_ < 2) return true;
   int noisiest = 0;

@@ -1,12 +1,13 @@
-// From what the sensor reads to what the user's hand does: bias and the tool's weight taken off, expressed at the tool.
+// From what the sensor reads to the hand's wrench: bias and tool weight are subtracted; the rest is expressed at the
+// tool.
 //
 // The sensor reads the wrench w_S that the tool side exerts on the flange side, in S and about S's origin:
 //
 //   w_S = bias + (hand's wrench) + (weight of the tool) − (inertia of the tool)
 //
-// The weight, m R_SW g at the tool's centre of mass c, is subtracted; the inertia is not: a handle of mass m behind the
-// sensor is felt in full, so (26) gets the wanted mass less m. The bias is what a reading at rest, with no hand on the
-// handle, has over the weight.
+// The weight, m R_SW g at the tool's centre of mass c, is subtracted. The inertia is not: the mass m of the handle
+// behind the sensor is felt in full, so (26) is given the wanted mass less m. The bias is the reading less the weight
+// while the arm is at rest and nobody touches the handle.
 #pragma once
 
 #include <cstdint>
@@ -26,27 +27,29 @@ class WrenchCompensation {
 
   // Adds one reading at rest to the average that becomes the bias.
   void add_tare_sample(const models::Wrench& reading_S, const models::Mat3& R_WS) noexcept;
-  // Takes the average so far as the bias; at least one sample must have been added.
+  // Takes the average so far as the bias. Precondition: at least one sample was added.
   void finish_tare() noexcept;
-  // Largest deviation of a sample from the running mean, in N: the handle was touched if it exceeds the noise.
+  // Largest deviation of a sample from the running mean, in N. If it exceeds the noise, the handle was touched.
   [[nodiscard]] double tare_spread_N() const noexcept { return tare_spread_N_; }
-  // Of one tare sample's force, per axis: the standard deviation of the noisiest one, in N. After finish_tare().
+  // The standard deviation of a single tare sample's force in the noisiest axis, in N. Precondition: finish_tare() was
+  // called.
   [[nodiscard]] double noise_N() const noexcept;
-  // False: what was noise_N has a memory from sample to sample, such as a hand's motion has, or a sensor's own filter.
+  // False if successive samples are correlated, as a hand's motion or the sensor's own filter makes them.
   [[nodiscard]] bool noise_is_white() const noexcept;
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
-  // The tool's own, behind the sensor.
+  // The mass of the tool behind the sensor.
   [[nodiscard]] double tool_mass_kg() const noexcept { return mass_kg_; }
-  // Nobody holds the handle, so what is left of the reading is bias: by so much of it at most in each axis of S.
+  // Adds rest_S to the bias, at most most_N and most_Nm in each axis of S. Precondition: nobody holds the handle, so
+  // what is left of the reading is bias.
   void follow_bias(const models::Wrench& rest_S, double most_N, double most_Nm) noexcept;
-  // By how much the force's bias has gone since the tare, in N.
+  // How far the force's bias has drifted since the tare, in N.
   [[nodiscard]] double drift_N() const noexcept { return drift_S_.force.norm(); }
   [[nodiscard]] const models::Wrench& bias_S() const noexcept { return bias_S_; }
 
   // The hand's wrench about T's origin, in W.
   [[nodiscard]] models::Wrench hand_wrench_W(const models::Wrench& reading_S, const models::Mat3& R_WS) const noexcept;
 
-  // What such a wrench adds to the reading: the inverse of hand_wrench_W().
+  // What a wrench of the hand adds to the reading: the inverse of hand_wrench_W().
   [[nodiscard]] models::Wrench reading_S(const models::Wrench& hand_W, const models::Mat3& R_WS) const noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -63,11 +66,11 @@ class WrenchCompensation {
   models::Vec3 gravity_W_;
   models::Wrench bias_S_;
   models::Wrench tare_sum_S_;
-  models::Vec3 tare_squares_S_ = models::Vec3::Zero();  // of the forces less the first one
+  models::Vec3 tare_squares_S_ = models::Vec3::Zero();  // Σ(x − x₁)² of the forces x, x₁ being the first
   models::Vec3 tare_first_S_ = models::Vec3::Zero();
   models::Vec3 tare_last_S_ = models::Vec3::Zero();
-  models::Vec3 tare_steps_S_ = models::Vec3::Zero();  // squares of the differences between one and the next
-  models::Wrench drift_S_;                            // of the bias, since the tare; in it
+  models::Vec3 tare_steps_S_ = models::Vec3::Zero();  // Σ(xᵢ₊₁ − xᵢ)²
+  models::Wrench drift_S_;  // how far the bias has drifted since the tare; bias_S_ includes it
   std::int64_t tare_count_ = 0;
   double tare_spread_N_ = 0.0;
 };

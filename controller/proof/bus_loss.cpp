@@ -58,7 +58,7 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   act(t_k_ns);
   if (step_ == Step::silent) return;
   fieldbus::CanFrame heartbeat;
-  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;  // begun in one cycle, they go together
+  fieldbus::HeartbeatProducer same = parts_.drive_buses.front().heartbeat;  // those of all buses begin in one cycle
   heartbeat_was_last_ = same.due(t_k_ns, cycle_, heartbeat);
   bus_.send_setpoints(setpoints_, t_k_ns, cycle_);
   bus_.hand_over();
@@ -66,7 +66,7 @@ void BusLossSession::run_cycle(std::int64_t t_k_ns) noexcept {
   ++cycle_;
 }
 
-// Whatever is wrong before the silence ends it: the drives are switched off.
+// Any fault or hold before the silence ends the session: the drives are switched off.
 void BusLossSession::heed(std::int64_t t_k_ns) noexcept {
   if (parts_.enabling) {
     parts_.enabling->on_cycle(t_k_ns);
@@ -97,7 +97,7 @@ void BusLossSession::act(std::int64_t t_k_ns) noexcept {
       supervisor_.handle(Event::tared);
       return go_to(Step::standing, t_k_ns);
     case Step::standing:
-      // Right after a heartbeat: the drives that wait for the next one wait longest then.
+      // The silence begins right after a heartbeat. This is the worst moment: drives that monitor it wait longest then.
       if (in_step_ns >= standing_ns && heartbeat_was_last_) go_to(Step::silent, t_k_ns);
       return;
     case Step::farewell:
@@ -124,7 +124,7 @@ void BusLossSession::wait_for_drives(std::int64_t t_k_ns) noexcept {
   }
 }
 
-// The frames of the last cycle are through before the silence is judged; a drive has no reason to react to them.
+// By the time that the silence is judged, the frames of the last cycle have arrived; no drive reacts to these.
 void BusLossSession::listen(std::int64_t until_ns) noexcept {
   fieldbus::TimedFrame received;
   do {
@@ -147,10 +147,10 @@ void BusLossSession::go_to(Step step, std::int64_t t_k_ns) noexcept {
     bus_.request(fieldbus::DriveGoal::operation_enabled);
   } else if (step == Step::silent) {
     since_ns_ = silence_ns_ = last_word_ns_;
-    bus_.request(fieldbus::DriveGoal::none);  // no frame says so; what the drives say from now on is no fault
+    bus_.request(fieldbus::DriveGoal::none);  // sends no frame, but what the drives report from now on isn't a fault
   } else if (step == Step::farewell) {
     bus_.request(fieldbus::DriveGoal::none);
-    send_nmt(fieldbus::NmtCommand::start);  // those that have left operational
+    send_nmt(fieldbus::NmtCommand::start);  // for drives that have left NMT operational
   }
 }
 

@@ -1,12 +1,13 @@
-// What each drive does when the controller dies, tried on purpose: at standstill, with the drives enabled, nothing is
-// sent any more, and what the drives say is listened to.
+// What each drive does when the controller dies, tried on purpose: while the arm stands with its drives enabled,
+// sending stops, and the answers of the drives are observed.
 //
-//   enabling, taring, standing for 0.3 s: under the same supervision as any session
-//   silent for a second, from right after a heartbeat on, which is the worst moment: no SYNC, no setpoint, no
-//   heartbeat, no SDO; frames are only received farewell: SYNC, heartbeat and controlwords again, until all drives are
-//   off, or half a second
-// A drive that lets go holds its axis by its brake, or the axis sinks: the same as when a controller dies in a session.
-// run_cycle() neither allocates, locks, throws nor prints.
+//   waiting, enabling, taring, standing for 0.3 s   under the same supervision as any session
+//   silent for a second   from right after a heartbeat on, which is the worst moment: no SYNC, no setpoint, no
+//                         heartbeat, no SDO; frames are only received
+//   farewell              SYNC, heartbeat and controlwords again, until all drives are off or half a second has passed
+//
+// If a drive lets go, its brake holds the axis or the axis sinks, as when a controller dies in a session. run_cycle()
+// neither allocates, locks, throws nor prints.
 #pragma once
 
 #include <atomic>
@@ -27,18 +28,18 @@
 
 namespace proxarm::proof {
 
-// Of one drive on CAN.
+// The reaction of one drive on CAN.
 struct OwnStop {
   std::string joint;
-  double reacts_s = -1.0;  // after the controller's last word; below zero: nothing was seen
-  double off_s = -1.0;     // its statusword says that it is off; below zero: it didn't say so
-  std::string signs;       // what it said, in words
+  double reacts_s = -1.0;  // after the controller's last frame; negative: no reaction was seen
+  double off_s = -1.0;     // when its statusword reported that it is off; negative: it didn't
+  std::string signs;       // its reactions, in words
   bool off_at_last = false;
 };
 
 class BusLossSession {
  public:
-  // The drives have been asked for words (silence_watch.hpp).
+  // Precondition: the drives have been configured to send the objects that silence_watch.hpp observes.
   BusLossSession(controller::CycleParts parts, const controller::SessionSettings& settings,
                  const description::Cell& cell);
   BusLossSession(const BusLossSession&) = delete;
@@ -46,15 +47,15 @@ class BusLossSession {
 
   void run_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool done() const noexcept { return step_ == Step::done; }
-  // Nothing is to be sent, and a late cycle is no matter.
+  // Whether nothing is to be sent; a late cycle doesn't matter then.
   [[nodiscard]] bool silent() const noexcept { return step_ == Step::silent; }
   void shut_down() noexcept { bus_.shut_down(controller::ns_of(settings_.period_s)); }
   void request_stop() noexcept { stop_.store(true); }  // any thread
-  // The switch is to be let go and pressed.
+  // Whether the enabling switch has to be released and pressed.
   [[nodiscard]] bool asks_for_press() const noexcept { return asks_for_press_.load(); }
 
   // ---- after the last cycle
-  // Empty where it didn't come to the silence.
+  // The drives' reactions; empty if the session didn't get as far as the silence.
   [[nodiscard]] std::vector<OwnStop> own_stops() const;
   [[nodiscard]] const controller::FaultReport& fault() const noexcept {
     return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
@@ -88,8 +89,8 @@ class BusLossSession {
   std::vector<fieldbus::SilenceWatch> watches_;
   Step step_ = Step::waiting;
   std::int64_t since_ns_ = 0, last_word_ns_ = -1;
-  bool heartbeat_was_last_ = false;  // the last cycle sent it
-  std::int64_t silence_ns_ = -1;     // the last cycle before it began
+  bool heartbeat_was_last_ = false;  // the last cycle sent a heartbeat
+  std::int64_t silence_ns_ = -1;     // the time of the last cycle before the silence
   std::atomic<bool> stop_{false}, asks_for_press_{false};
 };
 

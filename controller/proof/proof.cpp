@@ -17,14 +17,14 @@ using models::JointVector;
 using models::Mat3;
 using models::Vec3;
 
-// Of the tool's weight: below this a joint's turn is proven by pushes.
+// As a share of the tool's weight: if a joint's turn changes the reading by less than this, it is proven by pushes.
 constexpr double shown_by_weight = 0.08;
 constexpr int poses_tried = 400;
 
 struct Mistake {
   std::string name;
-  std::function<JointVector(JointVector)> motors;  // where they are, from where the cell has them
-  Mat3 reading = Mat3::Identity();                 // what the sensor makes of a force
+  std::function<JointVector(JointVector)> motors;  // the motors' true angles, from those that the cell computes
+  Mat3 reading = Mat3::Identity();                 // the force as the sensor reads it, from the true one
 };
 
 Mat3 turned(double angle_rad, const Vec3& axis) { return Eigen::AngleAxisd(angle_rad, axis).toRotationMatrix(); }
@@ -70,14 +70,14 @@ std::vector<Mistake> all_mistakes(const description::Cell& cell) {
   return mistakes;
 }
 
-// What hangs at the sensor pulls so, in S; a unit of force along `along_W`.
+// A unit force along `along_W`, expressed in S.
 Vec3 in_sensor(const models::Arm& arm, const JointVector& motor_rad, const Vec3& along_W) {
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * along_W;
 }
 
 double angle_between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
-// The reading without a push that was taken where this one was.
+// The reading without a push at the station where `pushed` was read.
 const Reading* without_push(const std::vector<Reading>& readings, const Reading& pushed) {
   const Reading* found = nullptr;
   for (const Reading& other : readings) {
@@ -125,7 +125,7 @@ Explanation explain(const description::Cell& cell, const models::Arm& arm, const
   return {mistake.name, residual(arm, weight_W, readings, mistake), largest_angle(arm, readings, mistake)};
 }
 
-// How much of the weight each joint's turn changes, in a pose.
+// The change of the weight's direction in S when each joint is turned, by joint, for a given pose.
 JointVector shown(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   const Vec3 down_W = Vec3(cell.gravity_W_m_per_s2.data()).normalized();
   const Vec3 here = in_sensor(arm, motor_rad, down_W);
@@ -138,7 +138,8 @@ JointVector shown(const description::Cell& cell, const models::Arm& arm, const J
   return changes;
 }
 
-// Joints that can't be seen in any pose about here don't count; of the others the least seen one does.
+// Chooses the pose that best shows the joint that is least visible in it. Joints that no pose nearby shows are left
+// out.
 JointVector best_pose(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   models::Random random(1);
   std::vector<JointVector> tried{motor_rad};
@@ -171,8 +172,8 @@ JointVector best_pose(const description::Cell& cell, const models::Arm& arm, con
   return tried[best];
 }
 
-// A mistake that fits half as well as the cell itself, beyond what noise and a careful hand are off by, isn't the
-// truth.
+// A mistake rivals the cell's description if its residual and angle are at most twice as large. Noise and the error of
+// a careful hand are the least that counts.
 bool rivals(const Explanation& mistake, const Explanation& as_it_is) {
   constexpr double noise = 0.05, careful_rad = 0.07, clearly = 2.0;
   if (!as_it_is.explains()) return true;
@@ -189,7 +190,7 @@ void require_provable(const description::Cell& cell, const models::Arm& arm) {
                                    .found = description::number_text(cell.tool.mass_kg),
                                    .expected = "above 0: the tool's weight is what the arm is proven by"});
   }
-  // A joint that slides turns nothing.
+  // A prismatic joint doesn't turn the tool.
   models::ToolKinematics at;
   arm.kinematics(arm.start_rad(), at);
   for (Eigen::Index i = 0; i < arm.axes(); ++i) {

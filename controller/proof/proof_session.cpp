@@ -13,10 +13,10 @@ using controller::Phase;
 using models::JointVector;
 using models::Vec3;
 
-// Paths keep to this share of the speed, since T moves along arcs and drives overshoot.
+// Paths keep to these shares of the speed limits, since T moves along arcs and drives overshoot.
 constexpr double share_of_speed = 0.7, share_of_joint_speed = 0.25, peak_of_minimum_jerk = 15.0 / 8.0;
 constexpr double settle_s = 0.4, read_s = 0.3;
-// A push is one from here on, when it has lasted; and it is over.
+// A force above push_N is a push once it has lasted; below no_push_N it is over.
 constexpr double push_N = 8.0, no_push_N = 2.0, steady_s = 0.3, push_timeout_s = 60.0;
 constexpr double run_out_s = 0.1, brakes_watched_s = 1.0, disable_timeout_s = 1.0;
 
@@ -78,7 +78,7 @@ void ProofSession::run_cycle(std::int64_t t_k_ns) noexcept {
   ++cycle_;
 }
 
-// What came from outside. A hold ends it, too: there is nothing to be gone on with.
+// Handles what comes from outside. A hold ends the session, too, since nothing can be resumed here.
 void ProofSession::heed(std::int64_t t_k_ns) noexcept {
   if (stop_.load()) supervisor_.handle(Event::stop);
   if (parts_.enabling) {
@@ -191,7 +191,7 @@ void ProofSession::go_to(Step step) noexcept {
   asked_ = asks ? Asked::push : frees ? Asked::let_go : Asked::nothing;
 }
 
-// x = x₀ + (x₁ − x₀)(10 s³ − 15 s⁴ + 6 s⁵)
+// The minimum-jerk path (Flash and Hogan 1985): x = x₀ + (x₁ − x₀)(10 s³ − 15 s⁴ + 6 s⁵)
 void ProofSession::move() noexcept {
   if (stations_.empty()) return;
   path_s_ = std::min(duration_s_, path_s_ + rate_ * settings_.period_s);
@@ -240,7 +240,7 @@ void ProofSession::read() noexcept {
   if (step_s_ < read_s || samples_ == 0) return;
   const Station& station = stations_[station_];
   const Vec3 mean_S = force_sum_S_ / samples_;
-  readings_.push_back({station, measured.motor_rad, mean_S});  // into what begin_plan() reserved
+  readings_.push_back({station, measured.motor_rad, mean_S});  // begin_plan() has reserved the room
   if (!station.push_W.isZero()) return go_to(Step::releasing);
   unpushed_S_ = mean_S;
   next_station();
@@ -256,7 +256,7 @@ void ProofSession::next_station() noexcept {
   begin_move(stations_[station_].motor_rad);
 }
 
-// The drives go off, and the brakes close; then nothing may move.
+// The drives go off and the brakes close; after that, no joint may move.
 void ProofSession::watch_brakes(double in_phase_s) noexcept {
   const JointVector& motor_rad = measurement_.now().motor_rad;
   if (!bus_.drives_off()) {

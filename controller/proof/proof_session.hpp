@@ -1,12 +1,14 @@
-// The session in which an arm is proven: each joint by a small slow motion, and pushes, under the same supervision as
+// The session in which an arm is proven: by small slow motions of each joint and by pushes, under the same supervision
+// as any other session.
 // any other session.
 //
-//   enabling, taring, then by the plan: move, settle, read; where a push is needed, wait for it, read, wait for its
-//   end; then the drives are switched off, and the brakes are watched for a second
-// The tool moves at proof_speed_m_per_s at most, joints on minimum-jerk paths from rest to rest. Any fault, any hold
-// and an enabling input that is let go end it: the motion runs out within a tenth of a second, and the drives are
-// switched off. run_cycle() neither allocates, locks, throws nor prints; begin_plan() is called between cycles and
-// does.
+// After enabling and taring, the session follows its plan: move, settle, read; and where a push is needed: wait for it,
+// read, wait for its end. Then the drives are switched off, and the brakes are watched for a second.
+//
+// The tool moves at proof_speed_m_per_s at most, and joints move on minimum-jerk paths from rest to rest. Any fault,
+// any hold, and an enabling input that is released end the session: the motion runs out within a tenth of a second, and
+// the drives are switched off. run_cycle() neither allocates, locks, throws nor prints. begin_plan() does; it is called
+// between cycles.
 #pragma once
 
 #include <atomic>
@@ -27,10 +29,10 @@
 
 namespace proxarm::proof {
 
-// Of the tool: the paths are slower, and what the encoders report faster than 1.2 times this is tool_too_fast.
+// The tool's speed limit. The paths are slower; a speed by the encoders of more than 1.2 times this is tool_too_fast.
 inline constexpr double proof_speed_m_per_s = 0.1;
 
-// What somebody is asked for, as one number that another thread may read.
+// What the person is asked to do, as one number that another thread may read.
 enum class Asked : std::uint8_t { nothing, press, push, let_go };
 
 class ProofSession {
@@ -41,7 +43,7 @@ class ProofSession {
   ProofSession& operator=(const ProofSession&) = delete;
 
   void run_cycle(std::int64_t t_k_ns) noexcept;
-  // The arm stands and waits for its plan. Throws SetupError where there is none.
+  // Whether the arm stands and waits for its plan, which begin_plan() makes. That throws SetupError if there is none.
   [[nodiscard]] bool needs_plan() const noexcept;
   void begin_plan();
   [[nodiscard]] bool done() const noexcept { return supervisor_.phase() == controller::Phase::done; }
@@ -50,7 +52,7 @@ class ProofSession {
   // ---- any thread
   void request_stop() noexcept { stop_.store(true); }
   [[nodiscard]] Asked asked() const noexcept { return asked_.load(); }
-  // Of the push that is asked for: an index of readings and stations.
+  // The station of the push that is asked for, an index of readings and stations.
   [[nodiscard]] std::size_t station() const noexcept { return station_.load(); }
 
   // ---- between cycles
@@ -58,14 +60,14 @@ class ProofSession {
 
   // ---- after the last cycle
   [[nodiscard]] bool complete() const noexcept { return !readings_.empty() && station_ == stations_.size(); }
-  // A push, or its end, was waited for in vain.
+  // Whether the session waited in vain for a push or for its end.
   [[nodiscard]] bool not_pushed() const noexcept { return not_pushed_; }
   [[nodiscard]] const std::vector<Reading>& readings() const noexcept { return readings_; }
-  // Of the stop, or of the hold that led to it; none: no fault.
+  // The fault that stopped the arm, or that caused the hold before it; Fault::none if there was no fault.
   [[nodiscard]] const controller::FaultReport& fault() const noexcept {
     return supervisor_.faulted() ? supervisor_.report() : supervisor_.held_for();
   }
-  // By how much the joints moved while their brakes held them, rad; none: it didn't come to that.
+  // By how much the joints moved while their brakes held them, rad; nullopt if the session didn't get that far.
   [[nodiscard]] std::optional<double> slipped_rad() const noexcept { return slipped_rad_; }
   [[nodiscard]] const controller::CycleParts& parts() const noexcept { return parts_; }
 
@@ -112,7 +114,7 @@ class ProofSession {
   std::vector<Station> stations_;
   std::vector<Reading> readings_;
   Step step_ = Step::moving;
-  double step_s_ = 0.0, pressed_s_ = 0.0;  // in this step; for how long a push has lasted, or its end
+  double step_s_ = 0.0, pressed_s_ = 0.0;  // the time in this step; how long a push, or its end, has lasted
   models::JointVector from_rad_, way_rad_;
   double duration_s_ = 0.0, path_s_ = 0.0, rate_ = 1.0;
   models::Vec3 force_sum_S_ = models::Vec3::Zero(), unpushed_S_ = models::Vec3::Zero();

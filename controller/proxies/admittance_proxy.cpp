@@ -18,7 +18,7 @@ bool AdmittanceProxy<N>::start(const ProxyStart<N>& start) noexcept {
   if (!start.q.allFinite() || !start.v.allFinite() || !start.a.allFinite() || !std::isfinite(start.time_s)) {
     return false;
   }
-  // x(t₀ − T) by x(t) = q₀ + v₀t + ½a₀t². With the label of order 1 (and of order 2 with matched labels), the sample
+  // q(t₀ − T) by q(t) = q₀ + v₀t + ½a₀t². With the label of order 1 (and of order 2 with matched labels), the sample
   // before the first step is the state at t₀ itself; with the plain label of order 2 it is the state at t₀ − T.
   const double T = config_.period_s;
   const bool one_later = config_.order == 2 && !config_.matched_labels;
@@ -69,7 +69,7 @@ ProxyFault AdmittanceProxy<N>::step(const V& h) noexcept {
   return ProxyFault::none;
 }
 
-// (26), with B and K_v; the header has the equations, also of two intervals that differ.
+// (26), with B and K_v. The header has the equations, also for two intervals that differ.
 template <int N>
 ProxyFault AdmittanceProxy<N>::verlet(const V& h, ProxyTrial<N>& out) noexcept {
   if (prepared_for_s_ != past_.period_k1_s) prepare();
@@ -86,12 +86,12 @@ ProxyFault AdmittanceProxy<N>::verlet(const V& h, ProxyTrial<N>& out) noexcept {
   return fault;
 }
 
-// What of the equations doesn't change from step to step.
+// Computes what doesn't change from step to step.
 template <int N>
 void AdmittanceProxy<N>::prepare() noexcept {
   const double M = config_.mass_kg, B = config_.damping_Ns_per_m, K_v = config_.spring_N_per_m;
   const double T = config_.period_s, T_o = past_.period_k1_s;
-  // (26a) with B and K_v, on two intervals that may differ; κq₁ = [2M/(T(T + T_o)) + B/T + K_v] q₁ is taken out.
+  // (26a) with B and K_v, for two intervals that may differ. κq₁ = [2M/(T(T + T_o)) + B/T + K_v] q₁ is factored out.
   plain_ = T == T_o && B == 0.0 && K_v == 0.0;
   const double inertia = plain_ ? M / (T * T) : 2.0 * M / (T * (T + T_o));
   verlet_ = ProxyRule::of(inertia + B / T + K_v, K_v);

@@ -25,10 +25,10 @@ void Bdf2<N>::start(const ProxyStart<N>& start, const ProxySolver<N>& solve, Pro
   restart_steps_left_ = 0;
   after_impact_ = false;
   first_order_steps_ = 0;
-  // In an established contact the place before may be on either side of the surface by rounding.
+  // In an established contact, rounding may put the place before the start on either side of the surface.
   if (past.q_k1 == start.q || start.contact_established) return;
   if (solve.timed()) solve.g().set_time({start.time_s, period_s_});
-  // The κ of (26) without B and K_v; which one doesn't matter, since nothing but geometry is asked.
+  // The κ of (26) without B and K_v. Any other would do, since only the geometry matters here.
   const V reached = solve.g()(0.5 * parabola_.kappa, past.q_k1, start.q);
   if (reached == past.q_k1 || !reached.allFinite()) return;
   past.q_k1 = reached;
@@ -56,11 +56,11 @@ ProxyFault Bdf2<N>::step(const ProxyHistory<N>& past, const V& h_k, const V& q_r
   return ProxyFault::none;
 }
 
-// The step of BDF2 proper; the header has the equations, here with q₁ taken out of p̂'s brackets. `now`: the contacts
-// that the step ends with. `event`: an event lies in the step, which must not be taken.
+// The step of BDF2 proper, with the header's equations and q₁ factored out of p̂'s brackets. `now`: the contacts that
+// the step ends with. `event`: an event lies in the step, which must not be taken.
 //
-// 𝒢 is asked from the true q₁ first: whether the way from there meets something, and whether the contacts are still
-// those of the step before. Where nothing acts on it from there, that is the step.
+// 𝒢 is first evaluated from the true q₁, to see whether the way from there meets something and whether the contacts are
+// still those of the step before. If nothing acts on the proxy from there, this is the step.
 template <int N>
 ProxyFault Bdf2<N>::look_back(const Given& given, ProxyTrial<N>& out, ContactSet& now, bool& event) noexcept {
   const ProxyHistory<N>& past = given.past;
@@ -85,8 +85,8 @@ ProxyFault Bdf2<N>::look_back(const Given& given, ProxyTrial<N>& out, ContactSet
   return fault;
 }
 
-// The answer from q̃, after that from q₁, which `out` and `now` hold. It must have the same contacts, each from the same
-// side: q̃ may lie beyond a wall that holds from both. `unresolved`: 𝒢's count of unresolved steps before the step.
+// The step from q̃, after the one from q₁, which `out` and `now` hold. It must have the same contacts, each from the
+// same side, since q̃ may lie beyond a wall that holds from both. `unresolved`: 𝒢's count of unresolved steps before.
 template <int N>
 ProxyFault Bdf2<N>::from_ahead(const Given& given, const V& q_tilde, std::uint64_t unresolved, ProxyTrial<N>& out,
                                ContactSet& now, bool& event) noexcept {
@@ -107,15 +107,15 @@ ProxyFault Bdf2<N>::from_ahead(const Given& given, const V& q_tilde, std::uint64
           !same_sides(contacts_from_q1, normals, contacts);
   if (event || (contacts.empty() && out.q == out.p_hat)) return ProxyFault::none;
 
-  // Behind a mesh, where another object holds in the same way, q̃ leads on behind it: an answer that differs from that
-  // from q₁ by more than a thousandth of the way must be in reach from q₁.
+  // Behind a mesh where another object holds in the same way, q̃ would lead on behind it. So if the result differs from
+  // that from q₁ by more than a thousandth of the way, it must be reachable from q₁.
   if (!((out.q - from_q1).norm() > 1e-3 * (from_q1 - given.past.q_k1).norm())) return ProxyFault::none;
   event = !in_reach(given, out);
   if (event) return ProxyFault::none;
-  return given.solve(out, q_tilde, law_period_s);  // once more: its contacts are the step's
+  return given.solve(out, q_tilde, law_period_s);  // repeated so that 𝒢's contacts are this step's
 }
 
-// Whether q₁ leads to out.q. A κ so large that no medium counts asks for that way and nothing else.
+// Whether the proxy can get from q₁ to out.q. κ is so large that no medium matters, so only the way is tested.
 template <int N>
 bool Bdf2<N>::in_reach(const Given& given, const ProxyTrial<N>& out) noexcept {
   ProxyTrial<N> way{.kappa = 1e15 * out.kappa, .p_hat = out.q, .q = out.q, .v = out.v, .f = out.f};
@@ -123,8 +123,8 @@ bool Bdf2<N>::in_reach(const Given& given, const ProxyTrial<N>& out) noexcept {
          (way.q - out.q).norm() <= 1e-9 * (1.0 + out.q.template lpNorm<1>());
 }
 
-// A step at an event or soon after one, by Euler or along the parabola; the header says which and why. `changed`: the
-// contacts have changed in the step that look_back() tried, and `now` is what they changed to.
+// A step at an event or soon after one, by Euler or along the parabola; the header tells which and why. `changed`: the
+// contacts changed in the step that look_back() tried, and `now` is what they changed to.
 template <int N>
 ProxyFault Bdf2<N>::restart(const Given& given, ProxyTrial<N>& out, ContactSet& now, bool changed) noexcept {
   const auto step = [&](ProxyFault (Bdf2::*by)(const Given&, ProxyTrial<N>&)) {
@@ -155,7 +155,7 @@ ProxyFault Bdf2<N>::restart(const Given& given, ProxyTrial<N>& out, ContactSet& 
 // One step of implicit Euler.
 //   M(v − v₁)/T + Bv + K_v(q − q_ref) = h + f,  v = (q − q₁)/T   gives
 //   κ = M/T² + B/T + K_v,   p̂ = q₁ + [M v₁/T + K_v(q_ref − q₁) + h]/κ    (B = K_v = 0: q₁ + T v₁ + T²h/M)
-// It is (26) but for v₁, which stands for (q₁ − q₂)/T there: that would be wrong by aT/2 with order 2's labels.
+// It is (26) except for v₁, which stands for (q₁ − q₂)/T there. With order 2's labels that would be wrong by aT/2.
 template <int N>
 ProxyFault Bdf2<N>::euler(const Given& given, ProxyTrial<N>& out) noexcept {
   const V& q_k1 = given.past.q_k1;
@@ -168,10 +168,11 @@ ProxyFault Bdf2<N>::euler(const Given& given, ProxyTrial<N>& out) noexcept {
   return fault;
 }
 
-// One step of constant acceleration, where nothing hits: friction sets in or lets go, or a contact ends.
+// One step of constant acceleration, for events without impact: friction sets in or lets go, or a contact ends.
 //   q = q₁ + T v₁ + T²(h + f)/(2M)   gives   κ = 2M/T²,   p̂ = q₁ + T v₁ + T²h/(2M),   and v = 2(q − q₁)/T − v₁
 // A proxy that sticks stops at most aT²/8 from where its slide would have ended, as with (26); with Euler it is aT²/2.
-// Friction stops and doesn't turn round. Not for B and K_v, which this would let ring where they are stiff.
+// Friction only stops the proxy and never reverses it. Not for B and K_v, with which this step would oscillate if they
+// are stiff.
 template <int N>
 ProxyFault Bdf2<N>::parabola(const Given& given, ProxyTrial<N>& out) noexcept {
   const V &q_k1 = given.past.q_k1, &v_k1 = given.past.v_k1;
@@ -196,8 +197,8 @@ void Bdf2<N>::set_contacts(ContactSet& set, std::span<const models::Contact<N>> 
   }
 }
 
-// Are the normals of the contacts that are in `set` within 90° of those there? A curved surface that turns by more in a
-// third of a step is an event as well.
+// Whether the normals of the contacts in `set` are within 90° of those in `normals`. A curved surface that turns by
+// more in a third of a step is an event, too.
 template <int N>
 bool Bdf2<N>::same_sides(const ContactSet& set, const std::array<V, max_contacts>& normals,
                          std::span<const models::Contact<N>> contacts) noexcept {

@@ -7,11 +7,10 @@
 //   p̂ = [M(12q₁ − 3q₂ + 2T(4v₁ − v₂))/(4T²) + (3B/2T) q̃ + K_v q_ref + h]/κ,   q = 𝒢(κ, p̂, q̃)
 //
 // Events are a contact that begins or ends, friction that sets in or lets go, a change of T, and a step for which 𝒢 has
-// no answer that keeps its laws. They are stepped with methods that need no q₂:
-// - An impact by implicit Euler: BDF2 would rebound where (26) doesn't. The velocity of that very step still holds part
-//   of the approach, so two more Euler steps follow it, which leave a clean history.
-// - The other events, without B and K_v, along the parabola of constant acceleration, and so is one more step after
-//   them.
+// no answer that keeps its laws. They are stepped by methods that don't need q₂:
+//   - An impact: by implicit Euler, since BDF2 would rebound where (26) doesn't. The velocity after this step still
+//     contains a part of the approach, so two more Euler steps follow, which leave a clean history.
+//   - The other events, without B and K_v: along the parabola of constant acceleration, as is the one step after them.
 //
 // One caller at a time; step() is for the cycle: it neither allocates, locks, throws nor prints.
 #pragma once
@@ -33,18 +32,19 @@ class Bdf2 {
  public:
   using V = models::Vec<N>;
 
-  // What M, B, K_v and T make of the equations. Precondition: `config` passes validate().
+  // Computes the coefficients from M, B, K_v and T. Precondition: `config` passes validate().
   void prepare(const AdmittanceConfig& config) noexcept;
 
-  // Begins a motion. With plain labels the history begins a period before the start; where an object lies in between,
-  // it is no free motion: `past.q_k1` moves to where 𝒢 leaves it, and the first step doesn't look further back.
+  // Begins a motion. With plain labels the history begins a period before the start. If an object lies in between, this
+  // is no free motion: `past.q_k1` moves to where 𝒢 leaves it, and the first step doesn't use earlier points.
   void start(const ProxyStart<N>& start, const ProxySolver<N>& solve, ProxyHistory<N>& past) noexcept;
 
-  // One period under the measured force h(k), into `out`. On a fault nothing has changed, and the step may be repeated.
+  // One period under the measured force h(k), into `out`. After a fault nothing has changed, and the step may be
+  // repeated.
   ProxyFault step(const ProxyHistory<N>& past, const V& h, const V& q_ref, const ProxySolver<N>& solve,
                   ProxyTrial<N>& out) noexcept;
 
-  // How many steps since start() didn't look back at q(k−2).
+  // The number of steps since start() that didn't use q(k−2).
   [[nodiscard]] std::uint64_t first_order_steps() const noexcept { return first_order_steps_; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -54,7 +54,7 @@ class Bdf2 {
  private:
   static constexpr std::size_t max_contacts = 8;
 
-  // Which objects press, where, and whether they slip: a change of it is an event.
+  // The objects that press, where they do, and whether they slip. A change of this set is an event.
   struct ContactSet {
     struct Key {
       std::int32_t object, feature;
@@ -62,9 +62,9 @@ class Bdf2 {
     };
     std::array<Key, max_contacts> keys;  // the first `count`
     std::size_t count = 0;
-    bool overflow = false;  // more than fit: never equal to anything
+    bool overflow = false;  // more contacts than fit; then never equal to another set
     bool known = true;
-    bool held = false;  // as in ProxyTrial: a 𝒢 that reports no contacts may stick all the same
+    bool held = false;  // as in ProxyTrial; a 𝒢 that reports no contacts may stick all the same
 
     void archive(fieldbus::StateArchive& state) noexcept {
       state(count, overflow, known, held);
@@ -73,7 +73,7 @@ class Bdf2 {
     }
   };
 
-  // What all the methods of a step are given.
+  // The input that all methods of a step share.
   struct Given {
     const ProxyHistory<N>& past;
     const V& h;
@@ -102,8 +102,8 @@ class Bdf2 {
   bool matched_labels_ = false;
 
   ContactSet contacts_;         // of the last step
-  int restart_steps_left_ = 0;  // first-order steps before it may look back again
-  bool after_impact_ = false;   // those by Euler
+  int restart_steps_left_ = 0;  // first-order steps to come before q(k−2) is used again
+  bool after_impact_ = false;   // these are steps by Euler
   std::uint64_t first_order_steps_ = 0;
 };
 

@@ -25,7 +25,7 @@ enum class ImpedanceLaw : std::uint8_t { plain, damped_motion, damped_tool, impl
 
 struct ImpedanceConfig {
   double stiffness_N_per_m = 750.0;  // K of the virtual coupling, > 0
-  double damping_Ns_per_m = 8.0;     // B ≥ 0; `plain` doesn't look at it
+  double damping_Ns_per_m = 8.0;     // B ≥ 0; unused by `plain`
   double period_s = 1e-3;            // T, > 0
   ImpedanceLaw law = ImpedanceLaw::implicit;
 
@@ -38,12 +38,12 @@ class ImpedanceProxy {
  public:
   using V = models::Vec<N>;
 
-  // Validates `config`. `g` is used by this proxy alone and must outlive it.
+  // Validates `config`. Precondition: `g` is used by this proxy alone and outlives it.
   ImpedanceProxy(const ImpedanceConfig& config, models::GeometricAlgorithm<N>& g) : config_(config), g_(&g) {
     config_.validate();
   }
 
-  // Tool and proxy rest at p. Returns false, and changes nothing, where p or the time isn't finite.
+  // Tool and proxy start at rest at p. If p or the time isn't finite, returns false and changes nothing.
   bool start(const V& p, double time_s = 0.0) noexcept {
     if (!p.allFinite() || !std::isfinite(time_s)) return false;
     q_k1_ = p_k1_ = p_hat_ = p;
@@ -53,7 +53,7 @@ class ImpedanceProxy {
     return true;
   }
 
-  // One period with the tool measured at p(k). On a fault nothing has changed.
+  // One period with the tool measured at p(k). After a fault nothing has changed.
   [[nodiscard]] ProxyFault step(const V& p) noexcept {
     if (!p.allFinite()) return ProxyFault::input_not_finite;
     const double K = config_.stiffness_N_per_m, B = config_.damping_Ns_per_m, T = config_.period_s;

@@ -35,7 +35,7 @@ void OrientationConfig::validate() const {
   require_option(is_not_negative(damping_Nms_per_rad), "orientation.damping", damping_Nms_per_rad,
                  "Nm s/rad, 0 or more");
   require_option(is_positive(max_speed_rad_per_s), "orientation.max_speed", max_speed_rad_per_s, "rad/s, above 0");
-  // Below π by more than a step, so that a rotation can't come round to the other side of the limit in one step.
+  // Less than π by more than a step, so that no step can jump to the other side of the limit.
   require_option(is_not_negative(max_angle_rad) && max_angle_rad <= 3.0, "orientation.max_angle", max_angle_rad,
                  "rad, from 0 to 3");
   require_option(is_positive(period_s), "--timestep", period_s, "seconds, above 0");
@@ -65,8 +65,8 @@ ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
   if (too_fast) omega *= config_.max_speed_rad_per_s / omega.norm();
   Eigen::Quaterniond R = (rotation(T * omega) * R_WT_).normalized();
 
-  // From the start: R = exp([φ]ₓ) R_start, ‖φ‖ ≤ max_angle. A step that leaves it ends on its border (the nearest
-  // orientation there is along the same axis), and the velocity is what has really been turned.
+  // With R = exp([φ]ₓ) R_start, ‖φ‖ ≤ max_angle. A step that leaves this set is projected onto its border (the nearest
+  // orientation with the same axis), and the velocity is that of the actual rotation.
   const Vec3 phi = rotation_vector(R * R_start_.conjugate());
   const bool too_far = phi.norm() > config_.max_angle_rad;
   if (too_far) {

@@ -1,16 +1,16 @@
-// What the tool's orientation does: it is held, or it turns freely with an inertia and a damping of its own.
+// The tool's orientation: it is held, or it turns freely with an inertia and a damping of its own.
 //
 //   J dω/dt + Dω = τ,  dR/dt = [ω]ₓ R     J, D scalars: a ball, so no gyroscopic terms and no preferred axis
 //   ω(k) = (J ω(k−1) + T τ(k)) / (J + T D)          implicit in D: no damping is too strong
 //   R(k) = exp([T ω(k)]ₓ) R(k−1)
-// which for small turns is (26) with B, label included: R(k) stands for t_{k+1}. Without damping a constant torque
-// gives the exact parabola of angles; with it ω settles at τ/D whatever T is.
+// For small angles this is (26) with B, its label included: R(k) is the orientation at t_{k+1}. Without damping a
+// constant torque gives the exact parabola of angles; with it ω tends to τ/D for any T.
 //
 // Two limits, neither of which depends on T: the speed, and the angle from the orientation at the start. They are sets
-// that the motion is projected onto, and what is projected becomes the history, so nothing winds up.
+// onto which the motion is projected. The projected motion becomes the history, so nothing winds up.
 //
-// Torque about the rendered point, in W. R_WT as a unit quaternion, kept unit. One caller at a time; step() is for the
-// cycle: it neither allocates, locks, throws nor prints.
+// τ is the torque about the rendered point, in W; R_WT is a quaternion that is kept unit. One caller at a time. step()
+// is for the cycle: it neither allocates, locks, throws nor prints.
 #pragma once
 
 #include <cstdint>
@@ -39,9 +39,9 @@ class OrientationProxy {
 
   // Precondition: the configuration with this period passes validate().
   void set_period(double period_s) noexcept { config_.period_s = period_s; }
-  // Rests at R. False, and nothing changes, where R isn't within 1e-6 of a unit quaternion (its norm).
+  // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing.
   bool start(const Eigen::Quaterniond& R_WT) noexcept;
-  // One period under the torque τ(k). On a fault nothing has changed.
+  // One period under the torque τ(k). After a fault nothing has changed.
   [[nodiscard]] ProxyFault step(const models::Vec3& torque_W_Nm) noexcept;
 
   [[nodiscard]] const Eigen::Quaterniond& R_WT() const noexcept { return R_WT_; }

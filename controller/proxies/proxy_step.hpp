@@ -1,5 +1,5 @@
-// What one step of a proxy is made of, whichever method computes it: its parameters, the motion that it looks back on,
-// p̂ as a weighted sum of that motion, and the question to 𝒢.
+// The parts of one step of a proxy, by whichever method it is computed: its parameters, its history, p̂ as a weighted
+// sum of that history, and the evaluation of 𝒢.
 //
 // All vectors in one frame, metres, newtons, seconds. n = 1, 2 or 3.
 #pragma once
@@ -12,7 +12,7 @@
 namespace proxarm::controller {
 
 struct AdmittanceConfig {
-  double mass_kg = 4.0;           // M of (26), > 0: what the hand feels less the handle after the sensor
+  double mass_kg = 4.0;           // M of (26), > 0: the felt mass less the handle's
   double damping_Ns_per_m = 0.0;  // B ≥ 0
   double spring_N_per_m = 0.0;    // K_v ≥ 0, towards the reference (set_reference(); at first the start position)
   double period_s = 1e-3;         // T, > 0
@@ -41,7 +41,7 @@ struct ProxyStart {
   bool contact_established = false;
 };
 
-// What a step looks back on; finite throughout.
+// The history that a step uses; finite throughout.
 template <int N>
 struct ProxyHistory {
   models::Vec<N> q_k1 = models::Vec<N>::Zero(), q_k2 = models::Vec<N>::Zero();  // q(k−1), q(k−2)
@@ -51,40 +51,40 @@ struct ProxyHistory {
   double period_k1_s = 0.0;  // time between q(k−2) and q(k−1)
 };
 
-// What M, B, K_v and T make of
+// The coefficients that follow from M, B, K_v and T:
 //   p̂ = q₁ + of_move (q₁ − q₂) + of_v1 v₁ + of_v2 v₂ + of_reference (q_ref − q₁) + compliance h
 struct ProxyRule {
   double kappa = 0.0, compliance = 0.0;  // κ, 1/κ
   double of_move = 0.0, of_v1 = 0.0, of_v2 = 0.0, of_reference = 0.0;
 
-  // With the spring K_v; the method adds what it takes of the motion.
+  // The terms of κ and of the spring K_v. The method adds its coefficients of the motion.
   static ProxyRule of(double kappa, double K_v) noexcept {
     return {.kappa = kappa, .compliance = 1.0 / kappa, .of_reference = K_v / kappa};
   }
 };
 
-// A step that has been tried: the proxy takes it over when no fault came of it.
+// The result of a step that has been tried. The proxy takes it over if there was no fault.
 template <int N>
 struct ProxyTrial {
   double kappa = 0.0;
   models::Vec<N> p_hat, q, v, f;
-  bool held = false;  // q is bit for bit where it came from although p̂ isn't
+  bool held = false;  // q is bit for bit where it came from, although p̂ isn't
 };
 
-// The question to 𝒢: q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out.
+// Evaluates q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out.
 template <int N>
 class ProxySolver {
  public:
   explicit ProxySolver(models::GeometricAlgorithm<N>& g) : g_(&g), timed_(g.wants_time()) {}
 
-  // Whether 𝒢 wants to know the time; if so, set_time() comes before each step.
+  // Whether 𝒢 depends on time; if so, set_time() must be called before each step.
   [[nodiscard]] bool timed() const noexcept { return timed_; }
-  // The time that q(k) of the step to come stands for.
+  // Sets the time label of the next q(k).
   void set_time(double time_s) noexcept { time_s_ = time_s; }
   [[nodiscard]] models::GeometricAlgorithm<N>& g() const noexcept { return *g_; }
 
-  // From trial.kappa and trial.p_hat to trial.q and trial.f. `law_period_s` is the T that 𝒢's laws of velocity take for
-  // the way from `q_previous`. The history is finite, so whatever else isn't shows in p̂.
+  // Computes trial.q and trial.f from trial.kappa and trial.p_hat. `law_period_s`: the T that 𝒢's velocity laws use for
+  // the way from `q_previous`. Precondition: the history is finite; anything else that isn't shows in p̂.
   ProxyFault operator()(ProxyTrial<N>& trial, const models::Vec<N>& q_previous, double law_period_s) const noexcept {
     if (!trial.p_hat.allFinite()) return ProxyFault::result_not_finite;
     if (timed_) g_->set_time({time_s_, law_period_s});

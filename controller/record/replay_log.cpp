@@ -13,7 +13,7 @@ using description::SetupError;
 // An upper bound of what a file may claim, far above what a cycle gets: a period of 100 ms on eight buses at 1 Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
-constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', ' ', '6'};
+constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', ' ', '7'};
 
 [[noreturn]] void cannot_write(const fs::path& file, const std::string& found) {
   throw SetupError({.file = file.string(), .found = found, .expected = "a file that can be written"});

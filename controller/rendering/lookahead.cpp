@@ -9,7 +9,7 @@ using models::Vec3;
 
 namespace {
 
-// H/T is a quotient of decimals: what lies below a whole number by rounding is that number.
+// H/T is a quotient of decimal numbers; if rounding puts it just below a whole number, that number is meant.
 constexpr double rounding_steps = 1e-9;
 
 }  // namespace
@@ -47,11 +47,11 @@ auto Lookahead<N>::operator()(const AdmittanceProxy<N>& proxy, const SceneChange
   return rest > 0.0 ? V(before + rest * (proxy_.q() - before)) : proxy_.q();
 }
 
-// What lies within reach: a plane of a border falls by its share of the way.
+// Collects the limits within reach. The bound of a border's plane falls by its share of the way towards it.
 template <int N>
 void Lookahead<N>::gather_limits(const StepLimits& limits, double reach_m) noexcept {
   ahead_.soft_count = ahead_.hard_count = ahead_.plane_count = 0;
-  double most_m = reach_m;  // in one step
+  double most_m = reach_m;  // the largest step
   for (std::size_t i = 0; i < limits.hard_count; ++i) {
     if (limits.hard[i].limit != Limit::speed) continue;
     ahead_.hard[ahead_.hard_count++] = limits.hard[i];

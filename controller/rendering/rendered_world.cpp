@@ -17,15 +17,15 @@ namespace {
 
 constexpr double rounding_m = 1e-12;  // of positions of some metres, a few operations
 
-// Where the spring of (26) pulls to: the start position, but for a while after the spring has become stiffer, and after
-// a hold.
+// The anchor of the spring of (26). It is the start position, except for a while after the spring has become stiffer
+// and after a hold.
 //
-// With q the proxy and a the anchor, K'(a' − q) = K(a − q) is the a' that leaves the force as it was when K becomes K';
-// without a spring before it is q itself. From there the anchor goes back, as a driven object goes to its place:
-//   v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: the distance that is left
-// A mass on an undamped spring swings about an anchor of constant speed v by v at most, and about one that stops by the
-// 2v that it may then have: nobody at the handle, and the proxy does 2 v_max = 0.1 m/s at most. A spring that becomes
-// softer throws nobody: its anchor stays.
+// With q the proxy and a the anchor, K'(a' − q) = K(a − q) gives the a' that keeps the force when K becomes K'. If
+// there was no spring before, a' is q itself. From a' the anchor returns, as a driven object moves to its place:
+//     v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: the distance that is left
+// A mass on an undamped spring oscillates with at most v about an anchor that moves at v, and with at most 2v after
+// that anchor has stopped. So with nobody at the handle, the proxy is no faster than 2 v_max = 0.1 m/s. A spring that
+// becomes softer throws nobody, so its anchor stays.
 template <int N>
 class SpringAnchor {
  public:
@@ -36,7 +36,7 @@ class SpringAnchor {
     home_ = at_ = home;
     speed_ = 0.0;
   }
-  // Out of a hold, which whoever held the arm may have left: the spring begins without a force.
+  // After a hold the spring begins without force, since the person may have left the handle.
   void start_again(const V& q) noexcept {
     at_ = q;
     speed_ = 0.0;
@@ -46,7 +46,7 @@ class SpringAnchor {
     at_ = q - K_before / K * (q - at_);
     speed_ = 0.0;
   }
-  // One period. True: it has moved.
+  // One period. Returns true if the anchor has moved.
   bool step(double period_s) noexcept {
     const V way = home_ - at_;
     const double distance_m = way.norm(), a = acceleration_m_per_s2;
@@ -81,7 +81,7 @@ class WorldOfDimension final : public RenderedWorld {
     space_.start(q_W);
     ProxyStart<N> start;
     start.q = space_.start();
-    // Out of a hold the scene goes on from where it stood.
+    // After a hold the scene goes on from where it stopped.
     if (started_) start.time_s = proxy_.time_s() + lead_s();
     proxy_.start(start);
     if (started_) {
@@ -96,9 +96,9 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
   Vec3 resume(const Vec3& q_W, const Vec3& v_W) noexcept override {
-    // One step of 𝒢 goes as far as the scene lets it, for any κ. From outside of all objects it leads nearer to what is
-    // wanted. From inside of one, where limits made the contact give way, 𝒢 leads out at once, however far that is;
-    // then the wanted place is taken instead.
+    // One evaluation of 𝒢 goes as far as the scene allows, for any κ. From outside of all objects this leads nearer to
+    // the wanted place. From inside of one, where limits made the contact give way, 𝒢 leads out at once, however far
+    // that is; then the wanted place is taken instead.
     const Vec<N> wanted = space_.from_W(q_W), v = space_.basis().transpose() * v_W;
     if (!wanted.allFinite() || !v.allFinite()) return last_.q_W;
     ProxyStart<N> start;
@@ -171,9 +171,10 @@ class WorldOfDimension final : public RenderedWorld {
  private:
   [[nodiscard]] double lead_s() const noexcept { return proxy_.config().order == 2 ? proxy_.config().period_s : 0.0; }
 
-  // A start that the scene doesn't let be, some micrometres off a guide or inside of a wall, is left at rest: 𝒢 of the
-  // place itself is where the proxy starts, with q(k−2) = q(k−1). As a step of (26) the same way would be a velocity,
-  // 21 µm in a millisecond. False: there was nothing to settle. What limits don't let go in one step takes several.
+  // If the scene doesn't allow the start position (some micrometres off a guide, or inside of a wall), the proxy starts
+  // at rest at 𝒢 of that position, with q(k−2) = q(k−1). As a step of (26) the same displacement would be a velocity:
+  // 21 µm in a millisecond. Returns false if there was nothing to settle. If limits hold the proxy back, settling takes
+  // several steps.
   bool settle() noexcept {
     unsettled_ = false;
     const Vec<N> before = proxy_.q();
@@ -220,12 +221,12 @@ class WorldOfDimension final : public RenderedWorld {
   SceneSpace<N> space_;
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
-  std::unique_ptr<Lookahead<N>> ahead_;  // none: looks no further than the proxy
+  std::unique_ptr<Lookahead<N>> ahead_;  // null: without lookahead
   SpringAnchor<N> anchor_;
   WorldStep last_;
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0;
   bool started_ = false;
-  bool unsettled_ = false;  // it may stand where the scene doesn't let it be
+  bool unsettled_ = false;  // the proxy may be where the scene doesn't allow it
 };
 
 }  // namespace

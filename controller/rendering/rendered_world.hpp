@@ -1,8 +1,8 @@
 // The proxy and its scene as the cycle sees them: a force in W goes in, the tool's next position in W comes out.
 //
-// The scene has n = 1, 2 or 3 dimensions; its space is o + U x with x in n coordinates and U an orthonormal 3×n basis.
-// The part of the start position that lies off that space is kept as it is: nothing jumps, and the proxy moves along
-// the line or plane through the start.
+// The scene has n = 1, 2 or 3 dimensions. Its space is o + U x, with x in n coordinates and U an orthonormal 3×n basis.
+// The component of the start position outside of that space is kept, so nothing jumps, and the proxy moves along the
+// line or plane through the start.
 //
 //   x = Uᵀ(q_W − o),   h = Uᵀ h_W,   q_W = q_start + U (x − x_start)
 #pragma once
@@ -22,7 +22,7 @@
 
 namespace proxarm::controller {
 
-// What one step of the proxy did; all in W.
+// The result of one step of the proxy; all in W.
 struct WorldStep {
   struct Contact {
     models::Vec3 normal_W = models::Vec3::Zero();
@@ -30,24 +30,24 @@ struct WorldStep {
     double friction = 0.0;
   };
   models::Vec3 q_W = models::Vec3::Zero();      // the new proxy
-  models::Vec3 p_hat_W = models::Vec3::Zero();  // p̂: where it would have gone without a world
-  models::Vec3 f_W = models::Vec3::Zero();      // the world's force on it, (25a)
+  models::Vec3 p_hat_W = models::Vec3::Zero();  // p̂: the proxy's position without a world
+  models::Vec3 f_W = models::Vec3::Zero();      // the world's force on the proxy, (25a)
   models::Vec3 v_W = models::Vec3::Zero();
   models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
   std::int32_t object = -1;                      // of the first contact, by its index in the scene; −1 when free
   double friction = 0.0;                         // its μ
-  std::array<Contact, 2> others;                 // that press beside it
+  std::array<Contact, 2> others;                 // further contacts that press
   int contacts = 0;
   bool slips = false;
   ActiveLimits limits;                                // that held the proxy back
-  bool soft_limits_met = true;                        // leash and power
-  models::Vec3 limit_force_W = models::Vec3::Zero();  // of the limits on the proxy; f_W is without it
+  bool soft_limits_met = true;                        // whether leash and power were satisfied
+  models::Vec3 limit_force_W = models::Vec3::Zero();  // the limits' force on the proxy; not in f_W
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // M and B of this step
-  bool settled = false;  // the start was moved to where the scene lets it be; it rests there
+  bool settled = false;  // the start was moved to where the scene allows it; the proxy rests there
   ProxyFault fault = ProxyFault::none;
 };
 
-// The contacts of a step, their normals turned to W by the scene's basis.
+// Adds the contacts of a step, with their normals turned to W by the scene's basis.
 template <int N>
 void add_contacts(WorldStep& step, std::span<const models::Contact<N>> contacts,
                   const Eigen::Matrix<double, 3, N>& basis) noexcept {
@@ -70,29 +70,30 @@ class RenderedWorld {
   RenderedWorld& operator=(const RenderedWorld&) = delete;
   virtual ~RenderedWorld() = default;
 
-  // Sets the proxy to rest at q_W; the spring, where there is one, pulls to it. Where an object or a guide doesn't let
-  // it be there, the first steps take it to where it may be, at rest, and heed no force.
+  // Sets the proxy to rest at q_W, and the spring's anchor, if there is a spring, to the same place. If an object or a
+  // guide doesn't allow the proxy there, the first steps move it to where it may be, at rest, and ignore the force.
   virtual void start(const models::Vec3& q_W) noexcept = 0;
   // One period under the hand's force, within these limits. q_W of the result is always finite; after a fault it is
   // that of the step before.
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
-  // Where the proxy will be `horizon_s` after its last step, which was of this force and within these limits, if the
-  // force stays (lookahead.hpp). The proxy itself, in a world that isn't made for looking ahead.
+  // Where the proxy will be `horizon_s` after its last step if the force stays (lookahead.hpp). Precondition: that step
+  // was made with the same force and limits. A world without lookahead returns the proxy itself.
   virtual models::Vec3 look_ahead(const models::Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept = 0;
-  // The arm couldn't follow: the proxy goes on with this velocity from the place nearest to q_W that the scene's
+  // The arm couldn't follow: the proxy goes on with this velocity, from the place nearest to q_W that the scene's
   // objects let it reach. Returns that place.
   virtual models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept = 0;
-  // Acts from the next step on. Position and velocity stay, so nothing jumps; a value out of range changes nothing.
+  // Takes effect with the next step. Position and velocity stay, so nothing jumps. A value out of range changes
+  // nothing.
   virtual void set(const Change& change) noexcept = 0;
-  // T of the steps to come. Precondition: the proxy is at rest. Moving objects don't jump, but their last step was of
-  // the other period.
+  // The period of the steps to come. Precondition: the proxy is at rest. Moving objects don't jump, but their last step
+  // had the old period.
   virtual void set_period(double period_s) noexcept = 0;
-  // Adds damping to the user's, from the next step on (passivity.hpp).
+  // Adds damping to the user's from the next step on (passivity.hpp).
   virtual void add_damping(double damping_Ns_per_m) noexcept = 0;
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 };
 
-// `proxy_mass_kg` is what is left of the wanted mass after the tool behind the sensor. The scene must outlive the
+// `proxy_mass_kg`: the wanted mass less that of the tool behind the sensor. Precondition: the scene outlives the
 // result.
 std::unique_ptr<RenderedWorld> make_rendered_world(scenes::CompiledScene& scene, const SessionSettings& settings,
                                                    double proxy_mass_kg);

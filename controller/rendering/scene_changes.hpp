@@ -1,12 +1,12 @@
-// Objects of a scene whose friction and place change while it is touched, without a step in either.
+// Changes of friction and place of a scene's objects while it is touched, without a discontinuity in either.
 //
-// An object that is driven (scenes::Motion::driven) moves straight to where it is wanted, at most at speed_m_per_s and
-// with acceleration_m_per_s2, and so sweeps what is in its way like any object that moves:
+// A driven object (scenes::Motion::driven) moves straight to where it is wanted, at speed_m_per_s and
+// acceleration_m_per_s2 at most. It sweeps what is in its way, as any moving object does:
 //   v(k) = min(v(k−1) + aT, v_max, √(2 a d))        d: the distance that is left
-// √(2ad) is the speed from which braking at a ends within d; the last step ends on the spot.
-// μ changes by at most friction_per_s, so that a proxy that slides feels no step of force.
+// √(2ad) is the speed from which braking at a ends within d. The last step ends exactly at the place. μ changes by at
+// most friction_per_s, so that a sliding proxy feels no step of force.
 //
-// set() and step() neither allocate, lock nor throw. With nothing under way, step() looks at one number.
+// set() and step() neither allocate, lock nor throw. If nothing is under way, step() only tests one number.
 #pragma once
 
 #include <cstdint>
@@ -23,22 +23,22 @@ class SceneChanges {
  public:
   static constexpr double speed_m_per_s = 0.1, acceleration_m_per_s2 = 0.5, friction_per_s = 1.0;
 
-  // The scene must outlive it.
+  // Precondition: the scene outlives this object.
   SceneChanges(scenes::CompiledScene& scene, double period_s);
 
-  // Takes Parameter::friction of an object with friction and Parameter::position of one that is driven; anything else
+  // Takes Parameter::friction of an object with friction, and Parameter::position of a driven one. Anything else
   // changes nothing.
   void set(const Change& change) noexcept;
   void set_period(double period_s) noexcept { period_s_ = period_s; }
-  // Called before each step of the proxy.
+  // Precondition: called before each step of the proxy.
   void step() noexcept;
 
-  // Goes on from where `other` is, in a scene of its own, compiled from the same file.
+  // Takes over the state of `other`, in a scene of its own that was compiled from the same file.
   void follow(const SceneChanges& other) noexcept;
 
-  // The present μ of an object, by its index in the scene; 0 where there is no such object.
+  // The present μ of an object, by its index in the scene; 0 if there is no such object.
   [[nodiscard]] double friction(std::int32_t object) const noexcept;
-  // How far an object is now from where the scene describes it, m.
+  // An object's present displacement from where the scene describes it, m.
   [[nodiscard]] models::Vec3 position_m(std::int32_t object) const noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept;

@@ -1,4 +1,4 @@
-// What a session renders, apart from the cell and the scene: what a user may set on the command line.
+// What a session renders, as far as the command line sets it, apart from the cell and the scene.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@ enum class OrientationMode : std::uint8_t {
 
 enum class Scheme : std::uint8_t {
   admittance,  // (26): force in, positions out
-  impedance,   // (23): position in, torques out; for a light device that can be driven back
+  impedance,   // (23): position in, torques out; for a light device that a hand can drive back
 };
 
 enum class Passivity : std::uint8_t {
   off,
-  observe,    // energies and oscillations are found (passivity.hpp)
-  automatic,  // and damping is added against oscillations that last,
-  on,         // or against any at once
+  observe,    // energies are computed and oscillations detected (passivity.hpp)
+  automatic,  // besides, damping is added against oscillations that last
+  on,         // damping is added against any oscillation at once
 };
 
 struct SessionSettings {
@@ -27,30 +27,30 @@ struct SessionSettings {
   double coupling_stiffness_N_per_m = 750.0;  // impedance type: K and B of the virtual coupling
   double coupling_damping_Ns_per_m = 8.0;
   double period_s = 1e-3;         // T, the timestep of the cycle
-  double receive_window = 0.45;   // of T, in which feedback and samples are taken; in what is left setpoints leave
+  double receive_window = 0.45;   // share of T in which feedback and samples are received
   double mass_kg = 4.0;           // what the hand feels, tool behind the sensor included
   double damping_Ns_per_m = 0.0;  // B, virtual damping against the world at rest
   double spring_N_per_m = 0.0;    // K_v, to the start position
   int order = 1;                  // 1: (26); 2: BDF2 (bdf2.hpp)
-  bool looks_ahead = false;       // the arm is sent to where the proxy is going to be (lookahead.hpp)
-  double horizon_s = 0.0;         // H, so far ahead
+  bool looks_ahead = false;       // the arm is sent to a predicted position of the proxy (lookahead.hpp)
+  double horizon_s = 0.0;         // H, the lookahead's horizon
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
-  double force_age_s = 0.0;  // how old the sensor's readings are when they come, for the passivity
+  double force_age_s = 0.0;  // the age of the sensor's readings on arrival, for the passivity observer
   double rotational_inertia_kg_m2 = 0.05;
   double rotational_damping_Nms_per_rad = 0.5;
 
-  double tare_s = 0.2;         // how long the sensor is averaged at rest before rendering
-  double tare_spread_N = 5.0;  // a reading that far from the mean means a hand on the handle
+  double tare_s = 0.2;         // how long readings at rest are averaged before rendering
+  double tare_spread_N = 5.0;  // a reading that differs from the mean by this much means that a hand is on the handle
   double enable_timeout_s = 5.0;
-  double enabling_timeout_s = 60.0;      // for the enabling input to be let go and pressed
+  double enabling_timeout_s = 60.0;      // for the enabling input to be released and pressed
   double wait_after_fault_s = 0.0;       // how long a stop by a fault waits for a reset before the session ends
-  bool without_enabling_input = false;   // the cell's is left out
+  bool without_enabling_input = false;   // the cell's enabling input isn't used
   std::uint32_t max_missed_samples = 3;  // cycles in a row without a complete sensor sample
-  // How many samples in a row may have exactly the reading of the one before, in all six gauges; 0: any number. With a
-  // noise of half a count (standard deviation) per gauge, a sample repeats the last one with probability
-  // 0.49⁶ = 0.013, and 20 in a row have a probability of 0.013²⁰ = 3e-38. With 0.2 counts it is 5e-14, once in 600
-  // years at 1 kHz. A quieter sensor needs more.
+  // How many samples in a row may have exactly the reading of the one before, in all six gauges; 0: any number. If the
+  // noise of each gauge has a standard deviation of half a count, a sample repeats the last one with probability 0.49⁶
+  // = 0.013, and 20 in a row have a probability of 0.013²⁰ = 3e-38. With 0.2 counts this becomes 5e-14, once in 600
+  // years at 1 kHz. A quieter sensor needs a larger number.
   std::uint32_t max_repeated_samples = 20;
   std::uint32_t max_missed_feedback = 3;  // cycles in a row without a drive's TPDO
   std::uint32_t max_overruns = 5;         // late cycles in a row

@@ -1,12 +1,12 @@
 // Impedance-type rendering of a scene by the device's own drives: the tool's position goes in, joint torques come out.
 //
 //   τ = τ_g(φ) + s Jᵀ f
-// φ: the links' angles; τ_g: what holds the device up against gravity; J: translations of T; f: the force of (23) on
-// the hand, in W. s ≤ 1 is the largest share with which no joint is asked for more than its max_torque_Nm. A rendered
-// force that is too large for the joints keeps its direction and loses size; τ_g is never cut.
+// φ: the links' angles; τ_g: torques that hold the device against gravity; J: the Jacobian of T's translation; f: the
+// force of (23) on the hand, in W. s ≤ 1 is the largest share with which no joint exceeds its max_torque_Nm. A rendered
+// force that is too large for the joints keeps its direction and is scaled down; τ_g is never reduced.
 //
-// The tool is rendered as a point: joint motion that only turns it is carried against gravity and otherwise free. In a
-// scene of one or two dimensions a spring of K and B holds the tool on the line or plane through the start.
+// The tool is rendered as a point: joint motion that only turns it is free, apart from the compensation of gravity. In
+// a scene of one or two dimensions, a spring of K and B holds the tool on the line or plane through the start.
 //
 // Delay: the torque for the position sampled at SYNC k is latched at k + 1 and acts for a period. With a wall's whole
 // K and B on a device of mass m at its tip, the loop is x(k) → u(k+1) = −K x(k) − B ∇x(k)/T:
@@ -29,7 +29,7 @@ namespace proxarm::controller {
 struct TorqueStep {
   models::JointVector torque_Nm;
   WorldStep world;      // f_W: the objects' force; p_hat_W and q_W as in (23)
-  ActiveLimits limits;  // the world's, and joint_torque
+  ActiveLimits limits;  // those of the world, and joint_torque
 };
 
 class TorqueRendering {
@@ -39,24 +39,24 @@ class TorqueRendering {
   TorqueRendering& operator=(const TorqueRendering&) = delete;
   virtual ~TorqueRendering() = default;
 
-  // One of the next two is called in each cycle, with φ as measured. hold() renders nothing: a spring of K and B holds
-  // the tool where it was at the last anchor(). Neither throws or allocates.
+  // Precondition: in each cycle, either hold() or step() is called with φ as measured. hold() renders nothing: a spring
+  // of K and B holds the tool where it was at the last anchor(). Neither throws nor allocates.
   virtual void anchor(const models::JointVector& link_rad) noexcept = 0;
   virtual const TorqueStep& hold(const models::JointVector& link_rad) noexcept = 0;
-  // From here on, at rest.
+  // Starts rendering here, at rest.
   virtual void start(const models::JointVector& link_rad) noexcept = 0;
   virtual const TorqueStep& step(const models::JointVector& link_rad) noexcept = 0;
 
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
 };
 
-// Scene and arm must outlive the result. Throws SetupError where the coupling's figures can't be.
+// Precondition: scene and arm outlive the result. Throws SetupError for a virtual coupling with invalid figures.
 std::unique_ptr<TorqueRendering> make_torque_rendering(scenes::CompiledScene& scene, const models::Arm& arm,
                                                        const std::vector<description::DriveDescription>& drives,
                                                        const description::CellLimits& limits,
                                                        const ImpedanceConfig& config);
 
-// The spectral radius of a wall's K and B with a free mass, see above.
+// The spectral radius of a wall's K and B with a free mass, see the head of this file.
 [[nodiscard]] double coupling_spectral_radius(const ImpedanceConfig& config, double mass_kg);
 
 }  // namespace proxarm::controller

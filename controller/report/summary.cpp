@@ -5,6 +5,7 @@
 #include <deque>
 #include <string_view>
 
+#include "controller/record/flag_words.hpp"
 #include "controller/record/setpoint_hash.hpp"
 #include "controller/report/apparent_mass.hpp"
 
@@ -93,6 +94,7 @@ struct SummaryBuilder::State {
   explicit State(const SummaryConfig& c) : config(c), apparent(c.period_s), period_ns(std::llround(1e9 * c.period_s)) {}
 
   void count(const CycleRecord& record);
+  void count_limit(const std::string& parameter, RecordFlag flag, const CycleRecord& record);
   void track(const CycleRecord& record);
   void observe(const CycleRecord& record);
   void follow_changes(const CycleRecord& record);
@@ -164,13 +166,20 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
   if (record.has(RecordFlag::hands_off)) summary.hands_off_s += 1e-9 * static_cast<double>(record.period_ns);
   if (limited(record)) ++summary.limited_cycles;
-  if (record.has(RecordFlag::limit_orientation)) ++summary.active_limits["orientation"];
+  if (record.has(RecordFlag::limit_orientation)) count_limit("orientation", RecordFlag::limit_orientation, record);
   for (const LimitFlag& flag : limit_flags) {
     if (record.has(flag.flag)) {
-      ++summary.active_limits[parameter_name(flag.limit, record.limited_axes, config.axis_names)];
+      count_limit(parameter_name(flag.limit, record.limited_axes, config.axis_names), flag.flag, record);
     }
   }
   if (record.has(RecordFlag::truth)) summary.from_truth = true;
+}
+
+void SummaryBuilder::State::count_limit(const std::string& parameter, RecordFlag flag, const CycleRecord& record) {
+  LimitSummary& limit = summary.active_limits[parameter];
+  if (limit.cycles == 0) limit = {.first_s = seconds(record.time_ns), .words = words_of(flag)};
+  ++limit.cycles;
+  limit.time_s += seconds(period_ns);
 }
 
 // A mass, damping or spring set while rendering counts from then on; the wanted mass is the last one.

@@ -65,10 +65,10 @@ struct EndSummary {
   std::string text;
 };
 
-// An order of the script that did nothing.
+// An order or a change ("set mass=6") of the script that did nothing.
 struct OrderSummary {
   std::string order;
-  double time_s = 0.0;  // after the first cycle
+  double time_s = 0.0;  // after the first cycle; of a change: of rendering
   std::string refused;  // why
 };
 
@@ -91,6 +91,13 @@ struct ViewSummary {
   std::uint16_t port = 0;
   std::size_t most_viewers = 0;
   bool may_change = false;  // with --view-control
+};
+
+// A limit or guard that acted.
+struct LimitSummary {
+  std::uint64_t cycles = 0;
+  double time_s = 0.0, first_s = 0.0;  // after the first cycle
+  std::string words;                   // what that was
 };
 
 struct ComputeTime {
@@ -148,9 +155,9 @@ struct Summary {
   std::optional<double> friction_ratio_error;
   double pulling_force_max_N = 0.0;
   double contact_time_s = 0.0, sliding_time_s = 0.0;
-  std::uint64_t contacts = 0;                          // how often the proxy came to touch
-  std::uint64_t limited_cycles = 0;                    // some limit was active
-  std::map<std::string, std::uint64_t> active_limits;  // cycles by the parameter that holds the limit
+  std::uint64_t contacts = 0;                         // how often the proxy came to touch
+  std::uint64_t limited_cycles = 0;                   // some limit was active
+  std::map<std::string, LimitSummary> active_limits;  // by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
   std::optional<Oscillation> oscillation;  // the longest; absent: not looked for
   double lookahead_s = 0.0;                // horizon at the start; 0: none

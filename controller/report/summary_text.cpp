@@ -116,7 +116,15 @@ void add_repeatable(Json& json, const Summary& s) {
   json["contacts"] = s.contacts;
   json["limited_cycles"] = s.limited_cycles;
   json["active_limits"] = Json::object();
-  for (const auto& [parameter, cycles] : s.active_limits) json["active_limits"][parameter] = cycles;
+  json["limits"] = Json::array();
+  for (const auto& [parameter, limit] : s.active_limits) {
+    json["active_limits"][parameter] = limit.cycles;
+    json["limits"].push_back({{"limit", parameter},
+                              {"what", limit.words},
+                              {"first_s", limit.first_s},
+                              {"time_s", limit.time_s},
+                              {"cycles", limit.cycles}});
+  }
   json["lookahead_s"] = s.lookahead_s;
   json["oscillation"] = oscillation(s.oscillation);
   json["passivity"] = passivity(s.passivity);
@@ -289,8 +297,10 @@ void tell_oscillation(const Summary& s, Lines& line) {
 // What kept the motion back, and the energy that went through it.
 void tell_limits(const Summary& s, Lines& line) {
   if (s.limited_cycles > 0) line("limits active", std::to_string(s.limited_cycles) + " cycles");
-  for (const auto& [parameter, cycles] : s.active_limits)
-    line("", parameter + ": " + std::to_string(cycles) + " cycles");
+  for (const auto& [parameter, limit] : s.active_limits) {
+    line("", parameter + ": " + std::to_string(limit.cycles) + " cycles");
+    line("", format("  %.3g s, ", limit.time_s) + format("first at %.3f s: ", limit.first_s) + limit.words);
+  }
   if (s.passivity) {
     const PortEnergies& e = s.passivity->energies_J;
     line("energy", format("hand to tool %.3g J, ", e.hand) + format("hand to proxy %.3g J, ", e.proxy) +

@@ -1,18 +1,18 @@
-// Motor setpoints that move the links, through gears that give, where the proxy wants them.
+// Motor setpoints that move the links through elastic gears to where the proxy wants them.
 //
-// Encoders sit on the motors, so a drive that follows exactly leaves the links ringing at the arm's elastic modes
-// (8–20 Hz, hardly damped). What moves after the force sensor then feeds that motion back as force, and below a few
-// kilograms of felt mass the loop is unstable: with a mass m_h after the sensor and a delay L, a mode ω of damping ζ
-// needs m_h/M < 2ζ/(ω L). So the setpoints are made from the arm's model instead:
+// Encoders sit on the motors, so a drive that follows its setpoints exactly leaves the links oscillating at the arm's
+// elastic modes (8–20 Hz, hardly damped). Masses after the force sensor then feed that motion back as force, and below
+// a few kilograms of felt mass M the loop is unstable: with a mass m_h after the sensor and a delay L, a mode ω of
+// damping ζ is stable only for m_h/M < 2ζ/(ω L). So the setpoints are made from the arm's model instead:
 //
 //   q̈_f = ω²(q − q_f) − 2ω q̇_f                     a critically damped filter of the links' wanted angles q
 //   θ = q_f + K⁻¹[M(q_f) q̈_f + τ_g(q_f)]            motor angles whose gears carry just that acceleration and gravity
 //
-// Links that obey the model follow q_f without ringing and, at a wall, without overshoot; the price is a delay of 2/ω,
-// which the stability check counts. Coriolis torques are left out: at 0.5 m/s they bend the gears by some micrometres.
-// The hand's wrench isn't compensated: its reaction on the wrist, where the hand's mass is of the links' own size,
-// comes back too late and was found to make contact with a wall chatter. The filter is exact for a q that holds still
-// over the period. bandwidth_Hz = 0 leaves it out, and only gravity is compensated.
+// Links that obey the model follow q_f without oscillation and, at a wall, without overshoot. The price is a delay of
+// 2/ω, which the stability check includes. Coriolis torques are left out: at 0.5 m/s they bend the gears by some
+// micrometres. The hand's wrench isn't compensated either. Its reaction on the wrist, where the hand's mass is as large
+// as the links', would come back too late, and made contact with a wall chatter. The filter is exact if q is constant
+// over the period. bandwidth_Hz = 0 disables it; then only gravity is compensated.
 //
 // Neither allocates, locks nor throws after construction.
 #pragma once
@@ -24,19 +24,19 @@ namespace proxarm::controller {
 
 class ElasticSetpoint {
  public:
-  // `arm` must outlive this.
+  // Precondition: `arm` outlives this object.
   ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s);
 
   void set_period(double period_s) noexcept;
   // Starts at rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
-  // Goes on from the motors' angles and speeds; whatever wound up in the filter is gone. The links' speed is taken to
-  // be the motors': the gears' part of it is left out.
+  // Goes on from the motors' angles and speeds, and discards what the filter had accumulated. The links are taken to be
+  // as fast as the motors; the speed of the gears' twist is neglected.
   void resume(const models::JointVector& motor_rad, const models::JointVector& motor_rad_per_s) noexcept;
-  // One period towards these angles of the links; returns the motors' setpoints.
+  // One period towards these angles of the links. Returns the motors' setpoints.
   models::JointVector step(const models::JointVector& link_rad) noexcept;
 
-  // Where the links are meant to be now, and how fast.
+  // The links' angles and speeds as they are commanded now.
   [[nodiscard]] const models::JointVector& link_rad() const noexcept { return angle_rad_; }
   [[nodiscard]] const models::JointVector& link_rad_per_s() const noexcept { return speed_rad_per_s_; }
   // How far the filter's input is ahead of its output at a constant speed: 2/ω, in seconds; 0 without a filter.

@@ -9,10 +9,11 @@ using models::JointVector;
 
 namespace {
 
-// Rounding of a double angle is some 1e-16 rad, of an acceleration made of three of them 1e-9 rad/s² at 1 kHz.
+// A double angle is rounded to some 1e-16 rad. An acceleration computed from three of them is off by 1e-9 rad/s² at 1
+// kHz.
 constexpr double lag_tolerance_rad = 1e-13;
 
-// c(d) of the header, 0 for a border that is crossed already.
+// c(d) of the header; 0 if the bound is crossed already.
 double approach_speed(double distance, double a, double T) noexcept {
   if (!(distance > 0.0)) return 0.0;
   return 2.0 * distance / (T + std::sqrt(T * T + 2.0 * distance / a));
@@ -54,7 +55,7 @@ ActiveLimits JointGuard::step(const JointVector& wanted_rad) noexcept {
     }
     const double u =
         choose_speed(joint, wanted_u, lag, theta, speed_rad_per_s_[i], active, static_cast<std::uint8_t>(1u << i));
-    // A setpoint that passes unchanged is the same to the bit.
+    // A wanted setpoint that no limit touches is passed on to the bit.
     target_rad_[i] = u == wanted_u && std::abs(lag) <= lag_tolerance_rad ? wanted : theta + u * T;
     speed_rad_per_s_[i] = u;
     wanted_k1_rad_[i] = wanted;
@@ -74,7 +75,7 @@ double JointGuard::choose_speed(const Joint& joint, double wanted_u, double lag,
   cap(-joint.speed_rad_per_s, joint.speed_rad_per_s, Limit::joint_speed);
   cap(-approach_speed(theta - joint.lower_rad, a, T), approach_speed(joint.upper_rad - theta, a, T),
       Limit::joint_range);
-  // The range comes last; it contradicts the others by rounding at most.
+  // Comes after the range, and so has the last word; the two contradict each other by rounding at most.
   cap(u_k1 - a * T, u_k1 + a * T, Limit::joint_acceleration);
   if (std::abs(lag) > lag_tolerance_rad && active.kinds == 0) active.set(Limit::joint_acceleration, bit);
   return u;

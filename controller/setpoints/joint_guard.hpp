@@ -1,13 +1,13 @@
-// No setpoint ever exceeds its joint's range, speed or acceleration, whatever is wanted. The tool's guard
+// Keeps each setpoint within its joint's range, speed and acceleration, whatever is wanted. The tool's guard
 // (tool_guard.hpp) comes after it, keeps the same bounds of the joints, and has the last word.
 //
 // Per joint, with θ₁ and u₁ the last setpoint and its speed, T the period, a and v the joint's limits:
 //   |u − u₁| ≤ aT,   |u| ≤ v,   u ≤ c(θ_max − θ₁),   −u ≤ c(θ₁ − θ_min),   θ = θ₁ + uT
 //   c(d) = −aT + √(a²T² + 2ad): the fastest approach from which braking at a ends within d
-// These never contradict each other: with Tu + u²/(2a) ≤ d, braking (u' = u − aT) keeps Tu' + u'²/(2a) ≤ d − Tu.
+// These bounds never contradict each other: if Tu + u²/(2a) ≤ d, braking (u' = u − aT) keeps Tu' + u'²/(2a) ≤ d − Tu.
 //
-// A wanted setpoint within all of these passes unchanged. Otherwise the setpoint lags, and catches up time-optimally:
-// with the speed of what is wanted, plus c(lag) towards it. Neither allocates, locks nor throws.
+// A wanted setpoint within all of these bounds passes unchanged. Otherwise the setpoint lags and catches up
+// time-optimally: with the speed of the wanted setpoint, plus c(lag) towards it. Neither allocates, locks nor throws.
 #pragma once
 
 #include <cstdint>
@@ -27,16 +27,16 @@ class JointGuard {
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Starts at rest at these angles.
   void start(const models::JointVector& target_rad) noexcept;
-  // One period. An angle that isn't finite is replaced by the last setpoint. Returns the limits that held something
-  // back.
+  // One period. An angle that isn't finite is replaced by the last setpoint. Returns the limits that were active.
   ActiveLimits step(const models::JointVector& wanted_rad) noexcept;
-  // Another guard's last word on this period's setpoints, within each joint's speed and acceleration.
+  // Takes over what another guard has made of this period's setpoints. Precondition: they are within each joint's speed
+  // and acceleration.
   void settle(const models::JointVector& target_rad, const models::JointVector& speed_rad_per_s) noexcept {
     target_rad_ = target_rad;
     speed_rad_per_s_ = speed_rad_per_s;
   }
-  // Forgets what was wanted so far: no lag is left to catch up. Not of the joints in `but_not`, as bits: those are on
-  // their way to somewhere, and brake ahead of it.
+  // Drops the lag: setpoints go on from where they are. The joints in `but_not` (bits) keep their target, since they
+  // are on their way to it and brake before it.
   void follow_from_here(std::uint8_t but_not = 0) noexcept;
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }

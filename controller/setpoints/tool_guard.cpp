@@ -12,35 +12,37 @@ using models::Vec3;
 
 namespace {
 
-// A thousandth of a share of the way is 0.5 µm at 0.5 m/s and 1 ms.
+// 2⁻¹⁰ of a step is 0.5 µm at 0.5 m/s and 1 ms.
 constexpr int bisections = 10;
-// The gears' twist follows from the links' angles and those from the twist: each round leaves a fiftieth of what it was
-// off. One round from the twist extrapolated is off by 2e-8 rad at most accelerations, three rounds from it at the end
-// of the longest braking way by 1e-6 rad.
+// Fixed-point iteration: the gears' twist follows from the links' angles, and these from the twist. Each round reduces
+// the error fifty times. One round from the extrapolated twist leaves at most 2e-8 rad at usual accelerations; three
+// rounds from it leave 1e-6 rad at the end of the longest braking distance.
 constexpr int quick_rounds = 1, exact_rounds = 3;
-// Of the speed limits, what is let through: drives overshoot by up to 7 % where the guard holds them back, and the arm
-// is to stay within 5 %. The quick judgement leaves what is close to the exact one.
+// The share of the speed limits that passes. Drives overshoot by up to 7 % where the guard acts, and the arm must stay
+// within 5 % of its limit. The quick test is stricter and leaves cases close to the limit to the exact one.
 constexpr double exact_share = 0.97, quick_share = 0.968, quick_way_m = 1e-4;
 // Rounding of positions.
 constexpr double touching_m = 1e-10;
-// A tool that the limits of the proxy stop at a border has gears that twist while it brakes, and so setpoints beyond it
-// by some micrometres: the guard keeps off what keeps itself. A fifth of the 0.1 mm that are promised; more of it would
-// be felt as a border that gives way, less as one that holds twice.
+// While the proxy's limits stop the tool at a border, its gears twist, and setpoints reach some micrometres beyond the
+// border. The guard tolerates this much, so that it doesn't act where the proxy's limits do. It is a fifth of the 0.1
+// mm that are promised. With more, the border would feel soft; with less, it would be felt twice.
 constexpr double twist_m = 2e-5;
-// Arcs may reach beyond a border that their ends keep to: half of the 0.1 mm that are promised.
+// The path between two points on the right side of a border may bulge beyond it by half of the 0.1 mm that are
+// promised.
 constexpr double bulge_m = 5e-5;
-// Of a speed that the tool is slowed to for now: its motors are faster for a moment, where their gears are bent (by up
-// to 1.42 where an arm that was let go in contact begins to move, and more at order 2).
+// Applies while the tool is slowed down temporarily. Motors whose gears are bent may then be faster for a moment: up to
+// 1.42 times when an arm that was released in contact begins to move, and more at order 2.
 constexpr double slowed_share = 1.8;
-// The fifth joint's place, where an arm's wrist has its centre.
+// The index of the fifth joint, where an arm's wrist has its centre.
 constexpr std::size_t wrist = 4;
-// Near the end of its reach or above its base an arm folds and is flat. At the start of the default cell and around it,
-// where hands are led and scenes stand, the former is below 2 and the latter above 0.58.
+// Thresholds of folds() and of stretched(): near the end of its reach or above its base, an arm exceeds the first or
+// falls below the second. Around the start pose of the default cell, where hands lead the tool and scenes stand, the
+// first quantity is below 2 and the second above 0.58.
 constexpr double folding = 2.5, flat = 0.5;
-// Of the cell's acceleration limit: see the header.
+// Times the cell's acceleration limit; the header says why.
 constexpr double acceleration_share = 2.0;
 
-// The highest speed on the way to rest, from the speed V of the last period; B is its growth (header).
+// The bound of the header for the speed on the way to rest: V is the speed of the last period, B its growth.
 double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
 
 double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept {
@@ -52,14 +54,14 @@ double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept 
   return depth;
 }
 
-// How deep in a box gears may twist a setpoint: in a thin one no more than a quarter of it.
+// How deep in a keep-out box the gears' twist may put a setpoint; in a thin box, at most a quarter of its thickness.
 double twist_in(const description::BoxDescription& box) noexcept {
   double thinnest = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < 3; ++k) thinnest = std::min(thinnest, box.max_m[k] - box.min_m[k]);
   return std::min(twist_m, 0.25 * thinnest);
 }
 
-// Whether the segment has a point deeper than that in the box made larger by `more`.
+// Whether the segment enters the box, enlarged by `more`, deeper than twist_in().
 bool crosses(const Vec3& from, const Vec3& to, const description::BoxDescription& box, double more) noexcept {
   double enters = 0.0, leaves = 1.0;
   const double twist = twist_in(box);
@@ -103,7 +105,7 @@ ToolGuard::ToolGuard(const models::Arm& arm, const std::vector<description::Driv
 void ToolGuard::start(const JointVector& target_rad) noexcept {
   target_rad_ = target_rad;
   speed_rad_per_s_ = JointVector::Zero(target_rad.size());
-  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer, and all are archived
+  points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer joints, and all are archived
   arm_->points(arm_->link_from_motor(target_rad), points_);
   twist_k2_rad_ = points_.twist_rad;
   steps_.fill(Vec3::Zero());
@@ -113,7 +115,7 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
 
 ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s) noexcept {
   ActiveLimits active;
-  // Where the tool is slowed, so is the elbow.
+  // If the tool is slowed down, the elbow is, too.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
   torques_.step();
   const Speeds limit{std::min(share * limits_.max_tool_speed_m_per_s, torques_.eased_m_per_s()),
@@ -128,7 +130,7 @@ ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_p
   return active;
 }
 
-// The gears' twist goes on as it did in the last period, to begin with.
+// The iteration starts from the twist that is extrapolated from the last two periods.
 void ToolGuard::evaluate(const JointVector& theta, int rounds, ArmPoints& out) const noexcept {
   JointVector twist = 2.0 * points_.twist_rad - twist_k2_rad_;
   for (int round = 0; round < rounds; ++round) {
@@ -146,7 +148,7 @@ double ToolGuard::bend(const JointVector& d) const noexcept {
   return size.dot(curvature_ * size);
 }
 
-// The sum of (1 − kT/t)uT over the periods k = 1 … t/T.
+// The braking distance: the sum of (1 − kT/t)uT over the periods k = 1 … t/T.
 JointVector ToolGuard::braking_way(const JointVector& u, double t) const noexcept {
   const double T = period_s_, steps = std::floor(t / T);
   if (steps < 1.0) return JointVector::Zero(u.size());
@@ -158,7 +160,7 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
   ActiveLimits out;
   const double T = period_s_;
   const JointVector u = (theta - target_rad_) / T;
-  const double t = stop_s(u), curvature = bend(u);  // of the path, m/s²
+  const double t = stop_s(u), curvature = bend(u);  // the path's second derivative in time, m/s²
   const JointVector way = braking_way(u, t);
   torques_.judge(u, speed_rad_per_s_, out);
   judge_ranges(theta + way, out);
@@ -241,9 +243,9 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   evaluate(wanted, exact_rounds, at);
   out = broken(wanted, at, limit, Care::exact);
   if (out.kinds == 0) return accept(wanted, at);
-  // In other poses a setpoint that is held back isn't followed by others that are.
+  // Only in these poses is a setpoint that is held back followed by others that are.
   if (torques_.strained() || folds() || stretched()) torques_.strain();
-  // With torques, what a braking takes depends on the pose: it goes on as it was judged.
+  // With rated torques, the braking time depends on the pose. Braking goes on as it was judged.
   const double T = period_s_, t = torques_.rated() ? brakes_for_s_ : stop_s(speed_rad_per_s_);
   const JointVector brakes = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
   JointVector best = brakes;
@@ -267,7 +269,7 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   if (out.has(Limit::joint_torque)) torques_.ease_from(steps_[0].norm() / T / exact_share);
 }
 
-// The joints that carry the arm turn faster than the tool's own speed explains.
+// Whether the arm folds: the joints that carry it turn faster than the tool's speed explains.
 bool ToolGuard::folds() const noexcept {
   const auto base = std::min(first_joint, static_cast<std::size_t>(speed_rad_per_s_.size())) - 1;
   const double reach_m = (points_.tool_W - points_.joint_W[base]).norm();
@@ -276,8 +278,8 @@ bool ToolGuard::folds() const noexcept {
   return reach_m * fastest * period_s_ > folding * steps_[0].norm();
 }
 
-// They move the wrist in nearly one plane: the volume that the directions of their motions span, 1 where they are at
-// right angles, is small.
+// Whether the arm is stretched: these joints move the wrist in nearly one plane. Then the determinant of the unit
+// directions of their motions, whose size is 1 for right angles, is small.
 bool ToolGuard::stretched() const noexcept {
   const auto axes = static_cast<std::size_t>(target_rad_.size());
   if (axes < 3) return true;

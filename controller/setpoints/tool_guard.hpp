@@ -1,30 +1,32 @@
-// The last word on where and how fast the tool is told to go, whatever joints, singularities and layers above make of
-// it.
+// The last limit on where and how fast the tool is commanded, whatever joints, singularities and the stages before have
+// made of it.
 //
-// A setpoint θ stands for where the arm is when it rests there, its gears twisted by gravity alone: θ = q + K⁻¹τ_g(q).
-// With p(θ) the place of T, or of one of the joints from the third on (elbow and wrist), by exact kinematics of each
-// setpoint, never by a Jacobian:
-//   speed         |p(θ) − p(θ₁)| ≤ vT, v = limits.max_tool_speed_m_per_s of T, max_elbow_speed_m_per_s of the joints
-//
-//   acceleration  |p(θ) − 2p(θ₁) + p(θ₂)| ≤ 2aT² where it gets faster, a = limits.max_tool_acceleration_m_per_s2
-//
-//   borders       T within limits.workspace_m and out of limits.keep_out_m, and on the way between two setpoints
+// A setpoint θ stands for the arm at rest there, with its gears twisted by gravity alone: θ = q + K⁻¹τ_g(q). Let p(θ)
+// be the position of T, or of a joint from the third on (elbow and wrist), by the exact kinematics of each setpoint and
+// not by a Jacobian. The bounds are
+//   speed         |p(θ) − p(θ₁)| ≤ vT, with v = limits.max_tool_speed_m_per_s for T and max_elbow_speed_m_per_s for
+//                 joints
+//   acceleration  |p(θ) − 2p(θ₁) + p(θ₂)| ≤ 2aT² while p gets faster, with a = limits.max_tool_acceleration_m_per_s2
+//   borders       T within limits.workspace_m and outside of limits.keep_out_m, also between two setpoints
 //   ranges        of the joints
-// and all of it (but the acceleration) on the way to rest, too: from θ, with the speed u = (θ − θ₁)/T, all joints brake
-// together along u, the one that takes longest at its own deceleration:
+//
+// Except for the acceleration, these bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T,
+// all joints brake together along u, in the time t that the slowest needs at its own deceleration:
 //   θ_b = θ + (1 − T/t)uT and so on,   t = max_i |u_i|/a_i
-// or longer, where the cell rates the drives' torques (torque_guard.hpp), which bound the way from θ₁ to θ as well.
-// Such a braking never has to be judged when it is needed: it was, when the setpoint before was let through. So where
-// what is wanted breaks a bound, the setpoint lies on the straight line (in the joints) from θ_b to what is wanted, as
-// far along as bisection finds all bounds kept; θ_b itself always keeps them, by induction from rest.
+// If the cell rates the drives' torques (torque_guard.hpp), braking may take longer, and the step from θ₁ to θ is
+// bounded, too. When such a braking is needed it doesn't have to be judged, because this was done when the setpoint
+// before it was accepted. So if a wanted setpoint breaks a bound, bisection finds the setpoint furthest along the
+// straight line (in joint space) from θ_b to the wanted one that keeps all bounds. θ_b itself always keeps them, by
+// induction from rest.
 //
-// How the way to rest is judged without walking it. With C of Arm::path_curvature(), at a share y of the time t it
-// takes, p is no faster than (1 − y)(V + yB),  V = |p(θ) − p(θ₁)|/T,  B = t |u|ᵀC|u|: V where B ≤ V, (V + B)²/4B else.
-// And it bends by no more than |D|ᵀC|D|/8 from the chord, D the way to rest.
+// The way to rest is judged by bounds of the path, without evaluating points on it. With C of Arm::path_curvature(), V
+// = |p(θ) − p(θ₁)|/T and B = t |u|ᵀC|u|, the speed of p after the share y of the time t is at most (1 − y)(V + yB). Its
+// maximum is V if B ≤ V, and (V + B)²/4B otherwise. The path deviates from its chord by at most |D|ᵀC|D|/8, D being the
+// way to rest in joint space.
 //
-// What is wanted passes unchanged, to the bit, where no bound is touched. Whoever starts outside of a border may move,
-// but not further out. The acceleration counts twice its limit: motors must accelerate more than the links that they
-// bend their gears for, by up to a quarter in ordinary contact. Neither allocates, locks nor throws.
+// A wanted setpoint that touches no bound is passed on to the bit. An arm that starts outside of a border may move, but
+// not further out. The bound of the acceleration is twice its limit, because motors must accelerate more than the links
+// while they bend their gears: by up to a quarter in ordinary contact. Neither allocates, locks nor throws.
 #pragma once
 
 #include <array>
@@ -40,34 +42,36 @@ namespace proxarm::controller {
 
 class ToolGuard {
  public:
-  // `arm` must outlive this.
+  // Precondition: `arm` outlives this object.
   ToolGuard(const models::Arm& arm, const std::vector<description::DriveDescription>& drives,
             const description::CellLimits& limits, double period_s);
 
-  // Precondition: at rest.
+  // Precondition: the arm is at rest.
   void set_period(double period_s) noexcept {
     period_s_ = period_s;
     torques_.set_period(period_s);
   }
-  // At rest there.
+  // Starts at rest at these angles.
   void start(const models::JointVector& target_rad) noexcept;
-  // One period. Precondition: `wanted_rad` is finite and within each joint's own limits (JointGuard). `max_speed`: of
-  // T, where it is lower than the cell's for now. Returns what held something back.
+  // One period. Precondition: `wanted_rad` is finite and within each joint's own limits (JointGuard).
+  // `max_speed_m_per_s`: the tool's present speed limit, if it is lower than the cell's. Returns the limits that were
+  // active.
   ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;
 
-  // The arm is at the end of its reach: what is wanted may be cut from cycle to cycle (torque_guard.hpp).
+  // Precondition: the arm is at the end of its reach, where setpoints may be held back from cycle to cycle
+  // (torque_guard.hpp).
   void strain() noexcept { torques_.strain(); }
-  // A drive is blocked: what its setpoints ask for isn't what it takes to move the arm.
+  // A drive is blocked, so the torques of its setpoints aren't those that move the arm.
   void relax() noexcept { torques_.relax(); }
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
-  // Where the arm rests at the last setpoint.
+  // The arm's points at rest at the last setpoint.
   [[nodiscard]] const models::ArmPoints& points() const noexcept { return points_; }
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
-  static constexpr std::size_t first_joint = 2;  // of those whose speed is limited; the first two hardly move
+  static constexpr std::size_t first_joint = 2;  // the first whose speed is limited; the two before it hardly move
   using Steps = std::array<models::Vec3, 1 + models::max_axes>;
 
   enum class Care : std::uint8_t { quick, exact };
@@ -103,7 +107,7 @@ class ToolGuard {
   models::JointVector target_rad_, speed_rad_per_s_, twist_k2_rad_;
   models::ArmPoints points_;   // at target_rad_
   Steps steps_{};              // of the points, in the last period
-  double brakes_for_s_ = 0.0;  // as long as the braking that was judged when target_rad_ was let through
+  double brakes_for_s_ = 0.0;  // the duration of the braking that was judged with target_rad_
 };
 
 }  // namespace proxarm::controller

@@ -10,16 +10,18 @@ using models::JointVector;
 
 namespace {
 
-// Of a drive's torque, what a single setpoint may ask for. Friction (3 % in the default cell), the motors' way ahead of
-// the links that they bend their gears for, and the hand's pull (200 N at 1.5 m: 12 %) take a quarter. The rest is for
-// the gears: a torque that comes or goes within a period has them swing by twice what it bends them. With 0.75 the
-// steel of the default cell did up to 1.32 times its limit for that, 9 of 64 pulls above 1.05.
+// The share of a drive's torque that a single setpoint may ask for. A quarter is taken by friction (3 % in the default
+// cell), by the motors' extra motion while they bend their gears, and by the hand's pull (200 N at 1.5 m: 12 %). The
+// rest is left for the gears: a torque that steps within a period makes them overshoot to twice their static twist.
+// With 0.75, the default cell's simulated arm exceeded its limit by up to 1.32 times; 9 of 64 pulls exceeded 1.05
+// times.
 constexpr double strained_share = 0.4;
-// Of it, what is left for accelerations at least: an arm that its own weight overloads must still be brought to rest.
+// The least part of that share that is left for acceleration: an arm that its own weight overloads must still be
+// stopped.
 constexpr double least_share = 0.1;
-// A gear's swing at full stretch takes 0.1 s: after that it has settled or is no more.
+// A gear's oscillation at full stretch has a period of 0.1 s; after that it has decayed.
 constexpr double strain_s = 0.1;
-// b/ω of the header is 16 mm/s at the 10 Hz of full stretch: a thirtieth of the default cell's limit.
+// The overshoot b/ω of the header is 16 mm/s at the 10 Hz of full stretch: a thirtieth of the default cell's limit.
 constexpr double eased_m_per_s2 = 1.0;
 
 }  // namespace

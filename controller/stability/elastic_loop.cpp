@@ -20,7 +20,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 3, 1>;  // in the tool's space
 
-// exp(A) by Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22, squared s times.
+// exp(A) by scaling and squaring: Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22,
+// squared s times.
 MatrixXd exponential(MatrixXd A) {
   const double norm = A.cwiseAbs().rowwise().sum().maxCoeff();
   const int squarings = std::max(0, static_cast<int>(std::ceil(std::log2(norm))) + 1);
@@ -42,7 +43,7 @@ std::array<double, 5> proxy_polynomial(int order, double M, double BT, double KT
   return {M + BT + KTT, -2.0 * M - BT, M, 0.0, 0.0};
 }
 
-// Of the arm's first mode; what a gear that is rigid rings with, far above all that a loop does.
+// The damping ratio of the arm's first mode, and the frequency that a rigid gear is given: far above all others here.
 constexpr double ringing = 0.03, rigid_Hz = 300.0;
 
 }  // namespace
@@ -51,7 +52,7 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
   constexpr double pi = std::numbers::pi;
   models::ToolKinematics kinematics;
   arm.kinematics(pose_rad, kinematics);
-  // Off that space a proxy would be a free mass that no hand moves: neither stable nor there.
+  // Outside of that space a proxy would be a free mass that no hand moves: neither stable nor real.
   const models::ToolSpace space = models::tool_space(arm);
   const auto U = space.axes.leftCols(space.dimensions);
   ElasticArm out{.mass = arm.link_mass_matrix(pose_rad),
@@ -76,11 +77,10 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
 
 std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
                                      const std::vector<models::Vec3>& offsets_W) {
-  constexpr double step_m =
-      0.005;  // no joint turns by the inverse kinematics' 0.01 rad on that, away from singularities
+  constexpr double step_m = 0.005;  // away from singularities, this turns no joint by the inverse kinematics' 0.01 rad
   constexpr double apart_m = 0.05;
   constexpr std::size_t most_poses = 16;
-  const models::InverseKinematics inverse(arm);  // refuses what moves no tool
+  const models::InverseKinematics inverse(arm);  // throws for an arm that can't move the tool
   std::vector<ElasticArm> arms{elastic_arm(arm, arm.start_rad(), cell)};
   const models::Pose start = arm.tool_pose(arm.start_rad());
   models::InverseKinematicsResult solution;
@@ -108,8 +108,8 @@ std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::
   return arms;
 }
 
-// Where things stand in the state of a period's begin: the plant's [φ, φ̇, θ], the two last setpoints, four proxies,
-// the filter's x_f and ẋ_f, and the forces that were read.
+// The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, four proxies, the
+// filter's x_f and ẋ_f, and the forces that were read.
 struct ElasticLoop::State {
   Index n, d, ages;
   [[nodiscard]] Index plant() const { return 0; }
@@ -132,7 +132,8 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
       matched_labels_(loop.matched_labels),
       joints_(arm.stiffness.size()),
       dimensions_(arm.jacobian.rows()) {
-  // Of a quotient of decimals; the newest force, one older to interpolate with, one for order 2's labels.
+  // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and one
+  // for the labels of order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + 2;
   twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
   make_plant(hand);
@@ -144,7 +145,7 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
   force_.middleCols(joints_, joints_) -= hand.damping_Ns_per_m * J;
 }
 
-// ż = A z of z = [φ, φ̇, θ, r, ṙ], with ṙ constant; leaves φ̈'s rows in force_.
+// ż = A z for z = [φ, φ̇, θ, r, ṙ] with ṙ constant. Leaves the rows of φ̈ in force_.
 void ElasticLoop::make_plant(const HandModel& hand) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
@@ -155,7 +156,7 @@ void ElasticLoop::make_plant(const HandModel& hand) {
   const MatrixXd one = MatrixXd::Identity(n, n);
   block(0, 1) = one;
   block(3, 4) = one;
-  // θ̇ = (r − θ)/τ; without a lag θ is r, and so is its speed.
+  // θ̇ = (r − θ)/τ. Without a lag, θ is r and has its speed.
   const bool lags = time_constant_s_ > 0.0;
   if (lags) {
     block(2, 2) = -one / time_constant_s_;
@@ -175,17 +176,18 @@ void ElasticLoop::make_plant(const HandModel& hand) {
 
 Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_}.size(); }
 
-// One period, from before the reading of the sensor to before the next.
+// One period, from just before one reading of the sensor to just before the next.
 void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
   const State at{n, d, ages_};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
-  // The force now, by the slope that the setpoints have had in the period before: θ and r meet at its end.
+  // The present force follows from the slope of the setpoints in the period before, at whose end θ and r meet.
   VectorXd z = VectorXd::Zero(5 * n);
   z.head(3 * n) = state.head(3 * n);
-  if (!(time_constant_s_ > 0.0)) z.segment(2 * n, n) = old_sent;  // else a difference of both would stay for ever
+  if (!(time_constant_s_ > 0.0))
+    z.segment(2 * n, n) = old_sent;  // otherwise a difference between θ and r would never decay
   z.segment(3 * n, n) = old_sent;
   z.tail(n) = (last_sent - old_sent) / T;
   const Place h_now = force_ * z;
@@ -205,7 +207,7 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   q /= a[0];
   const Place p = q + horizon_s_ / T * (q - state.segment(at.proxies(), d));
 
-  // As in ElasticSetpoint::step.
+  // As in ElasticSetpoint::step().
   Place x = p, v = Place::Zero(d), acceleration = Place::Zero(d);
   if (arm_.filter_s > 0.0) {
     const double omega = 1.0 / arm_.filter_s, decay = std::exp(-omega * T);

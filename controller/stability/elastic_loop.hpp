@@ -1,21 +1,21 @@
-// The loop of stability.hpp with the arm as it is: links that swing on their gears, and a hand that swings with them.
+// The loop of stability.hpp with an elastic arm: links that oscillate on their gears, together with the hand.
 //
-// What the rigid loop leaves out is what makes light proxies swing: a hand of some mass upon gears of 8 to 20 Hz. Its
-// inertia pushes the sensor in time with the gears' mode, the proxy yields to that, and the motors feed the mode. So
-// small deviations about a pose are taken, with φ the links' angles, θ the motors', x = J φ the tool's place:
+// The rigid loop neglects what makes light proxies oscillate: the hand's mass on gears of 8 to 20 Hz. Its inertia
+// pushes the sensor in phase with the gears' mode, the proxy yields to that force, and the motors drive the mode. This
+// model is linearised about a pose, with φ the links' angles, θ the motors', and x = J φ the tool's position:
 //   links     (M + m_h JᵀJ) φ̈ = k(θ − φ) + d(θ̇ − φ̇) − Jᵀ(K_h J φ + D_h J φ̇)          in continuous time
 //   motors    θ̇ = (r − θ)/τ, with r on a straight line from one setpoint to the next, a period later (τ = 0: θ = r)
 //   sensor    h = −K_h x − D_h ẋ − (m_h + m_t) ẍ                                        m_t, m_h: handle and hand
 //   proxy     A(w) q = w^(age/T) h                                                     as in stability.hpp
 //   sent to   p = q + (H/T)(q − q₁)                                                    with lookahead
 //   filter    x_f of p, critically damped; θ_sent = G x_f + k⁻¹ M G ẍ_f                 (elastic_setpoint.hpp)
-// G = ∂(joint angles)/∂(tool place), orientation held. M has handle and tool in it. Over a period the continuous part
-// is exact, by its matrix exponential; all of it together is one linear map from period to period, whose largest
-// eigenvalue tells. For six joints that is a matrix of some 45 rows.
+// G = ∂(joint angles)/∂(tool position), orientation held. M includes handle and tool. Over a period the continuous part
+// is integrated exactly, by its matrix exponential. Together this is one linear map from period to period, whose
+// largest eigenvalue decides on stability. For six joints it is a matrix of some 45 rows.
 //
-// What it doesn't know: friction in the gears, which helps; backlash; limits; poses other than its own.
+// Not modelled: friction in the gears, which helps; backlash; limits; other poses.
 //
-// For set-up: takes some milliseconds a mass, allocates, never runs in the cycle.
+// For set-up: takes some milliseconds per mass, allocates, never runs in the cycle.
 #pragma once
 
 #include <Eigen/Core>
@@ -29,30 +29,30 @@ namespace proxarm::controller {
 struct HandModel;
 struct LoopModel;
 
-// An arm in a pose, its joints in the order of the drives; what the controller takes it for.
+// An arm in a pose, with its joints in the order of the drives, as the controller models it.
 struct ElasticArm {
   Eigen::MatrixXd mass;                // M of the links and the tool, joint by joint
-  Eigen::MatrixXd jacobian;            // J, a row for each dimension of the tool's space: of its place
-  Eigen::MatrixXd joints_per_m;        // G, a column for each of them
+  Eigen::MatrixXd jacobian;            // J of the tool's position: a row for each dimension of its space
+  Eigen::MatrixXd joints_per_m;        // G: a column for each of these dimensions
   Eigen::VectorXd stiffness, damping;  // k > 0 and d ≥ 0 of each gear
   double filter_s = 0.0;               // 1/ω of the setpoints' filter; 0: none
 };
 
-// Gears of no stiffness are rigid. Where a drive doesn't say its gear's damping, gears ring with 0.03 of the critical
-// damping in the arm's first mode: little, since what is left out must not make a loop seem stable.
+// Gears without a stiffness are rigid. If a drive doesn't tell its gear's damping, gears have 0.03 of the critical
+// damping in the arm's first mode. This is little, because unmodelled effects must not make a loop seem stable.
 ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell);
 
-// At the start, and where the tool is led from there, one place after the other; as far as the arm gets. Modes change
-// with the pose: the default cell's smallest stable mass by a third on 0.3 m. Places within 50 mm of another are left
-// out, and so is what comes after the sixteenth.
+// The arm at the start, and at the places to which the tool is led from there, one after the other, as far as it gets.
+// Modes change with the pose: over 0.3 m, the default cell's smallest stable mass changes by a third. Places within 50
+// mm of another one are left out, and so are those after the sixteenth.
 std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
                                      const std::vector<models::Vec3>& offsets_W);
 
 class ElasticLoop {
  public:
-  // `loop.delay_s` has the filter's 2/ω and the period that a setpoint needs to be reached, as everywhere.
+  // `loop.delay_s` includes the filter's 2/ω and the period in which a setpoint is reached, as everywhere.
   ElasticLoop(const ElasticArm& arm, const HandModel& hand, const LoopModel& loop);
-  // The largest |z|; stable below 1. M is the proxy's, > 0.
+  // The largest |z|; the loop is stable below 1. M is the proxy's, > 0.
   [[nodiscard]] double spectral_radius(double proxy_mass_kg) const;
 
  private:
@@ -66,10 +66,10 @@ class ElasticLoop {
   double force_age_periods_;
   int order_;
   bool matched_labels_;
-  Eigen::MatrixXd plant_;                    // [φ, φ̇, θ, r, ṙ] over a period
-  Eigen::MatrixXd force_;                    // h of [φ, φ̇, θ, r, ṙ]
+  Eigen::MatrixXd plant_;                    // the map of [φ, φ̇, θ, r, ṙ] over a period
+  Eigen::MatrixXd force_;                    // h from [φ, φ̇, θ, r, ṙ]
   Eigen::MatrixXd twist_;                    // k⁻¹ M G
-  Eigen::Index joints_, dimensions_, ages_;  // n, those of the tool's space, and how many old forces are kept
+  Eigen::Index joints_, dimensions_, ages_;  // number of joints n, of tool dimensions, and of old forces that are kept
 };
 
 }  // namespace proxarm::controller

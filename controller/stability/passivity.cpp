@@ -10,12 +10,12 @@ using models::Vec3;
 
 namespace {
 
-// Of ⟨x̃²⟩, beside its largest: of an oscillation that lasts, and of one that is over.
+// Relative to the largest ⟨x̃²⟩: the least for an oscillation that lasts, and the bound below which it is over.
 constexpr double kept_share = 0.5, died_away = 1.0 / 16.0;
 
 }  // namespace
 
-// s = (2/T)(1 − z⁻¹)/(1 + z⁻¹) in the all-pass, with c = 2τ/T:
+// Bilinear transform of the all-pass: s = (2/T)(1 − z⁻¹)/(1 + z⁻¹), with c = 2τ/T:
 //   a₀ = c² + 6c + 12,   a₁ = (24 − 2c²)/a₀,   a₂ = (c² − 6c + 12)/a₀
 void PassivityObserver::Delay::design(double delay_s, double period_s) noexcept {
   const double c = 2.0 * delay_s / period_s;
@@ -33,7 +33,7 @@ Vec3 PassivityObserver::Delay::step(const Vec3& in) noexcept {
   return out;
 }
 
-// Bilinear transform, prewarped so that the corner stays in place: Ω = tan(π f T), and per section, of quality Q,
+// Bilinear transform, prewarped so that the corner frequency is kept: Ω = tan(π f T), and per section, of quality Q,
 //   H(z) = (1 − z⁻¹)²/(1 + Ω/Q + Ω²) / (1 + a₁z⁻¹ + a₂z⁻²)
 void PassivityObserver::HighPass::design(double corner_Hz, double period_s) noexcept {
   const double pi = std::numbers::pi, omega = std::tan(pi * corner_Hz * period_s);
@@ -93,7 +93,7 @@ void PassivityObserver::start(const Vec3& tool_W) noexcept {
 }
 
 double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noexcept {
-  if (!h_W.allFinite() || !tool_W.allFinite()) return added_;  // a fault follows; the state here stays finite
+  if (!h_W.allFinite() || !tool_W.allFinite()) return added_;  // a fault follows; the observer's state stays finite
   h_k1_ = h_;
   h_ = h_W;
   const Vec3 step = delay_.step(tool_W - tool_k1_), velocity = step / period_s_;
@@ -140,7 +140,7 @@ bool PassivityObserver::lasts() const noexcept {
   return 2.0 * square_ >= config_.felt_m * config_.felt_m || spell_.lasted_s >= config_.small_lasting_s;
 }
 
-// `begins`: a further oscillation.
+// `begins`: another oscillation begins.
 void PassivityObserver::follow_damping(bool begins) noexcept {
   const double felt = felt_damping_Ns_per_m();
   const bool acts = damping_ == Damping::at_once || remembered_s_ > 0.0;

@@ -3,14 +3,14 @@
 
 namespace proxarm::controller {
 
-// J, since rendering began.
+// Energies in J, since rendering began.
 struct PortEnergies {
   double hand = 0.0;     // W_h
   double proxy = 0.0;    // W_p
   double world = 0.0;    // W_w
   double kinetic = 0.0;  // ½Mv² of the proxy, now
-  double damping = 0.0;  // Σ T B v², the virtual damping's, added or not
-  double added = 0.0;    // the share of B_a in it
+  double damping = 0.0;  // Σ T B v²: dissipated by the virtual damping, B_a included
+  double added = 0.0;    // the share of B_a in that
 };
 
 }  // namespace proxarm::controller

@@ -39,9 +39,9 @@ Polynomial operator+(Polynomial a, const Polynomial& b) {
   return a;
 }
 
-// w^n for n ≥ 0, which needn't be whole.
+// w^n for n ≥ 0, which needn't be an integer.
 Polynomial delay(double periods) {
-  // L/T is a quotient of decimals: what lies below a whole number by rounding is that number.
+  // L/T is a quotient of decimal numbers; if rounding puts it just below a whole number, that number is meant.
   const double whole = std::floor(periods + 1e-9), rest = std::max(0.0, periods - whole);
   Polynomial w(static_cast<std::size_t>(whole) + 2, 0.0);
   w[static_cast<std::size_t>(whole)] = 1.0 - rest;
@@ -50,7 +50,7 @@ Polynomial delay(double periods) {
   return w;
 }
 
-// C(w) = M X(w) + Y(w), multiplied by T² so that the coefficients are of one size.
+// C(w) = M X(w) + Y(w), times T² so that the coefficients have similar sizes.
 struct Loop {
   Polynomial X, Y;
 };
@@ -75,7 +75,7 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   return {lag * (derivative * derivative), lag * (B * T * damper + Polynomial{loop.spring_N_per_m * T * T}) + force};
 }
 
-// Written out, since the product of std::complex looks for NaN each time, which would take most of a sweep.
+// Written out, because std::complex tests each product for NaN, which would take most of a sweep's time.
 Complex evaluate(const Polynomial& p, Complex w) {
   double re = 0.0, im = 0.0;
   for (std::size_t i = p.size(); i-- > 0;) {
@@ -86,7 +86,7 @@ Complex evaluate(const Polynomial& p, Complex w) {
   return {re, im};
 }
 
-// Roots z = 1/w of C, as eigenvalues of the companion matrix of zⁿ C(1/z).
+// The roots z = 1/w of C, as eigenvalues of the companion matrix of zⁿ C(1/z).
 double spectral_radius(const Loop& loop, double M) {
   Polynomial c = M * loop.X + loop.Y;
   while (c.size() > 1 && c.back() == 0.0) c.pop_back();
@@ -102,7 +102,7 @@ double spectral_radius(const Loop& loop, double M) {
 
 Complex on_circle(double theta) { return std::polar(1.0, -theta); }
 
-// Im(−Y/X) up to a positive factor: where it changes sign, a real mass puts a root at exp(jθ).
+// Im(−Y/X) up to a positive factor. Where it changes sign, a real mass puts a root at exp(jθ).
 double imaginary_part(const Loop& loop, double theta) {
   const Complex w = on_circle(theta);
   return (-evaluate(loop.Y, w) * std::conj(evaluate(loop.X, w))).imag();
@@ -113,11 +113,11 @@ double mass_at(const Loop& loop, double theta) {
   return (-evaluate(loop.Y, w) / evaluate(loop.X, w)).real();
 }
 
-// All masses in (0, max] that put a root on the unit circle, in falling order.
+// All masses in (0, max] that put a root on the unit circle, in descending order.
 std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   constexpr double pi = std::numbers::pi;
-  // The grid of θ has 200 points a decade at its lower end, since the slow roots of a large mass lie at θ = T√(K/M),
-  // and at its upper end at least 40 points for each turn of w^n over the circle.
+  // The grid of θ has 200 points per decade at its lower end, since the slow roots of a large mass are at θ = T√(K/M).
+  // At its upper end it has at least 40 points for each turn of w^n around the circle.
   std::vector<double> grid;
   for (int i = 0; i <= 1200; ++i) grid.push_back(0.1 * std::pow(10.0, (i - 1200) / 200.0));
   const std::size_t even = 40 * std::max<std::size_t>(loop.Y.size(), 25);
@@ -144,8 +144,8 @@ std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   return masses;
 }
 
-// In all poses. Held against the simulated arm the loops' smallest masses are off by −8 to 15 %: a twentieth more is
-// asked for.
+// The loops in all poses. Compared with the simulated arm, their smallest stable masses are off by −8 to 15 %, so a
+// twentieth more is asked for.
 class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop) {
@@ -166,12 +166,12 @@ class ElasticLoops {
   std::vector<ElasticLoop> loops_;
 };
 
-// Beyond, gears don't matter: the hand's mass is too little of the proxy's. Nor could rounding tell the slowest modes'
-// eigenvalues from 1, of which a proxy has two that are close.
+// Above this mass the gears don't matter, since the hand's mass is too small beside the proxy's. Besides, rounding
+// couldn't tell the eigenvalues of the slowest modes from 1; a proxy has two that are close to it.
 constexpr double heaviest_on_gears_kg = 50.0;
 
-// The same where only eigenvalues tell: from the top down until a mass isn't stable, then by halving the last step. An
-// interval of unstable masses that is narrower than a step, between stable ones, isn't seen.
+// The same if only eigenvalues decide: masses are tried from the top down until one isn't stable, and the last step is
+// then bisected. Unstable masses between stable ones aren't seen if their interval is narrower than a step.
 std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mass_kg) {
   constexpr double step = 1.4, close_enough = 1.002, least_kg = 1e-3;
   if (!loop.stable(max_mass_kg)) return std::nullopt;
@@ -187,7 +187,7 @@ std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mas
   return high;
 }
 
-// Rounded up to two digits.
+// Rounds up to two significant digits.
 double round_up(double mass_kg) {
   const double unit = std::pow(10.0, std::floor(std::log10(mass_kg)) - 1.0);
   return std::ceil(mass_kg / unit * (1.0 + 1e-9)) * unit;
@@ -217,7 +217,7 @@ std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopMode
   }
   const Loop loop = make_loop(hand, model);
   if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
-  // Goes from the top down and ends at the first interval that isn't stable.
+  // Goes from the top down and ends at the first interval of masses that aren't stable.
   double smallest = max_mass_kg;
   std::vector<double> edges = critical_masses(loop, max_mass_kg);
   edges.push_back(least_mass_kg);
@@ -283,7 +283,7 @@ void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopM
                            text(" (drives: %.3g ms)", 1e3 * loop.drive_time_constant_s);
   const auto smallest = smallest_stable_mass(hand, loop);
   if (!smallest) {
-    // B + D_h > K_h L is what no mass replaces.
+    // For B + D_h ≤ K_h L no mass helps.
     refuse("a loop that some mass makes stable; " + grip + " none does",
            "add --damping, or shorten the delay by a smaller --timestep (--force-unstable overrides, in simulation)");
   }

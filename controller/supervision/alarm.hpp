@@ -1,4 +1,4 @@
-// Where every part of the cycle says what is wrong: dates it and hands it to the supervisor.
+// The way on which every part of the cycle reports a fault: it is dated and given to the supervisor.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ namespace proxarm::controller {
 
 class Alarm {
  public:
-  // Both must outlive this.
+  // Precondition: both outlive this object.
   Alarm(Supervisor& supervisor, const std::uint64_t& cycle) noexcept : supervisor_(supervisor), cycle_(cycle) {}
 
   // `where`: drive index, bus index, or −1 for the sensor and the controller itself (FaultReport).
@@ -18,7 +18,7 @@ class Alarm {
     if (supervisor_.reaction(fault) == Reaction::hold) state_.hold_raised = true;
     supervisor_.raise({fault, where, cycle_, value, limit});
   }
-  // Whether a fault that holds the arm was raised since the last call.
+  // Whether a fault with the reaction `hold` was raised since the last call.
   [[nodiscard]] bool take_hold() noexcept {
     const bool raised = state_.hold_raised;
     state_.hold_raised = false;

@@ -1,5 +1,5 @@
-// What a person may ask of a session that runs, besides its end. Commands go from any thread into the cycle, or come
-// from a script.
+// Orders that a person may give to a running session, besides ending it. Commands enter the cycle from another thread
+// or from a script.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@ namespace proxarm::controller {
 enum class Order : std::uint8_t {
   none,
   hold,      // rendering: a controlled stop, drives stay enabled. Freeing: ends it
-  resume,    // out of a hold: rendering goes on, the force let in over ramp_in_s
-  release,   // out of a hold: the arm follows the hand slowly, without the scene
-  back_off,  // out of a hold: the tool moves `value` metres along the last contact's normal
+  resume,    // from a hold: rendering goes on; the force is let in over ramp_in_s
+  release,   // from a hold: the arm follows the hand slowly, without the scene
+  back_off,  // from a hold: the tool moves `value` metres along the last contact's normal
   reset,     // after a fault: the drives are enabled again, into a hold
 };
 

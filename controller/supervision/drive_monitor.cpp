@@ -12,7 +12,8 @@ namespace {
 
 constexpr double behind_share = 0.5;  // of following_error_rad
 constexpr double forgetting = 0.05;
-constexpr int fewest_cycles = 5;  // in which a drive is away: one of them may be a frame that came late
+constexpr double passing_s = 0.05;  // half a period of 10 Hz: what waits for a joint that stands swings at 15 to 20 Hz
+constexpr int fewest_cycles = 5;    // in which a drive is away: one of them may be a frame that came late
 // Of the torque that accelerates a drive's rotor as it must be able to.
 constexpr double holding_share = 0.1;
 
@@ -26,7 +27,7 @@ DriveMonitor::DriveMonitor(const models::Arm& arm, std::vector<description::Driv
                            double following_error_rad)
     : arm_(arm), drives_(std::move(drives)), following_error_rad_(following_error_rad) {
   const JointVector zero = JointVector::Zero(arm.axes());
-  state_.last_rad = state_.away_rad = state_.away_s = state_.behind_s = state_.behind_at_rad = zero;
+  state_.last_rad = state_.away_rad = state_.away_s = state_.behind_s = state_.behind_at_rad = state_.passing_s = zero;
   envelope_.start(arm.start_rad());
 }
 
@@ -52,9 +53,10 @@ void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
   envelope_.start(i, now.setpoint_rad[i]);
   state_.last_rad[i] = state_.behind_at_rad[i] = now.reported_rad[i];
   state_.away_rad[i] = state_.away_s[i] = state_.behind_s[i] = 0.0;
+  state_.passing_s[i] = passing_s;
 }
 
-// What it is away is no more than what it is outside: its way within the envelope doesn't count.
+// `away` is at most the distance outside of the envelope; motion within it doesn't count.
 void DriveMonitor::watch(Eigen::Index i, const DriveReports& now, bool waits, double period_s) noexcept {
   const double theta = now.reported_rad[i], d = envelope_.outside_rad(i, theta);
   const double moved = theta - std::exchange(state_.last_rad[i], theta), away = state_.away_rad[i] + moved;
@@ -65,7 +67,9 @@ void DriveMonitor::watch(Eigen::Index i, const DriveReports& now, bool waits, do
   double &behind_s = state_.behind_s[i], &at = state_.behind_at_rad[i];
   const bool moves = std::abs(theta - at) > least;
   if (moves) at = theta;
-  behind_s = moves || !waits ? 0.0 : counted(behind_s, std::abs(d) > least, period_s);
+  double& since_s = state_.passing_s[i];
+  since_s = std::abs(d) > least ? 0.0 : since_s + period_s;
+  behind_s = moves || !waits ? 0.0 : counted(behind_s, since_s < passing_s, period_s);
 }
 
 DriveVerdict DriveMonitor::judge_away(const DriveReports& now, double period_s) noexcept {

@@ -1,4 +1,4 @@
-// What each drive reports of its position, held against what it was sent: a drive that deviates is a fault.
+// Compares each drive's reported position with the setpoints that it was sent. A drive that deviates is a fault.
 //
 // A drive that follows is within the envelope of its setpoints (setpoint_envelope.hpp). With θ what it reports, d how
 // far θ is outside of that, ε = limits.following_error_rad, and while d isn't zero:
@@ -7,20 +7,22 @@
 //                   5 mm at the tool. The drive goes where nobody sent it: it runs off, goes the wrong way, can't hold
 //                   the arm's weight, or its encoder is off. It can't be asked to stop (stop category 0).
 //   drive_blocked   |d| > ε/2 for half a second in which θ stays within ε/2 of one place: setpoints wait for it, and it
-//                   doesn't come. It is jammed, doesn't heed its setpoints, or its encoder is stuck.
+//                   doesn't come. It is jammed, doesn't heed its setpoints, or its encoder is stuck. Setpoints that
+//                   the hand makes swing about it pass it again and again, for which |d| counts 50 ms longer.
 // Where the joint is behind because its setpoints went on, away stays zero; where the setpoints stand and it goes off,
 // d is what it is away. That tells both apart without the motor's torque. Times need not be of one piece: a twentieth
 // of the time in which it isn't so counts against them, so that a joint that swings about its setpoints with the hand,
 // as a drive of the wrong sign does, or about which they swing, is found as well.
 //
-// Drives that follow are away by up to 0.024 mrad in the shipped scenes. At their torque's limit they catch up with
-// what they lagged and overshoot. Of 400 random sessions of the tests, with hands of up to a kilonewton, two end by
-// that: one whose axis 5 was jammed at 0.8 rad/s for 3.4 ms and then ran past its setpoint by more than 5 mrad, and one
-// at 4 ms that a hand of 519 N made swing by 8 mrad.
+// In the shipped scenes drives that follow are away by up to 0.024 mrad. At their torque's limit they lag, catch up and
+// overshoot. Of 400 random sessions of the tests, with hands of up to a kilonewton, two end for that reason: one whose
+// axis 5 was jammed at 0.8 rad/s for 3.4 ms and then ran past its setpoint by more than 5 mrad, and one at 4 ms in
+// which a hand of 519 N made a joint oscillate by 8 mrad.
 //
-// A hand explains that a joint doesn't follow if its torque about that joint, Jᵀh, holds it back with at least a tenth
-// of what the drive has: J_r a, for it must be able to accelerate its rotor by its a. Then drive_blocked waits for
-// five seconds instead of half a one. For the default cell that takes 174 Nm about its base, 220 N at 0.8 m.
+// A hand may be why a joint doesn't follow: if its torque about that joint, Jᵀh, holds the joint back with at least a
+// tenth of the torque that the drive must have. That is J_r a, which accelerates its rotor's inertia J_r by its limit
+// a. Then drive_blocked waits for five seconds instead of half a second. In the default cell this takes 174 Nm about
+// the base, or 220 N at 0.8 m.
 //
 // Nothing allocates, locks or throws after construction.
 #pragma once
@@ -40,11 +42,11 @@ namespace proxarm::controller {
 inline constexpr double away_at_once = 5.0;  // of following_error_rad
 inline constexpr double deviates_m = 5e-3, deviates_s = 0.02, blocked_s = 0.5, held_by_hand_s = 5.0;
 
-// Of one cycle; joint vectors and bits in the order of the drives.
+// The reports of one cycle; joint vectors and bits in the order of the drives.
 struct DriveReports {
   const models::JointVector& reported_rad;  // by the motors' encoders
-  const models::JointVector& link_rad;      // of the links, by these
-  const models::JointVector& setpoint_rad;  // the last one that each was sent
+  const models::JointVector& link_rad;      // by the same encoders
+  const models::JointVector& setpoint_rad;  // the last one sent to each drive
   const models::JointVector& feedback_period_s;
   std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and that take setpoints
   models::Wrench hand_W;                  // about the rendered point
@@ -58,11 +60,11 @@ struct DriveVerdict {
 
 class DriveMonitor {
  public:
-  // `arm` must outlive this.
+  // Precondition: `arm` outlives this object.
   DriveMonitor(const models::Arm& arm, std::vector<description::DriveDescription> drives, double following_error_rad);
 
-  // Each cycle in which drives may take setpoints. `waits`: setpoints may be waiting for a joint (the arm is rendering
-  // or freed), so that one that is behind is blocked.
+  // To be called in each cycle in which drives may take setpoints. `waits`: setpoints may be waiting for a joint (the
+  // arm is rendering or being freed), so a joint that is behind is blocked.
   DriveVerdict step(const DriveReports& now, bool waits, double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
@@ -76,6 +78,7 @@ class DriveMonitor {
     models::JointVector away_s;         // for how long that is more than ε
     models::JointVector behind_s;       // for how long |d| is more than ε/2, from ...
     models::JointVector behind_at_rad;  // ... one place
+    models::JointVector passing_s;      // since |d| was more than ε/2
     std::uint8_t known = 0;             // drives that have been followed up to now
   };
 

@@ -1,10 +1,10 @@
-// The person's enabling switch (dead man) as a bit that comes on a CAN bus, in a TPDO of a drive or a message of its
-// own.
+// The person's enabling switch (dead man's switch), as a bit that is received on a CAN bus: in a TPDO of a drive, or in
+// a message of its own.
 //
-// The switch counts as released whenever its state isn't known: before the first message, when the last message is
-// older than the timeout, or when it is too short to hold the bit. To start or go on, the person must press it anew: a
-// message says released and the next one says pressed, without a gap beyond the timeout. A switch that is held, tied
-// down or stuck at "pressed" never starts anything.
+// The switch counts as released whenever its state isn't known: before the first message, if the last message is older
+// than the timeout, or if the message is too short to hold the bit. To start or go on, the person must press it anew:
+// one message must report it released and the next one pressed, with no gap beyond the timeout. A switch that is held,
+// tied down or stuck at "pressed" never starts anything.
 //
 // A switch with three positions has a second contact, which is made when it is squeezed through (IEC 60204-1, 10.9):
 //
@@ -34,17 +34,18 @@ class EnablingInput {
   EnablingInput(const description::EnablingInputDescription& input, const description::Cell& cell, std::size_t bus);
 
   [[nodiscard]] std::size_t bus() const noexcept { return bus_; }
-  // The identifier as fieldbus::CanFilter's lists have it: with extended_id_flag where it has 29 bits.
+  // The identifier as in the lists of fieldbus::CanFilter: with extended_id_flag if it has 29 bits.
   [[nodiscard]] std::uint32_t wanted_id() const noexcept;
 
-  // True where the frame was the message. This and all below is called from the cycle's thread alone.
+  // Returns true if the frame was the switch's message. Precondition: this and all below is called by the cycle's
+  // thread alone.
   bool on_frame(std::size_t bus, const fieldbus::CanFrame& frame, std::int64_t time_ns) noexcept;
-  // Called in each cycle before the others: forgets a message that is too old by now.
+  // Drops a message that has become too old. Precondition: called in each cycle before the others.
   void on_cycle(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool pressed() const noexcept { return pressed_; }
-  // It was squeezed through and hasn't been let go since; never so with two positions.
+  // The switch was squeezed through and hasn't been released since; always false with two positions.
   [[nodiscard]] bool squeezed() const noexcept { return squeezed_; }
-  // True once for each press after a release, while it is still pressed.
+  // Returns true once for each press after a release, while the switch is still pressed.
   [[nodiscard]] bool take_press() noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -53,7 +54,7 @@ class EnablingInput {
 
  private:
   enum class Position : std::uint8_t { unknown, released, middle, squeezed };
-  // A bit in the message's data, and what it is when its contact is made.
+  // A bit in the message's data, and its value while the contact is made.
   struct Contact {
     std::size_t byte = 0;
     std::uint8_t mask = 0;
@@ -66,7 +67,7 @@ class EnablingInput {
   std::uint32_t id_;
   bool extended_;
   Contact middle_;
-  std::optional<Contact> panic_;  // of the third position
+  std::optional<Contact> panic_;  // the contact of the third position
   std::int64_t timeout_ns_;
   std::int64_t last_ns_ = 0;
   bool heard_ = false, pressed_ = false, released_before_ = false, pressed_anew_ = false;

@@ -16,8 +16,8 @@ constexpr const char* unconfirmed =
     "the arm was told to stop and to switch off, but not every drive has confirmed it: keep away until its power is "
     "off";
 
-// One row per fault: the reaction, what was seen, and what to do. The text of what was seen may hold a %s for the place
-// and %.4g for value and limit. Faults that only a start can have say that nothing has moved.
+// One row per fault: the reaction, what was seen, and what to do. The text of what was seen may contain %s for the
+// place and %.4g for value and limit. The texts of faults that only occur at a start say that nothing has moved.
 struct FaultText {
   Fault fault;
   const char* name;
@@ -25,7 +25,7 @@ struct FaultText {
   const char* cause;
   const char* unit;  // of value and limit; nullptr: no figures
   const char* advice;
-  const char* did = nullptr;  // nullptr: by the reaction
+  const char* did = nullptr;  // what the arm did; nullptr: as the reaction says
 };
 
 constexpr std::array texts{
@@ -138,6 +138,10 @@ constexpr std::array texts{
               "a joint moved while the arm was to stand, by its encoder", "rad away",
               "look for a drive that runs off, an encoder that is off, or a load that the drive can't hold, before "
               "anybody comes near"},
+    FaultText{
+        Fault::elbow_too_fast, "elbow_too_fast", Reaction::stop_0,
+        "the elbow or the wrist is faster than it was told to be, by the encoders", "m/s",
+        "look for a drive that runs off, a slipping brake, a wrong gear ratio or encoder before anybody comes near"},
 };
 
 const FaultText& text_of(Fault fault) noexcept {

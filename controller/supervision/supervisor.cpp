@@ -70,7 +70,7 @@ bool Supervisor::handle(Event event) noexcept {
   return true;
 }
 
-// Called once per fault and cycle.
+// Precondition: called once per fault and cycle.
 void Supervisor::note(const FaultReport& report) noexcept {
   Notice& notice = notices_[static_cast<std::size_t>(report.fault)];
   if (notice.last == report.cycle + 1) return;
@@ -81,7 +81,7 @@ void Supervisor::note(const FaultReport& report) noexcept {
 
 void Supervisor::raise(FaultReport report) noexcept {
   Reaction reaction = reactions_[static_cast<std::size_t>(report.fault)];
-  // In this phase the arm can't be held: the drives aren't enabled yet, or aren't any more.
+  // In this phase the arm can't be held, because the drives aren't enabled.
   if (reaction == Reaction::hold && !live()) reaction = Reaction::stop_1;
   report.reaction = reaction;
   note(report);
@@ -109,7 +109,8 @@ void Supervisor::give_up_hold() noexcept {
 }
 
 void Supervisor::rescale(std::uint64_t cycle, double ratio) noexcept {
-  // Takes one more than a cycle's number, 0 for none. It rounds towards now, so that nothing counts as over too early.
+  // Converts a cycle's number plus one (0: none). It rounds towards the present, so that nothing counts as over too
+  // early.
   const auto at = [&](std::uint64_t end) {
     if (end == 0 || end > cycle) return end;
     const double age = std::floor(ratio * static_cast<double>(cycle - end));

@@ -1,4 +1,4 @@
-// Which phase a session is in, and what moves it on: one table, transitions(), which docs/supervision.md shows.
+// Which phase a session is in, and which events change it: one table, transitions(), which docs/supervision.md shows.
 //
 //   idle ─▶ enabling ─▶ taring ─▶ rendering ─▶ stopping ─▶ disabling ─▶ done
 //                                 ▲       │                    │
@@ -9,7 +9,7 @@
 //                                  freeing
 //
 // A fault acts by its reaction (fault.hpp). A stop latches the fault: the first one is kept and reported, and only a
-// reset leads back, into a hold. Faults that are carried on, slow the arm down or hold it are counted.
+// reset leads back, into a hold. Faults with the reactions `continue`, `slow` and `hold` are counted.
 #pragma once
 
 #include <array>
@@ -27,7 +27,7 @@ enum class Phase : std::uint8_t {
   taring,     // targets stand still; the sensor's bias is averaged
   rendering,  // the proxy moves, the arm follows
   holding,    // all joints brake together along their last motion, and stand; drives stay enabled
-  freeing,    // out of a hold, slowly: the arm follows the hand's force, or backs off, without the scene
+  freeing,    // from a hold: the arm follows the hand's force or backs off, slowly and without the scene
   stopping,   // all joints brake together along their last motion, the slowest to stop at its own deceleration
   disabling,  // targets stand still; the drives are led to switched off
   faulted,    // drives off; waits for a reset
@@ -36,20 +36,20 @@ enum class Phase : std::uint8_t {
 inline constexpr std::size_t phase_count = static_cast<std::size_t>(Phase::done) + 1;
 
 enum class Event : std::uint8_t {
-  begin,      // first cycle; with an enabling input: it was let go and pressed
+  begin,      // first cycle; with an enabling input: it was released and pressed
   enabled,    // all drives follow
-  reenabled,  // the same after a reset: the sensor is tared already, and somebody may be pinned
+  reenabled,  // the same after a reset: the sensor is tared already, and a person may be pinned
   tared,      //
   hold,       // a fault with this reaction, or a command
   resume,     // the cause is gone and the enabling input pressed, or a command
   free,       // a command: release, or back off
-  freed,      // the order hold, or the way backed off
+  freed,      // the order hold, or backing off is over
   stop,       // asked for: end of the duration, signal
   fault,      // stop category 1
   fault_off,  // stop category 0
   at_rest,    //
-  disabled,   // all drives off, or they don't say so
-  wait,       // the same with a fault that may be reset
+  disabled,   // all drives are off, or haven't confirmed it in time
+  wait,       // the same after a fault that may be reset
   reset,      // a command
 };
 inline constexpr std::size_t event_count = static_cast<std::size_t>(Event::reset) + 1;
@@ -64,11 +64,11 @@ struct Transition {
 };
 [[nodiscard]] std::span<const Transition> transitions() noexcept;
 
-// How often a fault that didn't stop the arm occurred.
+// How often a fault that didn't stop the arm has occurred.
 struct Notice {
-  std::uint32_t times = 0;   // begun anew, after a cycle without it
-  std::uint64_t cycles = 0;  // with it
-  std::uint64_t last = 0;    // one more than the last of them; 0: none
+  std::uint32_t times = 0;   // number of occurrences, each after a cycle without the fault
+  std::uint64_t cycles = 0;  // number of cycles with the fault
+  std::uint64_t last = 0;    // the last of these cycles plus one; 0: none
 };
 
 class Supervisor {
@@ -77,38 +77,39 @@ class Supervisor {
   explicit Supervisor(const Reactions& reactions) noexcept : reactions_(reactions) {}
 
   [[nodiscard]] Phase phase() const noexcept { return phase_; }
-  // The drives may move in this phase, so the enabling input must be pressed.
+  // Whether the drives may move in this phase, so that the enabling input must be pressed.
   [[nodiscard]] bool live() const noexcept {
     return phase_ == Phase::rendering || phase_ == Phase::holding || phase_ == Phase::freeing;
   }
   [[nodiscard]] bool faulted() const noexcept { return report_.fault != Fault::none; }
-  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }      // of the stop
-  [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // of the last hold; none: asked for
+  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }      // the fault that stopped the arm
+  [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // none: it was asked for
   [[nodiscard]] Reaction reaction(Fault fault) const noexcept { return reactions_[static_cast<std::size_t>(fault)]; }
   [[nodiscard]] const Notice& notice(Fault fault) const noexcept { return notices_[static_cast<std::size_t>(fault)]; }
   // Whether a fault that slows the arm down occurred in one of the last `cycles`.
   [[nodiscard]] bool slowed(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
     return slow_end_ > 0 && cycle < slow_end_ + cycles;
   }
-  // Whether the fault that the arm was held for lasts still, or occurred in one of the last `cycles`.
+  // Whether the fault that the arm was held for still lasts, or occurred in one of the last `cycles`.
   [[nodiscard]] bool cause_lasts(std::uint64_t cycle, std::uint64_t cycles) const noexcept {
     return held_for_.fault != Fault::none && cycle < notice(held_for_.fault).last + cycles;
   }
 
-  // Changes the phase where transitions() has a row for this event, and ignores it otherwise. True if the phase
-  // changed.
+  // Changes the phase if transitions() has a row for this event, and ignores the event otherwise. Returns true if the
+  // phase changed.
   bool handle(Event event) noexcept;
-  // Takes the fault's reaction.
+  // Applies the fault's reaction.
   void raise(FaultReport report) noexcept;
-  // A hold lasted too long: the arm stops for the fault that it was held for.
+  // A hold lasted too long: the arm stops, for the fault that it was held for.
   void give_up_hold() noexcept;
-  // A hold that a person asked for: held_for() is none.
+  // Begins a hold that a person asked for: held_for() is none.
   void hold() noexcept;
-  // Leaves the phase faulted and forgets the fault: whoever wants report() takes it before. False in any other phase.
+  // Leaves the phase `faulted` and forgets the fault, so report() must be read before. Returns false in any other
+  // phase.
   bool reset() noexcept;
 
-  // Another timestep, of which `ratio` times as many cycles fit into the same time. What is counted back from this
-  // cycle is converted, so that the times stay.
+  // Changes to a timestep of which `ratio` times as many cycles last for the same time. Numbers of past cycles are
+  // converted so that their distances from this cycle last as long as before.
   void rescale(std::uint64_t cycle, double ratio) noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -125,7 +126,7 @@ class Supervisor {
   Reactions reactions_;
   Phase phase_ = Phase::idle;
   FaultReport report_, held_for_;
-  std::uint64_t slow_end_ = 0;  // one more than the last cycle with a fault that slows; 0: none
+  std::uint64_t slow_end_ = 0;  // the last cycle with a fault that slows, plus one; 0: none
   std::array<Notice, fault_count> notices_{};
 };
 

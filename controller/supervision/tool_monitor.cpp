@@ -10,31 +10,49 @@ namespace {
 constexpr double overshoot_share = 1.2, rounding_m = 1e-4;
 }
 
-ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double period_s) noexcept {
+ToolVerdict ToolMonitor::step(const models::Vec3& tool_W, double elbow_moved_m, double period_s) noexcept {
   const double off_m = off_limits(tool_W);
   if (count_ == 0) allowed_m_ = std::max(0.0, off_m);
-  if (period_s != period_s_) places_.fill(tool_W);
+  if (period_s != period_s_) {
+    places_.fill(tool_W);
+    elbow_moved_m_.fill(0.0);
+    elbow_moved_m = 0.0;
+  }
   period_s_ = period_s;
   const double cycles = std::clamp(std::round(monitored_s / period_s), 1.0, static_cast<double>(most_places));
-  const auto window = static_cast<std::uint32_t>(cycles);
-  ToolVerdict verdict;
-  if (count_ > 0) {
-    // Less than a window after the start: from the start.
-    const models::Vec3& before_W = places_[(count_ - std::min(count_, window)) % most_places];
-    const double way_m = (tool_W - before_W).norm(), v = limits_.max_tool_speed_m_per_s;
-    const double most_m =
-        overshoot_share * v * cycles * period_s + v * (missed_cycles_ * period_s + 2.0 * feedback_s_) + rounding_m;
-    if (way_m > most_m) {
-      verdict = {Fault::tool_too_fast, way_m / (cycles * period_s), most_m / (cycles * period_s)};
-    }
-  }
+  // Less than a window after the start: from the start.
+  const auto window = std::min(count_, static_cast<std::uint32_t>(cycles));
+  elbow_moved_m_[count_ % most_places] = elbow_moved_m;
+  ToolVerdict verdict = judge_speeds(tool_W, window, period_s);
   places_[count_ % most_places] = tool_W;
-  // Which of them is the oldest is all that it is for.
+  // The count only has to tell which place is the oldest.
   count_ = count_ + 1 < 2 * most_places ? count_ + 1 : most_places;
   if (verdict.fault == Fault::none && off_m > allowed_m_ + off_limits_m) {
     verdict = {Fault::tool_off_limits, 1e3 * off_m, 1e3 * (allowed_m_ + off_limits_m)};
   }
   return verdict;
+}
+
+double ToolMonitor::most_way_m(double speed_m_per_s, double window_s, double period_s) const noexcept {
+  return overshoot_share * speed_m_per_s * window_s + speed_m_per_s * (missed_cycles_ * period_s + 2.0 * feedback_s_) +
+         rounding_m;
+}
+
+// Over the last `window` cycles, by what is allowed over all of W.
+ToolVerdict ToolMonitor::judge_speeds(const models::Vec3& tool_W, std::uint32_t window,
+                                      double period_s) const noexcept {
+  if (window == 0) return {};
+  const double cycles = std::clamp(std::round(monitored_s / period_s), 1.0, static_cast<double>(most_places));
+  const double window_s = cycles * period_s;
+  const auto judge = [&](Fault fault, double way_m, double most_m) {
+    return way_m > most_m ? ToolVerdict{fault, way_m / window_s, most_m / window_s} : ToolVerdict{};
+  };
+  const ToolVerdict tool = judge(Fault::tool_too_fast, (tool_W - places_[(count_ - window) % most_places]).norm(),
+                                 most_way_m(limits_.max_tool_speed_m_per_s, window_s, period_s));
+  if (tool.fault != Fault::none) return tool;
+  double way_m = 0.0;
+  for (std::uint32_t i = 0; i < window; ++i) way_m += elbow_moved_m_[(count_ - i) % most_places];
+  return judge(Fault::elbow_too_fast, way_m, most_way_m(limits_.max_elbow_speed_m_per_s, window_s, period_s));
 }
 
 double ToolMonitor::off_limits(const models::Vec3& p) const noexcept {
@@ -55,7 +73,7 @@ double ToolMonitor::off_limits(const models::Vec3& p) const noexcept {
 }
 
 void ToolMonitor::archive(fieldbus::StateArchive& state) noexcept {
-  state(count_, allowed_m_, period_s_);
+  state(count_, allowed_m_, period_s_, elbow_moved_m_);
   for (models::Vec3& place : places_) state(place);
 }
 

@@ -76,9 +76,11 @@ DescribedSensor::DescribedSensor(const description::SensorDescription& sensor, D
   if (protocol_.poll) poll_frame_ = command_frames(*protocol_.poll).front();
   for (const std::uint32_t id : used_ids()) {
     if (id != 0x000 && id != 0x080) continue;
-    throw SetupError({.file = protocol_.has_base_id ? "" : sensor.file.string(),
+    throw SetupError({.file = protocol_.has_base_id || protocol_.has_settings ? "" : sensor.file.string(),
                       .bus = settings_.bus_name,
-                      .key = protocol_.has_base_id ? "sensor.base_id" : "frames, poll and commands",
+                      .key = protocol_.has_base_id    ? "sensor.base_id"
+                             : protocol_.has_settings ? "sensor.settings"
+                                                      : "frames, poll and commands",
                       .found = "identifier " + hex_text(id, 3) + " for the force sensor",
                       .expected = "one that is neither NMT's (0x000) nor SYNC's (0x080)"});
   }

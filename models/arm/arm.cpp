@@ -22,7 +22,7 @@ using description::Cell;
 using description::in_quotes;
 using description::SetupError;
 
-// The mistake is in the cell's file, which has been read already, so the key's line is looked up again.
+// The mistake is in the cell's file, which has already been read, so the line of the key is looked up again.
 SetupError in_cell(const Cell& cell, const std::string& list, std::size_t index, const std::string& key,
                    std::string found, std::string expected, std::string advice = {}) {
   const bool element = list == "drives";
@@ -30,7 +30,7 @@ SetupError in_cell(const Cell& cell, const std::string& list, std::size_t index,
     const auto root = description::YamlNode::load(cell.file);
     const auto node = element ? root.list(list).at(index) : root.map(list);
     return node.error_at(key, expected, found, advice);
-  } catch (const std::exception&) {  // a cell that was never in a file
+  } catch (const std::exception&) {  // the cell was never in a file
     const std::string place = element ? list + "[" + std::to_string(index) + "]" : list;
     return SetupError({.file = cell.file.string(),
                        .key = place + "." + key,
@@ -49,7 +49,7 @@ bool is_axis(const UrdfJoint& joint) {
   return joint.type == "revolute" || joint.type == "continuous" || joint.type == "prismatic";
 }
 
-// Each drive has its joint, each joint that moves has its drive.
+// Checks that each drive has its joint and that each moving joint has its drive.
 void check_joints(const Cell& cell, const Urdf& urdf) {
   std::vector<std::string> names;
   for (const UrdfJoint& joint : urdf.joints) {
@@ -97,7 +97,7 @@ void check_range(const Cell& cell, std::size_t drive, const mjModel& model, int 
   if (!model.jnt_limited[joint]) return;
   const double low = model.jnt_range[2 * joint], high = model.jnt_range[2 * joint + 1];
   const auto& range = cell.drives[drive].range_rad;
-  constexpr double written_rad = 1e-5;  // limits are written with few digits, and 2.0944 is to match 2.094395
+  constexpr double written_rad = 1e-5;  // limits are written with few digits: 2.0944 must match 2.094395
   if (range[0] >= low - written_rad && range[1] <= high + written_rad) return;
   const auto text = [](double a, double b) {
     return "[" + description::number_text(a) + ", " + description::number_text(b) + "]";
@@ -114,7 +114,7 @@ Pose pose(const double* position, const double* quaternion) {
   return X;
 }
 
-// A rotation whose z is `axis`; exact where the axis is one of x, y, z, as it nearly always is.
+// A rotation whose z axis is `axis`; exact if that is one of x, y, z, as it nearly always is.
 Pose turn_z_to(const Vec3& axis) {
   Eigen::Index least = 0;
   axis.cwiseAbs().minCoeff(&least);
@@ -177,7 +177,7 @@ void Arm::read_chain(const Cell& cell) {
   }
   std::vector<int> link_of_body(static_cast<std::size_t>(m.nbody), -1);
   std::vector<Pose> X_link_body(static_cast<std::size_t>(m.nbody), Pose::Identity());
-  Pose X_before = to_pose(cell.base_W);  // the body before, in the link before
+  Pose X_before = to_pose(cell.base_W);  // pose of the previous body in the previous link
   int count = 0;
   for (const int body : path) {
     const auto b = static_cast<std::size_t>(body);
@@ -206,7 +206,7 @@ void Arm::read_chain(const Cell& cell) {
                     "a joint between the URDF's root and the sensor's link " + in_quotes(cell.sensor.link));
     }
   }
-  // Every body's mass goes to the last link before it; parents come before children in MuJoCo's numbering.
+  // Each body's mass is added to the last link before it; in MuJoCo's numbering, parents come before children.
   for (int body = 1; body < m.nbody; ++body) {
     const auto b = static_cast<std::size_t>(body), parent = static_cast<std::size_t>(m.body_parentid[body]);
     if (std::find(path.begin(), path.end(), body) == path.end()) {
@@ -320,7 +320,8 @@ void Arm::points(const JointVector& q, ArmPoints& out) const noexcept {
 }
 
 JointMatrix Arm::path_curvature() const {
-  // From joint i on: what lies between its origin and T when all is stretched, and what of that lies beside its axis.
+  // From the outermost joint inwards: stretched_m is the largest distance from the next joint's origin to T. The lever
+  // of axis j adds to it the part of link j that lies across the axis.
   JointMatrix C = JointMatrix::Zero(axes_, axes_);
   double stretched_m = 0.0;
   for (int j = axes_ - 1; j >= 0; --j) {
@@ -341,8 +342,8 @@ JointMatrix Arm::path_curvature() const {
 // ---- statics --------------------------------------------------------------------------------------------------------
 
 JointVector Arm::gravity_torque(const Frames& frames) const noexcept {
-  // With m_i, c_i mass and centre of mass of everything from link i outwards: τ_i = −z_i · (c_i − p_i) × m_i g; of an
-  // axis that slides, −z_i · m_i g.
+  // With m_i, c_i the mass and centre of mass of everything from link i outwards, τ_i = −z_i · (c_i − p_i) × m_i g. A
+  // prismatic axis has τ_i = −z_i · m_i g.
   JointVector torque(axes_);
   double mass = 0.0;
   Vec3 moment = Vec3::Zero();  // m_i c_i
@@ -417,10 +418,11 @@ JointVector Arm::link_from_motor(const JointVector& q_motor) const noexcept {
 // ---- dynamics -------------------------------------------------------------------------------------------------------
 
 JointMatrix Arm::link_mass_matrix(const JointVector& q) const noexcept {
-  // Composite bodies: everything from link j outwards has mass m, centre c and inertia I about c. Turning it about z_j
-  // at 1 rad/s² takes the force F = m z_j × (c − p_j) at c and the torque I z_j, and axis i ≤ j must supply
+  // Composite rigid bodies (Walker and Orin 1982): everything from link j outwards has mass m, centre c and inertia I
+  // about c. Turning it about z_j at 1 rad/s² takes the force F = m z_j × (c − p_j) at c and the torque I z_j, and axis
+  // i ≤ j must supply
   //   M_ij = z_i · (I z_j + (c − p_i) × F).
-  // An axis j that slides takes F = m z_j and no torque; an axis i that slides must supply z_i · F.
+  // A prismatic axis j takes F = m z_j and no torque; a prismatic axis i must supply z_i · F.
   Frames frames;
   forward(q, frames);
   JointMatrix M(axes_, axes_);
@@ -473,12 +475,12 @@ double Arm::effective_mass(const JointVector& q, const Vec3& n_W) const noexcept
 
 TipMass Arm::effective_mass_range(const JointVector& q, int dimensions) const noexcept {
   const Eigen::Matrix3d A = mobility(q);
-  // The iterative solver: the closed form for 3×3 loses half the digits where eigenvalues are close.
+  // The iterative solver is used because the closed form for 3×3 loses half the digits if eigenvalues are close.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(A);
   const Vec3& values = eigen.eigenvalues();
   TipMass tip;
   const double infinite = std::numeric_limits<double>::infinity();
-  // An eigenvalue is exact to about n ε times the largest one; below that it says "can't move".
+  // An eigenvalue is exact to about n ε times the largest one. Below that, T can't move in its direction.
   const double least = 16.0 * std::numeric_limits<double>::epsilon() * values[2];
   tip.min_kg = values[2] > 0.0 ? 1.0 / values[2] : infinite;
   const int slowest = 3 - dimensions;
@@ -489,8 +491,8 @@ TipMass Arm::effective_mass_range(const JointVector& q, int dimensions) const no
 }
 
 double Arm::first_elastic_frequency_Hz(const JointVector& q) const noexcept {
-  // Axes with a rigid gear are locked with their motors: only the block of the others remains. With K = D² the problem
-  // K v = ω² M v becomes D⁻¹ M D⁻¹ u = u/ω².
+  // Axes with a rigid gear are locked with their motors, so only the block of the others remains. With K = D², the
+  // problem K v = ω² M v becomes D⁻¹ M D⁻¹ u = u/ω².
   const JointMatrix M = link_mass_matrix(q);
   std::array<int, max_axes> elastic{};
   int n = 0;

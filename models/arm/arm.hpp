@@ -6,9 +6,9 @@
 //   W ─X_WB─ B ─ joints ─ L (link that carries the sensor) ─X_LS─ S ─X_ST─ T
 // MuJoCo reads the URDF; the recursions below are our own, since a fixed serial chain needs no more.
 //
-// Const functions neither allocate, lock nor throw and may be called each cycle by several threads at once. They take
-// vectors of size axes(); finite angles give finite results (but see effective_mass_range). NaN in is NaN out here: the
-// caller checks its angles, as InverseKinematics does.
+// Const functions neither allocate, lock nor throw, and several threads may call them in each cycle. Precondition:
+// vectors have the size axes(). Finite angles give finite results (but see effective_mass_range). NaN gives NaN here;
+// the caller checks its angles, as InverseKinematics does.
 #pragma once
 
 #include <array>
@@ -23,11 +23,11 @@ namespace proxarm::models {
 
 constexpr int max_axes = most_rows;
 
-// Their size is set at run time; they are stored in place.
+// Vectors and matrices whose size is set at run time and which are stored in place.
 using JointVector = SmallVector;
 using JointMatrix = SmallMatrix;
-// Column i is the motion of T for 1 rad/s of axis i, in W: rows 0..2 velocity (m/s), rows 3..5 angular velocity
-// (rad/s).
+// Column i is the velocity of T when axis i moves at 1 rad/s, in W: rows 0..2 velocity (m/s), rows 3..5 angular
+// velocity (rad/s).
 using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, max_axes>;
 
 struct ToolKinematics {
@@ -36,14 +36,14 @@ struct ToolKinematics {
   Jacobian J_W;  // geometric, of T
 };
 
-// Where the arm is: T, and the places of its joints. And what gravity makes of it there.
+// The positions of T and of the joints, and the twist of the gears under gravity.
 struct ArmPoints {
   Vec3 tool_W = Vec3::Zero();
   std::array<Vec3, max_axes> joint_W{};  // origins of the joints as the URDF has them, outwards from the base
   JointVector twist_rad;                 // by which each motor is ahead of its link: τ_g/k, in the order of the drives
 };
 
-// The mass that someone who pushes the tip feels, with idle motors. In direction n it is (nᵀ J M⁻¹ Jᵀ n)⁻¹.
+// The mass that a person feels who pushes the tip while the motors idle. In direction n it is (nᵀ J M⁻¹ Jᵀ n)⁻¹.
 struct TipMass {
   double min_kg = 0.0, max_kg = 0.0;  // max is infinite where T can't move along max_direction_W (a singularity)
   Vec3 min_direction_W = Vec3::UnitX(), max_direction_W = Vec3::UnitX();
@@ -51,8 +51,8 @@ struct TipMass {
 
 class Arm {
  public:
-  // Throws description::SetupError: unreadable URDF, a drive's joint that isn't there or can't be driven or isn't
-  // between root and sensor, a joint without a drive, a link without inertia.
+  // Throws description::SetupError for an unreadable URDF, a drive whose joint is missing, can't be driven or isn't
+  // between root and sensor, a joint without a drive, and a link without inertia.
   explicit Arm(const description::Cell& cell);
 
   [[nodiscard]] const std::string& file() const noexcept { return file_; }  // the cell's, for messages
@@ -63,7 +63,7 @@ class Arm {
   [[nodiscard]] const JointVector& start_rad() const noexcept { return start_rad_; }
   [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept { return gear_stiffness_; }  // 0: rigid
 
-  // A linear axis: its "angle" is in m.
+  // Whether the axis is prismatic; its "angle" is then in m.
   [[nodiscard]] bool slides(int drive) const noexcept { return slides_[static_cast<std::size_t>(drive)]; }
 
   // Poses and Jacobian of T and S.
@@ -71,12 +71,12 @@ class Arm {
   [[nodiscard]] Pose tool_pose(const JointVector& q) const noexcept;    // X_WT
   [[nodiscard]] Pose sensor_pose(const JointVector& q) const noexcept;  // X_WS
 
-  // One pass outwards and one back, without Jacobian.
+  // Computes the points in one pass outwards and one back, without a Jacobian.
   void points(const JointVector& q, ArmPoints& out) const noexcept;
-  // How much paths of constant joint speeds bend: with C this matrix and p any of the points above,
-  //   |d²p/dt²| ≤ |q̇|ᵀ C |q̇|   where q̈ = 0, at any angles, slides within their ranges.
-  // C_ij = R_j for the outer of both, j, with R_j the farthest that T can get from axis j; 1 where j slides, 0 where
-  // the inner one does.
+  // Bounds the curvature of paths with constant joint speeds. With C this matrix and p any of the points above,
+  //   |d²p/dt²| ≤ |q̇|ᵀ C |q̇|   if q̈ = 0, at any angles, with prismatic joints within their ranges.
+  // C_ij = R_j for the outer joint j of the two, where R_j is the largest distance of T from axis j. It is 1 if j is
+  // prismatic, and 0 if the inner one is.
   [[nodiscard]] JointMatrix path_curvature() const;
 
   // Torques that hold the arm at rest against gravity, tool included: τ_g = ∂U/∂q.
@@ -89,21 +89,22 @@ class Arm {
   // Joint-space mass matrix, tool included; with or without the rotors.
   [[nodiscard]] JointMatrix mass_matrix(const JointVector& q) const noexcept;
   [[nodiscard]] JointMatrix link_mass_matrix(const JointVector& q) const noexcept;
-  // (nᵀ J M⁻¹ Jᵀ n)⁻¹ in kg; infinite where T can't move along the unit vector n.
+  // (nᵀ J M⁻¹ Jᵀ n)⁻¹ in kg; infinite if T can't move along the unit vector n.
   [[nodiscard]] double effective_mass(const JointVector& q, const Vec3& n_W) const noexcept;
-  // Of an arm whose tool moves in a plane (dimensions: 2) or on a line (1), the range there.
+  // `dimensions`: 2 if the tool moves in a plane, 1 if on a line; the range is then that within this space.
   [[nodiscard]] TipMass effective_mass_range(const JointVector& q, int dimensions = 3) const noexcept;
 
   // Encoders sit on the motors. Gravity twists gear i by τ_i/k_i, so at rest
   //   q_motor = q + τ_g(q)/k   (motor angles as angles at the joint; k = 0 is a rigid gear)
   [[nodiscard]] JointVector motor_from_link(const JointVector& q) const noexcept;
   [[nodiscard]] JointVector motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept;
-  // Its inverse, by fixed-point iteration: it contracts by about |∂τ_g/∂q|/k, 0.02 for stiff gears; stops when the step
-  // is below 1e-15 rad or after 60 iterations (gears too soft to hold the arm up at all don't converge).
+  // The inverse of motor_from_link(), by fixed-point iteration. It contracts by about |∂τ_g/∂q|/k, 0.02 for stiff
+  // gears, and stops when the step is below 1e-15 rad or after 60 iterations. It doesn't converge if the gears are too
+  // soft to hold the arm up.
   [[nodiscard]] JointVector link_from_motor(const JointVector& q_motor) const noexcept;
 
   // First natural frequency with locked motors: the smallest ω of K v = ω² M_link v, over axes whose gear isn't rigid.
-  // Infinite if all are.
+  // Infinite if all gears are rigid.
   [[nodiscard]] double first_elastic_frequency_Hz(const JointVector& q) const noexcept;
 
  private:
@@ -114,7 +115,7 @@ class Arm {
     Vec3 centre_of_mass = Vec3::Zero();  // in the link
     Mat3 inertia = Mat3::Zero();         // about the centre of mass, axes of the link
     int drive = 0;                       // index in the cell's drives
-    bool slides = false;                 // along z, by q in m; else it turns about z
+    bool slides = false;                 // prismatic along z, q in m; else revolute about z
   };
   struct Frames {
     std::array<Mat3, max_axes> R_W;

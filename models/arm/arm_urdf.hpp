@@ -1,9 +1,9 @@
-// Reads a URDF into a MuJoCo model without MuJoCo's surprises.
+// Reads a URDF into a MuJoCo model, and avoids some of MuJoCo's defaults.
 //
-// MuJoCo 2.2.2 by itself fuses links that are fixed to each other (the flange disappears), ignores <mimic> in silence
-// and opens mesh files. Here the file is read first: <mimic> is refused, shapes are dropped (kinematics and dynamics
-// need none: each moving link must state its <inertial>), compiler settings that keep every link are added in memory,
-// and mistakes are reported with file and line. For set-up only.
+// By default MuJoCo 2.2.2 fuses links that are fixed to each other (the flange disappears), silently ignores <mimic>,
+// and opens mesh files. So the file is read here first. <mimic> is refused. Shapes are dropped, since kinematics and
+// dynamics need none; each moving link must state its <inertial>. Compiler settings that keep every link are added in
+// memory, and mistakes are reported with file and line. For set-up only.
 #pragma once
 
 #include <filesystem>
@@ -31,7 +31,7 @@ struct Urdf {
   std::vector<UrdfJoint> joints;  // in the file's order
   std::vector<UrdfLink> links;
   std::string root_link;
-  std::string mujoco_xml;  // the file as MuJoCo is to see it
+  std::string mujoco_xml;  // the file as it is passed to MuJoCo
 };
 
 struct MujocoModelDeleter {

@@ -1,14 +1,14 @@
-// How joints move where the tool keeps its orientation: G = ∂(joint angles)/∂(tool place). Arms with fewer than six
-// axes keep as much of it as they can (prioritized_step.hpp).
+// How the joints move if the tool keeps its orientation: G = ∂(joint angles)/∂(tool position). Arms with fewer than six
+// axes keep as much of the orientation as they can (prioritized_step.hpp).
 #pragma once
 
 #include "models/arm/arm.hpp"
 
 namespace proxarm::models {
 
-// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0], a row for each joint. Rotations count with a length of 0.5 m, as in the inverse
-// kinematics. The damping λ = 1e-3 m/rad keeps G finite: near a singularity a joint is taken to turn by at most
-// 1/(2λ) = 500 rad per metre. Of seven axes, G is the motion of least norm. Doesn't allocate.
+// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0], with a row for each joint. Rotations are weighted with a length of 0.5 m, as in the
+// inverse kinematics. The damping λ = 1e-3 m/rad keeps G finite: near a singularity a joint turns by at most 1/(2λ) =
+// 500 rad per metre. With seven axes, G is the motion of least norm. Doesn't allocate.
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept;
 
 }  // namespace proxarm::models

@@ -15,7 +15,7 @@ namespace {
 
 using tinyxml2::XMLElement;
 
-// Three numbers of an attribute; `missing` where there is none, or where it is something else.
+// The three numbers of an attribute; `missing` if it isn't there or is something else.
 Vec3 triple_of(const XMLElement* element, const char* name, const Vec3& missing) {
   const char* const text = element != nullptr ? element->Attribute(name) : nullptr;
   double x = 0.0, y = 0.0, z = 0.0;
@@ -36,7 +36,7 @@ double size_of(const XMLElement& element, const char* name) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-// Colours that <material name="…"> only names stand at the robot.
+// The robot's colours, to which <material name="…"> refers.
 using Colours = std::map<std::string, std::array<double, 3>>;
 
 std::optional<std::array<double, 3>> colour_of(const XMLElement* material, const Colours& named) {
@@ -59,7 +59,7 @@ Colours colours_of(const XMLElement& robot) {
   return colours;
 }
 
-// "package://name/path" is looked for beside the URDF and above it: which package is meant, only ROS would know.
+// "package://name/path" is searched beside the URDF and above it, since only ROS would know where the package is.
 std::filesystem::path mesh_path(const std::filesystem::path& urdf, const std::string& name) {
   constexpr std::string_view package = "package://", file = "file://";
   if (name.compare(0, file.size(), file) == 0) return name.substr(file.size());
@@ -72,7 +72,7 @@ std::filesystem::path mesh_path(const std::filesystem::path& urdf, const std::st
   return folder / within;
 }
 
-// Nothing: it can't be drawn.
+// Returns nullopt if the shape can't be drawn.
 std::optional<LinkShape> shape_of(const XMLElement& visual, const std::filesystem::path& urdf, const Colours& named) {
   const XMLElement* const geometry = visual.FirstChildElement("geometry");
   const XMLElement* const given = geometry != nullptr ? geometry->FirstChildElement() : nullptr;
@@ -120,7 +120,7 @@ UrdfLinks read_shapes(const XMLElement& robot, const std::filesystem::path& urdf
 }  // namespace
 
 LinkTree::LinkTree(const description::Cell& cell) : X_WB_(to_pose(cell.base_W)) {
-  const Urdf urdf = load_urdf(cell.urdf);  // which refuses what isn't a tree of links
+  const Urdf urdf = load_urdf(cell.urdf);  // refuses anything but a tree of links
   tinyxml2::XMLDocument document;
   if (document.LoadFile(cell.urdf.c_str()) != tinyxml2::XML_SUCCESS || document.RootElement() == nullptr) {
     throw description::SetupError({.file = cell.urdf.string(), .message = "can't be read a second time"});

@@ -1,8 +1,8 @@
-// What an arm looks like, and where each of its links is: for pictures, never for control.
+// The shapes and poses of an arm's links: for pictures, never for control.
 //
-// The URDF is read here a second time, without MuJoCo: all links, those without a moving joint as well, each with its
-// <visual> shapes. What can't be drawn (a shape that URDF doesn't have, a mesh file of another format) is left out and
-// named in notes(), since a picture with a gap is better than none.
+// The URDF is read here a second time, without MuJoCo: all links, also those without a moving joint, each with its
+// <visual> shapes. A shape that can't be drawn (one that URDF doesn't have, or a mesh file of another format) is left
+// out and named in notes(), since an incomplete picture is better than none.
 #pragma once
 
 #include <array>
@@ -40,11 +40,11 @@ struct LinkShape {
 
 struct DrawnLink {
   std::string name;
-  int parent = -1;                   // index of the link that it hangs on; −1: the root
-  Pose X_parent = Pose::Identity();  // of its joint at angle zero
-  Vec3 axis = Vec3::UnitX();         // of the joint, in the link
+  int parent = -1;                   // index of the parent link; −1: the root
+  Pose X_parent = Pose::Identity();  // the joint's pose in the parent at angle zero
+  Vec3 axis = Vec3::UnitX();         // the joint's, in the link
   int drive = -1;                    // index in the cell's drives; −1: fixed
-  bool slides = false;               // along the axis, by m; else it turns about it
+  bool slides = false;               // prismatic along the axis, in m; else revolute
   std::vector<LinkShape> shapes;
 };
 
@@ -53,7 +53,7 @@ class LinkTree {
   // Throws description::SetupError for a URDF that can't be read.
   explicit LinkTree(const description::Cell& cell);
 
-  // Parents before their children.
+  // All links, parents before their children.
   [[nodiscard]] const std::vector<DrawnLink>& links() const noexcept { return links_; }
   [[nodiscard]] const std::vector<std::string>& notes() const noexcept { return notes_; }
   // The pose of each link in W for joint angles in the order of the cell's drives.

@@ -5,8 +5,8 @@
 
 namespace proxarm::models {
 
-// The smallest linear space that holds the velocities of T in all poses within the joints' ranges. Of an arm with
-// fewer axes than dimensions, T keeps to a curve or a curved surface in it.
+// The smallest linear space that contains the velocities of T in all poses within the joints' ranges. If an arm has
+// fewer axes than that space has dimensions, T is confined to a curve or a curved surface in it.
 struct ToolSpace {
   int dimensions = 3;            // 0: T never moves
   Mat3 axes = Mat3::Identity();  // orthonormal; the first `dimensions` columns span it
@@ -16,11 +16,11 @@ struct ToolSpace {
   }
 };
 
-// What leaves the space by less than a thousandth of the tool's largest motion counts as a rounded number in the URDF.
-// For set-up.
+// A motion out of the space by less than a thousandth of the tool's largest motion is attributed to rounded numbers in
+// the URDF. For set-up.
 ToolSpace tool_space(const Arm& arm);
 
-// The index-th of poses that are spread evenly over the joints' ranges (Halton's sequence).
+// The pose number `index` of a sequence that covers the joints' ranges evenly (Halton's sequence).
 JointVector spread_pose(const Arm& arm, int index);
 
 }  // namespace proxarm::models

@@ -280,11 +280,25 @@ DriveDescription read_drive(const YamlNode& node) {
   return d;
 }
 
+SensorChoices read_choices(const YamlNode& node) {
+  SensorChoices choices;
+  choices.file = node.file();
+  if (const auto settings = node.find_map("settings")) {
+    for (const std::string& name : settings->keys()) {
+      choices.settings.push_back({name, settings->integer(name, 0, 0xFFFFFFFF), settings->at(name).line()});
+    }
+  }
+  if (node.has("force_range_N")) choices.force_range_N = node.vec3("force_range_N", above(0.0, 1e6));
+  if (node.has("torque_range_Nm")) choices.torque_range_Nm = node.vec3("torque_range_Nm", above(0.0, 1e6));
+  return choices;
+}
+
 SensorPlacement read_sensor(const YamlNode& node) {
   SensorPlacement s;
   s.description = node.existing_file("description").string();
   s.bus = node.string("bus");
   s.base_id = static_cast<std::uint32_t>(node.integer_or("base_id", 0, 0, 0x1fffffff));
+  s.choices = read_choices(node);
   s.link = node.string("link");
   s.pose_link = pose_or_identity(node, "pose_link");
   s.noise_N = node.number_or("noise_N", 0.0, 0.0, 1e3);

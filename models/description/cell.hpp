@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "models/description/sensor_choices.hpp"
 #include "models/description/supervision.hpp"
 
 namespace proxarm::description {
@@ -135,6 +136,7 @@ struct SensorPlacement {
   std::string description;  // path of the sensor's file, absolute (in the cell's file: relative to its folder)
   std::string bus;
   std::uint32_t base_id = 0;  // meaning is the sensor's own; some have none
+  SensorChoices choices;      // keys settings, force_range_N, torque_range_Nm
   std::string link;           // link of the URDF that carries it (the flange)
   PoseDescription pose_link;  // X_LS
   double noise_N = 0.0;       // simulated sensor only: standard deviation per axis

@@ -46,6 +46,7 @@ HandDescription read_hand(const YamlNode& root) {
   hand.mass_kg = root.number_or("mass_kg", hand.mass_kg, 0.0, 100.0);
   hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, stiffness_range);
   hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, damping_range);
+  hand.max_force_N = root.number_or("max_force_N", hand.max_force_N, between(1.0, 1e5));
   if (root.has("grips")) {
     for (const YamlNode& node : root.list("grips", 1, 1000)) {
       const Grip grip{node.number("time_s", 0.0, 1e6), node.number("stiffness_N_per_m", stiffness_range),

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -41,7 +42,8 @@ struct HandDescription {
   double mass_kg = 1.0;  // of the hand, beyond the handle; felt by the force sensor
   double stiffness_N_per_m = 500.0;
   double damping_Ns_per_m = 20.0;
-  std::vector<Grip> grips;  // after the one above
+  double max_force_N = std::numeric_limits<double>::infinity();  // it pulls by this at most
+  std::vector<Grip> grips;                                       // after the one above
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
 };

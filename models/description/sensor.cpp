@@ -82,9 +82,11 @@ SensorSources read_sensor_sources(const YamlNode& root) {
   return sources;
 }
 
-SensorDescription load_sensor(const std::filesystem::path& file) { return read_sensor(YamlNode::load(file)); }
+SensorDescription load_sensor(const std::filesystem::path& file, const SensorChoices& choices) {
+  return read_sensor(YamlNode::load(file), choices);
+}
 
-SensorDescription read_sensor(const YamlNode& root) {
+SensorDescription read_sensor(const YamlNode& root, const SensorChoices& choices) {
   const std::filesystem::path& file = root.file();
   SensorDescription sensor;
   sensor.file = std::filesystem::absolute(file).lexically_normal();
@@ -92,9 +94,17 @@ SensorDescription read_sensor(const YamlNode& root) {
   sensor.protocol = root.choice("protocol", {"ati_net_can_oem", "described"});
   sensor.force_range_N = root.vec3("force_range_N", above(0.0, 1e6));
   sensor.torque_range_Nm = root.vec3("torque_range_Nm", above(0.0, 1e6));
+  if (choices.force_range_N) sensor.force_range_N = *choices.force_range_N;
+  if (choices.torque_range_Nm) sensor.torque_range_Nm = *choices.torque_range_Nm;
   if (sensor.protocol == "described") {
-    sensor.described = read_sensor_protocol(root);
+    sensor.described = read_sensor_protocol(root, choices);
     for (std::size_t i = 0; i < 6; ++i) sensor.simulation.matrix[i][i] = 1.0;
+  } else if (!choices.settings.empty()) {
+    throw SetupError({.file = choices.file.string(),
+                      .line = choices.settings.front().line,
+                      .key = "sensor.settings",
+                      .found = "a setting",
+                      .expected = "none: " + sensor.name + " has no settings"});
   } else {
     sensor.simulation = read_simulation(root.map("simulation"));
   }

@@ -37,9 +37,9 @@ struct SensorDescription {
   std::optional<SensorProtocol> described;  // described
 };
 
-// Throws SetupError, with file, line and key.
-SensorDescription load_sensor(const std::filesystem::path& file);
+// With what a cell chooses, or as the sensor is delivered. Throws SetupError, with file, line and key.
+SensorDescription load_sensor(const std::filesystem::path& file, const SensorChoices& choices = {});
 // The same of a file that has been read already.
-SensorDescription read_sensor(const YamlNode& root);
+SensorDescription read_sensor(const YamlNode& root, const SensorChoices& choices = {});
 
 }  // namespace proxarm::description

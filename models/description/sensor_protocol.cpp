@@ -1,6 +1,7 @@
 #include "models/description/sensor_protocol.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -13,12 +14,76 @@ namespace {
 
 constexpr std::array<const char*, 6> components{"fx", "fy", "fz", "tx", "ty", "tz"};
 
+// What a sensor's file leaves to the cell, with the cell's value or its default.
+struct Setting {
+  std::int64_t value = 0;
+  bool is_identifier = false;
+};
+
 struct Reader {
   const YamlNode& root;
   SensorProtocol& protocol;
+  const SensorChoices& choices;
+  std::map<std::string, Setting> settings{};
   bool big_endian = true;
   std::optional<DbcFile> dbc{};
   std::vector<const DbcMessage*> messages{};  // of the frames; null where a frame states its own
+
+  void read_settings() {
+    if (const auto node = root.find_map("settings")) {
+      protocol.has_settings = true;
+      for (const std::string& name : node->keys()) settings.emplace(name, read_setting(node->map(name), name));
+    }
+    for (const SensorSettingChoice& choice : choices.settings) {
+      if (settings.contains(choice.name)) continue;
+      std::string names;
+      for (const auto& [name, setting] : settings) names += (names.empty() ? "" : ", ") + name;
+      throw SetupError({.file = choices.file.string(),
+                        .line = choice.line,
+                        .key = "sensor.settings",
+                        .found = in_quotes(choice.name),
+                        .expected = names.empty()
+                                        ? "none: " + root.file().filename().string() + " has no settings"
+                                        : "one of those of " + root.file().filename().string() + ": " + names});
+    }
+  }
+
+  [[nodiscard]] Setting read_setting(const YamlNode& node, const std::string& name) const {
+    if (std::isalpha(static_cast<unsigned char>(name.front())) == 0) {
+      throw node.error("a setting whose name begins with a letter");
+    }
+    constexpr std::int64_t most = 0xFFFFFFFF;
+    const std::int64_t min = node.integer("min", 0, most), max = node.integer("max", min, most);
+    Setting setting{node.integer("default", min, max)};
+    static_cast<void>(node.string("means"));
+    for (const SensorSettingChoice& choice : choices.settings) {
+      if (choice.name != name) continue;
+      if (choice.value < min || choice.value > max) {
+        throw SetupError(
+            {.file = choices.file.string(),
+             .line = choice.line,
+             .key = "sensor.settings." + name,
+             .found = std::to_string(choice.value),
+             .expected = std::to_string(min) + " to " + std::to_string(max) + " (" + node.string("means") + ")"});
+      }
+      setting.value = choice.value;
+    }
+    return setting;
+  }
+
+  [[nodiscard]] std::map<std::string, Setting>::const_iterator setting_named(const YamlNode& node) const {
+    return settings.empty() || !node.is_scalar() ? settings.end() : settings.find(node.as_string());
+  }
+
+  // A number, or the name of a setting.
+  [[nodiscard]] std::int64_t number_of(const YamlNode& node, std::int64_t min, std::int64_t max) const {
+    const auto named = setting_named(node);
+    if (named == settings.end()) return node.as_integer(min, max);
+    const std::int64_t value = named->second.value;
+    if (value >= min && value <= max) return value;
+    throw node.error("a setting of " + std::to_string(min) + " to " + std::to_string(max),
+                     named->first + " = " + std::to_string(value));
+  }
 
   // Position and scale by the signal's name in the DBC file.
   [[nodiscard]] const DbcSignal* find_signal(const YamlNode& node, std::size_t& at) const {
@@ -88,15 +153,34 @@ struct Reader {
     return number;
   }
 
-  [[nodiscard]] std::uint32_t read_id(const YamlNode& node) const {
-    return static_cast<std::uint32_t>(node.integer("id", 0, protocol.extended ? 0x1FFFFFFF : 0x7FF));
+  // Two settings that are identifiers name different frames.
+  void note_identifier(const std::string& name) {
+    Setting& setting = settings[name];
+    setting.is_identifier = true;
+    for (const auto& [other_name, other] : settings) {
+      if (other_name == name || !other.is_identifier || other.value != setting.value) continue;
+      const bool chosen = !choices.settings.empty();
+      throw SetupError({.file = (chosen ? choices.file : root.file()).string(),
+                        .line = chosen ? choices.settings.front().line : 0,
+                        .key = chosen ? "sensor.settings" : "settings",
+                        .found = std::min(name, other_name) + " and " + std::max(name, other_name) +
+                                 " with one value, " + std::to_string(setting.value),
+                        .expected = "identifiers that differ"});
+    }
   }
 
-  [[nodiscard]] static std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key,
-                                                            std::size_t most) {
+  [[nodiscard]] std::uint32_t read_id(const YamlNode& node) {
+    const YamlNode id = node.at("id");
+    const auto named = setting_named(id);
+    if (named != settings.end()) note_identifier(named->first);
+    return static_cast<std::uint32_t>(number_of(id, 0, protocol.extended ? 0x1FFFFFFF : 0x7FF));
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> read_bytes(const YamlNode& node, std::string_view key,
+                                                     std::size_t most) const {
     std::vector<std::uint8_t> bytes;
     for (const YamlNode& item : node.list(key, 0, most)) {
-      bytes.push_back(static_cast<std::uint8_t>(item.as_integer(0, 255)));
+      bytes.push_back(static_cast<std::uint8_t>(number_of(item, 0, 255)));
     }
     return bytes;
   }
@@ -154,6 +238,10 @@ struct Reader {
         throw node.error_at("signal", "a signal in N or Nm, or a `scale` and `offset` of your own that make it so",
                             "one in " + in_quotes(named->unit));
       }
+    }
+    if (node.has("divisor")) {
+      if (node.has("scale")) throw node.error_at("divisor", "either `divisor` or `scale`");
+      scale = 1.0 / static_cast<double>(number_of(node.at("divisor"), 1, 1'000'000'000));
     }
     signal.scale = node.number_or("scale", scale, -1e9, 1e9);
     if (signal.scale == 0.0) throw node.error_at("scale", "a number other than 0");
@@ -261,7 +349,7 @@ struct Reader {
     protocol.checksum = sum;
   }
 
-  [[nodiscard]] std::optional<SensorCommand> read_command(const YamlNode& from, std::string_view key) const {
+  [[nodiscard]] std::optional<SensorCommand> read_command(const YamlNode& from, std::string_view key) {
     const auto node = from.find_map(key);
     if (!node) return std::nullopt;
     SensorCommand command;
@@ -392,9 +480,10 @@ std::vector<std::uint32_t> SensorProtocol::wire_ids(std::uint32_t base_id) const
   return ids;
 }
 
-SensorProtocol read_sensor_protocol(const YamlNode& root) {
+SensorProtocol read_sensor_protocol(const YamlNode& root, const SensorChoices& choices) {
   SensorProtocol protocol;
-  Reader reader{root, protocol};
+  Reader reader{root, protocol, choices};
+  reader.read_settings();
   reader.read_format();
   reader.read_frames();
   reader.read_signals();

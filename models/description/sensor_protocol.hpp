@@ -7,13 +7,16 @@
 //   protocol: described
 //   base_id: {min: 0x010, max: 0x7F0, step: 1}   # the cell's sensor.base_id · step is added to every identifier; left
 //                                                # out: the identifiers are as they stand
+//   settings:                                    # what differs from unit to unit: the cell's sensor.settings
+//     command_id: {default: 0x64, min: 1, max: 0x7FF, means: commands}
+//                                                # then an `id`, an entry of `data` and a `divisor` may be its name
 //   format: {extended: true}                     # 29-bit identifiers; fd: CAN FD; bit_rate_switch
 //   byte_order: big_endian                       # of all numbers that don't state their own
 //   frames:                                      # of one sample
 //     - {id: 0x001, bytes: 8, starts_with: [0xAA, 0x07]}
 //     - {id: 0x002, bytes: 6}
 //   signals:                                     # value = scale · number + offset, in N and Nm
-//     fx: {byte: 0, bits: 16, type: signed, scale: 0.02, offset: 0}
+//     fx: {byte: 0, bits: 16, type: signed, scale: 0.02, offset: 0}   # or divisor: 50
 //   matrix: 6 rows                               # then `signals` is a list and wrench = matrix · values
 //   counter: {byte: 4, bits: 16}                 # goes up by one from sample to sample
 //   status: {byte: 6, bits: 16, error_mask: 0xFC00, overload_mask: 0x03F0, bits_named: {"10": text}}
@@ -38,6 +41,8 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "models/description/sensor_choices.hpp"
 
 namespace proxarm::description {
 
@@ -110,7 +115,7 @@ struct SensorRegisters {
 struct SensorProtocol {
   bool extended = false, fd = false, bit_rate_switch = false;
   std::optional<SensorRegisters> registers;  // on Modbus; then `frames` is one, of their bytes
-  bool has_base_id = false;
+  bool has_base_id = false, has_settings = false;
   std::uint32_t base_id_min = 0, base_id_max = 0, base_id_step = 1;
   std::vector<SampleFrame> frames;
   std::vector<SensorSignal> signals;                  // fx fy fz tx ty tz, or as many as the matrix has columns
@@ -136,6 +141,6 @@ struct SensorProtocol {
 };
 
 // Of a sensor's file whose protocol is "described". Throws SetupError.
-SensorProtocol read_sensor_protocol(const YamlNode& root);
+SensorProtocol read_sensor_protocol(const YamlNode& root, const SensorChoices& choices = {});
 
 }  // namespace proxarm::description

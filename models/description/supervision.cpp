@@ -20,6 +20,7 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"leash_exceeded", {"stop_1", "hold"}},
       {"tool_too_fast", {"stop_0", "stop_1"}},
       {"tool_off_limits", {"stop_1", "stop_0"}},
+      {"elbow_too_fast", {"stop_0", "stop_1"}},
       {"proxy_squeezed", {"stop_1", "hold"}},
       {"bus_off", {"stop_1", "stop_0"}},
       {"interface_down", {"stop_1", "stop_0"}},

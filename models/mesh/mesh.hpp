@@ -62,7 +62,7 @@ class TriangleMesh {
       return {sum[0] + sum[2], sum[1] + sum[3]};
     }
   };
-  // What takes long to build. A mesh restored from it is the same to the bit.
+  // The parts of a mesh that take long to build. A mesh restored from them is the same to the bit.
   struct Structure {
     std::vector<Vec3> vertices;                           // each used
     std::vector<std::array<std::uint32_t, 3>> triangles;  // in the tree's order

@@ -34,7 +34,7 @@ bool MeshSurface::is_clear(const Vec3& p, const Vec3& q) const noexcept {
 
 void MeshSurface::find_clearance(const Vec3& q) noexcept {
   constexpr double u = 0.5 * std::numeric_limits<double>::epsilon();
-  // Half of the true distance is cheap to find; the distance itself would take a look at every face about as near.
+  // Half of the true distance is cheap to find; the exact one would require testing every face at about that distance.
   const double distance = mesh_->distance_at_least(q, std::numeric_limits<double>::infinity(), nearest_face_, 0.5);
   // Rounding may add a few u of the coordinates to the distance. One lift (64 u S) pays for the mesh's coordinates, the
   // last term for q's. Two lifts more make sure that a proxy which is clear doesn't touch either.
@@ -124,7 +124,7 @@ void MeshSurface::keep_side(const Contact<3>& contact) noexcept {
   }
 }
 
-// The usual step, without a walk: the face that held the proxy goes on to hold it alone. Returns true only if the walk
+// The usual step, without a walk: the face that held the proxy alone still does. Returns true only if the walk
 // would find the same, bit for bit. That is so if this face blocks the way to p, the step on it stays within its sides,
 // and no other face is touched or crossed, each by more than rounding. Otherwise the walk decides.
 bool MeshSurface::glides(const Vec3& p, const Vec3& q, Vec3& r) noexcept {

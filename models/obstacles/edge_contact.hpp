@@ -1,11 +1,11 @@
 // A proxy that friction holds at a convex edge, or at a corner, of a solid.
 //
-// Beyond a face's edge there is nothing that its plane could hold. Where a proxy comes from beside an edge, both faces
-// may take it beyond that edge, each on its own plane, though p is inside. The edge itself is what it meets then: of
-// the normals between the faces' two, n(θ) = cos θ n₁ + sin θ n₂, the one counts for which (17) on the plane through
-// the edge ends on the edge. That point moves from beyond the edge on one side to beyond it on the other as θ goes from
-// 0 to 90°, so there is such a θ. There may be several (Coulomb's law leaves that open); the
-// one next to the face that was entered is taken.
+// Beyond a face's edge, its plane holds nothing. If a proxy comes from beside an edge, each of the two faces may take
+// it beyond that edge on its own plane, although p is inside. The proxy then meets the edge itself. Of the normals
+// between those of the faces, n(θ) = cos θ n₁ + sin θ n₂, the one applies for which (17), on the plane through the
+// edge, ends on the edge. As θ goes from 0 to 90°, that end moves from beyond the edge on one side to beyond it on the
+// other, so such a θ exists. There may be several (Coulomb's law leaves this open); the one nearest to the face that
+// was entered is taken.
 #pragma once
 
 #include <cmath>
@@ -19,10 +19,10 @@ struct EdgeContact {
   Vec3 r;
   Vec3 normal;  // unit
   bool slips = false;
-  bool found = true;  // false: r is there, but (17) isn't kept
+  bool found = true;  // false: r is that point, but doesn't satisfy (17)
 };
 
-// What a step is to solve on a plane, whichever it is.
+// The data of a step that is to be solved on several planes.
 struct StepOnPlanes {
   double mu, K;
   const Layer& layer;
@@ -33,9 +33,9 @@ struct StepOnPlanes {
   }
 };
 
-// Calls error(x) between low, where it is positive, and high, where it is negative, until it is `nothing` or there are
-// no numbers left between: false position (the Illinois variant), with a bisection every fourth step. False if the
-// errors at the ends have other signs, or if error(x) jumps past zero by more than `near`.
+// Solves error(x) = 0 between low, where it is positive, and high, where it is negative, by false position (the
+// Illinois variant) with a bisection every fourth step. It ends when |error| ≤ `nothing` or no double is left between.
+// Returns false if the errors at the ends have other signs, or if error(x) jumps past zero by more than `near`.
 template <typename Error>
 bool false_position(Error error, double low, double high, double nothing, double near) noexcept {
   double at_high = error(high);
@@ -58,13 +58,14 @@ bool false_position(Error error, double low, double high, double nothing, double
   return std::abs(now) <= near;
 }
 
-// At the straight edge through `point` in which two faces meet at a right angle: the solution next to the first face.
+// Holds the proxy at the straight edge through `point` in which two faces meet at a right angle, by the solution
+// nearest to the first face.
 // Precondition: p is behind both faces, and the step on the first ends beyond the edge.
 EdgeContact hold_at_edge(const Vec3& point, const Vec3& normal_1, const Vec3& normal_2,
                          const StepOnPlanes& step) noexcept;
 
-// At the corner r itself: by the normal at which the corner's force is on the friction cone's edge, against the slip;
-// or it sticks where the way there is the normal. Precondition: r is neither p nor q.
+// Holds the proxy at the corner r itself, by the normal for which the force is on the edge of the friction cone against
+// the slip. Or it sticks there, if the direction back to q can be the normal. Precondition: r is neither p nor q.
 EdgeContact hold_at_corner(const Vec3& r, double mu, const Vec3& p, const Vec3& q) noexcept;
 
 }  // namespace proxarm::models

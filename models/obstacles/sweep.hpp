@@ -5,8 +5,8 @@
 
 namespace proxarm::models {
 
-// The last point on the way from x to `barred` to which the obstacle doesn't bar the way, by bisection down to
-// neighbouring doubles. Precondition: the obstacle bars the way from x to `barred`.
+// The last point on the way from x to `barred` that can be reached, by bisection down to neighbouring doubles.
+// Precondition: the obstacle bars the way from x to `barred`.
 inline Vec3 sweep(const Obstacle& obstacle, const Vec3& x, Vec3 barred) noexcept {
   // From a metre down to the least double, 2⁻¹⁰⁷⁴ m, bisection takes 1074 steps; it mostly ends after some 50.
   constexpr int most_halvings = 1100;

@@ -1,5 +1,5 @@
-// Can the contacts that a 𝒢 reports bear its force? What `proxarm check`, the stress study and the contract tests judge
-// forces by. Nothing in the cycle needs it.
+// Can the contacts that a 𝒢 reports bear its force? `proxarm check`, the stress study and the contract tests judge
+// forces by this. The cycle doesn't need it.
 //
 // By (17), the force f = K (r − p) must be a sum of one force for each contact: of its friction cone if the contact
 // sticks, of the cone's edge against N Nᵀ (r − q) if it slips. So these are the cones to pass to in_sum_of_cones
@@ -32,9 +32,9 @@ double rounding_amplification(std::span<const Contact<N>> contacts) {
   return 4.0 / std::max(least, 1e-8);
 }
 
-// How far the proxy slid along contacts that are said to stick, metres. (17) lets such a contact bear any force of its
-// cone because N Nᵀ (r − q) = 0 there; a wall that creeps isn't told by its forces, but by this. Contacts without
-// friction, or of which it isn't known, have nothing that sticks. Arguments as below.
+// How far the proxy slid along contacts that are reported to stick, metres. (17) lets such a contact bear any force of
+// its cone because N Nᵀ (r − q) = 0 there. So a wall that creeps isn't detected by its forces, but by this distance.
+// Contacts without friction, or with unknown friction, are left out. Arguments as below.
 template <int N, typename Friction, typename Motion>
 double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion motion) {
   double most = 0.0;
@@ -49,7 +49,7 @@ double creep_m(std::span<const Contact<N>> contacts, Friction friction, Motion m
 
 // The cone of forces that each contact can bear.
 //   size_m                the size of the coordinates that r and q are rounded by
-//   friction(contact)     μ; nullopt if it isn't known: then any force will do that doesn't pull
+//   friction(contact)     μ; nullopt if it isn't known: then any force that doesn't pull is accepted
 //   motion(contact)       r − q as the contact's object sees it (q carried along where the object moves), in 3D
 //   slipping(μ, angle)    is called for each slipping contact: the direction of its slip, and so of its force, is only
 //                         known to `angle` (rad), the rounding of r and q over the slip's length

@@ -1,14 +1,15 @@
 // Which of a few contacts hold the proxy? The active-set search of all worlds.
 //
-// A step that meets several surfaces ends at a point that one, two or three of them hold together; the others let it
-// pass. Sets of contacts are tried by size, single ones first, until one is complete: nothing pulls, nothing is
-// penetrated, and friction is as (17) says for each contact. A trial that runs into a surface nobody has thought of
-// makes that a candidate, and the search starts again. Three contacts determine a point, so larger sets add nothing
-// where all are rigid; elastic layers share their force by another method (models/world/shared_support.hpp).
+// A step that meets several surfaces ends at a point that one, two or three of them hold together; the others don't
+// act. This is an active-set search: sets of contacts are tried by size, single ones first, until one is complete. A
+// set is complete if nothing pulls, nothing is penetrated, and friction is as (17) says for each contact. A trial that
+// runs into a further surface makes that a candidate, and the search starts again. Three contacts determine a point, so
+// larger sets add nothing if all are rigid; elastic layers share their force by another method
+// (models/world/shared_support.hpp).
 //
-// What a trial solves differs from world to world (planes, tangent planes of curved surfaces, faces of a mesh); that is
-// the caller's. Of the sets that are tried, the order is the same everywhere: candidates by their numbers, the greatest
-// in the outermost loop, so that results don't depend on anything but the order of the candidates.
+// What a trial solves differs from world to world (planes, tangent planes of curved surfaces, faces of a mesh) and is
+// up to the caller. The order of the sets is the same everywhere: by the candidates' numbers, with the greatest number
+// in the outermost loop, so that results depend on nothing but the order of the candidates.
 #pragma once
 
 #include <cstddef>
@@ -21,8 +22,8 @@ namespace proxarm::models {
 
 // What a stage of the search has achieved.
 enum class StepResult {
-  no_progress,  // no set of this size will do: larger ones are next
-  progress,     // there is one more candidate, or the proxy is somewhere else: single contacts are next
+  no_progress,  // no set of this size is complete: larger ones are next
+  progress,     // a candidate was added, or the proxy has moved: single contacts are next
   arrived,      // a complete set is found
 };
 
@@ -73,7 +74,7 @@ struct NearestSet {
   Vec3 r = Vec3::Zero();
 
   [[nodiscard]] bool found() const noexcept { return distance2 < std::numeric_limits<double>::infinity(); }
-  // True if `at` is better than what was there; the caller then notes its contacts.
+  // Takes `at` if it is better than the best so far. Returns true if so; the caller then notes its contacts.
   bool improve(const Vec3& p, const Vec3& at) noexcept {
     const double d2 = (at - p).squaredNorm();
     if (!(d2 < distance2)) return false;

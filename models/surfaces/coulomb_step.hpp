@@ -43,8 +43,9 @@ class CoulombStep {
         Vec<N> r;
         if (slip(F_ / pull, pull, r)) return r;
       }
-      // q isn't a place of the proxy: it lies behind a surface, as the reference of order 2 may, or an object carries
-      // the proxy away. r(τ) then doesn't end in q, and the medium's force grows without bound, so a bracket exists.
+      // The proxy can't rest at q, because q is behind a surface (as the reference of order 2 may be), or an object
+      // carries the proxy away. Then r(τ) doesn't end in q, and the medium's force grows without bound, so a bracket
+      // exists.
       while (high.excess < 0.0 && 1.0 - high.tau > 1e-15) {
         low = high;
         high = at(1.0 - 0.1 * (1.0 - high.tau));
@@ -67,7 +68,7 @@ class CoulombStep {
     return sample;
   }
 
-  // How near to F the rounding of r and of p + τ (q − p) lets the medium's force come, N.
+  // How far from F the rounding of r and of p + τ (q − p) may leave the medium's force, N.
   [[nodiscard]] double rounding_N(const Vec<N>& r) const noexcept {
     const double places = 16.0 * u * (r.template lpNorm<1>() + q_.template lpNorm<1>());
     return F_ * places / (r - q_).norm() + kappa_ * (places + 16.0 * u * p_.template lpNorm<1>());
@@ -94,7 +95,7 @@ class CoulombStep {
     return (rest_(1e15 * kappa_, q_, q_) - q_).norm() <= 32.0 * u * q_.template lpNorm<1>();
   }
 
-  // Next to rest (τ → 1) the way is short and the world is flat: r(τ) = q + (1 − τ) R. R is extrapolated to 1 − τ = 0
+  // Near rest (τ → 1) the slip is short and the world is flat: r(τ) = q + (1 − τ) R. R is extrapolated to 1 − τ = 0
   // by Neville's scheme (Richardson extrapolation), through samples whose 1 − τ is a quarter of the one before, until
   // it changes by no more than the rounding of r. `high` becomes the last sample. Returns true if the world is flat
   // from the first sample on.
@@ -121,7 +122,7 @@ class CoulombStep {
       const double change = (row[k] - last).norm();
       if (change > least && least <= 100.0 * rounding) break;
       least = change;
-      // Where the last two agree so closely, the one before is as good, and its rounding is a quarter of this one's.
+      // If the last two agree so closely, the one before is as good and has a quarter of this one's rounding.
       R = change <= 0.5 * rounding ? last : row[k];
       high = sample;
       if (change <= rounding) break;
@@ -129,8 +130,8 @@ class CoulombStep {
     return false;
   }
 
-  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R: the secant method, from the τ at which this form gives F. False if
-  // it doesn't converge.
+  // Tries a slip so short that r(τ) ≈ q + (1 − τ) R, by the secant method from the τ at which this form gives F.
+  // Returns false if it doesn't converge.
   bool slip(double tau, double pull, Vec<N>& r) noexcept {
     Sample sample = at(tau);
     double slope = pull;
@@ -146,8 +147,8 @@ class CoulombStep {
     return std::abs(sample.excess) <= rounding_N(sample.r);
   }
 
-  // Asks 𝒢' once more so that rest.contacts() are those at q: as near to q as contacts show above rounding, or else as
-  // near as the first sample was.
+  // Evaluates 𝒢' once more so that rest.contacts() are those at q: as near to q as contacts can be told from rounding,
+  // or where the first sample was if none is found there.
   void touch_at_rest() noexcept {
     at(1.0 - std::min(1e6 * u * (p_.template lpNorm<1>() + q_.template lpNorm<1>()) / size_, 1.0 - held_at));
     if (rest_.contacts().empty()) at(held_at);
@@ -172,8 +173,8 @@ class CoulombStep {
     return std::abs(last_.excess) <= rounding_N(last_.r);
   }
 
-  // Where 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps from one
-  // to another, and F may lie within the jump. Each solution by itself is smooth in τ, and is told by what it touches.
+  // If 𝒢' has several solutions (a push straight through a ball's middle, two faces of a box), r(τ) jumps from one to
+  // another, and F may lie within the jump. Each solution by itself is smooth in τ and is identified by its contacts.
   struct Answer {
     std::uint64_t touches = 0;
     Sample low{.tau = -1.0, .excess = 0.0, .r = {}}, high{.tau = 2.0, .excess = 0.0, .r = {}};
@@ -217,7 +218,8 @@ class CoulombStep {
     return false;
   }
 
-  // The secant while samples stay with this answer; else points spread evenly over the bracket by the golden ratio.
+  // The secant method while samples stay with this solution; else points spread evenly over the bracket by the golden
+  // ratio.
   bool search_within(Answer& answer) noexcept {
     constexpr double golden = 0.6180339887498949;
     bool same = true;

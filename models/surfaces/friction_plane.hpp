@@ -78,7 +78,7 @@ class FrictionPlane final : public GeometricAlgorithm<N> {
 
   [[nodiscard]] const FlatSurface<N>& surface() const noexcept { return surface_; }
   [[nodiscard]] double friction() const noexcept { return mu_; }
-  // From the next step on; finite and not negative.
+  // Takes effect with the next step. Precondition: finite and not negative.
   void set_friction(double friction) noexcept { mu_ = friction; }
 
  private:

@@ -130,7 +130,7 @@ class Groove {
     if (w_[0] == 0.0 && w_[1] == 0.0 && s_q_[0] == s_q_[1]) {
       from_within();
     } else if (may_pull() && (f_1_ < 0.0 || f_2_ < 0.0)) {
-      // Friction of a contact that pulls would lead nowhere.
+      // The friction of a contact that pulls is meaningless.
       out_.found = true;
       out_.r = place(s_p_);
     } else {
@@ -145,7 +145,7 @@ class Groove {
     return line_.settle(a_.surface, b_.surface, line_.x0 + s * line_.e);
   }
 
-  // The proxy was in the line already: the closed form.
+  // The proxy was already in the line: the closed form applies.
   void from_within() noexcept {
     if (f_1_ < least_ || f_2_ < least_) return;
     out_.found = true;

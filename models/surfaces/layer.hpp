@@ -1,4 +1,4 @@
-// An elastic layer on a surface, which gives way by force over stiffness k down to its rigid core.
+// An elastic layer on a surface, which yields by force over stiffness k, down to its rigid core.
 //
 //   K (h − h_p) = −k h        along the normal; h and h_p are the heights of r and p, and −h ≤ the layer's thickness
 //   (4) along the tangent     with the normal force K (h − h_p)
@@ -13,7 +13,7 @@
 
 namespace proxarm::models {
 
-// The surface gives way along its normal by f_n / stiffness until the rigid core is reached.
+// The surface yields along its normal by f_n / stiffness until the rigid core is reached.
 struct Layer {
   double stiffness_N_per_m = std::numeric_limits<double>::infinity();  // infinite: there is no layer
   double thickness_m = 0.0;

@@ -28,7 +28,7 @@ struct MembershipError {
   }
 };
 
-// What counts as zero when a law asks whether q is on the surface and whether it moves along it.
+// The tolerances of the laws' questions whether q is on the surface, and whether it moves along it.
 struct MembershipTolerance {
   double surface_m = 1e-12;     // height up to which q is on the surface
   double motion_m_per_s = 0.0;  // ‖Nᵀv‖ up to which the proxy is at rest

@@ -36,7 +36,7 @@ class PlaneComposition final : public GeometricAlgorithm<3> {
   // than 2 atan μ.
   [[nodiscard]] std::uint64_t unresolved_steps() const noexcept override { return without_friction_; }
 
-  // Of all faces of an object, from the next step on; finite and not negative.
+  // Sets the friction of all faces of an object, from the next step on. Precondition: finite and not negative.
   void set_friction(std::int32_t object, double friction) noexcept {
     for (Face& face : faces_) {
       if (face.object == object) face.mu = friction;

@@ -64,7 +64,7 @@ PolylineGuide PolylineGuide::line(const Vec3& point_m, const Vec3& direction, do
   return guide;
 }
 
-// The first one, if several are equally near (at a corner).
+// The nearest piece; the first one if several are equally near (at a corner).
 std::size_t PolylineGuide::nearest_piece(const Vec3& q) const noexcept {
   std::size_t best = 0;
   double least = infinity;
@@ -283,7 +283,7 @@ Vec3 PolylineGuide::slide(const Vec3& p, const Place& place) noexcept {
   const double begin = pieces_[i].begin, length = pieces_[i].length;
   Lead way = lead(pieces_[i], p, place.s);
   if (way.side == 0) {
-    // The piece doesn't lead it away. In a corner the neighbouring one may.
+    // This piece doesn't lead the proxy away. At a corner the neighbouring one may.
     const bool in_corner = pieces_.size() > 1 && (place.s == begin || place.s == length);
     if (!in_corner) return report(place.x, p, i, false);
     way = place.s == length ? Lead{infinity, 1} : Lead{-infinity, -1};

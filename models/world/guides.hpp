@@ -59,7 +59,7 @@ class PolylineGuide final : public GeometricAlgorithm<3> {
     objects_ = std::move(objects);
     contacts_[0].object = index;
   }
-  // Objects that move stop the proxy, too, and push it along. Precondition: they have no friction and are no meshes.
+  // Moving objects stop the proxy, too, and push it along. Precondition: they have no friction and aren't meshes.
   void be_pushed_by(std::vector<World::Entry> movers) {
     movers_ = std::make_shared<std::vector<World::Entry>>(std::move(movers));
     pushes_.assign(movers_->size(), 0);

@@ -1,6 +1,6 @@
-// A fixed point r = solution(r), where solution(x) is what is found on the tangent planes at x. It is iterated with
-// Anderson acceleration of depth 1 (D. G. Anderson, "Iterative procedures for nonlinear integral equations", Journal of
-// the ACM 12, 1965).
+// Finds a fixed point r = solution(r), where solution(x) is the solution on the tangent planes at x, by Anderson
+// acceleration of depth 1 (D. G. Anderson, "Iterative procedures for nonlinear integral equations", Journal of the ACM
+// 12, 1965).
 #pragma once
 
 #include <algorithm>

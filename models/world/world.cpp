@@ -203,9 +203,9 @@ bool World::fits(const Vec3& q, const Vec3& r, std::span<const std::size_t> cont
   return all;
 }
 
-// Whether all of the objects are where r is. Pairs and triples are solved on tangent planes, and the plane of a face
-// goes on beyond its edges, where nothing holds a proxy. The tolerance lies between two scales: rounding is smaller for
-// objects of up to a hundred metres, and whoever is held 1e-12 m off a face's edge is held at the edge.
+// Whether all of the objects are at r. Pairs and triples are solved on tangent planes, and a face's plane continues
+// beyond its edges, where nothing holds a proxy. The tolerance lies between two scales: rounding is smaller for objects
+// of up to a hundred metres, and a proxy that is held 1e-12 m off a face's edge is held at the edge.
 bool World::all_touch(const Vec3& r, std::span<const std::size_t> contacts) const noexcept {
   const double nothing = 1e-12 * (1.0 + r.lpNorm<1>());
   return std::all_of(contacts.begin(), contacts.end(),
@@ -229,7 +229,7 @@ StepResult World::try_singles(double K, const Vec3& p, const Vec3& q, Candidates
   return choice.result(candidates.grew);
 }
 
-// What a candidate's obstacle reports where it presses together with others.
+// The contact that a candidate's obstacle reports if it presses together with others.
 Contact<3> World::contact_of(const Candidates& candidates, std::size_t candidate, bool slips,
                              const Vec3& normal) const noexcept {
   const Entry& entry = entries_[candidates.index[candidate]];
@@ -388,9 +388,8 @@ bool World::solve(double K, const Vec3& p, const Vec3& q, Choice& choice) noexce
   if (search(K, p, q, candidates, choice)) return choice.resolved;
   candidates.around = true;
   if (search(K, p, q, candidates, choice)) return choice.resolved;
-  // The tool may be so deep, beyond the radius of a curved surface, that the iteration on tangent planes finds nothing.
-  // So it may where a far step passes several objects. The proxy then goes as far as a shorter step leads: the way to p
-  // is halved up to six times.
+  // Beyond the radius of a curved surface, or on a far step past several objects, the iteration on tangent planes may
+  // find nothing. The proxy then goes as far as a shorter step leads: the way to p is halved up to six times.
   Vec3 nearer = p;
   for (int k = 0; k < 6 && !choice.found(); ++k) {
     nearer = 0.5 * (nearer + q);

@@ -51,8 +51,10 @@ description::Grip Hand::grip(double time_s) const noexcept {
 Vec3 Hand::force_W(double time_s, const Vec3& position_W, const Vec3& velocity_W) const noexcept {
   const Intention want = intention(time_s);
   const description::Grip held = grip(time_s);
-  return held.stiffness_N_per_m * (want.position_W - position_W) +
-         held.damping_Ns_per_m * (want.velocity_W - velocity_W);
+  const Vec3 F =
+      held.stiffness_N_per_m * (want.position_W - position_W) + held.damping_Ns_per_m * (want.velocity_W - velocity_W);
+  const double length_N = F.norm();
+  return length_N > description_.max_force_N ? Vec3(description_.max_force_N / length_N * F) : F;
 }
 
 }  // namespace proxarm::sim

@@ -1,6 +1,6 @@
 // The person's hand in a simulation: it holds the handle through stiffness and damping and follows an intention.
 //
-//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ)
+//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ),   cut to max_force_N along itself
 // acts on hand and handle at T; x_int is the intention of description::HandDescription from where the tool was at the
 // start. The hand's mass belongs to ArmDynamics. Translation only: the hand doesn't twist the handle.
 #pragma once

@@ -182,6 +182,36 @@ class Timestep(Script):
         with open(self.folder / "session" / "signals.csv", newline="") as file:
             return [row for row in csv.DictReader(file) if row["phase"] in ("rendering", "holding")]
 
+    def clearance_mm(self, *arguments):
+        """How far the steel comes off the wall at most, from the hold's begin until half a second after its end, in a
+        contact that the proxy never leaves."""
+        self.figures("--record", "session", "--no-plot", "--mass", "6", "--force-unstable", *arguments)
+        rows = self.rows()
+        begins = next(k for k, row in enumerate(rows) if row["phase"] == "holding")
+        ends = next(k for k in range(begins, len(rows)) if rows[k]["phase"] == "rendering")
+        self.assertNotEqual(rows[begins - 1]["contact"], "free")
+        until_s = float(rows[ends]["time_s"]) + 0.5
+        after = [row for row in rows[ends:] if float(row["time_s"]) < until_s]
+        self.assertEqual({row["contact"] for row in after} & {"free"}, set(), "the proxy stays on it")
+        return 1e3 * max(float(row["tool_clearance_m"]) for row in rows[begins:ends] + after)
+
+    def test_the_steel_stays_on_a_wall_that_it_is_pressed_on_and_swings_off_one_that_it_slides_on(self):
+        """After a hold, and after a change of the timestep: gears that bent for a slide swing as it is braked."""
+        def held(t):
+            return "--do", f"hold@{t}s", "--do", f"resume@{t + 0.7:g}s"
+
+        for period_ms in (1, 2, 4):
+            period = ("--timestep", f"{period_ms}ms")
+            other = f"timestep={4 if period_ms < 4 else 1}ms"
+            for what, standing, sliding in (("a hold", held(4), held(6.3)),
+                                            ("another timestep", ("--set", f"{other}@4s"), ("--set", f"{other}@6.05s"))):
+                with self.subTest(f"{what}, {period_ms} ms"):
+                    stands, slides = self.clearance_mm(*period, *standing), self.clearance_mm(*period, *sliding)
+                    print(f"{what}, {period_ms} ms: standing {stands:.3f} mm, sliding {slides:.3f} mm off the wall")
+                    self.assertLess(stands, 0.001)
+                    # 0.23 was measured; it was 2 mm where the proxy left the wall.
+                    self.assertLess(slides, 0.25)
+
     def test_changes_in_motion_without_a_jump_and_repeats_to_the_bit(self):
         arguments = (*SWEEP, "--duration", "4s", "--mass", "6", "--set", "timestep=2ms@1s", "--set", "mass=8@2s",
                      "--set", "timestep=4ms@3s")
@@ -409,7 +439,7 @@ except ConnectionError:
         silent = self.silent_clients(8)
         answer, took_s = self.ask_raw(b"hold")
         self.assertEqual(answer, b"ok: hold\n")
-        self.assertLess(took_s, 10 * PROMPT_S)
+        self.assertLess(took_s, 3 * PROMPT_S)
         for client in silent:
             client.close()
         for order in (b"resume", b"hold", b"resume"):

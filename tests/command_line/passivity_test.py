@@ -1,10 +1,20 @@
 """A grip that the loop can't stand: --passivity, its figures, its place in cell and record."""
+import csv
+import math
 import unittest
 
 from harness import SOURCE, ProgramTest
 
 GRIP = ("--scene", "scenes/free.yaml", "--hand", SOURCE / "sim/hands/stiff_grip.yaml", "--extra-delay", "8ms",
         "--duration", "12s")
+
+
+def swing_m(time_s, place_m, from_s, until_s, window_s=0.15):
+    """The largest swing to either side along an axis within a window, in which a led hand goes millimetres at most."""
+    moving = [place for t, place in zip(time_s, place_m) if from_s <= t <= until_s]
+    n = round(window_s / (time_s[1] - time_s[0]))
+    return max((max(column) - min(column)) / 2 for i in range(0, max(1, len(moving) - n), n // 3)
+               for column in zip(*moving[i:i + n]))
 
 
 class Passivity(ProgramTest):
@@ -37,6 +47,37 @@ class Passivity(ProgramTest):
         self.assertLess(outcome.summary["oscillation"]["duration_s"], 1.5)
         self.assertGreater(done["added_damping_max_Ns_per_m"], 20)
         self.assertLess(done["oscillating_time_s"], 2)
+
+    def test_a_clamp_that_is_felt_late_is_quiet_or_stopped_soon(self):
+        """10,000 N/m with readings 30 and 50 ms older than the default cell's: nothing damps the first swing, which
+        reaches max_force_N where damping comes too late. Whatever comes: 20 mm and 350 N at most, and after a second
+        it is quiet or has been stopped. Half again what was measured bounds what is left."""
+        hand = self.written("clamp.yaml", "name: clamp\nmass_kg: 1\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
+                            "grips: [{time_s: 2, stiffness_N_per_m: 10000, damping_Ns_per_m: 50}]\nwaypoints:\n"
+                            "  - {time_s: 0.5, offset_m: [0, 0, 0]}\n  - {time_s: 1.5, offset_m: [0.02, 0.03, 0]}\n"
+                            "  - {time_s: 4, offset_m: [-0.02, 0, 0.02]}\n")
+        for delay, mode, quiet in (("30ms", "auto", False), ("30ms", "on", True), ("50ms", "auto", False),
+                                   ("50ms", "on", False)):
+            with self.subTest(f"{delay}, {mode}"):
+                outcome = self.call("run", "--scene", "scenes/free.yaml", "--hand", hand, "--extra-delay", delay,
+                                    "--force-unstable", "--passivity", mode, "--duration", "6s", "--no-plot", "--json",
+                                    "--record", "record")
+                faults = [fault["fault"] for fault in outcome.summary["faults"]]
+                self.assertEqual(faults, [] if quiet else ["force_excessive"])
+                time_s, force_N, place_m = self.motion("record")
+                self.assertLess(max(force_N), 350)
+                self.assertLess(swing_m(time_s, place_m, 2.2, time_s[-1]), 0.02)
+                if quiet:
+                    self.assertLess(swing_m(time_s, place_m, 3.5, 6.0), 2.5e-3)
+                else:
+                    self.assertLess(time_s[-1], 3.3)
+
+    def motion(self, record):
+        with open(self.folder / record / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        return ([float(row["time_s"]) for row in rows],
+                [math.hypot(*(float(row[f"hand_force_W_{axis}_N"]) for axis in "xyz")) for row in rows],
+                [[float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz"] for row in rows])
 
     def test_observing_changes_nothing(self):
         figures = [self.summary("--duration", "3s", "--passivity", mode)["setpoint_sha256"]

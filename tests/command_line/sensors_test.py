@@ -7,7 +7,8 @@ import unittest
 
 from harness import SOURCE, ProgramTest
 
-MAKES = {"aidin_aft200": "", "robotous_rft": "base_id: 0x1F0", "onrobot_hex": "", "wacoh_dynpick": "base_id: 7"}
+ROBOTOUS_IDS = "settings: {command_id: 0x1F0, first_id: 0x1F1, second_id: 0x1F2}"
+MAKES = {"aidin_aft200": "", "robotous_rft": ROBOTOUS_IDS, "onrobot_hex": "", "wacoh_dynpick": "base_id: 7"}
 
 
 class OtherSensors(ProgramTest):
@@ -31,6 +32,24 @@ class OtherSensors(ProgramTest):
             with self.subTest(name):
                 summary = self.summary(self.cell_with(name), "--duration", "1s")
                 self.assertEqual(summary["faults"], [])
+
+    def test_a_sensor_is_as_the_cell_sets_it(self):
+        """Identifiers as delivered, another number, another model's divisors: no copy of the sensor's file."""
+        cells = {"robotous_rft": ("", "settings: {force_divisor: 100, torque_divisor: 4000}\n  force_range_N: [150, 150, 150]"),
+                 "aidin_aft200": ("settings: {sensor_number: 9, force_id: 0x101, torque_id: 0x103}",)}
+        for name, settings in cells.items():
+            for text in settings:
+                with self.subTest(name, settings=text):
+                    cell = self.cell_with(name)
+                    changed = cell.read_text().replace(MAKES[name] or "link: ", text if MAKES[name] else text + "\n  link: ", 1)
+                    cell.write_text(changed)
+                    self.assertEqual(self.summary(cell, "--duration", "1s")["faults"], [])
+        plan = self.call("plan", cell)
+        self.assertRegex(plan.out, r"(?i)0?x?101\b")
+        cell.write_text(changed.replace("torque_id: 0x103", "torque_id: 0x101"))
+        refused = self.call("run", cell, "--duration", "1s")
+        self.assertEqual(refused.status, 2)
+        self.assertIn("force_id and torque_id with one value", refused.err)
 
     def test_a_sensor_on_can_fd_needs_a_bus_of_its_own_with_a_data_rate(self):
         """All six values in one frame of 12 bytes, at the data phase's rate."""

@@ -78,6 +78,27 @@ class SessionEnd(ProgramTest):
                          [{"order": "resume", "time_s": 1.0, "refused": "the arm isn't in a hold"},
                           {"order": "hold", "time_s": 20.0, "refused": "the session had ended before"}])
 
+    def test_changes_for_which_the_session_ended_too_early_are_told(self):
+        # `--set mass=6@20s` of a session of 10 s did nothing, without a word.
+        summary = self.ended("--duration", "3s", "--set", "mass=6@20s", "--set", "damping=20@1s", "--set",
+                             "timestep=2ms@30s")
+        self.assertEqual(summary["idle_orders"],
+                         [{"order": "set mass=6", "time_s": 20.0, "refused": "the session had ended before"},
+                          {"order": "set timestep=2ms", "time_s": 30.0, "refused": "the session had ended before"}])
+        outcome = self.call("run", "--no-plot", "--duration", "1s", "--set", "mass=6@20s")
+        self.assertIn("order without effect:     set mass=6 at 20 s: the session had ended before\n", outcome.out)
+
+    def test_changes_of_a_session_that_a_fault_ends_are_told(self):
+        summary = self.ended("--fault", "axis_2:silent@1s", "--set", "mass=6@0.2s", "--set", "mass=5@3s", status=1)
+        self.assertEqual([order["order"] for order in summary["idle_orders"]], ["set mass=5"])
+
+    def test_a_change_for_a_timestep_that_was_refused_is_told(self):
+        summary = self.ended("--duration", "3s", "--fault", "axis_3:period", "--set", "timestep=2ms@1s", "--set",
+                             "mass=6@1500ms")
+        self.assertEqual(summary["idle_orders"],
+                         [{"order": "set mass=6", "time_s": 1.5,
+                           "refused": "the timestep that it was checked for wasn't taken"}])
+
     def test_a_release_waits_until_the_arm_stands(self):
         """It was answered with ok and dropped."""
         summary = self.ended("--record", "session", *scripted("hold@2s", "release@2001ms"))

@@ -49,6 +49,13 @@ struct State {
   std::map<std::string, std::uint64_t> ends;  // sessions by the fault that ended them
 };
 
+// What was injected into a session, and as what it may be told: a fault by another name, or at another time, is a false
+// alarm, though one of its name was to come.
+struct Injected {
+  std::vector<Fault> faults;
+  double from_s = 0.0, until_s = 0.0;  // since power on
+};
+
 // Nothing where there is no such file.
 std::optional<State> restored(const std::string& file) {
   std::ifstream in(file);
@@ -109,8 +116,9 @@ std::string wandering_hand(const tests::ScratchFolder& folder, Random& random, d
 struct Session {
   RigOptions options;
   std::uint64_t harmless = 0;  // faults that mustn't end it
-  bool ends = false;           // whether one may
-  double pauses_s = 0.0;       // for which it may be held, at most
+  std::vector<Injected> injected;
+  bool ends = false;      // whether one of them is to end it
+  double pauses_s = 0.0;  // for which it may be held, at most
   double hand_N_per_m = 0.0;
 };
 
@@ -139,10 +147,26 @@ void order(Session& session, double t, Command command) {
   }
 }
 
+// A device fails for a second, and what that may be told as: within five cycles at 4 ms, or while it lasts where
+// nothing moved at first.
+struct Failure {
+  const char* device_fault;
+  Fault fault;
+};
+
+void inject(Session& session, const Failure& failure, double t) {
+  session.options.device_faults.push_back(span_of(failure.device_fault, t, 1.0));
+  session.injected.push_back({{failure.fault}, t, t + 1.05});
+  // Who says nothing doesn't say that it is off, either; a second after the stop.
+  if (failure.fault == Fault::drive_silent) session.injected.push_back({{Fault::drive_not_disabled}, t, t + 2.05});
+}
+
 // Stops the arm by a fault that goes away; a reset and a resume later it moves again.
 void add_reset(Session& session, Random& random, double t) {
-  constexpr std::array passing{"sensor:silent", "sensor:status=0x4000", "axis_3:fault=0x4210", "axis_6:fault=0x4210"};
-  session.options.device_faults.push_back(span_of(passing[random.below(passing.size())], t, 1.0));
+  constexpr std::array passing{
+      Failure{"sensor:silent", Fault::sensor_lost}, Failure{"sensor:status=0x4000", Fault::sensor_status},
+      Failure{"axis_3:fault=0x4210", Fault::drive_fault}, Failure{"axis_6:fault=0x4210", Fault::drive_fault}};
+  inject(session, passing[random.below(passing.size())], t);
   order(session, t + 1.4, {Order::reset});
   order(session, t + 2.8, {Order::resume});
   session.pauses_s += 5.0;
@@ -194,8 +218,10 @@ void add_timesteps(Session& session, Random& random) {
 // another the enabling input is let go; and in a third of all something ends them.
 Session session_of(const tests::ScratchFolder& folder, Random& random) {
   constexpr std::array scenes{"wall", "groove", "room", "free", "moving_plate", "honey"};
-  constexpr std::array grave{"sensor:silent", "sensor:status=0x4000", "axis_3:fault=0x4210", "axis_2:silent",
-                             "axis_5:power"};
+  constexpr std::array grave{
+      Failure{"sensor:silent", Fault::sensor_lost}, Failure{"sensor:status=0x4000", Fault::sensor_status},
+      Failure{"axis_3:fault=0x4210", Fault::drive_fault}, Failure{"axis_2:silent", Fault::drive_silent},
+      Failure{"axis_5:power", Fault::drive_silent}};
   Session session;
   RigOptions& o = session.options;
   o.duration_s = random.chance(0.9) ? random.uniform(10.0, 60.0) : random.log_uniform(60.0, 1200.0);
@@ -223,20 +249,28 @@ Session session_of(const tests::ScratchFolder& folder, Random& random) {
   session.ends = random.chance(0.33);
   if (session.ends) {
     const double t = random.uniform(3.0, o.duration_s);
-    o.device_faults.push_back(span_of(grave[random.below(grave.size())], t, 1.0));
+    inject(session, grave[random.below(grave.size())], t);
   }
   Random apart = random;  // what was added later leaves all else of a seed's sessions as it was
   if (apart.chance(0.3)) add_timesteps(session, apart);
+  if (apart.chance(0.6)) o.settings.passivity = Passivity::automatic;  // the default of the program
   return session;
+}
+
+const char* passivity_name(Passivity passivity) {
+  return passivity == Passivity::on ? "on" : passivity == Passivity::automatic ? "auto" : "off";
 }
 
 // Sees every record of a session, and what is wrong with them.
 class Watch {
  public:
-  explicit Watch(const ClosedLoopRig& rig) : rig_(rig) {}
+  // `injected`: faults with these may be told; any other is a false alarm.
+  Watch(const ClosedLoopRig& rig, const std::vector<Injected>& injected, bool enabling)
+      : rig_(rig), injected_(injected), enabling_(enabling) {}
 
-  void see(const CycleRecord& record, Digest& digest) {
+  void see(const CycleRecord& record, std::int64_t now_ns, Digest& digest) {
     digest.add(record);
+    judge_fault(record, 1e-9 * static_cast<double>(now_ns));
     if (seen_ >= 2) judge_motion(record);
     k2_ = k1_;
     k1_ = record;
@@ -260,7 +294,7 @@ class Watch {
     std::snprintf(text, sizeof text, ", a hand of %.4g N/m, %.4g kg, %.4g ms, order %d, passivity %s",
                   session.hand_N_per_m, rendered_.proxy_mass_kg + rig_.cell.tool.mass_kg,
                   1e-6 * static_cast<double>(rendered_.period_ns), session.options.settings.order,
-                  session.options.settings.passivity == Passivity::on ? "on" : "off");
+                  passivity_name(session.options.settings.passivity));
     return session.options.scene + text;
   }
 
@@ -283,13 +317,44 @@ class Watch {
     }
   }
 
+  // The fault that stops the arm, or that it is held for, reset ones and released switches included.
+  void judge_fault(const CycleRecord& record, double now_s) {
+    for (const auto& [fault, before] : {std::pair(record.fault, k1_.fault), std::pair(record.held_for, k1_.held_for)}) {
+      if (fault == Fault::none || fault == before) continue;
+      if (fault == Fault::enabling_released && enabling_) continue;
+      const auto explains = [&, fault = fault](const Injected& i) {
+        return std::find(i.faults.begin(), i.faults.end(), fault) != i.faults.end() && now_s > i.from_s &&
+               now_s < i.until_s;
+      };
+      if (std::any_of(injected_.begin(), injected_.end(), explains)) continue;
+      wrong_ = std::string(fault_name(fault)) + " at " + std::to_string(now_s) + " s, in cycle " +
+               std::to_string(record.cycle) + ", by which nothing failed";
+    }
+  }
+
   const ClosedLoopRig& rig_;
+  const std::vector<Injected>& injected_;
+  bool enabling_;                   // a switch is let go now and then
   CycleRecord k1_, k2_, rendered_;  // the last two, and the last of rendering
   std::uint64_t seen_ = 0;
   std::int64_t seen_ns_ = 0;
   double base_MB_ = 0.0;
   std::string wrong_;
 };
+
+// A fault that the session went on with, by which nothing failed; samples and feedback are lost in all of them.
+Fault false_notice(const Supervisor& supervisor, const Session& session) {
+  for (std::size_t i = 1; i < fault_count; ++i) {
+    const auto fault = static_cast<Fault>(i);
+    if (supervisor.notice(fault).times == 0 || fault == Fault::sensor_late || fault == Fault::feedback_late) continue;
+    const auto names = [&](const Injected& injected) {
+      return std::find(injected.faults.begin(), injected.faults.end(), fault) != injected.faults.end();
+    };
+    if (std::any_of(session.injected.begin(), session.injected.end(), names)) continue;
+    if (fault != Fault::enabling_released || session.options.enabling.empty()) return fault;
+  }
+  return Fault::none;
+}
 
 // What is wrong with it; empty: nothing.
 std::string run(const Session& session, State& state, Digest& digest) {
@@ -298,7 +363,7 @@ std::string run(const Session& session, State& state, Digest& digest) {
   cycle.changes().schedule(session.options.changes);
   cycle.commands().schedule(session.options.commands);
   cycle.timesteps().schedule(session.options.timesteps);
-  Watch watch(rig);
+  Watch watch(rig, session.injected, !session.options.enabling.empty());
   CycleRecord record;
   std::int64_t begun_ns = 0;
   constexpr double longest_period_s = 4e-3;
@@ -307,7 +372,7 @@ std::string run(const Session& session, State& state, Digest& digest) {
                              if (watch.seen() == 0) begun_ns = t_k_ns;
                            },
                            [&] {
-                             while (cycle.records().pop(record)) watch.see(record, digest);
+                             while (cycle.records().pop(record)) watch.see(record, rig.network.now_ns(), digest);
                              if (watch.seen_s() > patience_s) cycle.request_stop();
                            }};
   const SessionTally tally = run_session(cycle, rig.network, {session.options.duration_s}, hooks);
@@ -320,6 +385,10 @@ std::string run(const Session& session, State& state, Digest& digest) {
     wrong = "time was lost";
   } else if (fault != Fault::none && !session.ends) {
     wrong = "ended by " + describe(cycle.supervisor().report(), "");
+  } else if (const Fault noticed = false_notice(cycle.supervisor(), session); noticed != Fault::none) {
+    wrong = std::string("noticed ") + fault_name(noticed) + ", which nothing explains";
+  } else if (fault == Fault::none && session.ends && session.options.settings.wait_after_fault_s == 0.0) {
+    wrong = "not ended by what was to end it";
   } else if (!cycle.drives_off() && fault != Fault::drive_silent) {
     wrong = "drives that are still on";
   } else if (fault == Fault::none && rendered_s < session.options.duration_s - longest_period_s) {

@@ -61,7 +61,8 @@ class Aidin(Sensor):
 
 class Robotous(Sensor):
     """RFT: 0x0B, six signed numbers, Tx split between the frames; N / 50, Nm / 2000; overload byte."""
-    file, base_id, heard = "robotous_rft", "base_id: 0x1F0", ("1F1", "1F2")
+    file, heard = "robotous_rft", ("1F1", "1F2")
+    base_id = "settings: {command_id: 0x1F0, first_id: 0x1F1, second_id: 0x1F2}"
     wrench = (12.34, -5.00, 0.0, 0.4, -0.6, 0.25)
     told = [(0x1F0, "0c00000000000000"), (0x1F0, "0f08000000000000"), (0x1F0, "0b00000000000000")]
 

@@ -205,13 +205,14 @@ struct Script {
   std::vector<controller::ScheduledTimestep> timesteps;
 };
 
-// "mass=3@4s", after four seconds of rendering, in any order of times. Throws SetupError.
-Script script_of(const std::vector<std::string>& texts, const PreparedSession& session, const RunOptions& options) {
-  struct Timed {
-    double time_s;
-    std::string text;
-  };
-  std::vector<Timed> timed;
+struct TimedText {
+  double time_s;
+  std::string text;
+};
+
+// "mass=3@4s", after four seconds of rendering, in the order of their times. Throws SetupError.
+std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
+  std::vector<TimedText> timed;
   for (const std::string& text : texts) {
     const std::size_t at = text.rfind('@');
     if (at == std::string::npos) {
@@ -222,10 +223,15 @@ Script script_of(const std::vector<std::string>& texts, const PreparedSession& s
     }
     timed.push_back({description::parse_duration(text.substr(at + 1), "--set"), text.substr(0, at)});
   }
-  std::stable_sort(timed.begin(), timed.end(), [](const Timed& a, const Timed& b) { return a.time_s < b.time_s; });
+  std::stable_sort(timed.begin(), timed.end(),
+                   [](const TimedText& a, const TimedText& b) { return a.time_s < b.time_s; });
+  return timed;
+}
+
+Script script_of(const std::vector<std::string>& texts, const PreparedSession& session, const RunOptions& options) {
   LiveParameters parameters(session, options);
   Script script;
-  for (const Timed& change : timed) {
+  for (const TimedText& change : timed_texts(texts)) {
     const std::int64_t rendered_ns = std::llround(1e9 * change.time_s);
     if (LiveParameters::is_timestep(change.text)) {
       script.timesteps.push_back({rendered_ns, parameters.take_timestep(change.text)});
@@ -304,6 +310,21 @@ void require_changes(const PreparedSession& session, const RunOptions& options) 
   (void)script_of(options.changes, session, options);
   (void)scheduled_orders(options.orders);
   if (!options.control.empty()) require_control_path(control_path(options));
+}
+
+std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts) {
+  std::vector<IdleChange> idle;
+  const auto note = [&](const TimedText& change, const auto& scheduled) {
+    if (scheduled.taken && scheduled.refusal == nullptr) return;
+    idle.push_back({change.text, change.time_s, scheduled.taken ? scheduled.refusal : "the session had ended before"});
+  };
+  // In the order in which they were scheduled.
+  auto next = cycle.scheduled_changes().begin();
+  auto next_timestep = cycle.scheduled_timesteps().begin();
+  for (const TimedText& change : timed_texts(texts)) {
+    LiveParameters::is_timestep(change.text) ? note(change, *next_timestep++) : note(change, *next++);
+  }
+  return idle;
 }
 
 std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,

@@ -45,6 +45,15 @@ class LiveParameters {
 // Of the script and the socket, before a bus is opened. Throws SetupError.
 void require_changes(const PreparedSession& session, const RunOptions& options);
 
+// A change of the script that did nothing.
+struct IdleChange {
+  std::string text;     // as it was given, without its time
+  double time_s = 0.0;  // of rendering
+  const char* refusal;  // why
+};
+// Of a session that has ended; `texts` are those of its options.
+std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts);
+
 // The session's script, and its socket where one is wanted; null without.
 std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
                                             const RunOptions& options);

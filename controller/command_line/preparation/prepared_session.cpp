@@ -294,7 +294,8 @@ PreparedSession prepare(const RunOptions& options) {
   require_file(options.scene, "--scene", "scenes/wall.yaml");
   require_file(options.hand, "--hand", "sim/hands/touch.yaml");
   session.cell = loaded(cell_file, FileKind::cell, description::load_cell);
-  session.sensor = description::load_sensor(beside(session.cell.file, session.cell.sensor.description));
+  session.sensor =
+      description::load_sensor(beside(session.cell.file, session.cell.sensor.description), session.cell.sensor.choices);
   session.hand =
       loaded(chosen(options.hand, session.cell, "default_hand", session.cell.default_hand, "sim/hands/touch.yaml"),
              FileKind::hand, description::load_hand);

@@ -51,6 +51,7 @@ struct RunOptions {
   std::filesystem::path cell;   // empty: the default cell
   std::filesystem::path scene;  // empty: the cell's
   std::filesystem::path hand;   // empty: the cell's
+  std::filesystem::path arm;    // cell file of the simulated arm; empty: it is as the cell says
   std::optional<double> mass_kg;
   std::optional<double> period_s;
   double extra_delay_s = 0.0;  // of the sensor's readings

@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/signals/clearances.hpp"
@@ -327,6 +328,9 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
     if (order.taken && order.refusal == nullptr) continue;
     summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,
                                    order.taken ? order.refusal : "the session had ended before"});
+  }
+  for (const IdleChange& change : idle_changes(cycle, options_.changes)) {
+    summary.idle_orders.push_back({"set " + change.text, change.time_s, change.refusal});
   }
   for (const controller::FaultReport& report : cycle.past_faults()) {
     summary.faults.push_back(

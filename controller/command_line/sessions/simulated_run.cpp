@@ -53,12 +53,13 @@ sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
 
 }  // namespace
 
-SimulatedRun::SimulatedRun(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper)
+SimulatedRun::SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
+                           BlackBoxKeeper& keeper)
     : session_(session),
       options_(options),
       keeper_(keeper),
-      network_(sim::simulated_buses(session.cell)),
-      far_end_(session.cell, session.sensor, session.hand, network_.events(), far_end_config(options)),
+      network_(sim::simulated_buses(arm.cell)),
+      far_end_(arm.cell, arm.sensor, session.hand, network_.events(), far_end_config(options)),
       scene_(scenes::compile(session.scene)),
       output_(session, options, true) {}
 

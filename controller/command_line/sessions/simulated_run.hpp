@@ -12,8 +12,10 @@ namespace proxarm::command_line {
 
 class SimulatedRun {
  public:
-  // Throws SetupError. `session` and `options` must outlive the run.
-  SimulatedRun(const PreparedSession& session, const RunOptions& options, BlackBoxKeeper& keeper);
+  // Throws SetupError. `arm`: what is simulated, where it is another one than the session takes it for. `session`,
+  // `options` and `keeper` must outlive the run.
+  SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
+               BlackBoxKeeper& keeper);
 
   // Returns the exit status; throws SetupError while nothing has moved.
   int run();

@@ -1,5 +1,5 @@
-// session.mcap of a record: forces, contacts and joints of every cycle, poses and transforms of every tenth, the scene
-// where something of it moves. Taken out of the black box as the session goes on, outside of the cycle.
+// Writes session.mcap of a record: forces, contacts and joints of every cycle, poses and transforms of every tenth, and
+// the scene when something in it moves. It is taken from the black box while the session runs, outside of the cycle.
 #pragma once
 
 #include <array>
@@ -13,10 +13,10 @@ namespace proxarm::view {
 
 class McapRecord {
  public:
-  // `stage` must outlive it. Throws SetupError.
+  // Precondition: `stage` outlives this object. Throws SetupError.
   McapRecord(const std::filesystem::path& file, Stage& stage);
 
-  // The cycles that have come since the last call.
+  // Writes the cycles that have been added since the last call.
   void drain(const controller::BoxReader& box);
   void finish();  // throws SetupError
 

@@ -1,10 +1,10 @@
 // Writes MCAP, the container of messages that Foxglove, Lichtblick and ROS tools read.
 //
-// A file is magic, records, magic; a record is an opcode (u8), its length (u64) and its content; numbers are
-// little-endian, strings and maps are preceded by their length in bytes (u32). Messages stand in chunks of about a
-// megabyte, each followed by the places of its messages; at the end stand schemas and channels again, the chunks'
-// places and the counts, so that a reader finds any time without reading all. Chunks aren't compressed, and no
-// checksum is written but those of the chunks.
+// A file is magic, records, magic. A record is an opcode (u8), its length (u64) and its content. Numbers are
+// little-endian; strings and maps are preceded by their length in bytes (u32). Messages are in chunks of about a
+// megabyte, each followed by an index of its messages. At the end, schemas and channels are repeated, with the chunks'
+// index and the counts, so that a reader finds any time without reading all. Chunks aren't compressed, and only they
+// have checksums.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +22,13 @@ class McapWriter {
   // Throws SetupError for a file that can't be written.
   explicit McapWriter(const std::filesystem::path& file);
 
-  // Both before the first message; return the id. Messages of a channel are JSON, by a JSON Schema.
+  // Precondition: both are called before the first message. They return the id. A channel's messages are JSON,
+  // described by a JSON Schema.
   std::uint16_t add_schema(const std::string& name, const std::string& json_schema);
   std::uint16_t add_channel(const std::string& topic, std::uint16_t schema);
-  // Times don't go back.
+  // Precondition: times don't decrease.
   void add(std::uint16_t channel, std::int64_t time_ns, std::string_view message);
-  // Throws SetupError where it couldn't be written whole.
+  // Throws SetupError if the file couldn't be written completely.
   void finish();
 
  private:
@@ -43,12 +44,13 @@ class McapWriter {
 
   std::filesystem::path name_;
   std::ofstream file_;
-  std::uint64_t at_ = 0;     // of the file's end
-  std::string definitions_;  // schemas and channels as records, for both places
+  std::uint64_t at_ = 0;     // the file's length
+  std::string definitions_;  // schemas and channels as records, for both places in the file
   std::uint16_t schemas_ = 0, channels_ = 0;
-  std::string content_;  // of the chunk under way
+  std::string content_;  // of the present chunk
   Chunk chunk_;
-  std::map<std::uint16_t, std::vector<std::pair<std::int64_t, std::uint64_t>>> places_;  // in it, by channel
+  std::map<std::uint16_t, std::vector<std::pair<std::int64_t, std::uint64_t>>>
+      places_;  // index of the present chunk, by channel
   std::vector<Chunk> chunks_;
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::map<std::uint16_t, std::uint32_t> sequences_;

@@ -1,4 +1,4 @@
-// What the messages of a topic look like, as JSON Schema. Those whose title begins with foxglove are Foxglove's own.
+// The messages of each topic, as JSON Schemas. Those whose title begins with foxglove are Foxglove's own.
 #include <array>
 #include <utility>
 
@@ -7,7 +7,7 @@
 namespace proxarm::view {
 namespace {
 
-// Types that several schemas share: each text is put where its @name stands. A type may be made of types above it.
+// Types that several schemas share. Each text replaces its @name. A type may contain types above it.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 9> shared_types{{
     {"@text", R"({"type": "string"})"},
     {"@number", R"({"type": "number"})"},
@@ -156,7 +156,7 @@ constexpr std::string_view session_schema = R"({
   }
 })";
 
-// From the last to the first, because a type is made of those above it.
+// From the last to the first, since a type may contain those above it.
 std::string whole(std::string_view schema) {
   std::string text(schema);
   for (auto type = shared_types.rbegin(); type != shared_types.rend(); ++type) {

@@ -34,7 +34,7 @@ void put_time(JsonText& json, std::int64_t time_ns) {
   json.begin_object().add("sec", time_ns / 1'000'000'000).add("nsec", time_ns % 1'000'000'000).end();
 }
 
-// Most messages begin so.
+// The beginning that most messages share.
 JsonText begin_message(std::int64_t time_ns) {
   JsonText json;
   put_time(json.begin_object().name("timestamp"), time_ns);
@@ -49,21 +49,21 @@ Pose at(const Vec3& p) {
   return X;
 }
 
-// The shortest turn from z to a direction, as half of it twice; upside down it is about x.
+// The smallest rotation from z to a direction, by the half-way vector; for −z it is about x.
 Eigen::Quaterniond turn_from_z(const Vec3& direction) {
   const Vec3 d = direction.normalized();
-  if (d.z() < -1.0 + 1e-12) return {0.0, 1.0, 0.0, 0.0};  // nearer, and the sum is shorter than rounding lets it be
+  if (d.z() < -1.0 + 1e-12) return {0.0, 1.0, 0.0, 0.0};  // nearer to −z, rounding would dominate the sum
   return Eigen::Quaterniond(1.0 + d.z(), -d.y(), d.x(), 0.0).normalized();
 }
 
-// Between two points, its z from one to the other.
+// A pose between two points, with its z axis from one to the other.
 Pose between(const Vec3& from, const Vec3& to) {
   Pose X = at(0.5 * (from + to));
   X.linear() = turn_from_z(to - from).toRotationMatrix();
   return X;
 }
 
-// Large meshes would make the message larger than tools take: every so many triangles of them.
+// Large meshes would make the message larger than tools accept, so only every n-th of their triangles is sent.
 constexpr std::size_t most_triangles = 20'000;
 
 // A foxglove.SceneEntity: a list for each kind of shape.
@@ -101,7 +101,7 @@ class Entity {
     triangles_.end();
   }
 
-  // Takes what was added.
+  // Writes what was added, and clears it.
   void put_into(JsonText& json, const std::string& id, const std::string& frame, std::int64_t time_ns) {
     put_time(json.begin_object().name("timestamp"), time_ns);
     json.add("frame_id", frame).add("id", id);
@@ -133,7 +133,7 @@ void add_shape(Entity& entity, const models::LinkShape& shape) {
   }
 }
 
-// `X`: by which the object is moved from where it is described.
+// `X`: the object's displacement from where it is described.
 void add_object(Entity& entity, const scenes::Object& object, const Pose& X) {
   if (const auto* plane = std::get_if<scenes::PlaneShape>(&object.shape)) {
     Pose sheet = X * at(plane->point_m);
@@ -171,7 +171,7 @@ std::string scene_message(const Stage& stage, std::int64_t time_ns, std::span<co
   return json.end().end().take();
 }
 
-// ---- the others
+// ---- other messages
 
 std::string transforms_message(const Stage& stage, std::int64_t time_ns, std::span<const Pose> links) {
   JsonText json;
@@ -193,7 +193,7 @@ std::string wrench_message(const controller::CycleRecord& record) {
   return json.end().take();
 }
 
-// By its index in the scene; empty where there is none.
+// The object's name, by its index in the scene; empty if there is none.
 std::string object_name(const Stage& stage, std::int32_t object) {
   const auto index = static_cast<std::size_t>(object);
   return object >= 0 && index < stage.scene().objects.size() ? stage.scene().objects[index].name : std::string();
@@ -260,7 +260,7 @@ std::string SessionMessages::message(Topic topic, const Moment& moment, std::spa
   const controller::CycleRecord& record = moment.record;
   switch (topic) {
     case Topic::tool: {
-      // The tool's orientation is its link's: the handle is fixed to it.
+      // The handle is fixed to its link, so the tool has the link's orientation.
       Pose X = stage_.tool_pose(links);
       X.translation() = controller::vec3(record.tool_W_m);
       return pose_message(record.time_ns, X);

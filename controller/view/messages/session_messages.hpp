@@ -1,5 +1,5 @@
-// A session as messages of JSON, for tools that know no proxarm: Foxglove's own schemas where there is one (poses,
-// transforms, the scene), and schemas of ours for forces, contacts, joints and the session's state.
+// A session as JSON messages, for tools that don't know proxarm: in Foxglove's schemas where these exist (poses,
+// transforms, the scene), and in our own for forces, contacts, joints and the session's state.
 //
 //   /tool, /proxy      foxglove.PoseInFrame       where they are, in W
 //   /wrench            proxarm.Wrench             the hand's, in W
@@ -31,10 +31,10 @@ struct TopicDescription {
 
 class SessionMessages {
  public:
-  // `stage` must outlive it.
+  // Precondition: `stage` outlives this object.
   explicit SessionMessages(const Stage& stage) : stage_(stage) {}
 
-  // What a topic has to say of a moment. `links`, `objects`: as Stage::place() has them.
+  // A topic's message about a moment. `links`, `objects`: as from Stage::place().
   [[nodiscard]] std::string message(Topic topic, const Moment& moment, std::span<const models::Pose> links,
                                     std::span<const models::Pose> objects) const;
 

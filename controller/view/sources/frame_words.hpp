@@ -1,4 +1,4 @@
-// What a frame on a cell's bus says: whose it is, which objects it carries, and their values with units.
+// Describes a frame on a cell's bus: its sender, the objects that it carries, and their values with units.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 namespace proxarm::view {
 
 struct FrameWords {
-  std::string bus;    // as the network calls it
+  std::string bus;    // the bus' name in the network
   std::string id;     // hexadecimal
-  std::string bytes;  // the same, a space between two
+  std::string bytes;  // hexadecimal, separated by spaces
   std::string from;   // "axis_3", "sensor", "controller"
   std::string words;  // "target position 607Ah: 1234 = 0.0123 rad"
 };
 
-// `head` says which bus of the network is which of the cell's.
+// `head` tells which of the cell's buses each bus of the network is.
 FrameWords describe_frame(const controller::BoxFrame& frame, const controller::ReplayHead& head,
                           const description::Cell& cell);
 

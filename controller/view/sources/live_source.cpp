@@ -6,7 +6,7 @@ namespace proxarm::view {
 
 namespace {
 constexpr double history_s = 20.0;
-constexpr std::size_t most_rows = 1300;  // a little more than 20 s of 60 a second
+constexpr std::size_t most_rows = 1300;  // a little more than 20 s at 60 per second
 }  // namespace
 
 LiveSource::LiveSource(int descriptor, Stage& stage)

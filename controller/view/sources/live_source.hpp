@@ -1,4 +1,5 @@
-// A session that runs, read from the memory of its black box while its cycle writes: the cycle does nothing for it.
+// A running session, read from the shared memory of its black box while its cycle writes there. The cycle isn't
+// involved.
 #pragma once
 
 #include <cstdint>
@@ -13,21 +14,21 @@ namespace proxarm::view {
 
 class LiveSource {
  public:
-  // `stage` must outlive it. Throws std::runtime_error for a descriptor of something else.
+  // Precondition: `stage` outlives this object. Throws std::runtime_error if the descriptor isn't that of a black box.
   LiveSource(int descriptor, Stage& stage);
 
-  // Takes all cycles that have come since the last call. False: there was none.
+  // Reads all cycles that have been added since the last call. Returns false if there was none.
   bool advance();
-  // What the last ones were like. Precondition: advance() was true since the last call.
+  // The moment that these cycles make up. Precondition: advance() has returned true since the last call.
   Moment take();
-  // The wire's message of this moment.
+  // This moment as a message of the wire.
   [[nodiscard]] std::string encode(const Moment& moment);
 
-  // What the session is set to, after all cycles that were taken; true once since it was asked last: it has changed.
+  // The session's settings after all cycles that were read. The second function returns true once after each change.
   [[nodiscard]] const PresentSettings& settings() const noexcept { return settings_; }
   bool have_settings_changed() noexcept { return std::exchange(settings_changed_, false); }
 
-  // Fields of the last 20 s of moments, one after the other, for those who come later.
+  // The fields of the last 20 s of moments, one after the other, for pages that connect later.
   [[nodiscard]] const std::vector<double>& history() const noexcept { return history_; }
 
  private:

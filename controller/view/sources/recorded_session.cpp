@@ -16,7 +16,7 @@ using controller::Phase;
 using nlohmann::json;
 
 constexpr std::size_t most_events = 2000;
-constexpr std::int64_t apart_ns = 200'000'000;  // what begins again sooner is the same event
+constexpr std::int64_t apart_ns = 200'000'000;  // an event that recurs sooner counts as the same
 
 std::vector<std::string> axis_names(const Stage& stage) {
   std::vector<std::string> names;
@@ -56,7 +56,7 @@ RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& sta
   index_frames();
 }
 
-// The last fault that wasn't reset; of a program that died, why there is a black box.
+// The last fault that wasn't reset; for a program that died, the reason for its black box.
 void RecordedSession::read_fault(const std::filesystem::path& folder) {
   const json summary = json::parse(text_of_file(folder / "summary.json"), nullptr, false);
   if (summary.is_object() && summary.contains("faults") && summary["faults"].is_array() && !summary["faults"].empty()) {
@@ -68,7 +68,7 @@ void RecordedSession::read_fault(const std::filesystem::path& folder) {
   fault_ = text_of_file(folder / "reason.txt");
   while (!fault_.empty() && fault_.back() == '\n') fault_.pop_back();
   fault_cycle_ = signals_.row(size() - 1).cycle;
-  // The box's own figures leave faults out: its reason names the cycle.
+  // The box's own figures don't include faults, but its reason names the cycle.
   const std::size_t named = fault_.find(" at cycle ");
   if (named != std::string::npos) fault_cycle_ = std::strtoull(fault_.c_str() + named + 10, nullptr, 10);
 }
@@ -122,7 +122,7 @@ void RecordedSession::index_frames() {
   for (std::streamoff at = log_.position(); log_.skip(); at = log_.position()) positions_.push_back(at);
 }
 
-// Objects go where they were sent, one cycle after the other, as they did in the session.
+// Objects are moved cycle by cycle, as they were in the session.
 void RecordedSession::follow_driven() {
   controller::BoxCycle cycle;
   std::vector<controller::BoxFrame> frames;

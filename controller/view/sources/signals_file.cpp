@@ -113,7 +113,7 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
                              NamedVector{"true_tool_W", "m", store_part<&CycleRecord::true_tool_W_m>},
                              NamedVector{"hand_force_W", "N", store_part<&CycleRecord::hand_force_W_N>}};
 
-// "contact_object_2", "friction_2", "normal_2_W_x_1": of one that presses beside the first.
+// "contact_object_2", "friction_2", "normal_2_W_x_1": of further contacts.
 constexpr std::array<std::string_view, 3> axes_in_names{"_x_", "_y_", "_z_"};
 
 struct OtherColumn {
@@ -144,7 +144,7 @@ OtherColumn column_of_other(std::string_view name) {
   return {};
 }
 
-// Without the line's end.
+// The line that begins at `at`, without its end.
 std::string_view line_at(std::string_view text, std::size_t at) { return text.substr(at, text.find('\n', at) - at); }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Stage::describe(): what a page must know once, as JSON.
+// Stage::describe(): what a page needs to know once, as JSON.
 #include <algorithm>
 #include <cmath>
 
@@ -15,7 +15,7 @@ using models::Vec3;
 
 void put(JsonText& json, const Vec3& v) { json.begin_list().value(v.x()).value(v.y()).value(v.z()).end(); }
 
-// As on the wire: x y z and quaternion x y z w.
+// A pose in the order of the wire: x y z and quaternion x y z w.
 void put(JsonText& json, const Pose& X) {
   const Eigen::Quaterniond q(X.linear());
   json.begin_list();
@@ -25,13 +25,13 @@ void put(JsonText& json, const Pose& X) {
   json.end();
 }
 
-// A member of the object under way that is a vector or a pose.
+// Adds a vector or a pose as a member of the present object.
 template <typename Value>
 void add(JsonText& json, const char* name, const Value& value) {
   put(json.name(name), value);
 }
 
-// A capsule or a cylinder.
+// Adds a capsule or a cylinder.
 template <typename Round>
 void add_round(JsonText& json, const Round& shape) {
   add(json, "from", shape.from_m);
@@ -136,7 +136,7 @@ void put_links(JsonText& json, const models::LinkTree& tree) {
   json.end();
 }
 
-// Sides that aren't finite are open, and null; a box without any other side is null itself.
+// Sides that aren't finite are open and written as null; a box without any finite side is null itself.
 void put_box(JsonText& json, const std::array<double, 3>& low, const std::array<double, 3>& high) {
   const auto is_border = [](double x) { return std::isfinite(x); };
   if (std::none_of(low.begin(), low.end(), is_border) && std::none_of(high.begin(), high.end(), is_border)) {

@@ -1,5 +1,5 @@
-// Writes JSON from its beginning to its end. Messages of every cycle take a tenth of the time this way that they take
-// as objects of a JSON library, and their source is compiled in a quarter of it.
+// Writes JSON sequentially. For messages of every cycle this takes a tenth of the time of building objects with a JSON
+// library, and their source compiles in a quarter of the time.
 #pragma once
 
 #include <concepts>
@@ -14,22 +14,22 @@ class JsonText {
  public:
   JsonText& begin_object();
   JsonText& begin_list();
-  // Of the object or list that was begun last. Precondition: there is one.
+  // Ends the object or list that was begun last. Precondition: there is one.
   JsonText& end();
 
-  // Within an object: of the value that comes next.
+  // Within an object: the name of the next value.
   JsonText& name(std::string_view name);
 
-  // JSON has no infinity, which is how far it is to the nearest of no objects: what isn't finite is null.
+  // A number; null if it isn't finite, since JSON has no infinity (the distance to the nearest of no objects).
   JsonText& value(double number);
   JsonText& value(std::integral auto number) { return literal(std::to_string(number)); }
   JsonText& value(bool flag) { return literal(flag ? "true" : "false"); }
-  // A byte that isn't of UTF-8 becomes U+FFFD.
+  // A text; bytes that aren't valid UTF-8 become U+FFFD.
   JsonText& value(std::string_view text);
   JsonText& value(const char* text) { return value(std::string_view(text)); }
   JsonText& value(const std::string& text) { return value(std::string_view(text)); }
   JsonText& null() { return literal("null"); }
-  // Another text, which is whole, as a value; it is empty after that.
+  // Adds another complete text as a value, and clears that text.
   JsonText& splice(JsonText& whole) { return literal(whole.take()); }
 
   template <typename Value>
@@ -37,14 +37,14 @@ class JsonText {
     return name(its_name).value(its_value);
   }
 
-  // What was written; it is empty after that.
+  // Returns what was written, and clears it.
   std::string take() { return std::move(text_); }
 
  private:
   JsonText& literal(std::string_view text);
   void separate();
   std::string text_;
-  std::string open_;  // how what was begun ends, the innermost last
+  std::string open_;  // the closing brackets that are due, the innermost last
 };
 
 }  // namespace proxarm::view

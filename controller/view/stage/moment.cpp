@@ -10,7 +10,7 @@ namespace {
 using controller::CycleRecord;
 using controller::Triple;
 
-// A name, and the number that it stands for.
+// A field: its name and how its number is computed.
 struct Field {
   const char* name;
   double (*value)(const Moment&);
@@ -51,7 +51,7 @@ constexpr std::array fields{
     Field{"contact_peak_N", [](const Moment& m) { return m.contact_peak_N; }},
 };
 
-// Vectors have one name, and three numbers.
+// A vector: one name, three numbers.
 struct VectorField {
   const char* name;
   Triple CycleRecord::*value;

@@ -4,8 +4,8 @@
 //   double            kind: 1, a moment; 2, a history of moments without poses
 //   double[fields]    the fields, in the order of field_names()
 //   float[7 links]    x y z and quaternion x y z w of each of the arm's links in W
-//   float[7 objects]  by which each object of the scene is moved from where the scene describes it
-// A history has the number of its rows after the kind, and then the fields of each row.
+//   float[7 objects]  displacement of each object of the scene from where the scene describes it
+// After the kind, a history has the number of its rows, and then the fields of each row.
 #pragma once
 
 #include <cstdint>
@@ -20,24 +20,24 @@ namespace proxarm::view {
 
 inline constexpr double kind_moment = 1.0, kind_history = 2.0;
 
-// What a page is shown of one cycle, and of those before it that it was not shown.
+// What a page is shown of one cycle, and of the cycles before it that it wasn't shown.
 struct Moment {
   controller::CycleRecord record;
   double rendered_s = 0.0;
-  double handle_mass_kg = 0.0;    // of the tool behind the sensor, which the hand feels with the proxy
-  std::uint32_t flags_since = 0;  // RecordFlag of all cycles since the last moment
-  double compute_peak_us = 0.0;   // the longest of them
-  double hand_peak_N = 0.0;       // the largest force of the hand
-  double contact_peak_N = 0.0;    // and of the world
+  double handle_mass_kg = 0.0;    // the tool's mass behind the sensor, which the hand feels besides the proxy's
+  std::uint32_t flags_since = 0;  // all RecordFlags since the last moment
+  double compute_peak_us = 0.0;   // the longest time of these cycles
+  double hand_peak_N = 0.0;       // the hand's largest force
+  double contact_peak_N = 0.0;    // the world's largest force
   std::uint64_t overruns = 0;     // since the session began
 };
 
-// Adds up what happens between two moments.
+// Accumulates what happens between two moments.
 class MomentBuilder {
  public:
   explicit MomentBuilder(double handle_mass_kg) noexcept { next_.handle_mass_kg = handle_mass_kg; }
   void add(const controller::CycleRecord& record, double rendered_s) noexcept;
-  // The newest cycle that was added; the peaks begin anew.
+  // Returns the newest cycle that was added, and restarts the peaks.
   Moment take() noexcept;
   [[nodiscard]] bool empty() const noexcept { return cycles_ == 0; }
 
@@ -46,11 +46,11 @@ class MomentBuilder {
   std::uint64_t cycles_ = 0;
 };
 
-// In the order of the wire.
+// The names of the fields in the order of the wire.
 [[nodiscard]] const std::vector<std::string>& field_names();
 void append_fields(std::vector<double>& row, const Moment& moment);
 
-// A whole message.
+// A complete message.
 std::string encode_moment(const Moment& moment, std::span<const models::Pose> links,
                           std::span<const models::Pose> objects);
 // `rows`: fields of several moments, one after the other.

@@ -1,7 +1,7 @@
-// What a session is set to in its present cycle, whoever changed it: options, scripts, `proxarm set`, a page, a tool.
+// The present settings of a session, whoever changed them: options, scripts, `proxarm set`, a page, a tool.
 //
-// Followed by the changes that the cycle took, since its records have less: their damping is B with what was added
-// against an oscillation, a hold's mass is none, and a spring stands in none of them.
+// They are followed through the changes that the cycle took, since its records don't contain them all: a record's
+// damping includes what was added against oscillations, its mass is zero in a hold, and no record has the spring.
 #pragma once
 
 #include <vector>
@@ -13,16 +13,16 @@ namespace proxarm::view {
 
 struct PresentSettings {
   double period_s = 0.0;
-  double mass_kg = 0.0;  // felt: with the handle's
+  double mass_kg = 0.0;  // felt mass, the handle's included
   double damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;
-  std::vector<double> friction;          // wanted, of each object of the scene
-  std::vector<models::Vec3> position_m;  // wanted: by how much each object that is driven is to be moved
+  std::vector<double> friction;          // wanted μ of each object of the scene
+  std::vector<models::Vec3> position_m;  // wanted displacement of each driven object
   double handle_mass_kg = 0.0;
 
-  // As the session began.
+  // The settings with which the session began.
   explicit PresentSettings(const Stage& stage);
 
-  // Takes what the cycle took of `change` at this timestep. True: something is another value than before.
+  // Applies `change` as the cycle did at this timestep. Returns true if a value is now another.
   bool follow(const controller::Change& change, double period_s_now);
 };
 

@@ -1,7 +1,7 @@
-// The arm and the scene of a session: what stands there, told once, and where it all is in a cycle.
+// The arm and the scene of a session: a description that is sent once, and the poses of all in a cycle.
 //
-// Made from the cell's and the scene's files alone, so a session that runs and one that was recorded look alike. For
-// pictures, outside of the cycle.
+// It is made only from the cell's and the scene's files, so a running and a recorded session look alike. It is for
+// display, outside of the cycle.
 #pragma once
 
 #include <memory>
@@ -18,11 +18,11 @@
 
 namespace proxarm::view {
 
-// What isn't in the files.
+// What the files don't contain.
 struct StageOptions {
-  bool arm_alone = false;  // without a controller: no proxy, and what is called a phase is how far its drives are
+  bool arm_alone = false;  // without a controller: no proxy, and the phase stands for the state of the drives
   double period_s = 1e-3;
-  double mass_kg = 0.0, damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;  // as the session began
+  double mass_kg = 0.0, damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;  // those with which the session began
   bool impedance = false;
   int order = 1;
 };
@@ -36,29 +36,30 @@ class Stage {
   [[nodiscard]] const scenes::Scene& scene() const noexcept { return scene_; }
   [[nodiscard]] const StageOptions& options() const noexcept { return options_; }
   [[nodiscard]] const models::LinkTree& links() const noexcept { return tree_; }
-  // Of what the hand feels; 0 in the impedance type, which has no proxy with a mass.
+  // The handle's part of the felt mass; 0 in the impedance type, whose proxy has no mass.
   [[nodiscard]] double handle_mass_kg() const noexcept { return options_.impedance ? 0.0 : cell_.tool.mass_kg; }
 
-  // All that a page must know once, as JSON: fields of the wire, links, objects, limits, words.
+  // All that a page needs to know once, as JSON: fields of the wire, links, objects, limits, texts.
   [[nodiscard]] std::string describe() const;
   // A mesh of the scene (link < 0) or of a link's shape, as mesh_picture() packs it. Throws SetupError.
   [[nodiscard]] std::string mesh_bytes(int link, std::size_t index) const;
 
-  // The same objects move and change as in the cycle: `change` is what it took, `rendered` whether it rendered.
+  // Moves and changes the objects as the cycle does. `change`: the change that the cycle took; `rendered`: whether it
+  // rendered.
   void follow(const controller::Change& change, bool rendered, double period_s) noexcept;
 
-  // Distances that only the scene knows, which the cycle leaves out.
+  // Adds distances that only the scene knows and that the cycle doesn't compute.
   void complete(controller::CycleRecord& record, double rendered_s) const;
-  // How far an object that is driven is from where the scene describes it, after all that follow() was told.
+  // A driven object's displacement from where the scene describes it, after all calls of follow().
   [[nodiscard]] models::Vec3 driven_m(std::size_t object) const noexcept {
     return changes_.position_m(static_cast<std::int32_t>(object));
   }
-  // Where links and objects are. `driven_m`: of each object, where it isn't that of the last follow().
+  // The poses of links and objects. `driven_m`: the displacement of each object, if it isn't that of the last follow().
   void place(const controller::CycleRecord& record, double rendered_s, std::vector<models::Pose>& links,
              std::vector<models::Pose>& objects, std::span<const models::Vec3> driven_m = {}) const;
-  // X_WT, of links that place() has placed.
+  // X_WT, from the links that place() has computed.
   [[nodiscard]] models::Pose tool_pose(std::span<const models::Pose> links) const noexcept;
-  // Angles of the links by the encoders; those of the start before the first feedback.
+  // The links' angles by the encoders; those of the start before the first feedback.
   [[nodiscard]] models::JointVector joint_angles(const controller::CycleRecord& record) const;
 
  private:
@@ -67,7 +68,7 @@ class Stage {
   StageOptions options_;
   models::Arm arm_;
   models::LinkTree tree_;
-  scenes::CompiledScene compiled_;  // for the changes to its objects alone
+  scenes::CompiledScene compiled_;  // only for the changes to its objects
   controller::SceneChanges changes_;
 };
 

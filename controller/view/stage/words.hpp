@@ -1,21 +1,16 @@
-// What a session's flags, phases and faults mean, in words for people who look at it.
+// Texts that explain a session's flags, phases and faults to people.
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "controller/record/cycle_record.hpp"
+#include "controller/record/flag_words.hpp"
 #include "models/description/cell.hpp"
 
 namespace proxarm::view {
 
-// What holds the arm back, or is otherwise out of the ordinary, while a flag is set.
-struct FlagWords {
-  controller::RecordFlag flag;
-  const char* words;
-  bool holds_back;  // it is a limit that acts
-};
-[[nodiscard]] const std::vector<FlagWords>& flag_words();
+using controller::flag_words;
+using controller::FlagWords;
 
 // What the arm does in a phase.
 struct PhaseWords {
@@ -23,10 +18,10 @@ struct PhaseWords {
   const char* words;
 };
 [[nodiscard]] PhaseWords phase_words(controller::Phase phase) noexcept;
-// What its drives do, of an arm whose controller is elsewhere.
+// The state of the drives, for an arm whose controller is elsewhere.
 [[nodiscard]] PhaseWords drive_words(controller::Phase phase) noexcept;
 
-// The fault that stopped the arm or that it is held for, with its place and figures; empty where there is none.
+// The fault that stopped the arm or for which it is held, with its place and figures; empty if there is none.
 [[nodiscard]] std::string fault_text(const controller::CycleRecord& record, const description::Cell& cell);
 
 }  // namespace proxarm::view

@@ -22,7 +22,7 @@ std::string contents(const fs::path& file) {
   return text;
 }
 
-// Empty where zlib doesn't do it.
+// Empty if zlib fails.
 std::string compressed(const std::string& body) {
   z_stream stream{};
   constexpr int gzip_window = 15 + 16;

@@ -1,4 +1,4 @@
-// A file that the server gives out, with what a browser is told of it.
+// A file that the server sends, and what it tells the browser about it.
 #pragma once
 
 #include <filesystem>
@@ -12,22 +12,22 @@ namespace proxarm::view {
 struct Asset {
   std::string type;  // Content-Type
   std::string body;
-  std::string gzip;  // the same compressed; empty: it isn't worth it
+  std::string gzip;  // the compressed body; empty: not worth it
 };
 using AssetPtr = std::shared_ptr<const Asset>;
 
-// Compressed where that makes it smaller by a tenth.
+// Compresses the body if this makes it smaller by at least a tenth.
 AssetPtr make_asset(std::string type, std::string body);
 
-// By the end of the name; "application/octet-stream" for what isn't known.
+// The content type by the end of the name; "application/octet-stream" for unknown ones.
 std::string type_of(const std::filesystem::path& file);
 
-// All files of a page by their paths in it: "/index.html". Only what is listed can be asked for, so no path leads out.
+// All files of a page by their URL paths: "/index.html". Only what is listed is served, so no path leads elsewhere.
 using Assets = std::map<std::string, AssetPtr, std::less<>>;
 
-// Adds the files of `folder`, as at `prefix`. Throws SetupError where it holds no index.html.
+// Adds the files of `folder` under their paths in it. Throws SetupError if there is no index.html.
 void add_page(Assets& assets, const std::filesystem::path& folder);
-// three.js as Debian installs it. Throws SetupError where the package is missing.
+// Adds three.js as Debian installs it. Throws SetupError if the package is missing.
 void add_three(Assets& assets, const std::filesystem::path& folder);
 
 }  // namespace proxarm::view

@@ -1,4 +1,4 @@
-// So many things a second and no more, with some to spare for the beginning: a token bucket.
+// A token bucket: limits events to a number per second, with a reserve for bursts.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@ class Budget {
   using Clock = std::chrono::steady_clock;
   Budget(double per_second, double most) noexcept : per_second_(per_second), most_(most), left_(most) {}
 
-  // False: there is none left at this time.
+  // Takes a token. Returns false if none is left at this time.
   bool spend(Clock::time_point now = Clock::now()) noexcept {
     left_ = std::min(most_, left_ + per_second_ * std::chrono::duration<double>(now - since_).count());
     since_ = now;

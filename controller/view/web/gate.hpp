@@ -1,4 +1,4 @@
-// Who may see the page, and who may speak to it: decided for each request from its head alone.
+// Decides from each request's head alone who may see the page and who may speak to it.
 //
 // A port on 127.0.0.1 can be reached by every program and every user of this machine, and by every web page that its
 // browsers have open. What a page from elsewhere can do, and what stops it here:
@@ -18,18 +18,18 @@
 
 namespace proxarm::view {
 
-// The head of a request. Headers that may stand there once are lists, so that a second one is seen.
+// The head of a request. Headers that may occur only once are lists, so that a second one is noticed.
 struct RequestHead {
   std::string method{}, target{};
   std::vector<std::string> hosts{}, origins{}, cookies{};
-  std::string fetch_site{};  // Sec-Fetch-Site; empty: the browser sends none
-  bool upgrade = false;      // to a WebSocket
+  std::string fetch_site{};  // Sec-Fetch-Site; empty: the browser didn't send it
+  bool upgrade = false;      // the request asks for a WebSocket
   bool has_body = false;
 };
 
 enum class Answer : std::uint8_t {
   serve,       // the file at `path`
-  set_cookie,  // with the cookie, and on to the page without the secret in its URL
+  set_cookie,  // set the cookie, and redirect to the page without the secret in its URL
   open_page,   // a WebSocket of the page
   open_tool,   // a WebSocket of another tool
   refuse,
@@ -37,14 +37,14 @@ enum class Answer : std::uint8_t {
 
 struct Verdict {
   Answer answer = Answer::refuse;
-  unsigned status = 403;    // of a refusal
-  const char* reason = "";  // for its text
+  unsigned status = 403;    // HTTP status of a refusal
+  const char* reason = "";  // text of a refusal
   std::string path;
 };
 
 class Gate {
  public:
-  // Makes the secrets.
+  // Generates the secrets.
   Gate(std::uint16_t port, std::vector<std::string> allowed_origins);
 
   [[nodiscard]] Verdict judge(const RequestHead& head) const;
@@ -62,7 +62,7 @@ class Gate {
   std::vector<std::string> allowed_;
 };
 
-// Whether `text` is an origin as browsers send it: scheme://host, with a port where it isn't the scheme's own.
+// Whether `text` is an origin as browsers send it: scheme://host, and the port unless it is the scheme's default.
 bool is_origin(std::string_view text) noexcept;
 
 }  // namespace proxarm::view

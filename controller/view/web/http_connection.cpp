@@ -37,7 +37,7 @@ RequestHead head_of(const http::request_parser<http::empty_body>& parser) {
   return head;
 }
 
-// What a browser is told with each answer: nothing of ours in another page, nothing of others in ours.
+// Headers of each answer: no other page may embed ours, and ours may embed nothing from elsewhere.
 template <typename Body>
 void protect(http::response<Body>& response) {
   response.set(http::field::server, "proxarm");
@@ -105,8 +105,8 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     serve_socket(shared_, std::move(stream_), parser_->release(), channel);
   }
 
-  // A page from elsewhere that led here, such as the one that opens the browser, may not pass on a cookie at once: it
-  // gets the page itself.
+  // If a page from elsewhere led here (such as the one that opens the browser), the browser wouldn't send a cookie with
+  // a redirect. Such a request therefore gets the page itself.
   void welcome(bool from_elsewhere) {
     if (from_elsewhere) return serve("/index.html", true);
     Text response{http::status::see_other, parser_->get().version()};
@@ -144,7 +144,7 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     response.keep_alive(keep);
     response.prepare_payload();
     const auto whole = std::make_shared<Text>(std::move(response));
-    if (parser_->get().method() == http::verb::head) whole->body().clear();  // its length stays announced
+    if (parser_->get().method() == http::verb::head) whole->body().clear();  // Content-Length stays
     stream_.expires_after(patience);
     http::async_write(stream_, *whole, [self = shared_from_this(), whole, keep](const error_code& error, std::size_t) {
       if (error || !keep) return self->end();

@@ -1,4 +1,4 @@
-// Random words that can't be guessed, and comparing them without telling how much of a guess was right.
+// Random secrets, and a comparison whose duration doesn't tell how much of a guess was right.
 #pragma once
 
 #include <string>
@@ -6,10 +6,10 @@
 
 namespace proxarm::view {
 
-// 256 random bits as 64 hexadecimal digits. Throws std::runtime_error where the system gives none.
+// 256 random bits as 64 hexadecimal digits. Throws std::runtime_error if the system provides none.
 std::string random_secret();
 
-// Takes the same time wherever they differ; what differs in length is told apart at once.
+// Compares in a time that doesn't depend on where the texts differ. Different lengths are detected at once.
 bool same_secret(std::string_view a, std::string_view b) noexcept;
 
 }  // namespace proxarm::view

@@ -16,14 +16,13 @@
 
 namespace proxarm::view {
 
-// Reasons stand in web_server.hpp.
+// web_server.hpp gives the reasons.
 inline constexpr std::size_t most_connections = 64;
 inline constexpr std::size_t longest_head = 8192, longest_message = 1024;
-inline constexpr auto patience =
-    std::chrono::seconds(5);  // with a head that comes, and with a reader who takes nothing
+inline constexpr auto patience = std::chrono::seconds(5);  // for a request's head, and for a reader who accepts nothing
 inline constexpr auto idle_time = std::chrono::seconds(20);  // between two requests on one connection
 
-// A connection as the list of all of them has it.
+// A connection, as an element of the list of all.
 class Connection {
  public:
   Connection() = default;
@@ -31,7 +30,7 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
   virtual ~Connection() = default;
   virtual void close() = 0;
-  // It has shown the secret or the cookie.
+  // It has presented the secret or the cookie.
   bool known = false;
 };
 
@@ -45,19 +44,20 @@ struct ServerShared {
   WebServer::Finder finder;
   Channel* page = nullptr;
   Channel* tools = nullptr;
-  std::list<std::weak_ptr<Connection>> connections;  // the oldest first
+  std::list<std::weak_ptr<Connection>> connections;  // oldest first
   std::size_t sockets = 0;
-  // Of all connections together; who makes noise without the secret takes nothing from those who have it.
+  // For all connections together. Those without the secret have a budget of their own, so they can't use up the
+  // others'.
   Budget requests{300.0, 600.0}, requests_of_strangers{300.0, 600.0};
 
-  // Makes room for one more where there are too many. False: all of them show something.
+  // Closes an unknown connection if there are too many. Returns false if all connections are known.
   bool make_room();
 };
 using SharedPtr = std::shared_ptr<ServerShared>;
 
 using Request = boost::beast::http::request<boost::beast::http::empty_body>;
 
-// Reads requests and answers them until the other side or the server has had enough.
+// Reads requests and answers them until either side closes the connection.
 void serve_http(SharedPtr shared, boost::asio::ip::tcp::socket socket);
 
 // Takes over a connection whose request asked for a WebSocket of `channel`.

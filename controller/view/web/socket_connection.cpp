@@ -15,8 +15,8 @@ namespace http = beast::http;
 namespace websocket = beast::websocket;
 using boost::system::error_code;
 
-constexpr std::size_t most_waiting = 256;      // messages that a reader may let come together
-constexpr int send_buffer_bytes = 256 * 1024;  // of the kernel: what a reader can be behind before it is noticed
+constexpr std::size_t most_waiting = 256;      // messages that may be waiting for a reader
+constexpr int send_buffer_bytes = 256 * 1024;  // the kernel's buffer: how far a reader may lag unnoticed
 
 std::vector<std::string> offered_protocols(const Request& request) {
   std::vector<std::string> offered;
@@ -77,7 +77,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
     timer_.cancel();
     stream_.next_layer().socket().close(ignored);
     if (!std::exchange(open_, false)) return;
-    // Not from within a call of the channel's own.
+    // Posted, so that it doesn't happen within one of the channel's own calls.
     boost::asio::post(shared_->context, [self = shared_from_this()] { self->channel_.closed(self); });
   }
   [[nodiscard]] const std::string& protocol() const noexcept override { return protocol_; }
@@ -93,7 +93,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
     });
   }
 
-  // What was said goes before what is shown.
+  // Messages of say() are sent before those of show().
   void write() {
     if (writing_ || !open_ || (waiting_.empty() && !moment_)) return;
     Bytes message;
@@ -122,7 +122,7 @@ class SocketConnection final : public Connection, public Socket, public std::ena
   SharedPtr shared_;
   Channel& channel_;
   websocket::stream<beast::tcp_stream> stream_;
-  boost::asio::steady_timer timer_;  // of the write under way
+  boost::asio::steady_timer timer_;  // for the present write
   beast::flat_buffer buffer_;
   std::string protocol_;
   std::deque<std::pair<Bytes, bool>> waiting_;

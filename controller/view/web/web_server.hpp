@@ -1,9 +1,9 @@
 // HTTP and WebSocket on 127.0.0.1 for one page and the tools beside it, in one thread.
 //
-// Nothing that somebody sends or doesn't send can make it slow for others: heads of at most 8 KiB within 5 s, no
-// bodies, 64 connections of which the oldest that shows nothing makes room, 16 WebSockets, messages of at most 1 KiB
-// and 200 a second, and who reads too slowly is left out: of moments only the newest waits for each of them, and
-// after 5 s without a byte taken the connection is closed.
+// No client can slow down the others, whatever it sends or doesn't send. Limits: request heads of 8 KiB within 5 s, no
+// bodies, 64 connections (the oldest without the secret makes room), 16 WebSockets, messages of 1 KiB and 200 per
+// second. For a slow reader only the newest moment waits, and after 5 s in which it has accepted no byte the connection
+// is closed.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -20,10 +20,10 @@ namespace proxarm::view {
 
 using Bytes = std::shared_ptr<const std::string>;
 
-// WebSockets at once.
+// The most WebSockets at a time.
 inline constexpr std::size_t most_viewers = 16;
 
-// One open WebSocket, as those who talk through it see it.
+// One open WebSocket, as channels use it.
 class Socket {
  public:
   Socket() = default;
@@ -31,19 +31,19 @@ class Socket {
   Socket& operator=(const Socket&) = delete;
   virtual ~Socket() = default;
 
-  // Binary; replaces one that still waits to be sent: the newest counts.
+  // Sends a moment (binary). It replaces one that is still waiting, since only the newest counts.
   virtual void show(Bytes moment) = 0;
-  // In order, all of them; a reader who lets too many come together is dropped.
+  // Sends a message. All are sent, in order; a reader with too many waiting is dropped.
   virtual void say(Bytes message, bool binary) = 0;
   virtual void drop() = 0;
-  // All that was said and shown has been taken.
+  // Whether all messages and moments have been sent.
   [[nodiscard]] virtual bool idle() const noexcept = 0;
   // The subprotocol that was agreed on; empty for the page.
   [[nodiscard]] virtual const std::string& protocol() const noexcept = 0;
 };
 using SocketPtr = std::shared_ptr<Socket>;
 
-// What talks through sockets of one kind. All calls come in the server's thread.
+// A party that talks through sockets of one kind. All calls come from the server's thread.
 class Channel {
  public:
   Channel() = default;
@@ -54,32 +54,32 @@ class Channel {
   virtual void opened(const SocketPtr& socket) = 0;
   virtual void received(const SocketPtr& socket, std::string_view message, bool binary) = 0;
   virtual void closed(const SocketPtr& socket) = 0;
-  // Which of the subprotocols that a client offers it speaks; empty: none.
+  // Chooses one of the subprotocols that a client offers; empty: none.
   [[nodiscard]] virtual std::string choose(const std::vector<std::string>& offered) const = 0;
 };
 
 struct ServerConfig {
-  std::uint16_t port = 0;  // 0: any that is free
+  std::uint16_t port = 0;  // 0: any free port
   std::vector<std::string> allowed_origins;
 };
 
 class WebServer {
  public:
-  // The file at a path that isn't among the assets; null: there is none.
+  // Finds the file for a path that isn't among the assets; null: there is none.
   using Finder = std::function<AssetPtr(const std::string& path)>;
 
-  // Listens at once. `page` and `tools` must outlive it; without tools (null) there are none. Throws SetupError for a
-  // port that can't be had.
+  // Listens at once. Precondition: `page` and `tools` outlive this object; `tools` may be null. Throws SetupError if
+  // the port isn't available.
   WebServer(boost::asio::io_context& context, const ServerConfig& config, Assets assets, Finder finder, Channel& page,
             Channel* tools);
   WebServer(const WebServer&) = delete;
   WebServer& operator=(const WebServer&) = delete;
   ~WebServer();
 
-  // With the token.
+  // The URL with the token.
   [[nodiscard]] std::string url() const;
   [[nodiscard]] std::uint16_t port() const;
-  // Closes all connections; none is accepted any more.
+  // Closes all connections, and accepts no new ones.
   void stop();
 
  private:

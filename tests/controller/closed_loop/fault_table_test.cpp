@@ -271,6 +271,13 @@ RigOptions running_off(double rad_per_s) {
   return options;
 }
 
+// The joints above it are half as far from axis 1 as the tool, which stays within its own limit.
+RigOptions elbow_runs_off() {
+  RigOptions options = running_off(0.6);
+  options.edit_cell = [](description::Cell& cell) { cell.limits.max_elbow_speed_m_per_s = 0.1; };
+  return options;
+}
+
 RigOptions creeping_out() {
   RigOptions options = running_off(0.1);
   options.edit_cell = [](description::Cell& cell) {
@@ -463,6 +470,7 @@ std::vector<Row> rows() {
       // At 1.4 m/s, after 10 ms of lag, 13.6 mm; then only brakes and the gears' friction stop it.
       {tool_too_fast, Reaction::stop_0, 35, 0.15, [] { return running_off(2.0); }},
       {tool_off_limits, Reaction::stop_1, 1, 0.01, creeping_out, tool_is_out},
+      {elbow_too_fast, Reaction::stop_0, 15, 0.005, elbow_runs_off},
       {proxy_not_finite, Reaction::stop_1, 1, way_m,
        [] { return wrong_world([](WorldStep& step) { step.fault = ProxyFault::result_not_finite; }); }, world_is_wrong},
       {proxy_squeezed, Reaction::stop_1, 1, way_m,

@@ -58,6 +58,19 @@ TEST_F(FaultMonitorTest, MissesASampleForAsLongAsItMayBe) {
   EXPECT_EQ(watched.times(Fault::sensor_lost), 1u);
 }
 
+// A person who was pinned pressed a gauge to its rail in a hold, and after a tenth of a second the drives were switched
+// off: session 16 of RandomSessions.
+TEST_F(FaultMonitorTest, TakesAGaugeAtItsRailForNoStuckChannel) {
+  watched.supervisor.hold();
+  sensor.sample.saturated = true;
+  sensor.sample.channel_repeats = 500;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::none);
+  sensor.sample.saturated = false;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::sensor_frozen);
+}
+
 TEST_F(FaultMonitorTest, FindsSamplesLateThatAreMissedAgainAndAgain) {
   for (int k = 0; k < 200 && watched.times(Fault::sensor_late) == 0; ++k) {
     sensor.is_fresh = k % 10 != 0;

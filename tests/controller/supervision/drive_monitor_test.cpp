@@ -127,6 +127,17 @@ TEST_F(DriveMonitorTest, WaitsLongerForAHandThatHoldsTheJoint) {
   EXPECT_NEAR(pushed * period_s, blocked_s, 0.02) << "the hand pushes to where it doesn't go";
 }
 
+// What waits for a joint that heeds nothing swings with the hand, through where the joint stands: 15 to 20 Hz were
+// seen.
+TEST_F(DriveMonitorTest, CallsADriveBlockedThatSetpointsPassAgainAndAgain) {
+  for (const double f_Hz : {15.0, 20.0}) {
+    const auto passes = [=](double t) { return 7e-4 * std::sin(2.0 * M_PI * f_Hz * t); };
+    EXPECT_NEAR(found_after(passes, stands) * period_s, blocked_s, 0.06) << f_Hz;
+    EXPECT_EQ(verdict.fault, Fault::drive_blocked);
+    EXPECT_EQ(found_after(passes, passes), 0) << "it heeds them";
+  }
+}
+
 TEST_F(DriveMonitorTest, JudgesNoDriveThatTakesNoSetpoints) {
   following = 0b111101;
   EXPECT_EQ(found_after(stands, [](double t) { return t; }), 0);

@@ -22,6 +22,7 @@ namespace proxarm::fieldbus {
 namespace {
 
 using description::SetupError;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr std::int64_t us = 1'000, ms = 1'000'000;
@@ -29,6 +30,23 @@ const std::filesystem::path source_dir = source_file();
 
 description::SensorDescription shipped(const std::string& name) {
   return description::load_sensor(source_dir / "models/sensors" / (name + ".yaml"));
+}
+
+// With its identifiers set to three above the drives'.
+const description::SensorChoices robotous_ids{
+    .file = "cell.yaml", .settings = {{"command_id", 0x1F0}, {"first_id", 0x1F1}, {"second_id", 0x1F2}}};
+
+description::SensorDescription set(const std::string& name, const description::SensorChoices& choices) {
+  return description::load_sensor(source_dir / "models/sensors" / (name + ".yaml"), choices);
+}
+
+std::string refusal_of(const std::string& name, const description::SensorChoices& choices) {
+  try {
+    static_cast<void>(DescribedSensor(set(name, choices), {.bus_name = "sensor"}));
+  } catch (const SetupError& error) {
+    return error.what();
+  }
+  return "taken";
 }
 
 description::SensorDescription written(const std::string& text) {
@@ -93,7 +111,7 @@ TEST(DescribedSensor, StartsAnAidinWithTheMakersCommands) {
 // ---- Robotous RFT: 16 bytes in two frames, first byte 0B, six i16 big-endian, Tx split; F/50, T/2000
 
 TEST(DescribedSensor, ReadsARobotousValueThatIsSplitAcrossItsFrames) {
-  Rig rig(shipped("robotous_rft"), 0x1F0);
+  Rig rig(set("robotous_rft", robotous_ids));
   // Fx 0032 = 50: 1 N; Fy FFCE = −50: −1 N; Fz 01F4 = 500: 10 N; Tx 07|D0 = 2000: 1 Nm; Ty F830 = −2000: −1 Nm;
   // Tz 0001: 0.0005 Nm; no overload
   expect_wrench(rig.read({"1F1#0B0032FFCE01F407", "1F2#D0F8300001000000"}), {1, -1, 10, 1, -1, 0.0005});
@@ -104,7 +122,7 @@ TEST(DescribedSensor, ReadsARobotousValueThatIsSplitAcrossItsFrames) {
 }
 
 TEST(DescribedSensor, TakesARobotousAnswerToAnotherCommandForNoSample) {
-  Rig rig(shipped("robotous_rft"), 0x1F0);
+  Rig rig(set("robotous_rft", robotous_ids));
   rig.take("1F1#0F01000000000000");  // the rate has been set
   rig.take("1F2#0000000000000000");
   EXPECT_FALSE(rig.sensor.fresh());
@@ -114,9 +132,78 @@ TEST(DescribedSensor, StartsARobotousStream) {
   ScriptedNetwork network{{"sensor"}};
   Conversation c(network.bus(0), {"> 1F0#0C00000000000000", "> 1F0#1100000000000000", "> 1F0#0F08000000000000",
                                   "> 1F0#0B00000000000000", "< 1F1#0B00000000000000", "< 1F2#0000000000000000"});
-  DescribedSensor sensor(shipped("robotous_rft"), {.bus_name = "sensor", .base_id = 0x1F0});
+  DescribedSensor sensor(set("robotous_rft", robotous_ids), {.bus_name = "sensor"});
   sensor.start(network, 0);
   EXPECT_TRUE(c.complete()) << c.mistakes;
+}
+
+// Commands at 64h, data at 1 and 2.
+TEST(DescribedSensor, StartsARobotousAsItIsDelivered) {
+  ScriptedNetwork network{{"sensor"}};
+  Conversation c(network.bus(0), {"> 064#0C00000000000000", "> 064#1100000000000000", "> 064#0F08000000000000",
+                                  "> 064#0B00000000000000", "< 001#0B00000000000000", "< 002#0000000000000000"});
+  DescribedSensor sensor(shipped("robotous_rft"), {.bus_name = "sensor"});
+  sensor.start(network, 0);
+  EXPECT_TRUE(c.complete()) << c.mistakes;
+  EXPECT_EQ(sensor.used_ids(), (std::vector<std::uint32_t>{1, 2, 0x64}));
+}
+
+// 0032 = 50 is 1 N of an RFT60-HA01, half of that where 1 N is 100 counts; 07D0 = 2000 is 1 Nm, 0.4 of 5000 a Nm.
+TEST(DescribedSensor, ReadsAnotherModelByItsDivisorsAndRanges) {
+  description::SensorChoices choices = robotous_ids;
+  choices.settings.push_back({"force_divisor", 100});
+  choices.settings.push_back({"torque_divisor", 5000});
+  choices.force_range_N = {4, 4, 4};
+  Rig rig(set("robotous_rft", choices));
+  expect_wrench(rig.read({"1F1#0B0032FFCE000007", "1F2#D000000000000000"}), {0.5, -0.5, 0, 0.4, 0, 0});
+  EXPECT_FALSE(rig.sensor.latest().saturated);
+  expect_wrench(rig.read({"1F1#0B0000000001F400", "1F2#0000000000000000"}), {0, 0, 5, 0, 0, 0});
+  EXPECT_TRUE(rig.sensor.latest().saturated) << "5 N of 4";
+}
+
+// Commands begin with the sensor's number.
+TEST(DescribedSensor, StartsTheThirdAidinOfABus) {
+  ScriptedNetwork network{{"sensor"}};
+  Conversation c(network.bus(0), {"> 102#0302020000000000", "> 102#030503E800000000", "> 102#0303010000000000",
+                                  "< 005#7530753075300000", "< 006#61A861A861A80000"});
+  DescribedSensor sensor(set("aidin_aft200", {.settings = {{"sensor_number", 3}, {"force_id", 5}, {"torque_id", 6}}}),
+                         {.bus_name = "sensor"});
+  sensor.start(network, 0);
+  EXPECT_TRUE(c.complete()) << c.mistakes;
+}
+
+TEST(DescribedSensor, RefusesSettingsThatItsFileHasntOrThatFallTogether) {
+  const auto refusal = [](const char* name, std::int64_t value) {
+    return refusal_of("robotous_rft", {.file = "cell.yaml", .settings = {{name, value, 7}}});
+  };
+  EXPECT_THAT(refusal("base", 1), AllOf(HasSubstr("cell.yaml:7"), HasSubstr("found \"base\""),
+                                        HasSubstr("one of those of robotous_rft.yaml: command_id, first_id")));
+  EXPECT_THAT(refusal("first_id", 0), AllOf(HasSubstr("cell.yaml:7: sensor.settings.first_id: found 0"),
+                                            HasSubstr("1 to 2047 (identifier of a sample's first frame)")));
+  EXPECT_THAT(refusal("first_id", 0x800), HasSubstr("found 2048"));
+  EXPECT_THAT(refusal("first_id", 2), HasSubstr("first_id and second_id with one value, 2"));
+  EXPECT_THAT(refusal("command_id", 1), HasSubstr("command_id and first_id with one value, 1"));
+  EXPECT_THAT(refusal("command_id", 0x80), HasSubstr("neither NMT's (0x000) nor SYNC's (0x080)"));
+  EXPECT_THAT(refusal_of("onrobot_hex", {.file = "cell.yaml", .settings = {{"first_id", 1, 7}}}),
+              HasSubstr("none: onrobot_hex.yaml has no settings"));
+  EXPECT_THAT(refusal_of("ati_net_can_oem", {.file = "cell.yaml", .settings = {{"first_id", 1, 7}}}),
+              HasSubstr("has no settings"));
+}
+
+TEST(DescribedSensor, ASettingFitsWhereItIsNamed) {
+  const std::string text =
+      "name: own\nprotocol: described\nforce_range_N: [1, 1, 1]\ntorque_range_Nm: [1, 1, 1]\n"
+      "settings: {number: {default: 300, min: 0, max: 1000, means: its number}}\n"
+      "frames: [{id: 0x10, bytes: 8}]\nrate_Hz: 1000\n"
+      "signals:\n  fx: {byte: 0, bits: 8}\n  fy: {byte: 1, bits: 8}\n  fz: {byte: 2, bits: 8}\n"
+      "  tx: {byte: 3, bits: 8}\n  ty: {byte: 4, bits: 8}\n  tz: {byte: 5, bits: 8}\n"
+      "commands: {start: {id: 0x11, data: [number]}}\n";
+  try {
+    static_cast<void>(written(text));
+    FAIL() << "300 in a byte";
+  } catch (const SetupError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("number = 300"), HasSubstr("a setting of 0 to 255")));
+  }
 }
 
 // ---- OnRobot HEX: AA 07 08 10, counter, status, six i16 big-endian, sum of all bytes before
@@ -450,9 +537,7 @@ TEST(DescribedSensor, SaysWhatIsWrongAtStart) {
 }
 
 TEST(DescribedSensor, RefusesIdentifiersThatArentASensors) {
-  EXPECT_THROW(DescribedSensor(shipped("robotous_rft"), {.bus_name = "s", .base_id = 0}), SetupError);
-  EXPECT_THROW(DescribedSensor(shipped("robotous_rft"), {.bus_name = "s", .base_id = 0x7FE}), SetupError);
-  EXPECT_THROW(DescribedSensor(shipped("robotous_rft"), {.bus_name = "s", .base_id = 0x07F}), SetupError) << "SYNC";
+  EXPECT_THROW(DescribedSensor(shipped("robotous_rft"), {.bus_name = "s", .base_id = 0x1F0}), SetupError);
   EXPECT_THROW(DescribedSensor(shipped("aidin_aft200"), {.bus_name = "s", .base_id = 1}), SetupError);
 }
 

@@ -21,8 +21,11 @@ using testing::ms;
 
 const std::filesystem::path source = source_file();
 
+// The Robotous with its identifiers set to three above the drives'.
 description::SensorDescription shipped(const std::string& name) {
-  return description::load_sensor(source / "models/sensors" / (name + ".yaml"));
+  description::SensorChoices choices;
+  if (name == "robotous_rft") choices.settings = {{"command_id", 0x1F0}, {"first_id", 0x1F1}, {"second_id", 0x1F2}};
+  return description::load_sensor(source / "models/sensors" / (name + ".yaml"), choices);
 }
 
 struct FixedWrench final : WrenchSource {
@@ -56,7 +59,7 @@ std::vector<std::string> sample_of(const std::string& name, std::uint32_t base_i
 TEST(DescribedDevice, SendsWhatTheMakersSend) {
   EXPECT_THAT(sample_of("aidin_aft200", 0, "102#0103010000000000", {1, -20, 0.01, 1, -0.002, 2}),
               ElementsAre("001#75946D6075310000", "002#639C61A765900000"));
-  EXPECT_THAT(sample_of("robotous_rft", 0x1F0, "1F0#0B00000000000000", {1, -1, 10, 1, -1, 0.0005}),
+  EXPECT_THAT(sample_of("robotous_rft", 0, "1F0#0B00000000000000", {1, -1, 10, 1, -1, 0.0005}),
               ElementsAre("1F1#0B0032FFCE01F407", "1F2#D0F8300001000000"));
   EXPECT_THAT(sample_of("onrobot_hex", 0, "101#AA00320301010000", {1, -1, 10, 1, -1, 0.001}),
               ElementsAre("100#AA07081000000000", "100#000AFFF6006403E8", "100#FC180001052C"));
@@ -64,14 +67,14 @@ TEST(DescribedDevice, SendsWhatTheMakersSend) {
 
 TEST(DescribedDevice, StreamsOnlyWhenToldTo) {
   EXPECT_TRUE(sample_of("aidin_aft200", 0, "102#0102010000000000", {}).empty());
-  EXPECT_TRUE(sample_of("robotous_rft", 0x1F0, "1F0#0C00000000000000", {}).empty());
+  EXPECT_TRUE(sample_of("robotous_rft", 0, "1F0#0C00000000000000", {}).empty());
   EXPECT_TRUE(sample_of("onrobot_hex", 0, "101#AA00320300010000", {}).empty());
 }
 
 // One of the shipped sensors in the default cell, read by the master once a millisecond.
 struct SensorInCell {
   explicit SensorInCell(const std::string& name, const std::vector<std::string>& faults = {}) {
-    cell.sensor.base_id = name == "robotous_rft" ? 0x1F0 : name == "wacoh_dynpick" ? 7 : 0;
+    cell.sensor.base_id = name == "wacoh_dynpick" ? 7 : 0;
     cell.sensor.noise_N = cell.sensor.noise_Nm = 0.0;
     network = std::make_unique<fieldbus::SimulatedCanNetwork>(simulated_buses(cell));
     SimulatedCellConfig config;

@@ -65,6 +65,17 @@ TEST(Hand, PullsThroughItsStiffnessAndDamping) {
   EXPECT_LT((force - Vec3(-4.0, -3.0, 0.0)).norm(), 1e-14);
 }
 
+TEST(Hand, PullsNoHarderThanItCan) {
+  description::HandDescription weak;
+  weak.stiffness_N_per_m = 400.0;
+  weak.damping_Ns_per_m = 10.0;
+  weak.max_force_N = 50.0;
+  const Hand hand(weak, Vec3::Zero());
+  // 400 N/m · 0.1 m = 40 N, and 10 Ns/m · 0.5 m/s = 5 N: as it is. A metre would be 400 N, along the same line.
+  EXPECT_LT((hand.force_W(0.0, Vec3(-0.1, 0.0, 0.0), Vec3(-0.5, 0.0, 0.0)) - Vec3(45.0, 0.0, 0.0)).norm(), 1e-12);
+  EXPECT_LT((hand.force_W(0.0, Vec3(-0.6, 0.0, 0.8), Vec3::Zero()) - Vec3(30.0, 0.0, -40.0)).norm(), 1e-12);
+}
+
 // The hands that come with the project start at rest on the handle, or the arm would feel a push when it wakes up.
 TEST(Hand, ComesInFilesThatStartWithoutAForce) {
   for (const char* file : {"sim/hands/touch.yaml", "sim/hands/sweep.yaml"}) {
