@@ -228,10 +228,12 @@ TEST(Sensor, TheAtiOneLoadsAndReachesItsRange) {
   }
 }
 
+SensorDescription as_delivered(const std::filesystem::path& file) { return load_sensor(file); }
+
 TEST(Sensor, MistakesAreTold) {
   const auto told = [](const char* from, const char* to) {
     Changed sensor(default_sensor);
-    return sensor.replace(from, to).told(load_sensor);
+    return sensor.replace(from, to).told(as_delivered);
   };
   EXPECT_THAT(told("protocol: ati_net_can_oem", "protocol: ati"),
               HasSubstr("protocol: found \"ati\", expected ati_net_can_oem or described"));
@@ -249,13 +251,13 @@ TEST(Sensor, AMatrixThatCantBeInvertedIsRefused) {
       "name: x\nprotocol: ati_net_can_oem\nforce_range_N: [1, 1, 1]\ntorque_range_Nm: [1, 1, 1]\nsimulation:\n  "
       "matrix:\n  - [1, 0, 0, 0, 0, 0]\n  - [0, 1, 0, 0, 0, 0]\n  - [0, 0, 1, 0, 0, 0]\n  - [0, 0, 0, 1, 0, 0]\n  - "
       "[0, 0, 0, 0, 1, 0]\n  - [0, 0, 0, 0, 0, 1]\n");
-  EXPECT_EQ(sensor.told(load_sensor), "no error");
+  EXPECT_EQ(sensor.told(as_delivered), "no error");
   sensor.replace("[0, 0, 0, 0, 1, 0]", "[0, 0, 0, 2, 0, 0]");
-  EXPECT_THAT(sensor.told(load_sensor), HasSubstr("simulation.matrix: found one of condition "));
+  EXPECT_THAT(sensor.told(as_delivered), HasSubstr("simulation.matrix: found one of condition "));
   sensor.replace("[0, 0, 0, 2, 0, 0]", "[0, 0, 0, 0, 0, 0]");
-  EXPECT_THAT(sensor.told(load_sensor), HasSubstr("simulation.matrix: found one of condition "));
+  EXPECT_THAT(sensor.told(as_delivered), HasSubstr("simulation.matrix: found one of condition "));
   sensor.replace("[0, 0, 0, 0, 0, 0]", "[0, 0, 0, 0, 0]");
-  EXPECT_THAT(sensor.told(load_sensor), HasSubstr("simulation.matrix[4]: found a list of 5"));
+  EXPECT_THAT(sensor.told(as_delivered), HasSubstr("simulation.matrix[4]: found a list of 5"));
 }
 
 // ---- hands ----------------------------------------------------------------------------------------------------------
@@ -334,7 +336,7 @@ TEST(DamagedFiles, NeverDoMoreThanFail) {
     }
     file.set_text(text);
     if (kind == 0) file.told(load_cell);
-    if (kind == 1) file.told(load_sensor);
+    if (kind == 1) file.told(as_delivered);
     if (kind == 2) file.told(load_hand);
   }
 }
