@@ -134,6 +134,59 @@ class GravestFaults(two.VcanTestCase):
     def test_encoder_that_is_off(self):
         self.stop("drive_deviates", 25, 2, device="axis_1:offset=5mrad", begin=self.first_astray, words=["axis_1"])
 
+    def hand(self, *waypoints, stiffness=500):
+        path = self.folder / "hand.yaml"
+        path.write_text(f"name: leads\nmass_kg: 1.0\nstiffness_N_per_m: {stiffness}\ndamping_Ns_per_m: 20\nwaypoints:\n" +
+                        "".join(f"  - {{time_s: {t}, offset_m: {offset}}}\n" for t, offset in waypoints))
+        return path
+
+    def test_sensor_of_the_opposite_sign(self):
+        """From the start; the arm runs from the hand that leads it until the force has grown with the motion."""
+        record = self.folder / "record"
+        hand = self.hand((0.5, [0, 0, 0]), (2.5, [0.2, 0, 0]))
+        with two.simulated_arm(two.THREE, "--hand", hand, "--fault", "sensor:inverted"), \
+                two.controller(two.THREE, "5s", record, "--scene", two.source("scenes/free.yaml")) as run:
+            self.assertEqual(run.wait(), 1, run.errors())
+            summary = json.loads(run.output())
+        self.assertEqual([entry["fault"] for entry in summary["faults"]], ["force_reversed"])
+        way_mm = self.way_mm(record)
+        self.assertLess(way_mm, 20)
+        self.rows.append(f"| `force_reversed` | {summary['faults'][0]['cycle']} from the first | {way_mm:.1f} |")
+
+    def way_mm(self, record):
+        """How far the tool goes at most, by the encoders, from where it is first."""
+        with open(record / "signals.csv") as signals:
+            places = [[float(row[f"tool_W_{axis}_m"]) for axis in "xyz"] for row in csv.DictReader(signals)]
+        return 1e3 * max(math.dist(place, places[0]) for place in places)
+
+    def test_drive_jams(self):
+        """Setpoints wait for it, the arm is held after half a second; nobody ends the hold."""
+        cell = self.cell("supervision: {hold_s: 0.5}\n")
+        text, _ = self.stop("drive_blocked", 560, 10, device="axis_2:jammed", cell=cell, begin=self.jams,
+                            words=["drive of axis_2", "doesn't come to its setpoint"])
+        self.assertIn("was held there", text)
+
+    def jams(self, seen):
+        """When axis 2 stands for the first time since it has moved."""
+        moved, last = False, None
+        for frame in seen:
+            if frame.interface != "vcan0" or frame.id != two.TPDO + 2 or len(frame.data) < 6:
+                continue
+            position = struct.unpack("<Hi", frame.data[:6])[1]
+            step = abs(position - last) if last is not None else 0
+            if moved and step < 5:
+                return frame.time_us
+            moved, last = moved or step > 500, position
+        self.fail("axis 2 never stood")
+
+    def test_tool_that_is_too_fast(self):
+        """Axis 1 runs off at 0.3 rad/s, 0.2 m/s at the tool: under a limit of 0.05 m/s that is found before the 20 ms are
+        over after which drive_deviates finds it."""
+        # The wrist is as fast as the tool, and has the tool's limit where it has none of its own.
+        cell = self.cell("", max_tool_speed_m_per_s="0.05\n  max_elbow_speed_m_per_s: 0.5")
+        self.stop("tool_too_fast", 20, 10, device="axis_1:runaway=0.3", cell=cell, begin=self.first_astray,
+                  words=["faster than it was told to be"])
+
     def test_second_master(self):
         self.stop("second_master", 3, 5, act=lambda run: send("vcan1", two.NMT, b"\x80\x63"),
                   words=["bus vcan1", "another master"])

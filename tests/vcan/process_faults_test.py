@@ -4,6 +4,7 @@ import json
 import signal
 import socket
 import struct
+import subprocess
 import time
 
 import two_processes as two
@@ -62,6 +63,47 @@ class ProcessFaults(two.VcanTestCase):
 
     def test_sigint_makes_a_controlled_stop(self):
         self.controlled_stop(signal.SIGINT)
+
+    def test_sighup_makes_a_controlled_stop(self):
+        """It killed the controller in motion: a terminal that was closed."""
+        self.controlled_stop(signal.SIGHUP)
+
+    def test_a_hold_by_the_socket_stops_the_arm_and_resume_goes_on(self):
+        """From another process, while the hand leads: drives stay enabled, and stand."""
+        control, record = self.folder / "control", self.folder / "record"
+        self.folder.chmod(0o700)
+        with two.simulated_arm(two.THREE), two.candump(*two.INTERFACES) as witness, \
+                two.controller(two.THREE, "60s", record, "--control", control) as run:
+            time.sleep(MID_MOTION_S)
+            asked_us = time.time_ns() // 1000
+            for order in ("hold", "resume"):
+                done = subprocess.run([two.PROGRAM, order, "--control", control], capture_output=True, text=True,
+                                      timeout=30)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                if order == "hold":
+                    answered_us = time.time_ns() // 1000
+                    time.sleep(0.5)
+            time.sleep(0.3)
+            self.assertEqual(run.stop(), 0, run.errors())
+            summary = json.loads(run.output())
+            seen = two.frames_of(witness)
+        self.assertEqual((summary["faults"], summary["notices"]), ([], []))
+        self.assertLess(answered_us - asked_us, 100_000)
+        with open(record / "signals.csv") as signals:
+            phases = [row["phase"] for row in csv.DictReader(signals)]
+        begin = phases.index("holding")
+        end = phases.index("rendering", begin)
+        self.assertGreater(end - begin, 450)
+        self.assertIn("stopping", phases[end:])
+        first_us = next(f.time_us for f in seen if f.interface == "vcan0" and f.id == two.SYNC)
+        self.assertLess(first_us + 1000 * begin - asked_us, 100_000, "from the order to the cycle that obeys it")
+        for counts in two.setpoints(seen):
+            # v²/2a is 6 mm at most: the targets stand after 100 cycles, and until it goes on.
+            self.assertEqual(len(set(counts[begin + 100:end])), 1)
+        for node in two.NODES:
+            words = [word & 0x6F for time_us, word, _ in feedback(seen, node)
+                     if begin < (time_us - first_us) // 1000 < end]
+            self.assertEqual(set(words), {0x27}, "operation enabled")
 
     def test_drives_of_a_killed_controller_stop_by_themselves(self):
         status, _, killed_us, seen = self.signal_controller(signal.SIGKILL, send_syncs)

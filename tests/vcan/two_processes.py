@@ -183,6 +183,11 @@ def frames_of(process):
         return read_log(log.name)
 
 
+def source(path):
+    """A shipped file."""
+    return Path(__file__).resolve().parents[2] / path
+
+
 def write_hand(folder, name):
     """The file of a hand that stays where the tool starts."""
     path = Path(folder) / f"{name}.yaml"
