@@ -13,6 +13,13 @@ bool renders_torques(const CycleParts& parts) noexcept {
   return std::holds_alternative<std::unique_ptr<TorqueRendering>>(parts.rendering);
 }
 
+// A joint that a fault has stopped at an end of its range is beyond it by what drive_deviates allows it to be off.
+ReadingBounds reading_bounds(const CycleParts& parts, const description::CellLimits& limits) noexcept {
+  return {.max_force_N = limits.max_force_N,
+          .max_bias_drift_N = parts.supervision.max_bias_drift_N,
+          .beyond_range_rad = away_at_once * limits.following_error_rad};
+}
+
 // A device that takes torques is driven back by a hand as fast as the hand likes, so the tool's speed isn't monitored.
 std::optional<ToolMonitor> tool_monitor(const CycleParts& parts, const SessionSettings& settings,
                                         const description::CellLimits& limits) {
@@ -64,7 +71,7 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
       recorder_(record_capacity),
       bus_(parts_, recorder_, alarm_),
       measurement_(parts_.drives, *parts_.sensor, *parts_.arm, parts_.compensation, settings.period_s),
-      faults_(parts_.drives, settings_, {limits.max_force_N, parts_.supervision.max_bias_drift_N}, supervisor_, alarm_,
+      faults_(parts_.drives, settings_, reading_bounds(parts_, limits), supervisor_, alarm_,
               tool_monitor(parts_, settings, limits), drive_monitor(parts_, limits),
               standstill_monitor(parts_, limits)),
       motion_(make_motion(parts_, settings, limits)),

@@ -65,6 +65,7 @@ void FaultMonitor::judge(const JudgedCycle& cycle) noexcept {
     alarm_.raise(Fault::overrun, -1, cycle.overruns_in_a_row, settings_.max_overruns);
   }
   judge_enabling(cycle.enabling);
+  judge_start(cycle);
   judge_standstill(cycle);
   judge_buses(cycle.buses);
   judge_drives(cycle.telling);
@@ -76,6 +77,18 @@ void FaultMonitor::judge_enabling(const EnablingInput* enabling) noexcept {
   const Phase phase = supervisor_.phase();
   if (supervisor_.live() || phase == Phase::enabling || phase == Phase::taring) {
     alarm_.raise(enabling->squeezed() ? Fault::enabling_squeezed : Fault::enabling_released);
+  }
+}
+
+// The drives are enabled one state after the other, so each has told its position before it has power.
+void FaultMonitor::judge_start(const JudgedCycle& cycle) noexcept {
+  if (cycle.tared || supervisor_.phase() > Phase::taring) return;
+  for (Eigen::Index i = 0; i < cycle.measured.axes(); ++i) {
+    if ((cycle.measured.fresh & 1u << i) == 0) continue;
+    const double angle_rad = cycle.measured.motor_rad[i];
+    const auto [low, high] = drives_[static_cast<std::size_t>(i)].drive.description().range_rad;
+    if (angle_rad >= low - bounds_.beyond_range_rad && angle_rad <= high + bounds_.beyond_range_rad) continue;
+    alarm_.raise(Fault::joint_out_of_range, static_cast<std::int32_t>(i), angle_rad, angle_rad < low ? low : high);
   }
 }
 

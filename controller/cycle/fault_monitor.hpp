@@ -45,10 +45,11 @@ struct JudgedCycle {
   bool backs_off = false;  // while it is freed, the arm moves in a direction that is set
 };
 
-// Readings beyond these bounds aren't believed.
-struct ForceBounds {
+// What is read beyond these bounds is a fault.
+struct ReadingBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;
+  double beyond_range_rad = 0.0;  // by which a joint may stand out of its range at the start
 };
 
 class FaultMonitor {
@@ -56,7 +57,7 @@ class FaultMonitor {
   // `drives_follow` and `tool` are nullopt if the drives take torques, since a hand then moves the arm as it likes.
   // Precondition: all arguments but these two and `bounds` outlive this object. T, and what is counted in cycles, may
   // change in `settings`.
-  FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ForceBounds& bounds,
+  FaultMonitor(std::span<const DriveOnBus> drives, const SessionSettings& settings, const ReadingBounds& bounds,
                const Supervisor& supervisor, Alarm& alarm, std::optional<ToolMonitor> tool = {},
                std::optional<DriveMonitor> drives_follow = {},
                std::optional<StandstillMonitor> standstill = {}) noexcept
@@ -95,6 +96,7 @@ class FaultMonitor {
   void judge_following(const Measured& measured, Phase entered) noexcept;
   void judge_tool(const Measured& measured, Phase entered) noexcept;
   void judge_enabling(const EnablingInput* enabling) noexcept;
+  void judge_start(const JudgedCycle& cycle) noexcept;
   void judge_standstill(const JudgedCycle& cycle) noexcept;
   void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;
   void judge_drives(bool telling) noexcept;
@@ -106,7 +108,7 @@ class FaultMonitor {
 
   std::span<const DriveOnBus> drives_;
   const SessionSettings& settings_;
-  ForceBounds bounds_;
+  ReadingBounds bounds_;
   const Supervisor& supervisor_;
   Alarm& alarm_;
   std::optional<ToolMonitor> tool_;

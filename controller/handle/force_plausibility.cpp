@@ -1,5 +1,6 @@
 #include "controller/handle/force_plausibility.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace proxarm::controller {
@@ -12,6 +13,7 @@ constexpr double at_rest_m_per_s = 2e-3;
 constexpr double first_mark_m = 0.5e-3;
 constexpr std::size_t doublings = 4;
 constexpr double least_growth = 1.45, least_last_growth = 1.6, least_damped_growth = 1.6, most_growth = 2.1;
+constexpr double kept_growth = 0.85;  // of the largest of them, by the last
 constexpr double least_time = 0.78, most_time = 1.05;
 // A hundred times the noise of a usual sensor. Ratios of smaller forces say little.
 constexpr double least_force_N = 2.0;
@@ -29,18 +31,20 @@ constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.
 bool ReversedForce::grows(std::size_t last, const ForceAndMotion& now) const noexcept {
   const State& s = state_;
   if (last < doublings || s.force_N[last] < least_force_N) return false;
+  double largest = 0.0, growth = 0.0;
   for (std::size_t i = last + 1 - doublings; i <= last; ++i) {
     // λ solves M λ² + B λ = F/x.
     const double M = now.mass_kg, B = now.damping_Ns_per_m;
     const double stiffness = s.force_N[i] / (first_mark_m * std::exp2(static_cast<double>(i)));
     const double lambda = (std::sqrt(B * B + 4.0 * M * stiffness) - B) / (2.0 * M);
-    const double growth = s.force_N[i] / s.force_N[i - 1];
+    growth = s.force_N[i] / s.force_N[i - 1];
+    largest = std::max(largest, growth);
     const double least = B > M * lambda ? least_damped_growth : i == last ? least_last_growth : least_growth;
     if (!(growth >= least && growth <= most_growth)) return false;
     const double took = (s.time_s[i] - s.time_s[i - 1]) * lambda / std::log(2.0);
     if (took < least_time || took > most_time) return false;
   }
-  return true;
+  return growth >= kept_growth * largest;
 }
 
 bool ReversedForce::step(const ForceAndMotion& now) noexcept {

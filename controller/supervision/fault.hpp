@@ -30,6 +30,7 @@ enum class Fault : std::uint8_t {
   drive_fault,           // a drive reports the state fault, or an EMCY
   modbus_silent,         // no answer of a drive on a Modbus line for stale_after_s, or the line is closed
   drive_disabled,        // a drive left operation enabled by itself
+  joint_out_of_range,    // a joint stands out of its range at the start: nothing moves
   drive_not_enabled,     // a drive didn't reach operation enabled in time: nothing moves
   drive_not_disabled,    // a drive didn't confirm within a second that it is switched off
   timestep_unknown,      // a drive confirms neither the timestep that it was to take nor the one before
@@ -42,6 +43,7 @@ enum class Fault : std::uint8_t {
   leash_exceeded,        // the tool doesn't follow the proxy
   tool_too_fast,         // by the encoders the tool exceeds its speed limit, though no setpoint does
   tool_off_limits,       // by the encoders the tool is out of the workspace or in a keep-out zone; no setpoint is
+  elbow_too_fast,        // by the encoders the elbow or the wrist is faster than its limit, though no setpoint is
   proxy_not_finite,      // the integrator refused a step
   proxy_squeezed,        // objects that move leave the proxy no room
   bus_off,               // a CAN controller is bus-off: nothing can be commanded there
@@ -55,9 +57,8 @@ enum class Fault : std::uint8_t {
   enabling_not_pressed,  // it wasn't released and pressed within enabling_timeout_s of the start: nothing moves
   enabling_squeezed,     // a switch with three positions was squeezed through
   standstill_left,       // a joint moves, by its encoder, where the arm is to stand
-  elbow_too_fast,        // by the encoders the elbow or the wrist is faster than its limit, though no setpoint is
 };
-inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::elbow_too_fast) + 1;
+inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::standstill_left) + 1;
 
 // What the arm does. Each reaction does more than the one before.
 enum class Reaction : std::uint8_t {

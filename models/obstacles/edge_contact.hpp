@@ -25,7 +25,7 @@ struct EdgeContact {
 // The data of a step that is to be solved on several planes.
 struct StepOnPlanes {
   double mu, K;
-  const Layer& layer;
+  Layer layer;  // a copy: cylinders hand over what their end returns
   const Vec3 &p, &q;
 
   [[nodiscard]] FaceStep<3> on(const FlatSurface<3>& surface) const noexcept {

@@ -124,12 +124,21 @@ class Record(ProgramTest):
         self.assertEqual(len(self.signals), self.summaries[0]["cycles"])
         self.assertEqual(digest.hexdigest(), self.summaries[0]["setpoint_sha256"])
 
+    def goodbye(self):
+        """Periods after the last cycle, in which the drives are told to wait for nobody: ten on each bus or so."""
+        syncs = [frame for frame in self.frames if frame.bus == "axes_1_3" and frame.id == 0x080]
+        periods = len(syncs) - len(self.signals)
+        self.assertTrue(1 <= periods <= 30, periods)
+        return periods
+
     def test_the_frames_hold_the_setpoints_of_the_signals(self):
         for node in range(1, 7):
             sent = [struct.unpack("<Hi", frame.data) for frame in self.frames
                     if frame.id == 0x200 + node and frame.bus == BUS_OF[node]]
-            # A standing order in every cycle, the first one included.
-            self.assertEqual([counts for _, counts in sent], [targets(row)[node - 1] for row in self.signals])
+            # A standing order in every cycle, the first one included; then the goodbye, where all stand.
+            wanted = [targets(row)[node - 1] for row in self.signals]
+            self.assertEqual([counts for _, counts in sent], wanted + wanted[-1:] * self.goodbye())
+            self.assertTrue(all(word == 0 for word, _ in sent[len(wanted):]), "disable voltage")
             self.assertIn(0x0F, {word for word, _ in sent}, "enable operation")
 
     def test_the_frames_hold_the_feedback_of_the_signals(self):
@@ -137,14 +146,16 @@ class Record(ProgramTest):
             received = [struct.unpack("<Hi", frame.data)[1] for frame in self.frames
                         if frame.id == 0x180 + node and frame.bus == BUS_OF[node]]
             told = [int(row[f"axis_{node}_actual_counts"]) for row in self.signals]
-            self.assertEqual(received[-len(told):], told)
+            # The frame of each SYNC; the last one's comes after what is recorded.
+            last = len(received) - self.goodbye()
+            self.assertEqual(received[last - len(told):last], told)
 
     def test_times_rise_and_syncs_come_every_millisecond(self):
         for bus in ("axes_1_3", "axes_4_6", "sensor"):
             times = [frame.time_s for frame in self.frames if frame.bus == bus]
             self.assertEqual(times, sorted(times))
         syncs = [frame.time_s for frame in self.frames if frame.bus == "axes_1_3" and frame.id == 0x080]
-        self.assertEqual(len(syncs), len(self.signals))
+        self.assertEqual(len(syncs), len(self.signals) + self.goodbye())
         for before, after in zip(syncs, syncs[1:]):
             self.assertAlmostEqual(after - before, 1e-3, delta=0.135e-3)  # it may wait for one frame of 135 bits
 

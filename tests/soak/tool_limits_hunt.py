@@ -4,11 +4,13 @@
     PROXARM_PROGRAM=build/release/controller/proxarm tests/soak/tool_limits_hunt.py --cycles 10000000 --seed 1
 
 Judged by the records alone, with kinematics of the judge's own (tests/command_line/tool_motion.py). What is sent must
-keep every limit, but for the rounding to counts; what the encoders say and what the simulated steel does is told as a
-share of the limits. Status 1 and the session's files, in `--keep DIR`, where what is sent doesn't.
+keep every limit, but for the rounding to counts, in all sessions. In those that the stability check takes for stable
+what the encoders say and what the simulated steel does is kept below STABLE, too, and none may end, or notice
+anything, by a fault. Status 1 and the session's files, in `--keep DIR`, where it isn't so.
 """
 import argparse
 import csv
+import json
 import math
 import os
 import pathlib
@@ -27,11 +29,25 @@ import harness  # noqa: E402
 import tool_motion  # noqa: E402
 
 DURATION_S = 10.0
+# By which the steel may be faster than its limit, m/s.
+SWING_M_PER_S = 0.6
 # A setpoint is rounded by half a count, about 2e-8 rad: for each end of a step and each of six axes, at a metre or so.
 ROUNDING_M = 2.5e-7
 # Of a joint: a count at each end of a step.
 ROUNDING_COUNTS = 1.0
 BORDER_M = 1e-4
+# What is sent keeps every limit, whatever the hand.
+SENT = {"sent tool": 1.0, "sent elbow": 1.0, "sent joint": 1.0, "sent beyond": BORDER_M}
+# Of sessions that the stability check takes for stable, too: by the encoders, over the 20 ms that tool_too_fast and
+# elbow_too_fast look at, a fifth more at most, which is what these allow; and what the steel swings by beside its limit.
+WINDOW_S = 0.02
+STABLE = {"seen tool": 1.2, "seen elbow": 1.2, "seen beyond": 2e-3, "steel above m/s": SWING_M_PER_S}
+# Nothing fails here, so in a stable session any fault is a false alarm, but for
+#   force_excessive  above this: the limit is 200 N, and the handle of 0.25 kg adds what it is braked with. Hands of up
+#                    to 2 kg that are braked do get there;
+#   sensor_drifts    of a hand that pulls with all its strength: a constant force, without the tremor that tells a
+#                    person's from a bias.
+EXCESSIVE_N = 180.0
 SCENES = ("free", "free", "wall", "room", "frictionless_wall", "coulomb")
 
 
@@ -49,10 +65,10 @@ def direction(chance):
 
 
 def made_hand(chance):
-    """Of up to 200 N: how far it wants beyond where the arm can go, times its stiffness."""
+    """Wants to go beyond where the arm can, and pulls by up to 190 N; its own mass adds to that where it is braked."""
     stiffness, force_N = log_uniform(chance, 100, 1000), log_uniform(chance, 30, 190)
     lines = ["name: reaches", f"mass_kg: {chance.uniform(0.3, 2):.3g}", f"stiffness_N_per_m: {stiffness:.4g}",
-             f"damping_Ns_per_m: {log_uniform(chance, 5, 60):.4g}", "waypoints:",
+             f"damping_Ns_per_m: {log_uniform(chance, 5, 60):.4g}", f"max_force_N: {force_N:.4g}", "waypoints:",
              "  - {time_s: 0.2, offset_m: [0, 0, 0]}"]
     time_s = 0.2
     while time_s < DURATION_S:
@@ -91,7 +107,7 @@ def made_arguments(chance):
     period_ms = chance.choice((1, 1, 1, 2, 4))
     return ["--scene", str(SOURCE / f"scenes/{chance.choice(SCENES)}.yaml"), "--timestep", f"{period_ms}ms", "--mass",
             f"{log_uniform(chance, 4, 30):.4g}", "--orientation", chance.choice(("held", "held", "free")),
-            "--duration", f"{DURATION_S:g}s", "--accept-force", "200N", "--force-unstable", "--no-plot", "--json"]
+            "--duration", f"{DURATION_S:g}s", "--accept-force", "200N", "--no-plot", "--json"]
 
 
 class Signals:
@@ -103,6 +119,7 @@ class Signals:
             column = {name: i for i, name in enumerate(next(rows))}
             wanted = [column["time_s"]] + [column[f"{j}_{kind}_counts"] for kind in ("target", "actual") for j in joints]
             wanted += [column[f"true_tool_W_{axis}_m"] for axis in "xyz"]
+            wanted += [column[f"hand_force_W_{axis}_N"] for axis in "xyz"]
             phase = column["phase"]
             taken, moves = [], []
             for row in rows:
@@ -111,13 +128,21 @@ class Signals:
         table = numpy.array(taken).T
         n = len(joints)
         self.time_s, self.target, self.actual = table[0], table[1:1 + n], table[1 + n:1 + 2 * n]
-        self.steel = table[1 + 2 * n:]
+        self.steel, hand = table[1 + 2 * n:4 + 2 * n], table[4 + 2 * n:]
+        self.hand_N = float(numpy.sqrt((hand ** 2).sum(axis=0)).max())
         self.moves = numpy.array(moves)
 
 
 def speeds(points, T):
     """Of each point, over each step."""
     return numpy.array([numpy.sqrt(sum(numpy.diff(x) ** 2 for x in p)) / T for p in points])
+
+
+def lasting_speeds(points, time_s, n):
+    """Of each point, over n steps; at a step's index, over those that end with it."""
+    span = time_s[n:] - time_s[:-n]
+    over = numpy.array([numpy.sqrt(sum((x[n:] - x[:-n]) ** 2 for x in p)) / span for p in points])
+    return numpy.concatenate([numpy.zeros((len(points), n - 1)), over], axis=1)
 
 
 def beyond(points, cell):
@@ -145,7 +170,10 @@ def judged(folder):
     for name, counts in (("sent", signals.target), ("seen", signals.actual)):
         points = [[numpy.broadcast_to(x, len(signals.time_s)) for x in point]
                   for point in chain.at_motors([cell.angle(i, counts[i]) for i in range(len(counts))])]
-        v = numpy.maximum(0.0, speeds(points, T) - ROUNDING_M / T)[:, steps]
+        if name == "sent":
+            v = numpy.maximum(0.0, speeds(points, T) - ROUNDING_M / T)[:, steps]
+        else:
+            v = lasting_speeds(points, signals.time_s, round(WINDOW_S / T[0]))[:, steps]
         figures[f"{name} tool"] = float(v[0].max()) / cell.speed
         figures[f"{name} elbow"] = float(v[3:].max()) / cell.elbow_speed
         figures[f"{name} beyond"] = beyond([[x[signals.moves] for x in points[0]]], cell)
@@ -156,7 +184,12 @@ def judged(folder):
     # Over a millisecond, gears ringing and all.
     figures["steel tool"] = float(speeds([list(signals.steel)], T)[0][steps].max()) / cell.speed
     figures["steel above m/s"] = (figures["steel tool"] - 1.0) * cell.speed
+    figures["hand N"] = signals.hand_N
     return figures
+
+
+def call(command, folder):
+    return subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
 
 
 def session(seed, folder):
@@ -167,17 +200,26 @@ def session(seed, folder):
     command = [harness.program(), "run", str(folder / "cell.yaml"), "--hand", str(folder / "hand.yaml"),
                *made_arguments(chance), "--record", str(folder / "record")]
     (folder / "command").write_text(" ".join(command) + "\n")
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    # The hand is what the mass is judged by, so some of the masses are refused: those sessions are run all the same.
+    done, stable = call(command, folder), True
+    if done.returncode == 2 and "--mass: found" in done.stderr:
+        done, stable = call([*command, "--force-unstable"], folder), False
     if done.returncode not in (0, 1) or not (folder / "record/signals.csv").exists():
         said = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
         return {"refused": "the start is inside of an object" if "expected a start in free space" in said[-1] else
                 said[-1].partition("cell.yaml: ")[2].partition(" (")[0] or said[-1]}
-    return judged(folder)
+    summary = json.loads(done.stdout)
+    ends = [fault["fault"] for fault in summary["faults"]] or [summary["end"]["reason"]]
+    return {**judged(folder), "ends": ends + ["noticed " + notice["fault"] for notice in summary["notices"]],
+            "stable": stable and not summary["oscillation"]["lasts"]}
 
 
 def broken(figures):
-    return any(figures.get(f"sent {what}", 0.0) > 1.0 for what in ("tool", "elbow", "joint")) or \
-        figures.get("sent beyond", 0.0) > BORDER_M
+    """What of it mustn't be."""
+    most = {**SENT, **STABLE} if figures["stable"] else SENT
+    wrong = [f"{what} {figures[what]:.4g}" for what, value in most.items() if figures.get(what, 0.0) > value]
+    allowed = {"duration", "sensor_drifts"} | ({"force_excessive"} if figures.get("hand N", 0.0) > EXCESSIVE_N else set())
+    return wrong + [end for end in figures["ends"] if figures["stable"] and end not in allowed]
 
 
 def main():
@@ -187,14 +229,14 @@ def main():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--keep", type=pathlib.Path, default=pathlib.Path("tool_limits_hunt"))
     options = parser.parse_args()
-    total, sessions, refused, found = 0, 0, {}, []
+    total, sessions, refused, ends, found = 0, 0, {}, {}, {}
     figures_of = {}
     with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
         def run(n):
             folder = pathlib.Path(scratch) / str(n)
             seed = f"{options.seed}/{n}"
             figures = session(seed, folder)
-            if broken(figures):
+            if "refused" not in figures and broken(figures):
                 shutil.copytree(folder, options.keep / f"{options.seed}-{n}", dirs_exist_ok=True)
             shutil.rmtree(folder)
             return n, figures
@@ -207,18 +249,27 @@ def main():
                 sessions += 1
                 total += figures.pop("cycles")
                 if broken(figures):
-                    found.append(n)
+                    found[n] = ", ".join(broken(figures))
+                kind = "stable" if figures.pop("stable") else "not stable"
+                for end in figures.pop("ends"):
+                    end = end if kind == "stable" else f"{end} ({kind})"
+                    ends[end] = ends.get(end, 0) + 1
                 for what, value in figures.items():
+                    if kind != "stable" and what in STABLE:
+                        what += ", not stable"
                     figures_of.setdefault(what, []).append((value, n))
             n += 1
     print(f"{total} cycles of {sessions} sessions; {sum(refused.values())} refused: {refused}")
-    print("                    median      95 %       most")
+    print("                                median      95 %       most")
     for what, values in sorted(figures_of.items()):
         values.sort()
         most, at = values[-1]
         middle, high = (values[int(share * (len(values) - 1))][0] for share in (0.5, 0.95))
-        print(f"{what:16s} {middle:9.6f} {high:9.6f} {most:10.6f} in session {at}")
-    print(f"what was sent broke a limit in {len(found)} sessions {found[:20]}")
+        print(f"{what:28s} {middle:9.6f} {high:9.6f} {most:10.6f} in session {at}")
+    print("ended by: " + ", ".join(f"{end} {times}" for end, times in sorted(ends.items(), key=lambda e: -e[1])))
+    print(f"something was wrong in {len(found)} sessions")
+    for n, what in list(found.items())[:20]:
+        print(f"  {n}: {what}")
     return 1 if found or sessions == 0 else 0
 
 

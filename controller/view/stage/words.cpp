@@ -47,7 +47,8 @@ std::string fault_text(const controller::CycleRecord& record, const description:
   std::string place;
   const bool of_drive = fault == Fault::drive_silent || fault == Fault::drive_fault || fault == Fault::drive_disabled ||
                         fault == Fault::drive_deviates || fault == Fault::drive_blocked ||
-                        fault == Fault::feedback_late || fault == Fault::position_implausible;
+                        fault == Fault::feedback_late || fault == Fault::position_implausible ||
+                        fault == Fault::joint_out_of_range;
   if (of_drive && record.fault_where >= 0 && static_cast<std::size_t>(record.fault_where) < cell.drives.size()) {
     place = "drive of " + cell.drives[static_cast<std::size_t>(record.fault_where)].joint;
   }

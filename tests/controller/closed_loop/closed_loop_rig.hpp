@@ -48,6 +48,7 @@ struct RigOptions {
   std::function<void(description::HandDescription&)> edit_hand{};
   std::function<void(CycleParts&)> edit_parts{};                      // before the bring-up
   std::function<void(fieldbus::SimulatedCanNetwork&)> after_cycle{};  // such as to take a nap, and be late
+  std::function<void(sim::SimulatedCell&)> before_goodbye{};          // which takes back what the drives wait for
   std::int64_t restart_ns = 0;                                        // of all buses, after bus-off by errors
   BlackBox* box = nullptr;
 };
@@ -84,6 +85,7 @@ class ClosedLoopRig {
     cycle->commands().schedule(options.commands);
     cycle->timesteps().schedule(options.timesteps);
     tally = run_session(*cycle, through, {options.duration_s}, hooks);
+    if (options.before_goodbye) options.before_goodbye(far_end);
     cycle->shut_down();
     network.sleep_until(network.now_ns() + 1'500'000'000);  // the drives stop, and the gears ring out
   }

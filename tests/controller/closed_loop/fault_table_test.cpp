@@ -215,6 +215,18 @@ RigOptions hand_at_start() {
   return options;
 }
 
+// The fourth joint stands 5 mrad further beyond its range than it may.
+RigOptions zero_is_wrong() {
+  RigOptions options;
+  options.edit_belief = [](description::Cell& cell) {
+    description::DriveDescription& drive = cell.drives[3];
+    const double beyond_rad = 5.0 * cell.limits.following_error_rad + 5e-3;
+    const double off_rad = cell.start_rad[3] - (drive.range_rad[0] - beyond_rad);
+    drive.offset_counts += static_cast<std::int32_t>(std::llround(off_rad * drive.counts_per_rad()));
+  };
+  return options;
+}
+
 RigOptions never_enabled() {
   RigOptions options = failing_bus({.action = FaultAction::corrupt,
                                     .bus = "axes_1_3",
@@ -433,6 +445,7 @@ std::vector<Row> rows() {
                              .receiver = "axis_3",
                              .flips = {{.byte = 0, .bit = 1}}});
        }},
+      {joint_out_of_range, Reaction::stop_1, 2, still_m, zero_is_wrong, at_start},
       {drive_not_enabled, Reaction::stop_1, 505, still_m, never_enabled, at_start},
       {drive_not_disabled, Reaction::stop_0, 1001, way_m, never_disabled, at_the_end},
       // At rest after 50 ms; then it is asked four times, each time for 200 ms.

@@ -37,12 +37,28 @@ std::int64_t period_of_drive(ClosedLoopRig& rig, std::size_t axis) {
   return std::llround(1e9 * period_s);
 }
 
+// Keeps 1006h of all drives as it was in the session: the goodbye sets it to 0.
+class TimestepRig : public ClosedLoopRig {
+ public:
+  explicit TimestepRig(const RigOptions& rig) : ClosedLoopRig(rig) {
+    options.before_goodbye = [this](sim::SimulatedCell& simulated) {
+      for (std::size_t axis = 0; axis < 6; ++axis) {
+        sync_period_us[axis] = simulated.drive(axis).canopen().dictionary().number(0x1006);
+      }
+    };
+  }
+  TimestepRig(const TimestepRig&) = delete;
+  TimestepRig& operator=(const TimestepRig&) = delete;
+
+  std::array<std::int64_t, 6> sync_period_us{};
+};
+
 // 60C2h, 1006h and the RPDO's timer of all drives.
-void expect_drives_at(ClosedLoopRig& rig, std::int64_t period_ns) {
+void expect_drives_at(TimestepRig& rig, std::int64_t period_ns) {
   for (std::size_t axis = 0; axis < 6; ++axis) {
     const sim::ObjectDictionary& od = rig.far_end.drive(axis).canopen().dictionary();
     EXPECT_EQ(period_of_drive(rig, axis), period_ns) << axis;
-    EXPECT_EQ(od.number(0x1006), period_ns / 1000) << axis;
+    EXPECT_EQ(rig.sync_period_us[axis], period_ns / 1000) << axis;
     EXPECT_EQ(od.number(0x1400, 5), (5 * period_ns + 999'999) / ms) << axis;
   }
 }
@@ -116,7 +132,7 @@ TEST(TimestepChange, IsFeltByNobodyFromOneToTwoToOneToFourMilliseconds) {
     course.options.settings.mass_kg = std::max(course.options.settings.mass_kg, 6.0);
     const std::int64_t last_ns = std::llround(1e9 * course.options.duration_s) - 500 * ms;
     course.options.timesteps = {{1000 * ms, timestep(2)}, {2300 * ms, timestep(1)}, {last_ns, timestep(4)}};
-    ClosedLoopRig rig(course.options);
+    TimestepRig rig(course.options);
     rig.run();
     ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
     expect_within_joint_limits(rig);
@@ -165,7 +181,7 @@ TEST(TimestepChange, IsTakenBackWhereADriveRefuses) {
       if (period_ms < 1.0) options.settings.mass_kg = 6.0;
       const double wanted_ms = period_ms < 1.0 ? 1.0 : period_ms;
       options.timesteps = {{1000 * ms, timestep(wanted_ms)}};
-      ClosedLoopRig rig(options);
+      TimestepRig rig(options);
       rig.run();
       ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
       expect_within_joint_limits(rig);
@@ -198,7 +214,7 @@ TEST(TimestepChange, OutlivesLostAnswers) {
                         .from_ns = 1200 * ms,
                         .count = lost,
                         .receiver = "controller"}}};
-    ClosedLoopRig rig(options);
+    TimestepRig rig(options);
     rig.run();
     ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
     expect_within_joint_limits(rig);
@@ -227,7 +243,7 @@ TEST(TimestepChange, EndsInOnePeriodWhateverFailsInItsMiddle) {
       options.timesteps = {{1000 * ms, timestep(3.0 - from_ms)}};
       options.commands = {{2500 * ms, {Order::reset}}, {3500 * ms, {Order::resume}}};
       SCOPED_TRACE(options.device_faults.front() + " from " + std::to_string(from_ms) + " ms");
-      ClosedLoopRig rig(options);
+      TimestepRig rig(options);
       rig.run();
       ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
       EXPECT_EQ(rig.cycle->past_fault_count(), 1u);
@@ -248,7 +264,7 @@ TEST(TimestepChange, StopsWhereADriveDiesInItsMiddle) {
     options.settings.wait_after_fault_s = 2.0;
     options.timesteps = {{1000 * ms, timestep(2)}};
     options.commands = {{3000 * ms, {Order::reset}}};
-    ClosedLoopRig rig(options);
+    TimestepRig rig(options);
     rig.run();
     EXPECT_TRUE(rig.fault().fault == Fault::drive_silent || rig.fault().fault == Fault::drive_not_disabled ||
                 rig.fault().fault == Fault::drive_fault)
@@ -274,7 +290,7 @@ TEST(TimestepChange, ObeysOrdersInItsMiddle) {
       const std::int64_t at_ns = (1236 + moment) * ms;
       options.commands = {{at_ns, {ordered.order, 0.02}}};
       if (ordered.order == Order::hold) options.commands.push_back({at_ns + 1500 * ms, {Order::resume}});
-      ClosedLoopRig rig(options);
+      TimestepRig rig(options);
       rig.run();
       ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
       expect_within_joint_limits(rig);
@@ -298,7 +314,7 @@ TEST(TimestepChange, EndsWithTheSession) {
     options.after_cycle = [&](fieldbus::SimulatedCanNetwork&) {
       if (!session->records.empty() && changing(session->records.back()) && left-- == 0) session->cycle->request_stop();
     };
-    ClosedLoopRig rig(options);
+    TimestepRig rig(options);
     session = &rig;
     rig.run();
     EXPECT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
@@ -317,7 +333,7 @@ TEST(TimestepChange, LeavesAHoldAHoldAndTakesOneAfterTheOther) {
     for (const double period_ms : {1.0, 2.0, 2.0, 4.0})
       ASSERT_TRUE(session->cycle->timesteps().push(timestep(period_ms)));
   };
-  ClosedLoopRig rig(options);
+  TimestepRig rig(options);
   session = &rig;
   rig.run();
   ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
@@ -344,7 +360,7 @@ TEST(TimestepChange, WaitsForTheEnablingInput) {
   };
   options.enabling = {{100 * ms, 1365 * ms}, {2700 * ms, INT64_MAX}};
   options.timesteps = {{1000 * ms, timestep(2)}};
-  ClosedLoopRig rig(options);
+  TimestepRig rig(options);
   rig.run();
   ASSERT_EQ(rig.fault().fault, Fault::none) << describe(rig.fault(), "");
   const std::size_t asked = first(rig, 0, changing), told = first(rig, asked, steady);

@@ -41,7 +41,7 @@ struct FaultMonitorTest : ::testing::Test {
   std::vector<fieldbus::BusStatus> buses = std::vector<fieldbus::BusStatus>(3);
   std::uint32_t overruns = 0;
   Measurement measurement{drives.on_bus, sensor, arm, WrenchCompensation(cell), settings.period_s};
-  FaultMonitor monitor{drives.on_bus, settings, {200.0, 0.5}, watched.supervisor, watched.alarm};
+  FaultMonitor monitor{drives.on_bus, settings, {200.0, 0.5, 0.025}, watched.supervisor, watched.alarm};
 };
 
 TEST_F(FaultMonitorTest, FindsNothingWrongWithDevicesThatAreWell) {
@@ -169,6 +169,33 @@ TEST_F(FaultMonitorTest, LetsAnEncoderThatWasSilentCatchUp) {
   drives[0].angle_rad += 7.9 * per_cycle_rad;
   judge();
   EXPECT_EQ(watched.times(Fault::position_implausible), 0u);
+}
+
+// Nodes that are swapped and offsets that are wrong, told before a drive has power.
+TEST_F(FaultMonitorTest, FindsAJointThatStandsOutOfItsRangeBeforeTheFirstEnabling) {
+  watched.supervisor = Supervisor();
+  watched.supervisor.handle(Event::begin);
+  const auto [low, high] = drives[2].own.range_rad;
+  const auto found_at = [&](double angle_rad, bool tared, bool fresh = true) {
+    watched.supervisor = Supervisor();
+    watched.supervisor.handle(Event::begin);
+    drives[2].angle_rad = angle_rad;
+    drives[2].is_fresh = true;
+    measurement.take();
+    drives[2].is_fresh = fresh;
+    measurement.take();
+    monitor.judge({.measured = measurement.now(), .sample = sensor.sample, .buses = buses, .tared = tared});
+    return stopped_for();
+  };
+  for (const double beyond : {0.0249, -0.0249}) {
+    const double end = beyond > 0.0 ? high : low;
+    EXPECT_EQ(found_at(end + beyond, false), Fault::none);
+    EXPECT_EQ(found_at(end + 1.01 * beyond, false), Fault::joint_out_of_range);
+    EXPECT_EQ(watched.supervisor.report().where, 2);
+    EXPECT_EQ(watched.supervisor.report().limit, end);
+    EXPECT_EQ(found_at(end + 1.01 * beyond, true), Fault::none) << "it may be led back";
+    EXPECT_EQ(found_at(end + 1.01 * beyond, false, false), Fault::none) << "before it has said anything";
+  }
 }
 
 struct FollowingTest : FaultMonitorTest {
