@@ -146,6 +146,92 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
   return largest;
 }
 
+// What the advice is asked for: the hand as described, and the loop in the poses that it leads to.
+struct Tuned {
+  const PreparedSession& session;
+  HandModel hand;
+  LoopModel loop;
+};
+
+Tuned tuned(const PreparedSession& session) {
+  const description::Grip grip = description::tightest_grip(session.hand);
+  LoopModel loop = led_loop(session);
+  loop.horizon_s = 0.0;
+  return {session, {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg}, loop};
+}
+
+void print_delays(const Tuned& of) {
+  const HandModel& hand = of.hand;
+  const double T = of.loop.period_s, filter_s = motion_delay_s(of.session) - 2.0 * T;
+  std::printf("%s, held by %s: %.4g N/m, %.4g Ns/m, %.3g kg; T = %.4g ms\n", of.session.cell.name.c_str(),
+              of.session.hand.name.c_str(), hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, 1e3 * T);
+  std::printf(
+      "from a push to the arm being there: %.3g ms (sampling %.3g, reaching the target %.3g, setpoint filter %.3g, "
+      "sensor %.3g, drives %.3g)\n",
+      1e3 * total_delay_s(of.session), 1e3 * T, 1e3 * T, 1e3 * filter_s,
+      1e3 * std::max(0.0, of.loop.delay_s - T - filter_s), 1e3 * of.loop.drive_time_constant_s);
+}
+
+void print_mass(const Tuned& of, const std::optional<double>& smallest) {
+  LoopModel start = of.session.loop;  // in its pose
+  start.horizon_s = 0.0;
+  std::printf(
+      "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
+      mass_text(smallest).c_str(), of.loop.handle_mass_kg, mass_text(smallest_felt(of.hand, start)).c_str());
+  const auto safe = with_margin(of.hand, of.loop);
+  const TriedAdvice tried = safe ? tried_advice(of.session, round_up(*safe)) : TriedAdvice{};
+  std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
+              tried.mass_kg ? ("--mass " + mass_text(tried.mass_kg)).c_str() : "no mass up to 1000 kg",
+              tried.mass_kg ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
+  if (safe) std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
+}
+
+void print_damping(const Tuned& of) {
+  const LoopModel& loop = of.loop;
+  const auto damping = damping_needed(of.hand, loop);
+  if (!damping) {
+    std::printf("damping: not even %.3g Ns/m gives it these margins: shorten the delay\n",
+                std::max(500.0, loop.damping_Ns_per_m));
+  } else if (*damping > loop.damping_Ns_per_m) {
+    LoopModel damped = loop;
+    damped.damping_Ns_per_m = *damping;
+    const auto least = with_margin(of.hand, damped);
+    std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", *damping,
+                mass_text(least).c_str());
+    PreparedSession with_damping = of.session;
+    with_damping.settings.damping_Ns_per_m = *damping;
+    if (least) std::printf("  tried: %s\n", tried_advice(with_damping, round_up(*least)).text.c_str());
+  } else {
+    std::printf(
+        "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
+        "R: %.2g Ns/m at 20 N and 0.1 m\n",
+        loop.period_s * 20.0 / 0.1);
+  }
+}
+
+// Returns what limits the smallest mass most, in words.
+std::string print_limits(const Tuned& of, const std::optional<double>& smallest) {
+  const auto sorted = limits(of.session, of.loop, of.hand);
+  constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
+  const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
+  const std::string limit = helps ? sorted.front().what : "none of these alone";
+  std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),
+              helps ? "it" : sorted.front().what, mass_text(sorted.front().mass_without).c_str());
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    std::printf("  without %s: %s\n", sorted[i].what, mass_text(sorted[i].mass_without).c_str());
+  }
+  return limit;
+}
+
+void print_timestep(const Tuned& of, const std::string& limit) {
+  const double wanted = of.session.settings.mass_kg;
+  if (const auto timestep = timestep_for(wanted, of.hand, of.loop)) {
+    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms\n", wanted, 1e3 * *timestep);
+  } else {
+    std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
+  }
+}
+
 }  // namespace
 
 int tune_command(const RunOptions& options) {
@@ -156,66 +242,14 @@ int tune_command(const RunOptions& options) {
                                    .found = "a cell of the impedance type",
                                    .expected = "one whose drives take positions: `run` judges a coupling's K and B"});
   }
-  const description::Grip grip = description::tightest_grip(session.hand);
-  const HandModel hand{grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
-  LoopModel loop = led_loop(session);
-  loop.horizon_s = 0.0;
-  LoopModel start = session.loop;  // in its pose
-  start.horizon_s = 0.0;
-  const double T = loop.period_s, filter_s = motion_delay_s(session) - 2.0 * T;
-  std::printf("%s, held by %s: %.4g N/m, %.4g Ns/m, %.3g kg; T = %.4g ms\n", session.cell.name.c_str(),
-              session.hand.name.c_str(), hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, 1e3 * T);
-  std::printf(
-      "from a push to the arm being there: %.3g ms (sampling %.3g, reaching the target %.3g, setpoint filter %.3g, "
-      "sensor %.3g, drives %.3g)\n",
-      1e3 * total_delay_s(session), 1e3 * T, 1e3 * T, 1e3 * filter_s, 1e3 * std::max(0.0, loop.delay_s - T - filter_s),
-      1e3 * loop.drive_time_constant_s);
-  const auto smallest = smallest_felt(hand, loop), safe = with_margin(hand, loop);
-  std::printf(
-      "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
-      mass_text(smallest).c_str(), loop.handle_mass_kg, mass_text(smallest_felt(hand, start)).c_str());
-  const TriedAdvice tried = safe ? tried_advice(session, round_up(*safe)) : TriedAdvice{};
-  std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
-              tried.mass_kg ? ("--mass " + mass_text(tried.mass_kg)).c_str() : "no mass up to 1000 kg",
-              tried.mass_kg ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
-  if (safe) std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
-  const auto damping = damping_needed(hand, loop);
-  if (!damping) {
-    std::printf("damping: not even %.3g Ns/m gives it these margins: shorten the delay\n",
-                std::max(500.0, loop.damping_Ns_per_m));
-  } else if (*damping > loop.damping_Ns_per_m) {
-    LoopModel damped = loop;
-    damped.damping_Ns_per_m = *damping;
-    const auto least = with_margin(hand, damped);
-    std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", *damping,
-                mass_text(least).c_str());
-    PreparedSession with_damping = session;
-    with_damping.settings.damping_Ns_per_m = *damping;
-    if (least) std::printf("  tried: %s\n", tried_advice(with_damping, round_up(*least)).text.c_str());
-  } else {
-    std::printf(
-        "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
-        "R: %.2g Ns/m at 20 N and 0.1 m\n",
-        T * 20.0 / 0.1);
-  }
+  const Tuned of = tuned(session);
+  const auto smallest = smallest_felt(of.hand, of.loop);
+  print_delays(of);
+  print_mass(of, smallest);
+  print_damping(of);
   std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
               1e3 * longest_horizon_s(session), session.settings.mass_kg);
-  const auto sorted = limits(session, loop, hand);
-  constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
-  const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
-  const std::string limit = helps ? sorted.front().what : "none of these alone";
-  std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),
-              helps ? "it" : sorted.front().what, mass_text(sorted.front().mass_without).c_str());
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    std::printf("  without %s: %s\n", sorted[i].what, mass_text(sorted[i].mass_without).c_str());
-  }
-  const double wanted = session.settings.mass_kg;
-  const auto timestep = timestep_for(wanted, hand, loop);
-  if (timestep) {
-    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms\n", wanted, 1e3 * *timestep);
-  } else {
-    std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
-  }
+  print_timestep(of, print_limits(of, smallest));
   return smallest ? 0 : 1;
 }
 

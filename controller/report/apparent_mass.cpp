@@ -18,7 +18,7 @@ constexpr double longest_segment_s = 10.0, shortest_segment_s = 0.5, least_trave
 
 // Tukey's window, flat in the middle half with a cosine at either end. It keeps motion outside of the model (the arm's
 // resonance, say) from leaking into the band when a segment ends in motion.
-double window(std::size_t i, std::size_t count) {
+double tukey_window(std::size_t i, std::size_t count) {
   const double x = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
   const double edge = std::min(x, 1.0 - x) / 0.25;
   return edge >= 1.0 ? 1.0 : 0.5 - 0.5 * std::cos(std::numbers::pi * edge);
@@ -36,13 +36,54 @@ double travel(const std::vector<Vec3>& positions) {
 // Re(x* y), the inner product of complex numbers seen as pairs of real ones.
 double inner(const Complex& x, const Complex& y) { return x.real() * y.real() + x.imag() * y.imag(); }
 
-struct Spectrum {
+}  // namespace
+
+// The windowed transforms of a segment at one frequency.
+struct ApparentMass::Spectrum {
   Complex window;
   Complex3 F;
   std::array<Complex3, 3> x;  // a, v, ȧ
+
+  // Central differences lose two samples at either end.
+  static Spectrum at(double frequency_Hz, const std::vector<Vec3>& force, const std::vector<Vec3>& position, double T);
 };
 
-}  // namespace
+ApparentMass::Spectrum ApparentMass::Spectrum::at(double frequency_Hz, const std::vector<Vec3>& force,
+                                                  const std::vector<Vec3>& position, double T) {
+  const std::size_t count = force.size() - 4;
+  const Complex turn = std::polar(1.0, -2.0 * std::numbers::pi * frequency_Hz * T);
+  Complex phase = 1.0;
+  Spectrum s{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const Complex weight = tukey_window(i, count) * phase;
+    const Vec3* x = &position[i + 2];
+    const Vec3 acceleration = (x[1] - 2.0 * x[0] + x[-1]) / (T * T), velocity = (x[1] - x[-1]) / (2.0 * T);
+    const Vec3 jerk = (x[2] - 2.0 * x[1] + 2.0 * x[-1] - x[-2]) / (2.0 * T * T * T);
+    s.window += weight;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto j = static_cast<Eigen::Index>(axis);
+      s.F[axis] += weight * force[i + 2][j];
+      s.x[0][axis] += weight * acceleration[j];
+      s.x[1][axis] += weight * velocity[j];
+      s.x[2][axis] += weight * jerk[j];
+    }
+    phase *= turn;
+  }
+  return s;
+}
+
+// Removes a constant force from one axis: the part of each signal along the window's own transform.
+void ApparentMass::take_off_constant(std::vector<Spectrum>& band, std::size_t axis) {
+  double ww = 0.0;
+  for (const Spectrum& s : band) ww += std::norm(s.window);
+  const auto take_off = [&band, ww](const auto& signal) {
+    double wy = 0.0;
+    for (Spectrum& s : band) wy += inner(s.window, signal(s));
+    for (Spectrum& s : band) signal(s) -= wy / ww * s.window;
+  };
+  take_off([axis](Spectrum& s) -> Complex& { return s.F[axis]; });
+  for (std::size_t i = 0; i < 3; ++i) take_off([axis, i](Spectrum& s) -> Complex& { return s.x[i][axis]; });
+}
 
 void ApparentMass::add(const Vec3& force_N, const Vec3& position_m) {
   force_.push_back(force_N);
@@ -51,62 +92,31 @@ void ApparentMass::add(const Vec3& force_N, const Vec3& position_m) {
 }
 
 void ApparentMass::end_segment() {
-  const std::size_t samples = force_.size();
-  const double T = period_s_;
-  const double length_s = static_cast<double>(samples) * T;
+  const double length_s = static_cast<double>(force_.size()) * period_s_;
   // Fewer than 16 samples don't resolve the band, whatever T is.
-  if (samples >= 16 && length_s >= shortest_segment_s && travel(position_) >= least_travel_m) {
-    const std::size_t count = samples - 4;  // central differences lose two at either end
+  if (force_.size() >= 16 && length_s >= shortest_segment_s && travel(position_) >= least_travel_m) {
     std::vector<Spectrum> band;
     for (int line = 0; low_Hz + line * step_Hz < high_Hz + 0.5 * step_Hz; ++line) {
-      const double omega = 2.0 * std::numbers::pi * (low_Hz + line * step_Hz);
-      const Complex turn = std::polar(1.0, -omega * T);
-      Complex phase = 1.0;
-      Spectrum s{};
-      for (std::size_t i = 0; i < count; ++i) {
-        const Complex weight = window(i, count) * phase;
-        const Vec3* x = &position_[i + 2];
-        const Vec3 acceleration = (x[1] - 2.0 * x[0] + x[-1]) / (T * T), velocity = (x[1] - x[-1]) / (2.0 * T);
-        const Vec3 jerk = (x[2] - 2.0 * x[1] + 2.0 * x[-1] - x[-2]) / (2.0 * T * T * T);
-        s.window += weight;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const auto j = static_cast<Eigen::Index>(axis);
-          s.F[axis] += weight * force_[i + 2][j];
-          s.x[0][axis] += weight * acceleration[j];
-          s.x[1][axis] += weight * velocity[j];
-          s.x[2][axis] += weight * jerk[j];
-        }
-        phase *= turn;
-      }
-      band.push_back(s);
+      band.push_back(Spectrum::at(low_Hz + line * step_Hz, force_, position_, period_s_));
     }
-    // Removes a constant force: the part of y along the window's own transform.
-    double ww = 0.0;
-    for (const Spectrum& s : band) ww += std::norm(s.window);
-    const auto take_off_constant = [&band, ww](auto&& signal) {
-      double wy = 0.0;
-      for (Spectrum& s : band) wy += inner(s.window, signal(s));
-      for (Spectrum& s : band) signal(s) -= wy / ww * s.window;
-    };
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      take_off_constant([axis](Spectrum& s) -> Complex& { return s.F[axis]; });
-      for (std::size_t i = 0; i < 3; ++i) {
-        take_off_constant([axis, i](Spectrum& s) -> Complex& { return s.x[i][axis]; });
-      }
-      for (const Spectrum& s : band) {
-        for (std::size_t i = 0; i < 3; ++i) {
-          const auto row = static_cast<Eigen::Index>(i);
-          with_force_[row] += inner(s.x[i][axis], s.F[axis]);
-          for (std::size_t j = 0; j < 3; ++j) {
-            regressors_(row, static_cast<Eigen::Index>(j)) += inner(s.x[i][axis], s.x[j][axis]);
-          }
-        }
-      }
+      take_off_constant(band, axis);
+      for (const Spectrum& s : band) add_to_normal_equations(s, axis);
     }
     used_s_ += length_s;
   }
   force_.clear();
   position_.clear();
+}
+
+void ApparentMass::add_to_normal_equations(const Spectrum& s, std::size_t axis) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    with_force_[row] += inner(s.x[i][axis], s.F[axis]);
+    for (std::size_t j = 0; j < 3; ++j) {
+      regressors_(row, static_cast<Eigen::Index>(j)) += inner(s.x[i][axis], s.x[j][axis]);
+    }
+  }
 }
 
 std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {

@@ -41,6 +41,10 @@ class ApparentMass {
   [[nodiscard]] std::optional<Estimate> estimate() const;
 
  private:
+  struct Spectrum;
+  static void take_off_constant(std::vector<Spectrum>& band, std::size_t axis);
+  void add_to_normal_equations(const Spectrum& s, std::size_t axis);
+
   double period_s_;
   std::vector<models::Vec3> force_, position_;
   // Normal equations: sums of Re(x* y) over the band, for the regressors a, v, ȧ and for the force.

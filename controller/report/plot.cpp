@@ -16,6 +16,13 @@ using models::Vec3;
 
 constexpr std::size_t most_samples = 4000;
 
+// The next panel is drawn in this row.
+void place(std::ostream& gp, int row) {
+  constexpr double top = 0.915, height = 0.205;
+  gp << "set tmargin at screen " << top - height * row << "\nset bmargin at screen "
+     << top - height * (row + 1) + 0.018 << "\n";
+}
+
 }  // namespace
 
 // What the position panels show: coordinates along `directions` from `origin`.
@@ -162,37 +169,41 @@ std::string PlotBuilder::script(const Axes& axes) const {
      << "set style line 4 lc rgb '#009e73' lw 2.8 dt (2,4)\n"
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
      << "set lmargin 11\nset rmargin 3\nset format x ''\n";
+  const std::string labels = shade_contacts(gp, 0.04 * (to - from));
+  gp << "set multiplot\nset label 100000 " << gnuplot_string(title_) << " at screen 0.02, screen 0.98 left\n"
+     << labels << "set key at screen 0.97, screen 0.98 horizontal maxrows 1 samplen 3\n";
+  const Ranges range = ranges(axes);
+  draw_positions(gp, axes.wall, range);
+  draw_forces(gp, axes.wall, range);
+  return gp.str();
+}
+
+// Returns the labels of those that last long enough to bear one.
+std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labelled_s) const {
   int object = 0;
-  std::string labels;
+  std::ostringstream labels;
   for (const Band& band : bands()) {
     if (band.contact == ContactPhase::free) continue;
     const bool slip = band.contact == ContactPhase::slip;
     gp << "set object " << ++object << " rectangle from " << band.from_s << ", graph 0 to " << band.to_s
        << ", graph 1 fillcolor rgb '" << (slip ? "#c9dff0" : "#e4e4e4") << "' fillstyle solid noborder behind\n";
-    if (band.to_s - band.from_s > 0.04 * (to - from)) {
-      std::ostringstream label;
-      label << "set label " << object << " '" << contact_phase_name(band.contact) << "' at "
-            << 0.5 * (band.from_s + band.to_s) << ", graph 1.07 center\n";
-      labels += label.str();
-    }
+    if (band.to_s - band.from_s <= shortest_labelled_s) continue;
+    labels << "set label " << object << " '" << contact_phase_name(band.contact) << "' at "
+           << 0.5 * (band.from_s + band.to_s) << ", graph 1.07 center\n";
   }
-  const char* tool = truth_ ? "tool" : "tool (by encoders)";
-  constexpr double top = 0.915, height = 0.205;
-  const auto place = [&gp](int row) {
-    gp << "set tmargin at screen " << top - height * row << "\nset bmargin at screen "
-       << top - height * (row + 1) + 0.018 << "\n";
-  };
-  const auto panel = [&gp, &place, tool](int row, const char* ylabel, int tool_column) {
-    place(row);
+  return labels.str();
+}
+
+void PlotBuilder::draw_positions(std::ostream& gp, bool wall, const Ranges& range) const {
+  const char* const tool = truth_ ? "tool" : "tool (by encoders)";
+  const auto panel = [&gp, tool](int row, const char* ylabel, int tool_column) {
+    place(gp, row);
     gp << "set ylabel '" << ylabel << "' offset 1\n"
        << "plot 'data' using 1:" << tool_column << " with lines ls 1 title '" << tool
        << "', '' using 1:" << tool_column + 3 << " with lines ls 2 title 'proxy'\n"
        << "unset key\nunset label\n";
   };
-  const Ranges range = ranges(axes);
-  gp << "set multiplot\nset label 100000 " << gnuplot_string(title_) << " at screen 0.02, screen 0.98 left\n"
-     << labels << "set key at screen 0.97, screen 0.98 horizontal maxrows 1 samplen 3\n";
-  if (axes.wall) {
+  if (wall) {
     panel(0, "from wall (mm)", 2);
     gp << "set yrange [" << -range.near_mm << ":" << range.near_mm << "]\n";
     panel(1, "same, near (mm)", 2);
@@ -203,16 +214,18 @@ std::string PlotBuilder::script(const Axes& axes) const {
     panel(1, "y (mm)", 3);
     panel(2, "z (mm)", 4);
   }
-  const std::array<const char*, 3> wall_names{"hand, into wall", "contact, normal", "friction"};
-  const std::array<const char*, 3> free_names{"hand, x", "hand, y", "hand, z"};
-  const auto& names = axes.wall ? wall_names : free_names;
-  place(3);
+}
+
+void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) {
+  const std::array<const char*, 3> at_wall{"hand, into wall", "contact, normal", "friction"};
+  const std::array<const char*, 3> anywhere{"hand, x", "hand, y", "hand, z"};
+  const auto& names = wall ? at_wall : anywhere;
+  place(gp, 3);
   gp << "set format x\nset label 1 'time (s)' at graph 0.5, graph -0.27 center\n"
      << "set yrange [" << range.force_low_N << ":" << range.force_high_N << "]\nset ylabel 'force (N)' offset 1\n"
      << "set key at screen 0.97, screen 0.035 horizontal maxrows 1 samplen 3\n"
      << "plot 'data' using 1:8 with lines ls 1 title '" << names[0] << "', '' using 1:9 with lines ls 3 title '"
      << names[1] << "', '' using 1:10 with lines ls 4 title '" << names[2] << "'\nunset multiplot\n";
-  return gp.str();
 }
 
 std::string PlotBuilder::write(const fs::path& svg) const {

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
@@ -46,6 +47,9 @@ class PlotBuilder {
   [[nodiscard]] std::string data(const Axes& axes) const;
   [[nodiscard]] Ranges ranges(const Axes& axes) const;
   [[nodiscard]] std::string script(const Axes& axes) const;
+  std::string shade_contacts(std::ostream& gp, double shortest_labelled_s) const;
+  void draw_positions(std::ostream& gp, bool wall, const Ranges& range) const;
+  static void draw_forces(std::ostream& gp, bool wall, const Ranges& range);
 
   std::string title_, gnuplot_;
   std::vector<Sample> samples_;

@@ -163,23 +163,37 @@ Arm::Arm(const Cell& cell) : file_(cell.file.string()) {
   read_chain(cell);
 }
 
+// MuJoCo's bodies as links of the chain. A body without a joint on the chain belongs to the last link before it.
+struct Arm::Bodies {
+  Bodies(const mjModel& m, const std::string& sensor_link) : model(m) {
+    for (int body = mj_name2id(&m, mjOBJ_BODY, sensor_link.c_str()); body > 0; body = m.body_parentid[body]) {
+      path.insert(path.begin(), body);
+    }
+  }
+
+  const mjModel& model;
+  std::vector<int> path;  // from the world to the sensor's link
+  std::vector<int> link = std::vector<int>(static_cast<std::size_t>(model.nbody), -1);
+  std::vector<Pose> X_link = std::vector<Pose>(link.size(), Pose::Identity());  // pose of the body in its link
+};
+
 void Arm::read_chain(const Cell& cell) {
   const Urdf urdf = load_urdf(cell.urdf);
   check_joints(cell, urdf);
   check_sensor_link(cell, urdf);
   const MujocoModel model = compile(urdf);
-  const mjModel& m = *model;
+  Bodies bodies(*model, cell.sensor.link);
+  require_whole_chain(cell, read_joints(cell, bodies));
+  read_masses(bodies);
+  read_tool(cell, bodies.X_link[static_cast<std::size_t>(bodies.path.back())]);
+}
 
-  // The bodies from the world to the sensor's link; those that have a joint become links of the chain.
-  std::vector<int> path;
-  for (int body = mj_name2id(&m, mjOBJ_BODY, cell.sensor.link.c_str()); body > 0; body = m.body_parentid[body]) {
-    path.insert(path.begin(), body);
-  }
-  std::vector<int> link_of_body(static_cast<std::size_t>(m.nbody), -1);
-  std::vector<Pose> X_link_body(static_cast<std::size_t>(m.nbody), Pose::Identity());
+// Bodies of the path that have a joint become links of the chain. Returns their number.
+int Arm::read_joints(const Cell& cell, Bodies& bodies) {
+  const mjModel& m = bodies.model;
   Pose X_before = to_pose(cell.base_W);  // pose of the previous body in the previous link
   int count = 0;
-  for (const int body : path) {
+  for (const int body : bodies.path) {
     const auto b = static_cast<std::size_t>(body);
     X_before = X_before * pose(m.body_pos + 3 * body, m.body_quat + 4 * body);
     if (m.body_jntnum[body] > 0) {
@@ -195,31 +209,38 @@ void Arm::read_chain(const Cell& cell) {
       link.fixed = X_before * A;
       X_before = A.inverse();
     }
-    link_of_body[b] = count - 1;
-    X_link_body[b] = X_before;
+    bodies.link[b] = count - 1;
+    bodies.X_link[b] = X_before;
   }
-  if (count != axes_) {
-    for (std::size_t i = 0; i < joint_names_.size(); ++i) {
-      const auto used = [&](const Link& link) { return link.drive == static_cast<int>(i); };
-      if (std::any_of(links_.begin(), links_.begin() + count, used)) continue;
-      throw in_cell(cell, "drives", i, "joint", in_quotes(joint_names_[i]),
-                    "a joint between the URDF's root and the sensor's link " + in_quotes(cell.sensor.link));
-    }
+  return count;
+}
+
+// Each drive's joint must be one of the `count` between the root and the sensor.
+void Arm::require_whole_chain(const Cell& cell, int count) const {
+  if (count == axes_) return;
+  for (std::size_t i = 0; i < joint_names_.size(); ++i) {
+    const auto used = [&](const Link& link) { return link.drive == static_cast<int>(i); };
+    if (std::any_of(links_.begin(), links_.begin() + count, used)) continue;
+    throw in_cell(cell, "drives", i, "joint", in_quotes(joint_names_[i]),
+                  "a joint between the URDF's root and the sensor's link " + in_quotes(cell.sensor.link));
   }
-  // Each body's mass is added to the last link before it; in MuJoCo's numbering, parents come before children.
+}
+
+// Adds each body's mass to its link. In MuJoCo's numbering, parents come before children.
+void Arm::read_masses(Bodies& bodies) {
+  const mjModel& m = bodies.model;
   for (int body = 1; body < m.nbody; ++body) {
     const auto b = static_cast<std::size_t>(body), parent = static_cast<std::size_t>(m.body_parentid[body]);
-    if (std::find(path.begin(), path.end(), body) == path.end()) {
-      link_of_body[b] = link_of_body[parent];
-      X_link_body[b] = X_link_body[parent] * pose(m.body_pos + 3 * body, m.body_quat + 4 * body);
+    if (std::find(bodies.path.begin(), bodies.path.end(), body) == bodies.path.end()) {
+      bodies.link[b] = bodies.link[parent];
+      bodies.X_link[b] = bodies.X_link[parent] * pose(m.body_pos + 3 * body, m.body_quat + 4 * body);
     }
-    if (link_of_body[b] < 0) continue;
-    const Pose X_principal = X_link_body[b] * pose(m.body_ipos + 3 * body, m.body_iquat + 4 * body);
+    if (bodies.link[b] < 0) continue;
+    const Pose X_principal = bodies.X_link[b] * pose(m.body_ipos + 3 * body, m.body_iquat + 4 * body);
     const Vec3 principal(m.body_inertia[3 * body], m.body_inertia[3 * body + 1], m.body_inertia[3 * body + 2]);
-    add_to_link(links_[static_cast<std::size_t>(link_of_body[b])], m.body_mass[body], X_principal.translation(),
+    add_to_link(links_[static_cast<std::size_t>(bodies.link[b])], m.body_mass[body], X_principal.translation(),
                 X_principal.linear() * principal.asDiagonal() * X_principal.linear().transpose());
   }
-  read_tool(cell, X_before);
 }
 
 void Arm::read_tool(const Cell& cell, const Pose& X_nL) {

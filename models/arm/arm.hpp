@@ -126,7 +126,11 @@ class Arm {
   [[nodiscard]] JointVector twisted(const JointVector& q, const JointVector& torque) const noexcept;  // q + τ/k
   [[nodiscard]] Eigen::Matrix3d mobility(const JointVector& q) const noexcept;  // J M⁻¹ Jᵀ, translations
   void add_to_link(Link& link, double mass_kg, const Vec3& centre, const Mat3& inertia) const noexcept;
+  struct Bodies;
   void read_chain(const description::Cell& cell);
+  int read_joints(const description::Cell& cell, Bodies& bodies);
+  void require_whole_chain(const description::Cell& cell, int count) const;
+  void read_masses(Bodies& bodies);
   void read_tool(const description::Cell& cell, const Pose& X_nL);
 
   std::string file_;
