@@ -7,12 +7,15 @@
 //   σ² (1 + d √(2/(n − 2))) + (s F)²
 // σ is the sensor's noise, n the number of samples, d the number of standard deviations of that estimate that are left
 // to chance, and s F a share of the force for the tool behind the sensor, which oscillates as the arm starts. Nobody
-// leads the handle if the force hasn't bent while the handle moved 20 mm, and either of these holds:
+// leads the handle if the force hasn't bent while the handle moved 20 mm, now points along the motion, and is one of
+// these:
 //
-//   - The line began at rest (v₀ ≤ 10 mm/s plus what the force adds to the speed until its beginning is seen), and the
-//     force is less than 1.5 N: a bias that drifts or has jumped.
-//   - The force has accelerated the proxy by at least half as much as in free space. Besides, the line began at rest
-//     and changed by at most a fifth (a bias that has jumped), or it has lasted for a second.
+//   - A bias that drifts or has jumped: the line began at rest (v₀ ≤ 10 mm/s plus what the force adds to the speed
+//     until its beginning is seen), and the force is now less than 1.5 N. It needn't have accelerated the proxy.
+//   - A larger bias that has jumped: the line began at rest and has changed by at most a fifth of what it is now, and
+//     the force has accelerated the proxy by at least half as much as in free space.
+//   - A bias of whatever size and beginning, also one that drifts: the line has lasted for a second, with the same
+//     acceleration.
 //
 // A moving hand's force is straight for a tenth of a second now and then. That of a hand without tremor which begins to
 // pull is straight for half a second, at some newtons.

@@ -1,13 +1,15 @@
-// Predicts where the proxy is going to be: a copy of its state is stepped on through a 𝒢 of its own, with the force
-// held.
+// Predicts where the proxy is going to be: a copy of its state is stepped on through a 𝒢 of its own, under a force h
+// that the caller chooses. AdmittanceMotion, which sends the arm there, passes h = 0: the proxy coasts, whatever the
+// hand does meanwhile (admittance_motion.cpp says why).
 //
-//   q(k+1|k), q(k+2|k), …   each by the proxy's own method, (26) or order 2, with h(k)
+//   q(k+1|k), q(k+2|k), …   each by the proxy's own method, (26) or order 2, with this h
 //   p(k)                    the point a horizon H after q(k), linearly interpolated between two steps
 //
-// At order 1, p = q + Hv + ½H²a to rounding in free motion under a constant force. In contact, p is a point of the same
-// world: it isn't inside of a flat wall, it sticks where the proxy will stick, and it leaves where the proxy will
-// leave. Moving objects are predicted, too: each step has its own time, and objects that are driven, or whose friction
-// changes, go on as they would (scene_changes.hpp).
+// In free motion at order 1, p = q + Hv + ½H(H + T)a to rounding, with v the mean velocity of the last step and a =
+// h/M: a straight line if the proxy coasts, without damping and spring. In contact, p is a point of the same world: it
+// isn't inside of a flat wall, and it sticks or leaves where the proxy would under h. Moving objects are predicted,
+// too: each step has its own time, and objects that are driven, or whose friction changes, go on as they would
+// (scene_changes.hpp).
 //
 // Of the step's limits, the prediction keeps those that can matter within H: speed, power, and the planes that the
 // proxy can reach. The bound of a border's plane falls as the prediction approaches it, so the prediction slows down as
@@ -36,8 +38,8 @@ class Lookahead {
 
   Lookahead(const scenes::Scene& scene, const AdmittanceConfig& config);
 
-  // Precondition: called after the proxy's step under h within `limits`. If a step of the prediction fails, returns the
-  // point before it.
+  // `h`: the force during the prediction, whatever the proxy's own step was made with. Precondition: called after that
+  // step, which was made within `limits`. If a step of the prediction fails, returns the point before it.
   V operator()(const AdmittanceProxy<N>& proxy, const SceneChanges& changes, const V& h, const StepLimits& limits,
                const Basis& basis, double horizon_s) noexcept;
 

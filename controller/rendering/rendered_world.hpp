@@ -76,8 +76,9 @@ class RenderedWorld {
   // One period under the hand's force, within these limits. q_W of the result is always finite; after a fault it is
   // that of the step before.
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
-  // Where the proxy will be `horizon_s` after its last step if the force stays (lookahead.hpp). Precondition: that step
-  // was made with the same force and limits. A world without lookahead returns the proxy itself.
+  // Where the proxy will be `horizon_s` after its last step if h_W acts on it from there (lookahead.hpp): with h_W = 0
+  // it coasts. Precondition: that step was made within the same limits. A world without lookahead returns the proxy
+  // itself.
   virtual models::Vec3 look_ahead(const models::Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept = 0;
   // The arm couldn't follow: the proxy goes on with this velocity, from the place nearest to q_W that the scene's
   // objects let it reach. Returns that place.

@@ -21,9 +21,11 @@ PARTS = (" …", "…}", "enabling_input: {drive: axis_3")  # YAML that shows on
 
 
 def blocks(language):
+    """Fences are taken in pairs: the end of a YAML block would begin one without a language, and hide what follows."""
     for page in PAGES:
-        for found in re.finditer(rf"^```{language}\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL):
-            yield page.name, found[1]
+        for found in re.finditer(r"^```(\w*)\n(.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL):
+            if found[1] == language:
+                yield page.name, found[2]
 
 
 def commands():

@@ -43,7 +43,7 @@ def bumpy_ball(file, rows=405, columns=406, radius_m=0.15, centre_m=(1.05, 0.0, 
 
 
 def slowness():
-    """How much longer a fixed piece of arithmetic takes than on the machine that docs/safety.md has its figures from.
+    """How much longer a fixed piece of arithmetic takes than on the machine that docs/studies.md has its figures from.
 
     Its median over 0.2 s, so that it shows the processor and not who else runs."""
     def chunk_ns():

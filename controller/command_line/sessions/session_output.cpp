@@ -205,7 +205,7 @@ void SessionOutput::refuse_lost_plot() const {
 namespace {
 // What of the gears' ringing the stability check, whose arm is rigid, doesn't see.
 void warn_if_it_chatters(const description::Cell& cell, double mode_Hz) {
-  constexpr double most_modes = 3.0;  // measured: docs/safety.md
+  constexpr double most_modes = 3.0;  // measured: docs/studies.md
   const double bandwidth_Hz = cell.limits.setpoint_bandwidth_Hz;
   if (!(bandwidth_Hz >= most_modes * mode_Hz)) return;
   std::fprintf(
