@@ -60,6 +60,14 @@ std::string failure_of(const PreparedSession& session, const ProofOutcome& outco
          " rad in a second without power";
 }
 
+// The hand of an arm that is a process of its own hears no question.
+void tell_of_helper() {
+  std::fprintf(
+      stderr,
+      "proxarm prove: a simulated arm's hand plays its own motion; somebody who pushes as a proof asks is there "
+      "where the arm was started by `proxarm sim --for-proof`\n");
+}
+
 std::string text_of(const proof::Verdict& verdict, const std::string& failure) {
   if (!failure.empty()) return failure + "\nNOT PROVEN\n";
   return proof::text(verdict);
@@ -103,6 +111,7 @@ int prove_command(const ProveOptions& options) {
   const bool proven = failure.empty() && verdict.proven;
   const std::string told = options.run.json ? json_of(verdict, failure).dump() + "\n" : text_of(verdict, failure);
   std::fputs(told.c_str(), stdout);
+  if (!failure.empty() && !simulated && !outcome.real_arm) tell_of_helper();
   if (!proven) return not_proven;
   ProofFile proof{cell_sha256(session), outcome.real_arm, today(), "signs, ratios, sensor and brakes proven", true, {}};
   if (const auto kept = kept_proof(file, proof.cell_sha256, proof.real_arm)) proof.bus_loss = kept->bus_loss;

@@ -106,6 +106,10 @@ class Prove(ProgramTest):
         weak = self.cell("weak.yaml", lambda text: re.sub("( {6})(max_torque_Nm: .*)", r"\1\2\n\1brake_torque_Nm: 50", text))
         self.assertIn("the brakes don't hold", self.verdict(self.cell("arm.yaml"), "--arm", weak)["failure"])
 
+    def test_somebody_who_pushes_for_a_proof_is_there_in_place_of_the_hand_not_beside_it(self):
+        self.assert_refused(self.call("sim", "--bus", "vcan0", "--for-proof", "--hand", SOURCE / "sim/hands/touch.yaml"),
+                            "--for-proof: found --hand beside it", "one of the two")
+
     def test_the_enabling_switch_is_part_of_it(self):
         cell = self.cell("switch.yaml", lambda text: text + "\nenabling_input: {drive: axis_6, bit: 16}\n")
         self.assertIn("enabling_released", self.verdict(cell, "--enabling", "0.1s..5s")["failure"])

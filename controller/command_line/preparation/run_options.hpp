@@ -81,6 +81,7 @@ struct RunOptions {
   std::optional<ViewPlace> view_place;       // of the view that runs; absent: there is none
   std::vector<sim::DeviceFault> faults;      // of the simulated devices
   std::vector<sim::PressedSpan> enabling;    // of the simulated enabling switch
+  bool for_proof = false;                    // `sim`: somebody pushes as a proof asks, in place of the hand
 };
 
 }  // namespace proxarm::command_line
