@@ -90,6 +90,7 @@ Json json_of(const proof::Verdict& verdict, const std::string& failure) {
 
 int prove_command(const ProveOptions& options) {
   const bool simulated = options.run.bus.simulated();
+  require_interface_for_hardware(options.run);
   if (!simulated) refuse_on_interfaces(options);
   const PreparedSession session = prepared(options.run);
   if (!options.bus_loss) proof::require_provable(session.cell, models::Arm(session.cell));

@@ -83,6 +83,7 @@ void refuse_view(const PreparedSession& session, const RunOptions& options) {
 
 int run_command(const RunOptions& given) {
   RunOptions options = with_view(given);
+  require_interface_for_hardware(options);
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
   require_usable_start(session);

@@ -110,6 +110,13 @@ class Prove(ProgramTest):
         self.assert_refused(self.call("sim", "--bus", "vcan0", "--for-proof", "--hand", SOURCE / "sim/hands/touch.yaml"),
                             "--for-proof: found --hand beside it", "one of the two")
 
+    # `prove --hardware` proved the simulated arm, without a word of it.
+    def test_a_real_arm_is_one_on_an_interface(self):
+        for command in ("prove", "prove --bus-loss", "prove --bus sim", "run", "calibrate"):
+            with self.subTest(command):
+                self.assert_refused(self.call(*command.split(), "--hardware"), "--hardware: found --bus sim",
+                                    "such as --hardware --bus can0")
+
     def test_the_enabling_switch_is_part_of_it(self):
         cell = self.cell("switch.yaml", lambda text: text + "\nenabling_input: {drive: axis_6, bit: 16}\n")
         self.assertIn("enabling_released", self.verdict(cell, "--enabling", "0.1s..5s")["failure"])

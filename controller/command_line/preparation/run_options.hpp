@@ -84,4 +84,7 @@ struct RunOptions {
   bool for_proof = false;                    // `sim`: somebody pushes as a proof asks, in place of the hand
 };
 
+// Throws SetupError where `--hardware` is given and all buses are simulated: no real arm would be meant by that.
+void require_interface_for_hardware(const RunOptions& options);
+
 }  // namespace proxarm::command_line
