@@ -6,9 +6,11 @@
 #include <cstdio>
 #include <numbers>
 
+#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
 #include "controller/session/bring_up.hpp"
+#include "controller/session/identifiers.hpp"
 #include "controller/session/reachable_scene.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/arm/arm.hpp"
@@ -296,6 +298,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.cell = loaded(cell_file, FileKind::cell, description::load_cell);
   session.sensor =
       description::load_sensor(beside(session.cell.file, session.cell.sensor.description), session.cell.sensor.choices);
+  controller::require_own_identifiers(session.cell, session.sensor, options.settings, buses_in_order(session.cell));
   session.hand =
       loaded(chosen(options.hand, session.cell, "default_hand", session.cell.default_hand, "sim/hands/touch.yaml"),
              FileKind::hand, description::load_hand);
