@@ -98,7 +98,7 @@ int prove_command(const ProveOptions& options) {
   ProofOutcome outcome;
   RunOptions of_arm = options.run;
   if (!options.arm.empty()) of_arm.cell = options.arm;
-  if (simulated) require_carried(session);
+  if (simulated) require_carried(session, options.run);
   const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
   if (options.bus_loss) return prove_bus_loss(session, prepared(of_arm), options.run, file);
   if (simulated) {

@@ -89,9 +89,7 @@ int run_command(const RunOptions& given) {
   require_usable_start(session);
   require_enabling_switch(session, options);
   require_stable(session, options);
-  if (options.bus.simulated()) {
-    require_carried(session);
-  }
+  if (options.bus.simulated()) require_carried(session, options);
   refuse_view(session, options);
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);

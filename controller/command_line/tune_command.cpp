@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/trials/mass_trial.hpp"
 #include "controller/report/summary.hpp"
@@ -150,6 +151,7 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
 
 int tune_command(const RunOptions& options) {
   const PreparedSession session = prepare(options);
+  require_carried(session, options);
   if (session.impedance()) {
     throw description::SetupError({.file = session.cell.file.string(),
                                    .key = "tune",
@@ -212,7 +214,9 @@ int tune_command(const RunOptions& options) {
   const double wanted = session.settings.mass_kg;
   const auto timestep = timestep_for(wanted, hand, loop);
   if (timestep) {
-    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms\n", wanted, 1e3 * *timestep);
+    const bool carried = is_carried(with_timestep(session, options, *timestep));
+    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms%s\n", wanted, 1e3 * *timestep,
+                carried ? "" : ", which the cell's buses can't carry");
   } else {
     std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
   }

@@ -1,5 +1,6 @@
 """Bad input: one clear line each, exit status 2, nothing on standard output, nothing enabled."""
 import os
+import shutil
 import subprocess
 import unittest
 
@@ -386,6 +387,23 @@ class Options(ProgramTest):
     def test_half_a_millisecond_is_refused_with_the_arithmetic(self):
         self.refuse("run --timestep 0.5ms", "--timestep", "bus axes_1_3", "810 bits", "1 Mbit/s", "810 us", "500 us",
                     "would fit", "1 ms", "CAN FD")
+
+    # It was "--timestep" whoever had asked for it, and `tune` gave advice for a timestep that no bus could carry.
+    def test_a_timestep_that_a_bus_can_not_carry_is_told_by_who_asked_for_it(self):
+        for command in ("run", "tune", "prove", "assess"):
+            with self.subTest(command):
+                self.refuse(f"{command} --timestep 0.3ms", "--timestep: bus axes_1_3 can't carry a timestep of 0.3 ms",
+                            "`proxarm plan` shows each frame")
+                cell = self.changed(CELL, ("default_period_s: 0.001", "default_period_s: 0.0005"))
+                line = cell.read_text().split("default_period_s")[0].count("\n") + 1
+                outcome = self.call(command, cell)
+                self.assert_refused(outcome, f"default.yaml:{line}: default_period_s: bus axes_1_3 can't carry a timestep of "
+                                             "0.5 ms")
+                self.assertNotIn("--timestep", outcome.err)
+                cell.unlink()
+                shutil.copy(SOURCE / CELL, cell)
+        bench = self.changed("models/cells/bench.yaml", ("default_period_s: 0.001\n", ""), ("receive_window: 0.55", ""))
+        self.assert_refused(self.call("run", bench), "bench.yaml: default_period_s: bus can can't carry a timestep of 1 ms")
 
     def test_timesteps_that_drives_can_not_hold(self):
         self.refuse("run --timestep 1.0001ms", "--timestep: found 1.0001 ms", "60C2h", "such as 0.5ms, 1ms")

@@ -303,10 +303,17 @@ std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const 
   return plans;
 }
 
-void require_carried(const PreparedSession& session) {
+bool is_carried(const PreparedSession& session) {
+  return fieldbus::refusal_text(plan_buses(session, buses_in_order(session.cell))).empty();
+}
+
+void require_carried(const PreparedSession& session, const RunOptions& options) {
   const std::string refusal = fieldbus::refusal_text(plan_buses(session, buses_in_order(session.cell)));
   if (refusal.empty()) return;
-  throw description::SetupError({.key = "--timestep", .message = refusal, .advice = "`proxarm plan` shows each frame"});
+  description::SetupProblem problem = timestep_problem(session.cell, options);
+  problem.message = refusal;
+  problem.advice = "`proxarm plan` shows each frame";
+  throw description::SetupError(problem);
 }
 
 void warn_if_not_carried(const PreparedSession& session, const controller::BusIndices& indices) {
