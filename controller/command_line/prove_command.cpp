@@ -11,6 +11,7 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/proof_run.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -56,7 +57,7 @@ std::string failure_of(const PreparedSession& session, const ProofOutcome& outco
   if (!outcome.complete) return "the session ended before all was read";
   if (!outcome.slipped_rad) return "the brakes were never seen closed";
   if (*outcome.slipped_rad <= session.cell.limits.following_error_rad) return "";
-  return "the brakes don't hold: a joint moved by " + description::number_text(*outcome.slipped_rad) +
+  return "the brakes don't hold: a joint moved by " + description::rounded_text(*outcome.slipped_rad) +
          " rad in a second without power";
 }
 

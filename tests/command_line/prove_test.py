@@ -150,6 +150,11 @@ class Prove(ProgramTest):
                                  (("--hand", "sim/hands/touch.yaml"), ("--hand",))):
             with self.subTest(arguments):
                 self.assert_refused(self.call("prove", *arguments), *words)
+        # It had sixteen digits: "found elbow at 1.8509341503988659 rad".
+        narrow = self.cell("narrow.yaml", self.replaced("range_rad: [0.25, 2.65]", "range_rad: [1.8, 2.0]"), of="bench.yaml")
+        outcome = self.call("prove", narrow)
+        self.assert_refused(outcome, "narrow.yaml: prove: found elbow at ", "expected 0.3 rad of its range to either side")
+        self.assertRegex(outcome.err, r"found elbow at \d\.\d{1,2} rad")
         outcome = self.call("prove", "--out", self.folder / "nowhere" / "proof")
         self.assertEqual(outcome.status, 2)
         self.assertIn("the proof can't be written", outcome.err)
