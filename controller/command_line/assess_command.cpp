@@ -60,7 +60,7 @@ int assess_command(const AssessOptions& options) {
   }
   require_usable_start(session);
   require_stable(session, run);
-  require_carried(session);
+  require_carried(session, run);
   const assessment::Thresholds thresholds = assessment::load_thresholds(
       options.thresholds.empty() ? shipped_file("models/thresholds/hands.yaml") : user_file(options.thresholds));
   const int assumed = assume_brakes(session.cell);

@@ -5,6 +5,7 @@
 namespace proxarm::command_line {
 
 int calibrate_command(const CalibrateOptions& options) {
+  require_interface_for_hardware(options.run);
   if (!options.run.bus.simulated() && !options.arm.empty()) {
     throw description::SetupError({.key = "--arm",
                                    .found = "a bus that isn't simulated",

@@ -48,8 +48,8 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
   return nullptr;
 }
 
-// With the files that it names, each device as the controller would make it, and its arm's start in the scene, as `run`
-// judges it.
+// With the files that it names, each device as the controller would make it, the devices' identifiers, and its arm's
+// start in the scene, as `run` judges them.
 void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
@@ -64,7 +64,6 @@ void check_cell(const fs::path& file, const fs::path& scene) {
       const fieldbus::ModbusDrive modbus(drive, description::load_modbus_drive(drive.description), period_ns);
     }
   }
-  controller::make_sensor(cell, description::load_sensor(cell.sensor.description, cell.sensor.choices));
   RunOptions run;
   run.cell = file;
   run.scene = scene;

@@ -381,6 +381,8 @@ class Commands {
         add("sim", "the simulated arm as a process of its own on CAN interfaces", [this] { return sim_command(sim_); });
     add_session_options(*sim, sim_);
     leave_out(*sim, {"--lookahead"});
+    sim->add_flag("--for-proof", sim_.for_proof,
+                  "for `proxarm prove` on these interfaces: in place of the hand, somebody who pushes as it asks");
     add_fault_option(*sim, sim_);
     add_enabling_option(*sim, sim_);
     add_view_options(*sim, sim_,

@@ -5,6 +5,7 @@
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/modbus_rates.hpp"
+#include "controller/session/identifiers.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -29,6 +30,7 @@ int plan_command(const RunOptions& options) {
   const PreparedSession session = prepare(options);
   const std::vector<std::string> names = bus_names(session.cell);
   const controller::BusIndices indices = indices_of(options.bus.simulated() ? names : options.bus.interfaces(names));
+  controller::require_own_identifiers(session.cell, session.sensor, session.settings, indices);
   bool all_fit = true;
   for (const fieldbus::BusPlan& plan : plan_buses(session, indices)) {
     std::printf("%s", fieldbus::plan_text(plan).c_str());

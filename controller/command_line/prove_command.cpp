@@ -11,6 +11,7 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/proof_run.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -56,8 +57,16 @@ std::string failure_of(const PreparedSession& session, const ProofOutcome& outco
   if (!outcome.complete) return "the session ended before all was read";
   if (!outcome.slipped_rad) return "the brakes were never seen closed";
   if (*outcome.slipped_rad <= session.cell.limits.following_error_rad) return "";
-  return "the brakes don't hold: a joint moved by " + description::number_text(*outcome.slipped_rad) +
+  return "the brakes don't hold: a joint moved by " + description::rounded_text(*outcome.slipped_rad) +
          " rad in a second without power";
+}
+
+// The hand of an arm that is a process of its own hears no question.
+void tell_of_helper() {
+  std::fprintf(
+      stderr,
+      "proxarm prove: a simulated arm's hand plays its own motion; somebody who pushes as a proof asks is there "
+      "where the arm was started by `proxarm sim --for-proof`\n");
 }
 
 std::string text_of(const proof::Verdict& verdict, const std::string& failure) {
@@ -82,6 +91,7 @@ Json json_of(const proof::Verdict& verdict, const std::string& failure) {
 
 int prove_command(const ProveOptions& options) {
   const bool simulated = options.run.bus.simulated();
+  require_interface_for_hardware(options.run);
   if (!simulated) refuse_on_interfaces(options);
   const PreparedSession session = prepared(options.run);
   if (!options.bus_loss) proof::require_provable(session.cell, models::Arm(session.cell));
@@ -89,7 +99,7 @@ int prove_command(const ProveOptions& options) {
   ProofOutcome outcome;
   RunOptions of_arm = options.run;
   if (!options.arm.empty()) of_arm.cell = options.arm;
-  if (simulated) require_carried(session);
+  if (simulated) require_carried(session, options.run);
   const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
   if (options.bus_loss) return prove_bus_loss(session, prepared(of_arm), options.run, file);
   if (simulated) {
@@ -103,6 +113,7 @@ int prove_command(const ProveOptions& options) {
   const bool proven = failure.empty() && verdict.proven;
   const std::string told = options.run.json ? json_of(verdict, failure).dump() + "\n" : text_of(verdict, failure);
   std::fputs(told.c_str(), stdout);
+  if (!failure.empty() && !simulated && !outcome.real_arm) tell_of_helper();
   if (!proven) return not_proven;
   ProofFile proof{cell_sha256(session), outcome.real_arm, today(), "signs, ratios, sensor and brakes proven", true, {}};
   if (const auto kept = kept_proof(file, proof.cell_sha256, proof.real_arm)) proof.bus_loss = kept->bus_loss;

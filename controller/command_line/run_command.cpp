@@ -83,14 +83,13 @@ void refuse_view(const PreparedSession& session, const RunOptions& options) {
 
 int run_command(const RunOptions& given) {
   RunOptions options = with_view(given);
+  require_interface_for_hardware(options);
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
   require_usable_start(session);
   require_enabling_switch(session, options);
   require_stable(session, options);
-  if (options.bus.simulated()) {
-    require_carried(session);
-  }
+  if (options.bus.simulated()) require_carried(session, options);
   refuse_view(session, options);
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);

@@ -15,6 +15,24 @@
 
 namespace proxarm::command_line {
 
+namespace {
+
+// Who is at the handle: for a proof nobody but the helper.
+description::HandDescription hand_of(const PreparedSession& session, const RunOptions& options) {
+  if (!options.for_proof) return session.hand;
+  if (!options.hand.empty()) {
+    throw description::SetupError({.key = "--for-proof",
+                                   .found = "--hand beside it",
+                                   .expected = "one of the two",
+                                   .advice = "the hand plays its own motion, whatever a proof asks for"});
+  }
+  description::HandDescription nobody;
+  nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
+  return nobody;
+}
+
+}  // namespace
+
 // Runs until a signal, or until nobody is there to read what it says.
 int sim_command(const RunOptions& options) {
   if (options.bus.simulated()) {
@@ -24,6 +42,7 @@ int sim_command(const RunOptions& options) {
                                    .advice = "for both in one process: proxarm run"});
   }
   const PreparedSession session = prepare(options);
+  const description::HandDescription hand = hand_of(session, options);
   require_enabling_switch(session, options);
   require_view(options);
   std::unique_ptr<SimView> view;
@@ -39,7 +58,8 @@ int sim_command(const RunOptions& options) {
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
   config.enabling = options.enabling;
-  sim::FarEndProcess process(session.cell, session.sensor, session.hand, network, interface_of_bus, config);
+  config.helps_to_prove = options.for_proof;
+  sim::FarEndProcess process(session.cell, session.sensor, hand, network, interface_of_bus, config);
   std::vector<std::unique_ptr<sim::ModbusServer>> servers;
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
     servers.push_back(std::make_unique<sim::ModbusServer>(line, process.cell().modbus_devices(line.name)));

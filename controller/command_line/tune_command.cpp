@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/trials/mass_trial.hpp"
 #include "controller/report/summary.hpp"
@@ -236,6 +237,7 @@ void print_timestep(const Tuned& of, const std::string& limit) {
 
 int tune_command(const RunOptions& options) {
   const PreparedSession session = prepare(options);
+  require_carried(session, options);
   if (session.impedance()) {
     throw description::SetupError({.file = session.cell.file.string(),
                                    .key = "tune",
@@ -249,7 +251,28 @@ int tune_command(const RunOptions& options) {
   print_damping(of);
   std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
               1e3 * longest_horizon_s(session), session.settings.mass_kg);
+<<<<<<< HEAD
   print_timestep(of, print_limits(of, smallest));
+=======
+  const auto sorted = limits(session, loop, hand);
+  constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
+  const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
+  const std::string limit = helps ? sorted.front().what : "none of these alone";
+  std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),
+              helps ? "it" : sorted.front().what, mass_text(sorted.front().mass_without).c_str());
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    std::printf("  without %s: %s\n", sorted[i].what, mass_text(sorted[i].mass_without).c_str());
+  }
+  const double wanted = session.settings.mass_kg;
+  const auto timestep = timestep_for(wanted, hand, loop);
+  if (timestep) {
+    const bool carried = is_carried(with_timestep(session, options, *timestep));
+    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms%s\n", wanted, 1e3 * *timestep,
+                carried ? "" : ", which the cell's buses can't carry");
+  } else {
+    std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
+  }
+>>>>>>> d7e54b413085df94e3ee80651223c2aa4569f08e
   return smallest ? 0 : 1;
 }
 

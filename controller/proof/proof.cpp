@@ -9,6 +9,7 @@
 
 #include "models/base/random.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 
 namespace proxarm::proof {
 namespace {
@@ -223,8 +224,8 @@ std::vector<Station> plan(const description::Cell& cell, const models::Arm& arm,
     if (there[i] < drive.range_rad[0]) {
       throw description::SetupError({.file = cell.file.string(),
                                      .key = "prove",
-                                     .found = drive.joint + " at " + description::number_text(pose[i]) + " rad",
-                                     .expected = description::number_text(turn) + " rad of its range to either side"});
+                                     .found = drive.joint + " at " + description::rounded_text(pose[i]) + " rad",
+                                     .expected = description::rounded_text(turn) + " rad of its range to either side"});
     }
     stations.push_back({there});
     if (!by_weight) stations.push_back({there, Vec3::UnitX()});

@@ -5,6 +5,7 @@
 
 #include "fieldbus/can/byte_order.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/cia402/drive_identifiers.hpp"
 
 namespace proxarm::fieldbus {
 namespace {
@@ -18,10 +19,7 @@ std::array<std::uint32_t, 4> ServoDrive::wanted_ids() const noexcept {
           heartbeat_id(node())};
 }
 
-std::array<std::uint32_t, 6> ServoDrive::used_ids() const noexcept {
-  const auto [tpdo, emcy, sdo, heartbeat] = wanted_ids();
-  return {tpdo, emcy, sdo, heartbeat, pdo_id(PdoDirection::receive, 1, node()), SdoClient::request_id(node())};
-}
+std::array<std::uint32_t, 6> ServoDrive::used_ids() const noexcept { return drive_identifiers(node()); }
 
 void ServoDrive::start_cycle(std::int64_t now_ns) noexcept {
   cycling_ = true;

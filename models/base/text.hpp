@@ -1,4 +1,5 @@
-// Small strict readers of text that the descriptions share: numbers, UTF-8, the nearest of several words.
+// Small strict readers of text that the descriptions share: numbers, UTF-8, the nearest of several words; and what
+// messages are made of.
 #pragma once
 
 #include <cstddef>
@@ -23,6 +24,9 @@ std::optional<std::int64_t> strict_integer(std::string_view text) noexcept;
 // The candidate that `word` was probably meant to be (a slip of the pen or a forgotten unit away); empty if none is
 // near.
 std::string nearest(std::string_view word, std::span<const std::string> candidates);
+
+// A measured or computed number for people: three significant digits. What somebody wrote is number_text()'s.
+std::string rounded_text(double value);
 
 // "a, b or c"
 std::string one_of(std::span<const std::string> words);

@@ -182,6 +182,7 @@ SimulatedCell::SimulatedCell(const description::Cell& cell, const description::S
   }
   add_enabling(config.enabling);
   add_sensor(sensor);
+  if (config.helps_to_prove) helper_.emplace(plant_);
   check_faults(sensor);
 }
 
@@ -363,6 +364,7 @@ void SimulatedCell::tick(std::int64_t time_ns) noexcept {
   advance_to(time_ns);
   for (const auto& node : nodes_) node->on_time(time_ns);
   press(time_ns);
+  if (helper_) helper_->on_time(time_ns);
   for (const auto& drive : modbus_drives_) {
     if (drive) drive->on_time(time_ns);
   }

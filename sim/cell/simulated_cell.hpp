@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@
 #include "sim/devices/modbus_device.hpp"
 #include "sim/devices/modbus_sensor_device.hpp"
 #include "sim/physics/plant.hpp"
+#include "sim/physics/proof_helper.hpp"
 
 namespace proxarm::sim {
 
@@ -36,6 +38,7 @@ struct SimulatedCellConfig {
   PlantConfig plant;
   std::vector<DeviceFault> faults;
   std::vector<PressedSpan> enabling;  // of the cell's enabling input; none: pressed from 0.1 s on
+  bool helps_to_prove = false;        // somebody pushes as a proof asks for it (proof_helper.hpp)
   std::int64_t tick_ns = 1'000'000;   // how often devices look at the clock; physics has its own step
   std::int64_t drive_boot_time_ns = 20'000'000;
   std::int64_t brake_release_ns = 30'000'000;
@@ -138,6 +141,7 @@ class SimulatedCell final : private Clockwork {
   std::unique_ptr<DescribedDevice> described_sensor_;
   std::unique_ptr<EnablingSwitch> enabling_;
   std::size_t enabling_axis_ = 0;  // that it is wired to
+  std::optional<ProofHelper> helper_;
   std::function<void(const Truth&)> observer_;
 };
 

@@ -1,5 +1,6 @@
 """Bad input: one clear line each, exit status 2, nothing on standard output, nothing enabled."""
 import os
+import shutil
 import subprocess
 import unittest
 
@@ -52,6 +53,65 @@ class Files(ProgramTest):
                               pass_fds=[reader], capture_output=True, cwd=self.folder, timeout=300)
         os.close(reader)
         self.assertEqual(done.returncode, 0, done.stderr)
+
+
+class Identifiers(ProgramTest):
+    """Of two owners on one bus. `check` called such cells fine; `plan` refused them without the file and its line."""
+    BENCH = "models/cells/bench.yaml"
+    SENSOR = "  description: ../sensors/ati_net_can_oem.yaml\n  bus: can\n  base_id: 0x12\n"
+
+    def refuse(self, new, key, *fragments, extra=""):
+        cell = self.changed(self.BENCH, (self.SENSOR, new))
+        text = cell.read_text() + extra
+        cell.write_text(text)
+        name = key.split(".")[-1]
+        line = next(i for i, line in enumerate(text.splitlines(), 1) if f"{name}:" in line)
+        for command in ("check", "plan", "run", "tune", "prove"):
+            with self.subTest(new, command=command):
+                self.assert_refused(self.call(command, cell), f"bench.yaml:{line}: ", f": {key}: found ", *fragments)
+        cell.write_text(text.replace(new, self.SENSOR, 1))
+
+    def refuse_described(self, sensor, settings, key, *fragments):
+        text = "".join(f"    {name}: {value}\n" for name, value in settings.items())
+        self.refuse(f"  description: ../sensors/{sensor}.yaml\n  bus: can\n  settings:\n{text}", key, *fragments)
+
+    def test_of_a_sensor_that_are_a_drives(self):
+        self.refuse(self.SENSOR.replace("0x12", "0x18"), "sensor.base_id", "bus can", "identifier 0x181 for the force sensor",
+                    "the drive of shoulder has it")
+        self.refuse(self.SENSOR.replace("0x12", "0x70"), "sensor.base_id", "identifier 0x701", "the drive of shoulder")
+        ids = {"command_id": "0x1F0", "first_id": "0x1F1", "second_id": "0x202"}
+        self.refuse_described("robotous_rft", ids, "sensor.settings.second_id", "identifier 0x202 for the force sensor",
+                              "the drive of elbow has it")
+
+    def test_of_a_sensor_that_are_the_controllers(self):
+        self.refuse(self.SENSOR.replace("0x12", "0x77"), "sensor.base_id", "identifier 0x77F", "the controller has it")
+        self.refuse(self.SENSOR.replace("0x12", "0x08"), "sensor.base_id", "found 0x08", "0x09 or more")
+        for command_id in ("0x080", "0x77F"):
+            ids = {"command_id": command_id, "first_id": "0x1F1", "second_id": "0x1F2"}
+            self.refuse_described("robotous_rft", ids, "sensor.settings.command_id", f"identifier {command_id}")
+
+    def test_of_a_sensor_that_are_the_enabling_inputs(self):
+        self.refuse(self.SENSOR.replace("0x12", "0x28"), "sensor.base_id", "identifier 0x281",
+                    "the enabling input of shoulder has it", extra="enabling_input: {drive: shoulder, bit: 16}\n")
+
+    def test_of_an_enabling_input_that_are_a_drives_or_none(self):
+        text = "enabling_input: {{bus: can, identifier: {}, byte: 0, bit: 0}}\n"
+        cell = self.changed(self.BENCH)
+        shipped = cell.read_text()
+        for identifier, owner in (("0x182", "the drive of elbow"), ("0x080", "the controller")):
+            cell.write_text(shipped + text.format(identifier))
+            for command in ("check", "plan", "run"):
+                self.assert_refused(self.call(command, cell), f"bench.yaml:{shipped.count(chr(10)) + 1}: ",
+                                    f"enabling_input.identifier: found identifier {identifier}", owner)
+        cell.write_text(shipped + text.format("0x190"))
+        self.assertEqual(self.call("check", cell).status, 0)
+
+    def test_that_are_shared_on_one_interface_alone(self):
+        cell = self.changed(CELL, ("base_id: 0x68", "base_id: 0x18"))
+        self.assertEqual(self.call("check", cell).status, 0)
+        self.assertEqual(self.call("plan", cell).status, 0)
+        self.assert_refused(self.call("plan", cell, "--bus", "vcan0", "--timestep", "4ms"), "default.yaml:",
+                            "sensor.base_id: found identifier 0x181", "the drive of axis_1 has it")
 
 
 class CellFile(ProgramTest):
@@ -327,6 +387,23 @@ class Options(ProgramTest):
     def test_half_a_millisecond_is_refused_with_the_arithmetic(self):
         self.refuse("run --timestep 0.5ms", "--timestep", "bus axes_1_3", "810 bits", "1 Mbit/s", "810 us", "500 us",
                     "would fit", "1 ms", "CAN FD")
+
+    # It was "--timestep" whoever had asked for it, and `tune` gave advice for a timestep that no bus could carry.
+    def test_a_timestep_that_a_bus_can_not_carry_is_told_by_who_asked_for_it(self):
+        for command in ("run", "tune", "prove", "assess"):
+            with self.subTest(command):
+                self.refuse(f"{command} --timestep 0.3ms", "--timestep: bus axes_1_3 can't carry a timestep of 0.3 ms",
+                            "`proxarm plan` shows each frame")
+                cell = self.changed(CELL, ("default_period_s: 0.001", "default_period_s: 0.0005"))
+                line = cell.read_text().split("default_period_s")[0].count("\n") + 1
+                outcome = self.call(command, cell)
+                self.assert_refused(outcome, f"default.yaml:{line}: default_period_s: bus axes_1_3 can't carry a timestep of "
+                                             "0.5 ms")
+                self.assertNotIn("--timestep", outcome.err)
+                cell.unlink()
+                shutil.copy(SOURCE / CELL, cell)
+        bench = self.changed("models/cells/bench.yaml", ("default_period_s: 0.001\n", ""), ("receive_window: 0.55", ""))
+        self.assert_refused(self.call("run", bench), "bench.yaml: default_period_s: bus can can't carry a timestep of 1 ms")
 
     def test_timesteps_that_drives_can_not_hold(self):
         self.refuse("run --timestep 1.0001ms", "--timestep: found 1.0001 ms", "60C2h", "such as 0.5ms, 1ms")

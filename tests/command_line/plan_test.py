@@ -110,6 +110,25 @@ class Plan(ProgramTest):
             with self.subTest(name):
                 self.assert_agrees([self.cell_with(name)], streaming=True)
 
+    # LATE came with a longer timestep and CAN FD alone, where a key of the cell would do.
+    def test_a_late_sensor_is_told_which_key_of_the_cell_would_bring_it_in_time_and_does(self):
+        bench = "models/cells/bench.yaml"
+        for wrong, way in ((("base_id: 0x12", "base_id: 0x7F"), r"sensor\.(base_id: 0x\w\w) \(lower identifiers win\)"),
+                           (("receive_window: 0.55", "receive_window: 0.45"), r"(receive_window: 0\.\d+)")):
+            with self.subTest(wrong[1]):
+                cell = self.changed(bench, wrong)
+                late = self.call("plan", cell)
+                self.assertEqual(late.status, 1, late.err)
+                self.assertIn("LATE", late.out)
+                would_fit = late.out.split("would fit: ")[1]
+                self.assertRegex(would_fit, way)
+                self.assertIn("a timestep of 1.25 ms", would_fit)
+                self.assert_refused(self.call("run", cell), "can't carry", re.search(way, would_fit)[0])
+                cell.write_text(cell.read_text().replace(wrong[1], re.search(way, would_fit)[1]))
+                mended = self.call("plan", cell)
+                self.assertEqual(mended.status, 0, mended.out)
+                cell.write_text((SOURCE / bench).read_text())
+
     def test_modbus_lines_are_told_with_their_arithmetic(self):
         rail = (SOURCE / "models/cells/rail.yaml").read_text()
         for path in ("../arms", "../../scenes", "../../sim", "../sensors", "../drives"):

@@ -106,6 +106,17 @@ class Prove(ProgramTest):
         weak = self.cell("weak.yaml", lambda text: re.sub("( {6})(max_torque_Nm: .*)", r"\1\2\n\1brake_torque_Nm: 50", text))
         self.assertIn("the brakes don't hold", self.verdict(self.cell("arm.yaml"), "--arm", weak)["failure"])
 
+    def test_somebody_who_pushes_for_a_proof_is_there_in_place_of_the_hand_not_beside_it(self):
+        self.assert_refused(self.call("sim", "--bus", "vcan0", "--for-proof", "--hand", SOURCE / "sim/hands/touch.yaml"),
+                            "--for-proof: found --hand beside it", "one of the two")
+
+    # `prove --hardware` proved the simulated arm, without a word of it.
+    def test_a_real_arm_is_one_on_an_interface(self):
+        for command in ("prove", "prove --bus-loss", "prove --bus sim", "run", "calibrate"):
+            with self.subTest(command):
+                self.assert_refused(self.call(*command.split(), "--hardware"), "--hardware: found --bus sim",
+                                    "such as --hardware --bus can0")
+
     def test_the_enabling_switch_is_part_of_it(self):
         cell = self.cell("switch.yaml", lambda text: text + "\nenabling_input: {drive: axis_6, bit: 16}\n")
         self.assertIn("enabling_released", self.verdict(cell, "--enabling", "0.1s..5s")["failure"])
@@ -139,6 +150,11 @@ class Prove(ProgramTest):
                                  (("--hand", "sim/hands/touch.yaml"), ("--hand",))):
             with self.subTest(arguments):
                 self.assert_refused(self.call("prove", *arguments), *words)
+        # It had sixteen digits: "found elbow at 1.8509341503988659 rad".
+        narrow = self.cell("narrow.yaml", self.replaced("range_rad: [0.25, 2.65]", "range_rad: [1.8, 2.0]"), of="bench.yaml")
+        outcome = self.call("prove", narrow)
+        self.assert_refused(outcome, "narrow.yaml: prove: found elbow at ", "expected 0.3 rad of its range to either side")
+        self.assertRegex(outcome.err, r"found elbow at \d\.\d{1,2} rad")
         outcome = self.call("prove", "--out", self.folder / "nowhere" / "proof")
         self.assertEqual(outcome.status, 2)
         self.assertIn("the proof can't be written", outcome.err)

@@ -149,13 +149,15 @@ Json json_of(const std::vector<OwnStop>& stops, double promised_s, bool proven, 
   return json;
 }
 
-void keep(const PreparedSession& session, const Outcome& outcome, const std::filesystem::path& file) {
+// Returns whether the proof of all else is kept there, too.
+bool keep(const PreparedSession& session, const Outcome& outcome, const std::filesystem::path& file) {
   const std::string hash = cell_sha256(session);
   ProofFile proof{hash, outcome.real_arm, today(), "drives stop without the controller", false, {}};
   if (const auto kept = kept_proof(file, hash, outcome.real_arm)) proof = *kept;
   proof.bus_loss.clear();
   for (const OwnStop& stop : outcome.stops) proof.bus_loss.push_back({stop.joint, 1e3 * stop.reacts_s, stop.signs});
   write_proof(file, proof);
+  return proof.whole;
 }
 
 }  // namespace
@@ -180,8 +182,14 @@ int prove_bus_loss(const PreparedSession& session, const PreparedSession& arm, c
     tell(outcome.stops, promised_s, proven, failure);
   }
   if (!proven) return 1;
-  keep(session, outcome, file);
-  if (!options.json) std::printf("kept in %s\n", file.c_str());
+  const bool whole = keep(session, outcome, file);
+  if (options.json) return 0;
+  std::printf("kept in %s\n", file.c_str());
+  if (!whole) {
+    std::printf(
+        "still missing there: signs, ratios, sensor and brakes, without which `proxarm run --hardware` is refused; "
+        "the same command without --bus-loss proves them\n");
+  }
   return 0;
 }
 

@@ -137,7 +137,7 @@ controller::Timestep LiveParameters::take_timestep(const std::string& text) {
   controller::require_timestep(changed.cell, changed.settings);
   require_stable(changed, judged);
   if (options_.bus.simulated()) {
-    require_carried(changed);
+    require_carried(changed, judged);
   } else {
     warn_if_not_carried(changed, buses_in_order(changed.cell));
   }

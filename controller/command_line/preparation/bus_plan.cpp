@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <random>
 
 #include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/session/identifiers.hpp"
 #include "fieldbus/can/byte_order.hpp"
+#include "fieldbus/canopen/canopen_object.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 #include "sim/devices/described_device.hpp"
 
 namespace proxarm::command_line {
@@ -292,21 +296,98 @@ PlannedBus planned(const PreparedSession& session, const controller::BusIndices&
   return bus;
 }
 
+// ---- What of the cell would let a late sensor come in time
+
+// One of the network's buses in a session as it is or might be.
+class PlaceOfBus {
+ public:
+  PlaceOfBus(const controller::BusIndices& indices, std::size_t index) : indices_(indices), index_(index) {}
+
+  [[nodiscard]] fieldbus::BusPlan plan(const PreparedSession& session) const {
+    return fieldbus::plan_bus(planned(session, indices_, index_), period_ns(session));
+  }
+  [[nodiscard]] bool has_sensor(const description::Cell& cell) const {
+    for (std::size_t i = 0; i < cell.buses.size(); ++i) {
+      if (cell.buses[i].name == cell.sensor.bus) return indices_[i] == index_;
+    }
+    return false;
+  }
+  [[nodiscard]] bool has_own_identifiers(const PreparedSession& session) const {
+    try {
+      controller::require_own_identifiers(session.cell, session.sensor, session.settings, indices_);
+    } catch (const description::SetupError&) {
+      return false;
+    }
+    return true;
+  }
+
+ private:
+  const controller::BusIndices& indices_;
+  std::size_t index_;
+};
+
+// The nearest base_id below the sensor's that is free and with which all fits; nullopt: none, or the sensor has none.
+std::optional<std::uint32_t> lower_base_id(PreparedSession session, const PlaceOfBus& place) {
+  constexpr std::uint32_t tries = 128;  // all that an ATI sensor can have
+  if (session.sensor.described && !session.sensor.described->has_base_id) return std::nullopt;
+  const std::uint32_t least = session.sensor.described ? session.sensor.described->base_id_min : 0;
+  std::uint32_t& base_id = session.cell.sensor.base_id;
+  for (std::uint32_t n = 0; n < tries && base_id > least; ++n) {
+    --base_id;
+    if (place.has_own_identifiers(session) && place.plan(session).fits) return base_id;
+  }
+  return std::nullopt;
+}
+
+// The shortest receive_window above the cell's with which all fits, in twentieths of the timestep.
+std::optional<double> longer_window(PreparedSession session, const PlaceOfBus& place) {
+  constexpr int steps = 20, longest = 16;  // the key's range ends at 0.8
+  for (int n = 1; n <= longest; ++n) {
+    const double window = static_cast<double>(n) / steps;
+    if (window <= session.settings.receive_window) continue;
+    session.cell.receive_window = session.settings.receive_window = window;
+    if (place.plan(session).fits) return window;
+  }
+  return std::nullopt;
+}
+
+// Where all would fit into the cycle, but comes too late.
+void add_ways_of_the_cell(const PreparedSession& session, const PlaceOfBus& place, fieldbus::BusPlan& plan) {
+  if (plan.fits || plan.worst_ns > plan.period_ns || !place.has_sensor(session.cell)) return;
+  std::vector<std::string> ways;
+  if (const auto base_id = lower_base_id(session, place)) {
+    ways.push_back("sensor.base_id: " + fieldbus::hex_text(*base_id, 2) + " (lower identifiers win)");
+  }
+  if (const auto window = longer_window(session, place)) {
+    ways.push_back("receive_window: " + description::rounded_text(*window));
+  }
+  plan.alternatives.insert(plan.alternatives.begin(), ways.begin(), ways.end());
+}
+
 }  // namespace
 
 std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices) {
   std::vector<fieldbus::BusPlan> plans;
   const std::size_t buses = indices.empty() ? 0 : *std::max_element(indices.begin(), indices.end()) + 1;
   for (std::size_t index = 0; index < buses; ++index) {
-    plans.push_back(fieldbus::plan_bus(planned(session, indices, index), period_ns(session)));
+    const PlaceOfBus place(indices, index);
+    plans.push_back(place.plan(session));
+    add_ways_of_the_cell(session, place, plans.back());
   }
   return plans;
 }
 
-void require_carried(const PreparedSession& session) {
+bool is_carried(const PreparedSession& session) {
+  return fieldbus::refusal_text(plan_buses(session, buses_in_order(session.cell))).empty();
+}
+
+void require_carried(const PreparedSession& session, const RunOptions& options) {
   const std::string refusal = fieldbus::refusal_text(plan_buses(session, buses_in_order(session.cell)));
   if (refusal.empty()) return;
-  throw description::SetupError({.key = "--timestep", .message = refusal, .advice = "`proxarm plan` shows each frame"});
+  description::SetupProblem problem = timestep_problem(session.cell, options);
+  problem.message = refusal;
+  problem.advice = "`proxarm plan` shows each frame";
+  throw description::SetupError(problem);
 }
 
 void warn_if_not_carried(const PreparedSession& session, const controller::BusIndices& indices) {

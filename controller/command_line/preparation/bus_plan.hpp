@@ -14,7 +14,10 @@ namespace proxarm::command_line {
 std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices);
 
 // Throws SetupError with the arithmetic where a bus of the cell, each on a wire of its own, can't carry the timestep.
-void require_carried(const PreparedSession& session);
+// It names who asked for that: the options or the cell.
+void require_carried(const PreparedSession& session, const RunOptions& options);
+// Whether that would be refused.
+[[nodiscard]] bool is_carried(const PreparedSession& session);
 // The same as a warning on standard error: virtual interfaces have no bit timing, so the session runs nevertheless.
 void warn_if_not_carried(const PreparedSession& session, const controller::BusIndices& indices);
 

@@ -6,14 +6,17 @@
 #include <cstdio>
 #include <numbers>
 
+#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
 #include "controller/session/bring_up.hpp"
+#include "controller/session/identifiers.hpp"
 #include "controller/session/reachable_scene.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/files/key_line.hpp"
 #include "scenes/format/scene_file.hpp"
 
 namespace proxarm::command_line {
@@ -111,11 +114,11 @@ void require_period(const PreparedSession& session, const RunOptions& options) {
   std::array<char, 32> found{};
   std::snprintf(found.data(), found.size(), "%.9g ms", 1e3 * period_s);
   const auto refuse = [&](const char* expected, const char* advice) {
-    throw description::SetupError({.file = options.period_s ? "" : session.cell.file.string(),
-                                   .key = options.period_s ? "--timestep" : "default_period_s",
-                                   .found = found.data(),
-                                   .expected = expected,
-                                   .advice = advice});
+    description::SetupProblem problem = timestep_problem(session.cell, options);
+    problem.found = found.data();
+    problem.expected = expected;
+    problem.advice = advice;
+    throw description::SetupError(problem);
   };
   if (!(period_s >= shortest_period_s && period_s <= longest_period_s)) refuse("0.05 to 100 ms", "");
   const std::int64_t period_ns = std::llround(1e9 * period_s);
@@ -249,6 +252,13 @@ std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const Prepare
 
 }  // namespace
 
+description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options) {
+  if (options.period_s) return {.key = "--timestep"};
+  return {.file = cell.file.string(),
+          .line = description::line_of_key(cell.file, "default_period_s"),
+          .key = "default_period_s"};
+}
+
 controller::HandModel hand_model(const PreparedSession& session) {
   const description::Grip grip = description::tightest_grip(session.hand);
   return {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
@@ -296,6 +306,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.cell = loaded(cell_file, FileKind::cell, description::load_cell);
   session.sensor =
       description::load_sensor(beside(session.cell.file, session.cell.sensor.description), session.cell.sensor.choices);
+  controller::require_own_identifiers(session.cell, session.sensor, options.settings, buses_in_order(session.cell));
   session.hand =
       loaded(chosen(options.hand, session.cell, "default_hand", session.cell.default_hand, "sim/hands/touch.yaml"),
              FileKind::hand, description::load_hand);

@@ -5,6 +5,7 @@
 
 #include "controller/command_line/preparation/run_options.hpp"
 #include "controller/stability/stability.hpp"
+#include "models/base/setup_error.hpp"
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
@@ -42,6 +43,10 @@ PreparedSession prepare(const RunOptions& options);
 
 // The same session with another timestep. Throws SetupError where no drive could hold that one.
 PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s);
+
+// Where the timestep comes from, as a problem begins that is to be told of it: `--timestep`, or the cell's file and
+// line. Without a line, the file says nothing of it and has the default.
+description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options);
 
 // The mass and timestep, judged: throws SetupError where the handle alone is heavier, or where the loop with the hand
 // would be unstable (unless forced, which only a simulation may be). Impedance type: the virtual coupling is judged.

@@ -80,4 +80,13 @@ std::vector<std::string> BusMapping::interfaces(const std::vector<std::string>& 
   return interfaces;
 }
 
+void require_interface_for_hardware(const RunOptions& options) {
+  if (options.hardware.empty() || !options.bus.simulated()) return;
+  throw description::SetupError({.key = "--hardware",
+                                 .found = "--bus sim (the default), where the arm is simulated",
+                                 .expected = "the real arm's interfaces with it",
+                                 .advice = "such as --hardware --bus can0, or NAME=can0,NAME=can1 for a cell with "
+                                           "several buses; for the simulated arm leave --hardware away"});
+}
+
 }  // namespace proxarm::command_line

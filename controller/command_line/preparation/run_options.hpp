@@ -81,6 +81,10 @@ struct RunOptions {
   std::optional<ViewPlace> view_place;       // of the view that runs; absent: there is none
   std::vector<sim::DeviceFault> faults;      // of the simulated devices
   std::vector<sim::PressedSpan> enabling;    // of the simulated enabling switch
+  bool for_proof = false;                    // `sim`: somebody pushes as a proof asks, in place of the hand
 };
+
+// Throws SetupError where `--hardware` is given and all buses are simulated: no real arm would be meant by that.
+void require_interface_for_hardware(const RunOptions& options);
 
 }  // namespace proxarm::command_line

@@ -46,7 +46,7 @@ void run(proof::ProofSession& proof, fieldbus::CanNetwork& network, double perio
   proof.shut_down();
 }
 
-// Leans on the handle along the direction that is asked for, with 15 N, for as long as it is.
+// Leans on the handle along the direction that is asked for, for as long as it is.
 class SimulatedHand {
  public:
   explicit SimulatedHand(sim::SimulatedCell& arm) : arm_(arm) {}
@@ -54,21 +54,16 @@ class SimulatedHand {
   void heed(const proof::ProofSession& proof) {
     const bool asked = proof.asked() == Asked::push || pushed_at_ == proof.station();
     const bool pushes = proof.asked() != Asked::let_go && asked && proof.station() < proof.stations().size();
-    if (!pushes) return lean(models::Vec3::Zero());
+    if (!pushes) return arm_.plant().set_clamp({});
     if (pushed_at_ != proof.station()) {
       pushed_at_ = proof.station();
       from_W_ = arm_.truth().X_WT.translation();
     }
-    lean(proof.stations()[proof.station()].push_W);
+    const models::Vec3& along_W = proof.stations()[proof.station()].push_W;
+    arm_.plant().set_clamp(along_W.isZero() ? sim::Clamp{} : sim::leaning(from_W_, along_W));
   }
 
  private:
-  void lean(const models::Vec3& along_W) {
-    constexpr double depth_m = 0.02, stiffness_N_per_m = 750.0;
-    if (along_W.isZero()) return arm_.plant().set_clamp({});
-    arm_.plant().set_clamp({from_W_ + depth_m * along_W, -along_W, stiffness_N_per_m});
-  }
-
   sim::SimulatedCell& arm_;
   std::size_t pushed_at_ = static_cast<std::size_t>(-1);
   models::Vec3 from_W_ = models::Vec3::Zero();

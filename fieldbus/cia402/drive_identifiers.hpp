@@ -1,0 +1,24 @@
+// Identifiers that a drive has on its bus by its node, of CiA 301's predefined connections: those that are used here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "fieldbus/canopen/canopen_emcy.hpp"
+#include "fieldbus/canopen/canopen_heartbeat.hpp"
+#include "fieldbus/canopen/canopen_pdo.hpp"
+#include "fieldbus/canopen/canopen_sdo.hpp"
+
+namespace proxarm::fieldbus {
+
+// TPDO1, EMCY, SDO's answer and heartbeat, which it sends, then RPDO1 and SDO's request.
+inline std::array<std::uint32_t, 6> drive_identifiers(std::uint8_t node) noexcept {
+  return {pdo_id(PdoDirection::transmit, 1, node),
+          emcy_id(node),
+          SdoClient::answer_id(node),
+          heartbeat_id(node),
+          pdo_id(PdoDirection::receive, 1, node),
+          SdoClient::request_id(node)};
+}
+
+}  // namespace proxarm::fieldbus
