@@ -224,10 +224,12 @@ std::string print_limits(const Tuned& of, const std::optional<double>& smallest)
   return limit;
 }
 
-void print_timestep(const Tuned& of, const std::string& limit) {
+void print_timestep(const Tuned& of, const RunOptions& options, const std::string& limit) {
   const double wanted = of.session.settings.mass_kg;
   if (const auto timestep = timestep_for(wanted, of.hand, of.loop)) {
-    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms\n", wanted, 1e3 * *timestep);
+    const bool carried = is_carried(with_timestep(of.session, options, *timestep));
+    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms%s\n", wanted, 1e3 * *timestep,
+                carried ? "" : ", which the cell's buses can't carry");
   } else {
     std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
   }
@@ -251,28 +253,7 @@ int tune_command(const RunOptions& options) {
   print_damping(of);
   std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
               1e3 * longest_horizon_s(session), session.settings.mass_kg);
-<<<<<<< HEAD
-  print_timestep(of, print_limits(of, smallest));
-=======
-  const auto sorted = limits(session, loop, hand);
-  constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
-  const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
-  const std::string limit = helps ? sorted.front().what : "none of these alone";
-  std::printf("what limits it: %s; without %s the smallest stable mass would be %s\n", limit.c_str(),
-              helps ? "it" : sorted.front().what, mass_text(sorted.front().mass_without).c_str());
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    std::printf("  without %s: %s\n", sorted[i].what, mass_text(sorted[i].mass_without).c_str());
-  }
-  const double wanted = session.settings.mass_kg;
-  const auto timestep = timestep_for(wanted, hand, loop);
-  if (timestep) {
-    const bool carried = is_carried(with_timestep(session, options, *timestep));
-    std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms%s\n", wanted, 1e3 * *timestep,
-                carried ? "" : ", which the cell's buses can't carry");
-  } else {
-    std::printf("for %.3g kg with these margins: no timestep is short enough; in the way: %s\n", wanted, limit.c_str());
-  }
->>>>>>> d7e54b413085df94e3ee80651223c2aa4569f08e
+  print_timestep(of, options, print_limits(of, smallest));
   return smallest ? 0 : 1;
 }
 

@@ -19,8 +19,8 @@ constexpr std::size_t most_samples = 4000;
 // The next panel is drawn in this row.
 void place(std::ostream& gp, int row) {
   constexpr double top = 0.915, height = 0.205;
-  gp << "set tmargin at screen " << top - height * row << "\nset bmargin at screen "
-     << top - height * (row + 1) + 0.018 << "\n";
+  gp << "set tmargin at screen " << top - height * row << "\nset bmargin at screen " << top - height * (row + 1) + 0.018
+     << "\n";
 }
 
 }  // namespace

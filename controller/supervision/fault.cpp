@@ -68,11 +68,12 @@ constexpr std::array texts{
               nullptr, "check the drive's power, the line's cable or network, and the unit's number"},
     FaultText{Fault::drive_disabled, "drive_disabled", Reaction::stop_1, "a drive left operation enabled by itself",
               nullptr, "check the drive's enable input, its supply and STO"},
-    FaultText{Fault::joint_out_of_range, "joint_out_of_range", Reaction::stop_1,
-              "a joint stands out of its range_rad, by its encoder", "rad",
-              "are nodes swapped, or is offset_counts, direction or gear_ratio wrong? If the joint is where the encoder "
-              "says, bring it back by the drive's own tool",
-              still},
+    FaultText{
+        Fault::joint_out_of_range, "joint_out_of_range", Reaction::stop_1,
+        "a joint stands out of its range_rad, by its encoder", "rad",
+        "are nodes swapped, or is offset_counts, direction or gear_ratio wrong? If the joint is where the encoder "
+        "says, bring it back by the drive's own tool",
+        still},
     FaultText{Fault::drive_not_enabled, "drive_not_enabled", Reaction::stop_1, "a drive didn't reach operation enabled",
               "s", "check the drive's power stage, STO and enable input", still},
     FaultText{Fault::drive_not_disabled, "drive_not_disabled", Reaction::stop_0,

@@ -57,6 +57,10 @@ class Tune(ProgramTest):
                      "what limits it", "timestep of at most", "handle"):
             self.assertIn(word, outcome.out)
 
+    def test_a_timestep_that_a_mass_needs_and_no_bus_carries_is_told_as_such(self):
+        self.assertIn("a timestep of at most 0.5 ms, which the cell's buses can't carry", self.call("tune").out)
+        self.assertNotIn("can't carry", self.call("tune", "--mass", "6").out)
+
     def test_a_hopeless_loop_is_told_so(self):
         outcome = self.call("tune", "--timestep", "50ms")
         self.assertIn("damping", outcome.out)

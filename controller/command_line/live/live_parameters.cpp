@@ -139,7 +139,7 @@ controller::Timestep LiveParameters::take_timestep(const std::string& text) {
   if (options_.bus.simulated()) {
     require_carried(changed, judged);
   } else {
-    warn_if_not_carried(changed, buses_in_order(changed.cell));
+    require_carried_on(options_.bus.interfaces(bus_names(changed.cell)), changed, judged);
   }
   session_ = std::move(changed);
   const controller::SessionSettings& settings = session_.settings;

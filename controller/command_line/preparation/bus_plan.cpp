@@ -9,6 +9,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/session/identifiers.hpp"
 #include "fieldbus/can/byte_order.hpp"
+#include "fieldbus/can/socket_can_network.hpp"
 #include "fieldbus/canopen/canopen_object.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
@@ -364,6 +365,16 @@ void add_ways_of_the_cell(const PreparedSession& session, const PlaceOfBus& plac
   plan.alternatives.insert(plan.alternatives.begin(), ways.begin(), ways.end());
 }
 
+void require_within(const std::vector<fieldbus::BusPlan>& plans, const description::Cell& cell,
+                    const RunOptions& options) {
+  const std::string refusal = fieldbus::refusal_text(plans);
+  if (refusal.empty()) return;
+  description::SetupProblem problem = timestep_problem(cell, options);
+  problem.message = refusal;
+  problem.advice = "`proxarm plan` shows each frame";
+  throw description::SetupError(problem);
+}
+
 }  // namespace
 
 std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices) {
@@ -382,16 +393,27 @@ bool is_carried(const PreparedSession& session) {
 }
 
 void require_carried(const PreparedSession& session, const RunOptions& options) {
-  const std::string refusal = fieldbus::refusal_text(plan_buses(session, buses_in_order(session.cell)));
-  if (refusal.empty()) return;
-  description::SetupProblem problem = timestep_problem(session.cell, options);
-  problem.message = refusal;
-  problem.advice = "`proxarm plan` shows each frame";
-  throw description::SetupError(problem);
+  require_within(plan_buses(session, buses_in_order(session.cell)), session.cell, options);
 }
 
-void warn_if_not_carried(const PreparedSession& session, const controller::BusIndices& indices) {
-  const std::string refusal = fieldbus::refusal_text(plan_buses(session, indices));
+bool is_virtual_interface(const std::string& interface) { return fieldbus::is_virtual_can(interface); }
+
+void require_carried_on(const std::vector<std::string>& interfaces, const PreparedSession& session,
+                        const RunOptions& options, const IsVirtual& is_virtual) {
+  std::vector<std::string> wires;  // each interface once
+  controller::BusIndices indices;
+  for (const std::string& interface : interfaces) {
+    const auto known = std::find(wires.begin(), wires.end(), interface);
+    indices.push_back(static_cast<std::size_t>(known - wires.begin()));
+    if (known == wires.end()) wires.push_back(interface);
+  }
+  std::vector<fieldbus::BusPlan> real, virtual_ones;
+  std::size_t wire = 0;
+  for (fieldbus::BusPlan& plan : plan_buses(session, indices)) {
+    (is_virtual(wires[wire++]) ? virtual_ones : real).push_back(std::move(plan));
+  }
+  require_within(real, session.cell, options);
+  const std::string refusal = fieldbus::refusal_text(virtual_ones);
   if (refusal.empty()) return;
   std::fprintf(stderr, "proxarm: on a real bus this would be refused (a virtual one has no bit timing): %s\n",
                refusal.c_str());

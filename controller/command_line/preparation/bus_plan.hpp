@@ -1,6 +1,8 @@
 // The frames of a session's cycle on each bus, and whether the buses can carry them.
 #pragma once
 
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
@@ -18,7 +20,12 @@ std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const 
 void require_carried(const PreparedSession& session, const RunOptions& options);
 // Whether that would be refused.
 [[nodiscard]] bool is_carried(const PreparedSession& session);
-// The same as a warning on standard error: virtual interfaces have no bit timing, so the session runs nevertheless.
-void warn_if_not_carried(const PreparedSession& session, const controller::BusIndices& indices);
+
+using IsVirtual = std::function<bool(const std::string& interface)>;
+bool is_virtual_interface(const std::string& interface);
+// The same for buses on these interfaces, one for each of the cell's: two on one interface share its wire. Virtual ones
+// have no bit timing, so of them it is a warning on standard error.
+void require_carried_on(const std::vector<std::string>& interfaces, const PreparedSession& session,
+                        const RunOptions& options, const IsVirtual& is_virtual = is_virtual_interface);
 
 }  // namespace proxarm::command_line

@@ -153,10 +153,10 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
   SocketCanNetwork network = open_network(interfaces);
+  require_carried_on(interfaces, session, options);
   require_hardware_consent(session, options, interfaces);
   require_fd(session.cell, network);
   const controller::BusIndices indices = indices_in(network, interfaces.size());
-  warn_if_not_carried(session, indices);
 
   scenes::CompiledScene scene = scenes::compile(session.scene);
   controller::FrameTap tap(network, frame_capacity);
