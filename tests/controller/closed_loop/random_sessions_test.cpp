@@ -230,7 +230,7 @@ bool explained(const ClosedLoopRig& rig, Fault fault, std::size_t k) {
   // What a cycle judges comes until half of its period has gone.
   const CycleRecord& record = rig.records[k];
   const double since_power_on_s =
-      1e-9 * static_cast<double>(rig.first_cycle_ns + record.time_ns + record.period_ns / 2);
+      1e-9 * (static_cast<double>(rig.first_cycle_ns + record.time_ns) + 0.5 * static_cast<double>(record.period_ns));
   const auto is_told = [&](const std::string& text) {
     return tells(text, fault) && since_power_on_s > std::stod(text.substr(text.find('@') + 1));
   };
