@@ -387,6 +387,84 @@ TEST(ClosedLoopSupervision, StopsBackingOffIntoAHandThatResists) {
   EXPECT_LT(f.force_max_N, f.force_before_N + Release::resisted_N + 10.0);
 }
 
+// From a cycle on: how far the steel goes until it rests, and its last speed in the record.
+double way_from(ClosedLoopRig& rig, std::size_t k) {
+  double way_m = 0.0;
+  const Vec3 from = rig.truths[k].X_WT.translation();
+  for (; k < rig.truths.size(); ++k) way_m = std::max(way_m, (rig.truths[k].X_WT.translation() - from).norm());
+  return std::max(way_m, (rig.far_end.truth().X_WT.translation() - from).norm());
+}
+
+// The leash alone notices it, since a drive that follows may be 0.2 rad off.
+RigOptions runs_off_on_a_long_leash() {
+  RigOptions options{.device_faults = {"axis_1:runaway=1.5@1.2s"}, .scene = "scenes/free.yaml"};
+  options.edit_cell = [](description::Cell& cell) { cell.limits.following_error_rad = 0.2; };
+  return options;
+}
+
+// The story: where nothing but the leash noticed a drive that ran off, the stop began and ended in two cycles, since
+// all setpoints stood; the drives were told to ramp down, nobody looked at them any more, and the steel went 65 mm
+// further in 45 cycles, from 1.0 to 1.6 m/s.
+TEST(ClosedLoopSupervision, CutsThePowerOfADriveThatGoesOnRunningOffWhileTheArmStops) {
+  ClosedLoopRig rig(runs_off_on_a_long_leash());
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::leash_exceeded) << "the cause";
+  EXPECT_EQ(rig.fault().reaction, Reaction::stop_1);
+  const FaultReport& then = rig.cycle->supervisor().escalation();
+  EXPECT_TRUE(then.fault == Fault::tool_too_fast || then.fault == Fault::elbow_too_fast) << fault_name(then.fault);
+  const auto stop = static_cast<std::size_t>(rig.fault().cycle), cut = static_cast<std::size_t>(then.cycle);
+  EXPECT_LE(cut, stop + 5);
+  ASSERT_LT(cut + 1, rig.records.size());
+  EXPECT_FALSE(rig.records[stop].has(RecordFlag::power_cut));
+  EXPECT_TRUE(rig.records[cut].has(RecordFlag::power_cut));
+  const double way_m = way_from(rig, stop);
+  std::printf("the steel goes %.1f mm after the stop began\n", 1e3 * way_m);
+  // At 1.05 m/s it swings out on its gears, whose first mode is at 16 Hz: v/ω is 11 mm.
+  EXPECT_LT(way_m, 0.03);
+  EXPECT_TRUE(rig.cycle->drives_off());
+}
+
+// A drive that heeds no shutdown (0006h reaches it as 000Fh), and runs off instead, in a session that was to end.
+TEST(ClosedLoopSupervision, CutsThePowerOfADriveThatRunsOffInsteadOfSwitchingOff) {
+  RigOptions options{.duration_s = 1.43, .scene = "scenes/free.yaml"};
+  ClosedLoopRig without(options);
+  without.run();
+  const auto cycle = static_cast<std::int64_t>(first_in(without, Phase::disabling));
+  const std::int64_t from_ns = without.first_cycle_ns + ms * cycle;
+  options.script = {{{.action = fieldbus::FaultAction::corrupt,
+                      .bus = "axes_1_3",
+                      .id = 0x201,
+                      .mask = 0x7FF,
+                      .from_ns = from_ns,
+                      .receiver = "axis_1",
+                      .flips = {{.byte = 0, .bit = 0}, {.byte = 0, .bit = 3}}}}};
+  options.device_faults = {"axis_1:runaway=0.5@" + std::to_string(1e-9 * static_cast<double>(from_ns)) + "s"};
+  ClosedLoopRig rig(options);
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::drive_deviates);
+  EXPECT_EQ(rig.fault().where, 0);
+  EXPECT_TRUE(rig.cycle->supervisor().cuts_power());
+  EXPECT_LE(rig.fault().cycle, static_cast<std::uint64_t>(cycle) + 25);
+  const double way_m = way_from(rig, static_cast<std::size_t>(cycle));
+  std::printf("the steel goes %.1f mm after the drives were to switch off\n", 1e3 * way_m);
+  EXPECT_LT(way_m, 0.02) << "it was 0.35 m in the second after which drive_not_disabled ended it";
+}
+
+// The story: the record of a stop of category 0 ended with steel at 1 m/s.
+TEST(ClosedLoopSupervision, RecordsTheWayOfAnArmWhosePowerWasCut) {
+  ClosedLoopRig rig({.device_faults = {"axis_1:runaway=1@1.9s"}, .scene = "scenes/free.yaml"});
+  rig.run();
+  ASSERT_EQ(rig.fault().reaction, Reaction::stop_0);
+  const auto stop = static_cast<std::size_t>(rig.fault().cycle);
+  EXPECT_GE(rig.records.size(), stop + 200) << "a fifth of a second of standing encoders";
+  EXPECT_LE(rig.records.size(), stop + 1010);
+  const Vec3 last = rig.truths.back().X_WT.translation(), rest = rig.far_end.truth().X_WT.translation();
+  EXPECT_LT((rest - last).norm(), 2e-3) << "what the gears still swing";
+  for (std::size_t k = stop + 1; k < rig.records.size(); ++k) {
+    EXPECT_TRUE(rig.records[k].has(RecordFlag::power_cut));
+  }
+}
+
 TEST(ClosedLoopSupervision, ReplaysNothingItWasNotAskedFor) {
   RigOptions options{.duration_s = 1.0};
   options.commands = {{100 * ms, {Order::resume}},
