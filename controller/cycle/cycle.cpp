@@ -152,6 +152,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record.set(RecordFlag::sample_held, !measured.sample_is_new);
   record.set(RecordFlag::overrun, overruns_in_a_row_ > 0);
   record.set(RecordFlag::timestep, timestep_.under_way());
+  record.set(RecordFlag::power_cut, supervisor_.cuts_power());
   for (const LimitFlag& flag : limit_flags) record.set(flag.flag, motion_->active().has(flag.limit));
   record.limited_axes = motion_->active().axes;
   record.fault = supervisor_.report().fault;

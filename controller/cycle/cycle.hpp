@@ -113,6 +113,7 @@ class Cycle {
     bool yields = false;        // stopped because of a force, the arm backs off from what presses
     bool yielded = false;       // it has done so
     std::int64_t yields_since_ns = 0;
+    std::int64_t moved_ns = 0;  // when a joint of an arm without power last moved
   };
 
   // cycle.cpp: the stages
@@ -139,6 +140,7 @@ class Cycle {
   void yield(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool may_yield() const noexcept;
   void await_disabled(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] bool runs_down(std::int64_t t_k_ns) noexcept;
   void await_reset(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] MotionCycle motion_cycle() noexcept;
   [[nodiscard]] double in_phase_s(std::int64_t t_k_ns) const noexcept;

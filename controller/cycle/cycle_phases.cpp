@@ -1,4 +1,5 @@
 // What each phase of a session does, and what it does when it begins.
+#include <algorithm>
 #include <bit>
 
 #include "controller/cycle/cycle.hpp"
@@ -8,6 +9,9 @@ namespace {
 
 // How long the drives may take to switch off before the session ends with Fault::drive_not_disabled.
 constexpr std::int64_t disable_timeout_ns = 1'000'000'000;
+// An arm without power stands when no encoder has been faster than this for as long.
+constexpr double standing_rad_per_s = 0.01;
+constexpr std::int64_t standing_ns = 200'000'000;
 // A yield of 20 mm at 0.05 m/s takes 0.5 s, the acceleration included; this is twice as long.
 constexpr std::int64_t longest_yield_ns = 1'000'000'000;
 // The tool stays slow until this time after the last fault with the reaction `slow`.
@@ -37,11 +41,11 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
   }
 }
 
-// After stop_0 the drives lose power at once (goal `none`); otherwise they ramp down by themselves.
+// After stop_0, or where a stop has become one, the drives lose power at once (goal `none`) and get none again;
+// otherwise they ramp down by themselves.
 fieldbus::DriveGoal Cycle::goal_in(Phase phase) const noexcept {
   if (phase < Phase::disabling) return fieldbus::DriveGoal::operation_enabled;
-  const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == Reaction::stop_0;
-  return phase == Phase::disabling && at_once ? fieldbus::DriveGoal::none : fieldbus::DriveGoal::switched_off;
+  return supervisor_.cuts_power() ? fieldbus::DriveGoal::none : fieldbus::DriveGoal::switched_off;
 }
 
 void Cycle::act(std::int64_t t_k_ns) noexcept {
@@ -151,14 +155,22 @@ bool Cycle::may_yield() const noexcept {
 }
 
 void Cycle::await_disabled(std::int64_t t_k_ns) noexcept {
-  const bool off = bus_.drives_off();
-  if (!off) {
-    if (t_k_ns - state_.phase_since_ns <= disable_timeout_ns) return;
-    alarm_.raise(Fault::drive_not_disabled, bus_.first_drive_on());
-  }
+  bus_.request(goal_in(Phase::disabling));  // which may have become another one meanwhile
+  const bool off = bus_.drives_off(), in_time = t_k_ns - state_.phase_since_ns <= disable_timeout_ns;
+  if (in_time && (!off || runs_down(t_k_ns))) return;
+  if (!off) alarm_.raise(Fault::drive_not_disabled, bus_.first_drive_on());
   const bool waits = supervisor_.faulted() && settings_.wait_after_fault_s > 0.0 && off &&
                      !recorder_.entry().stop_requested && motion_->can_hold();
   supervisor_.handle(waits ? Event::wait : Event::disabled);
+}
+
+// Whether an arm whose power was cut still moves, by its encoders, or did a moment ago: brakes and gears take their
+// time, and the record goes on meanwhile.
+bool Cycle::runs_down(std::int64_t t_k_ns) noexcept {
+  if (!supervisor_.cuts_power()) return false;
+  const double most_rad = standing_rad_per_s * settings_.period_s;
+  if (measurement_.now().jump_rad.cwiseAbs().maxCoeff() > most_rad) state_.moved_ns = t_k_ns;
+  return t_k_ns - std::max(state_.moved_ns, state_.phase_since_ns) <= standing_ns;
 }
 
 void Cycle::await_reset(std::int64_t t_k_ns) noexcept {

@@ -108,6 +108,7 @@ void Cycle::start_freeing(const Command& command) noexcept {
 
 void Cycle::reset() noexcept {
   past_faults_.add(supervisor_.report());
+  if (supervisor_.escalation().fault != Fault::none) past_faults_.add(supervisor_.escalation());
   supervisor_.reset();
   bus_.forget_faults();
   faults_.forget(bus_.status());

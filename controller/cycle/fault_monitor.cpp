@@ -12,21 +12,36 @@ constexpr std::uint32_t late_sample = 16, late_limit = 8 * late_sample;
 // An encoder may seem faster than its joint by this factor. Gears that oscillate make it a little faster.
 constexpr double implausible_speeds = 4.0;
 
+// Whether the drive gives torque: it follows, or it brakes by itself.
+bool has_power(fieldbus::DriveState state) noexcept {
+  return state == fieldbus::DriveState::operation_enabled || state == fieldbus::DriveState::quick_stop_active ||
+         state == fieldbus::DriveState::fault_reaction_active;
+}
+
+bool is_faulty(fieldbus::DriveState state) noexcept {
+  return state == fieldbus::DriveState::fault || state == fieldbus::DriveState::fault_reaction_active;
+}
+
+std::uint8_t bit_of(std::size_t drive) noexcept { return static_cast<std::uint8_t>(1u << drive); }
+
 }  // namespace
 
 void FaultMonitor::judge_encoders(const Measured& measured, Phase entered) noexcept {
-  judge_joints(measured, entered);
-  judge_following(measured, entered);
-  judge_tool(measured, entered);
+  // Once the power was cut there is nothing left that a drive could be told.
+  const bool cut = entered == Phase::disabling && supervisor_.cuts_power();
+  const Phase judged = cut ? Phase::faulted : entered;
+  judge_joints(measured, judged);
+  judge_following(measured, judged);
+  judge_tool(measured, judged);
 }
 
 void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcept {
-  if (entered < Phase::taring || entered > Phase::stopping) return;
+  if (entered < Phase::taring || entered > Phase::disabling) return;
   for (Eigen::Index i = 0; i < measured.axes(); ++i) {
-    if ((measured.fresh & 1u << i) == 0) continue;
+    const fieldbus::CyclicDrive& drive = drives_[static_cast<std::size_t>(i)].drive;
+    if ((measured.fresh & 1u << i) == 0 || (entered == Phase::disabling && !has_power(drive.state()))) continue;
     const double T = settings_.period_s;
     const double cycles = 1.0 + measured.unheard_cycles[i] + 2.0 * measured.feedback_period_s[i] / T;
-    const fieldbus::CyclicDrive& drive = drives_[static_cast<std::size_t>(i)].drive;
     const double most_rad = implausible_speeds * drive.description().max_speed_rad_per_s * T * cycles;
     const double jump_rad = std::abs(measured.jump_rad[i]);
     if (jump_rad > most_rad) {
@@ -35,16 +50,22 @@ void FaultMonitor::judge_joints(const Measured& measured, Phase entered) noexcep
   }
 }
 
-// A drive is judged from when it takes setpoints.
+// A drive is judged from when it has power until it says that it is off. What takes no setpoints brakes by itself.
 void FaultMonitor::judge_following(const Measured& measured, Phase entered) noexcept {
   if (!drives_follow_) return;
-  const bool judged = entered >= Phase::enabling && entered <= Phase::stopping;
+  std::uint8_t following = 0, braking = 0;
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    if (entered < Phase::enabling || entered > Phase::disabling || !has_power(drives_[i].drive.state())) continue;
+    const bool follows = entered != Phase::disabling && (measured.following & bit_of(i)) != 0;
+    (follows ? following : braking) |= bit_of(i);
+  }
   const DriveReports now{.reported_rad = measured.motor_rad,
                          .link_rad = measured.link_rad,
                          .setpoint_rad = measured.drive_target_rad,
                          .feedback_period_s = measured.feedback_period_s,
                          .fresh = measured.fresh,
-                         .following = judged ? measured.following : std::uint8_t{0},
+                         .following = following,
+                         .braking = braking,
                          .hand_W = measured.hand_W};
   const bool waits = entered == Phase::rendering || entered == Phase::freeing;
   const DriveVerdict verdict = drives_follow_->step(now, waits, settings_.period_s);
@@ -53,7 +74,7 @@ void FaultMonitor::judge_following(const Measured& measured, Phase entered) noex
 
 void FaultMonitor::judge_tool(const Measured& measured, Phase entered) noexcept {
   if (!tool_) return;
-  if (entered < Phase::rendering || entered > Phase::stopping) return tool_->start();
+  if (entered < Phase::taring || entered > Phase::disabling) return tool_->start();
   const ToolVerdict verdict = tool_->step(measured.tool_W, measured.elbow_moved_m, settings_.period_s);
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, -1, verdict.value, verdict.limit);
 }
@@ -117,7 +138,9 @@ void FaultMonitor::judge_buses(std::span<const fieldbus::BusStatus> buses) noexc
 }
 
 void FaultMonitor::judge_drives(bool telling) noexcept {
-  if (supervisor_.phase() >= Phase::disabling) return;
+  if (supervisor_.phase() > Phase::disabling) return;
+  if (supervisor_.phase() == Phase::disabling) return judge_switching_off();
+  state_.faulty = 0;
   for (std::size_t i = 0; i < drives_.size(); ++i) {
     const fieldbus::CyclicDrive& drive = drives_[i].drive;
     const auto where = static_cast<std::int32_t>(i);
@@ -127,6 +150,16 @@ void FaultMonitor::judge_drives(bool telling) noexcept {
       alarm_.raise(Fault::feedback_late, where, drive.cycles_without_tpdo() + 1.0, settings_.max_missed_feedback);
     }
     judge_drive_fault(where, drive.fault());
+    if (is_faulty(drive.state())) state_.faulty |= bit_of(i);
+  }
+}
+
+// Drives that are told to switch off may fall silent or leave operation; one that reports a fault then is a fault.
+void FaultMonitor::judge_switching_off() noexcept {
+  for (std::size_t i = 0; i < drives_.size(); ++i) {
+    if (!is_faulty(drives_[i].drive.state()) || (state_.faulty & bit_of(i)) != 0) continue;
+    state_.faulty |= bit_of(i);
+    if (!supervisor_.cuts_power()) alarm_.raise(Fault::drive_fault, static_cast<std::int32_t>(i));
   }
 }
 

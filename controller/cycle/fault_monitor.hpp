@@ -89,6 +89,7 @@ class FaultMonitor {
   struct State {
     std::uint32_t missed_samples = 0;                         // in a row
     std::uint32_t late_score = 0;                             // see the file's head
+    std::uint8_t faulty = 0;                                  // drives that report a fault, and have been judged for it
     std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count as a fault
   };
 
@@ -100,6 +101,7 @@ class FaultMonitor {
   void judge_standstill(const JudgedCycle& cycle) noexcept;
   void judge_buses(std::span<const fieldbus::BusStatus> buses) noexcept;
   void judge_drives(bool telling) noexcept;
+  void judge_switching_off() noexcept;
   void judge_drive_fault(std::int32_t where, fieldbus::DriveFault fault) noexcept;
   void judge_sensor(const JudgedCycle& cycle) noexcept;
   void judge_sample(const JudgedCycle& cycle) noexcept;

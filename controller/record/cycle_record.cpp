@@ -54,6 +54,8 @@ const char* flag_name(RecordFlag flag) noexcept {
       return "limit_joint_torque";
     case RecordFlag::oscillation:
       return "oscillation";
+    case RecordFlag::power_cut:
+      return "power_cut";
     case RecordFlag::timestep:
       return "timestep";
     case RecordFlag::guard_speed:

@@ -77,6 +77,7 @@ struct FaultSummary {
   std::uint64_t cycle = 0;
   std::string text;  // describe()
   bool was_reset = false;
+  Fault escalation = Fault::none;  // what made a stop of category 0 of its stop; none: nothing did
 };
 
 // What was there without a stop: carried on, slowed down for, or held for.

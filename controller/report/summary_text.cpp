@@ -20,6 +20,7 @@ Json faults(const Summary& summary) {
                     {"cycle", fault.cycle},
                     {"text", fault.text},
                     {"was_reset", fault.was_reset}});
+    if (fault.escalation != Fault::none) list.back()["escalation"] = fault_name(fault.escalation);
   }
   return list;
 }

@@ -16,6 +16,11 @@ void SetpointEnvelope::step(Eigen::Index joint, double setpoint_rad, double peri
   high = std::max(s, s + kept * (high - s));
 }
 
+void SetpointEnvelope::widen(Eigen::Index joint, double down_rad, double up_rad) noexcept {
+  low_rad_[joint] -= down_rad;
+  high_rad_[joint] += up_rad;
+}
+
 double SetpointEnvelope::outside_rad(Eigen::Index joint, double angle_rad) const noexcept {
   return angle_rad - std::clamp(angle_rad, low_rad_[joint], high_rad_[joint]);
 }

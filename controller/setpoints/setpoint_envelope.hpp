@@ -30,6 +30,8 @@ class SetpointEnvelope {
 
   [[nodiscard]] double low_rad(Eigen::Index joint) const noexcept { return low_rad_[joint]; }
   [[nodiscard]] double high_rad(Eigen::Index joint) const noexcept { return high_rad_[joint]; }
+  // A drive that from now on brakes by itself ends further down and further up by as much as this.
+  void widen(Eigen::Index joint, double down_rad, double up_rad) noexcept;
   // How far an angle is above the upper bound (positive) or below the lower one (negative); 0 between them.
   [[nodiscard]] double outside_rad(Eigen::Index joint, double angle_rad) const noexcept;
   void archive(fieldbus::StateArchive& state) noexcept { state(low_rad_, high_rad_); }

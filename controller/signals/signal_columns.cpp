@@ -61,6 +61,7 @@ constexpr std::array written_flags{RecordFlag::sample_held,
                                    RecordFlag::timestep,
                                    RecordFlag::ramp_in,
                                    RecordFlag::slowed,
+                                   RecordFlag::power_cut,
                                    RecordFlag::hands_off};
 
 void append_flags(std::string& row, const CycleRecord& record) {

@@ -28,29 +28,63 @@ DriveMonitor::DriveMonitor(const models::Arm& arm, std::vector<description::Driv
     : arm_(arm), drives_(std::move(drives)), following_error_rad_(following_error_rad) {
   const JointVector zero = JointVector::Zero(arm.axes());
   state_.last_rad = state_.away_rad = state_.away_s = state_.behind_s = state_.behind_at_rad = state_.passing_s = zero;
+  state_.setpoint_rad = state_.setpoint_rad_per_s = zero;
   envelope_.start(arm.start_rad());
 }
 
 DriveVerdict DriveMonitor::step(const DriveReports& now, bool waits, double period_s) noexcept {
   for (Eigen::Index i = 0; i < now.reported_rad.size(); ++i) {
     const auto bit = static_cast<std::uint8_t>(1u << i);
-    if ((now.following & bit) == 0) {
+    if (((now.following | now.braking) & bit) == 0) {
       state_.known &= static_cast<std::uint8_t>(~bit);
       state_.away_rad[i] = state_.behind_s[i] = 0.0;
       continue;
     }
     if ((state_.known & bit) == 0) begin(i, now);
     state_.known |= bit;
-    envelope_.step(i, now.setpoint_rad[i], period_s,
-                   following_lag_s(drives_[static_cast<std::size_t>(i)], period_s, now.feedback_period_s[i]));
-    if ((now.fresh & bit) != 0) watch(i, now, waits, period_s);
+    if ((now.braking & bit) != 0) {
+      brake(i, now, period_s);
+    } else {
+      follow(i, now, period_s);
+    }
+    if ((now.fresh & bit) != 0) watch(i, now, waits && (now.braking & bit) == 0, period_s);
   }
   const DriveVerdict away = judge_away(now, period_s);
   return away.fault != Fault::none ? away : judge_behind(now);
 }
 
+double DriveMonitor::lag_s(Eigen::Index i, const DriveReports& now, double period_s) const noexcept {
+  return following_lag_s(drives_[static_cast<std::size_t>(i)], period_s, now.feedback_period_s[i]);
+}
+
+void DriveMonitor::follow(Eigen::Index i, const DriveReports& now, double period_s) noexcept {
+  const auto bit = static_cast<std::uint8_t>(1u << i);
+  if ((state_.braking & bit) != 0) begin(i, now);
+  state_.braking &= static_cast<std::uint8_t>(~bit);
+  const double before_rad = std::exchange(state_.setpoint_rad[i], now.setpoint_rad[i]);
+  state_.setpoint_rad_per_s[i] = (now.setpoint_rad[i] - before_rad) / period_s;
+  envelope_.step(i, now.setpoint_rad[i], period_s, lag_s(i, now, period_s));
+}
+
+// From the cycle on in which it begins to brake, the envelope stays where braking ends.
+void DriveMonitor::brake(Eigen::Index i, const DriveReports& now, double period_s) noexcept {
+  const auto bit = static_cast<std::uint8_t>(1u << i);
+  if ((state_.braking & bit) != 0) return;
+  state_.braking |= bit;
+  const double a = drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2;
+  const double lags = a * lag_s(i, now, period_s), speed = state_.setpoint_rad_per_s[i];
+  const double down = std::max(0.0, lags - speed), up = std::max(0.0, lags + speed);
+  envelope_.widen(i, down * down / (2.0 * a), up * up / (2.0 * a));
+}
+
+// A drive that takes no setpoints yet is to stand where it is.
 void DriveMonitor::begin(Eigen::Index i, const DriveReports& now) noexcept {
-  envelope_.start(i, now.setpoint_rad[i]);
+  const auto bit = static_cast<std::uint8_t>(1u << i);
+  const double from_rad = (now.following & bit) != 0 ? now.setpoint_rad[i] : now.reported_rad[i];
+  envelope_.start(i, from_rad);
+  state_.braking &= static_cast<std::uint8_t>(~bit);
+  state_.setpoint_rad[i] = from_rad;
+  state_.setpoint_rad_per_s[i] = 0.0;
   state_.last_rad[i] = state_.behind_at_rad[i] = now.reported_rad[i];
   state_.away_rad[i] = state_.away_s[i] = state_.behind_s[i] = 0.0;
   state_.passing_s[i] = passing_s;

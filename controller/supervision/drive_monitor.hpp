@@ -14,6 +14,13 @@
 // of the time in which it isn't so counts against them, so that a joint that swings about its setpoints with the hand,
 // as a drive of the wrong sign does, or about which they swing, is found as well.
 //
+// A drive that brakes by itself (it is told to switch off, or has left operation) takes no setpoints any more, so they
+// are no envelope. It was within it, and at most as fast as its setpoints were within its lag τ. With ṡ the last speed
+// of the setpoints and a its deceleration (6084h, which is max_acceleration_rad_per_s2), it ends within
+//   [l − max(0, aτ − ṡ)²/2a,  h + max(0, aτ + ṡ)²/2a]
+// which stays as it is, and is judged as above for what is `away` from it. With setpoints that stood that is aτ²/2 to
+// both sides: 0.65 mrad at 30 rad/s² and 1 ms. A drive that has power and takes no setpoints yet is judged so, too.
+//
 // In the shipped scenes drives that follow are away by up to 0.024 mrad. At their torque's limit they lag, catch up and
 // overshoot. Of 400 random sessions of the tests, with hands of up to a kilonewton, two end for that reason: one whose
 // axis 5 was jammed at 0.8 rad/s for 3.4 ms and then ran past its setpoint by more than 5 mrad, and one at 4 ms in
@@ -49,6 +56,7 @@ struct DriveReports {
   const models::JointVector& setpoint_rad;  // the last one sent to each drive
   const models::JointVector& feedback_period_s;
   std::uint8_t fresh = 0, following = 0;  // drives that have answered in this cycle, and that take setpoints
+  std::uint8_t braking = 0;               // that have power, and brake by themselves or take no setpoints yet
   models::Wrench hand_W;                  // about the rendered point
 };
 
@@ -63,7 +71,7 @@ class DriveMonitor {
   // Precondition: `arm` outlives this object.
   DriveMonitor(const models::Arm& arm, std::vector<description::DriveDescription> drives, double following_error_rad);
 
-  // To be called in each cycle in which drives may take setpoints. `waits`: setpoints may be waiting for a joint (the
+  // To be called in each cycle in which drives may have power. `waits`: setpoints may be waiting for a joint (the
   // arm is rendering or being freed), so a joint that is behind is blocked.
   DriveVerdict step(const DriveReports& now, bool waits, double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -79,10 +87,16 @@ class DriveMonitor {
     models::JointVector behind_s;       // for how long |d| is more than ε/2, from ...
     models::JointVector behind_at_rad;  // ... one place
     models::JointVector passing_s;      // since |d| was more than ε/2
-    std::uint8_t known = 0;             // drives that have been followed up to now
+    models::JointVector setpoint_rad;   // the one before
+    models::JointVector setpoint_rad_per_s;
+    std::uint8_t known = 0;    // drives that have been judged up to now
+    std::uint8_t braking = 0;  // of these, those that brake
   };
 
   void begin(Eigen::Index i, const DriveReports& now) noexcept;
+  void follow(Eigen::Index i, const DriveReports& now, double period_s) noexcept;
+  void brake(Eigen::Index i, const DriveReports& now, double period_s) noexcept;
+  [[nodiscard]] double lag_s(Eigen::Index i, const DriveReports& now, double period_s) const noexcept;
   void watch(Eigen::Index i, const DriveReports& now, bool waits, double period_s) noexcept;
   [[nodiscard]] DriveVerdict judge_away(const DriveReports& now, double period_s) noexcept;
   [[nodiscard]] DriveVerdict judge_behind(const DriveReports& now) noexcept;

@@ -8,7 +8,7 @@ namespace proxarm::controller {
 namespace {
 
 constexpr const char* stopped = "the arm made a controlled stop and the drives were switched off";
-constexpr const char* at_once = "the drives were switched off at once, and the brakes have stopped the arm";
+constexpr const char* at_once = "the drives were switched off at once; the brakes are to stop the arm";
 constexpr const char* held =
     "the arm made a controlled stop, was held there for supervision.hold_s, and the drives were switched off";
 constexpr const char* still = "the arm had not begun to move, and the drives were switched off";
@@ -162,6 +162,21 @@ const char* did(const FaultText& text, Reaction reaction) noexcept {
   return reaction == Reaction::stop_0 ? at_once : reaction == Reaction::hold ? held : stopped;
 }
 
+// The fault, where and when, and what was seen.
+std::string seen(const FaultReport& report, const std::string& where) {
+  const FaultText& text = text_of(report.fault);
+  std::string line = text.name;
+  if (!where.empty()) line += " (" + where + ")";
+  line += ": ";
+  line += text.cause;
+  if (text.unit != nullptr) {
+    std::array<char, 96> figures{};
+    std::snprintf(figures.data(), figures.size(), " (%.4g %s, limit %.4g)", report.value, text.unit, report.limit);
+    line += figures.data();
+  }
+  return line + " at cycle " + std::to_string(report.cycle);
+}
+
 constexpr std::array reaction_names{"continue", "slow", "hold", "stop_1", "stop_0"};
 
 }  // namespace
@@ -187,18 +202,14 @@ Reactions reactions_of(const description::SupervisionDescription& supervision) {
 
 std::string describe(const FaultReport& report, const std::string& where, bool drives_off) {
   const FaultText& text = text_of(report.fault);
-  std::string line = text.name;
-  if (!where.empty()) line += " (" + where + ")";
-  line += ": ";
-  line += text.cause;
-  if (text.unit != nullptr) {
-    std::array<char, 96> figures{};
-    std::snprintf(figures.data(), figures.size(), " (%.4g %s, limit %.4g)", report.value, text.unit, report.limit);
-    line += figures.data();
-  }
-  line += " at cycle " + std::to_string(report.cycle) + "; " + (drives_off ? did(text, report.reaction) : unconfirmed) +
-          "; " + text.advice;
-  return line;
+  return seen(report, where) + "; " + (drives_off ? did(text, report.reaction) : unconfirmed) + "; " + text.advice;
+}
+
+std::string describe(const FaultReport& report, const std::string& where, const FaultReport& escalation,
+                     const std::string& where_then, bool drives_off) {
+  return seen(report, where) + "; the arm began to stop, and then " + seen(escalation, where_then) + "; " +
+         (drives_off ? at_once : unconfirmed) + "; " + text_of(escalation.fault).advice + "; " +
+         text_of(report.fault).advice;
 }
 
 }  // namespace proxarm::controller

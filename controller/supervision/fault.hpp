@@ -94,5 +94,8 @@ Reactions reactions_of(const description::SupervisionDescription& supervision);
 // Describes the cause, what the arm did, and what to do, in one line. `where`: the name of the drive, joint or bus.
 // `drives_off`: every drive has confirmed that it is switched off.
 std::string describe(const FaultReport& report, const std::string& where, bool drives_off = true);
+// The same where another fault made a stop of category 0 of the stop that was under way.
+std::string describe(const FaultReport& report, const std::string& where, const FaultReport& escalation,
+                     const std::string& where_then, bool drives_off);
 
 }  // namespace proxarm::controller

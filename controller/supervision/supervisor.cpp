@@ -36,6 +36,7 @@ constexpr std::array table{
     Transition{Phase::freeing, Event::fault_off, Phase::disabling},
     Transition{Phase::stopping, Event::at_rest, Phase::disabling},
     Transition{Phase::stopping, Event::fault_off, Phase::disabling},
+    Transition{Phase::disabling, Event::fault_off, Phase::disabling},
     Transition{Phase::disabling, Event::disabled, Phase::done},
     Transition{Phase::disabling, Event::wait, Phase::faulted},
     Transition{Phase::faulted, Event::reset, Phase::enabling},
@@ -47,6 +48,34 @@ constexpr std::array phases{"idle",    "enabling", "taring",    "rendering", "ho
 constexpr std::array events{"begin", "enabled", "reenabled", "tared",   "hold",     "resume", "free", "freed",
                             "stop",  "fault",   "fault_off", "at_rest", "disabled", "wait",   "reset"};
 static_assert(phases.size() == phase_count && events.size() == event_count);
+
+// Whether a drive moves as nobody told it to.
+bool is_astray(Fault fault) noexcept {
+  return fault == Fault::drive_deviates || fault == Fault::position_implausible || fault == Fault::tool_too_fast ||
+         fault == Fault::elbow_too_fast;
+}
+
+// Whether drives go into their own fault for it: theirs is no second one then, and their own ramps stop them.
+bool makes_drives_faulty(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::drive_silent:
+    case Fault::drive_fault:
+    case Fault::drive_disabled:
+    case Fault::drive_not_enabled:
+    case Fault::modbus_silent:
+    case Fault::timestep_unknown:
+    case Fault::bus_off:
+    case Fault::send_failed:
+    case Fault::receive_overflow:
+    case Fault::overrun:
+    case Fault::second_master:
+    case Fault::error_passive:
+    case Fault::interface_down:
+      return true;
+    default:
+      return false;
+  }
+}
 
 }  // namespace
 
@@ -79,10 +108,25 @@ void Supervisor::note(const FaultReport& report) noexcept {
   notice.last = report.cycle + 1;
 }
 
-void Supervisor::raise(FaultReport report) noexcept {
-  Reaction reaction = reactions_[static_cast<std::size_t>(report.fault)];
+// While the arm stops, no drive may move as it likes: power is cut. A drive that only reports a fault while the others
+// still brake is no reason, unless something else had gone wrong before.
+bool Supervisor::escalates(Fault fault) const noexcept {
+  if (fault == Fault::drive_fault) {
+    const bool second = faulted() || phase_ == Phase::disabling;
+    return (phase_ == Phase::stopping || phase_ == Phase::disabling) && second && !makes_drives_faulty(report_.fault);
+  }
+  return phase_ == Phase::disabling && is_astray(fault);
+}
+
+Reaction Supervisor::reaction_now(Fault fault) const noexcept {
+  if (escalates(fault)) return Reaction::stop_0;
+  const Reaction reaction = reactions_[static_cast<std::size_t>(fault)];
   // In this phase the arm can't be held, because the drives aren't enabled.
-  if (reaction == Reaction::hold && !live()) reaction = Reaction::stop_1;
+  return reaction == Reaction::hold && !live() ? Reaction::stop_1 : reaction;
+}
+
+void Supervisor::raise(FaultReport report) noexcept {
+  const Reaction reaction = reaction_now(report.fault);
   report.reaction = reaction;
   note(report);
   if (reaction == Reaction::slow) slow_end_ = report.cycle + 1;
@@ -91,7 +135,11 @@ void Supervisor::raise(FaultReport report) noexcept {
     handle(Event::hold);
   }
   if (reaction < Reaction::stop_1) return;
-  if (report_.fault == Fault::none) report_ = report;
+  if (report_.fault == Fault::none) {
+    report_ = report;
+  } else if (reaction == Reaction::stop_0 && !cuts_power()) {
+    escalation_ = report;
+  }
   handle(reaction == Reaction::stop_0 ? Event::fault_off : Event::fault);
 }
 
@@ -122,7 +170,7 @@ void Supervisor::rescale(std::uint64_t cycle, double ratio) noexcept {
 
 bool Supervisor::reset() noexcept {
   if (!handle(Event::reset)) return false;
-  report_ = held_for_ = {};
+  report_ = escalation_ = held_for_ = {};
   slow_end_ = 0;
   return true;
 }

@@ -9,7 +9,9 @@
 //                                  freeing
 //
 // A fault acts by its reaction (fault.hpp). A stop latches the fault: the first one is kept and reported, and only a
-// reset leads back, into a hold. Faults with the reactions `continue`, `slow` and `hold` are counted.
+// reset leads back, into a hold. A drive that goes astray while the arm stops, or has stopped and its drives aren't off
+// yet, makes a stop of category 0 of it: the first fault stays the report's, and the second is the escalation. Faults
+// with the reactions `continue`, `slow` and `hold` are counted.
 #pragma once
 
 #include <array>
@@ -82,7 +84,13 @@ class Supervisor {
     return phase_ == Phase::rendering || phase_ == Phase::holding || phase_ == Phase::freeing;
   }
   [[nodiscard]] bool faulted() const noexcept { return report_.fault != Fault::none; }
-  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }      // the fault that stopped the arm
+  [[nodiscard]] const FaultReport& report() const noexcept { return report_; }  // the fault that stopped the arm
+  // The fault for which the stop that was under way became one of category 0; none: there wasn't one.
+  [[nodiscard]] const FaultReport& escalation() const noexcept { return escalation_; }
+  // Whether the drives are to lose their power at once (stop category 0).
+  [[nodiscard]] bool cuts_power() const noexcept {
+    return escalation_.fault != Fault::none || (faulted() && report_.reaction == Reaction::stop_0);
+  }
   [[nodiscard]] const FaultReport& held_for() const noexcept { return held_for_; }  // none: it was asked for
   [[nodiscard]] Reaction reaction(Fault fault) const noexcept { return reactions_[static_cast<std::size_t>(fault)]; }
   [[nodiscard]] const Notice& notice(Fault fault) const noexcept { return notices_[static_cast<std::size_t>(fault)]; }
@@ -95,8 +103,8 @@ class Supervisor {
     return held_for_.fault != Fault::none && cycle < notice(held_for_.fault).last + cycles;
   }
 
-  // Changes the phase if transitions() has a row for this event, and ignores the event otherwise. Returns true if the
-  // phase changed.
+  // Changes the phase if transitions() has a row for this event, and ignores the event otherwise. Returns true if there
+  // was one.
   bool handle(Event event) noexcept;
   // Applies the fault's reaction.
   void raise(FaultReport report) noexcept;
@@ -114,7 +122,7 @@ class Supervisor {
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(phase_, slow_end_);
-    for (FaultReport* report : {&report_, &held_for_}) {
+    for (FaultReport* report : {&report_, &escalation_, &held_for_}) {
       state(report->fault, report->where, report->cycle, report->value, report->limit, report->reaction);
     }
     for (Notice& notice : notices_) state(notice.times, notice.cycles, notice.last);
@@ -122,10 +130,12 @@ class Supervisor {
 
  private:
   void note(const FaultReport& report) noexcept;
+  [[nodiscard]] bool escalates(Fault fault) const noexcept;
+  [[nodiscard]] Reaction reaction_now(Fault fault) const noexcept;
 
   Reactions reactions_;
   Phase phase_ = Phase::idle;
-  FaultReport report_, held_for_;
+  FaultReport report_, escalation_, held_for_;
   std::uint64_t slow_end_ = 0;  // the last cycle with a fault that slows, plus one; 0: none
   std::array<Notice, fault_count> notices_{};
 };

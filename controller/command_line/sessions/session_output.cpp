@@ -318,6 +318,23 @@ void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& fr
   if (writer_) writer_->add_frame(bus, frame, time_ns);
 }
 
+// What ended the session. A drive that doesn't confirm that it is off is told of by what a fault's text says then.
+controller::FaultSummary SessionOutput::final_fault(const controller::Cycle& cycle) const {
+  const auto place = [&](const controller::FaultReport& r) { return place_of(r, cycle.parts(), session_.cell); };
+  const controller::FaultReport& report = cycle.supervisor().report();
+  const controller::FaultReport& then = cycle.supervisor().escalation();
+  controller::FaultSummary fault;
+  fault.fault = report.fault;
+  fault.cycle = report.cycle;
+  if (then.fault == Fault::none || then.fault == Fault::drive_not_disabled) {
+    fault.text = describe(report, place(report), cycle.drives_off());
+  } else {
+    fault.text = describe(report, place(report), then, place(then), cycle.drives_off());
+    fault.escalation = then.fault;
+  }
+  return fault;
+}
+
 Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end, const EndingCause& cause) {
   Summary summary = builder_.finish();
   summary.end = end_summary(end, cause, session_, summary.rendered_time_s);
@@ -338,8 +355,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
   }
   const controller::FaultReport& report = cycle.supervisor().report();
   if (report.fault != Fault::none) {
-    summary.faults.push_back({report.fault, report.cycle,
-                              describe(report, place_of(report, cycle.parts(), session_.cell), cycle.drives_off())});
+    summary.faults.push_back(final_fault(cycle));
     const std::string& brakes = session_.cell.supervision.brake_release;
     if (!brakes.empty()) summary.faults.back().text += "; somebody pinned: open the brakes by " + brakes;
   }

@@ -47,6 +47,7 @@ class SessionOutput {
   int finish(controller::Summary summary, BlackBoxKeeper& keeper);
 
  private:
+  [[nodiscard]] controller::FaultSummary final_fault(const controller::Cycle& cycle) const;
   void refuse_lost_plot() const;
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);

@@ -387,6 +387,146 @@ TEST(ClosedLoopSupervision, StopsBackingOffIntoAHandThatResists) {
   EXPECT_LT(f.force_max_N, f.force_before_N + Release::resisted_N + 10.0);
 }
 
+// From a cycle on: how far the steel goes until it rests, and its last speed in the record.
+double way_from(ClosedLoopRig& rig, std::size_t k) {
+  double way_m = 0.0;
+  const Vec3 from = rig.truths[k].X_WT.translation();
+  for (; k < rig.truths.size(); ++k) way_m = std::max(way_m, (rig.truths[k].X_WT.translation() - from).norm());
+  return std::max(way_m, (rig.far_end.truth().X_WT.translation() - from).norm());
+}
+
+// The leash alone notices it, since a drive that follows may be 0.2 rad off.
+RigOptions runs_off_on_a_long_leash() {
+  RigOptions options{.device_faults = {"axis_1:runaway=1.5@1.2s"}, .scene = "scenes/free.yaml"};
+  options.edit_cell = [](description::Cell& cell) { cell.limits.following_error_rad = 0.2; };
+  return options;
+}
+
+// The story: where nothing but the leash noticed a drive that ran off, the stop began and ended in two cycles, since
+// all setpoints stood; the drives were told to ramp down, nobody looked at them any more, and the steel went 74 mm
+// further, from 1.0 to 1.6 m/s.
+TEST(ClosedLoopSupervision, CutsThePowerOfADriveThatGoesOnRunningOffWhileTheArmStops) {
+  ClosedLoopRig rig(runs_off_on_a_long_leash());
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::leash_exceeded) << "the cause";
+  EXPECT_EQ(rig.fault().reaction, Reaction::stop_1);
+  const FaultReport& then = rig.cycle->supervisor().escalation();
+  EXPECT_TRUE(then.fault == Fault::tool_too_fast || then.fault == Fault::elbow_too_fast) << fault_name(then.fault);
+  const auto stop = static_cast<std::size_t>(rig.fault().cycle), cut = static_cast<std::size_t>(then.cycle);
+  EXPECT_LE(cut, stop + 5);
+  ASSERT_LT(cut + 1, rig.records.size());
+  EXPECT_FALSE(rig.records[stop].has(RecordFlag::power_cut));
+  EXPECT_TRUE(rig.records[cut].has(RecordFlag::power_cut));
+  const double way_m = way_from(rig, stop);
+  std::printf("the steel goes %.1f mm after the stop began\n", 1e3 * way_m);
+  // At 1.05 m/s it swings out on its gears, whose first mode is at 16 Hz: v/ω is 11 mm.
+  EXPECT_LT(way_m, 0.03);
+  EXPECT_TRUE(rig.cycle->drives_off());
+}
+
+// A drive that heeds no shutdown (0006h reaches it as 000Fh), and runs off instead, in a session that was to end.
+TEST(ClosedLoopSupervision, CutsThePowerOfADriveThatRunsOffInsteadOfSwitchingOff) {
+  RigOptions options{.duration_s = 1.43, .scene = "scenes/free.yaml"};
+  ClosedLoopRig without(options);
+  without.run();
+  const auto cycle = static_cast<std::int64_t>(first_in(without, Phase::disabling));
+  const std::int64_t from_ns = without.first_cycle_ns + ms * cycle;
+  options.script = {{{.action = fieldbus::FaultAction::corrupt,
+                      .bus = "axes_1_3",
+                      .id = 0x201,
+                      .mask = 0x7FF,
+                      .from_ns = from_ns,
+                      .receiver = "axis_1",
+                      .flips = {{.byte = 0, .bit = 0}, {.byte = 0, .bit = 3}}}}};
+  options.device_faults = {"axis_1:runaway=0.5@" + std::to_string(1e-9 * static_cast<double>(from_ns)) + "s"};
+  ClosedLoopRig rig(options);
+  rig.run();
+  EXPECT_EQ(rig.fault().fault, Fault::drive_deviates);
+  EXPECT_EQ(rig.fault().where, 0);
+  EXPECT_TRUE(rig.cycle->supervisor().cuts_power());
+  EXPECT_LE(rig.fault().cycle, static_cast<std::uint64_t>(cycle) + 25);
+  const double way_m = way_from(rig, static_cast<std::size_t>(cycle));
+  std::printf("the steel goes %.1f mm after the drives were to switch off\n", 1e3 * way_m);
+  EXPECT_LT(way_m, 0.02) << "it was 0.52 m until, after a second, drive_not_disabled ended it";
+}
+
+// What the simulated axis 1 does from a time since power on, in a session that would do nothing else.
+struct RunsOff {
+  const char* when;
+  RigOptions options;
+  std::string fault;  // without its time
+  double at_s;        // since power on
+  Fault first, then;
+};
+
+double steel_goes(const RunsOff& row) {
+  RigOptions options = row.options;
+  options.device_faults = {row.fault + "@" + std::to_string(row.at_s) + "s"};
+  ClosedLoopRig rig(options);
+  rig.run();
+  EXPECT_STREQ(fault_name(rig.fault().fault), fault_name(row.first));
+  EXPECT_STREQ(fault_name(rig.cycle->supervisor().escalation().fault), fault_name(row.then));
+  EXPECT_TRUE(rig.cycle->supervisor().cuts_power());
+  const double way_m = way_from(rig, rig.cycle_at(row.at_s));
+  std::printf("%s, %s: the steel goes %.1f mm\n", row.when, row.fault.c_str(), 1e3 * way_m);
+  return way_m;
+}
+
+RigOptions presses_too_hard() {
+  RigOptions options{.duration_s = 6.0};
+  options.edit_cell = [](description::Cell& cell) { cell.limits.max_force_N = 40.0; };
+  options.edit_hand = [](description::HandDescription& hand) {
+    hand.stiffness_N_per_m = 500.0;
+    hand.damping_Ns_per_m = 20.0;
+    hand.multisine.clear();
+    hand.waypoints = {{0.4, {0, 0, 0}}, {2.4, {0.2, 0, 0}}, {4.4, {0.32, 0, 0}}};
+  };
+  return options;
+}
+
+// When a session first is in a phase, since power on.
+double begins_s(const RigOptions& options, Phase phase) {
+  ClosedLoopRig rig(options);
+  rig.run();
+  const std::size_t k = first_in(rig, phase);
+  EXPECT_LT(k, rig.records.size());
+  return 1e-9 * static_cast<double>(rig.first_cycle_ns) + 1e-3 * static_cast<double>(k);
+}
+
+// The story: what began as another stop (the handle's inertia was force_at_start) went on as one, and the steel did 1.7
+// to 1.9 m/s when the record ended. It had gone 73 mm while the drives were enabled, 40 while the sensor was tared, 44
+// while the arm stopped and 64 while it backed off.
+TEST(ClosedLoopSupervision, CutsThePowerOfADriveThatRunsOffWhereTheArmIsToStandOrStops) {
+  using enum Fault;
+  const RigOptions free{.duration_s = 1.5, .scene = "scenes/free.yaml"}, presses = presses_too_hard();
+  const double stops_s = begins_s(free, Phase::stopping), yields_s = begins_s(presses, Phase::stopping) + 0.06;
+  for (const RunsOff& row :
+       {RunsOff{"enabling", free, "axis_1:runaway=1.5", 0.21, force_at_start, drive_deviates},
+        RunsOff{"enabling", free, "axis_1:offset=20mrad", 0.21, drive_deviates, none},
+        RunsOff{"taring", free, "axis_1:runaway=1.5", 0.3, force_at_start, drive_deviates},
+        RunsOff{"stopping", free, "axis_1:runaway=1.5", stops_s + 0.002, drive_deviates, none},
+        RunsOff{"backing off", presses, "axis_1:runaway=1.5", yields_s, force_excessive, drive_deviates}}) {
+    SCOPED_TRACE(row.when);
+    // v²/2a of a drive that gets to 0.5 m/s before it is found, and as much as its gears swing.
+    EXPECT_LT(steel_goes(row), 0.02);
+  }
+}
+
+// The story: the record of a stop of category 0 ended with steel at 1 m/s.
+TEST(ClosedLoopSupervision, RecordsTheWayOfAnArmWhosePowerWasCut) {
+  ClosedLoopRig rig({.device_faults = {"axis_1:runaway=1@1.9s"}, .scene = "scenes/free.yaml"});
+  rig.run();
+  ASSERT_EQ(rig.fault().reaction, Reaction::stop_0);
+  const auto stop = static_cast<std::size_t>(rig.fault().cycle);
+  EXPECT_GE(rig.records.size(), stop + 200) << "a fifth of a second of standing encoders";
+  EXPECT_LE(rig.records.size(), stop + 1010);
+  const Vec3 last = rig.truths.back().X_WT.translation(), rest = rig.far_end.truth().X_WT.translation();
+  EXPECT_LT((rest - last).norm(), 2e-3) << "what the gears still swing";
+  for (std::size_t k = stop + 1; k < rig.records.size(); ++k) {
+    EXPECT_TRUE(rig.records[k].has(RecordFlag::power_cut));
+  }
+}
+
 TEST(ClosedLoopSupervision, ReplaysNothingItWasNotAskedFor) {
   RigOptions options{.duration_s = 1.0};
   options.commands = {{100 * ms, {Order::resume}},

@@ -594,6 +594,8 @@ void expect_row(const Row& row) {
   measured.last = rig.far_end.truth();
   const bool stops = row.reaction >= Reaction::stop_1;
   EXPECT_STREQ(fault_name(rig.fault().fault), fault_name(stops ? row.fault : Fault::none));
+  const Fault then = rig.cycle->supervisor().escalation().fault;
+  EXPECT_TRUE(then == Fault::none || then == Fault::drive_not_disabled) << fault_name(then) << ": it was a second one";
   EXPECT_GE(rig.cycle->supervisor().notice(row.fault).times, 1u);
   EXPECT_GE(measured.reacted + 1, measured.failed);
   EXPECT_LE(measured.reacted, measured.failed + row.most_cycles);

@@ -298,7 +298,9 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
     if (HasFatalFailure()) return;
     cycles += rig.records.size();
     overruns += rig.tally.overruns;
-    ends[fault_name(rig.fault().fault)].push_back(run);
+    const Fault then = rig.cycle->supervisor().escalation().fault;
+    ends[fault_name(rig.fault().fault) + (then == Fault::none ? "" : std::string(", then ") + fault_name(then))]
+        .push_back(run);
     resets += rig.cycle->past_fault_count();
     for (std::size_t k = 1; k < rig.records.size(); ++k) {
       const Phase phase = rig.records[k].phase;

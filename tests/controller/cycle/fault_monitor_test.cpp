@@ -241,14 +241,71 @@ TEST_F(FollowingTest, HoldsTheArmForADriveThatDoesNotComeToItsSetpoint) {
 }
 
 TEST_F(FollowingTest, LetsAnArmThatIsOffBeMoved) {
-  for (const Phase phase : {Phase::idle, Phase::disabling, Phase::faulted}) {
+  drives[2].its_state = fieldbus::DriveState::switched_on;
+  drives[2].follows = false;
+  for (const Phase phase : {Phase::idle, Phase::enabling, Phase::disabling, Phase::faulted}) {
     drives[2].angle_rad += 0.01;
     judge_following(phase);
   }
-  drives[2].follows = false;
-  drives[2].angle_rad += 0.01;
-  judge_following(Phase::enabling);
   EXPECT_EQ(stopped_for(), Fault::none);
+}
+
+// Before it takes setpoints, while it brakes by itself, and until it says that it is off.
+TEST_F(FollowingTest, JudgesADriveThatHasPowerAndTakesNoSetpoints) {
+  using enum fieldbus::DriveState;
+  for (const auto& [phase, state] :
+       {std::pair{Phase::enabling, operation_enabled}, std::pair{Phase::stopping, quick_stop_active},
+        std::pair{Phase::stopping, fault_reaction_active}, std::pair{Phase::disabling, operation_enabled}}) {
+    SCOPED_TRACE(phase_name(phase));
+    watched.supervisor = Supervisor();
+    watched.bring_to_rendering();
+    drives[2].its_state = state;
+    drives[2].follows = false;
+    judge_following(phase);
+    for (int k = 0; k < 40; ++k) {
+      drives[2].angle_rad += 2e-4;
+      judge_following(phase);
+    }
+    EXPECT_EQ(stopped_for(), Fault::drive_deviates);
+    drives[2].its_state = switched_on;
+    judge_following(phase);
+  }
+}
+
+TEST_F(FollowingTest, JudgesNoDriveWhosePowerWasCut) {
+  watched.supervisor.raise({Fault::tool_too_fast, -1, 1});
+  ASSERT_EQ(watched.supervisor.phase(), Phase::disabling);
+  for (int k = 0; k < 40; ++k) {
+    drives[2].angle_rad += 0.01;
+    judge_following(Phase::disabling);
+  }
+  EXPECT_EQ(watched.times(Fault::drive_deviates), 0u);
+}
+
+TEST_F(FaultMonitorTest, JudgesTheEncodersOfDrivesThatAreNotOffYet) {
+  for (const Event event : {Event::stop, Event::at_rest}) watched.supervisor.handle(event);
+  drives[0].its_state = fieldbus::DriveState::ready_to_switch_on;
+  drives[0].angle_rad += 1.0;
+  drives[1].angle_rad += 1.0;
+  measurement.take();
+  monitor.judge_encoders(measurement.now(), Phase::disabling);
+  EXPECT_EQ(watched.times(Fault::position_implausible), 1u);
+  EXPECT_EQ(watched.supervisor.report().where, 1);
+  EXPECT_TRUE(watched.supervisor.cuts_power());
+}
+
+// One that fell into its fault while the others are switched off; not one that was in it before.
+TEST_F(FaultMonitorTest, FindsADriveThatReportsAFaultWhileItIsSwitchedOff) {
+  drives[3].its_state = fieldbus::DriveState::fault;
+  judge();
+  for (const Event event : {Event::stop, Event::at_rest}) watched.supervisor.handle(event);
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::none);
+  drives[4].its_state = fieldbus::DriveState::fault_reaction_active;
+  judge();
+  EXPECT_EQ(stopped_for(), Fault::drive_fault);
+  EXPECT_EQ(watched.supervisor.report().where, 4);
+  EXPECT_TRUE(watched.supervisor.cuts_power());
 }
 
 TEST_F(FaultMonitorTest, JudgesNoEncoderOfAnArmThatIsFree) {

@@ -33,6 +33,7 @@ struct DriveMonitorTest : ::testing::Test {
                               .feedback_period_s = no_feedback_s,
                               .fresh = is_fresh(k) ? std::uint8_t{0b111111} : std::uint8_t{0b111101},
                               .following = following,
+                              .braking = t > brakes_from_s ? std::uint8_t{1u << joint} : std::uint8_t{0},
                               .hand_W = hand_W},
                              waits, period_s);
       if (verdict.fault != Fault::none) return k - 100;
@@ -45,6 +46,7 @@ struct DriveMonitorTest : ::testing::Test {
   double period_s = 1e-3;
   std::uint8_t following = 0b111111;
   bool waits = true;
+  double brakes_from_s = 1e9;  // by itself
   std::function<bool(int)> is_fresh = [](int) { return true; };
   models::Wrench hand_W;
   DriveVerdict verdict;
@@ -141,6 +143,65 @@ TEST_F(DriveMonitorTest, CallsADriveBlockedThatSetpointsPassAgainAndAgain) {
 TEST_F(DriveMonitorTest, JudgesNoDriveThatTakesNoSetpoints) {
   following = 0b111101;
   EXPECT_EQ(found_after(stands, [](double t) { return t; }), 0);
+}
+
+// Speeds up to v, and after 0.2 s brakes by itself at `share` of its deceleration, after a delay.
+struct BrakingTest : DriveMonitorTest {
+  int found_braking(double v, double share, double delay_s) {
+    const double a = cell.drives[joint].max_acceleration_rad_per_s2, up_s = std::abs(v) / a;
+    brakes_from_s = 0.2;
+    const auto led = [=](double t) {
+      const double ramp = std::min(t, up_s);
+      return t < 0.0 ? 0.0 : std::copysign(0.5 * a * ramp * ramp, v) + v * std::max(0.0, t - up_s);
+    };
+    const auto brakes = [=, from_s = brakes_from_s + delay_s](double t) {
+      if (t < from_s) return led(t);
+      const double s = std::min(t - from_s, std::abs(v) / (share * a));
+      return led(from_s) + v * s - std::copysign(0.5 * share * a * s * s, v);
+    };
+    // Its setpoints aren't heeded any more, wherever they go.
+    return found_after([=, this](double t) { return t <= brakes_from_s ? led(t) : 0.0; },
+                       [=, lag_s = delay_s](double t) { return brakes(t - lag_s); });
+  }
+};
+
+TEST_F(BrakingTest, FindsNothingInADriveThatBrakesByItselfAsItWasToldTo) {
+  for (const double T : {2.5e-4, 1e-3, 4e-3}) {
+    period_s = T;
+    const double lag_s = following_lag_s(cell.drives[joint], T, 0.0);
+    for (const double v : {0.0, 0.3, -0.3, 2.1, -2.1}) {
+      for (const double delay_s : {0.0, 0.25 * lag_s, 0.5 * lag_s}) {
+        EXPECT_EQ(found_braking(v, 1.0, delay_s), 0) << T << " s, " << v << " rad/s, " << delay_s << " s";
+        EXPECT_EQ(found_braking(v, 3.0, delay_s), 0) << "a harder ramp";
+      }
+    }
+  }
+}
+
+// Of its way v²/2a: 6 mrad more are found at once, 2 mrad in 20 ms.
+TEST_F(BrakingTest, FindsADriveThatBrakesLessThanItMust) {
+  const double a = cell.drives[joint].max_acceleration_rad_per_s2,
+               lag_s = following_lag_s(cell.drives[joint], 1e-3, 0.0);
+  for (const double v : {1.0, -1.0, 2.1}) {
+    const double way_rad = std::pow(std::abs(v) + a * lag_s, 2.0) / (2.0 * a);
+    EXPECT_EQ(found_braking(v, 0.5 * v * v / (a * (way_rad + 0.5e-3)), 0.0), 0) << v;
+    EXPECT_GT(found_braking(v, 0.5 * v * v / (a * (way_rad + 2e-3)), 0.0), 0) << v;
+    EXPECT_EQ(verdict.fault, Fault::drive_deviates);
+  }
+}
+
+TEST_F(BrakingTest, FindsADriveThatIsToStandAndGoesOffInMilliseconds) {
+  brakes_from_s = 0.0;
+  const double slack_rad = 0.5 * cell.drives[joint].max_acceleration_rad_per_s2 *
+                           std::pow(following_lag_s(cell.drives[joint], period_s, 0.0), 2.0);
+  EXPECT_NEAR(slack_rad, 0.65e-3, 0.01e-3) << "as the head says";
+  for (const double rad_per_s : {0.5, -0.5}) {
+    const int cycles = found_after(stands, [=](double t) { return rad_per_s * t; });
+    EXPECT_EQ(verdict.fault, Fault::drive_deviates);
+    EXPECT_LE(0.5 * cycles * period_s, 5e-3 + slack_rad + 2e-3);
+  }
+  EXPECT_EQ(found_after(stands, [=](double) { return 0.95 * (slack_rad + 1e-3); }), 0);
+  EXPECT_GT(found_after(stands, [=](double) { return 1.05 * (slack_rad + 1e-3); }), 0);
 }
 
 TEST_F(DriveMonitorTest, TakesMissingFeedbackAndItsCatchingUpForNothing) {

@@ -90,7 +90,7 @@ TEST(Supervisor, LeadsBackToRenderingThroughAHoldAlone) {
       EXPECT_EQ(t.to, Phase::disabling);
     }
     if (t.from == Phase::disabling) {
-      EXPECT_TRUE(t.to == Phase::done || t.to == Phase::faulted);
+      EXPECT_TRUE(t.to == Phase::done || t.to == Phase::faulted || t.to == Phase::disabling);
     }
     EXPECT_NE(t.from, Phase::done);
   }
@@ -100,6 +100,10 @@ TEST(Supervisor, LeadsBackToRenderingThroughAHoldAlone) {
       Supervisor supervisor = in_phase(phase);
       EXPECT_TRUE(supervisor.handle(event)) << phase_name(phase) << " " << event_name(event);
     }
+  }
+  // And while the arm stops, until all drives are off, power can still be cut.
+  for (const Phase phase : {Phase::stopping, Phase::disabling}) {
+    EXPECT_TRUE(in_phase(phase).handle(Event::fault_off)) << phase_name(phase);
   }
 }
 
@@ -256,10 +260,68 @@ TEST(Supervisor, NeverRendersWithoutEnablingAndTaring) {
 TEST(Supervisor, KeepsTheFirstFault) {
   Supervisor supervisor = in_rendering();
   supervisor.raise({Fault::sensor_lost, -1, 17, 4.0, 3.0});
-  supervisor.raise({Fault::drive_fault, 2, 18});
+  supervisor.raise({Fault::bus_off, 2, 18});
   EXPECT_EQ(supervisor.phase(), Phase::stopping);
   EXPECT_EQ(supervisor.report().fault, Fault::sensor_lost);
   EXPECT_EQ(supervisor.report().cycle, 17U);
+  EXPECT_EQ(supervisor.escalation().fault, Fault::none);
+}
+
+// The story: a drive ran off while the arm stopped because its tool didn't follow. The stop's second fault was noted,
+// the drives were told to ramp down as after the first, and the steel went 65 mm at 1.6 m/s.
+TEST(Supervisor, CutsThePowerWhenADriveGoesAstrayWhileTheArmStops) {
+  for (const Fault astray :
+       {Fault::drive_deviates, Fault::position_implausible, Fault::tool_too_fast, Fault::elbow_too_fast}) {
+    Supervisor supervisor = in_rendering();
+    supervisor.raise({Fault::leash_exceeded, -1, 17});
+    EXPECT_FALSE(supervisor.cuts_power());
+    supervisor.raise({astray, 0, 18});
+    EXPECT_EQ(supervisor.phase(), Phase::disabling);
+    EXPECT_TRUE(supervisor.cuts_power());
+    supervisor.raise({astray, 0, 19});
+    EXPECT_EQ(supervisor.report().fault, Fault::leash_exceeded) << "the first one is the cause";
+    EXPECT_EQ(supervisor.escalation().fault, astray);
+    EXPECT_EQ(supervisor.escalation().cycle, 18u);
+    supervisor.handle(Event::wait);
+    EXPECT_TRUE(supervisor.reset());
+    EXPECT_FALSE(supervisor.cuts_power());
+  }
+}
+
+TEST(Supervisor, CutsThePowerOfADriveThatGoesAstrayWhileItIsSwitchedOffWhateverTheCellChose) {
+  proxarm::description::SupervisionDescription cell;
+  cell.reactions = {{"drive_deviates", "stop_1"}};
+  Supervisor supervisor{reactions_of(cell)};
+  for (const Event event : {Event::begin, Event::enabled, Event::tared}) supervisor.handle(event);
+  supervisor.raise({Fault::drive_deviates, 1, 17});
+  supervisor.raise({Fault::drive_deviates, 1, 18});
+  EXPECT_EQ(supervisor.phase(), Phase::stopping) << "as the cell chose, while it can be asked to stop";
+  EXPECT_FALSE(supervisor.cuts_power());
+  supervisor.handle(Event::at_rest);
+  supervisor.raise({Fault::drive_deviates, 1, 60});
+  EXPECT_TRUE(supervisor.cuts_power());
+}
+
+// A drive's own ramp is a better stop than none, so what makes several drives faulty at once isn't counted twice.
+TEST(Supervisor, TakesADrivesFaultForASecondOneOnlyWhereTheFirstDoesNotExplainIt) {
+  const auto cut = [](Fault first) {
+    Supervisor supervisor = in_rendering();
+    supervisor.raise({first, 0, 17});
+    supervisor.raise({Fault::drive_fault, 1, 18});
+    return supervisor.cuts_power();
+  };
+  for (const Fault first : {Fault::sensor_lost, Fault::leash_exceeded, Fault::force_excessive}) {
+    EXPECT_TRUE(cut(first)) << fault_name(first);
+  }
+  for (const Fault first : {Fault::drive_fault, Fault::bus_off, Fault::overrun, Fault::second_master}) {
+    EXPECT_FALSE(cut(first)) << fault_name(first);
+  }
+  Supervisor asked = in_phase(Phase::stopping);
+  asked.raise({Fault::drive_fault, 1, 18});
+  EXPECT_FALSE(asked.cuts_power()) << "the first fault of a stop that was asked for: the others brake";
+  Supervisor off = in_phase(Phase::disabling);
+  off.raise({Fault::drive_fault, 1, 18});
+  EXPECT_TRUE(off.cuts_power()) << "the arm stands";
 }
 
 TEST(Supervisor, AFaultBeforeAnythingMovesDisablesAtOnce) {
@@ -289,6 +351,18 @@ TEST(FaultText, EveryFaultSaysCauseReactionAndAdvice) {
     const std::size_t cause = text.find(": "), did = text.find("; "), advice = text.rfind("; ");
     EXPECT_TRUE(cause < did && did < advice && advice + 10 < text.size()) << text;
   }
+}
+
+TEST(FaultText, OfAStopThatBecameOneOfCategory0TellsBothFaultsAndWhatIsKnown) {
+  const FaultReport first{Fault::leash_exceeded, -1, 100, 0.021, 0.02}, then{Fault::drive_deviates, 0, 102, 0.1, 0.02};
+  const std::string text = describe(first, "", then, "drive of axis_1", true);
+  EXPECT_EQ(text.rfind("leash_exceeded: ", 0), 0u) << text;
+  EXPECT_NE(text.find("drive_deviates (drive of axis_1): "), std::string::npos) << text;
+  EXPECT_NE(text.find("at cycle 102; the drives were switched off at once; the brakes are to stop the arm; "),
+            std::string::npos)
+      << text;
+  EXPECT_EQ(text.find("a controlled stop"), std::string::npos) << text;
+  EXPECT_NE(describe(first, "", then, "", false).find("not every drive has confirmed it"), std::string::npos);
 }
 
 TEST(FaultText, DoesNotClaimDrivesToBeOffThatHaveNotSaidSo) {
