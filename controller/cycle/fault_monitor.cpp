@@ -75,8 +75,14 @@ void FaultMonitor::judge_following(const Measured& measured, Phase entered) noex
 void FaultMonitor::judge_tool(const Measured& measured, Phase entered) noexcept {
   if (!tool_) return;
   if (entered < Phase::taring || entered > Phase::disabling) return tool_->start();
+  // Without power, only brakes hold the arm: no order of the controller's lets the tool go faster.
+  if (entered == Phase::disabling && !any_has_power()) return tool_->start();
   const ToolVerdict verdict = tool_->step(measured.tool_W, measured.elbow_moved_m, settings_.period_s);
   if (verdict.fault != Fault::none) alarm_.raise(verdict.fault, -1, verdict.value, verdict.limit);
+}
+
+bool FaultMonitor::any_has_power() const noexcept {
+  return std::any_of(drives_.begin(), drives_.end(), [](const DriveOnBus& d) { return has_power(d.drive.state()); });
 }
 
 void FaultMonitor::judge(const JudgedCycle& cycle) noexcept {

@@ -106,6 +106,7 @@ class FaultMonitor {
   void judge_sensor(const JudgedCycle& cycle) noexcept;
   void judge_sample(const JudgedCycle& cycle) noexcept;
   void judge_lateness(bool late) noexcept;
+  [[nodiscard]] bool any_has_power() const noexcept;
   [[nodiscard]] bool needs_force(const JudgedCycle& cycle) const noexcept;
 
   std::span<const DriveOnBus> drives_;

@@ -97,11 +97,12 @@ void ProofSession::enter(std::int64_t t_k_ns) noexcept {
   entered_ = supervisor_.phase();
   since_ns_ = t_k_ns;
   if (entered_ != Phase::rendering) asked_ = Asked::nothing;
-  const bool at_once = supervisor_.faulted() && supervisor_.report().reaction == controller::Reaction::stop_0;
-  bus_.request(entered_ < Phase::disabling ? fieldbus::DriveGoal::operation_enabled
-               : at_once                   ? fieldbus::DriveGoal::none
-                                           : fieldbus::DriveGoal::switched_off);
+  bus_.request(entered_ < Phase::disabling ? fieldbus::DriveGoal::operation_enabled : goal_off());
   if (entered_ == Phase::rendering) from_rad_ = setpoints_.values;
+}
+
+fieldbus::DriveGoal ProofSession::goal_off() const noexcept {
+  return supervisor_.cuts_power() ? fieldbus::DriveGoal::none : fieldbus::DriveGoal::switched_off;
 }
 
 void ProofSession::act(std::int64_t t_k_ns) noexcept {
@@ -123,6 +124,7 @@ void ProofSession::act(std::int64_t t_k_ns) noexcept {
       if (rate_ <= 0.0) supervisor_.handle(Event::at_rest);
       return;
     case Phase::disabling:
+      bus_.request(goal_off());  // a drive may have gone astray meanwhile
       return watch_brakes(in_phase_s);
     default:
       return;

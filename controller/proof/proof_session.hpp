@@ -80,6 +80,7 @@ class ProofSession {
 
   void heed(std::int64_t t_k_ns) noexcept;
   void enter(std::int64_t t_k_ns) noexcept;
+  [[nodiscard]] fieldbus::DriveGoal goal_off() const noexcept;
   void act(std::int64_t t_k_ns) noexcept;
   void wait_for_drives(double in_phase_s) noexcept;
   void tare(double in_phase_s) noexcept;
