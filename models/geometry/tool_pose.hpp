@@ -1,0 +1,71 @@
+// Where a rigid tool is and how it moves: poses, twists, and the step from one to the other on SE(3).
+//
+//   moved(b, ξ) = (x_b + ξ_x, exp(ξ_θ) R_b)
+//   a ⊟ b       = (x_a − x_b, log(R_a R_bᵀ)),  so that moved(b, a ⊟ b) = a
+//
+// Translation and rotation are taken apart: x is the tool's reference point, and a rotation turns the tool about it.
+// All in W; metres and radians.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::models {
+
+using Quaternion = Eigen::Quaterniond;
+using Twist = Vec<6>;  // translation (m), then rotation (rad); a wrench has force (N), then torque (Nm)
+
+struct ToolPose {
+  Vec3 position = Vec3::Zero();                     // of the reference point
+  Quaternion orientation = Quaternion::Identity();  // unit, from the tool's frame to W
+
+  // Where a point of the tool is.
+  [[nodiscard]] Vec3 operator*(const Vec3& point_T) const noexcept { return position + orientation * point_T; }
+  [[nodiscard]] bool operator==(const ToolPose& other) const noexcept {
+    return position == other.position && orientation.coeffs() == other.orientation.coeffs();
+  }
+};
+
+// The rotation by ‖θ‖ about θ, θ in rad.
+inline Quaternion rotation_by(const Vec3& theta) noexcept {
+  const double half = 0.5 * theta.norm();
+  // sin(x)/x of the half angle. Below 1e-4 rad the next term, x⁴/120, is below rounding.
+  const double shrink = half < 1e-4 ? 1.0 - half * half / 6.0 : std::sin(half) / half;
+  const Vec3 v = 0.5 * shrink * theta;
+  return {std::cos(half), v.x(), v.y(), v.z()};
+}
+
+// Its inverse, the shortest: ‖θ‖ ≤ π. Exact to rounding also next to no rotation and to half a turn.
+inline Vec3 rotation_vector(const Quaternion& rotation) noexcept {
+  const double sign = rotation.w() < 0.0 ? -1.0 : 1.0;
+  const double s = rotation.vec().norm(), c = sign * rotation.w();
+  // 2 atan(s/c)/s; for small s/c = t this is (2/c)(1 − t²/3 + t⁴/5): t⁴ is below rounding for t < 1e-4.
+  const double t = s / c;
+  const double stretch = s < 1e-4 * c ? 2.0 / c * (1.0 - t * t / 3.0) : 2.0 * std::atan2(s, c) / s;
+  return sign * stretch * rotation.vec();
+}
+
+// a ⊟ b.
+inline Twist difference(const ToolPose& a, const ToolPose& b) noexcept {
+  Twist xi;
+  xi << a.position - b.position, rotation_vector(a.orientation * b.orientation.conjugate());
+  return xi;
+}
+
+// Renormalised, so that errors of rounding don't add up over steps.
+inline ToolPose moved(const ToolPose& pose, const Twist& xi) noexcept {
+  return {pose.position + xi.head<3>(), (rotation_by(xi.tail<3>()) * pose.orientation).normalized()};
+}
+
+inline Pose isometry(const ToolPose& pose) noexcept {
+  Pose X = Pose::Identity();
+  X.linear() = pose.orientation.toRotationMatrix();
+  X.translation() = pose.position;
+  return X;
+}
+
+inline ToolPose tool_pose(const Pose& X) noexcept { return {X.translation(), Quaternion(X.linear()).normalized()}; }
+
+}  // namespace proxarm::models
