@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
-#include <nlohmann/json.hpp>
+
+#include "models/files/json.hpp"
 
 namespace proxarm::assessment {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using description::Json;
 
 constexpr const char* statement =
     "A simulation of the values that the cell file has under simulation:, not a measurement of an arm. It certifies "

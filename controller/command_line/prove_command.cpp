@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "controller/command_line/commands.hpp"
@@ -13,11 +12,12 @@
 #include "controller/command_line/sessions/proof_run.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
+#include "models/files/json.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using description::Json;
 
 constexpr int not_proven = 1;
 

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "controller/command_line/commands.hpp"
@@ -9,6 +8,7 @@
 #include "controller/session/bring_up.hpp"
 #include "controller/session/reachable_scene.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/files/json.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 
@@ -18,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using controller::BoxCycle;
 using controller::BoxFrame;
+using description::Json;
 using description::SetupError;
 
 constexpr int other_setpoints = 1;
@@ -118,7 +119,7 @@ int replay_command(const ReplayOptions& options) {
   if (replay.cycles() == 0) {
     throw SetupError({.file = options.folder.string(), .found = "no cycle", .expected = "at least one"});
   }
-  nlohmann::ordered_json json{{"same", !difference}, {"first_cycle", replay.first_cycle()}};
+  Json json{{"same", !difference}, {"first_cycle", replay.first_cycle()}};
   std::string text;
   if (!difference) {
     json["cycles"] = replay.cycles();

@@ -2,16 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "controller/report/summary.hpp"
+#include "models/files/json.hpp"
 
 namespace proxarm::controller {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json optional_number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+using description::Json;
 
 Json faults(const Summary& summary) {
   Json list = Json::array();
@@ -95,21 +93,21 @@ Json view(const std::optional<ViewSummary>& summary) {
 void add_repeatable(Json& json, const Summary& s) {
   json["bus_load"] = Json::object();
   for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
-  json["first_cycle_s"] = optional_number(s.first_cycle_s);
-  json["rendering_from_s"] = optional_number(s.rendering_from_s);
-  json["proxy_clearance_min_m"] = optional_number(s.proxy_clearance_min_m);
+  json["first_cycle_s"] = s.first_cycle_s;
+  json["rendering_from_s"] = s.rendering_from_s;
+  json["proxy_clearance_min_m"] = s.proxy_clearance_min_m;
   json["penetration_max_m"] = s.penetration_max_m;
   json["tool_penetration_max_m"] = s.tool_penetration_max_m;
   json["tool_penetration_touch_max_m"] = s.tool_penetration_touch_max_m;
   json["tool_penetration_sliding_max_m"] = s.tool_penetration_sliding_max_m;
-  json["tracking_rms_m"] = optional_number(s.tracking_rms_m);
-  json["tracking_max_m"] = optional_number(s.tracking_max_m);
+  json["tracking_rms_m"] = s.tracking_rms_m;
+  json["tracking_max_m"] = s.tracking_max_m;
   json["wanted_mass_kg"] = s.wanted_mass_kg > 0.0 ? Json(s.wanted_mass_kg) : Json(nullptr);
-  json["apparent_mass_kg"] = optional_number(s.apparent_mass_kg);
-  json["apparent_damping_Ns_per_m"] = optional_number(s.apparent_damping_Ns_per_m);
-  json["contact_force_error_N"] = optional_number(s.contact_force_error_N);
-  json["contact_force_error_max_N"] = optional_number(s.contact_force_error_max_N);
-  json["friction_ratio_error"] = optional_number(s.friction_ratio_error);
+  json["apparent_mass_kg"] = s.apparent_mass_kg;
+  json["apparent_damping_Ns_per_m"] = s.apparent_damping_Ns_per_m;
+  json["contact_force_error_N"] = s.contact_force_error_N;
+  json["contact_force_error_max_N"] = s.contact_force_error_max_N;
+  json["friction_ratio_error"] = s.friction_ratio_error;
   json["pulling_force_max_N"] = s.pulling_force_max_N;
   json["rendered_time_s"] = s.rendered_time_s;
   json["contact_time_s"] = s.contact_time_s;

@@ -2,9 +2,9 @@
 
 #include <charconv>
 #include <cstdint>
-#include <nlohmann/json.hpp>
 
 #include "controller/supervision/fault.hpp"
+#include "models/files/json.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -195,9 +195,9 @@ std::string signals_header(const std::vector<std::string>& axis_names, bool with
 }
 
 std::string columns_json(const std::vector<std::string>& axis_names, bool with_truth) {
-  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  description::Json all = description::Json::array();
   for (const SignalColumn& column : signal_columns(axis_names, with_truth)) {
-    nlohmann::ordered_json one{{"name", column.name}};
+    description::Json one{{"name", column.name}};
     if (!column.unit.empty()) one["unit"] = column.unit;
     if (!column.frame.empty()) one["frame"] = column.frame;
     one["meaning"] = column.meaning;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 
 #include "controller/command_line/live/hardware_consent.hpp"
 #include "controller/command_line/live/realtime.hpp"
@@ -16,12 +15,13 @@
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/files/json.hpp"
 #include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using description::Json;
 using proof::OwnStop;
 
 // A drive counts the time by its own clock, and tells it by a frame.

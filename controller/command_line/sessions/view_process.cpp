@@ -11,20 +11,20 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "controller/command_line/entry/child_process.hpp"
 #include "controller/command_line/live/control_socket.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/files/json.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
 namespace fs = std::filesystem;
+using description::Json;
 using description::SetupError;
-using nlohmann::json;
 
 constexpr int answer_within_ms = 30'000;  // a mesh without a cache may take a while
 // Where the process finds its descriptors.
@@ -46,7 +46,7 @@ std::string readable_twice(const fs::path& file, const char* option) {
   return file.empty() ? "" : fs::absolute(file).lexically_normal().string();
 }
 
-json hello_of(const PreparedSession& session, const RunOptions& options, ViewProcess::Shows shows) {
+Json hello_of(const PreparedSession& session, const RunOptions& options, ViewProcess::Shows shows) {
   const bool arm_alone = shows == ViewProcess::Shows::simulated_arm;
   const controller::SessionSettings& settings = session.settings;
   fs::path control;
@@ -67,8 +67,8 @@ json hello_of(const PreparedSession& session, const RunOptions& options, ViewPro
 }
 
 // False where nobody reads any more.
-bool send_line(int line, const json& value) {
-  const std::string text = value.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+bool send_line(int line, const Json& value) {
+  const std::string text = value.dump() + "\n";
   return send(line, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
 }
 
@@ -129,13 +129,14 @@ void ViewProcess::start(int memory) {
 
 void ViewProcess::greet(const PreparedSession& session, const RunOptions& options, Shows shows) {
   send_line(line_, hello_of(session, options, shows));
-  const json answer = json::parse(read_line(line_), nullptr, false);
-  if (answer.is_object() && answer.contains("url")) {
-    url_ = answer["url"].get<std::string>();
-    place_ = {answer.at("port").get<std::uint16_t>(), answer.at("most_viewers").get<std::size_t>()};
+  const Json answer = Json::parse(read_line(line_)).value_or(Json());
+  if (const auto url = answer.text_of("url")) {
+    url_ = *url;
+    place_ = {static_cast<std::uint16_t>(answer.integer_of("port").value_or(0)),
+              static_cast<std::size_t>(answer.integer_of("most_viewers").value_or(0))};
     return;
   }
-  if (answer.is_object() && answer.contains("error")) throw SetupError({.message = answer["error"].get<std::string>()});
+  if (const auto error = answer.text_of("error")) throw SetupError({.message = *error});
   refuse("no answer of the view", "its address");
 }
 

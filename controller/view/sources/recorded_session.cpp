@@ -4,16 +4,16 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <nlohmann/json.hpp>
 
 #include "controller/view/stage/words.hpp"
+#include "models/files/json.hpp"
 
 namespace proxarm::view {
 namespace {
 
 using controller::CycleRecord;
 using controller::Phase;
-using nlohmann::json;
+using description::Json;
 
 constexpr std::size_t most_events = 2000;
 constexpr std::int64_t apart_ns = 200'000'000;  // an event that recurs sooner counts as the same
@@ -58,11 +58,11 @@ RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& sta
 
 // The last fault that wasn't reset; for a program that died, the reason for its black box.
 void RecordedSession::read_fault(const std::filesystem::path& folder) {
-  const json summary = json::parse(text_of_file(folder / "summary.json"), nullptr, false);
-  if (summary.is_object() && summary.contains("faults") && summary["faults"].is_array() && !summary["faults"].empty()) {
-    const json& fault = summary["faults"].back();
-    fault_ = fault.value("text", "");
-    fault_cycle_ = fault.value("cycle", std::uint64_t{0});
+  const Json summary = Json::parse(text_of_file(folder / "summary.json")).value_or(Json());
+  if (const Json* faults = summary.find("faults"); faults && !faults->items().empty()) {
+    const Json& fault = faults->items().back();
+    fault_ = fault.text_of("text").value_or("");
+    fault_cycle_ = static_cast<std::uint64_t>(fault.integer_of("cycle").value_or(0));
     return;
   }
   fault_ = text_of_file(folder / "reason.txt");
