@@ -12,18 +12,6 @@ namespace {
 
 constexpr int not_carried = 1;
 
-// --bus maps several buses of the cell to one interface: they share its bits.
-controller::BusIndices indices_of(const std::vector<std::string>& interfaces) {
-  controller::BusIndices indices;
-  std::vector<std::string> seen;
-  for (const std::string& interface : interfaces) {
-    const auto found = std::find(seen.begin(), seen.end(), interface);
-    indices.push_back(static_cast<std::size_t>(found - seen.begin()));
-    if (found == seen.end()) seen.push_back(interface);
-  }
-  return indices;
-}
-
 }  // namespace
 
 int plan_command(const RunOptions& options) {

@@ -400,17 +400,13 @@ bool is_virtual_interface(const std::string& interface) { return fieldbus::is_vi
 
 void require_carried_on(const std::vector<std::string>& interfaces, const PreparedSession& session,
                         const RunOptions& options, const IsVirtual& is_virtual) {
-  std::vector<std::string> wires;  // each interface once
-  controller::BusIndices indices;
-  for (const std::string& interface : interfaces) {
-    const auto known = std::find(wires.begin(), wires.end(), interface);
-    indices.push_back(static_cast<std::size_t>(known - wires.begin()));
-    if (known == wires.end()) wires.push_back(interface);
-  }
+  const controller::BusIndices indices = indices_of(interfaces);
+  const std::vector<fieldbus::BusPlan> plans = plan_buses(session, indices);
   std::vector<fieldbus::BusPlan> real, virtual_ones;
-  std::size_t wire = 0;
-  for (fieldbus::BusPlan& plan : plan_buses(session, indices)) {
-    (is_virtual(wires[wire++]) ? virtual_ones : real).push_back(std::move(plan));
+  for (std::size_t wire = 0; wire < plans.size(); ++wire) {
+    const auto first = std::find(indices.begin(), indices.end(), wire);
+    const std::string& interface = interfaces[static_cast<std::size_t>(first - indices.begin())];
+    (is_virtual(interface) ? virtual_ones : real).push_back(plans[wire]);
   }
   require_within(real, session.cell, options);
   const std::string refusal = fieldbus::refusal_text(virtual_ones);

@@ -1,5 +1,6 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 
+#include <algorithm>
 #include <numeric>
 #include <string>
 
@@ -16,6 +17,17 @@ std::vector<std::string> bus_names(const description::Cell& cell) {
 controller::BusIndices buses_in_order(const description::Cell& cell) {
   controller::BusIndices indices(cell.buses.size());
   std::iota(indices.begin(), indices.end(), std::size_t{0});
+  return indices;
+}
+
+controller::BusIndices indices_of(const std::vector<std::string>& interfaces) {
+  controller::BusIndices indices;
+  std::vector<std::string> seen;
+  for (const std::string& interface : interfaces) {
+    const auto found = std::find(seen.begin(), seen.end(), interface);
+    indices.push_back(static_cast<std::size_t>(found - seen.begin()));
+    if (found == seen.end()) seen.push_back(interface);
+  }
   return indices;
 }
 
