@@ -43,7 +43,6 @@ struct PoseContact {
 class PoseAlgorithm {
  public:
   PoseAlgorithm() = default;
-  PoseAlgorithm& operator=(const PoseAlgorithm&) = delete;
   virtual ~PoseAlgorithm() = default;
 
   // 𝒢(K, p̂, q). Preconditions: K symmetric and positive definite, both poses finite with unit quaternions, and the tool
@@ -76,6 +75,7 @@ class PoseAlgorithm {
 
  protected:
   PoseAlgorithm(const PoseAlgorithm&) = default;
+  PoseAlgorithm& operator=(const PoseAlgorithm&) = default;
 };
 
 // Nothing to touch.

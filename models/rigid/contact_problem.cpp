@@ -1,0 +1,248 @@
+#include "models/rigid/contact_problem.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+#include "models/geometry/linear_systems.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// Alart and Curnier's projection of z = f − u/w, and the state that it tells.
+struct Projected {
+  Vec3 f = Vec3::Zero();
+  ContactState state = ContactState::open;
+};
+
+Projected project(const Vec3& z, double mu) noexcept {
+  Projected out;
+  if (!(z[0] > 0.0)) return out;
+  const double z_t = z.tail<2>().norm(), limit = mu * z[0];
+  out.f = z;
+  out.state = z_t <= limit ? ContactState::stick : ContactState::slip;
+  if (out.state == ContactState::slip) out.f.tail<2>() *= limit / z_t;
+  return out;
+}
+
+// How much stiffer than the coupling the contacts are in Newton's iteration. The multipliers converge by 1/(1 + kStiff
+// λ) a step, λ being the smallest eigenvalue of the scaled W = H Hᵀ that isn't 0; beyond 1e9 rounding (kStiff u) would
+// be felt in the states.
+constexpr double kStiff = 1e7;
+// Relative to what the free motion would press with: a hundred roundings of sums over rows.
+constexpr double kTolerance = 1e-12;
+constexpr double kRough = 1e-7;  // before the forces are balanced
+
+}  // namespace
+
+void ContactProblem::set_stiffness(const Mat6& K) noexcept {
+  if (K == K_) return;
+  K_ = K;
+  L_ = K.llt().matrixL();
+  L_inverse_ = L_.triangularView<Eigen::Lower>().solve(Mat6::Identity());
+}
+
+Twist ContactProblem::yield_to(const Twist& wrench) const noexcept {
+  return L_inverse_.transpose() * (L_inverse_ * wrench);
+}
+
+double ContactProblem::make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept {
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    const LinearContact& contact = contacts[i];
+    Row& row = rows_[i];
+    row.H.noalias() = contact.J * L_inverse_.transpose();
+    row.b = contact.c - contact.J * e;
+    row.mu = contact.mu;
+    row.w = row.H.squaredNorm();
+    row.f = contact.f;
+    row.state = contact.state;
+  }
+  return (L_.transpose() * e).norm();
+}
+
+// ‖f − P(f − u/w)‖ + ‖Σ Hᵀf − y‖, in the units of y: 0 at a solution, and nowhere else.
+double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
+  Twist off = -y;
+  double law = 0.0;
+  for (const Row& row : rows) {
+    const Vec3 u = row.H * y + row.b;
+    off += row.H.transpose() * row.f;
+    law = std::max(law, (row.f - project(row.f - u / row.w, row.mu).f).norm() * std::sqrt(row.w));
+  }
+  return std::max(law, off.norm());
+}
+
+// One step of semismooth Newton for y and f, with the states chosen before. Each contact's new force is linear in its new
+// displacement, f⁺ = f̄ − P u⁺:
+//   stick  u⁺ = 0, for which f⁺ = f − R u⁺ with a large R (the proximal point: redundant rows need no choice)
+//   slip   u_n⁺ = 0 likewise; f_t⁺ = μ (f_n⁺ d + z_n T z_t⁺/‖z_t‖), d = z_t/‖z_t‖, T = I − d dᵀ, z = f − u/w. Along d
+//          that is μ f_n⁺, across it −a/(1 − a) u_t⁺/w with a = μ z_n/‖z_t‖
+bool ContactProblem::newton_step(Rows rows, Twist& y) noexcept {
+  Mat6 A = Mat6::Identity();
+  Twist off = -y;
+  std::array<Mat3, most> P;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    Row& row = rows[i];
+    if (row.state == ContactState::open) {
+      row.f.setZero();
+      continue;
+    }
+    const double R = kStiff / row.w;
+    const Vec3 u = row.H * y + row.b;
+    if (row.state == ContactState::stick) {
+      P[i] = R * Mat3::Identity();
+    } else {
+      const Eigen::Vector2d z_t = row.f.tail<2>() - u.tail<2>() / row.w;
+      const double size = z_t.norm(), z_n = std::max(row.f[0] - u[0] / row.w, 0.0);
+      const Eigen::Vector2d d = size > 0.0 ? Eigen::Vector2d(z_t / size) : Eigen::Vector2d(1.0, 0.0);
+      const double a = size > 0.0 ? std::min(row.mu * z_n / size, 1.0 - 1.0 / kStiff) : 0.0;
+      P[i].setZero();
+      P[i](0, 0) = R;
+      P[i].block<2, 1>(1, 0) = row.mu * R * d;
+      P[i].block<2, 2>(1, 1) = a / ((1.0 - a) * row.w) * (Eigen::Matrix2d::Identity() - d * d.transpose());
+      row.f.tail<2>() = row.mu * row.f[0] * d;
+    }
+    off.noalias() += row.H.transpose() * (row.f - P[i] * u);
+    A.noalias() += row.H.transpose() * (P[i] * row.H);
+  }
+  const Twist step = solve_square<6>(A, off);
+  if (!step.allFinite()) return false;
+  y += step;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].state != ContactState::open) rows[i].f -= P[i] * (rows[i].H * y + rows[i].b);
+  }
+  return true;
+}
+
+bool ContactProblem::newton(Rows rows, Twist& y, double size, int most_iterations) noexcept {
+  for (int k = 0; k < most_iterations; ++k) {
+    for (Row& row : rows) row.state = project(row.f - (row.H * y + row.b) / row.w, row.mu).state;
+    if (!newton_step(rows, y)) return false;
+    if (is_solved(rows, y, size)) return true;
+  }
+  return false;
+}
+
+bool ContactProblem::is_solved(Rows rows, const Twist& y, double size) noexcept {
+  if (violation(rows, y) > kRough * size) return false;
+  balance(rows, y);
+  return violation(rows, y) <= kTolerance * size;
+}
+
+// Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the states
+// allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
+void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
+  for (int k = 0; k < 2; ++k) {
+    Mat6 G = Mat6::Zero();
+    Twist lack = y;
+    double size = 0.0;
+    for (const Row& row : rows) {
+      if (row.state == ContactState::open) continue;
+      lack.noalias() -= row.H.transpose() * row.f;
+      size += row.w;
+      if (row.state == ContactState::stick) {
+        G.noalias() += row.H.transpose() * row.H;
+      } else {
+        const Twist ray = row.H.transpose() * (row.f / row.f[0]);
+        G.noalias() += ray * ray.transpose();
+      }
+    }
+    if (!(size > 0.0)) return;
+    G.diagonal().array() += 1e-10 * size;
+    const Twist share = solve_square<6>(G, lack);
+    for (Row& row : rows) {
+      if (row.state == ContactState::open) continue;
+      if (row.state == ContactState::stick) {
+        row.f += row.H * share;
+      } else {
+        const Vec3 ray = row.f / row.f[0];
+        row.f += ray * ray.dot(row.H * share);
+      }
+    }
+  }
+}
+
+void ContactProblem::gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept {
+  y.setZero();
+  for (const Row& row : rows) y += row.H.transpose() * row.f;
+  for (int k = 0; k < sweeps; ++k) {
+    for (Row& row : rows) {
+      // A few projections on the contact's own law; the trace bounds the largest eigenvalue of H Hᵀ.
+      for (int j = 0; j < 3; ++j) {
+        const Vec3 u = row.H * y + row.b;
+        const Projected now = project(row.f - u / row.w, row.mu);
+        y += row.H.transpose() * (now.f - row.f);
+        row.f = now.f;
+        row.state = now.state;
+      }
+    }
+  }
+}
+
+bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept {
+  const double size = make_rows(e, contacts);
+  const Rows rows(rows_.data(), contacts.size());
+  Twist y = L_.transpose() * e;
+  bool solved = newton(rows, y, size, 25);
+  for (int attempt = 0; attempt < 6 && !solved; ++attempt) {
+    if (attempt == 0) {
+      for (Row& row : rows) row.f.setZero();
+    }
+    gauss_seidel(rows, y, 20 << attempt);
+    std::array<Vec3, most> kept;
+    for (std::size_t i = 0; i < rows.size(); ++i) kept[i] = rows[i].f;
+    const Twist y_kept = y;
+    solved = newton(rows, y, size, 25);
+    if (solved) break;
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].f = kept[i];
+    y = y_kept;
+  }
+  if (!solved && contacts.size() <= 4) solved = enumerate(rows, y, size, nullptr);
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    contacts[i].f = rows[i].f;
+    contacts[i].state = rows[i].state;
+  }
+  delta = L_inverse_.transpose() * y - e;
+  return solved;
+}
+
+// Newton with the states held.
+bool ContactProblem::newton_with_states(Rows rows, Twist& y, double size, Twist start) noexcept {
+  y = start;
+  for (Row& row : rows) row.f.setZero();
+  for (int k = 0; k < 30; ++k) {
+    if (!newton_step(rows, y)) return false;
+    if (is_solved(rows, y, size)) return true;
+  }
+  return false;
+}
+
+bool ContactProblem::enumerate(Rows rows, Twist& y, double size, int* different) noexcept {
+  const Twist start = y;
+  std::array<Twist, 16> found;
+  std::size_t count = 0;
+  int combinations = 1;
+  for (std::size_t i = 0; i < rows.size(); ++i) combinations *= 3;
+  for (int number = 0; number < combinations; ++number) {
+    int rest = number;
+    for (Row& row : rows) {
+      row.state = static_cast<ContactState>(rest % 3);
+      rest /= 3;
+    }
+    if (!newton_with_states(rows, y, size, start)) continue;
+    if (different == nullptr) return true;
+    const auto same = [&](const Twist& other) { return (other - y).norm() <= 1e-6 * size; };
+    if (count < found.size() && std::none_of(found.begin(), found.begin() + count, same)) found[count++] = y;
+  }
+  if (different != nullptr) *different = static_cast<int>(count);
+  return count > 0;
+}
+
+int ContactProblem::count_solutions(const Twist& e, std::span<const LinearContact> contacts) noexcept {
+  const double size = make_rows(e, contacts);
+  Twist y = L_.transpose() * e;
+  int different = 0;
+  enumerate({rows_.data(), contacts.size()}, y, size, &different);
+  return different;
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,81 @@
+// The local problem of a step: a rigid tool on a coupling K, held by contacts whose geometry is frozen at a pose q_i.
+//
+//   K (e + δ) = Σ J_cᵀ f_c          e = q_i ⊟ p̂, δ the twist from q_i to the solution
+//   u_c = J_c δ + c_c               rows: gap; displacement of the material point since q(k−1) along two tangents
+//   0 ≤ u_n ⊥ f_n ≥ 0,  ‖f_t‖ ≤ μ f_n,  and u_t ≠ 0 → f_t = −μ f_n u_t/‖u_t‖      Coulomb's law as it is
+//
+// With K = L Lᵀ, y = Lᵀ(e + δ) and H = J L⁻ᵀ this is y = Σ Hᵀf, u = H y + b: six unknowns, however many contacts.
+//
+// Method: Alart and Curnier's projection ("A mixed formulation for frictional contact problems prone to Newton like
+// solution methods", 1991) writes the law as f = P(f − r u) for any r > 0, with P the projection on the cone's section.
+// Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
+// large, so the multipliers settle in two. Where Newton cycles, projected Gauss-Seidel over the contacts (Jean and
+// Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution; up to four contacts, all
+// combinations of free, stick and slip are tried as a last resort. What is returned has passed the law's own test.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "models/geometry/small_matrix.hpp"
+#include "models/geometry/tool_pose.hpp"
+
+namespace proxarm::models {
+
+enum class ContactState : std::uint8_t { open, stick, slip };
+
+struct LinearContact {
+  Eigen::Matrix<double, 3, 6> J;  // rows: normal, tangents; of the twist at the reference point
+  Vec3 c = Vec3::Zero();          // gap, slip at δ = 0; m
+  double mu = 0.0;
+  Vec3 f = Vec3::Zero();  // in: a guess; out: along normal and tangents, N
+  ContactState state = ContactState::open;
+};
+
+class ContactProblem {
+ public:
+  // So many contacts are solved together; 24 is six boxes' faces at once.
+  static constexpr std::size_t most = 24;
+
+  // Precondition: symmetric and positive definite. Remembered, so that the same K again costs a comparison.
+  void set_stiffness(const Mat6& K) noexcept;
+
+  // Fills in δ, and f and state of the contacts. False: no solution found; δ then holds all gaps open as far as
+  // Gauss-Seidel got. Precondition: at most `most` contacts.
+  bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept;
+
+  // The number of different y among all combinations of free, stick and slip, for up to four contacts: 1 where the
+  // solution is unique. Costs up to 3⁴ Newton iterations.
+  int count_solutions(const Twist& e, std::span<const LinearContact> contacts) noexcept;
+
+  // The twist that the wrench of a contact's force makes the coupling yield by: K⁻¹ w.
+  [[nodiscard]] Twist yield_to(const Twist& wrench) const noexcept;
+
+ private:
+  struct Row {
+    Eigen::Matrix<double, 3, 6> H;
+    Vec3 b;
+    double mu = 0.0;
+    double w = 0.0;  // the trace of H Hᵀ: how far the contact yields to a newton, m/N
+    Vec3 f;
+    ContactState state = ContactState::open;
+  };
+  using Rows = std::span<Row>;
+
+  static bool newton_step(Rows rows, Twist& y) noexcept;
+  static bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
+  static bool newton_with_states(Rows rows, Twist& y, double size, Twist tangent) noexcept;
+  static void gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept;
+  static bool is_solved(Rows rows, const Twist& y, double size) noexcept;
+  static void balance(Rows rows, const Twist& y) noexcept;
+  static double violation(Rows rows, const Twist& y) noexcept;
+  bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
+  double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;
+
+  Mat6 K_ = Mat6::Zero();
+  Mat6 L_ = Mat6::Identity(), L_inverse_ = Mat6::Identity();
+  std::array<Row, most> rows_;
+};
+
+}  // namespace proxarm::models

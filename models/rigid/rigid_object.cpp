@@ -1,0 +1,78 @@
+#include "models/rigid/rigid_object.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace proxarm::models {
+namespace {
+
+// Faces whose normals differ by less lie in one plane: a tool's point over their common edge is no nearer to it than to the
+// faces, to within this share of its distance from the edge.
+constexpr double kFlat = 1e-9;
+
+
+}  // namespace
+
+TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : mesh_(std::move(mesh)) {
+  // All half-edges, sorted, so that those of one edge are neighbours.
+  struct Half {
+    std::uint32_t low, high, face, opposite;
+  };
+  std::vector<Half> halves;
+  const auto faces = static_cast<std::uint32_t>(mesh_->size());
+  halves.reserve(3 * static_cast<std::size_t>(faces));
+  for (std::uint32_t f = 0; f < faces; ++f) {
+    const auto& t = mesh_->triangle(f);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      halves.push_back({std::min(a, b), std::max(a, b), f, t[(k + 2) % 3]});
+    }
+  }
+  std::sort(halves.begin(), halves.end(), [](const Half& x, const Half& y) {
+    return std::tie(x.low, x.high, x.face) < std::tie(y.low, y.high, y.face);
+  });
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges_by_face, vertices_by_face;
+  constexpr std::uint32_t none = ~0U;
+  std::uint32_t vertices = 0;
+  for (const Half& half : halves) vertices = std::max(vertices, half.high + 1);
+  std::vector<std::uint32_t> owner(vertices, none);
+  for (std::size_t i = 0; i < halves.size();) {
+    std::size_t end = i + 1;
+    while (end < halves.size() && halves[end].low == halves[i].low && halves[end].high == halves[i].high) ++end;
+    const Half& first = halves[i];
+    const TriangleMesh::Face& face = mesh_->face(first.face);
+    Edge edge;
+    edge.line = {mesh_->vertex(first.low), mesh_->vertex(first.high), face.normal, face.normal, end - i != 2};
+    bool sharp = end - i != 2;
+    if (end - i == 2) {
+      edge.line.right = mesh_->face(halves[i + 1].face).normal;
+      sharp = edge.line.left.cross(edge.line.right).norm() > kFlat || edge.line.left.dot(edge.line.right) < 0.0;
+      edge.ridge = face.normal.dot(mesh_->vertex(halves[i + 1].opposite) - face.corner) < 0.0;
+    }
+    if (sharp) {
+      edges_by_face.emplace_back(first.face, static_cast<std::uint32_t>(edges_.size()));
+      edges_.push_back(edge);
+      for (const std::uint32_t v : {first.low, first.high}) {
+        if (owner[v] == none) owner[v] = first.face;
+      }
+    }
+    i = end;
+  }
+  // The owner of a vertex must be a face that has it: the first sharp edge's is one.
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    if (owner[v] != none) vertices_by_face.emplace_back(owner[v], v);
+  }
+  const auto sort_out = [faces](auto& by_face, std::vector<std::uint32_t>& owned, std::vector<std::uint32_t>& first) {
+    std::sort(by_face.begin(), by_face.end());
+    first.assign(faces + 1, 0);
+    for (const auto& [face, feature] : by_face) {
+      ++first[face + 1];
+      owned.push_back(feature);
+    }
+    for (std::uint32_t f = 0; f < faces; ++f) first[f + 1] += first[f];
+  };
+  sort_out(edges_by_face, owned_edges_, first_edge_);
+  sort_out(vertices_by_face, owned_vertices_, first_vertex_);
+}
+
+}  // namespace proxarm::models

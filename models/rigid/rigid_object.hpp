@@ -1,0 +1,60 @@
+// What a rigid tool can touch, as RigidWorld is built from it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "models/mesh/mesh.hpp"
+#include "models/obstacles/moving_obstacle.hpp"
+#include "models/rigid_shapes/touch.hpp"
+
+namespace proxarm::models {
+
+// A surface of triangles. Both sides hold, as for a point proxy. Only what can be touched counts: an edge or a vertex
+// whose faces lie in one plane is left out, since the tool's points and edges meet the faces first.
+class TriangleFeatures {
+ public:
+  struct Edge {
+    EdgeLine line;
+    bool ridge = true;  // seen from the faces' front; otherwise a valley, which is a ridge from behind
+  };
+
+  explicit TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh);
+
+  [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  [[nodiscard]] const Edge& edge(std::uint32_t i) const noexcept { return edges_[i]; }
+  [[nodiscard]] const Vec3& vertex(std::uint32_t i) const noexcept { return mesh_->vertex(i); }
+  // The edges and vertices that a face owns; each belongs to one face.
+  [[nodiscard]] std::span<const std::uint32_t> edges_of(std::uint32_t face) const noexcept {
+    return owned(owned_edges_, first_edge_, face);
+  }
+  [[nodiscard]] std::span<const std::uint32_t> vertices_of(std::uint32_t face) const noexcept {
+    return owned(owned_vertices_, first_vertex_, face);
+  }
+
+ private:
+  [[nodiscard]] static std::span<const std::uint32_t> owned(const std::vector<std::uint32_t>& all,
+                                                            const std::vector<std::uint32_t>& first,
+                                                            std::uint32_t face) noexcept {
+    return std::span(all).subspan(first[face], first[face + 1] - first[face]);
+  }
+
+  std::shared_ptr<const TriangleMesh> mesh_;
+  std::vector<Edge> edges_;
+  std::vector<std::uint32_t> owned_edges_, first_edge_, owned_vertices_, first_vertex_;
+};
+
+struct RigidObject {
+  // At rest, where it was described, in W. A hollow one may need several: a box from inside is six sides.
+  std::variant<FlatSide, HollowSphere, HollowTube, Solid, std::shared_ptr<const TriangleFeatures>> shape;
+  double friction = 0.0;
+  std::vector<double> friction_of_face{};  // of a mesh; empty: the same everywhere
+  std::int32_t object = 0;                 // what contacts report
+  std::optional<ScriptedMotion> motion{};
+  bool driven = false;  // RigidWorld::drive() moves it
+};
+
+}  // namespace proxarm::models

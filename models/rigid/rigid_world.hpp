@@ -1,0 +1,146 @@
+// 𝒢 of a rigid tool among rigid objects (models/geometry/pose_algorithm.hpp states the law).
+//
+// 1. Candidates: pairs of features, one of the tool and one of an object, that come within a distance of each other that
+//    the steps to come won't exceed. They are gathered anew only when the tool has moved so far.
+// 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_shapes/touch.hpp). Linearised there, those
+//    that press or would be passed make a local problem (contact_problem.hpp); its solution is the next pose. Gaps and
+//    normals are taken again until nothing moves: a fixed point is exact, since at δ = 0 nothing is linearised. It
+//    converges by the ratio of the step's penetration to the radius of curvature, a thousandth or less; where surfaces
+//    conform (a peg in its hole) Anderson's acceleration takes over (Walker and Ni 2011).
+// 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the way
+//    from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from q(k−1).
+//
+// Friction between a part with a friction of its own and an object: √(μ_tool μ_object); otherwise the object's.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "models/geometry/pose_algorithm.hpp"
+#include "models/rigid/contact_problem.hpp"
+#include "models/rigid/rigid_object.hpp"
+
+namespace proxarm::models {
+
+class RigidWorld final : public PoseAlgorithm {
+ public:
+  // Throws std::invalid_argument for a shape without a size, points that span no solid, and a friction below 0. A tool
+  // without parts is a point: a sphere of no radius.
+  RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
+
+  const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
+  void set_time(const StepTime& time) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return shared_->moves; }
+  // Moves a driven object for the next step, from where it was for the last one. X is relative to where it was described.
+  void drive(std::int32_t object, const Pose& X) noexcept;
+
+  [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {contacts_.data(), count_}; }
+  [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
+  [[nodiscard]] bool several() const noexcept override { return several_; }
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
+  [[nodiscard]] double clearance_m(const ToolPose& pose) const noexcept override;
+  [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<RigidWorld>(*this); }
+  void copy_state(const PoseAlgorithm& other) noexcept override { *this = dynamic_cast<const RigidWorld&>(other); }
+
+  RigidWorld(const RigidWorld&) = default;
+  RigidWorld& operator=(const RigidWorld&) noexcept = default;
+
+ private:
+  enum class Kind : std::uint8_t { point_field, rim_field, point_face, face_point, edges, point_point, point_edge, edge_point };
+  struct Pair {
+    Kind kind = Kind::point_field;
+    std::uint16_t part = 0, entry = 0;
+    std::uint32_t own = 0, other = 0;
+    float side = 0.0F;  // of a two-sided surface: 1 or −1, or 0 where the pair is not to be judged in this step
+    bool pressed = false;
+    Vec3 force_W = Vec3::Zero();  // of the last solution
+  };
+  // A pair at a pose.
+  struct Found {
+    Touch touch;  // in W
+    std::uint16_t pair = 0;
+    std::uint8_t which = 0;  // of a rim
+    bool working = false;
+  };
+  struct Part {
+    Solid solid;
+    std::optional<double> friction;
+  };
+  struct Entry {
+    RigidObject object;
+    Bounds bounds;
+  };
+  struct Shared {  // constant
+    std::vector<Part> parts;
+    std::vector<Entry> entries;
+    double reach = 0.0;      // of the tool's points from the reference point
+    double thinness = 0.0;   // the least thickness of the tool's parts
+    bool moves = false;
+  };
+  struct Frame {  // of an object, now and at the last step
+    Pose now = Pose::Identity(), before = Pose::Identity();
+    bool moved = false;  // from where it was described
+  };
+  static constexpr std::size_t most_pairs = 768;
+  static constexpr std::size_t most_found = 256;
+
+  // The tool in an object's frame.
+  struct View {
+    Mat3 R;
+    Vec3 x;
+    [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + x; }
+  };
+  [[nodiscard]] View view(const ToolPose& pose, const Frame& frame, bool before) const noexcept;
+  [[nodiscard]] double motion(const ToolPose& a, const ToolPose& b) const noexcept;
+
+  void gather(const ToolPose& pose, double reach) noexcept;
+  void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
+  template <typename Add>
+  void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
+  template <typename Add>
+  void pairs_with(const Solid& own, const TriangleFeatures& other, const View& at, double reach, Add add) const noexcept;
+  void set_sides(const ToolPose& from, double far) noexcept;
+  [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
+  [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
+  template <typename Each>
+  void evaluate(const Pair& pair, const View& at, Each each) const noexcept;
+  void find(const ToolPose& pose) noexcept;
+  void drop_deeper() noexcept;
+  [[nodiscard]] double friction(const Pair& pair) const noexcept;
+  void linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
+                 Mat3& frame) const noexcept;
+  bool solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, Twist& delta) noexcept;
+  bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
+  bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
+  void report(const ToolPose& q_old) noexcept;
+
+  std::shared_ptr<const Shared> shared_;
+  std::vector<Frame> frames_;
+  double time_s_ = 0.0;
+
+  ToolPose q_;
+  std::array<Pair, most_pairs> pairs_;
+  std::size_t pair_count_ = 0;
+  ToolPose from_;  // where the sides were taken
+  ToolPose gathered_at_;
+  double gathered_reach_ = -1.0;
+  bool overflow_ = false;
+  ToolPose clear_at_;
+  double clearance_ = -1.0;
+
+  std::array<Found, most_found> found_;
+  std::size_t found_count_ = 0;
+  ContactProblem problem_;
+  std::array<LinearContact, ContactProblem::most> linear_;
+  std::array<std::uint16_t, ContactProblem::most> of_linear_{};  // in found_
+  std::array<Mat3, ContactProblem::most> axes_;                  // normal and tangents, columns
+  std::size_t linear_count_ = 0;
+
+  std::array<PoseContact, ContactProblem::most> contacts_;
+  std::size_t count_ = 0;
+  bool unresolved_ = false, several_ = false, squeezed_ = false;
+};
+
+}  // namespace proxarm::models

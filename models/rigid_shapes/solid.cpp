@@ -1,0 +1,237 @@
+#include "models/rigid_shapes/solid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace proxarm::models {
+namespace {
+
+void require(bool fine, const char* what) {
+  if (!fine) throw std::invalid_argument(what);
+}
+
+Solid finished(Solid solid) {
+  solid.reach = 0.0;
+  for (const Vec3& p : solid.points) solid.reach = std::max(solid.reach, p.norm() + solid.radius);
+  for (const Solid::Rim& rim : solid.rims) solid.reach = std::max(solid.reach, rim.centre.norm() + rim.radius);
+  return solid;
+}
+
+// Gift wrapping: from each face over its edges to the next, until all edges have two.
+class Hull {
+ public:
+  explicit Hull(std::vector<Vec3> points) : points_(std::move(points)) {
+    Vec3 low = points_.front(), high = low;
+    for (const Vec3& p : points_) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    // Points this near to a face's plane are its corners: a million roundings, far below what is made or measured.
+    flat_ = 1e-10 * (high - low).norm();
+    middle_ = Vec3::Zero();
+    for (const Vec3& p : points_) middle_ += p / static_cast<double>(points_.size());
+  }
+
+  Solid build() {
+    add_face(first_plane());
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      require(faces_.size() < 4 * points_.size() + 8, "the points span no solid");
+      const std::vector<std::uint32_t> ring = rings_[i];
+      for (std::size_t k = 0; k < ring.size(); ++k) {
+        wrap_over(ring[k], ring[(k + 1) % ring.size()], faces_[i].normal);
+      }
+    }
+    return collected();
+  }
+
+ private:
+  // The supporting plane whose normal is found by tilting an axis-parallel one onto the points twice.
+  Vec3 first_plane() {
+    const auto lowest = static_cast<std::uint32_t>(
+        std::min_element(points_.begin(), points_.end(), [](const Vec3& a, const Vec3& b) { return a.x() < b.x(); }) -
+        points_.begin());
+    const Vec3 start = -Vec3::UnitX();
+    const Vec3 n1 = tilted(lowest, Vec3::UnitY(), start);
+    std::uint32_t second = lowest;
+    for (std::uint32_t j = 0; j < points_.size(); ++j) {
+      const Vec3 d = points_[j] - points_[lowest];
+      if (std::abs(n1.dot(d)) <= flat_ && d.norm() > (points_[second] - points_[lowest]).norm()) second = j;
+    }
+    require(second != lowest, "the points span no solid");
+    return tilted(lowest, (points_[second] - points_[lowest]).normalized(), n1);
+  }
+
+  // Turns the plane through a point with normal n about an axis in it, until it meets the next points.
+  Vec3 tilted(std::uint32_t at, const Vec3& axis, const Vec3& n) const {
+    const Vec3 away = n.cross(axis);  // in the plane, the side that comes up
+    double least = std::numeric_limits<double>::infinity();
+    for (const Vec3& p : points_) {
+      const Vec3 d = p - points_[at];
+      const Vec3 across = d - axis * axis.dot(d);
+      if (across.norm() <= flat_) continue;
+      double angle = std::atan2(-n.dot(d), away.dot(d));
+      if (angle < -1e-9) angle += 2.0 * std::numbers::pi;
+      least = std::min(least, std::max(angle, 0.0));
+    }
+    require(least < std::numbers::pi - 1e-9, "the points span no solid");
+    return (std::cos(least) * n + std::sin(least) * away).normalized();
+  }
+
+  void wrap_over(std::uint32_t from, std::uint32_t to, const Vec3& n) {
+    for (const Solid::Edge& edge : edges_) {
+      if ((edge.from == from && edge.to == to) || (edge.from == to && edge.to == from)) return;
+    }
+    // Seen along the edge, the face lies to the left; the next one begins on its far side.
+    const Vec3 axis = (points_[from] - points_[to]).normalized();
+    const Vec3 away = n.cross(axis);
+    double most = -std::numeric_limits<double>::infinity();
+    Vec3 next = n;
+    for (const Vec3& p : points_) {
+      const Vec3 d = p - points_[from], across = d - axis * axis.dot(d);
+      if (across.norm() <= flat_ || std::abs(n.dot(d)) <= flat_) continue;
+      // The neighbour's plane leaves all points behind: the one that is seen at the flattest angle beyond the edge.
+      const double angle = std::atan2(n.dot(d), away.dot(d));
+      const double turned = angle <= -std::numbers::pi + 1e-12 ? std::numbers::pi : angle;
+      if (turned > most) {
+        most = turned;
+        const Vec3 unit = across.normalized();
+        next = axis.cross(unit);
+        if (next.dot(middle_ - points_[from]) > 0.0) next = -next;
+      }
+    }
+    edges_.push_back({from, to, n, add_face(next.normalized())});
+  }
+
+  // The face in a plane's direction, new or old; its exact normal.
+  Vec3 add_face(const Vec3& normal) {
+    for (const Solid::Face& face : faces_) {
+      if ((face.normal - normal).norm() < 1e-7) return face.normal;
+    }
+    double top = -std::numeric_limits<double>::infinity();
+    for (const Vec3& p : points_) top = std::max(top, normal.dot(p));
+    std::vector<std::uint32_t> on;
+    for (std::uint32_t j = 0; j < points_.size(); ++j) {
+      if (normal.dot(points_[j]) >= top - 2.0 * flat_) on.push_back(j);
+    }
+    require(on.size() >= 3, "the points span no solid");
+    const std::vector<std::uint32_t> ring = outline(on, normal);
+    require(ring.size() >= 3, "the points span no solid");
+    Vec3 exact = Vec3::Zero();
+    for (std::size_t k = 1; k + 1 < ring.size(); ++k) {
+      exact += (points_[ring[k]] - points_[ring[0]]).cross(points_[ring[k + 1]] - points_[ring[0]]);
+    }
+    exact.normalize();
+    double offset = -std::numeric_limits<double>::infinity();
+    for (const std::uint32_t j : ring) offset = std::max(offset, exact.dot(points_[j]));
+    faces_.push_back({exact, offset, 0, static_cast<std::uint32_t>(ring.size())});
+    rings_.push_back(ring);
+    return exact;
+  }
+
+  // The convex outline in the plane (Andrew's monotone chain), counter-clockwise about the normal.
+  std::vector<std::uint32_t> outline(std::vector<std::uint32_t> on, const Vec3& normal) const {
+    const Vec3 u = normal.unitOrthogonal(), v = normal.cross(u);
+    const auto at = [&](std::uint32_t j) { return Eigen::Vector2d(u.dot(points_[j]), v.dot(points_[j])); };
+    std::sort(on.begin(), on.end(), [&](std::uint32_t a, std::uint32_t b) {
+      const Eigen::Vector2d x = at(a), y = at(b);
+      return x.x() < y.x() || (x.x() == y.x() && x.y() < y.y());
+    });
+    std::vector<std::uint32_t> chain;
+    for (int side = 0; side < 2; ++side) {
+      const std::size_t begin = chain.size();
+      for (const std::uint32_t j : on) {
+        while (chain.size() >= begin + 2) {
+          const Eigen::Vector2d a = at(chain[chain.size() - 2]), b = at(chain.back()), c = at(j);
+          const double area = (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
+          if (area > flat_ * (c - a).norm()) break;
+          chain.pop_back();
+        }
+        chain.push_back(j);
+      }
+      chain.pop_back();
+      std::reverse(on.begin(), on.end());
+    }
+    return chain;
+  }
+
+  Solid collected() const {
+    Solid solid;
+    std::vector<std::uint32_t> number(points_.size(), ~0U);
+    const auto point = [&](std::uint32_t j) {
+      if (number[j] == ~0U) {
+        number[j] = static_cast<std::uint32_t>(solid.points.size());
+        solid.points.push_back(points_[j]);
+      }
+      return number[j];
+    };
+    for (std::size_t i = 0; i < faces_.size(); ++i) {
+      Solid::Face face = faces_[i];
+      face.first = static_cast<std::uint32_t>(solid.ring.size());
+      for (const std::uint32_t j : rings_[i]) solid.ring.push_back(point(j));
+      solid.faces.push_back(face);
+    }
+    for (Solid::Edge edge : edges_) {
+      edge.from = point(edge.from);
+      edge.to = point(edge.to);
+      solid.edges.push_back(edge);
+    }
+    require(solid.points.size() + solid.faces.size() == solid.edges.size() + 2, "the points span no solid");  // Euler
+    return solid;
+  }
+
+  std::vector<Vec3> points_;
+  double flat_ = 0.0;
+  Vec3 middle_;
+  std::vector<Solid::Face> faces_;
+  std::vector<std::vector<std::uint32_t>> rings_;
+  std::vector<Solid::Edge> edges_;
+};
+
+}  // namespace
+
+Solid solid_of(const SphereTool& shape, const Pose& X) {
+  require(shape.radius_m > 0.0, "a radius must be above 0");
+  Solid solid;
+  solid.points = {X.translation()};
+  solid.radius = shape.radius_m;
+  return finished(std::move(solid));
+}
+
+Solid solid_of(const CapsuleTool& shape, const Pose& X) {
+  require(shape.radius_m > 0.0 && shape.length_m > 0.0, "length and radius must be above 0");
+  Solid solid;
+  const Vec3 half = 0.5 * shape.length_m * Vec3::UnitZ();
+  solid.points = {X * Vec3(-half), X * half};
+  solid.edges = {{0, 1, Vec3::Zero(), Vec3::Zero()}};
+  solid.radius = shape.radius_m;
+  return finished(std::move(solid));
+}
+
+Solid solid_of(const BoxTool& shape, const Pose& X) {
+  require(shape.size_m.minCoeff() > 0.0, "a box's size must be above 0");
+  ConvexTool corners;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 sign(i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5);
+    corners.points_m.push_back(sign.cwiseProduct(shape.size_m));
+  }
+  return solid_of(corners, X);
+}
+
+Solid solid_of(const CylinderTool& shape, const Pose& X) {
+  require(shape.radius_m > 0.0 && shape.length_m > 0.0, "length and radius must be above 0");
+  Solid solid;
+  const Vec3 u = X.linear().col(0), v = X.linear().col(1), half = 0.5 * shape.length_m * X.linear().col(2);
+  solid.rims = {{X.translation() - half, u, v, shape.radius_m}, {X.translation() + half, u, v, shape.radius_m}};
+  return finished(std::move(solid));
+}
+
+Solid solid_of(const ConvexTool& shape, const Pose& X) {
+  require(shape.points_m.size() >= 4, "the points span no solid");
+  std::vector<Vec3> points;
+  for (const Vec3& p : shape.points_m) points.push_back(X * p);
+  return finished(Hull(std::move(points)).build());
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,183 @@
+#include "models/rigid_shapes/touch.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace proxarm::models {
+namespace {
+
+// How far beside a face or beyond an edge's end a foot may lie and still count: what rounding moves a point of a metre by
+// is 1e-16 m; this is far above it, and far below what a gap at a neighbouring feature would show.
+constexpr double kBeside_m = 1e-10;
+// By how much, in radians, a direction may miss the cone between the normals beside an edge. Where a face lies on an edge,
+// the direction lies on the cone's border, and either side of it must do. At a place where both edges really meet, solids
+// that are outside of each other keep the cone; so this admits no false contact.
+constexpr double kAskew = 0.02;
+
+double in_unit(double s) noexcept { return std::clamp(s, 0.0, 1.0); }
+
+struct Crossing {
+  Vec3 own = Vec3::Zero(), other = Vec3::Zero();
+  Vec3 across = Vec3::Zero();  // own × other, not normalised
+};
+
+// The nearest points of two lines, if they lie on both segments.
+std::optional<Crossing> cross(const EdgeLine& own, const EdgeLine& other) noexcept {
+  const Vec3 a = own.to - own.from, b = other.to - other.from, d = other.from - own.from;
+  const Vec3 n = a.cross(b);
+  const double aa = a.squaredNorm(), bb = b.squaredNorm(), nn = n.squaredNorm();
+  // Parallel within 1e-7 rad: their ends decide, with faces.
+  if (nn <= 1e-14 * aa * bb) return {};
+  const double s = d.cross(b).dot(n) / nn, t = d.cross(a).dot(n) / nn;
+  const double slack_s = kBeside_m / std::sqrt(aa), slack_t = kBeside_m / std::sqrt(bb);
+  if (s < -slack_s || s > 1.0 + slack_s || t < -slack_t || t > 1.0 + slack_t) return {};
+  return Crossing{own.from + s * a, other.from + t * b, n};
+}
+
+// Whether a unit direction across an edge lies between the normals of its faces.
+bool between(const Vec3& n, const Vec3& left, const Vec3& right) noexcept {
+  const Vec3 w = left.cross(right);
+  const double size = w.norm();
+  if (size < 1e-9) return n.dot(left) > 1.0 - kAskew;
+  return left.cross(n).dot(w) >= -kAskew * size && n.cross(right).dot(w) >= -kAskew * size && n.dot(left + right) > 0.0;
+}
+
+}  // namespace
+
+Touch touch(const FlatSide& side, const Vec3& p, double radius) noexcept {
+  return {p - radius * side.normal, side.normal, side.normal.dot(p) - side.offset - radius};
+}
+
+Touch touch(const HollowSphere& hollow, const Vec3& p, double radius) noexcept {
+  const Vec3 out = p - hollow.centre;
+  const double distance = out.norm();
+  const Vec3 n = distance > 0.0 ? Vec3(-out / distance) : Vec3(Vec3::UnitZ());
+  return {p - radius * n, n, hollow.radius - distance - radius};
+}
+
+Touch touch(const HollowTube& hollow, const Vec3& p, double radius) noexcept {
+  const Vec3 along = hollow.to - hollow.from;
+  const double s = along.dot(p - hollow.from) / along.squaredNorm();
+  const Vec3 out = p - (hollow.from + (hollow.endless ? s : in_unit(s)) * along);
+  const double distance = out.norm();
+  const Vec3 n = distance > 0.0 ? Vec3(-out / distance) : along.unitOrthogonal();
+  return {p - radius * n, n, hollow.radius - distance - radius};
+}
+
+namespace {
+
+// The local maxima of a function of the angle on a rim, of which the first two derivatives are known: Newton from the best
+// of twelve places and from other places that are higher than their neighbours.
+template <typename Value, typename Slopes>
+int highest_on_rim(const Solid::Rim& rim, Value value, Slopes slopes, std::array<Vec3, 4>& out) noexcept {
+  constexpr int places = 12;
+  constexpr double step = 2.0 * std::numbers::pi / places;
+  const auto at = [&rim](double angle) {
+    return Vec3(rim.centre + rim.radius * (std::cos(angle) * rim.u + std::sin(angle) * rim.v));
+  };
+  std::array<double, places> height;
+  for (int k = 0; k < places; ++k) height[static_cast<std::size_t>(k)] = value(at(step * k));
+  int count = 0;
+  for (int k = 0; k < places && count < 2; ++k) {
+    const double h = height[static_cast<std::size_t>(k)];
+    if (h < height[static_cast<std::size_t>((k + 1) % places)]) continue;
+    if (h <= height[static_cast<std::size_t>((k + places - 1) % places)]) continue;
+    double angle = step * k;
+    for (int i = 0; i < 12; ++i) {
+      const auto [first, second] = slopes(angle);
+      if (!(second < 0.0)) break;
+      const double turn = std::clamp(-first / second, -0.5 * step, 0.5 * step);
+      angle += turn;
+      if (std::abs(turn) < 1e-15) break;
+    }
+    out[static_cast<std::size_t>(count++)] = at(angle);
+  }
+  return count;
+}
+
+}  // namespace
+
+int nearest_of_rim(const FlatSide& side, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
+  const double u = side.normal.dot(rim.u), v = side.normal.dot(rim.v), tilt = std::hypot(u, v);
+  // The lowest point. Where the rim is nearly level, all of it comes near, and three points more hold it.
+  const Vec3 low = tilt > 0.0 ? Vec3(-(u * rim.u + v * rim.v) / tilt) : Vec3(-rim.u);
+  out[0] = rim.centre + rim.radius * low;
+  if (tilt > 0.05) return 1;
+  const Vec3 beside = rim.u.cross(rim.v).cross(low);
+  out[1] = rim.centre + rim.radius * beside;
+  out[2] = rim.centre - rim.radius * beside;
+  out[3] = rim.centre - rim.radius * low;
+  return 4;
+}
+
+int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
+  const Vec3 c = rim.centre - hollow.centre;
+  return nearest_of_rim(FlatSide{-c.normalized(), 0.0}, rim, out);
+}
+
+int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
+  const Vec3 along = hollow.to - hollow.from;
+  const double length2 = along.squaredNorm();
+  const auto radial = [&](const Vec3& p) { return Vec3(p - hollow.from - along * (along.dot(p - hollow.from) / length2)); };
+  const Vec3 c = radial(rim.centre), u = radial(hollow.from + rim.u), v = radial(hollow.from + rim.v);
+  const double r = rim.radius;
+  // The squared distance from the axis is |c + r (u cos α + v sin α)|².
+  const auto value = [&](const Vec3& p) { return radial(p).squaredNorm(); };
+  const auto slopes = [&](double angle) {
+    const double cos = std::cos(angle), sin = std::sin(angle);
+    const Vec3 x = c + r * (cos * u + sin * v), d = r * (cos * v - sin * u), dd = -r * (cos * u + sin * v);
+    return std::pair(2.0 * x.dot(d), 2.0 * (d.squaredNorm() + x.dot(dd)));
+  };
+  return highest_on_rim(rim, value, slopes, out);
+}
+
+std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,
+                                std::span<const Vec3> points, std::span<const std::uint32_t> ring, double side) noexcept {
+  for (std::size_t k = 0; k < ring.size(); ++k) {
+    const Vec3& corner = points[ring[k]];
+    const Vec3 inwards = normal.cross(points[ring[k + 1 < ring.size() ? k + 1 : 0]] - corner);
+    const double height = inwards.dot(p - corner);
+    if (height < 0.0 && height * height > kBeside_m * kBeside_m * inwards.squaredNorm()) return {};
+  }
+  const Vec3 n = side * normal;
+  return Touch{p - radius * n, n, side * (normal.dot(p) - offset) - radius};
+}
+
+std::optional<Touch> touch_point(const Vec3& own, const Vec3& other, double radii) noexcept {
+  const Vec3 d = own - other;
+  const double distance = d.norm();
+  if (!(distance > 0.0)) return {};
+  return Touch{own, d / distance, distance - radii};
+}
+
+std::optional<Touch> touch_round(const Vec3& p, const EdgeLine& edge, double radii, double own_radius,
+                                 bool own_is_edge) noexcept {
+  const Vec3 along = edge.to - edge.from;
+  const double s = along.dot(p - edge.from) / along.squaredNorm();
+  if (!(s > 0.0 && s < 1.0)) return {};
+  const Vec3 foot = edge.from + s * along;
+  std::optional<Touch> t = own_is_edge ? touch_point(foot, p, radii) : touch_point(p, foot, radii);
+  if (t) t->point -= own_radius * t->normal;
+  return t;
+}
+
+std::optional<Touch> touch_edges_round(const EdgeLine& own, const EdgeLine& other, double radii,
+                                       double own_radius) noexcept {
+  const std::optional<Crossing> x = cross(own, other);
+  if (!x) return {};
+  std::optional<Touch> t = touch_point(x->own, x->other, radii);
+  if (t) t->point -= own_radius * t->normal;
+  return t;
+}
+
+std::optional<Touch> touch_edges_sharp(const EdgeLine& own, const EdgeLine& other, double orientation) noexcept {
+  const std::optional<Crossing> x = cross(own, other);
+  if (!x) return {};
+  const Vec3 n = orientation * x->across.normalized();
+  if (!other.open && !between(n, other.left, other.right)) return {};
+  if (!own.open && !between(-n, own.left, own.right)) return {};
+  return Touch{x->own, n, n.dot(x->own - x->other)};
+}
+
+}  // namespace proxarm::models

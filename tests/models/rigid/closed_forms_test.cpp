@@ -1,0 +1,194 @@
+// A rigid tool against what can be written down: levers, ladders, rollers.
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "models/rigid/rigid_world.hpp"
+
+namespace proxarm::models {
+namespace {
+
+RigidObject floor_with(double mu, const Vec3& normal = Vec3::UnitZ(), std::int32_t object = 0) {
+  RigidObject plane;
+  plane.shape = FlatSide{normal, 0.0};
+  plane.friction = mu;
+  plane.object = object;
+  return plane;
+}
+
+Mat6 stiffness(double mass_kg = 4.0, double inertia_kgm2 = 0.01) {
+  Vec<6> d;
+  d << Vec3::Constant(mass_kg * 1e6), Vec3::Constant(inertia_kgm2 * 1e6);
+  return d.asDiagonal();
+}
+
+Twist wrench(const Vec3& force, const Vec3& torque) {
+  Twist w;
+  w << force, torque;
+  return w;
+}
+
+// A step from a pose under a wrench on the tool: p̂ = q ⊞ K⁻¹ w.
+ToolPose pushed(RigidWorld& g, const Mat6& K, const ToolPose& q, const Twist& w) {
+  return g.step(K, moved(q, K.inverse() * w), q);
+}
+
+// The sum of the contacts' wrenches against K (q ⊟ p̂).
+double imbalance_N(const RigidWorld& g, const Mat6& K, const ToolPose& q, const ToolPose& p_hat) {
+  Twist sum = Twist::Zero();
+  for (const PoseContact& contact : g.contacts()) {
+    sum += wrench(contact.force_W, (contact.point_W - q.position).cross(contact.force_W));
+  }
+  return (sum - K * difference(q, p_hat)).norm();
+}
+
+// By bisection to the last bit; the function changes its sign between.
+template <typename Function>
+double root(Function f, double low, double high) {
+  const bool rises = f(high) > f(low);
+  for (int k = 0; k < 200; ++k) {
+    const double middle = 0.5 * (low + high);
+    ((f(middle) > 0.0) == rises ? high : low) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+Tool one(const decltype(ToolPart::shape)& shape) { return {{{shape, Pose::Identity(), {}}}}; }
+
+TEST(RigidWorld, ABoxTipsOverItsEdgeAtTheLever) {
+  // Width 2a, pressed with N at its middle and pushed with F at a height h above the floor: it tips from F h = N a on.
+  const double a = 0.03, height = 0.08, N = 10.0, h = 0.07;
+  RigidWorld g(one(BoxTool{{2.0 * a, 0.05, height}}), {floor_with(5.0)});
+  const Mat6 K = stiffness();
+  const ToolPose q{{0.0, 0.0, 0.5 * height}, Quaternion::Identity()};
+  for (const double share : {0.5, 1.0 - 1e-9, 1.0 + 1e-9, 1.5}) {
+    const double F = share * N * a / h;
+    const Vec3 force(F, 0.0, -N);
+    const Twist w = wrench(force, Vec3(0.0, 0.0, h - 0.5 * height).cross(Vec3(F, 0.0, 0.0)));
+    const ToolPose r = pushed(g, K, q, w);
+    EXPECT_FALSE(g.unresolved());
+    const double turned = difference(r, q)[4];
+    if (share < 1.0) {
+      EXPECT_EQ(r, q) << "it stays, bit for bit";
+    } else {
+      // It turns by φ about the edge, on which all forces act: the moment of K (q ⊟ p̂) about the edge vanishes.
+      const ToolPose p = moved(q, K.inverse() * w);
+      const Vec3 edge(a, 0.0, 0.0);
+      const auto moment = [&](double angle) {
+        Vec3 turn(0.0, angle, 0.0);
+        const ToolPose at{edge + rotation_by(turn) * (q.position - edge), rotation_by(turn)};
+        const Twist f = K * difference(at, p);
+        return (f.tail<3>() + (at.position - edge).cross(f.head<3>())).y();
+      };
+      const double expected = root(moment, 0.0, 1e-3);
+      EXPECT_NEAR(turned, expected, 1e-9 * expected + 1e-16);
+      EXPECT_GT(turned, 0.0);
+    }
+  }
+}
+
+TEST(RigidWorld, ABoxSlidesWhenPushedBeyondItsFriction) {
+  const double mu = 0.4, N = 10.0, height = 0.02;
+  RigidWorld g(one(BoxTool{{0.06, 0.05, height}}), {floor_with(mu)});
+  const Mat6 K = stiffness();
+  const ToolPose q{{0.1, 0.2, 0.5 * height}, Quaternion::Identity()};
+  const ToolPose r = pushed(g, K, q, wrench({6.0, 0.0, -N}, {0.0, -0.5 * height * mu * N, 0.0}));
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_NEAR(r.position.x() - q.position.x(), (6.0 - mu * N) / K(0, 0), 1e-15);
+  EXPECT_EQ(g.contacts().size(), 4U);
+  for (const PoseContact& contact : g.contacts()) {
+    EXPECT_TRUE(contact.slips);
+    EXPECT_NEAR(contact.force_W.head<2>().norm(), mu * contact.force_W.z(), 1e-10);
+  }
+}
+
+TEST(RigidWorld, ALadderSlipsAtItsAngle) {
+  // A rod of length L and radius ρ between floor (z = 0) and wall (x = 0), loaded with W at its middle. With normal forces
+  // N_f and N_w and friction at its limit: N_w = μ_f N_f, N_f + μ_w N_w = W, and the moments about the middle vanish:
+  //   (L/2)(N_f cos θ − μ_f N_f sin θ − N_w sin θ − μ_w N_w cos θ) … with the arms ρ of friction.
+  const double L = 0.2, rho = 0.002, mu_f = 0.35, mu_w = 0.2, W = 10.0;
+  const double N_f = W / (1.0 + mu_f * mu_w), N_w = mu_f * N_f;
+  const auto moment = [&](double angle) {  // turning that lets the foot slide out
+    const Vec3 foot(0.5 * L * std::cos(angle), 0.0, -0.5 * L * std::sin(angle)), head = -foot;
+    const Vec3 f_f(-mu_f * N_f, 0.0, N_f), f_w(N_w, 0.0, mu_w * N_w);
+    return ((foot - rho * Vec3::UnitZ()).cross(f_f) + (head - rho * Vec3::UnitX()).cross(f_w)).y();
+  };
+  const double critical = root(moment, 0.1, 1.5);
+  for (const double off : {-1e-8, 1e-8}) {
+    const double angle = critical + off;
+    RigidWorld g(one(CapsuleTool{L, rho}), {floor_with(mu_f), floor_with(mu_w, Vec3::UnitX(), 1)});
+    ToolPose q;
+    q.position = Vec3(rho + 0.5 * L * std::cos(angle), 0.0, rho + 0.5 * L * std::sin(angle));
+    q.orientation = Quaternion::FromTwoVectors(Vec3::UnitZ(), Vec3(-std::cos(angle), 0.0, std::sin(angle)));
+    const ToolPose r = pushed(g, stiffness(), q, wrench({0.0, 0.0, -W}, Vec3::Zero()));
+    EXPECT_FALSE(g.unresolved());
+    const double slid = r.position.x() - q.position.x();
+    if (off > 0.0) {
+      EXPECT_LE(std::abs(slid), 1e-15) << "steeper: it stands";
+    } else {
+      EXPECT_GT(std::abs(slid), 1e-15) << "flatter: it slides";
+    }
+  }
+}
+
+TEST(RigidWorld, ASphereRollsWhereItSticksAndTurnsFreelyWhereItDoesNot) {
+  // Pushed with F at its middle: rolling, friction takes J/(J + M r²) of the force; sliding, none of it turns.
+  const double radius = 0.02, F = 2.0, N = 10.0;
+  const Mat6 K = stiffness(4.0, 0.001);
+  const ToolPose q{{0.0, 0.0, radius}, Quaternion::Identity()};
+  const Twist w = wrench({F, 0.0, -N}, Vec3::Zero());
+  RigidWorld rough(one(SphereTool{radius}), {floor_with(1.0)});
+  const Twist rolled = difference(pushed(rough, K, q, w), q);
+  const double M = K(0, 0), J = K(4, 4);
+  EXPECT_NEAR(rolled[0], F / (M + J / (radius * radius)), 1e-9 * F / M);
+  EXPECT_NEAR(rolled[4], rolled[0] / radius, 1e-9 * F / M / radius);
+  RigidWorld smooth(one(SphereTool{radius}), {floor_with(0.0)});
+  const Twist slid = difference(pushed(smooth, K, q, w), q);
+  EXPECT_NEAR(slid[0], F / M, 1e-9 * F / M);
+  EXPECT_EQ(slid[4], 0.0);
+}
+
+TEST(RigidWorld, ARowOfContactsHoldsAgainstATwist) {
+  // A box on its four corners, pressed in the middle and twisted about z: each corner bears N/4 and slips on a circle
+  // of the radius of the half diagonal, so the torque is μ N times that.
+  const double mu = 0.3, N = 10.0, x = 0.04, y = 0.03, arm = 0.5 * std::hypot(x, y);
+  RigidWorld g(one(BoxTool{{x, y, 0.02}}), {floor_with(mu)});
+  const Mat6 K = stiffness();
+  const ToolPose q{{0.0, 0.0, 0.01}, Quaternion::Identity()};
+  const double limit = mu * N * arm;
+  EXPECT_EQ(pushed(g, K, q, wrench({0.0, 0.0, -N}, {0.0, 0.0, (1.0 - 1e-9) * limit})), q);
+  const ToolPose p = moved(q, K.inverse() * wrench({0.0, 0.0, -N}, {0.0, 0.0, 1.5 * limit}));
+  const ToolPose r = g.step(K, p, q);
+  const Twist force = K * difference(r, p);
+  EXPECT_NEAR(force[5], -limit, 1e-9 * limit);
+  EXPECT_NEAR(difference(r, q)[5], 0.5 * limit / K(5, 5), 1e-9 * limit / K(5, 5));
+  EXPECT_LE(imbalance_N(g, K, r, p), 1e-10);
+}
+
+TEST(RigidWorld, ARodPivotsInACorner) {
+  // Its end in the corner of floor and two walls, pressed into all three; pushed at the other end it turns about the
+  // end's middle, and the distances stay as they are.
+  const double L = 0.1, rho = 0.003;
+  RigidWorld g(one(CapsuleTool{L, rho}),
+               {floor_with(0.0), floor_with(0.0, Vec3::UnitX(), 1), floor_with(0.0, Vec3::UnitY(), 2)});
+  const Mat6 K = stiffness();
+  const Vec3 along = Vec3(1.0, 1.0, 1.0).normalized(), end(rho, rho, rho);
+  ToolPose q{end + 0.5 * L * along, Quaternion::FromTwoVectors(Vec3::UnitZ(), along)};
+  const Vec3 across = along.unitOrthogonal(), push = 3.0 * across, lever = 0.5 * L * along;
+  const ToolPose p = moved(q, K.inverse() * wrench(-20.0 * along + push, lever.cross(push)));
+  const ToolPose r = g.step(K, p, q);
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_EQ(g.contacts().size(), 3U);
+  EXPECT_LE((r * Vec3(0.0, 0.0, -0.5 * L) - end).norm(), 1e-15);
+  const auto moment = [&](double angle) {
+    const Quaternion turn = rotation_by(Vec3(angle * along.cross(across)));
+    const ToolPose at{end + turn * lever, turn * q.orientation};
+    const Twist f = K * difference(at, p);
+    return along.cross(across).dot(f.tail<3>() + (at.position - end).cross(f.head<3>()));
+  };
+  const double expected = root(moment, 0.0, 1e-3);
+  EXPECT_NEAR(difference(r, q).tail<3>().norm(), expected, 1e-9 * expected);
+}
+
+}  // namespace
+}  // namespace proxarm::models

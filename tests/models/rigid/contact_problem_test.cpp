@@ -1,0 +1,140 @@
+#include "models/rigid/contact_problem.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "models/base/random.hpp"
+
+namespace proxarm::models {
+namespace {
+
+Mat6 random_stiffness(Random& random, double condition) {
+  Mat6 Q;
+  for (auto& x : Q.reshaped()) x = random.uniform(-1.0, 1.0);
+  // Gram and Schmidt.
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < i; ++j) Q.col(i) -= Q.col(j) * Q.col(j).dot(Q.col(i));
+    Q.col(i).normalize();
+  }
+  Vec<6> d;
+  for (auto& x : d) x = random.log_uniform(1.0, condition);
+  const Mat6 K = Q * d.asDiagonal() * Q.transpose();
+  return 0.5 * (K + K.transpose());
+}
+
+std::vector<LinearContact> random_contacts(Random& random, int count, const Twist& before, double most_mu) {
+  std::vector<LinearContact> contacts(static_cast<std::size_t>(count));
+  for (LinearContact& contact : contacts) {
+    const Vec3 place = random.in_box(1.0), n = random.direction(), t = n.unitOrthogonal();
+    int row = 0;
+    for (const Vec3& axis : {n, t, Vec3(n.cross(t))}) {
+      contact.J.row(row).head<3>() = axis;
+      contact.J.row(row++).tail<3>() = place.cross(axis);
+    }
+    // At `before` nothing had slipped and no gap was negative.
+    contact.c = -contact.J * before;
+    contact.c[0] += random.chance(0.5) ? 0.0 : random.uniform(0.0, 0.3);
+    contact.mu = random.chance(0.2) ? 0.0 : random.uniform(0.0, most_mu);
+  }
+  return contacts;
+}
+
+Twist random_twist(Random& random) {
+  Twist xi;
+  for (auto& x : xi) x = random.uniform(-1.0, 1.0);
+  return xi;
+}
+
+// The law, from its words alone; lengths and forces over the sizes given.
+double violation(const Mat6& K, const Twist& e, const std::vector<LinearContact>& contacts, const Twist& delta) {
+  using Real = long double;
+  Eigen::Matrix<Real, 6, 1> off = -(K.cast<Real>() * (e + delta).cast<Real>());
+  const Real force = (K * e).norm(), length = e.norm() + delta.norm();
+  Real worst = 0.0L;
+  for (const LinearContact& contact : contacts) {
+    const Eigen::Matrix<Real, 3, 1> f = contact.f.cast<Real>();
+    const Eigen::Matrix<Real, 3, 1> u =
+        contact.J.cast<Real>() * delta.cast<Real>() + contact.c.cast<Real>();
+    off += contact.J.cast<Real>().transpose() * f;
+    const Real limit = static_cast<Real>(contact.mu) * f[0];
+    worst = std::max({worst, -f[0] / force, -u[0] / length, std::min(f[0] / force, u[0] / length)});
+    worst = std::max(worst, (f.tail<2>().norm() - limit) / force);
+    if (f[0] > 1e-9L * force && u.tail<2>().norm() > 1e-9L * length) {
+      worst = std::max(worst, (f.tail<2>() + limit * u.tail<2>().normalized()).norm() / force *
+                                  std::min<Real>(1.0L, u.tail<2>().norm() / length));
+    }
+  }
+  return static_cast<double>(std::max(worst, off.norm() / force));
+}
+
+TEST(ContactProblem, KeepsTheLawForAFewContactsAndAnyStiffness) {
+  Random random(5);
+  ContactProblem problem;
+  int unsolved = 0;
+  const int cases = 4000;
+  for (int i = 0; i < cases; ++i) {
+    const Mat6 K = random_stiffness(random, random.log_uniform(1.0, 1e6));
+    problem.set_stiffness(K);
+    const Twist before = random_twist(random), e = random_twist(random);
+    std::vector<LinearContact> contacts = random_contacts(random, 1 + random.below(4), before, 0.6);
+    Twist delta;
+    if (!problem.solve(e, contacts, delta)) {
+      ++unsolved;
+      continue;
+    }
+    EXPECT_LE(violation(K, e, contacts, delta), 1e-9) << "case " << i;
+  }
+  EXPECT_LE(unsolved, cases / 200);
+}
+
+TEST(ContactProblem, ASolutionOfOneStiffnessIsOneOfAll) {
+  // Assumption 1: e' = K'⁻¹ K (e + δ) − δ leaves forces and δ as they are.
+  Random random(6);
+  ContactProblem problem;
+  int judged = 0, moved = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Mat6 K = random_stiffness(random, 100.0), other = random_stiffness(random, random.log_uniform(1.0, 1e6));
+    const Twist before = random_twist(random), e = random_twist(random);
+    std::vector<LinearContact> contacts = random_contacts(random, 1 + random.below(3), before, 0.4);
+    Twist delta, again;
+    problem.set_stiffness(K);
+    if (!problem.solve(e, contacts, delta)) continue;
+    problem.set_stiffness(other);
+    const Twist e_other = other.ldlt().solve(K * (e + delta)) - delta;
+    if (problem.count_solutions(e_other, contacts) != 1) continue;
+    for (LinearContact& contact : contacts) contact.f.setZero();
+    if (!problem.solve(e_other, contacts, again)) continue;
+    ++judged;
+    moved += (again - delta).norm() > 1e-8 * (1.0 + e_other.norm()) ? 1 : 0;
+  }
+  EXPECT_GT(judged, 1800);
+  EXPECT_EQ(moved, 0);
+}
+
+TEST(ContactProblem, SeveralSolutionsOfPainlevesRodAreCounted) {
+  // Painlevé's rod: one contact, a lever that makes friction press it on. μ beyond the limit leaves free and stuck.
+  LinearContact contact;
+  const Vec3 lever(-0.2, 0.0, -0.4);
+  int row = 0;
+  for (const Vec3& axis : {Vec3(0.0, 0.0, 1.0), Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0)}) {
+    contact.J.row(row).head<3>() = axis;
+    contact.J.row(row++).tail<3>() = lever.cross(axis);
+  }
+  contact.mu = 3.0;
+  ContactProblem problem;
+  Vec<6> K;
+  K << 1.0, 1.0, 1.0, 0.01, 0.01, 0.01;
+  problem.set_stiffness(K.asDiagonal());
+  Twist e = Twist::Zero();
+  e[0] = 0.1;
+  // Free, it would be 1 mm over the surface and have slid by 0.3 m towards where friction lifts the lever: f_n then
+  // takes u_n down by (μ 8 − 5) f_n, until it touches. So it may fly, slide or stick.
+  contact.c << contact.J.row(0).dot(e) + 0.001, contact.J.row(1).dot(e) - 0.3, contact.J.row(2).dot(e);
+  EXPECT_GT(problem.count_solutions(e, {&contact, 1}), 1);
+  contact.mu = 0.5;  // below 5/8 there is one
+  EXPECT_EQ(problem.count_solutions(e, {&contact, 1}), 1);
+}
+
+}  // namespace
+}  // namespace proxarm::models
