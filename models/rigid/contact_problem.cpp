@@ -71,8 +71,8 @@ double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
   return std::max(law, off.norm());
 }
 
-// One step of semismooth Newton for y and f, with the states chosen before. Each contact's new force is linear in its new
-// displacement, f⁺ = f̄ − P u⁺:
+// One step of semismooth Newton for y and f, with the states chosen before. Each contact's new force is linear in its
+// new displacement, f⁺ = f̄ − P u⁺:
 //   stick  u⁺ = 0, for which f⁺ = f − R u⁺ with a large R (the proximal point: redundant rows need no choice)
 //   slip   u_n⁺ = 0 likewise; f_t⁺ = μ (f_n⁺ d + z_n T z_t⁺/‖z_t‖), d = z_t/‖z_t‖, T = I − d dᵀ, z = f − u/w. Along d
 //          that is μ f_n⁺, across it −a/(1 − a) u_t⁺/w with a = μ z_n/‖z_t‖
@@ -128,8 +128,8 @@ bool ContactProblem::is_solved(Rows rows, const Twist& y, double size) noexcept 
   return violation(rows, y) <= kTolerance * size;
 }
 
-// Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the states
-// allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
+// Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the
+// states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
 void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
   for (int k = 0; k < 2; ++k) {
     Mat6 G = Mat6::Zero();
@@ -183,7 +183,7 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   const Rows rows(rows_.data(), contacts.size());
   Twist y = L_.transpose() * e;
   bool solved = newton(rows, y, size, 25);
-  for (int attempt = 0; attempt < 6 && !solved; ++attempt) {
+  for (int attempt = 0; attempt < 5 && !solved; ++attempt) {
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();
     }

@@ -6,10 +6,9 @@
 namespace proxarm::models {
 namespace {
 
-// Faces whose normals differ by less lie in one plane: a tool's point over their common edge is no nearer to it than to the
-// faces, to within this share of its distance from the edge.
+// Faces whose normals differ by less lie in one plane: a tool's point over their common edge is no nearer to it than to
+// the faces, to within this share of its distance from the edge.
 constexpr double kFlat = 1e-9;
-
 
 }  // namespace
 

@@ -8,15 +8,19 @@ namespace proxarm::models {
 namespace {
 
 // How far in front of a mesh's faces its surface is: a face has no inside from which a tool could be brought back, so
-// rounding must not take a tool in contact through it. Coordinates below a metre are rounded by 1e-16 m, and what is left
-// of the iteration is as small; this is a thousand times that, and a tenth of what a gap may be short of.
+// rounding must not take a tool in contact through it. Coordinates below a metre are rounded by 1e-16 m, and what is
+// left of the iteration is as small; this is a thousand times that, and a tenth of what a gap may be short of.
 constexpr double kLift_m = 1e-13;
-// Which side of a face a feature within this of it was on, rounding may have turned round: if it touched, it stays there.
+// Which side of a face a feature within this of it was on, rounding may have turned round: if it touched, it stays
+// there.
 constexpr double kFront_m = 1e-9;
 // A part of a step moves no point of the tool by more than this share of the least thickness of what may meet; features
-// that were up to twice as far behind another one may come to lie before it, as where an edge leaves the end of one edge
-// for the next, but never those of a far side.
+// that were up to twice as far behind another one may come to lie before it, as where an edge leaves the end of one
+// edge for the next, but never those of a far side.
 constexpr double kPart = 0.2;
+// A step may take so many poses; a local problem that has no solution, or none that is found, costs a hundred times
+// what one at hand does. What is left then counts as unresolved: the tool goes as far as the parts of the step got.
+constexpr int kBudget = 400, kHard = 40;
 constexpr double kGap_m = 1e-12;  // what a gap may be short of
 
 EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
@@ -24,7 +28,9 @@ EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
   return {solid.points[e.from], solid.points[e.to], e.left, e.right, false};
 }
 
-const TriangleMesh::Face& face_of(const TriangleFeatures& mesh, std::uint32_t i) noexcept { return mesh.mesh().face(i); }
+const TriangleMesh::Face& face_of(const TriangleFeatures& mesh, std::uint32_t i) noexcept {
+  return mesh.mesh().face(i);
+}
 
 // The least extent of a solid; features on its far side are that far away.
 double thickness(const Solid& solid) {
@@ -166,7 +172,8 @@ double RigidWorld::friction(const Pair& pair) const noexcept {
 // -- candidates -------------------------------------------------------------------------------------------------------
 
 template <typename Add>
-void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept {
+void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at, double reach,
+                            Add add) const noexcept {
   const double radii = own.radius + other.radius, near = reach + radii, near2 = near * near;
   const bool round = radii > 0.0;
   const auto own_edge = [&](std::uint32_t i) {
@@ -271,6 +278,14 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
   const View at = view(pose, frames_[entry], false);
   const double around = shared_->reach + reach;
   if (distance2_to_box(at.x, e.bounds) > around * around) return;
+  if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape)) {
+    const Solid& first = shared_->parts.front().solid;
+    const Vec3 inside = first.points.empty() ? Vec3(Vec3::Zero()) : first.points.front();
+    if ((*mesh)->mesh().closed() && !frames_[entry].side_known) {
+      frames_[entry].held_side = (*mesh)->mesh().encloses(at * inside) ? -1.0 : 1.0;
+      frames_[entry].side_known = true;
+    }
+  }
   for (std::uint16_t part = 0; part < shared_->parts.size(); ++part) {
     const Solid& own = shared_->parts[part].solid;
     const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j) {
@@ -331,7 +346,8 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
 
 // -- gaps -------------------------------------------------------------------------------------------------------------
 
-// Of a pair at q(k−1): the height of the tool's feature over the object's, or of the object's point over the tool's face.
+// Of a pair at q(k−1): the height of the tool's feature over the object's, or of the object's point over the tool's
+// face.
 double RigidWorld::signed_start(const Pair& pair, const View& at) const noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
   const RigidObject& object = shared_->entries[pair.entry].object;
@@ -380,16 +396,37 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
       if (radii > 0.0) continue;
     }
     const double height = signed_start(pair, at);
-    bool two_sided = is_mesh && pair.kind == Kind::point_face;
-    if (is_mesh && pair.kind == Kind::edges) {
-      two_sided = std::get<std::shared_ptr<const TriangleFeatures>>(object.shape)->edge(pair.other).line.open;
-    }
-    if (two_sided) {
-      if (!(pair.pressed && std::abs(height) < kFront_m)) pair.side = height < 0.0 ? -1.0F : 1.0F;
-    } else {
+    const bool near = pair.pressed && std::abs(height) < kFront_m;
+    if (!is_mesh) {
       pair.side = pair.pressed || height >= -2.0 * far - kFront_m ? 1.0F : 0.0F;
+    } else if (!near) {
+      pair.side = static_cast<float>(side_of_mesh(pair, at, height, far));
     }
   }
+}
+
+// A closed mesh holds the tool on its side, an open one on that on which the feature is. A feature may have been behind
+// without having come through, as beside an edge: its foot wasn't on the face then.
+double RigidWorld::side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept {
+  const auto& mesh = *std::get<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
+  const double held = frames_[pair.entry].held_side;
+  if (pair.kind == Kind::point_face) {
+    if (held == 0.0) return height < 0.0 ? -1.0 : 1.0;
+    if (held * height >= -kFront_m) return held;
+    if (held * height < -2.0 * far - kFront_m) return 0.0;
+    const Vec3 p = at * shared_->parts[pair.part].solid.points[pair.own];
+    return touch_face(p, 0.0, face_of(mesh, pair.other).normal, 0.0, mesh.mesh().structure().vertices,
+                      mesh.mesh().triangle(pair.other), 1.0)
+                   .has_value()
+               ? 0.0
+               : held;
+  }
+  if (pair.kind == Kind::edges) {
+    const TriangleFeatures::Edge& edge = mesh.edge(pair.other);
+    if (edge.line.open) return height < 0.0 ? -1.0 : 1.0;
+    if (held != 0.0 && edge.ridge != (held > 0.0)) return 0.0;
+  }
+  return height >= -2.0 * far - kFront_m ? 1.0 : 0.0;
 }
 
 // Whether a tool's point that is on the other side of a face than at the beginning has come through the face: the place
@@ -402,7 +439,8 @@ bool RigidWorld::crossed(const Pair& pair, const Vec3& p) const noexcept {
   const double before = TriangleMesh::height(face, was), after = TriangleMesh::height(face, p);
   if (pair.pressed || before * after >= 0.0) return true;
   const Vec3 there = was + before / (before - after) * (p - was);
-  return touch_face(there, 0.0, face.normal, 0.0, mesh.mesh().structure().vertices, mesh.mesh().triangle(pair.other), 1.0)
+  return touch_face(there, 0.0, face.normal, 0.0, mesh.mesh().structure().vertices, mesh.mesh().triangle(pair.other),
+                    1.0)
       .has_value();
 }
 
@@ -437,7 +475,9 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
   const double lift = mesh != nullptr ? kLift_m : 0.0, other_radius = solid != nullptr ? solid->radius : 0.0;
   const double radii = own.radius + other_radius;
   const auto other_point = [&] { return mesh != nullptr ? (*mesh)->vertex(pair.other) : solid->points[pair.other]; };
-  const auto other_edge = [&] { return mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other); };
+  const auto other_edge = [&] {
+    return mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other);
+  };
   const auto own_edge = [&] {
     EdgeLine edge = edge_of(own, pair.own);
     edge.from = at * edge.from;
@@ -453,9 +493,14 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
       const Vec3 p = at * own.points[pair.own];
       if (mesh != nullptr) {
         const TriangleMesh::Face& face = face_of(**mesh, pair.other);
-        if (side * TriangleMesh::height(face, p) < 0.0 && !crossed(pair, p)) return;
-        return emit(touch_face(p, own.radius, face.normal, face.normal.dot(face.corner), (*mesh)->mesh().structure().vertices,
-                               (*mesh)->mesh().triangle(pair.other), side),
+        const double height = side * TriangleMesh::height(face, p);
+        if (frames_[pair.entry].held_side == 0.0 && own.radius == 0.0 && height < 0.0) {
+          // Come through the face, wherever it is now; or come around, and then another face holds it.
+          if (crossed(pair, p)) emit(Touch{p, side * face.normal, height}, lift);
+          return;
+        }
+        return emit(touch_face(p, own.radius, face.normal, face.normal.dot(face.corner),
+                               (*mesh)->mesh().structure().vertices, (*mesh)->mesh().triangle(pair.other), side),
                     lift);
       }
       const Solid::Face& face = solid->faces[pair.other];
@@ -491,9 +536,11 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
     }
     case Kind::point_edge:
       return emit(touch_round(at * own.points[pair.own], other_edge(), radii, own.radius, false), lift);
-    case Kind::edge_point: return emit(touch_round(other_point(), own_edge(), radii, own.radius, true), lift);
+    case Kind::edge_point:
+      return emit(touch_round(other_point(), own_edge(), radii, own.radius, true), lift);
     case Kind::point_field:
-    case Kind::rim_field: return;
+    case Kind::rim_field:
+      return;
   }
 }
 
@@ -546,7 +593,11 @@ void RigidWorld::drop_deeper() noexcept {
         std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
     for (std::size_t j = 0; j < found_count_; ++j) {
       if (j == i || found_[j].touch.gap < found_[i].touch.gap || !same_point(pair, pairs_[found_[j].pair])) continue;
-      if (is_mesh && pair.kind == Kind::point_face && !behind(found_[i], found_[j])) continue;
+      // An open mesh's face may hold the point from behind: only one that it has come through counts here.
+      if (is_mesh && pair.kind == Kind::point_face) {
+        if (frames_[pair.entry].held_side == 0.0 && !(found_[j].touch.gap < 0.0)) continue;
+        if (!behind(found_[i], found_[j])) continue;
+      }
       found_[i] = found_[--found_count_];
       --i;
       break;
@@ -579,8 +630,8 @@ void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolP
   out.f = pair.pressed && found.which == 0 ? Vec3(axes.transpose() * pair.force_W) : Vec3(Vec3::Zero());
 }
 
-// Solves the local problem at a pose. Contacts that neither pressed last time nor are passed on the way to p̂ join when a
-// solution passes them.
+// Solves the local problem at a pose. Contacts that neither pressed last time nor are passed on the way to p̂ join when
+// a solution passes them.
 bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old,
                               Twist& delta) noexcept {
   const Twist e = difference(pose, p_hat);
@@ -609,6 +660,7 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const
     }
     if (!grew) break;
     solved = problem_.solve(e, {linear_.data(), linear_count_}, delta);
+    if (!solved) budget_ -= kHard;
   }
   for (std::size_t i = 0; i < pair_count_; ++i) pairs_[i].pressed = false;
   for (std::size_t k = 0; k < linear_count_; ++k) {
@@ -625,6 +677,7 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach);
   double last = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 50; ++k) {
+    if (--budget_ < 0) return false;
     find(q);
     Twist delta;
     const bool solved = solve_linear(q, p_hat, q_old, delta);
@@ -697,8 +750,9 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   problem_.set_stiffness(K);
   const double limit = std::min(kPart * shared_->thinness, gathered_reach_);
   const int parts = std::isfinite(limit) ? static_cast<int>(std::min(std::ceil(far / limit), 512.0)) : 1;
+  budget_ = kBudget + 8 * parts;
   bool fine = in_parts(p_hat, q, std::max(parts, 1), q_);
-  if (!fine) {
+  if (!fine && budget_ > 0) {
     gather(q, gathered_reach_);
     fine = in_parts(p_hat, q, 8 * std::max(parts, 1), q_);
   }

@@ -1,13 +1,15 @@
 // 𝒢 of a rigid tool among rigid objects (models/geometry/pose_algorithm.hpp states the law).
 //
-// 1. Candidates: pairs of features, one of the tool and one of an object, that come within a distance of each other that
+// 1. Candidates: pairs of features, one of the tool and one of an object, that come within a distance of each other
+// that
 //    the steps to come won't exceed. They are gathered anew only when the tool has moved so far.
 // 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_shapes/touch.hpp). Linearised there, those
 //    that press or would be passed make a local problem (contact_problem.hpp); its solution is the next pose. Gaps and
 //    normals are taken again until nothing moves: a fixed point is exact, since at δ = 0 nothing is linearised. It
 //    converges by the ratio of the step's penetration to the radius of curvature, a thousandth or less; where surfaces
 //    conform (a peg in its hole) Anderson's acceleration takes over (Walker and Ni 2011).
-// 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the way
+// 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the
+// way
 //    from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from q(k−1).
 //
 // Friction between a part with a friction of its own and an object: √(μ_tool μ_object); otherwise the object's.
@@ -33,7 +35,8 @@ class RigidWorld final : public PoseAlgorithm {
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
   void set_time(const StepTime& time) noexcept override;
   [[nodiscard]] bool wants_time() const noexcept override { return shared_->moves; }
-  // Moves a driven object for the next step, from where it was for the last one. X is relative to where it was described.
+  // Moves a driven object for the next step, from where it was for the last one. X is relative to where it was
+  // described.
   void drive(std::int32_t object, const Pose& X) noexcept;
 
   [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {contacts_.data(), count_}; }
@@ -48,7 +51,16 @@ class RigidWorld final : public PoseAlgorithm {
   RigidWorld& operator=(const RigidWorld&) noexcept = default;
 
  private:
-  enum class Kind : std::uint8_t { point_field, rim_field, point_face, face_point, edges, point_point, point_edge, edge_point };
+  enum class Kind : std::uint8_t {
+    point_field,
+    rim_field,
+    point_face,
+    face_point,
+    edges,
+    point_point,
+    point_edge,
+    edge_point
+  };
   struct Pair {
     Kind kind = Kind::point_field;
     std::uint16_t part = 0, entry = 0;
@@ -75,13 +87,17 @@ class RigidWorld final : public PoseAlgorithm {
   struct Shared {  // constant
     std::vector<Part> parts;
     std::vector<Entry> entries;
-    double reach = 0.0;      // of the tool's points from the reference point
-    double thinness = 0.0;   // the least thickness of the tool's parts
+    double reach = 0.0;     // of the tool's points from the reference point
+    double thinness = 0.0;  // the least thickness of the tool's parts
     bool moves = false;
   };
   struct Frame {  // of an object, now and at the last step
     Pose now = Pose::Identity(), before = Pose::Identity();
     bool moved = false;  // from where it was described
+    // Of a closed mesh: 1 or −1, the side of its faces on which the tool is, known from the first time that it comes
+    // near.
+    double held_side = 0.0;
+    bool side_known = false;
   };
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 256;
@@ -100,8 +116,10 @@ class RigidWorld final : public PoseAlgorithm {
   template <typename Add>
   void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
   template <typename Add>
-  void pairs_with(const Solid& own, const TriangleFeatures& other, const View& at, double reach, Add add) const noexcept;
+  void pairs_with(const Solid& own, const TriangleFeatures& other, const View& at, double reach,
+                  Add add) const noexcept;
   void set_sides(const ToolPose& from, double far) noexcept;
+  [[nodiscard]] double side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
@@ -127,6 +145,7 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
   bool overflow_ = false;
+  int budget_ = 0;  // poses that this step may still take
   ToolPose clear_at_;
   double clearance_ = -1.0;
 

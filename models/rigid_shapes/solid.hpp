@@ -1,5 +1,6 @@
-// A convex solid as its features: points, edges and faces, each with the same radius around it. A sphere is a point with a
-// radius, a capsule an edge with its ends, a box and a hull have faces and no radius. A flat cylinder has two rims instead.
+// A convex solid as its features: points, edges and faces, each with the same radius around it. A sphere is a point
+// with a radius, a capsule an edge with its ends, a box and a hull have faces and no radius. A flat cylinder has two
+// rims instead.
 //
 // Contact is found between features, because a feature pair has a gap in closed form, exact to rounding. Metres; built
 // once, then constant.
@@ -21,8 +22,8 @@ struct Solid {
     Vec3 left = Vec3::Zero(), right = Vec3::Zero();
   };
   struct Face {
-    Vec3 normal = Vec3::UnitZ();  // unit, outwards
-    double offset = 0.0;          // normalᵀ x on the face
+    Vec3 normal = Vec3::UnitZ();         // unit, outwards
+    double offset = 0.0;                 // normalᵀ x on the face
     std::uint32_t first = 0, count = 0;  // its corners in `ring`, counter-clockwise from outside
   };
   struct Rim {

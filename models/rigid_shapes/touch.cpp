@@ -7,12 +7,12 @@
 namespace proxarm::models {
 namespace {
 
-// How far beside a face or beyond an edge's end a foot may lie and still count: what rounding moves a point of a metre by
-// is 1e-16 m; this is far above it, and far below what a gap at a neighbouring feature would show.
+// How far beside a face or beyond an edge's end a foot may lie and still count: what rounding moves a point of a metre
+// by is 1e-16 m; this is far above it, and far below what a gap at a neighbouring feature would show.
 constexpr double kBeside_m = 1e-10;
-// By how much, in radians, a direction may miss the cone between the normals beside an edge. Where a face lies on an edge,
-// the direction lies on the cone's border, and either side of it must do. At a place where both edges really meet, solids
-// that are outside of each other keep the cone; so this admits no false contact.
+// By how much, in radians, a direction may miss the cone between the normals beside an edge. Where a face lies on an
+// edge, the direction lies on the cone's border, and either side of it must do. At a place where both edges really
+// meet, solids that are outside of each other keep the cone; so this admits no false contact.
 constexpr double kAskew = 0.02;
 
 double in_unit(double s) noexcept { return std::clamp(s, 0.0, 1.0); }
@@ -67,8 +67,8 @@ Touch touch(const HollowTube& hollow, const Vec3& p, double radius) noexcept {
 
 namespace {
 
-// The local maxima of a function of the angle on a rim, of which the first two derivatives are known: Newton from the best
-// of twelve places and from other places that are higher than their neighbours.
+// The local maxima of a function of the angle on a rim, of which the first two derivatives are known: Newton from the
+// best of twelve places and from other places that are higher than their neighbours.
 template <typename Value, typename Slopes>
 int highest_on_rim(const Solid::Rim& rim, Value value, Slopes slopes, std::array<Vec3, 4>& out) noexcept {
   constexpr int places = 12;
@@ -119,7 +119,9 @@ int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, std::array
 int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
   const Vec3 along = hollow.to - hollow.from;
   const double length2 = along.squaredNorm();
-  const auto radial = [&](const Vec3& p) { return Vec3(p - hollow.from - along * (along.dot(p - hollow.from) / length2)); };
+  const auto radial = [&](const Vec3& p) {
+    return Vec3(p - hollow.from - along * (along.dot(p - hollow.from) / length2));
+  };
   const Vec3 c = radial(rim.centre), u = radial(hollow.from + rim.u), v = radial(hollow.from + rim.v);
   const double r = rim.radius;
   // The squared distance from the axis is |c + r (u cos α + v sin α)|².
@@ -133,7 +135,8 @@ int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, std::array<V
 }
 
 std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,
-                                std::span<const Vec3> points, std::span<const std::uint32_t> ring, double side) noexcept {
+                                std::span<const Vec3> points, std::span<const std::uint32_t> ring,
+                                double side) noexcept {
   for (std::size_t k = 0; k < ring.size(); ++k) {
     const Vec3& corner = points[ring[k]];
     const Vec3 inwards = normal.cross(points[ring[k + 1 < ring.size() ? k + 1 : 0]] - corner);

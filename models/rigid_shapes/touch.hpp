@@ -1,11 +1,12 @@
 // How near two features are: one of the tool, one of an object, in the object's frame.
 //
 // A gap is the distance along the normal by which the features are apart; for small motions it changes by
-// nᵀ(displacement of the tool's material point). Each gap that is returned is one that must not become negative, wherever
-// the tool comes from outside.
+// nᵀ(displacement of the tool's material point). Each gap that is returned is one that must not become negative,
+// wherever the tool comes from outside.
 //
 //   point, face     where the foot lies on the face
-//   edge, edge      where the nearest points lie inside of both. Of sharp edges (no radius) they hold only in the directions
+//   edge, edge      where the nearest points lie inside of both. Of sharp edges (no radius) they hold only in the
+//   directions
 //                   that lie between the normals of the faces beside them, for both solids
 //   rounded ones    points and edges in any combination: the distance less both radii
 #pragma once
@@ -20,13 +21,13 @@
 namespace proxarm::models {
 
 struct Touch {
-  Vec3 point = Vec3::Zero();   // of the tool
+  Vec3 point = Vec3::Zero();    // of the tool
   Vec3 normal = Vec3::UnitZ();  // unit, towards the tool
   double gap = 0.0;
 };
 
-// Behind these lies an object, and the tool is on their free side. Each is convex from inside, so only the tool's points
-// and rims can touch it.
+// Behind these lies an object, and the tool is on their free side. Each is convex from inside, so only the tool's
+// points and rims can touch it.
 struct FlatSide {
   Vec3 normal = Vec3::UnitZ();
   double offset = 0.0;
@@ -61,7 +62,8 @@ struct EdgeLine {
 // A point p with a radius over a face; none if its foot isn't on the face. `side` is 1 or −1, the side of the face that
 // the point is on.
 std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,
-                                std::span<const Vec3> points, std::span<const std::uint32_t> ring, double side) noexcept;
+                                std::span<const Vec3> points, std::span<const std::uint32_t> ring,
+                                double side) noexcept;
 // Both with radii: the nearest points.
 std::optional<Touch> touch_point(const Vec3& own, const Vec3& other, double radii) noexcept;
 // None if the nearest point of the edge is one of its ends. `own_is_edge`: the tool's feature is the edge.

@@ -17,10 +17,16 @@ using models::Pose;
 using models::RigidObject;
 using models::Vec3;
 
-template <typename T>
-bool has_cylinder(const T& parts) {
+bool has_cylinder(const std::vector<models::ToolPart>& parts) {
   return std::any_of(parts.begin(), parts.end(), [](const models::ToolPart& part) {
     return std::holds_alternative<models::CylinderTool>(part.shape);
+  });
+}
+
+bool has_edges(const std::vector<models::ToolPart>& parts) {
+  return std::any_of(parts.begin(), parts.end(), [](const models::ToolPart& part) {
+    return std::holds_alternative<models::BoxTool>(part.shape) ||
+           std::holds_alternative<models::ConvexTool>(part.shape);
   });
 }
 
@@ -73,10 +79,12 @@ std::optional<Refusal> why_not(const Scene& scene, const models::Tool& tool) {
     return Refusal{"a medium and a Coulomb force act on a point; they aren't rendered for a rigid tool",
                    scene.media.empty() ? scene.coulomb_line : scene.media.front().line};
   }
-  if (scene.guide) return Refusal{"a guide holds a point; it isn't rendered for a rigid tool", scene.guide->line_number};
+  if (scene.guide)
+    return Refusal{"a guide holds a point; it isn't rendered for a rigid tool", scene.guide->line_number};
   for (const Object& object : scene.objects) {
     const std::string name = "\"" + object.name + "\"";
-    if (object.layer) return Refusal{"a rigid tool touches rigid objects only, and " + name + " has a layer", object.line};
+    if (object.layer)
+      return Refusal{"a rigid tool touches rigid objects only, and " + name + " has a layer", object.line};
     const bool hollow = std::visit(
         [](const auto& s) {
           if constexpr (requires { s.inside_out; }) return s.inside_out;
@@ -85,15 +93,22 @@ std::optional<Refusal> why_not(const Scene& scene, const models::Tool& tool) {
         object.shape);
     const bool is_mesh = std::holds_alternative<MeshShape>(object.shape);
     if (std::holds_alternative<CylinderShape>(object.shape) && !hollow) {
-      return Refusal{"contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a mesh for " +
-                         name,
+      return Refusal{
+          "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a mesh for " + name,
+          object.line};
+    }
+    const auto* mesh = std::get_if<MeshShape>(&object.shape);
+    if (mesh != nullptr && !mesh->mesh->closed() && has_edges(tool.parts)) {
+      return Refusal{"a box or a convex tool among meshes needs closed ones, and " + name +
+                         " has holes: take a sphere or a capsule, or close it",
                      object.line};
     }
     if (has_cylinder(tool.parts) && (is_mesh || !hollow)) {
-      return Refusal{"a cylinder as a tool is held by planes and by hollow objects only: take a convex tool or a capsule "
-                     "beside " +
-                         name,
-                     object.line};
+      return Refusal{
+          "a cylinder as a tool is held by planes and by hollow objects only: take a convex tool or a capsule "
+          "beside " +
+              name,
+          object.line};
     }
   }
   return {};

@@ -11,8 +11,8 @@
 
 namespace proxarm::scenes {
 
-// Why a tool can't be rendered in a scene, as a sentence; none if it can. `line` of the scene's file is set where one is
-// to blame.
+// Why a tool can't be rendered in a scene, as a sentence; none if it can. `line` of the scene's file is set where one
+// is to blame.
 struct Refusal {
   std::string why;
   int line = 0;

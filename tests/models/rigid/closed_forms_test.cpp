@@ -103,8 +103,9 @@ TEST(RigidWorld, ABoxSlidesWhenPushedBeyondItsFriction) {
 }
 
 TEST(RigidWorld, ALadderSlipsAtItsAngle) {
-  // A rod of length L and radius ρ between floor (z = 0) and wall (x = 0), loaded with W at its middle. With normal forces
-  // N_f and N_w and friction at its limit: N_w = μ_f N_f, N_f + μ_w N_w = W, and the moments about the middle vanish:
+  // A rod of length L and radius ρ between floor (z = 0) and wall (x = 0), loaded with W at its middle. With normal
+  // forces N_f and N_w and friction at its limit: N_w = μ_f N_f, N_f + μ_w N_w = W, and the moments about the middle
+  // vanish:
   //   (L/2)(N_f cos θ − μ_f N_f sin θ − N_w sin θ − μ_w N_w cos θ) … with the arms ρ of friction.
   const double L = 0.2, rho = 0.002, mu_f = 0.35, mu_w = 0.2, W = 10.0;
   const double N_f = W / (1.0 + mu_f * mu_w), N_w = mu_f * N_f;

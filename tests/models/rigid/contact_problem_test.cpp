@@ -54,8 +54,7 @@ double violation(const Mat6& K, const Twist& e, const std::vector<LinearContact>
   Real worst = 0.0L;
   for (const LinearContact& contact : contacts) {
     const Eigen::Matrix<Real, 3, 1> f = contact.f.cast<Real>();
-    const Eigen::Matrix<Real, 3, 1> u =
-        contact.J.cast<Real>() * delta.cast<Real>() + contact.c.cast<Real>();
+    const Eigen::Matrix<Real, 3, 1> u = contact.J.cast<Real>() * delta.cast<Real>() + contact.c.cast<Real>();
     off += contact.J.cast<Real>().transpose() * f;
     const Real limit = static_cast<Real>(contact.mu) * f[0];
     worst = std::max({worst, -f[0] / force, -u[0] / length, std::min(f[0] / force, u[0] / length)});

@@ -19,8 +19,8 @@ struct Polyhedron {
 inline Polyhedron polyhedron_of_box(const Vec3& size, const Pose& X) {
   Polyhedron box;
   for (int i = 0; i < 8; ++i) {
-    box.corners.push_back(X * Vec3((i & 1 ? 0.5 : -0.5) * size.x(), (i & 2 ? 0.5 : -0.5) * size.y(),
-                                   (i & 4 ? 0.5 : -0.5) * size.z()));
+    box.corners.push_back(
+        X * Vec3((i & 1 ? 0.5 : -0.5) * size.x(), (i & 2 ? 0.5 : -0.5) * size.y(), (i & 4 ? 0.5 : -0.5) * size.z()));
   }
   for (int k = 0; k < 3; ++k) {
     box.normals.push_back(X.linear().col(k));
@@ -29,8 +29,8 @@ inline Polyhedron polyhedron_of_box(const Vec3& size, const Pose& X) {
   return box;
 }
 
-// The separating axis theorem: the largest separation over all face normals and products of edges. It is the distance where
-// the nearest features are a face's, and no larger than it otherwise; negative inside.
+// The separating axis theorem: the largest separation over all face normals and products of edges. It is the distance
+// where the nearest features are a face's, and no larger than it otherwise; negative inside.
 inline double separation(const Polyhedron& a, const Polyhedron& b) {
   std::vector<Vec3> axes = a.normals;
   axes.insert(axes.end(), b.normals.begin(), b.normals.end());
@@ -57,11 +57,12 @@ inline double separation(const Polyhedron& a, const Polyhedron& b) {
 }
 
 struct LawFigures {
-  double imbalance = 0.0;      // of the wrench, over its size
-  double outside_cone = 0.0;   // of friction, over the force
-  double against_slip = 0.0;   // the angle's sine between friction and the slip that it opposes, and what it lacks of μ f_n
-  double pull = 0.0;           // a normal force below 0
-  double gap_m = 0.0;          // of a contact that presses
+  double imbalance = 0.0;     // of the wrench, over its size
+  double outside_cone = 0.0;  // of friction, over the force
+  double against_slip =
+      0.0;             // the angle's sine between friction and the slip that it opposes, and what it lacks of μ f_n
+  double pull = 0.0;   // a normal force below 0
+  double gap_m = 0.0;  // of a contact that presses
 };
 
 // Against the law as pose_algorithm.hpp states it, for objects that stand still. `mu` of each object.

@@ -7,8 +7,8 @@
 namespace proxarm::models {
 namespace {
 
-// What a convex hull promises, from the promise alone: all points are behind all faces, each face touches three or more,
-// each edge lies on both of its faces, which turn outwards there.
+// What a convex hull promises, from the promise alone: all points are behind all faces, each face touches three or
+// more, each edge lies on both of its faces, which turn outwards there.
 void expect_hull(const Solid& solid, const std::vector<Vec3>& points, double size) {
   for (const Solid::Face& face : solid.faces) {
     for (const Vec3& p : points) EXPECT_LE(face.normal.dot(p), face.offset + 1e-9 * size);
@@ -44,7 +44,8 @@ TEST(Solid, AHullHoldsItsPoints) {
   for (int i = 0; i < 50; ++i) {
     ConvexTool tool;
     const int n = 4 + random.below(200);
-    for (int k = 0; k < n; ++k) tool.points_m.emplace_back(random.chance(0.5) ? random.in_box(0.01) : 0.012 * random.direction());
+    for (int k = 0; k < n; ++k)
+      tool.points_m.emplace_back(random.chance(0.5) ? random.in_box(0.01) : 0.012 * random.direction());
     expect_hull(solid_of(tool, Pose::Identity()), tool.points_m, 0.02);
   }
 }
