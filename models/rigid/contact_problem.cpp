@@ -183,7 +183,7 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   const Rows rows(rows_.data(), contacts.size());
   Twist y = L_.transpose() * e;
   bool solved = newton(rows, y, size, 25);
-  for (int attempt = 0; attempt < 5 && !solved; ++attempt) {
+  for (int attempt = 0; attempt < 6 && !solved; ++attempt) {
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();
     }
