@@ -97,10 +97,8 @@ std::optional<Refusal> why_not(const Scene& scene, const models::Tool& tool) {
           "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a mesh for " + name,
           object.line};
     }
-    const auto* mesh = std::get_if<MeshShape>(&object.shape);
-    if (mesh != nullptr && !mesh->mesh->closed() && has_edges(tool.parts)) {
-      return Refusal{"a box or a convex tool among meshes needs closed ones, and " + name +
-                         " has holes: take a sphere or a capsule, or close it",
+    if (is_mesh && has_edges(tool.parts)) {
+      return Refusal{"a box or a convex tool isn't held by meshes yet: take a sphere or a capsule beside " + name,
                      object.line};
     }
     if (has_cylinder(tool.parts) && (is_mesh || !hollow)) {

@@ -104,13 +104,6 @@ void expect_law(const Figures& figures) {
   EXPECT_LE(figures.law.against_slip, 1e-8);
 }
 
-TEST(RigidWorldsOfMeshes, ABoxKeepsTheLaw) {
-  const Vec3 size(0.03, 0.02, 0.01);
-  expect_law(push_about({{{BoxTool{size}, Pose::Identity(), {}}}}, [&](const ToolPose& q) {
-    return separation(polyhedron_of_box(size, isometry(q)), polyhedron_of_box(block_size, Pose::Identity()));
-  }));
-}
-
 TEST(RigidWorldsOfMeshes, ACapsuleKeepsTheLaw) {
   expect_law(push_about({{{CapsuleTool{0.03, 0.004}, Pose::Identity(), {}}}}, [](const ToolPose& q) {
     return to_block(q * Vec3(0.0, 0.0, -0.015), q * Vec3(0.0, 0.0, 0.015)) - 0.004;
