@@ -115,55 +115,5 @@ TEST(RigidWorldsOfMeshes, ASphereKeepsTheLaw) {
                         [](const ToolPose& q) { return to_block(q.position) - 0.01; }));
 }
 
-// An open sheet of zero thickness, and tools of a tenth of a millimetre that are driven at it, spinning at 10 rad/s.
-TEST(RigidWorldsOfMeshes, NothingThinPassesASheet) {
-  Random random(9);
-  TriangleSoup soup;
-  const int n = 12;
-  for (int i = 0; i <= n; ++i) {
-    for (int j = 0; j <= n; ++j) {
-      soup.vertices.emplace_back(0.01 * (i - n / 2), 0.01 * (j - n / 2), random.uniform(-0.001, 0.001));
-    }
-  }
-  for (std::uint32_t i = 0; i < n; ++i) {
-    for (std::uint32_t j = 0; j < n; ++j) {
-      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
-      soup.triangles.push_back({a, b, a + 1});
-      soup.triangles.push_back({b, b + 1, a + 1});
-    }
-  }
-  const auto mesh = std::make_shared<const TriangleMesh>(std::move(soup));
-  const std::vector<Tool> tools = {{{{SphereTool{5e-5}, Pose::Identity(), {}}}},
-                                   {{{CapsuleTool{0.01, 5e-5}, Pose::Identity(), {}}}}};
-  for (std::size_t t = 0; t < tools.size(); ++t) {
-    RigidObject object;
-    object.shape = std::make_shared<const TriangleFeatures>(mesh);
-    object.friction = 0.3;
-    std::vector<RigidObject> objects;
-    objects.push_back(std::move(object));
-    RigidWorld g(tools[t], std::move(objects));
-    Mat6 K = Mat6::Zero();
-    K.diagonal() << Vec3::Constant(4e6), Vec3::Constant(4e2);
-    int touching = 0, unresolved = 0;
-    ToolPose q;
-    q.position.z() = 0.02;
-    Twist way = Twist::Zero();
-    for (int k = 0; k < 6000; ++k) {
-      if (k % 200 == 0) {
-        way.head<3>() << random.uniform(-1e-4, 1e-4), random.uniform(-1e-4, 1e-4), -random.log_uniform(1e-6, 3e-4);
-        way.head<2>() -= 2e-3 * q.position.head<2>();
-        way.tail<3>() = 0.01 * random.direction();
-      }
-      q = g.step(K, moved(q, way), q);
-      touching += g.contacts().empty() ? 0 : 1;
-      unresolved += g.unresolved() ? 1 : 0;
-      ASSERT_GT(q.position.z(), -0.007) << "tool " << t << " passed the sheet in step " << k;
-      ASSERT_LT(q.position.head<2>().lpNorm<Eigen::Infinity>(), 0.055);
-    }
-    EXPECT_GT(touching, 3000) << "tool " << t;
-    EXPECT_LE(unresolved, 60) << "tool " << t;
-  }
-}
-
 }  // namespace
 }  // namespace proxarm::models
