@@ -291,6 +291,9 @@ void tell_felt_mass(const Summary& s, Lines& line) {
                format("phase %.0f degrees", 180.0 / std::numbers::pi * std::arg(last.mass_kg)));
 }
 
+// Below, a world's force is rounding.
+constexpr double noticeable_N = 1e-3;
+
 // What was felt, and how true it was.
 void tell_motion(const Summary& s, Lines& line) {
   line("apparent mass",
@@ -321,7 +324,7 @@ void tell_motion(const Summary& s, Lines& line) {
   line("friction ratio error", s.friction_ratio_error ? format("%+.2f %%", 100 * *s.friction_ratio_error) : "none");
   line("pulling force",
        format("%.3g N", s.pulling_force_max_N) +
-           (s.drag_force_max_N > 0.0 ? format("; drag without contact %.3g N", s.drag_force_max_N) : ""));
+           (s.drag_force_max_N > noticeable_N ? format("; drag without contact %.3g N", s.drag_force_max_N) : ""));
 }
 
 }  // namespace
