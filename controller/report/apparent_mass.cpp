@@ -1,6 +1,7 @@
 #include "controller/report/apparent_mass.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -131,6 +132,125 @@ std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
   Estimate estimate{mass_and_damping[0] / size[0], mass_and_damping[1] / size[1], used_s_};
   if (scaled.determinant() > 1e-6) estimate.mass_kg = (scaled.inverse() * force)[0] / size[0];
   return estimate;
+}
+
+// ---- by frequency
+
+namespace {
+
+constexpr double average_s = 0.01, segment_s = 5.0;
+constexpr double first_Hz = 0.4, last_Hz = 15.0, half_width = 0.1, least_coherence = 0.9;
+constexpr std::size_t least_segments = 3;
+
+double band_Hz(std::size_t band, std::size_t bands) {
+  return first_Hz * std::pow(last_Hz / first_Hz, static_cast<double>(band) / static_cast<double>(bands - 1));
+}
+
+}  // namespace
+
+FeltMassCurve::FeltMassCurve(double period_s)
+    : period_s_(period_s),
+      samples_per_average_(std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(average_s / period_s)))),
+      averages_per_segment_(
+          static_cast<std::size_t>(std::lround(segment_s / (static_cast<double>(samples_per_average_) * period_s)))) {}
+
+void FeltMassCurve::end_segment() {
+  last_positions_.clear();
+  force_.clear();
+  acceleration_.clear();
+  force_sum_ = acceleration_sum_ = Vec3::Zero();
+  summed_ = 0;
+}
+
+// The acceleration is that of the sample before, whose force is kept.
+void FeltMassCurve::add(const Vec3& force_N, const Vec3& position_m) {
+  if (last_positions_.size() == 2) {
+    const Vec3 a = (position_m - 2.0 * last_positions_[1] + last_positions_[0]) / (period_s_ * period_s_);
+    force_sum_ += last_force_;
+    acceleration_sum_ += a;
+    if (++summed_ == samples_per_average_) {
+      const auto count = static_cast<double>(summed_);
+      add_average(force_sum_ / count, acceleration_sum_ / count);
+      force_sum_ = acceleration_sum_ = Vec3::Zero();
+      summed_ = 0;
+    }
+    last_positions_.erase(last_positions_.begin());
+  }
+  last_positions_.push_back(position_m);
+  last_force_ = force_N;
+}
+
+void FeltMassCurve::add_average(const Vec3& force_N, const Vec3& acceleration) {
+  force_.push_back(force_N);
+  acceleration_.push_back(acceleration);
+  if (force_.size() < averages_per_segment_) return;
+  add_segment();
+  const auto half = static_cast<std::ptrdiff_t>(force_.size() / 2);
+  force_.erase(force_.begin(), force_.begin() + half);
+  acceleration_.erase(acceleration_.begin(), acceleration_.begin() + half);
+}
+
+void FeltMassCurve::add_segment() {
+  const std::size_t count = force_.size();
+  const double step_s = static_cast<double>(samples_per_average_) * period_s_;
+  const double line_Hz = 1.0 / (static_cast<double>(count) * step_s);
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& f : force_) mean += f / static_cast<double>(count);
+  for (std::size_t band = 0; band < bands; ++band) {
+    const double f = band_Hz(band, bands);
+    const auto first = std::lround((1.0 - half_width) * f / line_Hz),
+               last = std::lround((1.0 + half_width) * f / line_Hz);
+    for (auto line = first; line <= last; ++line) {
+      const Complex turn =
+          std::polar(1.0, -2.0 * std::numbers::pi * static_cast<double>(line) / static_cast<double>(count));
+      Complex phase = 1.0;
+      Complex3 F{}, a{};
+      for (std::size_t i = 0; i < count; ++i) {
+        const double x = (static_cast<double>(i) + 0.5) / static_cast<double>(count);
+        const Complex weight = (0.5 - 0.5 * std::cos(2.0 * std::numbers::pi * x)) * phase;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const auto j = static_cast<Eigen::Index>(axis);
+          F[axis] += weight * (force_[i][j] - mean[j]);
+          a[axis] += weight * acceleration_[i][j];
+        }
+        phase *= turn;
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        sums_[band].force_acceleration += F[axis] * std::conj(a[axis]);
+        sums_[band].force += std::norm(F[axis]);
+        sums_[band].acceleration += std::norm(a[axis]);
+      }
+    }
+  }
+  ++segments_;
+}
+
+std::vector<FeltMassCurve::Point> FeltMassCurve::points() const {
+  std::vector<Point> points;
+  if (segments_ < least_segments) return points;
+  for (std::size_t band = 0; band < bands; ++band) {
+    const Sums& s = sums_[band];
+    if (!(std::norm(s.force_acceleration) >= least_coherence * s.force * s.acceleration) || !(s.acceleration > 0.0))
+      continue;
+    points.push_back({band_Hz(band, bands), s.force_acceleration / s.acceleration});
+  }
+  return points;
+}
+
+double band_within_Hz(const std::vector<FeltMassCurve::Point>& curve, double mass_kg, double limit) {
+  double within_Hz = 0.0, error_there = 0.0;
+  for (const FeltMassCurve::Point& point : curve) {
+    const double error = std::abs(point.mass_kg - mass_kg) / mass_kg;
+    if (error > limit) {
+      if (within_Hz == 0.0) return 0.0;
+      // Between the two, on the straight line through their logarithms.
+      const double share = std::log(limit / error_there) / std::log(error / error_there);
+      return within_Hz * std::pow(point.frequency_Hz / within_Hz, share);
+    }
+    within_Hz = point.frequency_Hz;
+    error_there = error;
+  }
+  return within_Hz;
 }
 
 }  // namespace proxarm::controller

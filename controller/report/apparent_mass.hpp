@@ -15,6 +15,8 @@
 // Not for the cycle.
 #pragma once
 
+#include <array>
+#include <complex>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -52,5 +54,52 @@ class ApparentMass {
   Eigen::Vector3d with_force_ = Eigen::Vector3d::Zero();
   double used_s_ = 0.0;
 };
+
+// The mass that is felt, by frequency, in sessions that excite many: F/a = M(f), complex, from 0.3 to 15 Hz.
+//
+// Welch's method: free motion is cut into segments of 5 s that overlap by half, with Hann's window. In a band of a
+// tenth of f to either side, over its lines, all segments and axes,
+//   M(f) = Σ F̂ â* / Σ |â|²,   γ² = |Σ F̂ â*|² / (Σ |F̂|² Σ |â|²)
+// A band in which γ² is below 0.9 wasn't excited, or not by one mass, and is left out; so are bands of fewer than
+// three segments. Force and acceleration are averaged over some 10 ms first, both alike, so that M(f) doesn't change.
+class FeltMassCurve {
+ public:
+  explicit FeltMassCurve(double period_s);
+
+  // The next sample of free motion, one period after the one before it.
+  void add(const models::Vec3& force_N, const models::Vec3& position_m);
+  // Free motion is interrupted.
+  void end_segment();
+
+  struct Point {
+    double frequency_Hz = 0.0;
+    std::complex<double> mass_kg;
+  };
+  // In the order of their frequencies; empty where nothing was excited.
+  [[nodiscard]] std::vector<Point> points() const;
+
+ private:
+  static constexpr std::size_t bands = 18;
+  struct Sums {
+    std::complex<double> force_acceleration;
+    double force = 0.0, acceleration = 0.0;
+  };
+
+  void add_average(const models::Vec3& force_N, const models::Vec3& acceleration);
+  void add_segment();
+
+  double period_s_;
+  std::size_t samples_per_average_, averages_per_segment_;
+  std::vector<models::Vec3> last_positions_;  // at most two
+  models::Vec3 last_force_ = models::Vec3::Zero();
+  models::Vec3 force_sum_ = models::Vec3::Zero(), acceleration_sum_ = models::Vec3::Zero();
+  std::size_t summed_ = 0;
+  std::vector<models::Vec3> force_, acceleration_;  // of the segment that is being filled
+  std::array<Sums, bands> sums_{};
+  std::size_t segments_ = 0;
+};
+
+// Up to which frequency, from the first point on, |M(f) − M|/M stays within `limit`; 0: not even there.
+double band_within_Hz(const std::vector<FeltMassCurve::Point>& curve, double mass_kg, double limit);
 
 }  // namespace proxarm::controller

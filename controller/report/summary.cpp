@@ -14,7 +14,7 @@ namespace {
 
 using models::Vec3;
 
-constexpr double shortest_slide_s = 0.1, shortest_slide_m = 1e-3;
+constexpr double shortest_slide_s = 0.1;
 constexpr double free_force_N = 1e-3;  // far above rounding (κ times an ulp of q), far below what a hand feels
 
 // Durations up to 1 ms in bins of 10 ns, so that a median over hours needs no more memory than one over seconds.
@@ -64,7 +64,7 @@ struct Spread {
 };
 
 struct Slide {
-  double tangential = 0.0, limit = 0.0, length_s = 0.0, travel_m = 0.0;
+  double tangential = 0.0, limit = 0.0, length_s = 0.0;
 };
 
 // "limits.leash_m"; joints' own limits with the joints' names: "axis_2, axis_3: max_speed_rad_per_s".
@@ -91,7 +91,8 @@ bool limited(const CycleRecord& record) {
 }  // namespace
 
 struct SummaryBuilder::State {
-  explicit State(const SummaryConfig& c) : config(c), apparent(c.period_s), period_ns(std::llround(1e9 * c.period_s)) {}
+  explicit State(const SummaryConfig& c)
+      : config(c), apparent(c.period_s), felt(c.period_s), period_ns(std::llround(1e9 * c.period_s)) {}
 
   void count(const CycleRecord& record);
   void count_limit(const std::string& parameter, RecordFlag flag, const CycleRecord& record);
@@ -102,14 +103,15 @@ struct SummaryBuilder::State {
   void take_period(std::int64_t period_ns);
   void penetrate(const CycleRecord& record);
   void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
-  void slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance);
+  void slide(const CycleRecord& now, const Vec3& resistance);
 
   SummaryConfig config;
   Summary summary;
   SetpointHash hash;
   Durations durations;
-  Spread tracking, contact_force;
+  Spread tracking, lagging, contact_force;
   ApparentMass apparent;
+  FeltMassCurve felt;
   OscillationWatch oscillation;
   Slide sliding;
   double contact_s = 0.0;  // how long the contact has lasted
@@ -135,6 +137,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
   if (record.phase != Phase::rendering || !follows) {
     s.recent.clear();
     s.apparent.end_segment();
+    s.felt.end_segment();
     s.oscillation.reset();
     s.contact_s = 0.0;
   }
@@ -188,6 +191,7 @@ void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
     if (mass_kg > 0.0) {
       config.wanted_mass_kg = record.proxy_mass_kg + config.handle_mass_kg;
       apparent = ApparentMass(config.period_s);
+      felt = FeltMassCurve(config.period_s);
     }
     mass_kg = record.proxy_mass_kg;
   }
@@ -221,6 +225,7 @@ void SummaryBuilder::State::take_period(std::int64_t ns) {
   config.period_s = seconds(ns);
   config.setpoint_delay_cycles = 2 + static_cast<int>(std::lround(config.setpoint_filter_s / config.period_s));
   apparent = ApparentMass(config.period_s);
+  felt = FeltMassCurve(config.period_s);
 }
 
 void SummaryBuilder::State::observe(const CycleRecord& record) {
@@ -244,6 +249,7 @@ void SummaryBuilder::State::observe(const CycleRecord& record) {
 void SummaryBuilder::State::penetrate(const CycleRecord& record) {
   if (record.contact == ContactPhase::free) {
     contact_s = 0.0;
+    summary.drag_force_max_N = std::max(summary.drag_force_max_N, vec3(record.contact_force_W_N).norm());
   } else {
     if (contact_s == 0.0) ++summary.contacts;
     contact_s += config.period_s;
@@ -268,10 +274,11 @@ void SummaryBuilder::State::penetrate(const CycleRecord& record) {
 }
 
 void SummaryBuilder::State::track(const CycleRecord& record) {
+  const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
+  if (recent.size() >= 2) lagging.add((vec3(tool) - vec3(recent[recent.size() - 2].proxy_W_m)).norm());
   const auto delay = static_cast<std::size_t>(std::max(config.setpoint_delay_cycles, 0));
   if (recent.size() <= delay) return;
   const CycleRecord& due = recent[recent.size() - 1 - delay];
-  const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
   tracking.add((vec3(tool) - vec3(due.proxy_W_m)).norm());
 }
 
@@ -289,10 +296,13 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
     // A world without contacts may act all the same: a field of friction, a soft layer. Where a limit acts, the motion
     // isn't the mass's.
     if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in) &&
-        !now.has(RecordFlag::hands_off))
+        !now.has(RecordFlag::hands_off)) {
+      felt.add(hand - spring, x);
       return apparent.add(hand - spring, x);
+    }
   }
   apparent.end_segment();
+  felt.end_segment();
   if (now.contact == ContactPhase::free) return;
   // `contact_s` is that of `after`: one period more than that of `now`, unless the contact ends there.
   const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
@@ -307,20 +317,19 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
     const Vec3 pull_back = config.spring_N_per_m * (q - *start);
     const Vec3 resistance = hand - m * a - (M - m) * a_q - B * v_q - pull_back;
     contact_force.add(n.dot(vec3(now.contact_force_W_N)) + n.dot(resistance));
-    if (contact_s - T > config.settle_s) slide(before, now, resistance);
+    if (contact_s - T > config.settle_s) slide(now, resistance);
   }
 }
 
-void SummaryBuilder::State::slide(const CycleRecord& before, const CycleRecord& now, const Vec3& resistance) {
+void SummaryBuilder::State::slide(const CycleRecord& now, const Vec3& resistance) {
   if (now.contact != ContactPhase::slip || !(now.friction > 0.0) || now.contact_count > 1) return;
   const Vec3 n = vec3(now.normal_W);
-  const Vec3 step = vec3(now.proxy_W_m) - vec3(before.proxy_W_m);
-  const Vec3 along = step - n.dot(step) * n;
+  const Vec3 f = vec3(now.contact_force_W_N);
+  const Vec3 along = n.dot(f) * n - f;
   if (!(along.norm() > 0.0)) return;
   sliding.tangential += resistance.dot(along.normalized());
   sliding.limit += -now.friction * n.dot(resistance);
   sliding.length_s += config.period_s;
-  sliding.travel_m += along.norm();
 }
 
 Oscillation SummaryBuilder::oscillation() const { return state_->oscillation.present(); }
@@ -336,13 +345,17 @@ Summary SummaryBuilder::finish() {
   summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
   summary.tracking_rms_m = s.tracking.rms();
   summary.tracking_max_m = s.tracking.largest();
+  summary.tracking_lag_rms_m = s.lagging.rms();
+  summary.tracking_lag_max_m = s.lagging.largest();
+  summary.tracking_delay_s = (s.config.setpoint_delay_cycles - 1) * s.config.period_s;
+  summary.felt_mass = s.felt.points();
   if (const auto apparent = s.apparent.estimate()) {
     summary.apparent_mass_kg = apparent->mass_kg;
     summary.apparent_damping_Ns_per_m = apparent->damping_Ns_per_m;
   }
   summary.contact_force_error_N = s.contact_force.rms();
   summary.contact_force_error_max_N = s.contact_force.largest();
-  if (s.sliding.length_s >= shortest_slide_s && s.sliding.travel_m >= shortest_slide_m && s.sliding.limit > 0.0) {
+  if (s.sliding.length_s >= shortest_slide_s && s.sliding.limit > 0.0) {
     summary.friction_ratio_error = s.sliding.tangential / s.sliding.limit - 1.0;
   }
   if (s.config.passivity) summary.oscillation = s.oscillation.longest();

@@ -14,18 +14,25 @@
 //   tool_penetration_max_m  the same of the tool; …_touch_… within the first touch_s of a contact, …_sliding_… after
 //                           that while the proxy slips
 //   tracking_rms_m, _max_m  ‖x(t_k) − q(k − delay)‖, delay = 2 cycles: a target sent in cycle k is latched at SYNC k+1
-//                           and, interpolated, reached at k+2
+//                           and, interpolated, reached at k+2; with the setpoints' filter, its delay is added.
+//                           tracking_lag_rms_m, …_max_m: ‖x(t_k) − q(k − 1)‖, the lag left in: q(k − 1) is where the
+//                           proxy is at t_k
 //   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while no limit acts and the world's
 //                           force on the proxy is below 1 mN (apparent_mass.hpp);
 //                           apparent_damping_Ns_per_m is its Im
+//   felt_mass, _band_Hz     F_h/a by frequency, and up to which one |F_h/a − M|/M is at most so much, where the same
+//   free
+//                           motion excites it (FeltMassCurve)
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
 //                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
 //                           Impedance type: push = −n·F_h, so that it has the device's own friction and inertia, too
-//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, t the direction of the slide:
-//                           over all cycles that slip on one thing, from settle_s after the contact began; at least
-//                           0.1 s and 1 mm of it
+//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, and t against the friction in
+//   f,
+//                           which is the direction of the slide relative to the surface, also where that moves: over
+//                           all cycles that slip on one thing, from settle_s after the contact began; at least 0.1 s
 //   pulling_force_max_N     max(0, −n·f) over all cycles in contact with one thing
+//   drag_force_max_N        max ‖f‖ over all cycles without contact: what media and fields hold the proxy back with
 //   setpoint_sha256         all target counts of all cycles (setpoint_hash.hpp), whatever the phase
 #pragma once
 
@@ -39,6 +46,7 @@
 
 #include "controller/record/cycle_record.hpp"
 #include "controller/record/page_faults.hpp"
+#include "controller/report/apparent_mass.hpp"
 #include "controller/report/oscillation.hpp"
 #include "controller/supervision/fault.hpp"
 
@@ -150,11 +158,14 @@ struct Summary {
   double tool_penetration_max_m = 0.0;
   double tool_penetration_touch_max_m = 0.0;
   double tool_penetration_sliding_max_m = 0.0;
-  std::optional<double> tracking_rms_m, tracking_max_m;
+  std::optional<double> tracking_rms_m, tracking_max_m;          // the setpoints' delay taken off
+  std::optional<double> tracking_lag_rms_m, tracking_lag_max_m;  // and not
+  double tracking_delay_s = 0.0;                                 // what is taken off
   std::optional<double> apparent_mass_kg, apparent_damping_Ns_per_m;
   std::optional<double> contact_force_error_N, contact_force_error_max_N;
   std::optional<double> friction_ratio_error;
-  double pulling_force_max_N = 0.0;
+  double pulling_force_max_N = 0.0, drag_force_max_N = 0.0;
+  std::vector<FeltMassCurve::Point> felt_mass;  // by frequency; empty: the session didn't excite it
   double contact_time_s = 0.0, sliding_time_s = 0.0;
   std::uint64_t contacts = 0;                         // how often the proxy came to touch
   std::uint64_t limited_cycles = 0;                   // some limit was active

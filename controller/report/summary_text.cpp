@@ -1,7 +1,10 @@
 // The summary for programs and for people.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
+#include <utility>
 
 #include "controller/report/summary.hpp"
 #include "models/files/json.hpp"
@@ -90,6 +93,28 @@ Json view(const std::optional<ViewSummary>& summary) {
           {"may_change", summary->may_change}};
 }
 
+// By frequency: Re and phase of F/a, and |F/a − M|/M.
+Json felt_mass(const Summary& s) {
+  Json list = Json::array();
+  if (!(s.wanted_mass_kg > 0.0)) return list;
+  for (const FeltMassCurve::Point& point : s.felt_mass) {
+    list.push_back({{"frequency_Hz", point.frequency_Hz},
+                    {"mass_kg", point.mass_kg.real()},
+                    {"phase_deg", 180.0 / std::numbers::pi * std::arg(point.mass_kg)},
+                    {"error", std::abs(point.mass_kg - s.wanted_mass_kg) / s.wanted_mass_kg}});
+  }
+  return list;
+}
+
+constexpr std::array<std::pair<const char*, double>, 3> felt_limits{{{"5 %", 0.05}, {"10 %", 0.1}, {"25 %", 0.25}}};
+
+Json felt_bands(const Summary& s) {
+  if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return nullptr;
+  Json bands;
+  for (const auto& [name, limit] : felt_limits) bands[name] = band_within_Hz(s.felt_mass, s.wanted_mass_kg, limit);
+  return bands;
+}
+
 void add_repeatable(Json& json, const Summary& s) {
   json["bus_load"] = Json::object();
   for (const auto& [bus, load] : s.bus_load) json["bus_load"][bus] = load;
@@ -102,13 +127,18 @@ void add_repeatable(Json& json, const Summary& s) {
   json["tool_penetration_sliding_max_m"] = s.tool_penetration_sliding_max_m;
   json["tracking_rms_m"] = s.tracking_rms_m;
   json["tracking_max_m"] = s.tracking_max_m;
+  json["tracking_lag_rms_m"] = s.tracking_lag_rms_m;
+  json["tracking_lag_max_m"] = s.tracking_lag_max_m;
   json["wanted_mass_kg"] = s.wanted_mass_kg > 0.0 ? Json(s.wanted_mass_kg) : Json(nullptr);
   json["apparent_mass_kg"] = s.apparent_mass_kg;
   json["apparent_damping_Ns_per_m"] = s.apparent_damping_Ns_per_m;
+  json["felt_mass"] = felt_mass(s);
+  json["felt_mass_band_Hz"] = felt_bands(s);
   json["contact_force_error_N"] = s.contact_force_error_N;
   json["contact_force_error_max_N"] = s.contact_force_error_max_N;
   json["friction_ratio_error"] = s.friction_ratio_error;
   json["pulling_force_max_N"] = s.pulling_force_max_N;
+  json["drag_force_max_N"] = s.drag_force_max_N;
   json["rendered_time_s"] = s.rendered_time_s;
   json["contact_time_s"] = s.contact_time_s;
   json["sliding_time_s"] = s.sliding_time_s;
@@ -246,6 +276,24 @@ void tell_time(const Summary& s, Lines& line) {
   if (!loads.empty()) line("bus load", loads);
 }
 
+// Up to which frequency the mass is what it should be, and what it is where that is worst.
+void tell_felt_mass(const Summary& s, Lines& line) {
+  if (s.felt_mass.empty() || !(s.wanted_mass_kg > 0.0)) return;
+  std::string bands;
+  for (const auto& [name, limit] : felt_limits) {
+    const double band_Hz = band_within_Hz(s.felt_mass, s.wanted_mass_kg, limit);
+    bands += (bands.empty() ? "within " : ", ") + std::string(name);
+    bands += band_Hz > 0.0 ? format(" up to %.2g Hz", band_Hz) : " nowhere";
+  }
+  line("mass by frequency", bands);
+  const FeltMassCurve::Point& last = s.felt_mass.back();
+  line("", format("at %.3g Hz ", last.frequency_Hz) + format("%.3g kg in phase, ", last.mass_kg.real()) +
+               format("phase %.0f degrees", 180.0 / std::numbers::pi * std::arg(last.mass_kg)));
+}
+
+// Below, a world's force is rounding.
+constexpr double noticeable_N = 1e-3;
+
 // What was felt, and how true it was.
 void tell_motion(const Summary& s, Lines& line) {
   line("apparent mass",
@@ -255,7 +303,10 @@ void tell_motion(const Summary& s, Lines& line) {
            (s.limited_cycles > 0 ? "; where no limit acts" : ""));
   if (s.lookahead_s > 0.0)
     line("lookahead", format("%.3g ms: the arm is sent to where the proxy will be", 1e3 * s.lookahead_s));
-  line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m));
+  tell_felt_mass(s, line);
+  line("tracking error", "rms " + length(s.tracking_rms_m) + ", max " + length(s.tracking_max_m) +
+                             format("; with the lag of %.3g ms: rms ", 1e3 * s.tracking_delay_s) +
+                             length(s.tracking_lag_rms_m) + ", max " + length(s.tracking_lag_max_m));
   if (s.contacts == 0) {
     line("contact", s.proxy_clearance_min_m
                         ? "none; the nearest surface was " + length(s.proxy_clearance_min_m) + " away"
@@ -271,7 +322,9 @@ void tell_motion(const Summary& s, Lines& line) {
   line("contact force error",
        "rms " + number(s.contact_force_error_N, "%.3f N") + ", max " + number(s.contact_force_error_max_N, "%.3f N"));
   line("friction ratio error", s.friction_ratio_error ? format("%+.2f %%", 100 * *s.friction_ratio_error) : "none");
-  line("pulling force", format("%.3g N", s.pulling_force_max_N));
+  line("pulling force",
+       format("%.3g N", s.pulling_force_max_N) +
+           (s.drag_force_max_N > noticeable_N ? format("; drag without contact %.3g N", s.drag_force_max_N) : ""));
 }
 
 }  // namespace

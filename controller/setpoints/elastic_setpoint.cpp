@@ -11,9 +11,7 @@ ElasticSetpoint::ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, do
     : arm_(&arm),
       omega_rad_per_s_(2.0 * std::numbers::pi * bandwidth_Hz),
       angle_rad_(arm.start_rad()),
-      speed_rad_per_s_(JointVector::Zero(arm.axes())),
-      inverse_stiffness_(arm.gear_stiffness_Nm_per_rad()) {
-  for (double& compliance : inverse_stiffness_) compliance = compliance > 0.0 ? 1.0 / compliance : 0.0;
+      speed_rad_per_s_(JointVector::Zero(arm.axes())) {
   set_period(period_s);
 }
 
@@ -45,8 +43,7 @@ JointVector ElasticSetpoint::step(const JointVector& link_rad) noexcept {
   angle_rad_ = link_rad + decay_ * (e + T * c);
   speed_rad_per_s_ = decay_ * (speed_rad_per_s_ - omega * T * c);
   const JointVector acceleration = omega * omega * (link_rad - angle_rad_) - 2.0 * omega * speed_rad_per_s_;
-  const JointVector torque = arm_->link_mass_matrix(angle_rad_) * acceleration;
-  return arm_->motor_from_link(angle_rad_) + inverse_stiffness_.cwiseProduct(torque);
+  return arm_->motor_from_moving_link(angle_rad_, acceleration);
 }
 
 }  // namespace proxarm::controller

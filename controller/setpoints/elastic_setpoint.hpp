@@ -48,7 +48,7 @@ class ElasticSetpoint {
   double omega_rad_per_s_;
   double decay_ = 1.0;  // exp(−ωT)
   double period_s_ = 0.0;
-  models::JointVector angle_rad_, speed_rad_per_s_, inverse_stiffness_;
+  models::JointVector angle_rad_, speed_rad_per_s_;
 };
 
 }  // namespace proxarm::controller

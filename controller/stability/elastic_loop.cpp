@@ -136,7 +136,7 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
   // for the labels of order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + 2;
   twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
-  make_plant(hand);
+  make_plant(hand, loop.gear_stiffness_ratio);
   const double after_sensor_kg = hand.mass_kg + loop.handle_mass_kg;
   // h = −K_h Jφ − D_h Jφ̇ − m Jφ̈, with φ̈ the plant's second block of rows.
   const MatrixXd& J = arm_.jacobian;
@@ -146,11 +146,11 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
 }
 
 // ż = A z for z = [φ, φ̇, θ, r, ṙ] with ṙ constant. Leaves the rows of φ̈ in force_.
-void ElasticLoop::make_plant(const HandModel& hand) {
+void ElasticLoop::make_plant(const HandModel& hand, double gear_stiffness_ratio) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
   const MatrixXd mass = arm_.mass + hand.mass_kg * J.transpose() * J;
-  MatrixXd k = arm_.stiffness.asDiagonal(), d = arm_.damping.asDiagonal();
+  MatrixXd k = (gear_stiffness_ratio * arm_.stiffness).asDiagonal(), d = arm_.damping.asDiagonal();
   MatrixXd A = MatrixXd::Zero(5 * n, 5 * n);
   const auto block = [&](Index row, Index column) { return A.block(row * n, column * n, n, n); };
   const MatrixXd one = MatrixXd::Identity(n, n);

@@ -13,6 +13,8 @@
 // is integrated exactly, by its matrix exponential. Together this is one linear map from period to period, whose
 // largest eigenvalue decides on stability. For six joints it is a matrix of some 45 rows.
 //
+// The gears' true stiffness may differ from the believed one, in k but not in k⁻¹ (gear_stiffness_ratio).
+//
 // Not modelled: friction in the gears, which helps; backlash; limits; other poses.
 //
 // For set-up: takes some milliseconds per mass, allocates, never runs in the cycle.
@@ -59,7 +61,7 @@ class ElasticLoop {
   struct State;
   [[nodiscard]] Eigen::Index size() const noexcept;
   void advance(const Eigen::VectorXd& state, double proxy_mass_kg, Eigen::VectorXd& next) const;
-  void make_plant(const HandModel& hand);
+  void make_plant(const HandModel& hand, double gear_stiffness_ratio);
 
   ElasticArm arm_;
   double period_s_, damping_, spring_, horizon_s_, time_constant_s_;

@@ -246,24 +246,64 @@ bool with_margins(const HandModel& hand, const LoopModel& loop,
   return true;
 }
 
+namespace {
+
+// A hand, and the loop that it closes.
+struct Held {
+  HandModel hand;
+  LoopModel loop;
+};
+
+// What a horizon has to be stable with: each pose, hand, delay and gear alone.
+std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model) {
+  std::vector<LoopModel> poses;
+  if (!model.arms) poses = {model};
+  for (std::size_t i = 0; model.arms && i < model.arms->size(); ++i) {
+    poses.push_back(model);
+    poses.back().arms = std::make_shared<const std::vector<ElasticArm>>(1, (*model.arms)[i]);
+  }
+  std::vector<Held> all;
+  for (LoopModel loop : poses) {
+    const double unsure_s = loop.delay_s - 2.0 * loop.filter_s;
+    for (const double ratio : gear_margins) {
+      loop.gear_stiffness_ratio = ratio;
+      for (const double stiffer : {1.0, hand_margin}) {
+        for (const double heavier : {1.0, heavy_hand}) {
+          for (const double later : {1.0, delay_margin}) {
+            all.push_back({hand, loop});
+            all.back().hand.stiffness_N_per_m *= stiffer;
+            all.back().hand.mass_kg *= heavier;
+            all.back().loop.delay_s += (later - 1.0) * unsure_s;
+          }
+        }
+      }
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
 double stable_horizon_s(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
   if (!(proxy_mass_kg > 0.0)) return 0.0;
-  const auto stable = [proxy_mass_kg](const HandModel& other, const LoopModel& loop) {
-    return spectral_radius(other, loop, proxy_mass_kg) < 1.0;
+  const double T = model.period_s;
+  const auto radius = [&](Held& held, int steps) {
+    held.loop.horizon_s = steps * T;
+    return spectral_radius(held.hand, held.loop, proxy_mass_kg);
   };
-  LoopModel loop = model;
-  const double T = loop.period_s;
-  constexpr double lightest_hand_kg = 1.0;
-  const double heavy =
-      (proxy_mass_kg + model.handle_mass_kg) / (auto_mass_ratio * std::max(hand.mass_kg, lightest_hand_kg));
-  const double most_s = auto_share * std::min(1.0, heavy) * (T + loop.delay_s + loop.drive_time_constant_s);
-  double longest_s = 0.0;
-  for (int steps = 0; steps * T <= most_s; ++steps) {
-    loop.horizon_s = steps * T;
-    if (!with_margins(hand, loop, stable)) break;
-    longest_s = loop.horizon_s;
+  std::vector<Held> all = held_in_all_ways(hand, model);
+  std::vector<double> without;
+  for (Held& held : all) without.push_back(radius(held, 0));
+  const double worst = *std::max_element(without.begin(), without.end());
+  int steps = static_cast<int>(auto_share * (T + model.delay_s + model.drive_time_constant_s) / T);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    while (steps > 0) {
+      const double with = radius(all[i], steps);
+      if (with < 1.0 || (without[i] >= 1.0 && with <= worst)) break;
+      --steps;
+    }
   }
-  return longest_s;
+  return steps * T;
 }
 
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable) {

@@ -28,6 +28,7 @@
 // cycle.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -53,7 +54,8 @@ struct LoopModel {
   bool explicit_damping = false;       // −B(q₁ − q₂)/T instead of the implicit damping; order 1, for comparison
   int order = 1;
   bool matched_labels = false;
-  double horizon_s = 0.0;  // H ≥ 0 of the lookahead
+  double horizon_s = 0.0;             // H ≥ 0 of the lookahead
+  double gear_stiffness_ratio = 1.0;  // > 0, of the arms' true gears to those that the controller believes in
   // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s. It is used when a horizon is chosen: the filter is
   // modelled there as the two first-order lags that it is. Lookahead compensates for their phase; a pure delay would
   // seem worse.
@@ -75,14 +77,15 @@ inline constexpr double hand_margin = 1.5, delay_margin = 1.2;
 bool with_margins(const HandModel& hand, const LoopModel& loop,
                   const std::function<bool(const HandModel&, const LoopModel&)>& holds);
 
-// The horizon that `--lookahead auto` takes for this mass, in whole periods. It is the longest one such that the loop
-// is stable with the margins above at it and at all shorter ones; at most `auto_share` of the loop's delay, beyond
-// which the felt mass gets worse again. The model has no elastic gears, which a long horizon makes oscillate if the
-// hand is heavy. So below `auto_mass_ratio` times the hand's mass (at least 1 kg) the horizon shrinks with the mass.
-// This was found by simulation, with hands of 0.3 and 2 kg and of 100 to 3000 N/m, and gears of 0.7 to 1.4 times the
-// assumed stiffness. Returns 0 if the loop without lookahead lacks these margins, so that the rest of them isn't used
-// up.
-inline constexpr double auto_share = 0.85, auto_mass_ratio = 10.0;
+// Gears from softer to stiffer than the controller believes.
+inline constexpr std::array<double, 3> gear_margins{0.7, 1.0, 1.4};
+// The horizon that `--lookahead auto` takes for this mass, in whole periods. It is the longest one, of at most
+// `auto_share` of the loop's delay, with which no loop is unstable that is stable without, and none more than the worst
+// of them is without: neither with the hand as described nor with one hand_margin times as stiff or heavy_hand times as
+// heavy, with the delay as it is and, the filter's apart, delay_margin times as long, with each of gear_margins, in
+// each pose. Beyond auto_share, the felt mass gets worse again. With the twentieth that elastic loops ask for beside,
+// heavy_hand is twice. Precondition: loop.filter_s is the filter's.
+inline constexpr double auto_share = 0.85, heavy_hand = 1.9;
 double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
 // The check of --mass. Throws description::SetupError that names the smallest stable felt mass (proxy and handle),

@@ -184,12 +184,12 @@ std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*opt
                                         const std::filesystem::path& out) const {
   const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
   Chart chart{.title = "What the hand feels at the simulated arm", .panel_width = 1100, .panel_height = 500};
-  Panel mass{.title = "Free motion: mass felt",
+  Panel mass{.title = "Free motion: mass felt, as a share of the wanted one (below 0 it pulls)",
              .x_label = "frequency (Hz)",
-             .y_label = "Re(F/a) (kg)",
+             .y_label = "Re(F/a)/M",
              .log_x = true,
-             .y_low = -10.0,
-             .y_high = 40.0};
+             .y_low = -2.0,
+             .y_high = 3.0};
   Panel phase{.title = "Free motion: phase (above 0 the arm does work on the hand)",
               .x_label = "frequency (Hz)",
               .y_label = "arg(F/a) (degrees)",
@@ -218,7 +218,8 @@ std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*opt
       curve.x.push_back(value(row, "frequency_Hz"));
     }
     const bool at_wall = value(row, "wall") != 0.0;
-    of_job[0].y.push_back(at_wall ? value(row, "stiffness_N_per_m") : value(row, "mass_real_kg"));
+    of_job[0].y.push_back(at_wall ? value(row, "stiffness_N_per_m")
+                                  : value(row, "mass_real_kg") / value(row, "mass_kg"));
     of_job[1].y.push_back(value(row, "mass_error"));
     of_job[2].y.push_back(180.0 / std::numbers::pi *
                           std::atan2(value(row, "mass_imag_kg"), value(row, "mass_real_kg")));

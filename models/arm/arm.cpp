@@ -293,6 +293,7 @@ void Arm::forward(const JointVector& q, Frames& frames) const noexcept {
 void Arm::kinematics(const JointVector& q, ToolKinematics& out) const noexcept {
   Frames frames;
   forward(q, frames);
+  out.q_rad = q;
   const auto last = static_cast<std::size_t>(axes_ - 1);
   const auto place = [&](Pose& X, const Pose& X_n) {
     X.linear().noalias() = frames.R_W[last] * X_n.linear();
@@ -411,6 +412,40 @@ JointVector Arm::motor_from_link(const JointVector& q) const noexcept { return t
 
 JointVector Arm::motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept {
   return twisted(q, holding_torque(q, wrench_W));
+}
+
+JointVector Arm::motor_from_moving_link(const JointVector& q, const JointVector& q_dd) const noexcept {
+  // Newton and Euler's equations, recursively (Luh, Walker and Paul 1980), with all speeds zero. Outwards, with a₀ =
+  // −g:
+  //   α_i = α_{i−1} + z_i q̈_i,   a_i = a_{i−1} + α_{i−1} × (p_i − p_{i−1})          (prismatic: z_i q̈_i belongs to a_i)
+  //   F_i = m_i (a_i + α_i × (c_i − p_i)),   N_i = I_i α_i
+  // and back, with f_i and n_i (about p_i) what link i and all beyond it need:
+  //   f_i = F_i + f_{i+1},   n_i = N_i + (c_i − p_i) × F_i + n_{i+1} + (p_{i+1} − p_i) × f_{i+1},   τ_i = z_i · n_i
+  Frames frames;
+  forward(q, frames);
+  std::array<Vec3, max_axes> F, N;
+  Vec3 alpha = Vec3::Zero(), a = -gravity_W_;
+  for (int i = 0; i < axes_; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Link& link = links_[k];
+    const Mat3& R = frames.R_W[k];
+    if (i > 0) a += alpha.cross(frames.p_W[k] - frames.p_W[k - 1]);
+    (link.slides ? a : alpha) += q_dd[link.drive] * R.col(2);
+    const Vec3 lever = R * link.centre_of_mass;
+    F[k] = link.mass_kg * (a + alpha.cross(lever));
+    const Vec3 alpha_in_link = R.transpose() * alpha;
+    N[k] = R * Vec3(link.inertia * alpha_in_link) + lever.cross(F[k]);
+  }
+  JointVector torque(axes_);
+  Vec3 f = Vec3::Zero(), n = Vec3::Zero();
+  for (int i = axes_ - 1; i >= 0; --i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (i + 1 < axes_) n += (frames.p_W[k + 1] - frames.p_W[k]).cross(f);
+    f += F[k];
+    n += N[k];
+    torque[links_[k].drive] = frames.R_W[k].col(2).dot(links_[k].slides ? f : n);
+  }
+  return twisted(q, torque);
 }
 
 JointVector Arm::twisted(const JointVector& q, const JointVector& torque) const noexcept {

@@ -31,6 +31,7 @@ using JointMatrix = SmallMatrix;
 using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, max_axes>;
 
 struct ToolKinematics {
+  JointVector q_rad;  // the angles that all this was computed at; empty: none yet
   Pose X_WT = Pose::Identity();
   Pose X_WS = Pose::Identity();
   Jacobian J_W;  // geometric, of T
@@ -98,6 +99,10 @@ class Arm {
   //   q_motor = q + τ_g(q)/k   (motor angles as angles at the joint; k = 0 is a rigid gear)
   [[nodiscard]] JointVector motor_from_link(const JointVector& q) const noexcept;
   [[nodiscard]] JointVector motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept;
+  // The same while the links begin to move with this acceleration: q + (M_link q̈ + τ_g)/k, speeds neglected. One pass
+  // outwards and one back, without the matrix.
+  [[nodiscard]] JointVector motor_from_moving_link(const JointVector& q,
+                                                   const JointVector& acceleration_rad_per_s2) const noexcept;
   // The inverse of motor_from_link(), by fixed-point iteration. It contracts by about |∂τ_g/∂q|/k, 0.02 for stiff
   // gears, and stops when the step is below 1e-15 rad or after 60 iterations. It doesn't converge if the gears are too
   // soft to hold the arm up.

@@ -112,7 +112,8 @@ void InverseKinematics::set_max_step(const std::array<double, max_axes>& max_ste
 
 // Updates kinematics and residuals at result.q. Returns the weighted error of the pose.
 InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinematicsResult& result) const noexcept {
-  arm_.kinematics(result.q, result.kinematics);
+  const JointVector& known = result.kinematics.q_rad;
+  if (known.size() != result.q.size() || known != result.q) arm_.kinematics(result.q, result.kinematics);
   const Pose& X = result.kinematics.X_WT;
   const Vec3 e_p = X_WT.translation() - X.translation();
   const Vec3 e_R = rotation_vector(X_WT.linear() * X.linear().transpose());
@@ -156,9 +157,9 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
   for (int i = 0;; ++i) {
     const bool there = result.position_residual_m <= config_.position_tolerance_m &&
                        result.rotation_residual_rad <= config_.rotation_tolerance_rad;
-    if (!there || i == 0) J.factor(task_jacobian<6>(result.kinematics));
-    if (there) break;
+    if (there) return true;
     if (i == config_.max_iterations) return false;
+    J.factor(task_jacobian<6>(result.kinematics));
     const Vec6 q = result.q + J.solve(e);
     // Written so that NaN and infinity, from a singular J, are refused here, too.
     if (!(((q - q0).array().abs() <= max_step_.array()).all())) return false;
@@ -166,8 +167,6 @@ bool InverseKinematics::newton(const Vec6& q0, const Pose& X_WT, InverseKinemati
     ++result.iterations;
     e = error(X_WT, result);
   }
-  smallest_singular_value(J.inverse(), result.smallest_singular_value_m_per_rad, result.lost_direction_W);
-  return true;
 }
 
 // The same for other numbers of axes. The null space has its share in the first step, even if the tool stands. This
@@ -184,11 +183,19 @@ bool InverseKinematics::by_priority(const JointVector& q0, const Pose& X_WT,
     pose_error = error(X_WT, result);
     e = task_error(pose_error, result);
   }
+  return true;
+}
+
+void InverseKinematics::measure_singularity(InverseKinematicsResult& result) const noexcept {
+  if (arm_.axes() == 6) {
+    FactoredMatrix J;
+    J.factor(task_jacobian<6>(result.kinematics));
+    return smallest_singular_value(J.inverse(), result.smallest_singular_value_m_per_rad, result.lost_direction_W);
+  }
   const TaskJacobian<Eigen::Dynamic> J = task_jacobian<Eigen::Dynamic>(result.kinematics);
   const SymmetricEigen eigen = symmetric_eigen(J.lazyProduct(J.transpose()));
   result.smallest_singular_value_m_per_rad = std::sqrt(std::max(0.0, eigen.values[lost_row_]));
   result.lost_direction_W = eigen.vectors.col(lost_row_);
-  return true;
 }
 
 // Written so that NaN and infinity, from a singular J, count as outside.

@@ -64,9 +64,10 @@ struct InverseKinematicsResult {
   JointVector q;              // rad
   double position_residual_m = 0.0;
   double rotation_residual_rad = 0.0;
+  ToolKinematics kinematics;  // at q
+  // Of measure_singularity(), and of misses.
   double smallest_singular_value_m_per_rad = 0.0;  // of the weighted J near q; an estimate, within 10 % if it is small
   Vec<6> lost_direction_W = Vec<6>::Zero();  // unit vector of weighted motion (v, length·ω) along which J is smallest
-  ToolKinematics kinematics;                 // at q
 };
 
 class InverseKinematics {
@@ -76,8 +77,11 @@ class InverseKinematics {
   explicit InverseKinematics(const Arm& arm, const InverseKinematicsConfig& config = {});
 
   // For the cycle: no allocation, no exception, bounded work. Precondition: `q` are the angles that were commanded
-  // last.
+  // last. Where result.kinematics are at q already, they aren't computed again.
   void solve(const JointVector& q, const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
+
+  // How near result.q is to a singularity. Precondition: result.kinematics are at it.
+  void measure_singularity(InverseKinematicsResult& result) const noexcept;
 
   // For set-up: angles within the cell's ranges for a pose, from anywhere. The search starts at q_near and then at
   // places all over the ranges (the same ones each time). Returns the solution nearest to q_near, or nullopt if none

@@ -372,14 +372,42 @@ double clearance_m(const Scene& scene, const Vec3& x_W) {
   return least;
 }
 
-double clearance_m(const Scene& scene, const Vec3& x_W, double time_s, Driven driven) {
-  double least = std::numeric_limits<double>::infinity();
+namespace {
+
+// Calls visit(object, X⁻¹) for each object whose place is known, with the inverse of its motion since it was described.
+template <typename Visit>
+void visit_objects(const Scene& scene, double time_s, Driven driven, Visit visit) {
   for (const Object& object : scene.objects) {
     if (object.motion && object.motion->driven && driven == Driven::left_out) continue;
     const bool moves = object.motion && !object.motion->driven;
-    const Vec3 x = moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) * x_W : x_W;
-    least = std::min(least, distance_to(object, x));
+    visit(object, moves ? script_of(*object.motion).at(time_s).inverse(Eigen::Isometry) : models::Pose::Identity());
   }
+}
+
+// Whether an open mesh is between the two.
+bool separates(const Object& object, const Vec3& x, const Vec3& y) {
+  const auto* shape = std::get_if<MeshShape>(&object.shape);
+  return shape != nullptr && !shape->mesh->closed() && shape->mesh->first_hit(x, y).any();
+}
+
+}  // namespace
+
+double clearance_m(const Scene& scene, const Vec3& x_W, double time_s, Driven driven) {
+  double least = std::numeric_limits<double>::infinity();
+  visit_objects(scene, time_s, driven, [&](const Object& object, const models::Pose& X) {
+    least = std::min(least, distance_to(object, X * x_W));
+  });
+  return least;
+}
+
+double tool_clearance_m(const Scene& scene, const Vec3& tool_W, const Vec3& proxy_W, double time_s, Driven driven) {
+  double least = std::numeric_limits<double>::infinity();
+  visit_objects(scene, time_s, driven, [&](const Object& object, const models::Pose& X) {
+    const Vec3 tool = X * tool_W;
+    const double distance = distance_to(object, tool);
+    const double behind = object.layer ? object.layer->thickness_m : 0.0;
+    least = std::min(least, separates(object, X * proxy_W, tool) ? 2.0 * behind - distance : distance);
+  });
   return least;
 }
 

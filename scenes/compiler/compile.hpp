@@ -73,5 +73,9 @@ double clearance_m(const Scene& scene, const models::Vec3& x_W);
 // objects count where they are described, or, if their places aren't known, not at all.
 enum class Driven { as_described, left_out };
 double clearance_m(const Scene& scene, const models::Vec3& x_W, double time_s, Driven driven = Driven::as_described);
+// The same for a tool whose proxy is at proxy_W. An open mesh has no inside; a tool that it separates from its proxy is
+// behind it, and its distance counts as negative.
+double tool_clearance_m(const Scene& scene, const models::Vec3& tool_W, const models::Vec3& proxy_W, double time_s,
+                        Driven driven = Driven::as_described);
 
 }  // namespace proxarm::scenes

@@ -225,9 +225,6 @@ void choose_passivity(PreparedSession& session, const RunOptions& options) {
                                  .expected = "off: it has no proxy with a mass to be damped"});
 }
 
-// What makes a horizon stable was found in sessions at 1 ms. At 4 ms it let a hand of 500 N/m ring by 6 mm at 16 Hz.
-constexpr double longest_period_ahead_s = 1.000001e-3;
-
 [[noreturn]] void refuse_lookahead() {
   throw description::SetupError({.key = "--lookahead",
                                  .found = "the impedance type",
@@ -275,11 +272,8 @@ controller::LoopModel led_loop(const PreparedSession& session) {
 }
 
 double longest_horizon_s(const PreparedSession& session) {
-  if (session.settings.period_s > longest_period_ahead_s) return 0.0;
   const double proxy_kg = session.settings.mass_kg - session.loop.handle_mass_kg;
-  controller::LoopModel loop = session.loop;
-  loop.arms = nullptr;  // auto_mass_ratio and auto_share stand for its gears
-  loop.horizon_s = 0.0;
+  controller::LoopModel loop = led_loop(session);
   loop.filter_s = 0.5 * setpoint_filter_delay_s(session.cell);
   return controller::stable_horizon_s(hand_model(session), loop, proxy_kg);
 }
@@ -372,13 +366,11 @@ void require_stable_horizon(const PreparedSession& session) {
   std::snprintf(found.data(), found.size(), "%.4g ms with %.4g kg", 1e3 * session.settings.horizon_s,
                 session.settings.mass_kg);
   std::snprintf(expected.data(), expected.size(), "at most %.4g ms, which is stable with margins", 1e3 * longest_s);
-  const bool known = session.settings.period_s <= longest_period_ahead_s;
-  throw description::SetupError(
-      {.key = "--lookahead",
-       .found = found.data(),
-       .expected = known ? expected.data() : "off at timesteps above 1 ms, where no horizon is known to be stable",
-       .advice = "--lookahead auto, or a larger --mass (--force-unstable overrides, in "
-                 "simulation)"});
+  throw description::SetupError({.key = "--lookahead",
+                                 .found = found.data(),
+                                 .expected = expected.data(),
+                                 .advice = "--lookahead auto, or a larger --mass (--force-unstable overrides, in "
+                                           "simulation)"});
 }
 
 }  // namespace

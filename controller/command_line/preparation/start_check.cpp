@@ -39,6 +39,7 @@ double smallest_singular_value(const PreparedSession& session, const models::Arm
   const models::InverseKinematics inverse(arm);
   models::InverseKinematicsResult result;
   inverse.solve(arm.start_rad(), arm.tool_pose(arm.start_rad()), result);
+  inverse.measure_singularity(result);
   return result.smallest_singular_value_m_per_rad;
 }
 

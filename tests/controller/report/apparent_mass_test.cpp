@@ -144,5 +144,54 @@ TEST(ApparentMass, SaysNothingWhereNothingMoved) {
   EXPECT_FALSE(estimator.estimate());
 }
 
+// A mass felt with a delay: M e^{jωτ}, by arithmetic. The lines of a band are up to a tenth off its middle, and a 5 s
+// window sees each sine as 0.4 Hz wide: a per cent of the phase's slope over that.
+TEST(FeltMassCurve, SeesADelayGrowWithFrequency) {
+  constexpr double M = 4.0, tau = 5e-3;
+  FeltMassCurve curve(period_s);
+  const double frequencies[] = {0.6, 1.0, 2.0, 4.2, 8.0, 12.2};
+  for (int k = 0; k < 30000; ++k) {
+    double F = 3.0, x = 0.0;
+    for (const double f : frequencies) {
+      const double w = 2.0 * std::numbers::pi * f, t = k * period_s;
+      x += 0.02 / w * std::sin(w * t);
+      F -= M * 0.02 * w * std::sin(w * (t + tau));
+    }
+    curve.add(F * direction, x * direction);
+  }
+  const auto points = curve.points();
+  ASSERT_GE(points.size(), 6u);
+  for (const auto& point : points) {
+    const auto nearest = *std::min_element(std::begin(frequencies), std::end(frequencies), [&](double a, double b) {
+      return std::abs(a - point.frequency_Hz) < std::abs(b - point.frequency_Hz);
+    });
+    const auto expected = std::polar(M, 2.0 * std::numbers::pi * nearest * tau);
+    EXPECT_LT(std::abs(point.mass_kg - expected), 0.03 * M) << point.frequency_Hz << " Hz: " << point.mass_kg;
+  }
+  // |e^{jωτ} − 1| = 2 sin(ωτ/2) is 0.25 at 8.0 Hz; points are a fifth apart.
+  EXPECT_NEAR(band_within_Hz(points, M, 0.25), 8.0, 1.2);
+  EXPECT_EQ(band_within_Hz(points, 8.0, 0.25), 0.0);
+}
+
+TEST(FeltMassCurve, SaysNothingOfWhatWasNotExcited) {
+  FeltMassCurve of_noise(period_s), of_a_sine(period_s);
+  std::mt19937_64 generator(7);
+  std::normal_distribution<> noise(0.0, 1.0);
+  for (int k = 0; k < 30000; ++k) {
+    of_noise.add(Vec3(noise(generator), 0.0, 0.0), 1e-5 * Vec3(noise(generator), 0.0, 0.0));
+    const double w = 2.0 * std::numbers::pi, t = k * period_s;
+    of_a_sine.add(Vec3(-4.0 * 0.01 * w * w * std::sin(w * t) + 0.01 * noise(generator), 0.0, 0.0),
+                  Vec3(0.01 * std::sin(w * t), 0.0, 0.0));
+  }
+  EXPECT_TRUE(of_noise.points().empty());
+  for (const auto& point : of_a_sine.points()) EXPECT_NEAR(point.frequency_Hz, 1.0, 0.5);
+  FeltMassCurve of_short_moves(period_s);
+  for (int k = 0; k < 30000; ++k) {
+    of_short_moves.add(Vec3::UnitX(), Vec3::UnitX() * std::sin(6.0 * k * period_s));
+    if (k % 4000 == 0) of_short_moves.end_segment();
+  }
+  EXPECT_TRUE(of_short_moves.points().empty());
+}
+
 }  // namespace
 }  // namespace proxarm::controller

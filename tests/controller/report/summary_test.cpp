@@ -23,6 +23,7 @@ struct Session {
   double lag_m = 0.0;           // of the tool, along y
   double tool_depth_m = 0.0;    // while in contact
   double spring = 0.0;          // K_v
+  double belt_m_per_s = 0.0;    // of the wall, along x
   double field_N = 0.0;         // of a field of friction, in which nothing is touched
   bool truth = true;
 
@@ -52,7 +53,8 @@ struct Session {
     const double inertial = handle_kg * ax(t) + (mass_kg - handle_kg) * ax(t + T) + damping * vx(t + 1.5 * T) +
                             spring * x(t) + (vx(t) > 0 ? field_N : -field_N);
     const double normal = contact ? 5.0 : 0.0;
-    const double slide = contact ? friction * normal * (1 + friction_error) * (vx(t) > 0 ? 1.0 : -1.0) : 0.0;
+    const double slip = vx(t) > belt_m_per_s ? 1.0 : -1.0;
+    const double slide = contact ? friction * normal * (1 + friction_error) * slip : 0.0;
     r.hand_force_W_N = {inertial + slide, 0.0, -normal + (contact ? -0.01 * spring : 0.0)};
     r.contact_force_W_N = {vx(t) > 0 ? -field_N : field_N, 0.0, 0.0};
     r.force_W_N = {inertial + slide - handle_kg * ax(t), 0.0, -normal};
@@ -133,6 +135,33 @@ TEST(Summary, FindsWhatIsWrong) {
   Session pulling;
   pulling.force_error_N = -7.0;
   EXPECT_NEAR(pulling.run().pulling_force_max_N, 2.0, 1e-12);
+}
+
+// The story: on a conveyor the friction was 36 % too small, since the direction of the slide was the tool's, not that
+// relative to the belt.
+TEST(Summary, SeesFrictionOnABeltThatOvertakesTheTool) {
+  Session session;
+  session.belt_m_per_s = 1.0;
+  const Summary s = session.run();
+  ASSERT_TRUE(s.friction_ratio_error);
+  EXPECT_NEAR(*s.friction_ratio_error, 0.0, 1e-3);
+}
+
+TEST(Summary, SaysTheLagThatIsTakenOff) {
+  const Summary s = Session{}.run(3900);
+  EXPECT_LT(*s.tracking_max_m, 1e-15);
+  // The proxy's place at t is one period ahead of the tool's there.
+  EXPECT_NEAR(*s.tracking_lag_max_m, T * 0.05 * 2 * std::numbers::pi * 0.7, 1e-7);
+  EXPECT_DOUBLE_EQ(s.tracking_delay_s, T);
+}
+
+TEST(Summary, TellsDragFromPull) {
+  Session session;
+  session.field_N = 2.0;
+  const Summary s = session.run(3900);
+  EXPECT_EQ(s.pulling_force_max_N, 0.0);
+  EXPECT_EQ(s.drag_force_max_N, 2.0);
+  EXPECT_NE(summary_text(s).find("drag without contact 2 N"), std::string::npos);
 }
 
 TEST(Summary, TakesTheSpringOff) {

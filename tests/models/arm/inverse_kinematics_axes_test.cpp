@@ -152,6 +152,7 @@ TEST(InverseKinematicsAxes, AtRestNothingMoves) {
     inverse.solve(arm.start_rad(), arm.tool_pose(arm.start_rad()), result);
     EXPECT_EQ(result.status, Status::converged) << name;
     EXPECT_LT((result.q - arm.start_rad()).cwiseAbs().maxCoeff(), 1e-12) << name;
+    inverse.measure_singularity(result);
     EXPECT_GT(result.smallest_singular_value_m_per_rad, 0.05) << name;
   }
 }

@@ -130,6 +130,7 @@ TEST_F(InverseKinematicsTest, StaysWhereItIsWhenTheTargetIsReached) {
   ik.solve(q, arm.tool_pose(q), result);
   EXPECT_EQ(result.status, Status::converged);
   EXPECT_EQ(result.q, q);
+  ik.measure_singularity(result);
   EXPECT_LT(result.smallest_singular_value_m_per_rad, 1e-10);
 }
 
@@ -149,6 +150,7 @@ TEST_F(InverseKinematicsTest, NeverJumpsAndNeverGivesNan) {
     const Pose X = nearby(random, arm.tool_pose(q), size, size);
     ik.solve(q, X, result);
     ASSERT_TRUE(result.q.allFinite());
+    ik.measure_singularity(result);
     ASSERT_TRUE(result.lost_direction_W.allFinite());
     ASSERT_TRUE(std::isfinite(result.smallest_singular_value_m_per_rad));
     ASSERT_NE(result.status, Status::invalid);
@@ -174,6 +176,7 @@ TEST_F(InverseKinematicsTest, ReportsTheSmallestSingularValueAndItsDirection) {
     Vec<6> direction;
     const double exact = smallest(q, &direction);
     ik.solve(q, arm.tool_pose(q), result);
+    ik.measure_singularity(result);
     ASSERT_GE(result.smallest_singular_value_m_per_rad, exact * (1.0 - 1e-6));
     if (exact < 0.02) {
       ASSERT_LE(result.smallest_singular_value_m_per_rad, 1.1 * exact) << q.transpose();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -217,6 +218,24 @@ TEST(Clearance, IsTheDistanceToTheNearestSurface) {
   EXPECT_NEAR(clearance_m(scene, {1.0, 3.0, -2.0}), -0.1, 1e-15);
   EXPECT_EQ(clearance_m(load_scene(scenes_folder / "free.yaml"), Vec3::Zero()),
             std::numeric_limits<double>::infinity());
+}
+
+// The story: a tool that had sunk 381 µm behind a sheet was said not to have, since an open mesh has no inside.
+TEST(Clearance, OfAToolBehindASheetIsNegative) {
+  models::TriangleSoup soup;
+  soup.vertices = {{0.9, -1.0, -1.0}, {0.9, 1.0, -1.0}, {0.9, 1.0, 1.0}, {0.9, -1.0, 1.0}};
+  soup.triangles = {{0, 1, 2}, {0, 2, 3}};
+  scenes::MeshShape shape;
+  shape.mesh = std::make_shared<const models::TriangleMesh>(soup);
+  scenes::Scene scene;
+  scene.objects.emplace_back();
+  scene.objects.back().shape = shape;
+  const Vec3 proxy(0.9 - shape.mesh->lift_m(), 0.1, 0.2), behind(0.9 + 381e-6, 0.1, 0.2), before(0.89, 0.1, 0.2);
+  EXPECT_NEAR(tool_clearance_m(scene, behind, proxy, 0.0), -381e-6, 1e-12);
+  EXPECT_NEAR(tool_clearance_m(scene, before, proxy, 0.0), 0.01, 1e-12);
+  EXPECT_NEAR(tool_clearance_m(scene, proxy, behind, 0.0), -shape.mesh->lift_m(), 1e-12) << "from the other side";
+  const Vec3 beside(0.95, 1.5, 0.2), led(0.9, 1.5, 0.2);
+  EXPECT_GT(tool_clearance_m(scene, beside, led, 0.0), 0.0) << "nothing is between them";
 }
 
 // The plate of moving_plate.yaml is 20 mm thick and swings by 0.1 m along x about x = 0.9, once in 5 s.
