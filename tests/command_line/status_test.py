@@ -25,7 +25,7 @@ class Status(unittest.TestCase):
         self.control = os.path.join(folder.name, "control")
 
     def test_says_phase_force_and_mass_of_a_session(self):
-        run = subprocess.Popen([PROGRAM, "run", "--control", self.control, "--pace", "realtime", "--duration", "30",
+        run = subprocess.Popen([PROGRAM, "run", "--control", self.control, "--pace", "realtime", "--duration", "30s",
                                 "--mass", "6kg", "--no-plot"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             until = time.monotonic() + 60
