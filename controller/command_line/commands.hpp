@@ -28,6 +28,12 @@ struct SetOptions {
   std::filesystem::path control;
 };
 
+struct StatusOptions {
+  std::filesystem::path control;
+  bool watch = false;
+  bool json = false;
+};
+
 struct ReplayOptions {
   std::filesystem::path folder;
   bool json = false;
@@ -57,6 +63,7 @@ int plan_command(const RunOptions& options);
 int scan_command(const ScanOptions& options);         // 1: nothing answers
 int replay_command(const ReplayOptions& options);     // 1: other setpoints
 int set_command(const SetOptions& options);           // of a running session
+int status_command(const StatusOptions& options);     // of a running session
 int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
 int tune_command(const RunOptions& options);

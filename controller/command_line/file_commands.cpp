@@ -10,6 +10,7 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/arm_urdf.hpp"
 #include "models/base/setup_error.hpp"
@@ -23,6 +24,8 @@
 #include "scenes/compiler/check.hpp"
 #include "scenes/compiler/explain.hpp"
 #include "scenes/format/scene_file.hpp"
+#include "scenes/mesh_files/mesh_report.hpp"
+#include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -48,8 +51,13 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
   return nullptr;
 }
 
-// With the files that it names, each device as the controller would make it, the devices' identifiers, and its arm's
-// start in the scene, as `run` judges them.
+// Throws SetupError for what the simulated arm can't be, such as gears that are too stiff for its step.
+void require_simulable(const PreparedSession& session) {
+  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
+  const sim::SimulatedCell far_end(session.cell, session.sensor, session.hand, network.events());
+}
+
+// With the files that it names, each device as the controller would make it, and all that `run` would refuse.
 void check_cell(const fs::path& file, const fs::path& scene) {
   const description::Cell cell = description::load_cell(file);
   if (!cell.default_scene.empty()) description::require_default_file(cell, "default_scene", cell.default_scene);
@@ -67,7 +75,10 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   RunOptions run;
   run.cell = file;
   run.scene = scene;
-  require_usable_start(prepare(run));
+  const PreparedSession session = prepare(run);
+  require_runnable(session, run);
+  for (const std::string& line : scene_surprises(session)) std::printf("%s\n", line.c_str());
+  require_simulable(session);
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});
   for (const std::string& lack : fieldbus::losses_of(slots)) std::printf("%s\n", lack.c_str());
@@ -81,6 +92,11 @@ void tell_sources(const fs::path& file) {
   } else if (said.sources.empty()) {
     std::printf("the file doesn't say where its figures are from\n");
   }
+}
+
+// What is wrong with a mesh is told; whether that matters is for its scene to say.
+void tell_mesh(const fs::path& file) {
+  for (const std::string& line : scenes::mesh_report(scenes::load_mesh(file, {}))) std::printf("%s\n", line.c_str());
 }
 
 const char* check(const fs::path& file, const CheckFilesOptions& options) {
@@ -107,6 +123,9 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
     case FileKind::urdf:
       models::compile(models::load_urdf(file));
       return "arm";
+    case FileKind::mesh:
+      tell_mesh(file);
+      return "mesh";
     case FileKind::scene:
     case FileKind::unknown:
       return check_laws(scenes::load_scene(file), options.states);

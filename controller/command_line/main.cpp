@@ -428,6 +428,7 @@ class Commands {
         ->required()
         ->type_name("NAME=VALUE");
     set->add_option("--control", set_.control, control_text)->type_name("PATH");
+    add_status(control_text);
 
     const std::pair<const char*, const char*> orders[] = {
         {"hold", "stop the arm of a running session, its drives enabled"},
@@ -444,6 +445,14 @@ class Commands {
       order->add_option("--control", set_.control, control_text)->type_name("PATH");
       if (has_distance) order->add_option("distance", distance_, "such as 20mm")->required();
     }
+  }
+
+  void add_status(const char* control_text) {
+    CLI::App* status = add("status", "how a running session is: phase, force, speed, limits, delay",
+                           [this] { return command_line::status_command(status_); });
+    status->add_option("--control", status_.control, control_text)->type_name("PATH");
+    status->add_flag("--watch", status_.watch, "four times a second, until the session ends");
+    status->add_flag("--json", status_.json, "a line of JSON (docs/files.md#the-status-of-a-session)");
   }
 
   void add_files() {
@@ -495,6 +504,7 @@ class Commands {
   command_line::ReplayOptions replay_;
   command_line::ScanOptions scan_;
   command_line::SetOptions set_;
+  command_line::StatusOptions status_;
   std::string distance_;
   command_line::CheckFilesOptions check_;
   command_line::FileOptions explain_;

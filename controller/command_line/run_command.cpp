@@ -1,8 +1,8 @@
+#include <cstdio>
 #include <memory>
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/live/live_parameters.hpp"
-#include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_run.hpp"
@@ -86,10 +86,8 @@ int run_command(const RunOptions& given) {
   require_interface_for_hardware(options);
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
-  require_usable_start(session);
-  require_enabling_switch(session, options);
-  require_stable(session, options);
-  if (options.bus.simulated()) require_carried(session, options);
+  require_runnable(session, options);
+  for (const std::string& line : scene_surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
   refuse_view(session, options);
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);

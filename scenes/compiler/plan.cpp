@@ -89,9 +89,11 @@ class Narrator {
     if (!only().friction_regions.empty()) {
       stage("friction by triangle", std::to_string(only().friction_regions.size()) + " regions");
     }
-    if (mesh.dropped_triangles() > 0) {
-      skipped(std::to_string(mesh.dropped_triangles()) + " triangles", "without an area");
+    const FaceAccount& account = std::get<MeshShape>(only().shape).account;
+    if (account.flat + account.unfit > 0) {
+      skipped(std::to_string(account.flat + account.unfit) + " triangles", "without an area");
     }
+    if (account.closing > 0) stage("holes closed", "by " + std::to_string(account.closing) + " triangles");
     skipped("composition", "a single object");
     skip_friction();
     skipped("motion", "nothing moves");

@@ -14,6 +14,7 @@
 
 #include "models/geometry/geometry.hpp"
 #include "models/mesh/mesh.hpp"
+#include "scenes/mesh_files/face_account.hpp"
 
 namespace proxarm::scenes {
 
@@ -66,8 +67,10 @@ struct MeshShape {
   std::filesystem::path file;
   double scale_m = 1.0;  // metres per unit of the file
   models::Pose pose_W = models::Pose::Identity();
+  double close_holes_m = 0.0;                        // holes up to this size are closed; 0: none
   bool inside_out = false;                           // of a closed mesh: the inside is the free side
   std::shared_ptr<const models::TriangleMesh> mesh;  // in W
+  FaceAccount account;                               // what became of the file's faces
 };
 
 using Shape = std::variant<PlaneShape, BoxShape, SphereShape, CapsuleShape, CylinderShape, MeshShape>;

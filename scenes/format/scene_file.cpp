@@ -57,7 +57,10 @@ MeshShape read_mesh(const YamlNode& node) {
   mesh.scale_m = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
   mesh.pose_W = pose_of(node);
   mesh.inside_out = node.boolean_or("inside_out", false);
-  mesh.mesh = load_mesh(mesh.file, mesh.scale_m, mesh.pose_W);
+  mesh.close_holes_m = node.number_or("close_holes_m", 0.0, between(0.0, 1e3));
+  LoadedMesh loaded = load_mesh(mesh.file, {mesh.scale_m, mesh.pose_W, mesh.close_holes_m});
+  mesh.mesh = std::move(loaded.mesh);
+  mesh.account = loaded.account;
   if (mesh.inside_out && !mesh.mesh->closed()) {
     throw node.error_at("inside_out", "a closed mesh; both sides of an open one hold anyway", "an open mesh");
   }

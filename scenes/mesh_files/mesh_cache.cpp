@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "models/base/sha256.hpp"
+#include "scenes/mesh_files/mesh_file.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -28,9 +29,10 @@ using Digest = Sha256::Digest;
 constexpr std::uintmax_t kSmallest = 1'000'000;
 
 struct Header {
-  std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'm', 'e', 's', 'h', ' ', '1', '\n', '\0'};
+  std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'm', 'e', 's', 'h', ' ', '2', '\n', '\0'};
   Digest content{};
   std::uint64_t vertices = 0, triangles = 0, nodes = 0, dropped = 0, closed = 0;
+  FaceAccount account;
 };
 
 template <typename T>
@@ -50,12 +52,13 @@ bool read(std::istream& in, std::span<std::byte> bytes) {
   return static_cast<bool>(in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size())));
 }
 
-std::optional<Digest> content_of(const std::filesystem::path& file, double scale, const models::Pose& pose_W) {
+std::optional<Digest> content_of(const std::filesystem::path& file, const MeshPlacement& placement) {
   Sha256 hash;
   const std::string extension = file.extension().string();
   hash.add(std::as_bytes(std::span(extension)));
-  hash.add(bytes_of(scale));
-  hash.add(std::as_bytes(std::span(pose_W.data(), 16)));
+  hash.add(bytes_of(placement.scale));
+  hash.add(std::as_bytes(std::span(placement.pose_W.data(), 16)));
+  hash.add(bytes_of(placement.close_holes_m));
   std::ifstream in(file, std::ios::binary);
   std::vector<std::byte> some(1 << 20);
   while (read(in, some)) hash.add(some);
@@ -138,20 +141,20 @@ std::optional<Digest> signature(const Header& header, const TriangleMesh::Struct
 
 }  // namespace
 
-MeshCache::MeshCache(const std::filesystem::path& mesh_file, double scale, const models::Pose& pose_W)
+MeshCache::MeshCache(const std::filesystem::path& mesh_file, const MeshPlacement& placement)
     : file_(mesh_file.string() + ".proxarm") {
   std::error_code error;
   const auto size = std::filesystem::file_size(mesh_file, error);
   if (error || size < kSmallest) return;
   const auto key = secret();
-  const auto content = key ? content_of(mesh_file, scale, pose_W) : std::nullopt;
+  const auto content = key ? content_of(mesh_file, placement) : std::nullopt;
   if (!content) return;
   used_ = true;
   secret_ = *key;
   content_ = *content;
 }
 
-std::optional<TriangleMesh::Structure> MeshCache::load() const {
+std::optional<CachedMesh> MeshCache::load() const {
   std::error_code error;
   if (!used_ || !std::filesystem::is_regular_file(file_, error)) return std::nullopt;
   std::ifstream in(file_, std::ios::binary);
@@ -178,11 +181,12 @@ std::optional<TriangleMesh::Structure> MeshCache::load() const {
       signature(header, structure, secret_) != signed_as) {
     return std::nullopt;
   }
-  return structure;
+  return CachedMesh{std::move(structure), header.account};
 }
 
-void MeshCache::store(const TriangleMesh::Structure& structure) const {
+void MeshCache::store(const CachedMesh& mesh) const {
   if (!used_) return;
+  const TriangleMesh::Structure& structure = mesh.structure;
   Header header;
   header.content = content_;
   header.vertices = structure.vertices.size();
@@ -190,6 +194,7 @@ void MeshCache::store(const TriangleMesh::Structure& structure) const {
   header.nodes = structure.nodes.size();
   header.dropped = structure.dropped;
   header.closed = structure.closed ? 1 : 0;
+  header.account = mesh.account;
   const auto signed_as = signature(header, structure, secret_);
   if (!signed_as) return;
   // The cache appears whole or not at all: it is written beside its place and then renamed.

@@ -1,14 +1,15 @@
 // Caches the structure of a large mesh beside its file (`part.stl.proxarm`), so that the next load is quick.
 //
-// A cache is valid for the same bytes of the mesh file at the same scale and pose; there is one cache per file, the
+// A cache is valid for the same bytes of the mesh file at the same placement; there is one cache per file, the
 // last one. It must also have been written by this user's proxarm on this machine: it is signed with a secret that is
 // made once and kept in the user's cache folder ($XDG_CACHE_HOME or ~/.cache, proxarm/mesh-key). An invalid cache
 // (damaged, cut off, from another user or another version) is ignored. Where no secret or no file can be written, there
 // is no cache.
 //
-//   "proxarm mesh 1\n\0"   16 bytes
-//   SHA-256 of what the structure is of: extension, scale, pose, bytes of the mesh file
+//   "proxarm mesh 2\n\0"   16 bytes
+//   SHA-256 of what the structure is of: extension, scale, pose, close_holes_m, bytes of the mesh file
 //   numbers of vertices, triangles, pairs of nodes; dropped triangles; closed    5 × u64
+//   what became of the file's faces (FaceAccount)    11 × u64
 //   vertices (3 × f64), triangles (3 × u32), pairs of nodes, as they are in memory
 //   HMAC-SHA-256 of the SHA-256 of all before
 #pragma once
@@ -18,16 +19,24 @@
 #include <optional>
 
 #include "models/mesh/mesh.hpp"
+#include "scenes/mesh_files/face_account.hpp"
 
 namespace proxarm::scenes {
+
+struct MeshPlacement;
+
+struct CachedMesh {
+  models::TriangleMesh::Structure structure;
+  FaceAccount account;
+};
 
 class MeshCache {
  public:
   // Reads the mesh file to identify it. A file below 1 MB is quick to load and has no cache.
-  MeshCache(const std::filesystem::path& mesh_file, double scale, const models::Pose& pose_W);
+  MeshCache(const std::filesystem::path& mesh_file, const MeshPlacement& placement);
 
-  [[nodiscard]] std::optional<models::TriangleMesh::Structure> load() const;
-  void store(const models::TriangleMesh::Structure& structure) const;
+  [[nodiscard]] std::optional<CachedMesh> load() const;
+  void store(const CachedMesh& mesh) const;
 
  private:
   using Digest = std::array<unsigned char, 32>;

@@ -28,6 +28,9 @@ constexpr double rigid_gear_rad_per_s = 2.0 * M_PI * 200.0;
 // Symplectic Euler is unstable from ωh = 2 on; damping and rotors bring that down a little.
 constexpr double largest_phase_step = 1.5;
 
+// Of step_share(), at the start: the masses at the tip of the arm change by less than a third on its way.
+constexpr double largest_step_share = 0.75;
+
 Mat3 inertia_matrix(const std::array<double, 6>& i) {
   Mat3 m;
   m << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
@@ -133,6 +136,15 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
          .found = description::number_text(highest / (2.0 * M_PI)) + " Hz",
          .expected = "at most " + description::number_text(largest_phase_step / (2.0 * M_PI * step_s_)) + " Hz",
          .advice = "raise servo_rate_Hz, or lower the stiffness"});
+  }
+  if (const double share = step_share(); !(share < largest_step_share)) {
+    throw SetupError({.key = "gear_damping_Nms_per_rad",
+                      .message = "gears that are as stiff and as damped as these make the simulated arm explode",
+                      .found = description::number_text(std::round(1e3 * share) / 1e3) + " of what its step of " +
+                               description::number_text(1e3 * step_s_) + " ms bears",
+                      .expected = "at most " + description::number_text(largest_step_share),
+                      .advice = "raise servo_rate_Hz, lower simulation.gear_damping_Nms_per_rad or the stiffness, or "
+                                "look for a rotor or link that is too light for its gear"});
   }
   std::vector<double> torque(axes_.size());
   for (std::size_t i = 0; i < axes_.size(); ++i) torque[i] = axes_[i].torque_Nm;
@@ -319,6 +331,26 @@ Mat3 ArmDynamics::effective_mass_kg() const {
       l.jacobian.lazyProduct(models::solve_positive_definite(M, models::SmallColumns3(l.jacobian.transpose())));
   const Mat3 R_WB = X_WB_.linear();
   return R_WB * inverse_B.inverse() * R_WB.transpose();
+}
+
+double ArmDynamics::step_share() const {
+  const mjModel* m = links_->model.get();
+  const Eigen::Index n = m->nv;
+  models::SmallMatrix links(n, n);
+  mj_fullM(m, links.data(), links_->data->qM);
+  // Links first, rotors behind them; a gear is between one of each.
+  Eigen::MatrixXd M = Eigen::MatrixXd::Zero(2 * n, 2 * n), F = M;
+  M.topLeftCorner(n, n) = links;
+  for (const Axis& axis : axes_) {
+    const Eigen::Index link = axis.dof, rotor = n + axis.dof;
+    M(rotor, rotor) = axis.rotor_inertia_kg_m2;
+    const double gear = step_s_ * step_s_ * axis.stiffness_Nm_per_rad + 2.0 * step_s_ * axis.damping_Nms_per_rad;
+    F(link, link) += gear;
+    F(rotor, rotor) += gear;
+    F(link, rotor) -= gear;
+    F(rotor, link) -= gear;
+  }
+  return models::generalized_eigenvalues(F, M)[2 * n - 1] / 4.0;
 }
 
 std::vector<double> ArmDynamics::locked_modes_Hz() const {

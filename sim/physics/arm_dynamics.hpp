@@ -92,6 +92,12 @@ class ArmDynamics {
   // Undamped natural frequencies of the arm with its motors locked, rising; handle and hand included.
   [[nodiscard]] std::vector<double> locked_modes_Hz() const;
 
+  // How near the step is to where the motion of links and rotors on their gears explodes: below 1 it doesn't.
+  // Symplectic Euler, v(t+h) = v − h M⁻¹ (K q + C v), q(t+h) = q + h v(t+h), is M z² − (2M − hC − h²K) z + (M − hC).
+  // For symmetric K, C ≥ 0 it leaves the unit circle at z = −1, where 4M − 2hC − h²K becomes singular: stable as long
+  // as the largest eigenvalue of M⁻¹ (h²K + 2hC) is below 4, of which this is the share.
+  [[nodiscard]] double step_share() const;
+
  private:
   struct Axis {
     int dof = 0;  // of the link in MuJoCo's model; hinges only, so also the index in qpos

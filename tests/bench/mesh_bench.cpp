@@ -238,7 +238,7 @@ void mesh_load(benchmark::State& state) {
   const auto file = folder / "ball.stl", cache = folder / "ball.stl.proxarm";
   std::filesystem::create_directories(folder);
   std::ofstream(file, std::ios::binary) << proxarm::tests::stl_of(soup_of(8));
-  const auto load = [&] { return proxarm::scenes::load_mesh(file, 1.0, Pose::Identity()); };
+  const auto load = [&] { return proxarm::scenes::load_mesh(file, {1.0, Pose::Identity()}).mesh; };
   std::shared_ptr<const TriangleMesh> mesh = load();
   for (auto _ : state) {
     if (state.range(0) == 0) std::filesystem::remove(cache);

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "controller/command_line/live/orders.hpp"
+#include "controller/command_line/live/session_status.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/session/bring_up.hpp"
@@ -328,7 +329,7 @@ std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::
 }
 
 std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
-                                            const RunOptions& options) {
+                                            const RunOptions& options, const controller::BoxReader& box) {
   Script script = script_of(options.changes, session, options);
   cycle.changes().schedule(std::move(script.changes));
   cycle.timesteps().schedule(std::move(script.timesteps));
@@ -337,7 +338,10 @@ std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const Prep
   const auto parameters = std::make_shared<LiveParameters>(session, options);
   return std::make_unique<ControlSocket>(
       control_path(options),
-      ControlHandlers{[&cycle](const std::string& line) { return obey(cycle, line); },
+      ControlHandlers{[&cycle, &box, &session](const std::string& line) {
+                        const auto status = session_status(line, box, session);
+                        return status ? status : obey(cycle, line);
+                      },
                       [&cycle, parameters](const std::string& line) { return change(cycle, *parameters, line); }});
 }
 

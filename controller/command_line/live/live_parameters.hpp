@@ -12,6 +12,7 @@
 #include "controller/command_line/live/control_socket.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/cycle/cycle.hpp"
+#include "controller/record/black_box.hpp"
 #include "controller/rendering/change.hpp"
 
 namespace proxarm::command_line {
@@ -54,8 +55,9 @@ struct IdleChange {
 // Of a session that has ended; `texts` are those of its options.
 std::vector<IdleChange> idle_changes(const controller::Cycle& cycle, const std::vector<std::string>& texts);
 
-// The session's script, and its socket where one is wanted; null without.
+// The session's script, and its socket where one is wanted; null without. What it says of the session it reads in
+// `box`.
 std::unique_ptr<ControlSocket> take_changes(controller::Cycle& cycle, const PreparedSession& session,
-                                            const RunOptions& options);
+                                            const RunOptions& options, const controller::BoxReader& box);
 
 }  // namespace proxarm::command_line

@@ -41,6 +41,8 @@ const char* name_of(FileKind kind) {
       return "a description of a CANopen device";
     case FileKind::dbc:
       return "a list of messages and signals";
+    case FileKind::mesh:
+      return "a mesh";
     case FileKind::unknown:
       break;
   }
@@ -56,6 +58,8 @@ const char* advice_for(FileKind kind) {
       return "give it as --scene FILE";
     case FileKind::hand:
       return "give it as --hand FILE";
+    case FileKind::mesh:
+      return "a scene names it: `objects: [{mesh: {file: part.stl, scale_m: 0.001}}]`";
     default:
       return "a cell file names it; models/cells/default.yaml is an example";
   }
@@ -70,6 +74,7 @@ FileKind kind_of(const fs::path& file) {
   if (extension == ".eds" || extension == ".dcf") return FileKind::eds;
   if (extension == ".dbc") return FileKind::dbc;
   if (extension == ".urdf") return FileKind::urdf;
+  if (extension == ".stl" || extension == ".obj" || extension == ".ply") return FileKind::mesh;
   std::error_code ignored;
   if (!fs::is_regular_file(file, ignored)) return FileKind::unknown;
   try {

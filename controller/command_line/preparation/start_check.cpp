@@ -5,12 +5,14 @@
 #include <cstdio>
 #include <limits>
 
+#include "controller/command_line/preparation/bus_plan.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/geometry/eigenvalues.hpp"
 #include "scenes/compiler/compile.hpp"
+#include "scenes/mesh_files/mesh_report.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -194,6 +196,29 @@ void require_usable_start(const PreparedSession& session) {
   require_outside(session, start_W);
   require_on_guide(session, start_W);
   require_allowed(session, start_W);
+}
+
+void require_runnable(const PreparedSession& session, const RunOptions& options) {
+  require_usable_start(session);
+  require_enabling_switch(session, options);
+  require_stable(session, options);
+  if (options.bus.simulated()) require_carried(session, options);
+}
+
+std::vector<std::string> scene_surprises(const PreparedSession& session) {
+  const models::Arm arm(session.cell);
+  // No joint's axis is further from the tool than the arm can reach.
+  const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
+  std::vector<std::string> lines;
+  for (const scenes::Object& object : session.scene.objects) {
+    const auto* const mesh = std::get_if<scenes::MeshShape>(&object.shape);
+    if (mesh == nullptr || !mesh->mesh) continue;
+    for (const std::string& line : scenes::mesh_surprises(*mesh->mesh, reach_m, mesh->scale_m)) {
+      lines.push_back(session.scene.file.string() + ":" + std::to_string(object.line) + ": " + object.name + " (" +
+                      mesh->file.filename().string() + "): " + line);
+    }
+  }
+  return lines;
 }
 
 void require_enabling_switch(const PreparedSession& session, const RunOptions& options) {

@@ -1,9 +1,19 @@
 // Whether a session can begin where the arm stands: before a bus is opened or a drive enabled.
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "controller/command_line/preparation/prepared_session.hpp"
 
 namespace proxarm::command_line {
+
+// All that `run` refuses of files and options before it opens a bus, and `check` of a cell with it: the three below,
+// masses that aren't stable, and in simulation a timestep that a bus can't carry. Throws SetupError.
+void require_runnable(const PreparedSession& session, const RunOptions& options);
+
+// What isn't wrong with the scene's meshes but would surprise, a line each (scenes/mesh_files/mesh_report.hpp).
+std::vector<std::string> scene_surprises(const PreparedSession& session);
 
 // Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for axes whose tool
 // can't go straight in any direction, for a start pose in a singularity, from which the tool can't move in some

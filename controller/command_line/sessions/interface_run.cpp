@@ -179,7 +179,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
   cycle.write_to(keeper.box());
   SignalWatch signals([&] { cycle.request_stop(); });
-  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options);
+  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options, keeper.box());
   controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
   Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get(),
               messages.get(), [&] { cycle.request_stop(); });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <thread>
 
@@ -12,6 +13,7 @@
 #include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/report/latency.hpp"
 #include "controller/session/session.hpp"
+#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -49,6 +51,27 @@ sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
   config.faults = options.faults;
   config.enabling = options.enabling;
   return config;
+}
+
+// Faster than any tool by far; what explodes is there within some steps.
+constexpr double impossible_m_per_s = 1000.0;
+
+bool is_possible(const sim::Truth& truth) {
+  return truth.X_WT.matrix().allFinite() && truth.acceleration_W.allFinite() &&
+         truth.velocity_W.norm() < impossible_m_per_s;
+}
+
+// Not a fault of the session: no arm can move as this one does.
+[[noreturn]] void refuse_explosion(double time_s) {
+  char found[80];
+  std::snprintf(found, sizeof found, "a motion that is no longer finite, %.3f s after power-on", time_s);
+  throw description::SetupError(
+      {.key = "simulation",
+       .message = "the simulated arm has exploded: its integration was unstable; nothing that this session says counts",
+       .found = found,
+       .expected = "gears, rotors and hand that the simulation's step can follow",
+       .advice = "raise servo_rate_Hz (the step is a servo period), lower simulation.gear_damping_Nms_per_rad or "
+                 "velocity_bandwidth_Hz, or a hand's stiffness and damping"});
 }
 
 }  // namespace
@@ -97,7 +120,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   Cycle cycle(std::move(parts), session_.settings, session_.cell.limits, record_capacity);
   cycle.write_to(keeper_.box());
   SignalWatch signals([&] { cycle.request_stop(); });
-  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session_, options_);
+  const std::unique_ptr<ControlSocket> control = take_changes(cycle, session_, options_, keeper_.box());
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     network_.simulated_bus(i).statistics().reset(network_.now_ns());
   }
@@ -110,10 +133,15 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                          if (!first_cycle_ns) first_cycle_ns = t_k_ns;
                                          wake_up.add(network_.woken_late_ns());
                                          truth_ = far_end_.truth();
+                                         if (!exploded_at_ns_ && !is_possible(truth_)) {
+                                           exploded_at_ns_ = t_k_ns;
+                                           cycle.request_stop();
+                                         }
                                        },
                                        [&] { drain(cycle.records()); }};
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_length(session_, options_), hooks);
+  if (exploded_at_ns_) refuse_explosion(1e-9 * static_cast<double>(*exploded_at_ns_ - power_on_ns_));
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
   controller::Summary summary = output_.summary(cycle, tally.end, signals.cause());
   summary.wall_time_s = wall_s;

@@ -1,6 +1,8 @@
 // `proxarm run --bus sim`: controller and simulated arm in one process, on in-process buses.
 #pragma once
 
+#include <optional>
+
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/sessions/recorded_messages.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
@@ -34,6 +36,7 @@ class SimulatedRun {
   SessionOutput output_;
   std::unique_ptr<controller::ReplayRecorder> replay_;
   std::unique_ptr<RecordedMessages> messages_;
+  std::optional<std::int64_t> exploded_at_ns_;  // when the simulated arm's motion has become impossible
   std::int64_t power_on_ns_ = 0;
   sim::Truth truth_;  // at the present cycle's SYNC
 };

@@ -35,7 +35,7 @@ class MeshCache : public MeshFolder {
     bytes = text_of(cache);
   }
   std::shared_ptr<const TriangleMesh> load(double scale = 1.0) const {
-    return scenes::load_mesh(file, scale, models::Pose::Identity());
+    return scenes::load_mesh(file, {scale, models::Pose::Identity()}).mesh;
   }
   // A cache that isn't used is written again.
   bool is_used(double scale = 1.0) const {

@@ -93,7 +93,7 @@ TEST_F(MeshFile, ReadsStlObjAndPlyWeldedAndClosed) {
   const TriangleSoup soup = block({1, 2, 3});
   for (const auto& file : {write("a.stl", stl_of(soup)), write("b.OBJ", obj_of(soup)), write("c.ply", ply_of(soup)),
                            write("d.stl", text_stl_of(soup)), write("e.ply", binary_ply_of(soup))}) {
-    const auto mesh = scenes::load_mesh(file, 1.0, models::Pose::Identity());
+    const auto mesh = scenes::load_mesh(file, {1.0, models::Pose::Identity()}).mesh;
     EXPECT_EQ(mesh->size(), 12u) << file;
     EXPECT_TRUE(mesh->closed()) << file;
     EXPECT_EQ(mesh->bounds().high, Vec3(0.5, 1, 1.5)) << file;
@@ -105,7 +105,7 @@ TEST_F(MeshFile, ReadsStlObjAndPlyWeldedAndClosed) {
 TEST_F(MeshFile, SaysWhatIsWrong) {
   const auto expect = [&](const std::filesystem::path& file, const std::string& part) {
     try {
-      (void)scenes::load_mesh(file, 1.0, models::Pose::Identity());
+      (void)scenes::load_mesh(file, {1.0, models::Pose::Identity()}).mesh;
       ADD_FAILURE() << file << " was read";
     } catch (const SetupError& error) {
       EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
@@ -178,7 +178,7 @@ TEST_F(MeshFile, SurvivesWhateverIsInIt) {
     const auto file = write(name, text);
     const auto begun = std::chrono::steady_clock::now();
     try {
-      const auto mesh = scenes::load_mesh(file, 1.0, models::Pose::Identity());
+      const auto mesh = scenes::load_mesh(file, {1.0, models::Pose::Identity()}).mesh;
       ASSERT_GT(mesh->size(), 0u);
       ASSERT_TRUE(mesh->bounds().finite());
       ++read;

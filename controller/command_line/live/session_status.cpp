@@ -1,0 +1,115 @@
+#include "controller/command_line/live/session_status.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "controller/supervision/fault.hpp"
+#include "models/files/json.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using controller::BoxCycle;
+using controller::CycleRecord;
+using controller::Fault;
+using controller::RecordFlag;
+using description::Json;
+
+// Over which the tool's speed is told: encoders' steps are far below what moves in it.
+constexpr std::uint64_t speed_cycles = 20;
+
+struct Status {
+  CycleRecord record;
+  std::uint64_t cycles = 0;
+  double rendered_s = 0.0, delay_s = 0.0, felt_mass_kg = 0.0, damping_Ns_per_m = 0.0, tool_speed_m_per_s = 0.0;
+  std::string touches;  // the object's name; empty: nothing
+  std::vector<std::string> limits;
+};
+
+// Nothing before the first cycle.
+std::optional<Status> present(const controller::BoxReader& box, const PreparedSession& session) {
+  // A cycle is some kilobytes; not on this thread's stack.
+  const auto now = std::make_unique<BoxCycle>(), before = std::make_unique<BoxCycle>();
+  Status status;
+  status.cycles = box.cycles();
+  if (status.cycles == 0 || !box.read(status.cycles - 1, *now)) return std::nullopt;
+  const CycleRecord& record = status.record = now->record;
+  status.rendered_s = 1e-9 * static_cast<double>(now->rendered_ns);
+  status.delay_s = total_delay_s(session);
+  status.felt_mass_kg = record.proxy_mass_kg + session.cell.tool.mass_kg;
+  status.damping_Ns_per_m = record.proxy_damping_Ns_per_m + record.added_damping_Ns_per_m;
+  const std::uint64_t back = std::min(speed_cycles, status.cycles - 1);
+  if (back > 0 && box.read(status.cycles - 1 - back, *before)) {
+    const double elapsed_s = 1e-9 * static_cast<double>(record.time_ns - before->record.time_ns);
+    const double way_m = (controller::vec3(record.tool_W_m) - controller::vec3(before->record.tool_W_m)).norm();
+    status.tool_speed_m_per_s = elapsed_s > 0.0 ? way_m / elapsed_s : 0.0;
+  }
+  const auto object = static_cast<std::size_t>(record.contact_object);
+  if (record.contact_object >= 0 && object < session.scene.objects.size()) {
+    status.touches = session.scene.objects[object].name;
+  }
+  for (const auto& [flag, limit] : controller::limit_flags) {
+    if (record.has(flag)) status.limits.emplace_back(controller::limit_parameter(limit));
+  }
+  return status;
+}
+
+Json fault_or_null(Fault fault) { return fault == Fault::none ? Json() : Json(controller::fault_name(fault)); }
+Json list_of(const controller::Triple& v) { return Json(std::vector<double>(v.begin(), v.end())); }
+
+std::string as_json(const std::optional<Status>& status, const PreparedSession& session) {
+  Json json{{"version", 1}, {"cell", session.cell.name}, {"scene", session.scene.name}};
+  json["phase"] = status ? controller::phase_name(status->record.phase) : "starting";
+  if (!status) return json.dump();
+  const CycleRecord& record = status->record;
+  json["fault"] = fault_or_null(record.fault);
+  json["held_for"] = fault_or_null(record.held_for);
+  json["cycles"] = status->cycles;
+  json["rendered_s"] = status->rendered_s;
+  json["timestep_s"] = 1e-9 * static_cast<double>(record.period_ns);
+  json["delay_s"] = status->delay_s;
+  json["felt_mass_kg"] = status->felt_mass_kg;
+  json["damping_Ns_per_m"] = status->damping_Ns_per_m;
+  json["force_W_N"] = list_of(record.force_W_N);
+  json["force_N"] = controller::vec3(record.force_W_N).norm();
+  json["tool_W_m"] = list_of(record.tool_W_m);
+  json["tool_speed_m_per_s"] = status->tool_speed_m_per_s;
+  json["leash_m"] = (controller::vec3(record.tool_W_m) - controller::vec3(record.proxy_W_m)).norm();
+  json["touches"] = status->touches.empty() ? Json() : Json(status->touches);
+  json["limits"] = status->limits;
+  json["oscillates"] = record.has(RecordFlag::oscillation);
+  json["sample_held"] = record.has(RecordFlag::sample_held);
+  return json.dump();
+}
+
+std::string as_text(const std::optional<Status>& status) {
+  if (!status) return "starting";
+  const CycleRecord& record = status->record;
+  std::string text = controller::phase_name(record.phase);
+  if (record.fault != Fault::none) text += std::string(" (") + controller::fault_name(record.fault) + ")";
+  if (record.held_for != Fault::none) text += std::string(", held for ") + controller::fault_name(record.held_for);
+  std::array<char, 200> figures{};
+  std::snprintf(figures.data(), figures.size(),
+                ": %.1f s rendered, %.3g N, %.3f m/s, %.3g kg, T %.4g ms, delay %.3g ms", status->rendered_s,
+                controller::vec3(record.force_W_N).norm(), status->tool_speed_m_per_s, status->felt_mass_kg,
+                1e-6 * static_cast<double>(record.period_ns), 1e3 * status->delay_s);
+  text += figures.data();
+  if (!status->touches.empty()) text += ", touches " + status->touches;
+  for (const std::string& limit : status->limits) text += ", at " + limit;
+  if (record.has(RecordFlag::oscillation)) text += ", OSCILLATES";
+  return text;
+}
+
+}  // namespace
+
+std::optional<std::string> session_status(const std::string& line, const controller::BoxReader& box,
+                                          const PreparedSession& session) {
+  if (line == "status") return as_json(present(box, session), session);
+  if (line == "status text") return as_text(present(box, session));
+  return std::nullopt;
+}
+
+}  // namespace proxarm::command_line

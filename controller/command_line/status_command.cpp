@@ -1,0 +1,37 @@
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/live/control_socket.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+// About as fast as a person reads.
+constexpr auto watch_every = std::chrono::milliseconds(250);
+
+}  // namespace
+
+int status_command(const StatusOptions& options) {
+  const std::filesystem::path path = options.control.empty() ? default_control_path() : options.control;
+  const std::string fine_word = "ok: ";
+  for (bool first = true;; first = false) {
+    std::string answer;
+    try {
+      answer = ask_control_socket(path, options.json ? "status" : "status text");
+    } catch (const description::SetupError&) {
+      if (first) throw;
+      return fine;  // the session has ended
+    }
+    if (answer.compare(0, fine_word.size(), fine_word) != 0) throw description::SetupError({.message = answer});
+    std::printf("%s\n", answer.c_str() + fine_word.size());
+    std::fflush(stdout);
+    if (!options.watch) return fine;
+    std::this_thread::sleep_for(watch_every);
+  }
+}
+
+}  // namespace proxarm::command_line

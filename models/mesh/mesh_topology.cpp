@@ -1,0 +1,271 @@
+#include "models/mesh/mesh_topology.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+#include <utility>
+
+#include "models/mesh/polygon.hpp"
+
+namespace proxarm::models {
+namespace {
+
+struct Edge {
+  std::uint32_t low, high;  // vertices
+  std::uint32_t face;
+  bool forth;  // from low to high, as the face goes round
+  [[nodiscard]] std::pair<std::uint32_t, std::uint32_t> key() const noexcept { return {low, high}; }
+};
+
+std::vector<Edge> sorted_edges(const TriangleMesh& mesh) {
+  std::vector<Edge> edges;
+  edges.reserve(3 * mesh.size());
+  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+    const auto& t = mesh.triangle(f);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = t[k], b = t[(k + 1) % 3];
+      edges.push_back({std::min(a, b), std::max(a, b), f, a < b});
+    }
+  }
+  std::sort(edges.begin(), edges.end(),
+            [](const Edge& a, const Edge& b) { return std::pair(a.key(), a.face) < std::pair(b.key(), b.face); });
+  return edges;
+}
+
+// Which faces are of one part, and which of them face the other way: union-find with the parity to a part's root.
+class Parts {
+ public:
+  explicit Parts(std::size_t faces) : parent_(faces), turned_(faces, false), one_sided_(faces, false) {
+    std::iota(parent_.begin(), parent_.end(), 0u);
+  }
+  struct Root {
+    std::uint32_t face;
+    bool turned;
+  };
+  Root root(std::uint32_t face) {
+    std::uint32_t at = face;
+    bool turned = false;
+    while (parent_[at] != at) {
+      turned = turned != turned_[at];
+      at = parent_[at];
+    }
+    // Path compression: all on the way hang at the root from now on.
+    for (bool left = turned; parent_[face] != face && face != at;) {
+      const std::uint32_t next = parent_[face];
+      const bool own = turned_[face];
+      parent_[face] = at;
+      turned_[face] = left;
+      left = left != own;
+      face = next;
+    }
+    return {at, turned};
+  }
+  // `turned`: one of them faces the other way.
+  void join(std::uint32_t a, std::uint32_t b, bool turned) {
+    const Root x = root(a), y = root(b);
+    if (x.face == y.face) {
+      if ((x.turned != y.turned) != turned) one_sided_[x.face] = true;
+      return;
+    }
+    parent_[x.face] = y.face;
+    turned_[x.face] = (x.turned != y.turned) != turned;
+    one_sided_[y.face] = one_sided_[y.face] || one_sided_[x.face];
+  }
+  [[nodiscard]] bool one_sided(std::uint32_t root) const { return one_sided_[root]; }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+  std::vector<bool> turned_, one_sided_;
+};
+
+Vec3 middle(const TriangleMesh& mesh, std::uint32_t f) {
+  return (mesh.corner(f, 0) + mesh.corner(f, 1) + mesh.corner(f, 2)) / 3.0;
+}
+
+// Calls visit(first, last) for each edge's run of faces.
+template <typename Visit>
+void each_edge(const std::vector<Edge>& edges, Visit visit) {
+  for (auto first = edges.begin(); first != edges.end();) {
+    auto last = first + 1;
+    while (last != edges.end() && last->key() == first->key()) ++last;
+    visit(first, last);
+    first = last;
+  }
+}
+
+void note(MeshDefect& defect, const Vec3& at_W) {
+  if (defect.count++ == 0) defect.first_W = at_W;
+}
+
+// Loops of the edges that have one face. Each is walked against its face's direction, as what closes it would go.
+std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::pair<std::uint32_t, std::uint32_t>> open) {
+  std::sort(open.begin(), open.end());
+  std::vector<bool> used(open.size(), false);
+  const auto next_from = [&](std::uint32_t vertex) {
+    auto at = std::lower_bound(open.begin(), open.end(), std::pair(vertex, 0u));
+    while (at != open.end() && at->first == vertex && used[static_cast<std::size_t>(at - open.begin())]) ++at;
+    return at != open.end() && at->first == vertex ? static_cast<std::size_t>(at - open.begin()) : open.size();
+  };
+  std::vector<std::vector<std::uint32_t>> loops;
+  for (std::size_t first = 0; first < open.size(); ++first) {
+    if (used[first]) continue;
+    std::vector<std::uint32_t> loop;
+    for (std::size_t at = first; at < open.size(); at = next_from(open[at].second)) {
+      used[at] = true;
+      loop.push_back(open[at].first);
+      if (open[at].second == open[first].first) break;
+    }
+    loops.push_back(std::move(loop));
+  }
+  return loops;
+}
+
+// Longer outlines aren't holes that anybody wants closed; their area is that of Newell's normal, and costs nothing.
+constexpr std::size_t longest_loop = 2000;
+
+std::vector<std::array<std::uint32_t, 3>> cover(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  if (loop.size() >= 3) triangulate(mesh.structure().vertices, loop, triangles);
+  return triangles;
+}
+
+double area_over(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
+  Vec3 newell = Vec3::Zero();
+  for (std::size_t k = 1; k + 1 < loop.size(); ++k) {
+    newell += (mesh.vertex(loop[k]) - mesh.vertex(loop[0])).cross(mesh.vertex(loop[k + 1]) - mesh.vertex(loop[0]));
+  }
+  if (loop.size() > longest_loop) return 0.5 * newell.norm();
+  double area = 0.0;
+  for (const auto& [a, b, c] : cover(mesh, loop)) {
+    area += 0.5 * (mesh.vertex(b) - mesh.vertex(a)).cross(mesh.vertex(c) - mesh.vertex(a)).norm();
+  }
+  return area;
+}
+
+MeshHole hole_of(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
+  MeshHole hole;
+  double length = 0.0;
+  for (std::size_t k = 0; k < loop.size(); ++k) {
+    hole.centre += mesh.vertex(loop[k]) / static_cast<double>(loop.size());
+    length += (mesh.vertex(loop[(k + 1) % loop.size()]) - mesh.vertex(loop[k])).norm();
+  }
+  hole.size_m = 4.0 * area_over(mesh, loop) / length;
+  hole.loop = std::move(loop);
+  return hole;
+}
+
+// Faces that are turned against most of their part, and parts that are closed and inside out.
+void judge_sides(const TriangleMesh& mesh, Parts& parts, const std::vector<bool>& open_part, MeshTopology& found) {
+  struct Part {
+    std::size_t faces = 0, turned = 0;
+    double volume = 0.0;
+  };
+  std::vector<Part> of_root(mesh.size());
+  const Vec3 origin = mesh.vertex(0);
+  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+    const auto [root, turned] = parts.root(f);
+    Part& part = of_root[root];
+    ++part.faces;
+    part.turned += turned ? 1 : 0;
+    part.volume += (mesh.corner(f, 0) - origin).dot((mesh.corner(f, 1) - origin).cross(mesh.corner(f, 2) - origin));
+  }
+  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+    const auto [root, turned] = parts.root(f);
+    const Part& part = of_root[root];
+    if (!parts.one_sided(root) && turned == (2 * part.turned <= part.faces)) note(found.flipped, middle(mesh, f));
+    if (root != f) continue;
+    ++found.parts;
+    if (parts.one_sided(root)) {
+      ++found.one_sided;
+    } else if (part.turned == 0 && !open_part[root] && part.volume < 0.0) {
+      ++found.inside_out;
+    }
+  }
+}
+
+}  // namespace
+
+MeshTopology topology_of(const TriangleMesh& mesh) {
+  MeshTopology found;
+  Parts parts(mesh.size());
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> open;
+  std::vector<std::uint32_t> open_faces;
+  each_edge(sorted_edges(mesh), [&](auto first, auto last) {
+    const auto count = last - first;
+    if (count == 1) {
+      open.emplace_back(first->forth ? first->high : first->low, first->forth ? first->low : first->high);
+      open_faces.push_back(first->face);
+    } else if (count == 2) {
+      parts.join(first->face, (first + 1)->face, first->forth == (first + 1)->forth);
+    } else {
+      note(found.non_manifold, 0.5 * (mesh.vertex(first->low) + mesh.vertex(first->high)));
+    }
+  });
+  for (auto& loop : loops_of(std::move(open))) found.holes.push_back(hole_of(mesh, std::move(loop)));
+  std::sort(found.holes.begin(), found.holes.end(),
+            [](const MeshHole& a, const MeshHole& b) { return a.size_m < b.size_m; });
+  std::vector<bool> open_part(mesh.size(), false);
+  for (const std::uint32_t face : open_faces) open_part[parts.root(face).face] = true;
+  judge_sides(mesh, parts, open_part, found);
+  return found;
+}
+
+MeshDefect crossing_faces(const TriangleMesh& mesh) {
+  MeshDefect found;
+  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+    const Vec3 centre = middle(mesh, f);
+    double radius = 0.0;
+    for (std::size_t k = 0; k < 3; ++k) radius = std::max(radius, (mesh.corner(f, k) - centre).norm());
+    const auto& own = mesh.triangle(f);
+    const auto is_own = [&own](std::uint32_t v) { return v == own[0] || v == own[1] || v == own[2]; };
+    // Whether an edge of `of` that ends in no vertex of `other` touches that face.
+    const auto cuts = [&mesh](std::uint32_t of, std::uint32_t other) {
+      const auto& there = mesh.triangle(other);
+      const auto shared = [&there](std::uint32_t v) { return v == there[0] || v == there[1] || v == there[2]; };
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = mesh.triangle(of)[k], b = mesh.triangle(of)[(k + 1) % 3];
+        if (!shared(a) && !shared(b) && mesh.touched_by(other, mesh.vertex(a), mesh.vertex(b))) return true;
+      }
+      return false;
+    };
+    mesh.within(centre, radius, [&](std::uint32_t g) {
+      if (g <= f) return true;
+      const auto& there = mesh.triangle(g);
+      const auto shared = std::count_if(there.begin(), there.end(), is_own);
+      if (shared == 3 || (shared < 2 && (cuts(f, g) || cuts(g, f)))) note(found, centre);
+      return true;
+    });
+  }
+  return found;
+}
+
+TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m) {
+  TriangleSoup soup{mesh.structure().vertices, mesh.structure().triangles};
+  for (const MeshHole& hole : topology_of(mesh).holes) {
+    if (hole.size_m > up_to_m || hole.loop.size() > longest_loop) continue;
+    for (const auto& triangle : cover(mesh, hole.loop)) soup.triangles.push_back(triangle);
+  }
+  return soup;
+}
+
+std::string place_text(const Vec3& at_W) {
+  char text[96];
+  std::snprintf(text, sizeof text, "x %.4g, y %.4g, z %.4g m", at_W.x(), at_W.y(), at_W.z());
+  return text;
+}
+
+std::string size_text(double size_m) {
+  char text[32];
+  if (size_m < 1e-3) {
+    std::snprintf(text, sizeof text, "%.3g µm", 1e6 * size_m);
+  } else if (size_m < 1.0) {
+    std::snprintf(text, sizeof text, "%.3g mm", 1e3 * size_m);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g m", size_m);
+  }
+  return text;
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,53 @@
+// How the faces of a mesh hang together: where it is open, and what is wrong with it.
+//
+// A proxy needs none of this: nothing passes a face, however faces are connected. But it falls through a hole that
+// nobody knew of. Vertices with the same coordinates are one (TriangleMesh), so what is found are gaps in space, not
+// in a file's numbering.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "models/mesh/mesh.hpp"
+
+namespace proxarm::models {
+
+// An outline of the mesh: a loop of edges that have a face on one side only.
+struct MeshHole {
+  std::vector<std::uint32_t> loop;  // vertices, in turn
+  Vec3 centre = Vec3::Zero();       // the mean of them, in W
+  // Four times the area that closes it over its length: the diameter of a round hole, the side of a square one, twice
+  // the width of a crack.
+  double size_m = 0.0;
+};
+
+// Something of which there are several: how many, and one of them.
+struct MeshDefect {
+  std::size_t count = 0;
+  Vec3 first_W = Vec3::Zero();
+};
+
+struct MeshTopology {
+  std::size_t parts = 0;        // faces that share an edge are of one part
+  std::vector<MeshHole> holes;  // the smallest first
+  MeshDefect non_manifold;      // edges of three and more faces
+  MeshDefect flipped;           // faces seen from behind where most of their part is seen from the front
+  std::size_t one_sided = 0;    // parts of which nobody can say which side is the front, such as a Möbius strip
+  std::size_t inside_out = 0;   // closed parts whose fronts are inside
+};
+MeshTopology topology_of(const TriangleMesh& mesh);
+
+// Faces that cut through others with which they share no edge, and faces that lie in the same three vertices. Costs
+// about as much as building the mesh: not for each start of a session.
+MeshDefect crossing_faces(const TriangleMesh& mesh);
+
+// The mesh with all holes up to that size closed by triangles between their vertices. Where nothing is to be closed the
+// soup is that of the mesh.
+TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m);
+
+// "12 mm at x 0.1, y 0.2, z 0.3 m" and the like, for people.
+std::string place_text(const Vec3& at_W);
+std::string size_text(double size_m);
+
+}  // namespace proxarm::models

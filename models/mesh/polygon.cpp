@@ -1,0 +1,104 @@
+#include "models/mesh/polygon.hpp"
+
+#include <cmath>
+
+namespace proxarm::models {
+namespace {
+
+// In long double a product of two differences of floats is exact, and that of doubles is known to 2⁻⁶³.
+struct Flat {
+  long double x, y;
+  bool operator==(const Flat&) const = default;
+};
+
+long double turn(const Flat& a, const Flat& b, const Flat& c) noexcept {
+  return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+// The corners in the plane that shows most of the polygon, counter-clockwise; none where it has no area to show, as a
+// bow whose halves are alike.
+std::vector<Flat> flattened(std::span<const Vec3> vertices, std::span<const std::uint32_t> corners) {
+  Vec3 normal = Vec3::Zero();
+  const Vec3& origin = vertices[corners[0]];
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    normal += (vertices[corners[k]] - origin).cross(vertices[corners[(k + 1) % corners.size()]] - origin);
+  }
+  if (normal.isZero(0.0)) return {};
+  Eigen::Index away = 0;
+  normal.cwiseAbs().maxCoeff(&away);
+  Eigen::Index right = (away + 1) % 3, up = (away + 2) % 3;
+  if (normal[away] < 0.0) std::swap(right, up);
+  std::vector<Flat> flat;
+  flat.reserve(corners.size());
+  for (const std::uint32_t corner : corners) flat.push_back({vertices[corner][right], vertices[corner][up]});
+  return flat;
+}
+
+// The corners that are left, as a ring.
+class Ring {
+ public:
+  explicit Ring(std::vector<Flat> flat) : flat_(std::move(flat)), left_(flat_.size()) {
+    for (std::size_t k = 0; k < left_.size(); ++k) left_[k] = k;
+  }
+  [[nodiscard]] std::size_t size() const noexcept { return left_.size(); }
+  // Precondition: size() > 0.
+  [[nodiscard]] std::array<std::size_t, 3> at(std::size_t k) const noexcept {
+    return {left_[(k + left_.size() - 1) % left_.size()], left_[k], left_[(k + 1) % left_.size()]};
+  }
+  void cut(std::size_t k) { left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(k)); }
+
+  // Whether the corner may be cut off: it turns left, and no other corner is in its triangle. One in the same place as
+  // one of the three is at a seam and isn't in the way.
+  [[nodiscard]] bool is_ear(std::size_t k) const noexcept {
+    const auto [before, here, after] = at(k);
+    const Flat &a = flat_[before], &b = flat_[here], &c = flat_[after];
+    if (!(turn(a, b, c) > 0.0L)) return false;
+    for (const std::size_t other : left_) {
+      const Flat& p = flat_[other];
+      if (p == a || p == b || p == c) continue;
+      if (turn(a, b, p) >= 0.0L && turn(b, c, p) >= 0.0L && turn(c, a, p) >= 0.0L) return false;
+    }
+    return true;
+  }
+
+  // Twice the area of the triangle that a corner makes with its neighbours: 0 on their line, where it bounds nothing.
+  [[nodiscard]] long double turn_at(std::size_t k) const noexcept {
+    const auto [before, here, after] = at(k);
+    return turn(flat_[before], flat_[here], flat_[after]);
+  }
+
+ private:
+  std::vector<Flat> flat_;
+  std::vector<std::size_t> left_;
+};
+
+}  // namespace
+
+bool triangulate(std::span<const Vec3> vertices, std::span<const std::uint32_t> corners,
+                 std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const std::size_t first = triangles.size();
+  Ring ring(flattened(vertices, corners));
+  const auto find = [&ring](auto suits) {
+    std::size_t k = 0;
+    while (k < ring.size() && !suits(k)) ++k;
+    return k;
+  };
+  while (ring.size() > 3) {
+    std::size_t k = find([&ring](std::size_t at) { return ring.is_ear(at); });
+    if (k == ring.size()) k = find([&ring](std::size_t at) { return ring.turn_at(at) == 0.0L; });
+    if (k == ring.size()) break;
+    const auto [a, b, c] = ring.at(k);
+    triangles.push_back({corners[a], corners[b], corners[c]});
+    ring.cut(k);
+  }
+  if (ring.size() == 3 && ring.turn_at(1) >= 0.0L) {
+    const auto [a, b, c] = ring.at(1);
+    triangles.push_back({corners[a], corners[b], corners[c]});
+    return true;
+  }
+  triangles.resize(first);
+  for (std::size_t k = 2; k < corners.size(); ++k) triangles.push_back({corners[0], corners[k - 1], corners[k]});
+  return false;
+}
+
+}  // namespace proxarm::models

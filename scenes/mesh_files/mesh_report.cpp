@@ -1,0 +1,90 @@
+#include "scenes/mesh_files/mesh_report.hpp"
+
+#include <algorithm>
+
+#include "models/base/setup_error.hpp"
+#include "models/mesh/mesh_topology.hpp"
+
+namespace proxarm::scenes {
+namespace {
+
+using models::MeshDefect;
+using models::MeshHole;
+using models::place_text;
+using models::size_text;
+using models::Vec3;
+
+std::string counted(std::size_t count, const char* one, const char* several) {
+  return std::to_string(count) + " " + (count == 1 ? one : several);
+}
+
+// The first few, which are the smallest: large ones are seen.
+std::string holes_text(const std::vector<MeshHole>& holes, std::size_t count) {
+  constexpr std::size_t told = 5;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(count, told); ++k) {
+    text += (k == 0 ? "" : "; ") + size_text(holes[k].size_m) + " at " + place_text(holes[k].centre);
+  }
+  return count > told ? text + "; …" : text;
+}
+
+void add(std::vector<std::string>& lines, const MeshDefect& defect, const char* one, const char* several) {
+  if (defect.count == 0) return;
+  lines.push_back(counted(defect.count, one, several) + ", " + (defect.count == 1 ? "" : "such as ") + "at " +
+                  place_text(defect.first_W));
+}
+
+}  // namespace
+
+std::vector<std::string> mesh_report(const LoadedMesh& loaded) {
+  const models::TriangleMesh& mesh = *loaded.mesh;
+  const models::MeshTopology found = models::topology_of(mesh);
+  const Vec3 size = mesh.bounds().high - mesh.bounds().low;
+  std::vector<std::string> lines{loaded.account.text()};
+  lines.push_back(counted(mesh.size(), "triangle", "triangles") + " in " + counted(found.parts, "part", "parts") +
+                  (mesh.closed() ? ", closed; " : ", open; ") + size_text(size.x()) + " × " + size_text(size.y()) +
+                  " × " + size_text(size.z()));
+  if (!found.holes.empty()) {
+    lines.push_back(counted(found.holes.size(), "hole or border", "holes and borders") + ": " +
+                    holes_text(found.holes, found.holes.size()));
+  }
+  add(lines, found.non_manifold, "edge with more than two faces", "edges with more than two faces");
+  add(lines, found.flipped, "face turned against the others of its part (it holds all the same)",
+      "faces turned against the others of their part (they hold all the same)");
+  if (found.one_sided > 0) {
+    lines.push_back(counted(found.one_sided, "part", "parts") + " without a front and a back, as a Möbius strip is");
+  }
+  if (found.inside_out > 0) {
+    lines.push_back(counted(found.inside_out, "closed part", "closed parts") + " with the fronts of all faces inside");
+  }
+  add(lines, models::crossing_faces(mesh), "pair of faces that cross or are the same",
+      "pairs of faces that cross or are the same");
+  return lines;
+}
+
+std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double reach_m, double scale) {
+  // A mesh in millimetres is a thousand times as large as it should be, and parts that an arm of some metres touches
+  // are from a tenth of its reach to some times that. So 30 times its reach is no part; neither is a 3000th of it.
+  constexpr double too_large = 30.0, too_small = 1.0 / 3000.0;
+  // Of the mesh's diagonal: larger holes are seen, and the border of a sheet is about 1.
+  constexpr double hardly_seen = 0.1;
+  std::vector<std::string> lines;
+  const double diagonal = (mesh.bounds().high - mesh.bounds().low).norm();
+  if (diagonal > too_large * reach_m || diagonal < too_small * reach_m) {
+    const double factor = diagonal > reach_m ? 1e-3 : 1e3;
+    lines.push_back("it is " + size_text(diagonal) + " across, and the arm reaches " + size_text(reach_m) +
+                    ": if its unit isn't the one of scale_m " + description::number_text(scale) +
+                    ", write scale_m: " + description::number_text(scale * factor));
+  }
+  if (mesh.closed()) return lines;
+  const std::vector<MeshHole> holes = models::topology_of(mesh).holes;
+  const auto small = static_cast<std::size_t>(std::count_if(
+      holes.begin(), holes.end(), [&](const MeshHole& hole) { return hole.size_m < hardly_seen * diagonal; }));
+  if (small > 0) {
+    lines.push_back("the proxy, a point, falls through " + counted(small, "small hole", "small holes") + ": " +
+                    holes_text(holes, small) + " (close_holes_m closes them)");
+  }
+  return lines;
+}
+
+}  // namespace proxarm::scenes

@@ -1,0 +1,20 @@
+// What there is to say of a mesh that was read: for `proxarm check`, everything; before a session, what would surprise.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "scenes/mesh_files/mesh_file.hpp"
+
+namespace proxarm::scenes {
+
+// All of it, a line each: faces, size, holes with places and sizes, edges and faces that are wrong, a guess of the
+// unit. Takes as long as loading the mesh.
+std::vector<std::string> mesh_report(const LoadedMesh& mesh);
+
+// Of an open mesh: holes that are small against it, through which a proxy falls though they can hardly be seen. And a
+// mesh that is hundreds of times as large as what the arm reaches (or a thousandth of it), which is in another unit
+// than the scene takes it for. Empty for most meshes; of one that is closed it costs nothing.
+std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double reach_m, double scale);
+
+}  // namespace proxarm::scenes
