@@ -56,11 +56,10 @@ class PoseAlgorithm {
   // Where the tool touches after the last step (empty: free). Valid until the next call.
   [[nodiscard]] virtual std::span<const PoseContact> contacts() const noexcept { return {}; }
 
-  // Flags of the last step. Unresolved: no solution was found that keeps all laws, and one was given up. Several: the
-  // laws allow more than one (a wedged peg, Painlevé's rod), and one was chosen. Squeezed: objects that move leave the
-  // tool no room, and it is inside of one.
+  // Flags of the last step. Unresolved: no solution was found that keeps all laws, and one was given up. Where the laws
+  // allow several (a wedged peg, Painlevé's rod) one is chosen, and nothing tells. Squeezed: objects that move leave
+  // the tool no room, and it is inside of one.
   [[nodiscard]] virtual bool unresolved() const noexcept { return false; }
-  [[nodiscard]] virtual bool several() const noexcept { return false; }
   [[nodiscard]] virtual bool squeezed() const noexcept { return false; }
 
   // The smallest signed gap between tool and objects at a pose, metres; infinite if there is nothing. Not for the

@@ -3,12 +3,10 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <variant>
 #include <vector>
 
 #include "models/mesh/mesh.hpp"
-#include "models/obstacles/moving_obstacle.hpp"
 #include "models/rigid_shapes/touch.hpp"
 
 namespace proxarm::models {
@@ -48,13 +46,10 @@ class TriangleFeatures {
 };
 
 struct RigidObject {
-  // At rest, where it was described, in W. A hollow one may need several: a box from inside is six sides.
+  // In W. A hollow one may need several: a box from inside is six sides.
   std::variant<FlatSide, HollowSphere, HollowTube, Solid, std::shared_ptr<const TriangleFeatures>> shape;
   double friction = 0.0;
-  std::vector<double> friction_of_face{};  // of a mesh; empty: the same everywhere
-  std::int32_t object = 0;                 // what contacts report
-  std::optional<ScriptedMotion> motion{};
-  bool driven = false;  // RigidWorld::drive() moves it
+  std::int32_t object = 0;  // what contacts report
 };
 
 }  // namespace proxarm::models

@@ -1,16 +1,19 @@
 // 𝒢 of a rigid tool among rigid objects (models/geometry/pose_algorithm.hpp states the law).
 //
-// 1. Candidates: pairs of features, one of the tool and one of an object, that come within a distance of each other
-// that
-//    the steps to come won't exceed. They are gathered anew only when the tool has moved so far.
-// 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_shapes/touch.hpp). Linearised there, those
-//    that press or would be passed make a local problem (contact_problem.hpp); its solution is the next pose. Gaps and
-//    normals are taken again until nothing moves: a fixed point is exact, since at δ = 0 nothing is linearised. It
-//    converges by the ratio of the step's penetration to the radius of curvature, a thousandth or less; where surfaces
-//    conform (a peg in its hole) Anderson's acceleration takes over (Walker and Ni 2011).
+// 1. Candidates (rigid_candidates.cpp): pairs of features, one of the tool and one of an object, that come within a
+//    distance of each other that the steps to come won't exceed. They are gathered anew only when the tool has moved so
+//    far.
+// 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_gaps.cpp, rigid_shapes/touch.hpp).
+//    Linearised there, those that press or would be passed make a local problem (contact_problem.hpp); its solution is
+//    the next pose. Gaps and normals are taken again until nothing moves: a fixed point is exact, since at δ = 0
+//    nothing is linearised. It converges by the ratio of the step's penetration to the radius of curvature, a
+//    thousandth or less. Where surfaces conform (a peg in its hole) that ratio is near one, and the step may end
+//    unresolved.
 // 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the
-// way
-//    from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from q(k−1).
+//    way from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from
+//    q(k−1).
+//
+// Objects stand still.
 //
 // Friction between a part with a friction of its own and an object: √(μ_tool μ_object); otherwise the object's.
 #pragma once
@@ -28,21 +31,16 @@ namespace proxarm::models {
 
 class RigidWorld final : public PoseAlgorithm {
  public:
-  // Throws std::invalid_argument for a shape without a size, points that span no solid, and a friction below 0. A tool
-  // without parts is a point: a sphere of no radius.
+  // Throws std::invalid_argument for a tool's shape without a size, points that span no solid, a friction below 0, a
+  // cylinder as an object, and one as a tool beside solids or meshes. A tool without parts is a point: a sphere of no
+  // radius. What else compile_rigid() refuses (a box beside a mesh) is held, but leaves more steps unresolved.
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
-  void set_time(const StepTime& time) noexcept override;
-  [[nodiscard]] bool wants_time() const noexcept override { return shared_->moves; }
-  // Moves a driven object for the next step, from where it was for the last one. X is relative to where it was
-  // described.
-  void drive(std::int32_t object, const Pose& X) noexcept;
+  [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
   [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {contacts_.data(), count_}; }
   [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
-  [[nodiscard]] bool several() const noexcept override { return several_; }
-  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
   [[nodiscard]] double clearance_m(const ToolPose& pose) const noexcept override;
   [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<RigidWorld>(*this); }
   void copy_state(const PoseAlgorithm& other) noexcept override { *this = dynamic_cast<const RigidWorld&>(other); }
@@ -89,28 +87,26 @@ class RigidWorld final : public PoseAlgorithm {
     std::vector<Entry> entries;
     double reach = 0.0;     // of the tool's points from the reference point
     double thinness = 0.0;  // the least thickness of the tool's parts
-    bool moves = false;
   };
-  struct Frame {  // of an object, now and at the last step
-    Pose now = Pose::Identity(), before = Pose::Identity();
-    bool moved = false;  // from where it was described
-    // Of a closed mesh: 1 or −1, the side of its faces on which the tool is, known from the first time that it comes
-    // near.
-    double held_side = 0.0;
-    bool side_known = false;
+  // Of a closed mesh: 1 or −1, the side of its faces on which the tool is, known from the first time that it comes near
+  // after a start. Of other objects: 0.
+  struct Held {
+    double side = 0.0;
+    bool known = false;
   };
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 256;
 
-  // The tool in an object's frame.
+  // Where the tool is.
   struct View {
     Mat3 R;
     Vec3 x;
     [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + x; }
   };
-  [[nodiscard]] View view(const ToolPose& pose, const Frame& frame, bool before) const noexcept;
+  [[nodiscard]] static View view(const ToolPose& pose) noexcept;
   [[nodiscard]] double motion(const ToolPose& a, const ToolPose& b) const noexcept;
 
+  void forget() noexcept;
   void gather(const ToolPose& pose, double reach) noexcept;
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
   template <typename Add>
@@ -135,8 +131,7 @@ class RigidWorld final : public PoseAlgorithm {
   void report(const ToolPose& q_old) noexcept;
 
   std::shared_ptr<const Shared> shared_;
-  std::vector<Frame> frames_;
-  double time_s_ = 0.0;
+  std::vector<Held> held_;  // of each entry
 
   ToolPose q_;
   std::array<Pair, most_pairs> pairs_;
@@ -144,8 +139,8 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;  // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
-  bool overflow_ = false;
-  int budget_ = 0;  // poses that this step may still take
+  bool crowded_ = false;  // more pairs than there is room for, when they were gathered
+  int budget_ = 0;        // poses that this step may still take
   ToolPose clear_at_;
   double clearance_ = -1.0;
 
@@ -159,7 +154,7 @@ class RigidWorld final : public PoseAlgorithm {
 
   std::array<PoseContact, ContactProblem::most> contacts_;
   std::size_t count_ = 0;
-  bool unresolved_ = false, several_ = false, squeezed_ = false;
+  bool unresolved_ = false, overflow_ = false;
 };
 
 }  // namespace proxarm::models

@@ -6,8 +6,7 @@
 //
 //   point, face     where the foot lies on the face
 //   edge, edge      where the nearest points lie inside of both. Of sharp edges (no radius) they hold only in the
-//   directions
-//                   that lie between the normals of the faces beside them, for both solids
+//                   directions that lie between the normals of the faces beside them, for both solids
 //   rounded ones    points and edges in any combination: the distance less both radii
 #pragma once
 

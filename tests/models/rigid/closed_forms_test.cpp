@@ -102,6 +102,15 @@ TEST(RigidWorld, ABoxSlidesWhenPushedBeyondItsFriction) {
   }
 }
 
+TEST(RigidWorld, APartsOwnFrictionCountsAsTheGeometricMean) {
+  const double mu_tool = 0.9, mu = 0.4, N = 10.0, F = 9.0;
+  RigidWorld g({{{SphereTool{0.01}, Pose::Identity(), mu_tool}}}, {floor_with(mu)});
+  const Mat6 K = stiffness(4.0, 1e6);  // it can't roll
+  const ToolPose q{{0.0, 0.0, 0.01}, Quaternion::Identity()};
+  const ToolPose r = pushed(g, K, q, wrench({F, 0.0, -N}, Vec3::Zero()));
+  EXPECT_NEAR(r.position.x(), (F - std::sqrt(mu_tool * mu) * N) / K(0, 0), 1e-9 * F / K(0, 0));
+}
+
 TEST(RigidWorld, ALadderSlipsAtItsAngle) {
   // A rod of length L and radius ρ between floor (z = 0) and wall (x = 0), loaded with W at its middle. With normal
   // forces N_f and N_w and friction at its limit: N_w = μ_f N_f, N_f + μ_w N_w = W, and the moments about the middle
@@ -189,6 +198,34 @@ TEST(RigidWorld, ARodPivotsInACorner) {
   };
   const double expected = root(moment, 0.0, 1e-3);
   EXPECT_NEAR(difference(r, q).tail<3>().norm(), expected, 1e-9 * expected);
+}
+
+TEST(RigidWorld, ALongStepGoesThroughNothingThin) {
+  // A plate of a tenth of a millimetre; a step that needs more parts than one may have ends early, and says so.
+  RigidObject plate;
+  plate.shape = solid_of(BoxTool{{1.0, 1.0, 1e-4}}, Pose::Identity());
+  for (const double depth : {0.001, 0.01, 1.0, 100.0}) {
+    RigidWorld g(one(SphereTool{0.001}), {plate});
+    ToolPose q, p;
+    q.position.z() = 0.003;
+    p.position.z() = -depth;
+    for (int k = 0; k < 5; ++k) {
+      const bool too_long = q.position.z() + depth > 512 * 0.2 * 1e-4;  // parts of a fifth of the plate's thickness
+      q = g.step(stiffness(), p, q);
+      EXPECT_GE(q.position.z(), 0.00105 - 1e-12) << depth;
+      EXPECT_EQ(g.unresolved(), too_long) << depth;
+    }
+    EXPECT_NEAR(q.position.z(), 0.00105, 1e-12) << depth;
+  }
+}
+
+TEST(RigidWorld, RefusesCylindersBesideWhatTheyAreNotHeldBy) {
+  RigidObject box, can;
+  box.shape = solid_of(BoxTool{Vec3::Ones()}, Pose::Identity());
+  can.shape = solid_of(CylinderTool{1.0, 1.0}, Pose::Identity());
+  EXPECT_THROW(RigidWorld(one(CylinderTool{0.1, 0.1}), {box}), std::invalid_argument);
+  EXPECT_THROW(RigidWorld(one(SphereTool{0.1}), {can}), std::invalid_argument);
+  EXPECT_THROW(RigidWorld(one(SphereTool{0.1}), {floor_with(-1.0)}), std::invalid_argument);
 }
 
 }  // namespace

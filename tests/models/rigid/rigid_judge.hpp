@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "models/base/random.hpp"
 #include "models/geometry/pose_algorithm.hpp"
 
 namespace proxarm::models {
@@ -59,10 +60,17 @@ inline double separation(const Polyhedron& a, const Polyhedron& b) {
 struct LawFigures {
   double imbalance = 0.0;     // of the wrench, over its size
   double outside_cone = 0.0;  // of friction, over the force
-  double against_slip =
-      0.0;             // the angle's sine between friction and the slip that it opposes, and what it lacks of μ f_n
-  double pull = 0.0;   // a normal force below 0
-  double gap_m = 0.0;  // of a contact that presses
+  double against_slip = 0.0;  // what friction misses of μ f_n against the slip, over the force
+  double pull = 0.0;          // a normal force below 0
+  double gap_m = 0.0;         // of a contact that presses
+
+  void take(const LawFigures& other) {
+    imbalance = std::max(imbalance, other.imbalance);
+    outside_cone = std::max(outside_cone, other.outside_cone);
+    against_slip = std::max(against_slip, other.against_slip);
+    pull = std::max(pull, other.pull);
+    gap_m = std::max(gap_m, other.gap_m);
+  }
 };
 
 // Against the law as pose_algorithm.hpp states it, for objects that stand still. `mu` of each object.
@@ -89,6 +97,52 @@ inline LawFigures judge_law(std::span<const PoseContact> contacts, const Mat6& K
   // Force and torque are compared as they are: N and Nm, at levers of some centimetres.
   out.imbalance = (sum - w).norm() / std::max(w.norm(), 1e-300);
   return out;
+}
+
+// What steps in a world came to.
+struct Pushed {
+  int judged = 0, touching = 0, unresolved = 0;
+  double deepest = 0.0;
+  LawFigures law;
+};
+
+// Sends a tool about from a pose by up to 2 mm and 0.02 rad a step, towards `middle` or away from it, as a hand would.
+// `apart` is how far it is from everything, of which the step knows nothing.
+template <typename Apart>
+void push_about(PoseAlgorithm& g, Random& random, ToolPose q, const Mat6& K, const std::vector<double>& mu, int steps,
+                const Vec3& middle, bool outwards, Apart apart, Pushed& out) {
+  Twist way = Twist::Zero();
+  for (int k = 0; k < steps; ++k) {
+    if (k % 20 == 0) {
+      const Vec3 away = q.position - middle;
+      const Vec3 towards = away.norm() > 1e-9 ? Vec3(away.normalized() * (outwards ? 1.0 : -1.0)) : random.direction();
+      way.head<3>() = towards * random.log_uniform(1e-6, 2e-3);
+      way.head<3>() += random.in_box(3e-4);
+      way.tail<3>() = random.log_arrow(1e-5, 2e-2);
+    }
+    const ToolPose p = moved(q, way);
+    const ToolPose r = g.step(K, p, q);
+    out.deepest = std::min(out.deepest, apart(r));
+    ++out.judged;
+    if (g.unresolved()) {
+      ++out.unresolved;
+    } else if (!g.contacts().empty()) {
+      ++out.touching;
+      out.law.take(judge_law(g.contacts(), K, p, q, r, mu));
+    }
+    q = r;
+  }
+}
+
+inline void expect_law(const Pushed& out) {
+  EXPECT_GE(out.deepest, -1e-12);
+  EXPECT_GT(out.touching, 300) << "or else this looks at nothing";
+  EXPECT_LE(out.unresolved, out.judged / 1000);
+  EXPECT_LE(out.law.imbalance, 1e-10);
+  EXPECT_LE(out.law.outside_cone, 1e-12);
+  EXPECT_LE(out.law.against_slip, 1e-8) << "slips of a picometre have a direction only to 1e-4 of that";
+  EXPECT_EQ(out.law.pull, 0.0);
+  EXPECT_LE(out.law.gap_m, 1e-12);
 }
 
 }  // namespace proxarm::models

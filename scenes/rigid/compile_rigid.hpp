@@ -4,9 +4,9 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
-#include "models/rigid/rigid_world.hpp"
+#include "models/geometry/pose_algorithm.hpp"
+#include "models/rigid_shapes/tool.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::scenes {

@@ -1,10 +1,11 @@
-#include "scenes/compiler/rigid.hpp"
+#include "scenes/rigid/compile_rigid.hpp"
 
 #include <algorithm>
 #include <stdexcept>
 
 #include "models/base/setup_error.hpp"
 #include "models/obstacles/box_obstacle.hpp"
+#include "models/rigid/rigid_world.hpp"
 #include "scenes/compiler/obstacles.hpp"
 
 namespace proxarm::scenes {
@@ -71,43 +72,48 @@ struct Shapes {
   }
 };
 
+// What no test holds yet is refused. Empty: nothing stands against it.
+std::string why_not_beside(const Object& object, const models::Tool& tool) {
+  const std::string name = "\"" + object.name + "\"";
+  if (object.layer) return "a rigid tool touches rigid objects only, and " + name + " has a layer";
+  if (object.motion) return "a rigid tool touches objects that stand still only, and " + name + " moves";
+  if (!object.friction_regions.empty()) {
+    return "a rigid tool feels one friction for all of an object, and " + name + " has regions";
+  }
+  const bool hollow = std::visit(
+      [](const auto& s) {
+        if constexpr (requires { s.inside_out; }) return s.inside_out;
+        return true;  // a plane
+      },
+      object.shape);
+  const bool is_mesh = std::holds_alternative<MeshShape>(object.shape);
+  if (std::holds_alternative<CylinderShape>(object.shape) && !hollow) {
+    return "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a mesh for " + name;
+  }
+  if (is_mesh && has_edges(tool.parts)) {
+    return "a box or a convex tool isn't held by meshes yet: take a sphere or a capsule beside " + name;
+  }
+  if (has_cylinder(tool.parts) && !std::holds_alternative<PlaneShape>(object.shape)) {
+    return "a cylinder as a tool is held by planes only: take a convex tool or a capsule beside " + name;
+  }
+  return {};
+}
+
 }  // namespace
 
 std::optional<Refusal> why_not(const Scene& scene, const models::Tool& tool) {
   if (scene.space.dimensions != 3) return Refusal{"a rigid tool needs a scene of three dimensions"};
-  if (!scene.media.empty() || scene.coulomb_force_N) {
-    return Refusal{"a medium and a Coulomb force act on a point; they aren't rendered for a rigid tool",
-                   scene.media.empty() ? scene.coulomb_line : scene.media.front().line};
+  if (!scene.media.empty()) {
+    return Refusal{"a medium acts on a point; it isn't rendered for a rigid tool", scene.media.front().line};
   }
-  if (scene.guide)
+  if (scene.coulomb_force_N) {
+    return Refusal{"a Coulomb force acts on a point; it isn't rendered for a rigid tool", scene.coulomb_line};
+  }
+  if (scene.guide) {
     return Refusal{"a guide holds a point; it isn't rendered for a rigid tool", scene.guide->line_number};
+  }
   for (const Object& object : scene.objects) {
-    const std::string name = "\"" + object.name + "\"";
-    if (object.layer)
-      return Refusal{"a rigid tool touches rigid objects only, and " + name + " has a layer", object.line};
-    const bool hollow = std::visit(
-        [](const auto& s) {
-          if constexpr (requires { s.inside_out; }) return s.inside_out;
-          return true;  // a plane
-        },
-        object.shape);
-    const bool is_mesh = std::holds_alternative<MeshShape>(object.shape);
-    if (std::holds_alternative<CylinderShape>(object.shape) && !hollow) {
-      return Refusal{
-          "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a mesh for " + name,
-          object.line};
-    }
-    if (is_mesh && has_edges(tool.parts)) {
-      return Refusal{"a box or a convex tool isn't held by meshes yet: take a sphere or a capsule beside " + name,
-                     object.line};
-    }
-    if (has_cylinder(tool.parts) && (is_mesh || !hollow)) {
-      return Refusal{
-          "a cylinder as a tool is held by planes and by hollow objects only: take a convex tool or a capsule "
-          "beside " +
-              name,
-          object.line};
-    }
+    if (const std::string why = why_not_beside(object, tool); !why.empty()) return Refusal{why, object.line};
   }
   return {};
 }
@@ -116,24 +122,18 @@ std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const m
   if (const std::optional<Refusal> no = why_not(scene, tool)) throw refusal(scene, no->line, no->why, "");
   std::vector<RigidObject> objects;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const Object& object = scene.objects[i];
-    for (auto& shape : std::visit(Shapes{}, object.shape)) {
+    for (auto& shape : std::visit(Shapes{}, scene.objects[i].shape)) {
       RigidObject part;
       part.shape = std::move(shape);
-      part.friction = object.friction;
-      part.friction_of_face = friction_by_face(scene, object);
+      part.friction = scene.objects[i].friction;
       part.object = static_cast<std::int32_t>(i);
-      if (object.motion && object.motion->driven) {
-        part.driven = true;
-      } else if (object.motion) {
-        part.motion = script_of(*object.motion);
-      }
       objects.push_back(std::move(part));
     }
   }
-  if (objects.empty()) return std::make_unique<models::FreePose>();
   try {
-    return std::make_unique<models::RigidWorld>(tool, std::move(objects));
+    auto world = std::make_unique<models::RigidWorld>(tool, std::move(objects));
+    if (scene.objects.empty()) return std::make_unique<models::FreePose>();
+    return world;
   } catch (const std::invalid_argument& problem) {
     throw description::SetupError({.key = "tool", .message = problem.what()});
   }

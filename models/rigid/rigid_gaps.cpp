@@ -1,0 +1,262 @@
+// On which side of a feature the tool is, and how far from it.
+#include <algorithm>
+#include <cmath>
+
+#include "models/rigid/rigid_features.hpp"
+#include "models/rigid/rigid_world.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// How far in front of a mesh's faces its surface is: a face has no inside from which a tool could be brought back, so
+// rounding must not take a tool in contact through it. Coordinates below a metre are rounded by 1e-16 m, and what is
+// left of the iteration is as small; this is a thousand times that, and a tenth of what a gap may be short of.
+constexpr double kLift_m = 1e-13;
+
+}  // namespace
+
+// Of a pair at q(k−1): the height of the tool's feature over the object's, or of the object's point over the tool's
+// face.
+double RigidWorld::signed_start(const Pair& pair, const View& at) const noexcept {
+  const Solid& own = shared_->parts[pair.part].solid;
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  const Solid* solid = std::get_if<Solid>(&object.shape);
+  if (pair.kind == Kind::point_face) {
+    const Vec3 p = at * own.points[pair.own];
+    if (mesh != nullptr) return TriangleMesh::height(face_of(**mesh, pair.other), p);
+    const Solid::Face& face = solid->faces[pair.other];
+    return face.normal.dot(p) - face.offset;
+  }
+  if (pair.kind == Kind::face_point) {
+    const Vec3& p = mesh != nullptr ? (*mesh)->vertex(pair.other) : solid->points[pair.other];
+    const Solid::Face& face = own.faces[pair.own];
+    return face.normal.dot(at.R.transpose() * (p - at.x)) - face.offset;
+  }
+  const EdgeLine a = edge_of(own, pair.own);
+  const EdgeLine b = mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other);
+  Vec3 n = (at.R * (a.to - a.from)).cross(b.to - b.from);
+  const double size = n.norm();
+  if (!(size > 1e-7 * (a.to - a.from).norm() * (b.to - b.from).norm())) return 0.0;
+  n /= size;
+  if (!b.open) {
+    const double outwards = mesh != nullptr && !(*mesh)->edge(pair.other).ridge ? -1.0 : 1.0;
+    if (outwards * n.dot(b.left + b.right) < 0.0) n = -n;
+  }
+  return n.dot(at * a.from - b.from);
+}
+
+void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
+  from_ = q_old;
+  const View at = view(q_old);
+  for (std::size_t i = 0; i < pair_count_; ++i) {
+    Pair& pair = pairs_[i];
+    if (pair.kind != Kind::point_face && pair.kind != Kind::face_point && pair.kind != Kind::edges) continue;
+    const RigidObject& object = shared_->entries[pair.entry].object;
+    const bool is_mesh = std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
+    const double own_radius = shared_->parts[pair.part].solid.radius;
+    if (pair.kind == Kind::edges) {
+      const double radii = own_radius + (is_mesh ? 0.0 : std::get<Solid>(object.shape).radius);
+      if (radii > 0.0) continue;
+    }
+    const double height = signed_start(pair, at);
+    const bool near = pair.pressed && std::abs(height) < kFront_m;
+    if (!is_mesh) {
+      pair.side = pair.pressed || height >= -2.0 * far - kFront_m ? 1.0F : 0.0F;
+    } else if (!near) {
+      pair.side = static_cast<float>(side_of_mesh(pair, at, height, far));
+    }
+  }
+}
+
+// A closed mesh holds the tool on its side, an open one on that on which the feature is. A feature may have been behind
+// without having come through, as beside an edge: its foot wasn't on the face then.
+double RigidWorld::side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept {
+  const auto& mesh = *std::get<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
+  const double held = held_[pair.entry].side;
+  if (pair.kind == Kind::point_face) {
+    if (held == 0.0) return height < 0.0 ? -1.0 : 1.0;
+    if (held * height >= -kFront_m) return held;
+    if (held * height < -2.0 * far - kFront_m) return 0.0;
+    const Vec3 p = at * shared_->parts[pair.part].solid.points[pair.own];
+    return touch_face(p, 0.0, face_of(mesh, pair.other).normal, 0.0, mesh.mesh().structure().vertices,
+                      mesh.mesh().triangle(pair.other), 1.0)
+                   .has_value()
+               ? 0.0
+               : held;
+  }
+  if (pair.kind == Kind::edges) {
+    const TriangleFeatures::Edge& edge = mesh.edge(pair.other);
+    if (edge.line.open) return height < 0.0 ? -1.0 : 1.0;
+    if (held != 0.0 && edge.ridge != (held > 0.0)) return 0.0;
+  }
+  return height >= -2.0 * far - kFront_m ? 1.0 : 0.0;
+}
+
+// Whether a tool's point that is on the other side of a face than at the beginning has come through the face: the place
+// where its way meets the plane is on the triangle. It may have come around.
+bool RigidWorld::crossed(const Pair& pair, const Vec3& p) const noexcept {
+  const Solid& own = shared_->parts[pair.part].solid;
+  const auto& mesh = *std::get<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
+  const TriangleMesh::Face& face = face_of(mesh, pair.other);
+  const Vec3 was = view(from_) * own.points[pair.own];
+  const double before = TriangleMesh::height(face, was), after = TriangleMesh::height(face, p);
+  if (pair.pressed || before * after >= 0.0) return true;
+  const Vec3 there = was + before / (before - after) * (p - was);
+  return touch_face(there, 0.0, face.normal, 0.0, mesh.mesh().structure().vertices, mesh.mesh().triangle(pair.other),
+                    1.0)
+      .has_value();
+}
+
+template <typename Each>
+void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noexcept {
+  const Solid& own = shared_->parts[pair.part].solid;
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto emit = [&](std::optional<Touch> t, double lift = 0.0) {
+    if (!t) return;
+    t->gap -= lift;
+    each(*t, 0);
+  };
+  if (pair.kind == Kind::point_field || pair.kind == Kind::rim_field) {
+    std::visit(
+        [&](const auto& shape) {
+          if constexpr (requires { touch(shape, Vec3(), 0.0); }) {
+            if (pair.kind == Kind::point_field) return each(touch(shape, at * own.points[pair.own], own.radius), 0);
+            Solid::Rim rim = own.rims[pair.own];
+            rim.centre = at * rim.centre;
+            rim.u = at.R * rim.u;
+            rim.v = at.R * rim.v;
+            std::array<Vec3, 4> places;
+            const int count = nearest_of_rim(shape, rim, places);
+            for (int k = 0; k < count; ++k) each(touch(shape, places[static_cast<std::size_t>(k)], 0.0), k);
+          }
+        },
+        object.shape);
+    return;
+  }
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  const Solid* solid = std::get_if<Solid>(&object.shape);
+  const double lift = mesh != nullptr ? kLift_m : 0.0, other_radius = solid != nullptr ? solid->radius : 0.0;
+  const double radii = own.radius + other_radius;
+  const auto other_point = [&] { return mesh != nullptr ? (*mesh)->vertex(pair.other) : solid->points[pair.other]; };
+  const auto other_edge = [&] {
+    return mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other);
+  };
+  const auto own_edge = [&] {
+    EdgeLine edge = edge_of(own, pair.own);
+    edge.from = at * edge.from;
+    edge.to = at * edge.to;
+    edge.left = at.R * edge.left;
+    edge.right = at.R * edge.right;
+    return edge;
+  };
+  const double side = static_cast<double>(pair.side);
+  switch (pair.kind) {
+    case Kind::point_face: {
+      if (side == 0.0) return;
+      const Vec3 p = at * own.points[pair.own];
+      if (mesh != nullptr) {
+        const TriangleMesh::Face& face = face_of(**mesh, pair.other);
+        const double height = side * TriangleMesh::height(face, p);
+        if (held_[pair.entry].side == 0.0 && own.radius == 0.0 && height < 0.0) {
+          // Come through the face, wherever it is now; or come around, and then another face holds it.
+          if (crossed(pair, p)) emit(Touch{p, side * face.normal, height}, lift);
+          return;
+        }
+        return emit(touch_face(p, own.radius, face.normal, face.normal.dot(face.corner),
+                               (*mesh)->mesh().structure().vertices, (*mesh)->mesh().triangle(pair.other), side),
+                    lift);
+      }
+      const Solid::Face& face = solid->faces[pair.other];
+      return emit(touch_face(p, own.radius, face.normal, face.offset, solid->points, solid->corners(face), 1.0));
+    }
+    case Kind::face_point: {
+      if (side == 0.0) return;
+      const Solid::Face& face = own.faces[pair.own];
+      const Vec3 y = at.R.transpose() * (other_point() - at.x);
+      std::optional<Touch> t =
+          touch_face(y, other_radius, face.normal, face.offset, own.points, own.corners(face), 1.0);
+      if (!t) return;
+      const Vec3 foot = y - (t->gap + other_radius) * face.normal;
+      return emit(Touch{at * foot, -(at.R * face.normal), t->gap}, lift);
+    }
+    case Kind::edges: {
+      EdgeLine other = other_edge();
+      const EdgeLine edge = own_edge();
+      if (radii > 0.0) return emit(touch_edges_round(edge, other, radii, own.radius), lift);
+      if (side == 0.0) return;
+      if (mesh != nullptr && !other.open && !(*mesh)->edge(pair.other).ridge) {
+        other.left = -other.left;
+        other.right = -other.right;
+      }
+      const Vec3 n = (edge.to - edge.from).cross(other.to - other.from);
+      const double orientation = other.open ? side : n.dot(other.left + other.right) < 0.0 ? -1.0 : 1.0;
+      return emit(touch_edges_sharp(edge, other, orientation), lift);
+    }
+    case Kind::point_point: {
+      std::optional<Touch> t = touch_point(at * own.points[pair.own], other_point(), radii);
+      if (t) t->point -= own.radius * t->normal;
+      return emit(t, lift);
+    }
+    case Kind::point_edge:
+      return emit(touch_round(at * own.points[pair.own], other_edge(), radii, own.radius, false), lift);
+    case Kind::edge_point:
+      return emit(touch_round(other_point(), own_edge(), radii, own.radius, true), lift);
+    case Kind::point_field:
+    case Kind::rim_field:
+      return;
+  }
+}
+
+void RigidWorld::find(const ToolPose& pose) noexcept {
+  found_count_ = 0;
+  const View at = view(pose);
+  for (std::size_t i = 0; i < pair_count_; ++i) {
+    evaluate(pairs_[i], at, [&](const Touch& t, int which) {
+      if (found_count_ == most_found) {
+        overflow_ = true;
+        return;
+      }
+      Found& found = found_[found_count_++];
+      found.touch = t;
+      found.pair = static_cast<std::uint16_t>(i);
+      found.which = static_cast<std::uint8_t>(which);
+      found.working = false;
+    });
+  }
+  drop_deeper();
+}
+
+// A point inside of a convex solid, or under a ridge of a mesh, is behind several faces: only the one that it is least
+// deep under holds it. The same for an object's point in a part of the tool.
+void RigidWorld::drop_deeper() noexcept {
+  const auto same_point = [&](const Pair& a, const Pair& b) {
+    if (a.kind != b.kind || a.part != b.part || a.entry != b.entry) return false;
+    return a.kind == Kind::point_face ? a.own == b.own : a.kind == Kind::face_point && a.other == b.other;
+  };
+  const auto behind = [&](const Found& deep, const Found& other) {
+    // The foot of the deeper one on its face, seen from the other face.
+    const Vec3 foot = deep.touch.point - deep.touch.gap * deep.touch.normal;
+    return other.touch.normal.dot(foot - (other.touch.point - other.touch.gap * other.touch.normal)) < kGap_m;
+  };
+  for (std::size_t i = 0; i < found_count_; ++i) {
+    if (!(found_[i].touch.gap < -kGap_m)) continue;
+    const Pair& pair = pairs_[found_[i].pair];
+    if (pair.kind != Kind::point_face && pair.kind != Kind::face_point) continue;
+    const bool is_mesh =
+        std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
+    for (std::size_t j = 0; j < found_count_; ++j) {
+      if (j == i || found_[j].touch.gap < found_[i].touch.gap || !same_point(pair, pairs_[found_[j].pair])) continue;
+      // An open mesh's face may hold the point from behind: only one that it has come through counts here.
+      if (is_mesh && pair.kind == Kind::point_face) {
+        if (held_[pair.entry].side == 0.0 && !(found_[j].touch.gap < 0.0)) continue;
+        if (!behind(found_[i], found_[j])) continue;
+      }
+      found_[i] = found_[--found_count_];
+      --i;
+      break;
+    }
+  }
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,143 @@
+#include "scenes/rigid/compile_rigid.hpp"
+
+#include <gtest/gtest.h>
+
+#include "models/base/setup_error.hpp"
+#include "models/mesh/mesh.hpp"
+
+namespace proxarm::scenes {
+namespace {
+
+using models::Pose;
+using models::Tool;
+using models::Vec3;
+
+Tool box(double edge_m) { return {{{models::BoxTool{Vec3::Constant(edge_m)}, Pose::Identity(), {}}}}; }
+Tool sphere(double radius_m) { return {{{models::SphereTool{radius_m}, Pose::Identity(), {}}}}; }
+Tool cylinder() { return {{{models::CylinderTool{0.02, 0.01}, Pose::Identity(), {}}}}; }
+
+Scene scene_of(const Shape& shape) {
+  Object object;
+  object.name = "it";
+  object.shape = shape;
+  object.line = 7;
+  Scene scene;
+  scene.objects = {object};
+  return scene;
+}
+
+MeshShape pyramid() {
+  models::TriangleSoup soup;
+  soup.vertices = {{0.2, 0.2, -0.1}, {-0.2, 0.2, -0.1}, {-0.2, -0.2, -0.1}, {0.2, -0.2, -0.1}, {0.0, 0.0, 0.1}};
+  soup.triangles = {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}, {0, 2, 1}, {0, 3, 2}};
+  MeshShape shape;
+  shape.mesh = std::make_shared<const models::TriangleMesh>(std::move(soup));
+  return shape;
+}
+
+TEST(CompileRigid, ABoxRestsOnAPlaneOfTheScene) {
+  const auto g = compile_rigid(scene_of(PlaneShape{{0.0, 0.0, 0.1}, {0.0, 0.0, 2.0}}), box(0.02));
+  models::ToolPose q, p;
+  q.position.z() = 0.11;
+  p.position.z() = 0.109;
+  EXPECT_NEAR(g->step(1e6 * models::Mat6::Identity(), p, q).position.z(), 0.11, 1e-16);
+  EXPECT_EQ(g->contacts().size(), 4U);
+  EXPECT_NEAR(g->clearance_m(q), 0.0, 1e-16);
+}
+
+// Along z, in steps of 2 mm, as far as it goes.
+double end_of_way(const Shape& shape, const Tool& tool, double from, double step) {
+  const auto g = compile_rigid(scene_of(shape), tool);
+  models::ToolPose q;
+  q.position.z() = from;
+  for (int k = 0; k < 250; ++k) {
+    models::ToolPose p = q;
+    p.position.z() += step;
+    q = g->step(1e6 * models::Mat6::Identity(), p, q);
+    EXPECT_FALSE(g->unresolved());
+  }
+  return q.position.z();
+}
+
+TEST(CompileRigid, EveryShapeHoldsATool) {
+  const double down = -0.002, up = 0.002;
+  EXPECT_NEAR(end_of_way(PlaneShape{}, box(0.02), 0.3, down), 0.01, 1e-12);
+  EXPECT_NEAR(end_of_way(BoxShape{Pose::Identity(), Vec3::Constant(0.2), false}, box(0.02), 0.3, down), 0.11, 1e-12);
+  EXPECT_NEAR(end_of_way(SphereShape{Vec3::Zero(), 0.1, false}, box(0.02), 0.3, down), 0.11, 1e-12);
+  EXPECT_NEAR(end_of_way(CapsuleShape{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}, 0.05, false}, box(0.02), 0.3, down), 0.06,
+              1e-12);
+  EXPECT_NEAR(end_of_way(pyramid(), sphere(0.01), 0.3, down), 0.11, 1e-12);
+  EXPECT_NEAR(end_of_way(PlaneShape{}, cylinder(), 0.3, down), 0.01, 1e-12);
+  // From inside.
+  EXPECT_NEAR(end_of_way(BoxShape{Pose::Identity(), Vec3::Constant(0.2), true}, box(0.02), 0.0, up), 0.09, 1e-12);
+  EXPECT_NEAR(end_of_way(SphereShape{Vec3::Zero(), 0.1, true}, sphere(0.01), 0.0, up), 0.09, 1e-12);
+  EXPECT_NEAR(end_of_way(CapsuleShape{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}, 0.05, true}, sphere(0.01), 0.0, up), 0.04,
+              1e-12);
+  EXPECT_NEAR(end_of_way(CylinderShape{{0.0, 0.0, -0.1}, {0.0, 0.0, 0.1}, 0.05, true}, box(0.02), 0.0, up), 0.09,
+              1e-12);
+}
+
+// The reason is in why_not(), with the line, and compile_rigid() throws it.
+void expect_refused(const Scene& scene, const Tool& tool, const std::string& word, int line) {
+  const std::optional<Refusal> no = why_not(scene, tool);
+  ASSERT_TRUE(no.has_value()) << word;
+  EXPECT_NE(no->why.find(word), std::string::npos) << no->why;
+  EXPECT_EQ(no->line, line) << no->why;
+  try {
+    compile_rigid(scene, tool);
+    ADD_FAILURE() << word << " isn't refused";
+  } catch (const description::SetupError& error) {
+    EXPECT_NE(std::string(error.what()).find(no->why), std::string::npos) << error.what();
+  }
+}
+
+TEST(CompileRigid, RefusesASceneWithTheReason) {
+  Scene flat;
+  flat.space.dimensions = 2;
+  expect_refused(flat, box(0.01), "three dimensions", 0);
+  Scene honey;
+  honey.media.emplace_back().line = 3;
+  expect_refused(honey, box(0.01), "medium", 3);
+  Scene dry;
+  dry.coulomb_force_N = 1.0;
+  dry.coulomb_line = 4;
+  expect_refused(dry, box(0.01), "Coulomb", 4);
+  Scene guided;
+  guided.guide.emplace().line_number = 5;
+  expect_refused(guided, box(0.01), "guide", 5);
+}
+
+TEST(CompileRigid, RefusesAnObjectWithTheReason) {
+  Scene scene = scene_of(PlaneShape{});
+  scene.objects[0].layer = ElasticLayer{0.001, 500.0};
+  expect_refused(scene, box(0.01), "layer", 7);
+  scene = scene_of(PlaneShape{});
+  scene.objects[0].motion.emplace();
+  expect_refused(scene, box(0.01), "moves", 7);
+  scene.objects[0].motion->driven = true;
+  expect_refused(scene, box(0.01), "moves", 7);
+  scene = scene_of(pyramid());
+  scene.objects[0].friction_regions.emplace_back();
+  expect_refused(scene, sphere(0.01), "regions", 7);
+  expect_refused(scene_of(CylinderShape{}), sphere(0.01), "outside of a cylinder", 7);
+}
+
+TEST(CompileRigid, RefusesAToolBesideAnObjectWithTheReason) {
+  expect_refused(scene_of(pyramid()), box(0.01), "isn't held by meshes", 7);
+  Tool compound = sphere(0.01);
+  compound.parts.push_back(box(0.01).parts.front());
+  expect_refused(scene_of(pyramid()), compound, "isn't held by meshes", 7);
+  expect_refused(scene_of(pyramid()), cylinder(), "planes only", 7);
+  expect_refused(scene_of(BoxShape{}), cylinder(), "planes only", 7);
+  expect_refused(scene_of(SphereShape{Vec3::Zero(), 1.0, true}), cylinder(), "planes only", 7);
+  EXPECT_FALSE(why_not(scene_of(pyramid()), sphere(0.01)).has_value());
+}
+
+TEST(CompileRigid, RefusesAToolWithoutASizeAlsoWhereNothingIsToTouch) {
+  EXPECT_THROW(compile_rigid(scene_of(PlaneShape{}), box(0.0)), description::SetupError);
+  EXPECT_THROW(compile_rigid(Scene{}, box(0.0)), description::SetupError);
+  EXPECT_NE(dynamic_cast<models::FreePose*>(compile_rigid(Scene{}, box(0.01)).get()), nullptr);
+}
+
+}  // namespace
+}  // namespace proxarm::scenes
