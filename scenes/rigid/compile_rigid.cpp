@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "models/base/setup_error.hpp"
-#include "models/obstacles/box_obstacle.hpp"
 #include "models/rigid/rigid_world.hpp"
 #include "scenes/compiler/obstacles.hpp"
 
@@ -12,8 +11,6 @@ namespace proxarm::scenes {
 namespace {
 
 using models::FlatSide;
-using models::HollowSphere;
-using models::HollowTube;
 using models::Pose;
 using models::RigidObject;
 using models::Vec3;
@@ -24,13 +21,6 @@ bool has_cylinder(const std::vector<models::ToolPart>& parts) {
   });
 }
 
-bool has_edges(const std::vector<models::ToolPart>& parts) {
-  return std::any_of(parts.begin(), parts.end(), [](const models::ToolPart& part) {
-    return std::holds_alternative<models::BoxTool>(part.shape) ||
-           std::holds_alternative<models::ConvexTool>(part.shape);
-  });
-}
-
 Pose at(const Vec3& place, const Vec3& axis) {
   Pose X = Pose::Identity();
   X.linear() = models::Quaternion::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix();
@@ -38,37 +28,25 @@ Pose at(const Vec3& place, const Vec3& axis) {
   return X;
 }
 
-// The shapes of an object: one, unless it is hollow with flat sides.
-struct Shapes {
-  std::vector<decltype(RigidObject::shape)> operator()(const PlaneShape& s) const {
+// The shape of an object that why_not_beside() lets through.
+struct ShapeOf {
+  decltype(RigidObject::shape) operator()(const PlaneShape& s) const {
     const Vec3 n = s.normal.normalized();
-    return {FlatSide{n, n.dot(s.point_m)}};
+    return FlatSide{n, n.dot(s.point_m)};
   }
-  std::vector<decltype(RigidObject::shape)> operator()(const SphereShape& s) const {
-    if (s.inside_out) return {HollowSphere{s.centre_m, s.radius_m}};
-    return {models::solid_of(models::SphereTool{s.radius_m}, at(s.centre_m, Vec3::UnitZ()))};
+  decltype(RigidObject::shape) operator()(const SphereShape& s) const {
+    return models::solid_of(models::SphereTool{s.radius_m}, at(s.centre_m, Vec3::UnitZ()));
   }
-  std::vector<decltype(RigidObject::shape)> operator()(const CapsuleShape& s) const {
-    if (s.inside_out) return {HollowTube{s.from_m, s.to_m, s.radius_m, false}};
+  decltype(RigidObject::shape) operator()(const CapsuleShape& s) const {
     const Vec3 along = s.to_m - s.from_m;
-    return {models::solid_of(models::CapsuleTool{along.norm(), s.radius_m}, at(0.5 * (s.from_m + s.to_m), along))};
+    return models::solid_of(models::CapsuleTool{along.norm(), s.radius_m}, at(0.5 * (s.from_m + s.to_m), along));
   }
-  std::vector<decltype(RigidObject::shape)> operator()(const BoxShape& s) const {
-    if (!s.inside_out) return {models::solid_of(models::BoxTool{s.size_m}, s.pose_W)};
-    std::vector<decltype(RigidObject::shape)> sides;
-    for (const auto& face : models::BoxObstacle::faces(s.pose_W, s.size_m)) {
-      const Vec3 inwards = -face.normal();
-      sides.emplace_back(FlatSide{inwards, inwards.dot(face.point())});
-    }
-    return sides;
+  decltype(RigidObject::shape) operator()(const BoxShape& s) const {
+    return models::solid_of(models::BoxTool{s.size_m}, s.pose_W);
   }
-  std::vector<decltype(RigidObject::shape)> operator()(const CylinderShape& s) const {
-    const Vec3 e = (s.to_m - s.from_m).normalized();
-    return {HollowTube{s.from_m, s.to_m, s.radius_m, true}, FlatSide{Vec3(-e), -e.dot(s.to_m)},
-            FlatSide{e, e.dot(s.from_m)}};
-  }
-  std::vector<decltype(RigidObject::shape)> operator()(const MeshShape& s) const {
-    return {std::make_shared<const models::TriangleFeatures>(s.mesh)};
+  template <class Other>
+  decltype(RigidObject::shape) operator()(const Other& /*shape*/) const {
+    throw std::invalid_argument("an object that a rigid tool doesn't touch");
   }
 };
 
@@ -83,19 +61,16 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
   const bool hollow = std::visit(
       [](const auto& s) {
         if constexpr (requires { s.inside_out; }) return s.inside_out;
-        return true;  // a plane
+        return false;
       },
       object.shape);
-  const bool is_mesh = std::holds_alternative<MeshShape>(object.shape);
-  if (std::holds_alternative<CylinderShape>(object.shape) && !hollow) {
-    return "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a mesh for " + name;
+  if (hollow) return "a rigid tool isn't held inside of objects yet, and " + name + " is inside out";
+  if (std::holds_alternative<MeshShape>(object.shape)) return "a rigid tool isn't held by meshes yet: " + name;
+  if (std::holds_alternative<CylinderShape>(object.shape)) {
+    return "contact of a rigid tool with a cylinder isn't built: take a capsule or a box for " + name;
   }
-  if (is_mesh && has_edges(tool.parts)) {
-    return "a box or a convex tool isn't held by meshes yet: take a sphere or a capsule beside " + name;
-  }
-  if (has_cylinder(tool.parts) && !std::holds_alternative<PlaneShape>(object.shape)) {
-    return "a cylinder as a tool is held by planes only: take a convex tool or a capsule beside " + name;
-  }
+  if (has_cylinder(tool.parts))
+    return "a cylinder as a tool isn't held yet: take a convex tool or a capsule beside " + name;
   return {};
 }
 
@@ -122,13 +97,11 @@ std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const m
   if (const std::optional<Refusal> no = why_not(scene, tool)) throw refusal(scene, no->line, no->why, "");
   std::vector<RigidObject> objects;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    for (auto& shape : std::visit(Shapes{}, scene.objects[i].shape)) {
-      RigidObject part;
-      part.shape = std::move(shape);
-      part.friction = scene.objects[i].friction;
-      part.object = static_cast<std::int32_t>(i);
-      objects.push_back(std::move(part));
-    }
+    RigidObject part;
+    part.shape = std::visit(ShapeOf{}, scene.objects[i].shape);
+    part.friction = scene.objects[i].friction;
+    part.object = static_cast<std::int32_t>(i);
+    objects.push_back(std::move(part));
   }
   try {
     auto world = std::make_unique<models::RigidWorld>(tool, std::move(objects));

@@ -79,53 +79,6 @@ TEST(RigidWorldsOfMeshes, ASphereKeepsTheLaw) {
                          [](const ToolPose& q) { return to_block(q.position) - 0.01; }));
 }
 
-TEST(RigidWorldsOfMeshes, ACapsuleWithinKeepsTheLaw) {
-  expect_law(about_block({{{CapsuleTool{0.02, 0.004}, Pose::Identity(), {}}}}, true, [](const ToolPose& q) {
-    return -std::max(to_block(q * Vec3(0.0, 0.0, -0.01)), to_block(q * Vec3(0.0, 0.0, 0.01))) - 0.004;
-  }));
-}
-
-TEST(RigidWorldsOfMeshes, APointKeepsTheLaw) {
-  expect_law(about_block({}, false, [](const ToolPose& q) { return to_block(q.position); }));
-}
-
-// Against a square of no thickness: wherever a tool comes from, it doesn't come through, and a rounded one keeps its
-// distance.
-TEST(RigidWorldsOfMeshes, ASheetHoldsOnBothSides) {
-  TriangleSoup soup;
-  soup.vertices = {{0.05, 0.05, 0.0}, {-0.05, 0.05, 0.0}, {-0.05, -0.05, 0.0}, {0.05, -0.05, 0.0}};
-  soup.triangles = {{0, 1, 2}, {0, 2, 3}};
-  const auto sheet = std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(std::move(soup)));
-  for (const double radius : {0.0, 0.005}) {
-    Pushed out;
-    for (std::uint64_t world = 0; world < 20; ++world) {
-      Random random(900 + world);
-      RigidObject object;
-      object.shape = sheet;
-      object.friction = 0.3;
-      Tool tool;
-      if (radius > 0.0) tool.parts.push_back({SphereTool{radius}, Pose::Identity(), {}});
-      RigidWorld g(tool, {object});
-      Mat6 K = Mat6::Zero();
-      K.diagonal() << Vec3::Constant(4e6), Vec3::Constant(4e3);
-      ToolPose q;
-      q.position = Vec3(random.uniform(-0.04, 0.04), random.uniform(-0.04, 0.04), world % 2 == 0 ? 0.02 : -0.02);
-      Vec3 last = q.position;
-      const auto apart = [&](const ToolPose& pose) {
-        const Vec3 x = pose.position, beside = (x.cwiseAbs() - Vec3(0.05, 0.05, 0.0)).cwiseMax(0.0);
-        const double share = last.z() / (last.z() - x.z());
-        const Vec3 there = last + share * (x - last);
-        const bool through = last.z() * x.z() < 0.0 && std::max(std::abs(there.x()), std::abs(there.y())) < 0.05;
-        last = x;
-        return through ? -1.0 : beside.norm() - radius;
-      };
-      push_about(g, random, q, K, {0.3}, 400, Vec3::Zero(), false, apart, out);
-    }
-    SCOPED_TRACE(radius);
-    expect_law(out);
-  }
-}
-
 TEST(RigidWorldsOfMeshes, ATouchedSideIsForgottenWhereTheToolBeginsAnew) {
   // A session starts outside, the next one inside of the block, with the same world: each is held on its side.
   RigidObject object;
