@@ -151,7 +151,7 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
       held_[entry].known = true;
     }
   }
-  for (std::uint16_t part = 0; part < shared_->parts.size(); ++part) {
+  for (std::size_t part = 0; part < shared_->parts.size(); ++part) {
     const Solid& own = shared_->parts[part].solid;
     const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j) {
       if (pair_count_ == most_pairs) {
@@ -161,7 +161,7 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
       Pair& pair = pairs_[pair_count_++];
       pair = {};
       pair.kind = kind;
-      pair.part = part;
+      pair.part = static_cast<std::uint16_t>(part);
       pair.entry = entry;
       pair.own = i;
       pair.other = j;
@@ -171,18 +171,14 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
     } else if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape)) {
       pairs_with(own, **mesh, at, reach, add);
     } else {
-      std::visit(
-          [&](const auto& shape) {
-            if constexpr (requires { touch(shape, Vec3(), 0.0); }) {
-              for (std::uint32_t i = 0; i < own.points.size(); ++i) {
-                if (touch(shape, at * own.points[i], own.radius).gap <= reach) add(Kind::point_field, i, 0);
-              }
-              for (std::uint32_t i = 0; i < own.rims.size(); ++i) {
-                if (touch(shape, at * own.rims[i].centre, own.rims[i].radius).gap <= reach) add(Kind::rim_field, i, 0);
-              }
-            }
-          },
-          e.object.shape);
+      with_flat_or_hollow(e.object, [&](const auto& shape) {
+        for (std::uint32_t i = 0; i < own.points.size(); ++i) {
+          if (touch(shape, at * own.points[i], own.radius).gap <= reach) add(Kind::point_field, i, 0);
+        }
+        for (std::uint32_t i = 0; i < own.rims.size(); ++i) {
+          if (touch(shape, at * own.rims[i].centre, own.rims[i].radius).gap <= reach) add(Kind::rim_field, i, 0);
+        }
+      });
     }
   }
 }
@@ -196,7 +192,9 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
   }
   pair_count_ = 0;
   crowded_ = false;
-  for (std::uint16_t entry = 0; entry < shared_->entries.size(); ++entry) gather_entry(entry, pose, reach);
+  for (std::size_t entry = 0; entry < shared_->entries.size(); ++entry) {
+    gather_entry(static_cast<std::uint16_t>(entry), pose, reach);
+  }
   gathered_at_ = pose;
   gathered_reach_ = reach;
   for (std::size_t k = 0; k < kept_count; ++k) {

@@ -56,7 +56,7 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
     const bool is_mesh = std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
     const double own_radius = shared_->parts[pair.part].solid.radius;
     if (pair.kind == Kind::edges) {
-      const double radii = own_radius + (is_mesh ? 0.0 : std::get<Solid>(object.shape).radius);
+      const double radii = own_radius + (is_mesh ? 0.0 : std::get_if<Solid>(&object.shape)->radius);
       if (radii > 0.0) continue;
     }
     const double height = signed_start(pair, at);
@@ -72,7 +72,7 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
 // A closed mesh holds the tool on its side, an open one on that on which the feature is. A feature may have been behind
 // without having come through, as beside an edge: its foot wasn't on the face then.
 double RigidWorld::side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept {
-  const auto& mesh = *std::get<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
+  const auto& mesh = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&shared_->entries[pair.entry].object.shape);
   const double held = held_[pair.entry].side;
   if (pair.kind == Kind::point_face) {
     if (held == 0.0) return height < 0.0 ? -1.0 : 1.0;
@@ -97,7 +97,7 @@ double RigidWorld::side_of_mesh(const Pair& pair, const View& at, double height,
 // where its way meets the plane is on the triangle. It may have come around.
 bool RigidWorld::crossed(const Pair& pair, const Vec3& p) const noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
-  const auto& mesh = *std::get<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);
+  const auto& mesh = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&shared_->entries[pair.entry].object.shape);
   const TriangleMesh::Face& face = face_of(mesh, pair.other);
   const Vec3 was = view(from_) * own.points[pair.own];
   const double before = TriangleMesh::height(face, was), after = TriangleMesh::height(face, p);
@@ -118,20 +118,16 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
     each(*t, 0);
   };
   if (pair.kind == Kind::point_field || pair.kind == Kind::rim_field) {
-    std::visit(
-        [&](const auto& shape) {
-          if constexpr (requires { touch(shape, Vec3(), 0.0); }) {
-            if (pair.kind == Kind::point_field) return each(touch(shape, at * own.points[pair.own], own.radius), 0);
-            Solid::Rim rim = own.rims[pair.own];
-            rim.centre = at * rim.centre;
-            rim.u = at.R * rim.u;
-            rim.v = at.R * rim.v;
-            std::array<Vec3, 4> places;
-            const int count = nearest_of_rim(shape, rim, places);
-            for (int k = 0; k < count; ++k) each(touch(shape, places[static_cast<std::size_t>(k)], 0.0), k);
-          }
-        },
-        object.shape);
+    with_flat_or_hollow(object, [&](const auto& shape) {
+      if (pair.kind == Kind::point_field) return each(touch(shape, at * own.points[pair.own], own.radius), 0);
+      Solid::Rim rim = own.rims[pair.own];
+      rim.centre = at * rim.centre;
+      rim.u = at.R * rim.u;
+      rim.v = at.R * rim.v;
+      std::array<Vec3, 4> places;
+      const int count = nearest_of_rim(shape, rim, places);
+      for (int k = 0; k < count; ++k) each(touch(shape, places[static_cast<std::size_t>(k)], 0.0), k);
+    });
     return;
   }
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);

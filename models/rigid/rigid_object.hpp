@@ -52,4 +52,17 @@ struct RigidObject {
   std::int32_t object = 0;  // what contacts report
 };
 
+// Calls with the object's shape where that is one that a point alone is held by: flat or hollow. (std::visit may
+// throw.)
+template <typename Function>
+void with_flat_or_hollow(const RigidObject& object, Function function) noexcept {
+  if (const auto* flat = std::get_if<FlatSide>(&object.shape)) {
+    function(*flat);
+  } else if (const auto* sphere = std::get_if<HollowSphere>(&object.shape)) {
+    function(*sphere);
+  } else if (const auto* tube = std::get_if<HollowTube>(&object.shape)) {
+    function(*tube);
+  }
+}
+
 }  // namespace proxarm::models

@@ -4,6 +4,8 @@
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <limits>
+#include <limits>
 #include <stdexcept>
 
 #include "models/base/setup_error.hpp"
@@ -76,6 +78,10 @@ long long whole_number_of(std::string_view word, const std::string& where) {
   if (digits.starts_with('+')) digits.remove_prefix(1);
   long long value = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  // Larger than any file is: whoever asked says what it can't be.
+  if (error == std::errc::result_out_of_range && end == digits.data() + digits.size()) {
+    return digits.starts_with('-') ? std::numeric_limits<long long>::min() : std::numeric_limits<long long>::max();
+  }
   if (error != std::errc() || end != digits.data() + digits.size()) refuse(word, where, "a whole number");
   return value;
 }

@@ -4,6 +4,7 @@
 #include "controller/stability/elastic_loop.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <memory>
@@ -37,7 +38,8 @@ LoopModel loop_of(const description::Cell& cell, double period_s, const std::vec
 
 // A hand that moves the tool by 5 mm and holds it there.
 std::string nudging_hand(const HandModel& hand) {
-  const std::string file = ::testing::TempDir() + "nudge.yaml";
+  const std::string file =
+      ::testing::TempDir() + "nudge-" + std::to_string(getpid()) + ".yaml";  // tests run side by side
   std::ofstream(file) << "name: nudge\nmass_kg: " << hand.mass_kg << "\nstiffness_N_per_m: " << hand.stiffness_N_per_m
                       << "\ndamping_Ns_per_m: " << hand.damping_Ns_per_m
                       << "\nwaypoints:\n  - {time_s: 0.3, offset_m: [0, 0, 0]}\n"
