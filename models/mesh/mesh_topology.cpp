@@ -203,7 +203,8 @@ MeshTopology topology_of(const TriangleMesh& mesh) {
       note(found.non_manifold, 0.5 * (mesh.vertex(first->low) + mesh.vertex(first->high)));
     }
   });
-  for (auto& loop : loops_of(std::move(open))) found.holes.push_back(hole_of(mesh, std::move(loop)));
+  auto loops = loops_of(std::move(open));
+  for (auto& loop : loops) found.holes.push_back(hole_of(mesh, std::move(loop)));
   std::sort(found.holes.begin(), found.holes.end(),
             [](const MeshHole& a, const MeshHole& b) { return a.size_m < b.size_m; });
   std::vector<bool> open_part(mesh.size(), false);

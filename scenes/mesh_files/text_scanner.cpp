@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cstdlib>
 #include <limits>
-#include <limits>
 #include <stdexcept>
 
 #include "models/base/setup_error.hpp"
