@@ -27,13 +27,12 @@ std::string line_of(const std::vector<std::string>& changes) {
 int set_command(const SetOptions& options) {
   const std::filesystem::path path = options.control.empty() ? default_control_path() : options.control;
   const std::string answer = ask_control_socket(path, line_of(options.changes));
-  const std::string fine_word = "ok: ";
-  if (answer.compare(0, fine_word.size(), fine_word) != 0) {
+  if (!answer.starts_with(agreed)) {
     std::fprintf(stderr, "proxarm: %s%s\n", answer.c_str(),
                  options.changes.size() > 1 ? "; none of the changes was made" : "");
     return set_up_mistake;
   }
-  std::istringstream done(answer.substr(fine_word.size()));
+  std::istringstream done(answer.substr(agreed.size()));
   for (std::string change; std::getline(done, change, '\t');) std::printf("ok: %s\n", change.c_str());
   return fine;
 }

@@ -17,7 +17,6 @@ constexpr auto watch_every = std::chrono::milliseconds(250);
 
 int status_command(const StatusOptions& options) {
   const std::filesystem::path path = options.control.empty() ? default_control_path() : options.control;
-  const std::string fine_word = "ok: ";
   for (bool first = true;; first = false) {
     std::string answer;
     try {
@@ -26,8 +25,8 @@ int status_command(const StatusOptions& options) {
       if (first) throw;
       return fine;  // the session has ended
     }
-    if (answer.compare(0, fine_word.size(), fine_word) != 0) throw description::SetupError({.message = answer});
-    std::printf("%s\n", answer.c_str() + fine_word.size());
+    if (!answer.starts_with(agreed)) throw description::SetupError({.message = answer});
+    std::printf("%s\n", answer.c_str() + agreed.size());
     std::fflush(stdout);
     if (!options.watch) return fine;
     std::this_thread::sleep_for(watch_every);

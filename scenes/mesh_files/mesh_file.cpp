@@ -1,8 +1,6 @@
 #include "scenes/mesh_files/mesh_file.hpp"
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstddef>
 #include <cstring>
 #include <fstream>
@@ -17,6 +15,7 @@
 #include "scenes/mesh_files/formats.hpp"
 #include "scenes/mesh_files/mesh_cache.hpp"
 #include "scenes/mesh_files/sandbox.hpp"
+#include "scenes/mesh_files/text_scanner.hpp"
 
 namespace proxarm::scenes {
 namespace {
@@ -31,13 +30,6 @@ using models::Vec3;
 constexpr std::uintmax_t most_bytes = std::uintmax_t{256} << 20;
 
 constexpr const char* kExpected = "a mesh: STL, OBJ or PLY, with triangles";
-
-std::string extension_of(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
-}
 
 // The size of a file that is one, and of a size that may be read: a pipe would wait for ever.
 std::uintmax_t checked_size(const std::filesystem::path& file) {
@@ -118,7 +110,7 @@ ParsedMesh mesh_of(const std::vector<std::byte>& bytes) {
 }  // namespace
 
 ParsedMesh parse_mesh_file(const std::filesystem::path& file) {
-  const std::string extension = extension_of(file);
+  const std::string extension = lower(file.extension().string());
   if (extension != ".stl" && extension != ".obj" && extension != ".ply") {
     throw SetupError({.file = file.string(),
                       .found = extension.empty() ? "a file without an extension" : in_quotes(extension),

@@ -108,7 +108,7 @@ using Client = std::shared_ptr<Connection>;
 template <typename Handle>
 std::string answer_of(const Handle& handle) {
   try {
-    return "ok: " + handle() + "\n";
+    return std::string(agreed) + handle() + "\n";
   } catch (const std::exception& error) {
     return std::string("refused: ") + error.what() + "\n";
   }

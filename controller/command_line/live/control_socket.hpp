@@ -14,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace proxarm::command_line {
 
@@ -40,6 +41,9 @@ class ControlSocket {
 
 // Before a bus is opened: throws SetupError where ControlSocket would.
 void require_control_path(const std::filesystem::path& path);
+
+// What an answer begins with where the session does as it is asked.
+inline constexpr std::string_view agreed = "ok: ";
 
 // Sends a line and returns the answer. Throws SetupError where nobody listens.
 std::string ask_control_socket(const std::filesystem::path& path, const std::string& line);
