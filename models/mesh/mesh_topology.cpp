@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numeric>
+#include <tuple>
 #include <utility>
 
 #include "models/mesh/polygon.hpp"
@@ -125,23 +127,54 @@ std::vector<std::vector<std::uint32_t>> loops_of(std::vector<std::pair<std::uint
 // Longer outlines aren't holes that anybody wants closed; their area is that of Newell's normal, and costs nothing.
 constexpr std::size_t longest_loop = 2000;
 
-std::vector<std::array<std::uint32_t, 3>> cover(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  if (loop.size() >= 3) triangulate(mesh.structure().vertices, loop, triangles);
+using Cover = std::vector<std::array<std::uint32_t, 3>>;
+
+double area_of(const TriangleMesh& mesh, const Cover& cover) {
+  double area = 0.0;
+  for (const auto& [a, b, c] : cover) {
+    area += 0.5 * (mesh.vertex(b) - mesh.vertex(a)).cross(mesh.vertex(c) - mesh.vertex(a)).norm();
+  }
+  return area;
+}
+
+// Cuts off the corner with the smallest triangle, again and again. Along a crack those are the slivers across it,
+// which ear clipping, that looks from one side, can't tell from what lies on either side of it.
+Cover slivers_first(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
+  const auto triangle_at = [&loop](std::size_t k) {
+    return std::array{loop[(k + loop.size() - 1) % loop.size()], loop[k], loop[(k + 1) % loop.size()]};
+  };
+  Cover triangles;
+  while (loop.size() > 3) {
+    std::size_t smallest = 0;
+    double smallest_m2 = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < loop.size(); ++k) {
+      const double area_m2 = area_of(mesh, {triangle_at(k)});
+      if (area_m2 < smallest_m2) std::tie(smallest, smallest_m2) = std::pair(k, area_m2);
+    }
+    triangles.push_back(triangle_at(smallest));
+    loop.erase(loop.begin() + static_cast<std::ptrdiff_t>(smallest));
+  }
+  triangles.push_back(triangle_at(1));
   return triangles;
 }
 
+// The smaller of two covers: what closes a loop of n vertices with n − 2 triangles has many, and the smallest of all is
+// costly to find.
+Cover cover(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
+  Cover ears;
+  if (loop.size() < 3) return ears;
+  triangulate(mesh.structure().vertices, loop, ears);
+  Cover slivers = slivers_first(mesh, loop);
+  return area_of(mesh, slivers) < area_of(mesh, ears) ? slivers : ears;
+}
+
 double area_over(const TriangleMesh& mesh, const std::vector<std::uint32_t>& loop) {
+  if (loop.size() <= longest_loop) return area_of(mesh, cover(mesh, loop));
   Vec3 newell = Vec3::Zero();
   for (std::size_t k = 1; k + 1 < loop.size(); ++k) {
     newell += (mesh.vertex(loop[k]) - mesh.vertex(loop[0])).cross(mesh.vertex(loop[k + 1]) - mesh.vertex(loop[0]));
   }
-  if (loop.size() > longest_loop) return 0.5 * newell.norm();
-  double area = 0.0;
-  for (const auto& [a, b, c] : cover(mesh, loop)) {
-    area += 0.5 * (mesh.vertex(b) - mesh.vertex(a)).cross(mesh.vertex(c) - mesh.vertex(a)).norm();
-  }
-  return area;
+  return 0.5 * newell.norm();
 }
 
 MeshHole hole_of(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {

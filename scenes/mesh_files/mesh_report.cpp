@@ -1,6 +1,7 @@
 #include "scenes/mesh_files/mesh_report.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "models/base/setup_error.hpp"
 #include "models/mesh/mesh_topology.hpp"
@@ -77,7 +78,13 @@ std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double
                     ", write scale_m: " + description::number_text(scale * factor));
   }
   if (mesh.closed()) return lines;
-  const std::vector<MeshHole> holes = models::topology_of(mesh).holes;
+  // A crack is no wider than the rounding of its coordinates where a file has the same vertex twice, such as a pole of a
+  // sphere that a script reckoned once for each triangle. Nobody falls through it: no proxy is there.
+  const double largest_m = mesh.bounds().low.cwiseAbs().cwiseMax(mesh.bounds().high.cwiseAbs()).maxCoeff();
+  std::vector<MeshHole> holes = models::topology_of(mesh).holes;
+  std::erase_if(holes, [&](const MeshHole& hole) {
+    return hole.size_m < 2.0 * std::numeric_limits<double>::epsilon() * largest_m;
+  });
   const auto small = static_cast<std::size_t>(std::count_if(
       holes.begin(), holes.end(), [&](const MeshHole& hole) { return hole.size_m < hardly_seen * diagonal; }));
   if (small > 0) {
