@@ -78,8 +78,8 @@ std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double
                     ", write scale_m: " + description::number_text(scale * factor));
   }
   if (mesh.closed()) return lines;
-  // A crack is no wider than the rounding of its coordinates where a file has the same vertex twice, such as a pole of a
-  // sphere that a script reckoned once for each triangle. Nobody falls through it: no proxy is there.
+  // A crack is no wider than the rounding of its coordinates where a file has the same vertex twice, such as a pole of
+  // a sphere that a script reckoned once for each triangle. Nobody falls through it: no proxy is there.
   const double largest_m = mesh.bounds().low.cwiseAbs().cwiseMax(mesh.bounds().high.cwiseAbs()).maxCoeff();
   std::vector<MeshHole> holes = models::topology_of(mesh).holes;
   std::erase_if(holes, [&](const MeshHole& hole) {

@@ -448,8 +448,8 @@ TEST_F(OddMeshFiles, HaveCracksToldOfByTheirWidthAndOnlyWhereAProxyHasRoom) {
     return scenes::mesh_surprises(*mesh, 1.0, 1.0);
   };
   EXPECT_THAT(told_of(1e-17), testing::IsEmpty());
-  // Cracks that are 2 π 1 µm / 40 wide at their end, half of that on average, and a crack's size is twice its width. The
-  // smallest cover isn't looked for: one that is half as large again is good enough.
+  // Cracks that are 2 π 1 µm / 40 wide at their end, half of that on average, and a crack's size is twice its width.
+  // The smallest cover isn't looked for: one that is half as large again is good enough.
   const auto surprises = told_of(1e-6);
   ASSERT_EQ(surprises.size(), 1u);
   const std::string before = "falls through 1 small hole: ";
