@@ -224,7 +224,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                  choice<Pace>("--pace", {{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}},
                               [&](Pace value) { options.pace = value; }),
                  "virtual (default in-process) or realtime")
-      ->type_name("PACE");
+      ->type_name("virtual|realtime");
   app.add_option("--order",
                  choice<int>("--order", {{"1", 1}, {"2", 2}}, [&](int value) { options.settings.order = value; }),
                  "1: eq. (26) (default); 2: its second-order sibling")
@@ -463,7 +463,8 @@ class Commands {
     CLI::App* check = add("check", "whether cell, scene, hand, sensor and other files are fine. Status 2: one isn't",
                           [this] { return check_command(check_); });
     check->add_option("files", check_.files, "files to check")->required();
-    check->add_option("--scene", check_.scene, "the scene that cells are held against (default: each cell's own)");
+    check->add_option("--scene", check_.scene, "the scene that cells are held against (default: each cell's own)")
+        ->type_name("FILE");
     add_check_options(*check, check_.states);
     add("explain", "what a scene compiles to, what is skipped and why", [this] { return explain_command(explain_); })
         ->add_option("scene", explain_.files, "scene file")

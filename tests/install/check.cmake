@@ -12,8 +12,20 @@ endfunction()
 
 run(${CMAKE_COMMAND} --install ${build} --prefix ${folder}/prefix)
 
-# What the view serves and what cells, scenes and hands are read from: every file is there, whatever its name ends in.
 get_filename_component(source ${CMAKE_CURRENT_LIST_DIR}/../.. ABSOLUTE)
+# Docs, manual pages and completion.
+file(GLOB_RECURSE docs RELATIVE ${source} ${source}/docs/*.md ${source}/docs/*.png ${source}/docs/*.svg)
+foreach(file IN LISTS docs ITEMS README.md CHANGELOG.md)
+  list(APPEND rest share/doc/proxarm/${file})
+endforeach()
+foreach(file IN LISTS rest ITEMS share/man/man1/proxarm.1.gz share/man/man1/proxarm-run.1.gz
+        share/bash-completion/completions/proxarm)
+  if(NOT EXISTS ${folder}/prefix/${file})
+    message(FATAL_ERROR "${file} isn't installed")
+  endif()
+endforeach()
+
+# What the view serves and what cells, scenes and hands are read from: every file is there, whatever its name ends in.
 file(GLOB_RECURSE shipped RELATIVE ${source} ${source}/controller/view/page/* ${source}/models/cells/*.yaml
      ${source}/scenes/*.yaml ${source}/scenes/meshes/* ${source}/sim/hands/*.yaml)
 list(FILTER shipped INCLUDE REGEX "\\.[a-z]+$")
