@@ -9,6 +9,37 @@ namespace proxarm::description {
 namespace {
 
 constexpr Range stiffness_range = between(0.0, 1e5), damping_range = between(0.0, 1e4);
+constexpr Range place_range = between(-100.0, 100.0), force_range = between(-1e4, 1e4);
+
+// `FILE.csv`, whose header has these names; or `{file: FILE.csv, columns: {x_m: px}}` for others.
+std::vector<TimedVector> read_data(const YamlNode& root, const char* key, CsvColumns columns, Range range,
+                                   HandDescription& hand) {
+  const YamlNode node = root.at(key);
+  hand.data_files.push_back(node.is_map() ? node.existing_file("file") : root.existing_file(key));
+  if (const auto names = node.is_map() ? node.find_map("columns") : std::nullopt) {
+    for (std::string& column : columns) {
+      if (names->has(column)) column = names->string(column);
+    }
+  }
+  return load_csv(hand.data_files.back(), columns, range);
+}
+
+// The tool begins where the trajectory does, wherever that was recorded.
+void begin_at_zero(std::vector<TimedVector>& trajectory) {
+  const std::array<double, 3> first = trajectory.front().value;
+  for (TimedVector& sample : trajectory) {
+    for (std::size_t i = 0; i < 3; ++i) sample.value[i] -= first[i];
+  }
+}
+
+void read_hand_data(const YamlNode& root, HandDescription& hand) {
+  if (root.has("trajectory")) {
+    if (root.has("waypoints")) throw root.error_at("trajectory", "either waypoints or a trajectory", "both");
+    hand.trajectory = read_data(root, "trajectory", {"time_s", "x_m", "y_m", "z_m"}, place_range, hand);
+    begin_at_zero(hand.trajectory);
+  }
+  if (root.has("force")) hand.force = read_data(root, "force", {"time_s", "x_N", "y_N", "z_N"}, force_range, hand);
+}
 
 Waypoint read_waypoint(const YamlNode& node) {
   return {.time_s = node.number("time_s", 0.0, 1e6), .offset_m = node.vec3("offset_m", between(-10.0, 10.0))};
@@ -44,6 +75,8 @@ HandDescription read_hand(const YamlNode& root) {
   hand.file = std::filesystem::absolute(file).lexically_normal();
   hand.name = root.string_or("name", file.stem().string());
   hand.mass_kg = root.number_or("mass_kg", hand.mass_kg, 0.0, 100.0);
+  const bool follows = root.has("waypoints") || root.has("trajectory") || root.has("multisine");
+  if (root.has("force") && !follows) hand.stiffness_N_per_m = hand.damping_Ns_per_m = 0.0;
   hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, stiffness_range);
   hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, damping_range);
   hand.max_force_N = root.number_or("max_force_N", hand.max_force_N, between(1.0, 1e5));
@@ -71,6 +104,7 @@ HandDescription read_hand(const YamlNode& root) {
   if (root.has("multisine")) {
     for (const YamlNode& node : root.list("multisine", 1, 1000)) hand.multisine.push_back(read_sine(node));
   }
+  read_hand_data(root, hand);
   root.finish();
   return hand;
 }

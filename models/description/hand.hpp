@@ -4,6 +4,10 @@
 // minimum-jerk motions, plus a sum of sines. With s = (t − t_i)/(t_{i+1} − t_i) in [0, 1]:
 //   x(t) = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵) + Σ_j a_j d_j sin(2π f_j t + φ_j)
 // It rests at the first waypoint before its time and at the last one after it. No waypoint: it holds the start.
+//
+// Or both come as data, from CSV files: a trajectory in the place of waypoints, and a force that it exerts beside that
+// of its grip. A hand with a force and nothing to follow has no grip unless the file gives it one: what it exerts is
+// what the file says, whatever the tool does.
 #pragma once
 
 #include <array>
@@ -11,6 +15,8 @@
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "models/files/csv_file.hpp"
 
 namespace proxarm::description {
 
@@ -46,6 +52,9 @@ struct HandDescription {
   std::vector<Grip> grips;                                       // after the one above
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
+  std::vector<TimedVector> trajectory;            // instead of waypoints; m, in W, from its first row on
+  std::vector<TimedVector> force;                 // N, in W; none before its first row and after its last
+  std::vector<std::filesystem::path> data_files;  // that both were read from
 };
 
 // The stiffest of all its grips.

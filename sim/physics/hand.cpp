@@ -12,21 +12,78 @@ Hand::Hand(const description::HandDescription& description, const Vec3& start_W)
 
 // Minimum jerk between waypoints, with s = (t − t_i)/(t_{i+1} − t_i):
 //   x = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵),   ẋ = (x_{i+1} − x_i)(30 s² − 60 s³ + 30 s⁴)/(t_{i+1} − t_i)
-// and on top of it Σ a_j d_j sin(2π f_j t + φ_j), from its own time zero on (before, it rests where that begins).
-Intention Hand::intention(double time_s) const noexcept {
-  Intention result;
-  result.position_W = start_W_;
+void Hand::add_waypoints(double time_s, Intention& want) const noexcept {
   const auto& points = description_.waypoints;
   std::size_t next = 0;
   while (next < points.size() && points[next].time_s <= time_s) ++next;
-  if (!points.empty()) result.position_W += Vec3(points[next == 0 ? 0 : next - 1].offset_m.data());
+  if (!points.empty()) want.position_W += Vec3(points[next == 0 ? 0 : next - 1].offset_m.data());
   if (next > 0 && next < points.size()) {
     const auto &a = points[next - 1], &b = points[next];
     const double duration = b.time_s - a.time_s, s = (time_s - a.time_s) / duration;
     const Vec3 way = Vec3(b.offset_m.data()) - Vec3(a.offset_m.data());
-    result.position_W += way * (s * s * s * (10.0 + s * (-15.0 + s * 6.0)));
-    result.velocity_W = way * (30.0 * s * s * (1.0 - s) * (1.0 - s) / duration);
+    want.position_W += way * (s * s * s * (10.0 + s * (-15.0 + s * 6.0)));
+    want.velocity_W = way * (30.0 * s * s * (1.0 - s) * (1.0 - s) / duration);
   }
+}
+
+namespace {
+
+Vec3 value_of(const description::TimedVector& row) { return Vec3(row.value.data()); }
+
+// The slope at a row of the parabola through it and its neighbours; at rest at both ends.
+//   ẋ_i = (v₁ d₀ + v₀ d₁)/(d₀ + d₁),   v₀ = (x_i − x_{i−1})/d₀,  v₁ = (x_{i+1} − x_i)/d₁
+Vec3 slope(const std::vector<description::TimedVector>& rows, std::size_t i) {
+  if (i == 0 || i + 1 == rows.size()) return Vec3::Zero();
+  const double d0 = rows[i].time_s - rows[i - 1].time_s, d1 = rows[i + 1].time_s - rows[i].time_s;
+  const Vec3 v0 = (value_of(rows[i]) - value_of(rows[i - 1])) / d0;
+  const Vec3 v1 = (value_of(rows[i + 1]) - value_of(rows[i])) / d1;
+  return (v1 * d0 + v0 * d1) / (d0 + d1);
+}
+
+// The first row after this time; as many as there are after the last.
+std::size_t row_after(const std::vector<description::TimedVector>& rows, double time_s) {
+  const auto next =
+      std::upper_bound(rows.begin(), rows.end(), time_s, [](double t, const auto& row) { return t < row.time_s; });
+  return static_cast<std::size_t>(next - rows.begin());
+}
+
+}  // namespace
+
+// With s as above, d = t_{i+1} − t_i, places x₀ and x₁ and slopes m₀ and m₁:
+//   x = x₀ + (x₁ − x₀)(3 s² − 2 s³) + d (m₀ (s − 2 s² + s³) + m₁ (s³ − s²))
+void Hand::add_trajectory(double time_s, Intention& want) const noexcept {
+  const auto& rows = description_.trajectory;
+  if (rows.empty()) return;
+  const std::size_t next = row_after(rows, time_s);
+  if (next == 0 || next == rows.size()) {
+    want.position_W += value_of(next == 0 ? rows.front() : rows.back());
+    return;
+  }
+  const double d = rows[next].time_s - rows[next - 1].time_s, s = (time_s - rows[next - 1].time_s) / d;
+  const Vec3 x0 = value_of(rows[next - 1]), way = value_of(rows[next]) - x0;
+  const Vec3 m0 = slope(rows, next - 1), m1 = slope(rows, next);
+  want.position_W +=
+      x0 + way * (s * s * (3.0 - 2.0 * s)) + d * (m0 * (s * (1.0 - s) * (1.0 - s)) - m1 * (s * s * (1.0 - s)));
+  want.velocity_W += way * (6.0 * s * (1.0 - s) / d) + m0 * ((1.0 - s) * (1.0 - 3.0 * s)) + m1 * (s * (3.0 * s - 2.0));
+}
+
+Vec3 Hand::data_force_W(double time_s) const noexcept {
+  const auto& rows = description_.force;
+  if (rows.empty() || time_s > rows.back().time_s) return Vec3::Zero();
+  const std::size_t next = row_after(rows, time_s);
+  if (next == 0) return Vec3::Zero();
+  if (next == rows.size()) return value_of(rows.back());  // at the last row's very time
+  const double s = (time_s - rows[next - 1].time_s) / (rows[next].time_s - rows[next - 1].time_s);
+  return (1.0 - s) * value_of(rows[next - 1]) + s * value_of(rows[next]);
+}
+
+// On top of where it is led comes Σ a_j d_j sin(2π f_j t + φ_j), from its own time zero on (before, it rests where that
+// begins).
+Intention Hand::intention(double time_s) const noexcept {
+  Intention result;
+  result.position_W = start_W_;
+  add_waypoints(time_s, result);
+  add_trajectory(time_s, result);
   const double sine_time = time_s > 0.0 ? time_s : 0.0;
   for (const auto& sine : description_.multisine) {
     const double omega = 2.0 * M_PI * sine.frequency_Hz, angle = omega * sine_time + sine.phase_rad;
@@ -51,8 +108,9 @@ description::Grip Hand::grip(double time_s) const noexcept {
 Vec3 Hand::force_W(double time_s, const Vec3& position_W, const Vec3& velocity_W) const noexcept {
   const Intention want = intention(time_s);
   const description::Grip held = grip(time_s);
-  const Vec3 F =
+  Vec3 F =
       held.stiffness_N_per_m * (want.position_W - position_W) + held.damping_Ns_per_m * (want.velocity_W - velocity_W);
+  if (!description_.force.empty()) F += data_force_W(time_s);
   const double length_N = F.norm();
   return length_N > description_.max_force_N ? Vec3(description_.max_force_N / length_N * F) : F;
 }

@@ -1,11 +1,11 @@
 // The person's hand in a simulation: it holds the handle through stiffness and damping and follows an intention.
 //
-//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ),   cut to max_force_N along itself
+//   F = K (x_int(t) − x) + D (ẋ_int(t) − ẋ) + F_data(t),   cut to max_force_N along itself
 // acts on hand and handle at T; x_int is the intention of description::HandDescription from where the tool was at the
-// start. The hand's mass belongs to ArmDynamics. Translation only: the hand doesn't twist the handle.
+// start. Between the rows of a trajectory, x_int is a cubic through their places with the slopes of parabolas through
+// three of them (Hermite); F_data is straight between those of a force. The hand's mass belongs to ArmDynamics.
+// Translation only: the hand doesn't twist the handle.
 #pragma once
-
-#include <vector>
 
 #include "models/description/hand.hpp"
 #include "models/geometry/geometry.hpp"
@@ -30,6 +30,9 @@ class Hand {
 
  private:
   [[nodiscard]] description::Grip grip(double time_s) const noexcept;
+  void add_waypoints(double time_s, Intention& want) const noexcept;
+  void add_trajectory(double time_s, Intention& want) const noexcept;
+  [[nodiscard]] models::Vec3 data_force_W(double time_s) const noexcept;
 
   description::HandDescription description_;
   models::Vec3 start_W_;

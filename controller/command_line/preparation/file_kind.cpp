@@ -16,7 +16,9 @@ FileKind kind_of_yaml(const description::YamlNode& root) {
   if (root.has("drives") || root.has("urdf")) return FileKind::cell;
   if (root.has("protocol") && root.has("command")) return FileKind::registers;
   if (root.has("protocol")) return FileKind::sensor;
-  if (root.has("waypoints") || root.has("multisine") || root.has("stiffness_N_per_m")) return FileKind::hand;
+  for (const char* key : {"waypoints", "multisine", "trajectory", "force", "stiffness_N_per_m"}) {
+    if (root.has(key)) return FileKind::hand;
+  }
   for (const char* key : {"objects", "media", "coulomb_field", "guide", "space", "dimensions"}) {
     if (root.has(key)) return FileKind::scene;
   }

@@ -76,6 +76,7 @@ controller::ReplayHead replay_head(const PreparedSession& session, const std::ve
 std::vector<fs::path> replay_files(const PreparedSession& session) {
   std::vector<fs::path> files{session.cell.file, session.cell.urdf, session.scene.file, session.sensor.file,
                               session.hand.file};
+  files.insert(files.end(), session.hand.data_files.begin(), session.hand.data_files.end());
   if (session.sensor.described) files.push_back(session.sensor.described->dbc);
   for (const description::DriveDescription& drive : session.cell.drives) {
     files.emplace_back(drive.description);

@@ -76,6 +76,64 @@ TEST(Hand, PullsNoHarderThanItCan) {
   EXPECT_LT((hand.force_W(0.0, Vec3(-0.6, 0.0, 0.8), Vec3::Zero()) - Vec3(30.0, 0.0, -40.0)).norm(), 1e-12);
 }
 
+// ---- motions and forces as data -------------------------------------------------------------------------------------
+
+description::HandDescription with_trajectory() {
+  description::HandDescription hand;
+  hand.trajectory = {{0.5, {0, 0, 0}}, {0.9, {0.01, 0, 0.02}}, {1.0, {0.03, -0.01, 0}}, {1.6, {0.02, 0.05, 0.01}}};
+  return hand;
+}
+
+TEST(Hand, GoesThroughTheRowsOfItsTrajectoryAndRestsAtBothEnds) {
+  const Vec3 start(0.7, 0.0, 0.6);
+  const Hand hand(with_trajectory(), start);
+  for (const description::TimedVector& row : with_trajectory().trajectory) {
+    EXPECT_LT((hand.intention(row.time_s).position_W - start - Vec3(row.value.data())).norm(), 1e-15) << row.time_s;
+  }
+  EXPECT_EQ(hand.intention(-1.0).position_W, start);
+  EXPECT_EQ(hand.intention(0.5).velocity_W, Vec3::Zero());
+  EXPECT_LT((hand.intention(9.0).position_W - start - Vec3(0.02, 0.05, 0.01)).norm(), 1e-15);
+  EXPECT_EQ(hand.intention(9.0).velocity_W, Vec3::Zero());
+}
+
+// A parabola's slopes are exact by three points, and a cubic holds it: only the first and last span rest at their ends.
+TEST(Hand, FollowsAParabolaExactlyWhateverTheRowsTimes) {
+  const auto at = [](double t) { return Vec3(0.3 * t * t, -0.1 * t, 0.02 + 0.05 * t * (1.0 - t)); };
+  description::HandDescription description;
+  for (const double t : {0.0, 0.1, 0.17, 0.3, 0.31, 0.5, 0.8}) {
+    const Vec3 x = at(t);
+    description.trajectory.push_back({t, {x.x(), x.y(), x.z()}});
+  }
+  const Hand hand(description, Vec3::Zero());
+  for (double t = 0.1; t <= 0.5; t += 0.0123) {
+    EXPECT_LT((hand.intention(t).position_W - at(t)).norm(), 1e-15) << t;
+    EXPECT_LT((hand.intention(t).velocity_W - Vec3(0.6 * t, -0.1, 0.05 - 0.1 * t)).norm(), 1e-14) << t;
+  }
+}
+
+TEST(Hand, HasTheVelocityThatIsItsTrajectorysDerivative) {
+  const Hand hand(with_trajectory(), Vec3::Zero());
+  for (double t = 0.45; t < 1.7; t += 0.00377) {
+    constexpr double h = 1e-6;  // slopes bend at rows: error h x''/2, with x'' below 10 m/s²
+    const Vec3 slope = (hand.intention(t + h).position_W - hand.intention(t - h).position_W) / (2.0 * h);
+    EXPECT_LT((slope - hand.intention(t).velocity_W).norm(), 1e-5) << t;
+  }
+}
+
+TEST(Hand, ExertsTheForceOfItsDataBesideThatOfItsGrip) {
+  description::HandDescription description;
+  description.force = {{1.0, {2, 0, 0}}, {1.5, {4, -2, 0}}};
+  description.stiffness_N_per_m = 100.0;
+  description.damping_Ns_per_m = 0.0;
+  const Hand hand(description, Vec3::Zero());
+  const auto force = [&](double t) { return hand.force_W(t, Vec3(0.01, 0, 0), Vec3::Zero()); };
+  EXPECT_LT((force(0.9) - Vec3(-1, 0, 0)).norm(), 1e-14) << "not yet";
+  EXPECT_LT((force(1.0) - Vec3(1, 0, 0)).norm(), 1e-14);
+  EXPECT_LT((force(1.25) - Vec3(2, -1, 0)).norm(), 1e-14) << "half way";
+  EXPECT_LT((force(1.5) - Vec3(3, -2, 0)).norm(), 1e-14);
+  EXPECT_LT((force(1.51) - Vec3(-1, 0, 0)).norm(), 1e-14) << "not any more";
+}
+
 // The hands that come with the project start at rest on the handle, or the arm would feel a push when it wakes up.
 TEST(Hand, ComesInFilesThatStartWithoutAForce) {
   for (const char* file : {"sim/hands/touch.yaml", "sim/hands/sweep.yaml"}) {
