@@ -8,6 +8,7 @@
 #include "controller/command_line/preparation/file_kind.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/trials/cycle_work.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/cia402/cia402_bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
@@ -156,11 +157,30 @@ int check_command(const CheckFilesOptions& options) {
   return status;
 }
 
+namespace {
+
+// What a cycle of the default cell does around that, counted in its default session; why not, where that can't be.
+std::string explain_cycle(const fs::path& scene) {
+  RunOptions options;
+  options.scene = scene;
+  try {
+    const PreparedSession session = prepare(options);
+    require_runnable(session, options);
+    return work_text(session, count_work(session));
+  } catch (const description::SetupError& error) {
+    return std::string("a cycle around that wasn't counted, since the default cell doesn't render it: ") +
+           error.what() + "\n";
+  }
+}
+
+}  // namespace
+
 int explain_command(const FileOptions& options) {
   for (const fs::path& given : options.files) {
     const fs::path file = user_file(given);
     require_kind(file, FileKind::scene);
-    std::printf("%s: %s", given.c_str(), scenes::explain(scenes::load_scene(file)).c_str());
+    std::printf("%s: %s%s", given.c_str(), scenes::explain(scenes::load_scene(file)).c_str(),
+                explain_cycle(file).c_str());
   }
   return 0;
 }

@@ -17,7 +17,9 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
+#include "controller/limits/joint_limits.hpp"
 #include "controller/limits/step_limits.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -29,21 +31,29 @@ class LimitSets {
  public:
   using V = models::Vec<N>;
 
-  void clear() noexcept { soft_count_ = plane_count_ = flat_count_ = hard_count_ = 0; }
+  void clear() noexcept {
+    soft_count_ = plane_count_ = flat_count_ = hard_count_ = 0;
+    joints_ = nullptr;
+  }
 
   // The intersection of sets in W with a scene's space (basis: 3×N, orthonormal).
   void set(const StepLimits& limits, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     clear();
     for (std::size_t i = 0; i < limits.soft_count; ++i) soft_[soft_count_++] = cut(limits.soft[i], basis);
     for (std::size_t i = 0; i < limits.hard_count; ++i) hard_[hard_count_++] = cut(limits.hard[i], basis);
-    for (std::size_t i = 0; i < limits.plane_count; ++i) {
-      const LimitPlane<3>& plane = limits.planes[i];
-      const V normal = basis.transpose() * plane.normal;
-      const double length = normal.norm();
-      if (!(length > 1e-9)) continue;  // parallel to the scene's space: no motion in it comes nearer
-      planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limit, plane.axis_bits};
-    }
-    flat_count_ = plane_count_;
+    add({limits.planes.data(), limits.plane_count}, basis);
+    joints_ = limits.joints;
+    basis_ = basis;
+  }
+
+  // Takes in the joints' limits, for a step of this length only if it may reach one. Precondition: before walls.
+  void take_joints_for(double step_m) noexcept {
+    if (joints_ != nullptr && !joints_->out_of_reach(step_m)) take_joints();
+  }
+  void take_joints() noexcept {
+    if (joints_ == nullptr) return;
+    add(joints_->planes(), basis_);
+    joints_ = nullptr;
   }
 
   // Walls, which nearest() treats as half-spaces, too: −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
@@ -123,6 +133,17 @@ class LimitSets {
   static constexpr double sweep_tolerance_m = 1e-13;
   static constexpr int most_exchanges = 60;  // of active sets; about 3 are usual
   static constexpr double parallel = 1e-12;  // sine of the angle below which normals count as parallel
+
+  void add(std::span<const LimitPlane<3>> planes, const Eigen::Matrix<double, 3, N>& basis) noexcept {
+    for (const LimitPlane<3>& plane : planes) {
+      if (plane_count_ == StepLimits::max_planes) break;
+      const V normal = basis.transpose() * plane.normal;
+      const double length = normal.norm();
+      if (!(length > 1e-9)) continue;  // parallel to the scene's space: no motion in it comes nearer
+      planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limit, plane.axis_bits};
+    }
+    flat_count_ = plane_count_;
+  }
 
   // Sets by number: planes, hard balls, soft balls.
   [[nodiscard]] std::size_t size(bool with_soft) const noexcept {
@@ -351,6 +372,8 @@ class LimitSets {
   std::array<LimitBall<N>, 2> soft_{}, hard_{};
   std::array<LimitPlane<N>, StepLimits::max_planes + most_walls> planes_{};  // walls last
   std::size_t soft_count_ = 0, plane_count_ = 0, flat_count_ = 0, hard_count_ = 0;
+  JointLimits* joints_ = nullptr;  // those that weren't taken in yet
+  Eigen::Matrix<double, 3, N> basis_ = Eigen::Matrix<double, 3, N>::Zero();
 };
 
 }  // namespace proxarm::controller

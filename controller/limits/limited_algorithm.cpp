@@ -20,7 +20,11 @@ auto LimitedAlgorithm<N>::operator()(double K, const V& p, const V& q) noexcept 
   active_ = {};
   soft_met_ = true;
   limit_shift_ = V::Zero();
-  if (!sets_.contains(r - q_k1_, tolerance_m, true)) r = solve(K, p, q, r);
+  sets_.take_joints_for((r - q_k1_).norm());
+  if (!sets_.contains(r - q_k1_, tolerance_m, true)) {
+    sets_.take_joints();
+    r = solve(K, p, q, r);
+  }
   gather_contacts();
   return r;
 }

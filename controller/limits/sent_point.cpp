@@ -62,7 +62,9 @@ void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits&
   Vec3 way = predicted_W + state_.beside_W - state_.c_k1_W;
   sets_.set(limits, models::Mat3::Identity());
   active_ = {};
+  sets_.take_joints_for(way.norm());
   if (!sets_.contains(way, tolerance_m, true)) {
+    sets_.take_joints();
     int sweeps = most_sweeps;
     auto nearest = sets_.nearest(way, true, sweeps);
     if (!sets_.contains(nearest.x, 1e-9, true)) {  // leash and power give way

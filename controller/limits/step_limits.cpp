@@ -6,8 +6,6 @@
 #include <limits>
 #include <numbers>
 
-#include "models/arm/held_orientation.hpp"
-
 namespace proxarm::controller {
 
 using models::JointVector;
@@ -15,11 +13,9 @@ using models::Vec3;
 
 namespace {
 
-// The damping of joints_per_m(). Near a singularity it bounds the joints' motion; what they would turn beyond, the
-// inverse kinematics limits.
+// The damping of joints_per_m() (held_orientation.hpp). Near a singularity it bounds the joints' motion; what they
+// would turn beyond, the inverse kinematics limits.
 constexpr double damping_m_per_rad = 1e-3;
-// The share of a joint's speed that the tool's translation may use; the rest is for its rotation and the gears' twist.
-constexpr double speed_share = 0.95;
 // The share of the tool's speed limit that is commanded. Elastic gears add some 7 % when the hand pulls the arm along
 // at the limit.
 constexpr double commanded_share = 0.9;
@@ -72,26 +68,15 @@ StepLimiter::StepLimiter(const std::vector<description::DriveDescription>& drive
                          const description::CellLimits& limits, double period_s)
     : limits_(limits), period_s_(period_s), omega_rad_per_s_(2.0 * std::numbers::pi * limits.setpoint_bandwidth_Hz) {
   for (const description::DriveDescription& drive : drives) {
-    joints_.push_back(
-        {drive.range_rad[0], drive.range_rad[1], drive.max_speed_rad_per_s, drive.max_acceleration_rad_per_s2});
+    joints_.push_back({drive.range_rad[0], drive.range_rad[1]});
   }
 }
 
-void StepLimiter::make(const StepStart& start, const JointVector& joint_rad, const JointVector& twist_rad,
-                       const models::Jacobian& J_W, StepLimits& out) const noexcept {
+void StepLimiter::make(const StepStart& start, JointLimits* joints, StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
+  out.joints = joints;
   add_balls(start, out);
   add_borders(start.q_k1_W, Borders::slow_down, out);
-  add_joints(joint_rad, twist_rad, J_W, out);
-}
-
-void StepLimiter::make_sent(const StepStart& start, const StepLimits& of_proxy, StepLimits& out) const noexcept {
-  out.soft_count = out.plane_count = out.hard_count = 0;
-  add_balls(start, out);
-  add_borders(start.q_k1_W, Borders::slow_down, out);
-  for (std::size_t i = 0; i < of_proxy.plane_count; ++i) {
-    if (of_proxy.planes[i].axis_bits != 0) add_plane(out, of_proxy.planes[i]);
-  }
 }
 
 void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, const models::Jacobian& J_W,
@@ -147,31 +132,7 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
   }
 }
 
-void StepLimiter::add_joints(const JointVector& joint_rad, const JointVector& twist_rad, const models::Jacobian& J_W,
-                             StepLimits& out) const noexcept {
-  const models::SmallColumns3 G = models::joints_per_m(J_W);
-  const double T = period_s_;
-  for (std::size_t i = 0; i < joints_.size(); ++i) {
-    const Joint& joint = joints_[i];
-    const auto k = static_cast<Eigen::Index>(i);
-    const Vec3 row = G.row(k);
-    const double length = row.norm();
-    if (!(length > 1e-9)) continue;
-    const auto bit = static_cast<std::uint8_t>(1u << i);
-    const double per_step = speed_share * joint.speed_rad_per_s * T;
-    const double share = T / (T + joint.speed_rad_per_s / joint.acceleration_rad_per_s2);
-    const double to_upper = joint.upper_rad - joint_rad[k] - std::max(0.0, twist_rad[k]);
-    const double to_lower = joint_rad[k] - joint.lower_rad - std::max(0.0, -twist_rad[k]);
-    for (const double sign : {1.0, -1.0}) {
-      const double room = std::max(0.0, share * (sign > 0.0 ? to_upper : to_lower));
-      const bool range = room < per_step;
-      add_plane(out, {sign / length * row, std::min(room, per_step) / length,
-                      range ? Limit::joint_range : Limit::joint_speed, bit, range ? share : 0.0});
-    }
-  }
-}
-
-// The same for the tool's translation alone, as torques render it: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
+// The planes of joint_limits.hpp for the tool's translation alone, as torques render it: G = Jᵀ(J Jᵀ + λ²E)⁻¹.
 void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
                                   StepLimits& out) const noexcept {
   models::Mat3 A = J_W.topRows<3>().lazyProduct(J_W.topRows<3>().transpose());

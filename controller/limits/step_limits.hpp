@@ -2,6 +2,7 @@
 //
 //   ball        ‖q − c‖ ≤ r       speed, acceleration, power, leash
 //   half-space  n·(q − q₁) ≤ b    workspace, keep-out zones, joint ranges, joint speeds
+// (those of the joints in joint_limits.hpp)
 //
 // The proxy's next position is the point of contacts ∩ sets that is nearest to p̂, found in one solve
 // (limited_algorithm.hpp). If not all can be satisfied, they give way in this order: friction, contact, leash and
@@ -98,6 +99,8 @@ struct LimitPlane {
   double share = 0.0;  // share of a step towards it by which its bound shrinks for the next step; 0 for a speed
 };
 
+class JointLimits;
+
 struct StepLimits {
   static constexpr std::size_t max_planes = 40;
   std::array<LimitBall<3>, 2> soft{};  // leash, power: these may give way
@@ -106,6 +109,7 @@ struct StepLimits {
   std::size_t plane_count = 0;
   std::array<LimitBall<3>, 2> hard{};  // speed, acceleration
   std::size_t hard_count = 0;
+  JointLimits* joints = nullptr;  // further planes, which are made where a step may reach them; null: none
 };
 
 // The state that a step begins with, in W.
@@ -123,14 +127,10 @@ class StepLimiter {
               double period_s);
 
   void set_period(double period_s) noexcept { period_s_ = period_s; }
-  // Makes the sets of one step. `joint_rad`: angles of the links at q₁; `twist_rad`: by how much each motor is ahead of
-  // its link; `J_W`: of T at joint_rad. Neither allocates nor throws.
-  void make(const StepStart& start, const models::JointVector& joint_rad, const models::JointVector& twist_rad,
-            const models::Jacobian& J_W, StepLimits& out) const noexcept;
-  // Makes the sets around the point that the arm is sent to, if that isn't the proxy (sent_point.hpp); `start` holds it
-  // as q_k1_W and q_k2_W. Precondition: make() has made `of_proxy` for the same angles; the planes of the joints are
-  // taken from it.
-  void make_sent(const StepStart& start, const StepLimits& of_proxy, StepLimits& out) const noexcept;
+  // Makes the sets of one step, around the proxy or around another point that the arm is sent to (sent_point.hpp);
+  // `start` holds it as q_k1_W and q_k2_W. `joints`: the joints' limits where the links are. Neither allocates nor
+  // throws.
+  void make(const StepStart& start, JointLimits* joints, StepLimits& out) const noexcept;
   // Impedance type: makes only the borders, as walls for a proxy whose tool is at q_W. They don't slow the tool before
   // them, but push it back if it is pushed through.
   void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,
@@ -139,11 +139,9 @@ class StepLimiter {
  private:
   enum class Borders : std::uint8_t { slow_down, walls };
   struct Joint {
-    double lower_rad, upper_rad, speed_rad_per_s, acceleration_rad_per_s2;
+    double lower_rad, upper_rad;
   };
   void add_borders(const models::Vec3& q_W, Borders borders, StepLimits& out) const noexcept;
-  void add_joints(const models::JointVector& joint_rad, const models::JointVector& twist_rad,
-                  const models::Jacobian& J_W, StepLimits& out) const noexcept;
   void add_joint_walls(const models::JointVector& joint_rad, const models::Jacobian& J_W,
                        StepLimits& out) const noexcept;
   void add_balls(const StepStart& start, StepLimits& out) const noexcept;

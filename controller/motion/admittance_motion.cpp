@@ -47,6 +47,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       supervision_(supervision),
       period_s_(settings.period_s),
       limiter_(drives_, limits, settings.period_s),
+      joint_limits_(arm, drives_, settings.period_s),
       guard_(drives_, settings.period_s),
       tool_guard_(arm, drives_, limits, settings.period_s) {
   state_.link_rad = solution_.q = arm.start_rad();
@@ -130,6 +131,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   if (passivity_) passivity_->set_period(period_s);
   if (empty_handle_) empty_handle_->set_period(period_s);
   limiter_.set_period(period_s);
+  joint_limits_.set_period(period_s);
   if (sent_) sent_->set_period(period_s);
   guard_.set_period(period_s);
   tool_guard_.set_period(period_s);
@@ -192,6 +194,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   cycle.record.set(RecordFlag::limit_orientation,
                    parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
   follow_proxy(cycle);
+  count_work(step);
   const double distance_m = (measured.tool_W - state_.q_k1_W).norm();
   if (!(distance_m <= limits_.leash_m + leash_tolerance_m)) {
     cycle.alarm.raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
@@ -202,11 +205,11 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
 // Makes the sets that limit this step: around the proxy, and around the motion commanded behind the setpoints' filter.
 void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
   limit_speed(cycle);
-  arm_.kinematics(parts_.elastic.link_rad(), filtered_);
+  const models::ToolKinematics& filtered = parts_.elastic.kinematics();
   StepStart start{.q_k1_W = state_.q_k1_W,
                   .q_k2_W = state_.q_k2_W,
-                  .filtered_W = filtered_.X_WT.translation(),
-                  .filtered_velocity_W = filtered_.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
+                  .filtered_W = filtered.X_WT.translation(),
+                  .filtered_velocity_W = filtered.J_W.topRows<3>() * parts_.elastic.link_rad_per_s(),
                   .measured_W = cycle.measured.tool_W,
                   .force_N = cycle.measured.hand_W.force.norm(),
                   .max_speed_m_per_s = state_.speed_limit_m_per_s};
@@ -215,8 +218,8 @@ void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
     start.filtered_W = sent_->filtered_W();
     start.filtered_velocity_W = sent_->filtered_velocity_W();
   }
-  limiter_.make(start, state_.link_rad, guard_.target_rad() - parts_.elastic.link_rad(), solution_.kinematics.J_W,
-                step_limits_);
+  joint_limits_.begin(state_.link_rad, guard_.target_rad() - parts_.elastic.link_rad(), solution_.kinematics.J_W);
+  limiter_.make(start, &joint_limits_, step_limits_);
   if (sent_) make_sent_limits(sent);
 }
 
@@ -225,7 +228,7 @@ void AdmittanceMotion::make_limits(const MotionCycle& cycle) noexcept {
 void AdmittanceMotion::make_sent_limits(StepStart start) noexcept {
   start.q_k1_W = sent_->c_k1_W();
   start.q_k2_W = sent_->c_k2_W();
-  limiter_.make_sent(start, step_limits_, sent_limits_);
+  limiter_.make(start, &joint_limits_, sent_limits_);
 }
 
 // The arm is sent to the point where the proxy would be after the horizon H if it coasted. If the hand's force h were
@@ -306,6 +309,15 @@ void AdmittanceMotion::judge_force(const MotionCycle& cycle, const Vec3& v_W, bo
 void AdmittanceMotion::advance_proxy(const Vec3& q_W) noexcept {
   state_.q_k2_W = state_.q_k1_W;
   state_.q_k1_W = q_W;
+}
+
+void AdmittanceMotion::count_work(const WorldStep& step) noexcept {
+  ++work_.steps;
+  work_.joint_limits = joint_limits_.counts().made;
+  work_.joint_bounds = joint_limits_.counts().bounds;
+  if (step.limits.kinds != 0) ++work_.limited;
+  work_.joint_steps += static_cast<std::uint64_t>(solution_.iterations);
+  work_.guarded = tool_guard_.judged_exactly();
 }
 
 void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& record) noexcept {

@@ -18,6 +18,7 @@
 
 #include "controller/handle/empty_handle.hpp"
 #include "controller/handle/force_plausibility.hpp"
+#include "controller/limits/joint_limits.hpp"
 #include "controller/limits/sent_point.hpp"
 #include "controller/limits/step_limits.hpp"
 #include "controller/motion/motion.hpp"
@@ -64,6 +65,7 @@ class AdmittanceMotion final : public Motion {
     return supervision_.let_go == description::LetGo::hold && empty_handle_ && empty_handle_->empty();
   }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
+  [[nodiscard]] const MotionWork* work() const noexcept override { return &work_; }
 
   void archive(fieldbus::StateArchive& state) noexcept override;
 
@@ -99,6 +101,7 @@ class AdmittanceMotion final : public Motion {
   void judge_force(const MotionCycle& cycle, const models::Vec3& v_W, bool empty) noexcept;
   [[nodiscard]] models::Vec3 moving_force_W(const models::Vec3& force_W) const noexcept;
   void advance_proxy(const models::Vec3& q_W) noexcept;
+  void count_work(const WorldStep& step) noexcept;
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;
   void shorten_step(const models::JointVector& link_k1_rad, const models::Vec3& reached_k1_W) noexcept;
@@ -121,16 +124,17 @@ class AdmittanceMotion final : public Motion {
   ReversedForce reversed_;
   StraightForce straight_;
   StepLimiter limiter_;
+  JointLimits joint_limits_;
   std::optional<SentPoint> sent_;  // nullopt: the arm is sent to the proxy itself
   JointGuard guard_;
   ToolGuard tool_guard_;
   SetpointEnvelope envelope_;  // of the setpoints; a blocked joint's is frozen
   State state_;
+  MotionWork work_;
 
   // The values of this cycle:
   StepLimits step_limits_;
   StepLimits sent_limits_;                    // around the point that the arm is sent to (with lookahead)
-  models::ToolKinematics filtered_;           // of the links as commanded, behind the filter
   models::InverseKinematicsResult solution_;  // for the pose that the arm is sent to
 };
 

@@ -15,6 +15,7 @@
 
 #include "controller/limits/step_limits.hpp"
 #include "controller/motion/measurement.hpp"
+#include "controller/motion/motion_work.hpp"
 #include "controller/motion/setpoints.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/rendering/change.hpp"
@@ -91,6 +92,8 @@ class Motion {
   [[nodiscard]] virtual const models::Vec3& proxy_W() const noexcept = 0;
   // The limits that were active in this cycle.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
+  // Null: nothing is counted.
+  [[nodiscard]] virtual const MotionWork* work() const noexcept { return nullptr; }
   // This cycle's setpoints are made already. A second step in the same cycle would double the speed.
   [[nodiscard]] bool made_setpoints() const noexcept { return made_setpoints_; }
 

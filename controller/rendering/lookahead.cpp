@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace proxarm::controller {
 
@@ -40,7 +41,7 @@ auto Lookahead<N>::operator()(const AdmittanceProxy<N>& proxy, const SceneChange
   for (int k = 1; k <= count; ++k) {
     before = proxy_.q();
     changes_.step();
-    shift_limits(limits, basis * (before - proxy.q()));
+    shift_limits(basis * (before - proxy.q()));
     limited_.set_limits(ahead_, basis, before);
     if (proxy_.step(h) != ProxyFault::none || limited_.squeezed()) return before;
   }
@@ -60,20 +61,23 @@ void Lookahead<N>::gather_limits(const StepLimits& limits, double reach_m) noexc
   for (std::size_t i = 0; i < limits.soft_count; ++i) {
     if (limits.soft[i].limit == Limit::power) ahead_.soft[ahead_.soft_count++] = limits.soft[i];
   }
-  for (std::size_t i = 0; i < limits.plane_count; ++i) {
-    const LimitPlane<3>& plane = limits.planes[i];
-    if (plane.bound_m - plane.share * reach_m > most_m) continue;
-    of_[ahead_.plane_count] = i;
-    ahead_.planes[ahead_.plane_count++] = plane;
-  }
+  const auto gather = [&](std::span<const LimitPlane<3>> planes) {
+    for (const LimitPlane<3>& plane : planes) {
+      if (plane.bound_m - plane.share * reach_m > most_m || ahead_.plane_count == StepLimits::max_planes) continue;
+      bounds_m_[ahead_.plane_count] = plane.bound_m;
+      ahead_.planes[ahead_.plane_count++] = plane;
+    }
+  };
+  gather({limits.planes.data(), limits.plane_count});
+  if (limits.joints != nullptr && !limits.joints->out_of_reach(most_m, reach_m)) gather(limits.joints->planes());
 }
 
 template <int N>
-void Lookahead<N>::shift_limits(const StepLimits& limits, const Vec3& way_W) noexcept {
+void Lookahead<N>::shift_limits(const Vec3& way_W) noexcept {
   for (std::size_t i = 0; i < ahead_.plane_count; ++i) {
-    const LimitPlane<3>& plane = limits.planes[of_[i]];
+    LimitPlane<3>& plane = ahead_.planes[i];
     const double nearer_m = plane.share * plane.normal.dot(way_W);
-    ahead_.planes[i].bound_m = std::max(0.0, plane.bound_m - std::max(0.0, nearer_m));
+    plane.bound_m = std::max(0.0, bounds_m_[i] - std::max(0.0, nearer_m));
   }
 }
 

@@ -45,14 +45,14 @@ class Lookahead {
 
  private:
   void gather_limits(const StepLimits& limits, double reach_m) noexcept;
-  void shift_limits(const StepLimits& limits, const models::Vec3& way_W) noexcept;
+  void shift_limits(const models::Vec3& way_W) noexcept;
 
   scenes::CompiledScene scene_;
   SceneChanges changes_;
   LimitedAlgorithm<N> limited_;
   AdmittanceProxy<N> proxy_;
-  StepLimits ahead_;                                      // of the predicted step
-  std::array<std::size_t, StepLimits::max_planes> of_{};  // for each of these planes, the index of the proxy's plane
+  StepLimits ahead_;                                       // of the predicted step
+  std::array<double, StepLimits::max_planes> bounds_m_{};  // of its planes, for the proxy's own step
 };
 
 extern template class Lookahead<1>;

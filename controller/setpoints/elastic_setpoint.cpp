@@ -13,6 +13,7 @@ ElasticSetpoint::ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, do
       angle_rad_(arm.start_rad()),
       speed_rad_per_s_(JointVector::Zero(arm.axes())) {
   set_period(period_s);
+  arm.kinematics(angle_rad_, kinematics_);
 }
 
 void ElasticSetpoint::set_period(double period_s) noexcept {
@@ -23,16 +24,24 @@ void ElasticSetpoint::set_period(double period_s) noexcept {
 void ElasticSetpoint::start(const JointVector& link_rad) noexcept {
   angle_rad_ = link_rad;
   speed_rad_per_s_.setZero();
+  arm_->kinematics(angle_rad_, kinematics_);
 }
 
 void ElasticSetpoint::resume(const JointVector& motor_rad, const JointVector& motor_rad_per_s) noexcept {
   angle_rad_ = arm_->link_from_motor(motor_rad);
   speed_rad_per_s_ = motor_rad_per_s;
+  arm_->kinematics(angle_rad_, kinematics_);
+}
+
+void ElasticSetpoint::archive(fieldbus::StateArchive& state) noexcept {
+  state(angle_rad_, speed_rad_per_s_);
+  if (state.reading()) arm_->kinematics(angle_rad_, kinematics_);
 }
 
 JointVector ElasticSetpoint::step(const JointVector& link_rad) noexcept {
   if (omega_rad_per_s_ <= 0.0) {
     angle_rad_ = link_rad;
+    arm_->kinematics(angle_rad_, kinematics_);
     return arm_->motor_from_link(link_rad);
   }
   // With e = q_f − q and q constant over the period:  e(T) = (e + (ė + ωe)T) exp(−ωT),
@@ -43,7 +52,7 @@ JointVector ElasticSetpoint::step(const JointVector& link_rad) noexcept {
   angle_rad_ = link_rad + decay_ * (e + T * c);
   speed_rad_per_s_ = decay_ * (speed_rad_per_s_ - omega * T * c);
   const JointVector acceleration = omega * omega * (link_rad - angle_rad_) - 2.0 * omega * speed_rad_per_s_;
-  return arm_->motor_from_moving_link(angle_rad_, acceleration);
+  return arm_->motor_from_moving_link(angle_rad_, acceleration, kinematics_);
 }
 
 }  // namespace proxarm::controller

@@ -41,7 +41,9 @@ class ElasticSetpoint {
   [[nodiscard]] const models::JointVector& link_rad_per_s() const noexcept { return speed_rad_per_s_; }
   // How far the filter's input is ahead of its output at a constant speed: 2/ω, in seconds; 0 without a filter.
   [[nodiscard]] double lead_s() const noexcept { return omega_rad_per_s_ > 0.0 ? 2.0 / omega_rad_per_s_ : 0.0; }
-  void archive(fieldbus::StateArchive& state) noexcept { state(angle_rad_, speed_rad_per_s_); }
+  // Of the tool, at these angles.
+  [[nodiscard]] const models::ToolKinematics& kinematics() const noexcept { return kinematics_; }
+  void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
   const models::Arm* arm_;
@@ -49,6 +51,7 @@ class ElasticSetpoint {
   double decay_ = 1.0;  // exp(−ωT)
   double period_s_ = 0.0;
   models::JointVector angle_rad_, speed_rad_per_s_;
+  models::ToolKinematics kinematics_;  // at angle_rad_
 };
 
 }  // namespace proxarm::controller

@@ -236,6 +236,7 @@ void ToolGuard::judge_borders(const Vec3& p, const Vec3& rest_p, double step_ben
 }
 
 void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept {
+  ++judged_exactly_;
   ArmPoints at;
   evaluate(target_rad_, exact_rounds, at);
   points_.tool_W = at.tool_W;

@@ -30,6 +30,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
@@ -68,6 +69,8 @@ class ToolGuard {
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
   // The arm's points at rest at the last setpoint.
   [[nodiscard]] const models::ArmPoints& points() const noexcept { return points_; }
+  // How many setpoints were near a bound, so that the quick test didn't suffice.
+  [[nodiscard]] std::uint64_t judged_exactly() const noexcept { return judged_exactly_; }
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
@@ -108,6 +111,7 @@ class ToolGuard {
   models::ArmPoints points_;   // at target_rad_
   Steps steps_{};              // of the points, in the last period
   double brakes_for_s_ = 0.0;  // the duration of the braking that was judged with target_rad_
+  std::uint64_t judged_exactly_ = 0;
 };
 
 }  // namespace proxarm::controller

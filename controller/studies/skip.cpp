@@ -135,6 +135,13 @@ std::vector<OptionScene> option_scenes() {
   return list;
 }
 
+constexpr std::array cycle_setups{
+    CycleSetup{.name = "default session"},
+    CycleSetup{.name = "default session, lookahead", .looks_ahead = true},
+    CycleSetup{.name = "room, a hand that explores", .scene = "scenes/room.yaml", .hand = "sim/hands/explore.yaml"},
+    CycleSetup{.name = "seven axes", .cell = "models/cells/seven.yaml"},
+};
+
 std::vector<std::size_t> counts(bool quick) {
   if (quick) return {1, 10, 100, 1000};
   return {1, 3, 10, 30, 100, 300, 1000, 3000, 10000};
@@ -147,16 +154,25 @@ std::vector<std::size_t> triangle_counts(bool quick) {
 }  // namespace
 
 std::vector<Column> Skip::columns() const {
-  return {{"kind", true}, {"name", true}, {"count"},  {"far_ns"},
-          {"near_ns"},    {"contact_ns"}, {"all_ns"}, {"start_up_us"}};
+  return {{"kind", true},  {"name", true},   {"count"},        {"far_ns"},  {"near_ns"},     {"contact_ns"}, {"all_ns"},
+          {"start_up_us"}, {"joint_limits"}, {"joint_bounds"}, {"limited"}, {"joint_steps"}, {"guarded"}};
 }
 
 std::size_t Skip::jobs(const Options& options) const {
-  return counts(options.quick).size() + triangle_counts(options.quick).size() + option_scenes().size();
+  return counts(options.quick).size() + triangle_counts(options.quick).size() + option_scenes().size() +
+         cycle_setups.size();
 }
 
 std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const std::vector<std::size_t> objects = counts(options.quick), triangles = triangle_counts(options.quick);
+  if (const std::size_t first = jobs(options) - cycle_setups.size(); job >= first) {
+    const CycleSetup& setup = cycle_setups[job - first];
+    const CycleCounts c = cycles_(setup);
+    const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
+    return {{"cycle", setup.name, number(c.steps), nan_value, nan_value, nan_value, nan_value, nan_value,
+             number(c.joint_limits), number(c.joint_bounds), number(c.limited), number(c.joint_steps),
+             number(c.guarded)}};
+  }
   const int steps = options.quick ? 500 : 2'000;
   std::string kind = "option", name;
   Scene scene;
@@ -192,11 +208,12 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const Vec3 down = empty ? surface : g(K, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
   const double contact = empty ? nan_value : step_ns(g, down, into, steps);
   const double all = kind == "option" ? nan_value : all_ns(scene, surface);
-  return {{kind, name, count, far, near, contact, all, start_up_us}};
+  return {
+      {kind, name, count, far, near, contact, all, start_up_us, nan_value, nan_value, nan_value, nan_value, nan_value}};
 }
 
 json Skip::headline(const Table& table, const Options& /*options*/) const {
-  json free, near, contact, all, start_up, triangles, option;
+  json free, near, contact, all, start_up, triangles, option, cycles;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
     const std::string kind = table.text(row, table.column("kind"));
@@ -205,6 +222,12 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
       json& one = option[table.text(row, table.column("name"))];
       one["free_ns"] = value("far_ns");
       if (std::isfinite(value("contact_ns"))) one["contact_ns"] = value("contact_ns");
+    } else if (kind == "cycle") {
+      json& one = cycles[table.text(row, table.column("name"))];
+      one["steps"] = value("count");
+      for (const char* name : {"joint_limits", "joint_bounds", "limited", "joint_steps", "guarded"}) {
+        one[name] = value(name);
+      }
     } else if (kind == "objects") {
       free[count] = value("far_ns");
       near[count] = value("near_ns");
@@ -226,6 +249,7 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
           {"start_up_us", start_up},
           {"triangles", triangles},
           {"options", option},
+          {"cycles", cycles},
           {"keys",
            {{"free_ns", "by number of spheres: a step far from all of them"},
             {"near_ns", "a step that touches nothing, a twentieth of a radius above one of them"},
@@ -233,6 +257,10 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
             {"all_ns", "asking every object (every face) for its distance, once"},
             {"start_up_us", "compiling the scene"},
             {"triangles", "the same by number of triangles of a mesh"},
+            {"cycles",
+             "by session: steps of rendering; those that made the joints' limits, and that computed the bound anew by "
+             "which others don't; those in which a limit acted; steps of inverse kinematics; setpoints that the last "
+             "guard judged exactly"},
             {"options",
              "a wall, and what one option more costs; a scene without it has another algorithm and pays nothing"}}}};
 }
@@ -271,7 +299,7 @@ std::vector<std::string> Skip::plot(const Table& table, const Options& /*options
 
 std::string Skip::text(const json& headline) const {
   std::ostringstream text;
-  char line[200];
+  char line[300];
   for (const auto& item : headline.at("options").items()) {
     const json& contact = item.value().value("contact_ns", json());
     std::snprintf(line, sizeof line, "%-16s free %6.1f ns", item.key().c_str(),
@@ -296,6 +324,15 @@ std::string Skip::text(const json& headline) const {
     };
     std::snprintf(line, sizeof line, "%6s triangles: far %.1f, near %.1f, in contact %.1f ns; all of them %.0f ns\n",
                   item.key().c_str(), ns("free_ns"), ns("near_ns"), ns("contact_ns"), ns("all_ns"));
+    text << line;
+  }
+  for (const auto& item : headline.at("cycles").items()) {
+    const auto n = [&](const char* key) { return item.value().at(key).get<double>(); };
+    std::snprintf(line, sizeof line,
+                  "%s: of %.0f steps %.0f made the joints' limits (%.0f their bound), in %.0f a limit acted, %.0f "
+                  "setpoints were judged exactly; %.2f steps of inverse kinematics each\n",
+                  item.key().c_str(), n("steps"), n("joint_limits"), n("joint_bounds"), n("limited"), n("guarded"),
+                  n("joint_steps") / std::max(1.0, n("steps")));
     text << line;
   }
   return text.str();

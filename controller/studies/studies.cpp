@@ -2,7 +2,6 @@
 
 #include "controller/studies/error/error.hpp"
 #include "controller/studies/figure5.hpp"
-#include "controller/studies/skip.hpp"
 #include "controller/studies/stability_map.hpp"
 #include "controller/studies/stress/stress.hpp"
 #include "models/base/setup_error.hpp"
@@ -10,7 +9,7 @@
 
 namespace proxarm::studies {
 
-StudyList all_studies(const ArmRun& arm) {
+StudyList all_studies(const ArmRun& arm, const CycleRun& cycles) {
   StudyList list;
   list.push_back(std::make_unique<Figure5>());
   list.push_back(std::make_unique<Stress>());
@@ -19,7 +18,7 @@ StudyList all_studies(const ArmRun& arm) {
   list.push_back(std::make_unique<ErrorStudy>());
   list.push_back(std::make_unique<StabilityMap>());
   list.push_back(std::make_unique<Fidelity>(arm));
-  list.push_back(std::make_unique<Skip>());
+  list.push_back(std::make_unique<Skip>(cycles));
   return list;
 }
 

@@ -7,13 +7,14 @@
 
 #include "controller/studies/common/study.hpp"
 #include "controller/studies/fidelity.hpp"
+#include "controller/studies/skip.hpp"
 
 namespace proxarm::studies {
 
 using StudyList = std::vector<std::unique_ptr<Study>>;
 
-// `arm` runs the simulated arm for the studies that want it.
-StudyList all_studies(const ArmRun& arm);
+// `arm` and `cycles` run the simulated arm for the studies that want it.
+StudyList all_studies(const ArmRun& arm, const CycleRun& cycles);
 
 // Throws description::SetupError that names the studies there are.
 const Study& study_named(const StudyList& list, const std::string& name);

@@ -293,6 +293,10 @@ void Arm::forward(const JointVector& q, Frames& frames) const noexcept {
 void Arm::kinematics(const JointVector& q, ToolKinematics& out) const noexcept {
   Frames frames;
   forward(q, frames);
+  place_tool(q, frames, out);
+}
+
+void Arm::place_tool(const JointVector& q, const Frames& frames, ToolKinematics& out) const noexcept {
   out.q_rad = q;
   const auto last = static_cast<std::size_t>(axes_ - 1);
   const auto place = [&](Pose& X, const Pose& X_n) {
@@ -414,7 +418,8 @@ JointVector Arm::motor_from_link(const JointVector& q, const Wrench& wrench_W) c
   return twisted(q, holding_torque(q, wrench_W));
 }
 
-JointVector Arm::motor_from_moving_link(const JointVector& q, const JointVector& q_dd) const noexcept {
+JointVector Arm::motor_from_moving_link(const JointVector& q, const JointVector& q_dd,
+                                        ToolKinematics& at_q) const noexcept {
   // Newton and Euler's equations, recursively (Luh, Walker and Paul 1980), with all speeds zero. Outwards, with a₀ =
   // −g:
   //   α_i = α_{i−1} + z_i q̈_i,   a_i = a_{i−1} + α_{i−1} × (p_i − p_{i−1})          (prismatic: z_i q̈_i belongs to a_i)
@@ -423,6 +428,7 @@ JointVector Arm::motor_from_moving_link(const JointVector& q, const JointVector&
   //   f_i = F_i + f_{i+1},   n_i = N_i + (c_i − p_i) × F_i + n_{i+1} + (p_{i+1} − p_i) × f_{i+1},   τ_i = z_i · n_i
   Frames frames;
   forward(q, frames);
+  place_tool(q, frames, at_q);
   std::array<Vec3, max_axes> F, N;
   Vec3 alpha = Vec3::Zero(), a = -gravity_W_;
   for (int i = 0; i < axes_; ++i) {

@@ -100,9 +100,9 @@ class Arm {
   [[nodiscard]] JointVector motor_from_link(const JointVector& q) const noexcept;
   [[nodiscard]] JointVector motor_from_link(const JointVector& q, const Wrench& wrench_W) const noexcept;
   // The same while the links begin to move with this acceleration: q + (M_link q̈ + τ_g)/k, speeds neglected. One pass
-  // outwards and one back, without the matrix.
-  [[nodiscard]] JointVector motor_from_moving_link(const JointVector& q,
-                                                   const JointVector& acceleration_rad_per_s2) const noexcept;
+  // outwards and one back, without the matrix. The first gives the kinematics at q, too.
+  [[nodiscard]] JointVector motor_from_moving_link(const JointVector& q, const JointVector& acceleration_rad_per_s2,
+                                                   ToolKinematics& at_q) const noexcept;
   // The inverse of motor_from_link(), by fixed-point iteration. It contracts by about |∂τ_g/∂q|/k, 0.02 for stiff
   // gears, and stops when the step is below 1e-15 rad or after 60 iterations. It doesn't converge if the gears are too
   // soft to hold the arm up.
@@ -127,6 +127,7 @@ class Arm {
     std::array<Vec3, max_axes> p_W;
   };
   void forward(const JointVector& q, Frames& frames) const noexcept;
+  void place_tool(const JointVector& q, const Frames& frames, ToolKinematics& out) const noexcept;
   [[nodiscard]] JointVector gravity_torque(const Frames& frames) const noexcept;
   [[nodiscard]] JointVector twisted(const JointVector& q, const JointVector& torque) const noexcept;  // q + τ/k
   [[nodiscard]] Eigen::Matrix3d mobility(const JointVector& q) const noexcept;  // J M⁻¹ Jᵀ, translations

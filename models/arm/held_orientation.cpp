@@ -1,12 +1,13 @@
 #include "models/arm/held_orientation.hpp"
 
+#include <cmath>
+
 #include "models/arm/prioritized_step.hpp"
 #include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::models {
 namespace {
 
-constexpr double length_m = 0.5;
 constexpr double damping_m_per_rad = 1e-3;
 
 // G = H⁻¹J_pᵀ(J_p H⁻¹J_pᵀ + λ²E)⁻¹, with H of prioritized_step.hpp.
@@ -19,12 +20,25 @@ SmallColumns3 joints_of_few_axes(const Jacobian& J_W) noexcept {
   return HJt.lazyProduct(inverse);
 }
 
+Jacobian weighted(const Jacobian& J_W) noexcept {
+  Jacobian J = J_W;
+  J.bottomRows<3>() *= turning_length_m;
+  return J;
+}
+
 }  // namespace
+
+double least_singular_value(const Jacobian& J_W) noexcept {
+  const Jacobian J = weighted(J_W);
+  FactoredMatrix squared;
+  squared.factor(J.lazyProduct(J.transpose()));
+  const double trace = squared.inverse().trace();
+  return trace > 0.0 ? 1.0 / std::sqrt(trace) : 0.0;
+}
 
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept {
   if (J_W.cols() < 6) return joints_of_few_axes(J_W);
-  Jacobian J = J_W;
-  J.bottomRows<3>() *= length_m;
+  const Jacobian J = weighted(J_W);
   Mat6 A = J.lazyProduct(J.transpose());
   A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
   Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();

@@ -6,9 +6,16 @@
 
 namespace proxarm::models {
 
-// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0], with a row for each joint. Rotations are weighted with a length of 0.5 m, as in the
-// inverse kinematics. The damping λ = 1e-3 m/rad keeps G finite: near a singularity a joint turns by at most 1/(2λ) =
-// 500 rad per metre. With seven axes, G is the motion of least norm. Doesn't allocate.
+// Rotations are weighted with this length, here as in the inverse kinematics.
+constexpr double turning_length_m = 0.5;
+
+// G = Jᵀ(J Jᵀ + λ²E)⁻¹ [E; 0], with a row for each joint. The damping λ = 1e-3 m/rad keeps G finite: near a singularity
+// a joint turns by at most 1/(2λ) = 500 rad per metre. With seven axes, G is the motion of least norm. Doesn't
+// allocate.
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept;
+
+// A bound from below of the smallest singular value of J, with its rotations weighted: (tr (J Jᵀ)⁻¹)^−½, which is at
+// least 1/√6 of it. Precondition: six axes or more.
+double least_singular_value(const Jacobian& J_W) noexcept;
 
 }  // namespace proxarm::models

@@ -1,14 +1,49 @@
 #include "models/geometry/linear_systems.hpp"
 
 #include <Eigen/QR>
+#include <cmath>
+#include <utility>
 
 namespace proxarm::models {
 
-void FactoredMatrix::factor(const Mat6& A) noexcept { lu_.compute(A); }
+// Column k of L and row k of U. The loops' bounds are constants, so that they are unrolled.
+template <int k>
+void FactoredMatrix::eliminate() noexcept {
+  int pivot = k;
+  for (int i = k + 1; i < 6; ++i) {
+    if (std::abs(lu_(i, k)) > std::abs(lu_(pivot, k))) pivot = i;
+  }
+  if (pivot != k) {
+    lu_.row(k).swap(lu_.row(pivot));
+    std::swap(rows_[k], rows_[static_cast<std::size_t>(pivot)]);
+  }
+  if constexpr (k < 5) {
+    constexpr int below = 5 - k;
+    auto L = lu_.col(k).tail<below>();
+    if (lu_(k, k) != 0.0) L /= lu_(k, k);
+    for (int j = k + 1; j < 6; ++j) lu_.col(j).tail<below>() -= lu_(k, j) * L;
+    eliminate<k + 1>();
+  }
+}
 
-Vec<6> FactoredMatrix::solve(const Vec<6>& b) const noexcept { return lu_.solve(b); }
+void FactoredMatrix::factor(const Mat6& A) noexcept {
+  lu_ = A;
+  rows_ = {0, 1, 2, 3, 4, 5};
+  eliminate<0>();
+}
 
-Mat6 FactoredMatrix::inverse() const noexcept { return lu_.inverse(); }
+template <typename Columns>
+Columns FactoredMatrix::solve_columns(const Columns& B) const noexcept {
+  Columns X;
+  for (int i = 0; i < 6; ++i) X.row(i) = B.row(rows_[static_cast<std::size_t>(i)]);
+  lu_.triangularView<Eigen::UnitLower>().solveInPlace(X);
+  lu_.triangularView<Eigen::Upper>().solveInPlace(X);
+  return X;
+}
+
+Vec<6> FactoredMatrix::solve(const Vec<6>& b) const noexcept { return solve_columns(b); }
+
+Mat6 FactoredMatrix::inverse() const noexcept { return solve_columns<Mat6>(Mat6::Identity()); }
 
 template <int N>
 Vec<N> solve_square(const Eigen::Matrix<double, N, N>& A, const Vec<N>& b) noexcept {

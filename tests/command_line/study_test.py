@@ -1,8 +1,9 @@
 """The studies and the advice of `tune`, as the program prints and writes them."""
 import json
+import re
 import unittest
 
-from harness import ProgramTest
+from harness import SOURCE, ProgramTest
 
 
 class Study(ProgramTest):
@@ -47,6 +48,23 @@ class Study(ProgramTest):
             self.assertEqual(outcome.err.count("\n"), 1, outcome.err)
             for word in words:
                 self.assertIn(word.strip("'"), outcome.err)
+
+
+class Explain(ProgramTest):
+    def test_a_cycle_leaves_out_what_it_can_and_counts_it(self):
+        told = self.call("explain", SOURCE / "scenes/wall.yaml").out
+        steps = int(re.search(r"(\d+) steps\)", told)[1])
+        for what, share in (("limits of the joints", 0.95), ("the nearest point of all limits", 1.0),
+                            ("the last guard's exact test", 1.0)):
+            self.assertGreaterEqual(int(re.search(rf"{what}: in (\d+) of", told)[1]), share * steps, told)
+
+    def test_a_scene_that_no_cycle_was_counted_with_is_explained_all_the_same(self):
+        (self.folder / "ball.yaml").write_text("name: ball\nobjects:\n  - {sphere: {"
+                                               "centre_m: [0.7, 0, 0.6], radius_m: 0.1}}\n")
+        outcome = self.call("explain", "ball.yaml")
+        self.assertEqual(outcome.status, 0, outcome.err)
+        self.assertIn("a step goes through", outcome.out)
+        self.assertIn("wasn't counted", outcome.out)
 
 
 class Tune(ProgramTest):

@@ -4,6 +4,7 @@
 
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/trials/cycle_work.hpp"
 #include "controller/command_line/trials/quiet_run.hpp"
 
 namespace proxarm::command_line {
@@ -48,6 +49,17 @@ std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
     if (rendered_s > setup.settling_s) samples.push_back({truth.hand_force_W, truth.X_WT.translation()});
   });
   return samples;
+}
+
+studies::CycleCounts count_cycles(const studies::CycleSetup& setup) {
+  RunOptions options;
+  const auto file = [](const char* name) { return *name == '\0' ? std::filesystem::path() : shipped_file(name); };
+  options.cell = file(setup.cell);
+  options.scene = file(setup.scene);
+  options.hand = file(setup.hand);
+  if (setup.looks_ahead) options.lookahead = LookaheadChoice{.kind = LookaheadChoice::Kind::automatic};
+  const controller::MotionWork work = count_work(prepare(options));
+  return {work.steps, work.joint_limits, work.joint_bounds, work.limited, work.joint_steps, work.guarded};
 }
 
 }  // namespace proxarm::command_line

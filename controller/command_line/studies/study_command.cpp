@@ -39,7 +39,8 @@ constexpr StudyText study_texts[] = {
      "What the hand feels at the simulated arm from 0.1 to 30 Hz, in free motion and on a wall. Writes fidelity.csv, "
      "fidelity.json and a plot. Nothing in it is random."},
     {"skip",
-     "The cost of a step and of start-up against the size of a world. Writes skip.csv, skip.json and a plot. It "
+     "The cost of a step and of start-up against the size of a world, and how often cycles can leave something out. "
+     "Writes skip.csv, skip.json and a plot. It "
      "measures "
      "time: leave the machine alone meanwhile. Nothing in it is random."},
     {"stress",
@@ -61,7 +62,7 @@ std::string study_description(const std::string& name) {
 }
 
 int study_command(const StudyOptions& options) {
-  const studies::StudyList list = studies::all_studies(run_arm);
+  const studies::StudyList list = studies::all_studies(run_arm, count_cycles);
   const std::string& name = options.words.front();
   if (options.replay) {
     const auto& known = studies::Stress::worlds_names;

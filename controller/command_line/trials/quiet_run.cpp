@@ -42,6 +42,7 @@ QuietEnd run_quietly(const PreparedSession& session, const LookAtCycle& look) {
   QuietEnd out;
   out.end = controller::run_session(cycle, network, {session.duration_s}, hooks).end;
   if (cycle.supervisor().faulted()) out.fault = controller::fault_name(cycle.supervisor().report().fault);
+  if (cycle.work() != nullptr) out.work = *cycle.work();
   cycle.shut_down();
   return out;
 }

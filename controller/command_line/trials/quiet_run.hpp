@@ -5,6 +5,7 @@
 #include <string>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/motion/motion_work.hpp"
 #include "controller/record/cycle_record.hpp"
 #include "controller/session/session.hpp"
 #include "sim/cell/simulated_cell.hpp"
@@ -15,7 +16,8 @@ using LookAtCycle = std::function<void(const controller::CycleRecord&, const sim
 
 struct QuietEnd {
   controller::SessionEnd end = controller::SessionEnd::fault;
-  std::string fault;  // its name; empty: none
+  std::string fault;            // its name; empty: none
+  controller::MotionWork work;  // all zero where nothing is counted
 };
 
 // `look` sees each cycle's record, and the truth at its SYNC. Throws SetupError where the session can't begin. Several

@@ -174,7 +174,27 @@ TEST_F(ElasticSetpointTest, GoesOnFromItsArchiveToTheBit) {
   auto read = fieldbus::StateArchive::reader(std::span<const std::byte>(bytes).first(written.bytes()));
   copy.archive(read);
   ASSERT_TRUE(written.whole() && read.whole());
+  ASSERT_EQ(copy.kinematics().J_W, elastic.kinematics().J_W);
   for (int k = 0; k < 20; ++k) ASSERT_EQ(copy.step(place(-0.02)), elastic.step(place(-0.02)));
+}
+
+TEST_F(ElasticSetpointTest, KnowsWhereTheToolIsAtItsAngles) {
+  for (const double bandwidth : {bandwidth_Hz, 0.0}) {
+    ElasticSetpoint elastic(arm, bandwidth, T);
+    const auto expect_there = [&] {
+      models::ToolKinematics there;
+      arm.kinematics(elastic.link_rad(), there);
+      EXPECT_EQ(elastic.kinematics().X_WT.matrix(), there.X_WT.matrix());
+      EXPECT_EQ(elastic.kinematics().J_W, there.J_W);
+    };
+    expect_there();
+    elastic.start(place(0.01));
+    expect_there();
+    elastic.step(place(0.02));
+    expect_there();
+    elastic.resume(place(0.03), JointVector::Constant(arm.axes(), 0.1));
+    expect_there();
+  }
 }
 
 }  // namespace

@@ -410,7 +410,10 @@ TEST(ArmThatMoves, HasItsMotorsWhereMassMatrixAndGravitySay) {
         const double k = arm.gear_stiffness_Nm_per_rad()[i];
         if (k > 0.0) expected[i] += torque[i] / k;
       }
-      ASSERT_LT((arm.motor_from_moving_link(q, q_dd) - expected).cwiseAbs().maxCoeff(), 1e-13) << name;
+      ToolKinematics at_q, alone;
+      ASSERT_LT((arm.motor_from_moving_link(q, q_dd, at_q) - expected).cwiseAbs().maxCoeff(), 1e-13) << name;
+      arm.kinematics(q, alone);
+      ASSERT_TRUE(at_q.q_rad == q && at_q.J_W == alone.J_W && at_q.X_WT.matrix() == alone.X_WT.matrix()) << name;
     }
   }
 }

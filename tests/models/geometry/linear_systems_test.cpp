@@ -4,6 +4,8 @@
 
 #include <limits>
 
+#include "tests/models/surfaces/random_states.hpp"
+
 namespace proxarm::models {
 namespace {
 
@@ -42,6 +44,27 @@ TEST(LinearSystems, FactorsSolveAndInvert) {
   const Eigen::Matrix<double, 9, 9> nine = dominant(9, false);
   const Vec<9> ones = Vec<9>::Ones();
   EXPECT_LT((nine * solve_square<9>(nine, ones) - ones).norm(), rounding * ones.norm());
+}
+
+// So that whoever counts on the old bits of a session gets them.
+TEST(LinearSystems, FactorsAreEigensToTheBit) {
+  tests::Random random(7);
+  for (int run = 0; run < 1000; ++run) {
+    Mat6 A;
+    for (double& a : A.reshaped()) a = random.chance(0.1) ? 0.0 : random.uniform(-1.0, 1.0);
+    if (random.chance(0.1)) A.row(3) = 2.0 * A.row(1);
+    const Vec<6> b = A.col(0) + Vec<6>::Ones();
+    FactoredMatrix factored;
+    factored.factor(A);
+    const Eigen::PartialPivLU<Mat6> theirs(A);
+    const Vec<6> ours = factored.solve(b), expected = theirs.solve(b);
+    if (!expected.allFinite()) {
+      EXPECT_FALSE(ours.allFinite()) << run;
+      continue;
+    }
+    ASSERT_EQ(ours, expected) << run;
+    ASSERT_EQ(factored.inverse(), Mat6(theirs.inverse())) << run;
+  }
 }
 
 TEST(LinearSystems, OnlyARegularMatrixHasAnInverse) {
