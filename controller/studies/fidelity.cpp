@@ -19,8 +19,7 @@ using nlohmann::json;
 using Complex = std::complex<double>;
 
 constexpr std::array<double, 3> limits{0.05, 0.1, 0.25};
-constexpr std::array<double, 15> frequencies_Hz{0.1, 0.2, 0.3,  0.5,  0.8,  1.2,  2.0, 3.0,
-                                                5.0, 8.0, 10.0, 12.0, 15.0, 20.0, 30.0};
+constexpr std::array<double, 13> frequencies_Hz{0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0};
 
 // At low frequencies as much travel as a hand takes, above a velocity of 5 cm/s each.
 std::vector<ArmSine> sines(bool wall) {
