@@ -45,6 +45,8 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
 
   void set_time(const models::StepTime& time) noexcept override { inner_->set_time(time); }
   [[nodiscard]] bool wants_time() const noexcept override { return inner_->wants_time(); }
+  [[nodiscard]] std::uint32_t media_at(const V& q) const noexcept override { return inner_->media_at(q); }
+  [[nodiscard]] bool has_media() const noexcept override { return inner_->has_media(); }
   [[nodiscard]] std::span<const models::Contact<N>> contacts() const noexcept override {
     return {contacts_.data(), count_};
   }

@@ -14,13 +14,11 @@
 //       κ = M/T² + B/T + K_v,   p̂ = [M(2q₁ − q₂)/T² + B q₁/T + K_v q_ref + h]/κ,   q₁ = q(k−1), q₂ = q(k−2).
 //   - Parameters change without a bump. M, B, K_v and q_ref change at once, since they don't affect position or
 //     velocity. A new T takes one step on an uneven grid, see set_period().
-//   - Order 2: bdf2.hpp has the equations.
+//   - Order 2: (26) whose forces are weighted over the last steps. force_weights.hpp has the equations.
 //
-// Time labels. At order 1, q(k) computed from h(k) = h(t_k) is the state at t_{k+1} (Störmer–Verlet, shifted by one
-// sample), which is when the next SYNC makes it effective. The history that start() sets is exact for this label: free
-// motion under a constant force follows the parabola to rounding. At order 2, q(k) is the state at t_k. With
-// `matched_labels`, h(k) is replaced by 2h(k) − h(k−1), so that q(k) is the state at t_{k+1}, too. This amplifies
-// noise: white noise of 1 N at 1 kg becomes 1.00 m/s² at order 1, 0.71 at order 2 and 1.36 with matched labels.
+// Time labels. q(k) computed from h(k) = h(t_k) is the state at t_{k+1} (Störmer–Verlet, shifted by one sample), which
+// is when the next SYNC makes it effective. The history that start() sets is exact for this label: free motion under a
+// constant force follows the parabola to rounding.
 //
 // All vectors in one frame, metres, newtons, seconds. n = 1, 2 or 3. One caller at a time; step() and the setters are
 // for the cycle: they neither allocate, lock, throw nor print.
@@ -28,7 +26,7 @@
 
 #include <cstdint>
 
-#include "controller/proxies/bdf2.hpp"
+#include "controller/proxies/force_weights.hpp"
 #include "controller/proxies/proxy_step.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometric_algorithm.hpp"
@@ -55,12 +53,13 @@ class AdmittanceProxy {
   // One period under the measured force h(k). After a fault nothing has changed, and the step may be repeated.
   [[nodiscard]] ProxyFault step(const V& h) noexcept;
 
-  // Results of the last step. Before the first one: the start position, zero force, p̂ = q.
+  // Results of the last step. Before the first one: the start position, zero force, p̂ = q. At order 2 the force is the
+  // weighted one that accelerated the proxy, and κ and p̂ are those of (26) with which it has that size.
   [[nodiscard]] const V& q() const noexcept { return past_.q_k1; }
   [[nodiscard]] const V& f() const noexcept { return f_; }
   [[nodiscard]] const V& p_hat() const noexcept { return p_hat_; }
   [[nodiscard]] double kappa_N_per_m() const noexcept { return kappa_; }
-  // Order 1: mean velocity over the last step. Order 2: velocity at the end of it.
+  // The mean over the last step.
   [[nodiscard]] const V& velocity() const noexcept { return past_.v_k1; }
   [[nodiscard]] double time_s() const noexcept { return epoch_s_ + static_cast<double>(steps_) * config_.period_s; }
 
@@ -75,13 +74,12 @@ class AdmittanceProxy {
   bool set_period(double period_s) noexcept;
 
   [[nodiscard]] const AdmittanceConfig& config() const noexcept { return config_; }
-  // Order 2: the number of steps that didn't use q(k−2) (impacts, releases, stick and slip, restarts).
-  [[nodiscard]] std::uint64_t first_order_steps() const noexcept { return bdf2_.first_order_steps(); }
+  // Order 2: the number of steps in which the world's force wasn't weighted (impacts, releases, stick and slip).
+  [[nodiscard]] std::uint64_t first_order_steps() const noexcept { return weights_.first_order_steps(); }
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(config_.mass_kg, config_.damping_Ns_per_m, config_.spring_N_per_m, config_.period_s, past_.q_k1, past_.q_k2,
-          past_.v_k1, past_.v_k2, past_.h_k1, past_.has_h_k1, past_.period_k1_s, q_ref_, f_, p_hat_, kappa_, epoch_s_,
-          steps_, bdf2_);
+          past_.v_k1, past_.period_k1_s, q_ref_, f_, p_hat_, kappa_, epoch_s_, steps_, weights_);
     prepare();
     // A moving object's previous place must be, to the bit, the one to which the step before took it.
     if (solve_.timed()) solve_.g().set_time({time_s(), config_.period_s});
@@ -89,7 +87,6 @@ class AdmittanceProxy {
 
  private:
   void prepare() noexcept;
-  ProxyFault verlet(const V& h, ProxyTrial<N>& out) noexcept;
 
   AdmittanceConfig config_;
   ProxySolver<N> solve_;
@@ -101,10 +98,9 @@ class AdmittanceProxy {
   std::uint64_t steps_ = 0;
   // Computed from config_ and past_.period_k1_s when one of them has changed.
   ProxyRule verlet_;
-  bool plain_ = true;            // no B, no K_v, equal intervals: (26a) as in the paper
   double prepared_for_s_ = 0.0;  // the period_k1_s of verlet_
   double rate_Hz_ = 0.0;         // 1/T
-  Bdf2<N> bdf2_;                 // order 2
+  ForceWeights<N> weights_;      // order 2
 };
 
 extern template class AdmittanceProxy<1>;

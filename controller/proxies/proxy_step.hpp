@@ -16,8 +16,7 @@ struct AdmittanceConfig {
   double damping_Ns_per_m = 0.0;  // B ≥ 0
   double spring_N_per_m = 0.0;    // K_v ≥ 0, towards the reference (set_reference(); at first the start position)
   double period_s = 1e-3;         // T, > 0
-  int order = 1;                  // 1: the paper's (26). 2: BDF2
-  bool matched_labels = false;    // order 2 only: q(k) stands for t_{k+1}, as at order 1
+  int order = 1;                  // 1: the paper's (26). 2: (26) with forces weighted over steps (force_weights.hpp)
 
   // Throws description::SetupError that names the option.
   void validate() const;
@@ -37,7 +36,8 @@ struct ProxyStart {
   models::Vec<N> v = models::Vec<N>::Zero();
   models::Vec<N> a = models::Vec<N>::Zero();
   double time_s = 0.0;
-  // Order 2: the contacts of the first step were there before it, so it is no impact.
+  // Order 2: the contacts of the first step were there before it, so it is no impact, and `a` is the acceleration of a
+  // proxy on which they act.
   bool contact_established = false;
 };
 
@@ -45,30 +45,23 @@ struct ProxyStart {
 template <int N>
 struct ProxyHistory {
   models::Vec<N> q_k1 = models::Vec<N>::Zero(), q_k2 = models::Vec<N>::Zero();  // q(k−1), q(k−2)
-  models::Vec<N> v_k1 = models::Vec<N>::Zero(), v_k2 = models::Vec<N>::Zero();  // their velocities
-  models::Vec<N> h_k1 = models::Vec<N>::Zero();                                 // h(k−1)
-  bool has_h_k1 = false;
-  double period_k1_s = 0.0;  // time between q(k−2) and q(k−1)
+  models::Vec<N> v_k1 = models::Vec<N>::Zero();                                 // mean velocity between them
+  double period_k1_s = 0.0;                                                     // time between them
 };
 
-// The coefficients that follow from M, B, K_v and T:
-//   p̂ = q₁ + of_move (q₁ − q₂) + of_v1 v₁ + of_v2 v₂ + of_reference (q_ref − q₁) + compliance h
+// The coefficients of (26) that follow from M, B, K_v and T:
+//   p̂ = q₁ + of_move (q₁ − q₂) + of_reference (q_ref − q₁) + compliance h
 struct ProxyRule {
   double kappa = 0.0, compliance = 0.0;  // κ, 1/κ
-  double of_move = 0.0, of_v1 = 0.0, of_v2 = 0.0, of_reference = 0.0;
-
-  // The terms of κ and of the spring K_v. The method adds its coefficients of the motion.
-  static ProxyRule of(double kappa, double K_v) noexcept {
-    return {.kappa = kappa, .compliance = 1.0 / kappa, .of_reference = K_v / kappa};
-  }
+  double of_move = 0.0, of_reference = 0.0;
+  bool plain = true;  // no B, no K_v, equal intervals: (26a) as in the paper
 };
 
 // The result of a step that has been tried. The proxy takes it over if there was no fault.
 template <int N>
 struct ProxyTrial {
   double kappa = 0.0;
-  models::Vec<N> p_hat, q, v, f;
-  bool held = false;  // q is bit for bit where it came from, although p̂ isn't
+  models::Vec<N> p_hat, q, f;
 };
 
 // Evaluates q = 𝒢(κ, p̂, q_previous), with nothing but finite numbers in and out.
@@ -98,5 +91,20 @@ class ProxySolver {
   bool timed_;
   double time_s_ = 0.0;
 };
+
+// One step of (26) under the force h, the last one being `past`. `period_s`: T.
+template <int N>
+ProxyFault step_of_26(const ProxyRule& rule, const ProxyHistory<N>& past, const models::Vec<N>& h,
+                      const models::Vec<N>& q_ref, double period_s, const ProxySolver<N>& solve,
+                      ProxyTrial<N>& out) noexcept {
+  const models::Vec<N>&q_k1 = past.q_k1, &q_k2 = past.q_k2;
+  out.kappa = rule.kappa;
+  if (rule.plain) {
+    out.p_hat = 2.0 * q_k1 - q_k2 + rule.compliance * h;  // (26a)
+  } else {
+    out.p_hat = q_k1 + (rule.of_move * (q_k1 - q_k2) + rule.of_reference * (q_ref - q_k1) + rule.compliance * h);
+  }
+  return solve(out, q_k1, period_s);  // (26b)
+}
 
 }  // namespace proxarm::controller

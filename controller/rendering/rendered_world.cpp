@@ -82,7 +82,7 @@ class WorldOfDimension final : public RenderedWorld {
     ProxyStart<N> start;
     start.q = space_.start();
     // After a hold the scene goes on from where it stopped.
-    if (started_) start.time_s = proxy_.time_s() + lead_s();
+    if (started_) start.time_s = proxy_.time_s();
     proxy_.start(start);
     if (started_) {
       anchor_.start_again(start.q);
@@ -105,7 +105,7 @@ class WorldOfDimension final : public RenderedWorld {
     start.q = scene_->algorithm<N>()(proxy_.kappa_N_per_m(), wanted, proxy_.q());
     if (!((start.q - wanted).norm() <= (proxy_.q() - wanted).norm() + rounding_m)) start.q = wanted;
     start.v = v;
-    start.time_s = proxy_.time_s() + lead_s();
+    start.time_s = proxy_.time_s();
     proxy_.start(start);
     proxy_.set_reference(anchor_.at());
     unsettled_ = false;
@@ -169,8 +169,6 @@ class WorldOfDimension final : public RenderedWorld {
   }
 
  private:
-  [[nodiscard]] double lead_s() const noexcept { return proxy_.config().order == 2 ? proxy_.config().period_s : 0.0; }
-
   // If the scene doesn't allow the start position (some micrometres off a guide, or inside of a wall), the proxy starts
   // at rest at 𝒢 of that position, with q(k−2) = q(k−1). As a step of (26) the same displacement would be a velocity:
   // 21 µm in a millisecond. Returns false if there was nothing to settle. If limits hold the proxy back, settling takes
@@ -182,7 +180,7 @@ class WorldOfDimension final : public RenderedWorld {
     if (limited_.wants_time()) limited_.set_time({next_s, proxy_.config().period_s});
     ProxyStart<N> start;
     start.q = limited_(proxy_.kappa_N_per_m(), before, before);
-    start.time_s = next_s + lead_s();
+    start.time_s = next_s;
     if (!((start.q - before).norm() > rounding_m) || limited_.squeezed() || !proxy_.start(start)) return false;
     unsettled_ = limited_.active().kinds != 0;
     proxy_.set_reference(anchor_.at());

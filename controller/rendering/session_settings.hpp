@@ -31,7 +31,7 @@ struct SessionSettings {
   double mass_kg = 4.0;           // what the hand feels, tool behind the sensor included
   double damping_Ns_per_m = 0.0;  // B, virtual damping against the world at rest
   double spring_N_per_m = 0.0;    // K_v, to the start position
-  int order = 1;                  // 1: (26); 2: BDF2 (bdf2.hpp)
+  int order = 1;                  // 1: (26); 2: with weighted forces (force_weights.hpp)
   bool looks_ahead = false;       // the arm is sent to a predicted position of the proxy (lookahead.hpp)
   double horizon_s = 0.0;         // H, the lookahead's horizon
   OrientationMode orientation = OrientationMode::held;

@@ -8,8 +8,8 @@
 
 namespace proxarm::controller {
 
-// Sets both clearances of a record, after so much rendering by a proxy of that order. The tool is where the
+// Sets both clearances of a record, after so much rendering. The tool is where the
 // simulation's truth has it, else where the encoders do.
-void add_clearances(CycleRecord& record, const scenes::Scene& scene, int order, std::int64_t rendered_ns);
+void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_t rendered_ns);
 
 }  // namespace proxarm::controller

@@ -36,11 +36,15 @@ MatrixXd exponential(MatrixXd A) {
 }
 
 // A(w) T²: the coefficients of q(k−i).
-std::array<double, 5> proxy_polynomial(int order, double M, double BT, double KTT) {
-  if (order == 2) {  // D = (3 − 4w + w²)/2T
-    return {2.25 * M + 1.5 * BT + KTT, -6.0 * M - 2.0 * BT, 5.5 * M + 0.5 * BT, -2.0 * M, 0.25 * M};
+std::array<double, 6> proxy_polynomial(int order, double M, double BT, double KTT) {
+  if (order == 1) return {M + BT + KTT, -2.0 * M - BT, M, 0.0, 0.0, 0.0};
+  std::array<double, 6> a{M, -2.0 * M, M, 0.0, 0.0, 0.0};
+  const std::array<double, 4> W{8.0 / 27.0, 12.0 / 27.0, 6.0 / 27.0, 1.0 / 27.0};
+  const std::array<double, 3> own{1.5 * BT + KTT, -2.0 * BT, 0.5 * BT};
+  for (std::size_t i = 0; i < W.size(); ++i) {
+    for (std::size_t j = 0; j < own.size(); ++j) a[i + j] += W[i] * own[j];
   }
-  return {M + BT + KTT, -2.0 * M - BT, M, 0.0, 0.0};
+  return a;
 }
 
 // The damping ratio of the arm's first mode, and the frequency that a rigid gear is given: far above all others here.
@@ -108,15 +112,15 @@ std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::
   return arms;
 }
 
-// The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, four proxies, the
+// The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the
 // filter's x_f and ẋ_f, and the forces that were read.
 struct ElasticLoop::State {
-  Index n, d, ages;
+  Index n, d, ages, kept;
   [[nodiscard]] Index plant() const { return 0; }
   [[nodiscard]] Index sent() const { return 3 * n; }
   [[nodiscard]] Index proxies() const { return 5 * n; }
-  [[nodiscard]] Index filter() const { return 5 * n + 4 * d; }
-  [[nodiscard]] Index forces() const { return 5 * n + 6 * d; }
+  [[nodiscard]] Index filter() const { return 5 * n + kept * d; }
+  [[nodiscard]] Index forces() const { return 5 * n + (kept + 2) * d; }
   [[nodiscard]] Index size() const { return forces() + d * ages; }
 };
 
@@ -129,12 +133,12 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
       time_constant_s_(loop.drive_time_constant_s),
       force_age_periods_(std::max(0.0, (loop.delay_s - 2.0 * arm.filter_s) / loop.period_s - 1.0)),
       order_(loop.order),
-      matched_labels_(loop.matched_labels),
       joints_(arm.stiffness.size()),
-      dimensions_(arm.jacobian.rows()) {
-  // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and one
-  // for the labels of order 2.
-  ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + 2;
+      dimensions_(arm.jacobian.rows()),
+      proxies_(loop.order == 2 ? 5 : 4) {
+  // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
+  // for Störmer's correction at order 2.
+  ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
   twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
   make_plant(hand, loop.gear_stiffness_ratio);
   const double after_sensor_kg = hand.mass_kg + loop.handle_mass_kg;
@@ -174,12 +178,12 @@ void ElasticLoop::make_plant(const HandModel& hand, double gear_stiffness_ratio)
   plant_ = exponential(A * period_s_);
 }
 
-Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_}.size(); }
+Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_, proxies_}.size(); }
 
 // One period, from just before one reading of the sensor to just before the next.
 void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
-  const State at{n, d, ages_};
+  const State at{n, d, ages_, proxies_};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
@@ -196,14 +200,14 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   };
   const auto whole = static_cast<Index>(std::floor(force_age_periods_ + 1e-9));
   const double rest = std::max(0.0, force_age_periods_ - static_cast<double>(whole));
-  Place h = (1.0 - rest) * force(whole) + rest * force(whole + 1);
-  if (order_ == 2 && matched_labels_) {
-    h = 2.0 * h - ((1.0 - rest) * force(whole + 1) + rest * force(std::min(whole + 2, ages_)));
-  }
+  const auto read = [&](Index age) -> Place { return (1.0 - rest) * force(age) + rest * force(age + 1); };
+  Place h = read(whole);
+  if (order_ == 2) h = (13.0 * h - 2.0 * read(whole + 1) + read(whole + 2)) / 12.0;
 
-  const std::array<double, 5> a = proxy_polynomial(order_, M, damping_ * T, spring_ * T * T);
+  const std::array<double, 6> a = proxy_polynomial(order_, M, damping_ * T, spring_ * T * T);
   Place q = T * T * h;
-  for (Index i = 1; i < 5; ++i) q -= a[static_cast<std::size_t>(i)] * state.segment(at.proxies() + d * (i - 1), d);
+  for (Index i = 1; i <= proxies_; ++i)
+    q -= a[static_cast<std::size_t>(i)] * state.segment(at.proxies() + d * (i - 1), d);
   q /= a[0];
   const Place p = q + horizon_s_ / T * (q - state.segment(at.proxies(), d));
 
@@ -222,7 +226,7 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   next.segment(at.sent(), n) = arm_.joints_per_m * x + twist_ * acceleration;
   next.segment(at.sent() + n, n) = last_sent;
   next.segment(at.proxies(), d) = q;
-  next.segment(at.proxies() + d, 3 * d) = state.segment(at.proxies(), 3 * d);
+  next.segment(at.proxies() + d, (proxies_ - 1) * d) = state.segment(at.proxies(), (proxies_ - 1) * d);
   next.segment(at.filter(), d) = x;
   next.segment(at.filter() + d, d) = v;
   next.segment(at.forces(), d) = h_now;

@@ -67,11 +67,11 @@ class ElasticLoop {
   double period_s_, damping_, spring_, horizon_s_, time_constant_s_;
   double force_age_periods_;
   int order_;
-  bool matched_labels_;
-  Eigen::MatrixXd plant_;                    // the map of [φ, φ̇, θ, r, ṙ] over a period
-  Eigen::MatrixXd force_;                    // h from [φ, φ̇, θ, r, ṙ]
-  Eigen::MatrixXd twist_;                    // k⁻¹ M G
-  Eigen::Index joints_, dimensions_, ages_;  // number of joints n, of tool dimensions, and of old forces that are kept
+  Eigen::MatrixXd plant_;  // the map of [φ, φ̇, θ, r, ṙ] over a period
+  Eigen::MatrixXd force_;  // h from [φ, φ̇, θ, r, ṙ]
+  Eigen::MatrixXd twist_;  // k⁻¹ M G
+  // Numbers of joints n, of tool dimensions, and of old forces and proxies that are kept.
+  Eigen::Index joints_, dimensions_, ages_, proxies_;
 };
 
 }  // namespace proxarm::controller

@@ -9,7 +9,7 @@
 // v = ∇q(k)/T, with (a − b)·a = ½(a² − b² + (a − b)²):
 //   T (h + f)·v = Δ(½M v²) + T B v² + Δ(½K_v (q − q_ref)²) + ½M(∇v)² + ½K_v(∇q)²
 // The last two terms are the step's own loss, so the integration never generates energy. At order 2 the same holds with
-// ¼M(v² + (2v − v₁)²) for the kinetic energy and ¼M(v − 2v₁ + v₂)² for the loss. If the world generates energy (moving
+// the h, B and K_v that it weights over its steps. If the world generates energy (moving
 // objects; curved surfaces, on which (26) isn't neutral), W_w > 0. W_p − W_h is the energy that delay, drives and arm
 // add between the two ports. For a force that accelerates M at the frequency ω, and a motion that lags by L, the hand
 // feels the damping

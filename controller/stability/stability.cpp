@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "models/base/option_check.hpp"
@@ -62,8 +63,9 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   const Polynomial difference{1.0, -1.0}, one_lag{1.0, -pole};
   const Polynomial lag = Polynomial{1.0, -beta} * (one_lag * one_lag);
   const double delay_s = std::max(0.0, loop.delay_s - 2.0 * loop.filter_s);
-  const Polynomial derivative = loop.order == 2 ? Polynomial{1.5, -2.0, 0.5} : difference;  // times T
-  const Polynomial damper = loop.explicit_damping ? Polynomial{0.0, 1.0} * difference : derivative;
+  const Polynomial damper = loop.explicit_damping ? Polynomial{0.0, 1.0} * difference
+                            : loop.order == 2     ? Polynomial{1.5, -2.0, 0.5}
+                                                  : difference;  // times T
   const double m = hand.mass_kg + loop.handle_mass_kg;
   const Polynomial grip = Polynomial{hand.stiffness_N_per_m * T * T} + hand.damping_Ns_per_m * T * difference +
                           m * (difference * difference);
@@ -71,8 +73,12 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   if (loop.horizon_s > 0.0) {
     force = (Polynomial{1.0} + loop.horizon_s / T * difference) * force;
   }
-  if (loop.order == 2 && loop.matched_labels) force = Polynomial{2.0, -1.0} * force;
-  return {lag * (derivative * derivative), lag * (B * T * damper + Polynomial{loop.spring_N_per_m * T * T}) + force};
+  Polynomial own = B * T * damper + Polynomial{loop.spring_N_per_m * T * T};
+  if (loop.order == 2) {
+    own = Polynomial{8.0 / 27.0, 12.0 / 27.0, 6.0 / 27.0, 1.0 / 27.0} * own;
+    force = Polynomial{13.0 / 12.0, -2.0 / 12.0, 1.0 / 12.0} * force;
+  }
+  return {lag * (difference * difference), lag * own + force};
 }
 
 // Written out, because std::complex tests each product for NaN, which would take most of a sweep's time.
@@ -187,6 +193,14 @@ std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mas
   return high;
 }
 
+// Of an order 2 whose events count: its free motion, and (26).
+std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
+  LoopModel free = loop, at_events = loop;
+  free.with_events = false;
+  at_events.order = 1;
+  return {free, at_events};
+}
+
 // Rounds up to two significant digits.
 double round_up(double mass_kg) {
   const double unit = std::pow(10.0, std::floor(std::log10(mass_kg)) - 1.0);
@@ -202,12 +216,22 @@ std::string text(const char* pattern, double value) {
 }  // namespace
 
 double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  if (loop.order == 2 && loop.with_events) {
+    const auto [free, at_events] = both_methods(loop);
+    return std::max(spectral_radius(hand, free, proxy_mass_kg), spectral_radius(hand, at_events, proxy_mass_kg));
+  }
   if (loop.arms && proxy_mass_kg <= heaviest_on_gears_kg)
     return ElasticLoops(hand, loop).spectral_radius(proxy_mass_kg);
   return spectral_radius(make_loop(hand, loop), proxy_mass_kg);
 }
 
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& model, double max_mass_kg) {
+  if (model.order == 2 && model.with_events) {
+    const auto [free, at_events] = both_methods(model);
+    const auto one = smallest_stable_mass(hand, free, max_mass_kg);
+    const auto other = smallest_stable_mass(hand, at_events, max_mass_kg);
+    return one && other ? std::optional(std::max(*one, *other)) : std::nullopt;
+  }
   if (model.arms) {
     LoopModel rigid = model;
     rigid.arms = nullptr;

@@ -2,12 +2,13 @@
 // that is stable.
 //
 // In free motion the loop is linear, with w = z⁻¹ one period of delay:
-//   proxy   A(w) q = h          order 1: A = M(1−w)²/T² + B(1−w)/T + K_v
-//                               order 2: A = M D² + B D + K_v, D = (3 − 4w + w²)/(2T); matched labels: h → (2−w) h
+//   proxy   A(w) q = S(w) h     order 1: A = M(1−w)²/T² + B(1−w)/T + K_v,  S = 1
+//                               order 2: A = M(1−w)²/T² + W(w)[B D + K_v],  S = 1 + (1−w)²/12,
+//                                        D = (3 − 4w + w²)/(2T), W = (8 + 12w + 6w² + w³)/27 (force_weights.hpp)
 //   drive   p = (1−β) q / (1−βw),  β = exp(−T/τ)              (τ = 0: p = q)
 //   hand    h = −w^(1+L/T) [K_h + D_h(1−w)/T + m_h(1−w)²/T²] p
 // so the eigenvalues z = 1/w are the roots of
-//   C(w) = (1−βw) A(w) + (1−β) w^(1+L/T) [K_h + D_h(1−w)/T + m_h(1−w)²/T²].
+//   C(w) = (1−βw) A(w) + (1−β) S(w) w^(1+L/T) [K_h + D_h(1−w)/T + m_h(1−w)²/T²].
 // L is the loop's delay beyond the one period that any sampled loop has. An L between two periods is interpolated
 // linearly. What moves after the force sensor (the handle, the hand) belongs to m_h, because the sensor measures the
 // force that moves it.
@@ -53,7 +54,9 @@ struct LoopModel {
   double spring_N_per_m = 0.0;         // K_v ≥ 0 of the proxy
   bool explicit_damping = false;       // −B(q₁ − q₂)/T instead of the implicit damping; order 1, for comparison
   int order = 1;
-  bool matched_labels = false;
+  // Order 2 steps by (26) where contacts change, at a wall in most of its steps. So a mass counts as stable only if it
+  // is with both. False: free motion alone.
+  bool with_events = true;
   double horizon_s = 0.0;             // H ≥ 0 of the lookahead
   double gear_stiffness_ratio = 1.0;  // > 0, of the arms' true gears to those that the controller believes in
   // 1/ω ≥ 0 of the setpoints' filter, whose 2/ω are part of delay_s. It is used when a horizon is chosen: the filter is

@@ -25,9 +25,9 @@ namespace proxarm::models {
 // A surface that pressed on the proxy in the last step.
 template <int N>
 struct Contact {
-  std::int32_t object = 0;         // index in the scene; 0 for a 𝒢 that is a single object
-  std::int32_t feature = 0;        // face, edge or region within the object
-  bool slips = false;              // false: the proxy sticks there, or there is no friction
+  std::int32_t object = 0;   // index in the scene; 0 for a 𝒢 that is a single object; below 0: no part of the world
+  std::int32_t feature = 0;  // face, edge or region within the object
+  bool slips = false;        // false: the proxy sticks there, or there is no friction
   Vec<N> normal = Vec<N>::Zero();  // unit, out of the object
 };
 
@@ -66,6 +66,13 @@ class GeometricAlgorithm {
 
   // Whether the last step left the proxy inside of an object, because objects that move leave it no room. A fault.
   [[nodiscard]] virtual bool squeezed() const noexcept { return false; }
+
+  // Which media hold the point q (they act without a surface), as a number; 0: none. A proxy of order 2 cuts its step
+  // where this changes.
+  [[nodiscard]] virtual std::uint32_t media_at(const Vec<N>& /*q*/) const noexcept { return 0; }
+
+  // False if media_at() is always 0: a proxy then leaves the call out.
+  [[nodiscard]] virtual bool has_media() const noexcept { return false; }
 };
 
 }  // namespace proxarm::models

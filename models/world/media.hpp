@@ -37,7 +37,7 @@ class Media final : public GeometricAlgorithm<N> {
   Vec<N> operator()(double K, const Vec<N>& p, const Vec<N>& q) noexcept override {
     double c = 0.0, F = 0.0;
     for (const Medium& medium : media_) {
-      if (medium.shape != nullptr && medium.shape->distance(in_W(q)) > 0.0) continue;
+      if (!holds(medium, q)) continue;
       c += medium.damping_Ns_per_m / T_;
       F += medium.force_N;
     }
@@ -45,6 +45,16 @@ class Media final : public GeometricAlgorithm<N> {
     const Vec<N> p_v = c > 0.0 ? Vec<N>(q + (K / kappa) * (p - q)) : p;
     return F > 0.0 ? coulomb(kappa, F, p_v, q) : (*rest_)(kappa, p_v, q);
   }
+
+  // A bit for each medium; those beyond the 32nd share bits with the first ones.
+  [[nodiscard]] std::uint32_t media_at(const Vec<N>& q) const noexcept override {
+    std::uint32_t held = 0;
+    for (std::size_t i = 0; i < media_.size(); ++i) {
+      if (holds(media_[i], q)) held |= 1U << (i % 32);
+    }
+    return held;
+  }
+  [[nodiscard]] bool has_media() const noexcept override { return !media_.empty(); }
 
   void set_time(const StepTime& time) noexcept override {
     if (time.period_s > 0.0) T_ = time.period_s;
@@ -57,6 +67,9 @@ class Media final : public GeometricAlgorithm<N> {
   [[nodiscard]] bool squeezed() const noexcept override { return rest_->squeezed(); }
 
  private:
+  [[nodiscard]] bool holds(const Medium& medium, const Vec<N>& q) const noexcept {
+    return medium.shape == nullptr || !(medium.shape->distance(in_W(q)) > 0.0);
+  }
   [[nodiscard]] Vec3 in_W(const Vec<N>& q) const noexcept {
     if constexpr (N == 3) return q;
     return X_WS_ * lift<N>(q);

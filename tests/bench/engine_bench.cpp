@@ -1,4 +1,4 @@
-// (26) against physics engines of Debian 12 on the same point, the same wall, under the same forces at the
+// (26) and order 2 against physics engines of Debian 12 on the same point, the same wall, under the same forces at the
 // same steps of 1 ms: the time of a step, and the rms position error against the exact solution, the median of twenty
 // places within a step at which the motion begins.
 //
@@ -60,8 +60,8 @@ class Engine {
 
 class Proxy final : public Engine {
  public:
-  Proxy(const ErrorCase& which, double t_0)
-      : world_(which.world()), proxy_({.mass_kg = which.mass_kg, .period_s = T}, *world_) {
+  Proxy(const ErrorCase& which, int order, double t_0)
+      : world_(which.world()), proxy_({.mass_kg = which.mass_kg, .period_s = T, .order = order}, *world_) {
     const CaseState start = which.exact(t_0);
     proxy_.start({.q = start.q,
                   .v = start.v,
@@ -327,7 +327,11 @@ const int registered = [] {
       benchmark::RegisterBenchmark((which.name + "/" + engine).c_str(),
                                    [&which, list](benchmark::State& state) { bench(state, which, list); });
     };
-    add("(26)", {{"nothing to tune", [](const ErrorCase& c, double t_0) { return std::make_unique<Proxy>(c, t_0); }}});
+    for (const int order : {1, 2}) {
+      add(order == 1 ? "(26)" : "order 2", {{"nothing to tune", [order](const ErrorCase& c, double t_0) {
+                                               return std::make_unique<Proxy>(c, order, t_0);
+                                             }}});
+    }
     std::vector<Tuned> list;
     for (const double stiffness : {1e3, 1e4, 1e5, 2.5e5, 1e6}) {
       for (const double ratio : {0.3, 1.0, 3.0}) {

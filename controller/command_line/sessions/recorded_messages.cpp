@@ -8,8 +8,7 @@ RecordedMessages::RecordedMessages(const std::filesystem::path& folder, const Pr
               .mass_kg = session.settings.mass_kg,
               .damping_Ns_per_m = session.settings.damping_Ns_per_m,
               .spring_N_per_m = session.settings.spring_N_per_m,
-              .impedance = session.impedance(),
-              .order = session.settings.order}),
+              .impedance = session.impedance()}),
       record_(folder / "session.mcap", stage_) {}
 
 }  // namespace proxarm::command_line

@@ -51,7 +51,7 @@ controller::SummaryConfig summary_config(const PreparedSession& session) {
 }
 
 void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
-  controller::add_clearances(record, session.scene, session.settings.order, rendered_ns);
+  controller::add_clearances(record, session.scene, rendered_ns);
   if (!session.impedance()) return;
   if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
     record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;

@@ -62,8 +62,7 @@ Json hello_of(const PreparedSession& session, const RunOptions& options, ViewPro
             {"mass_kg", settings.mass_kg},
             {"damping_Ns_per_m", settings.damping_Ns_per_m},
             {"spring_N_per_m", settings.spring_N_per_m},
-            {"impedance", session.impedance()},
-            {"order", settings.order}}}};
+            {"impedance", session.impedance()}}}};
 }
 
 // False where nobody reads any more.

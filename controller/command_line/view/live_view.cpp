@@ -50,8 +50,7 @@ view::Stage stage_of(const json& hello) {
            .mass_kg = settings.at("mass_kg"),
            .damping_Ns_per_m = settings.at("damping_Ns_per_m"),
            .spring_N_per_m = settings.at("spring_N_per_m"),
-           .impedance = settings.at("impedance"),
-           .order = settings.at("order")}};
+           .impedance = settings.at("impedance")}};
 }
 
 view::ServerConfig server_of(const json& hello) {

@@ -33,8 +33,7 @@ view::Stage stage_of(const fs::path& folder) {
            .mass_kg = settings.mass_kg,
            .damping_Ns_per_m = settings.damping_Ns_per_m,
            .spring_N_per_m = settings.spring_N_per_m,
-           .impedance = settings.scheme == controller::Scheme::impedance,
-           .order = settings.order}};
+           .impedance = settings.scheme == controller::Scheme::impedance}};
 }
 
 const char* kind_name(view::RecordedEvent::Kind kind) {

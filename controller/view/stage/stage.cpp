@@ -51,7 +51,7 @@ void Stage::follow(const controller::Change& change, bool rendered, double perio
 }
 
 void Stage::complete(CycleRecord& record, double rendered_s) const {
-  controller::add_clearances(record, scene_, options_.order, std::llround(1e9 * rendered_s));
+  controller::add_clearances(record, scene_, std::llround(1e9 * rendered_s));
 }
 
 Pose Stage::tool_pose(std::span<const Pose> links) const noexcept {

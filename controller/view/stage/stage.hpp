@@ -24,7 +24,6 @@ struct StageOptions {
   double period_s = 1e-3;
   double mass_kg = 0.0, damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;  // those with which the session began
   bool impedance = false;
-  int order = 1;
 };
 
 class Stage {
