@@ -72,7 +72,6 @@ controller::AdmittanceConfig config(const LoopModel& loop, double mass_kg) {
   config.spring_N_per_m = loop.spring_N_per_m;
   config.period_s = loop.period_s;
   config.order = loop.order;
-  config.matched_labels = loop.matched_labels;
   return config;
 }
 
@@ -113,10 +112,11 @@ double slope(const std::vector<double>& q, double from) {
 //
 // Where one mode A rᵏ cos(kθ + φ) is left, q(k)² − q(k+s) q(k−s) = A² r²ᵏ sin²(sθ) whatever its phase: a straight line
 // ln r² over k. The simulation goes on, twice as long each time, until the last quarter of that line is as steep as
-// its second half, within `share`.
+// its second half, within `share`, and the motion has grown or faded e⁸ times: a mode that does the opposite would show
+// by then if it had begun a three-thousandth as large.
 double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
-  constexpr double start = 1e-3, share = 0.005;
-  constexpr int most_steps = 400'000, most_half_waves = 1280;
+  constexpr double start = 1e-3, share = 0.005, folds = 8.0;
+  constexpr int most_steps = 100'000;
   models::FreeSpace<1> nothing;
   AdmittanceProxy<1> proxy(config(loop, mass_kg), nothing);
   // The hand wants 0; the proxy is released from rest away from it.
@@ -124,11 +124,16 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
   static_cast<void>(proxy.set_reference(Vec1::Zero()));
   LinearPlant plant(hand, loop, 0.0, start);
   double h = plant.first_force();
+  // A release from rest hardly excites what is near the Nyquist frequency. A force that pulls the proxy aside by as
+  // much for one step excites all modes alike.
+  const double aside = mass_kg / (loop.period_s * loop.period_s) * start;
+  const std::array<double, 3> kick{aside, -2.0 * aside, aside};
   std::vector<double> q{start};
   int crossings = 0, look_at = 40;
   double rate = 0.0;
-  while (q.size() < most_steps && crossings < most_half_waves) {
-    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) return blew_up;
+  while (q.size() < most_steps) {
+    const double pull = q.size() <= kick.size() ? kick[q.size() - 1] : 0.0;
+    if (proxy.step(Vec1(h + pull)) != controller::ProxyFault::none) return blew_up;
     const double now = proxy.q()[0];
     h = plant(now);
     crossings += (now < 0.0) != (q.back() < 0.0) ? 1 : 0;
@@ -138,10 +143,11 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
       return died;
     }
     if (crossings < look_at) continue;
-    look_at *= 2;
+    look_at = 2 * crossings;
     const double last_quarter = slope(q, 0.75);
     rate = slope(q, 0.5);
-    if (std::abs(rate - last_quarter) <= share * std::abs(rate)) break;
+    const double folded = std::abs(rate) * static_cast<double>(q.size());
+    if (folded >= folds && std::abs(rate - last_quarter) <= share * std::abs(rate)) break;
   }
   return crossings >= 40 ? rate : died;
 }
@@ -149,6 +155,7 @@ double growth(const HandModel& hand, const LoopModel& loop, double mass_kg) {
 struct Contact {
   double bounces = 0.0;      // how often it touches in the last third
   double amplitude_m = 0.0;  // of the proxy in it, peak to peak
+  double growth = 0.0;       // that by what it was in the third before; 0 where it settles
 };
 
 // The hand means to be 20 mm behind a wall that is 10 mm away.
@@ -161,21 +168,38 @@ Contact push_against_wall(const HandModel& hand, const LoopModel& loop, double m
   double h = 0.0;
   const int steps = static_cast<int>(std::min(20'000.0, 3.0 / loop.period_s));
   Contact contact;
-  double low = start, high = -start;
+  std::array<double, 2> low{start, start}, high{-start, -start};  // of the last two thirds
   bool touched = false;
   for (int k = 0; k < steps; ++k) {
-    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) break;
+    if (proxy.step(Vec1(h)) != controller::ProxyFault::none) return {contact.bounces, blew_up, blew_up};
     h = plant(proxy.q()[0]);
     const bool touches = proxy.f()[0] > 0.0;
-    if (3 * k > 2 * steps) {
-      contact.bounces += touches && !touched ? 1.0 : 0.0;
-      low = std::min(low, proxy.q()[0]);
-      high = std::max(high, proxy.q()[0]);
+    const std::size_t third = 3 * k > 2 * steps ? 1 : 0;
+    if (third == 1) contact.bounces += touches && !touched ? 1.0 : 0.0;
+    if (3 * k > steps) {
+      low[third] = std::min(low[third], proxy.q()[0]);
+      high[third] = std::max(high[third], proxy.q()[0]);
     }
     touched = touches;
   }
-  contact.amplitude_m = std::max(0.0, high - low);
+  contact.amplitude_m = std::max(0.0, high[1] - low[1]);
+  const double before_m = std::max(0.0, high[0] - low[0]);
+  contact.growth = contact.amplitude_m == 0.0 ? 0.0 : before_m > 0.0 ? contact.amplitude_m / before_m : blew_up;
   return contact;
+}
+
+// What is tried at walls, as multiples of the smallest stable mass, from light to heavy.
+constexpr std::array<double, 8> wall_multiples{1.02, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 2.0};
+
+// The multiple from which on nothing grows at the wall: the lightest such that it doesn't with it nor with any heavier
+// one. Infinite where it does with the heaviest.
+double bears_walls_from(const HandModel& hand, const LoopModel& loop, double smallest_kg) {
+  double from = std::numeric_limits<double>::infinity();
+  for (std::size_t i = wall_multiples.size(); i-- > 0;) {
+    if (push_against_wall(hand, loop, wall_multiples[i] * smallest_kg).growth > 1.0) break;
+    from = wall_multiples[i];
+  }
+  return from;
 }
 
 std::vector<double> decades(double low, double high, int count) {
@@ -253,7 +277,8 @@ std::vector<Column> StabilityMap::columns() const {
   return {{"period_s"},     {"stiffness_N_per_m"}, {"damping_Ns_per_m"},
           {"hand_mass_kg"}, {"delay_s"},           {"drive_time_constant_s"},
           {"order"},        {"predicted_kg"},      {"measured_kg"},
-          {"sensitivity"},  {"contact_bounces"},   {"contact_amplitude_m"}};
+          {"sensitivity"},  {"contact_bounces"},   {"contact_amplitude_m"},
+          {"at_walls_kg"},  {"contact_growth"},    {"bears_walls_from"}};
 }
 
 // A job computes all stiffnesses of one line, so that jobs aren't too small.
@@ -276,19 +301,27 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
   const Grip grip = take(grid.grips);
   loop.drive_time_constant_s = take(grid.tau);
   loop.order = take(grid.orders);
+  loop.with_events = false;
+  LoopModel at_walls = loop;
+  at_walls.with_events = true;
   std::vector<Row> rows;
   for (std::size_t i = 0; i < grid.K.size(); ++i) {
     const HandModel hand{grid.K[i], grip.damping_Ns_per_m, grip.mass_kg};
     const auto predicted = controller::smallest_stable_mass(hand, loop);
     double measured = nan_value, sensitivity = nan_value;
-    Contact contact{nan_value, nan_value};
+    Contact contact{nan_value, nan_value, nan_value};
+    double bears_from = nan_value;
+    const auto predicted_at_walls = controller::smallest_stable_mass(hand, at_walls);
     if (predicted) {
       HandModel stiffer = hand;
       stiffer.stiffness_N_per_m *= 1.01;
       const auto other = controller::smallest_stable_mass(stiffer, loop);
       sensitivity = other ? std::abs(std::log(*other / *predicted)) / std::log(1.01) : 1e3;
       measured = measured_boundary_kg(hand, loop, *predicted);
-      if ((job + i) % 10 == 0) contact = push_against_wall(hand, loop, 1.5 * *predicted);
+      if ((job + i) % 10 == 0 && predicted_at_walls) {
+        contact = push_against_wall(hand, loop, wall_margin * *predicted_at_walls);
+        bears_from = bears_walls_from(hand, loop, *predicted_at_walls);
+      }
     } else {
       // Compares measured and predicted rate at a mass whose oscillation takes some hundred steps.
       const double mass = std::clamp(hand.stiffness_N_per_m * std::pow(40.0 * loop.period_s, 2), 1e-2, 1000.0);
@@ -297,21 +330,28 @@ std::vector<Row> StabilityMap::run(std::size_t job, const Options& options) cons
     }
     rows.push_back({loop.period_s, hand.stiffness_N_per_m, hand.damping_Ns_per_m, hand.mass_kg, loop.delay_s,
                     loop.drive_time_constant_s, static_cast<double>(loop.order), predicted.value_or(-1.0), measured,
-                    sensitivity, contact.bounces, contact.amplitude_m});
+                    sensitivity, contact.bounces, contact.amplitude_m, predicted_at_walls.value_or(-1.0),
+                    contact.growth, bears_from});
   }
   return rows;
 }
 
 json StabilityMap::headline(const Table& table, const Options& /*options*/) const {
   const std::size_t predicted = table.column("predicted_kg"), measured = table.column("measured_kg"),
-                    sensitivity = table.column("sensitivity"), bounces = table.column("contact_bounces");
+                    sensitivity = table.column("sensitivity"), bounces = table.column("contact_bounces"),
+                    bears_from = table.column("bears_walls_from");
   std::int64_t ill = 0, none = 0, none_disagree = 0, not_found = 0, contact = 0, contact_cycles = 0, compared = 0;
-  double worst = 0.0, sum2 = 0.0;
+  std::int64_t diverged = 0, want_more = 0;
+  double worst = 0.0, sum2 = 0.0, most_from = 0.0;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double p = table.number(row, predicted), m = table.number(row, measured);
     if (std::isfinite(table.number(row, bounces))) {
       ++contact;
       contact_cycles += table.number(row, bounces) > 1.0 ? 1 : 0;
+      const double from = table.number(row, bears_from);
+      diverged += from > wall_margin ? 1 : 0;
+      want_more += from > wall_multiples.front() ? 1 : 0;
+      most_from = std::max(most_from, from);
     }
     if (p < 0.0) {
       ++none;
@@ -338,6 +378,10 @@ json StabilityMap::headline(const Table& table, const Options& /*options*/) cons
       {"not_found", not_found},
       {"contact_points", contact},
       {"contact_cycles", contact_cycles},
+      {"contact_diverged", diverged},
+      {"contact_want_more", want_more},
+      {"contact_bears_from_max", std::isfinite(most_from) ? json(most_from) : json()},
+      {"wall_margin", wall_margin},
       {"d1_error_max", d1_error()},
       {"keys",
        {{"points", "combinations of timestep, hand, delay, drive and order"},
@@ -349,8 +393,18 @@ json StabilityMap::headline(const Table& table, const Options& /*options*/) cons
          "points where no mass up to 1000 kg is stable; _disagree: simulation and eigenvalues differ at a mass that "
          "oscillates fast enough to be followed"},
         {"not_found", "points where the simulation showed no boundary near the predicted one"},
-        {"contact_points", "points that were also simulated against a wall, at 1.5 times the smallest stable mass"},
-        {"contact_cycles", "of those, how many went on making and breaking contact"},
+        {"contact_points",
+         "points that were also simulated against a wall, at 1.02 to 2 times the smallest mass that is stable by "
+         "eigenvalues; order 2 steps by (26) at contacts, and must be stable as both"},
+        {"contact_cycles", "of those, how many went on making and breaking contact at wall_margin times that mass"},
+        {"wall_margin", "from that many times the smallest mass on the map calls a mass stable at walls"},
+        {"contact_diverged",
+         "of those, how many swing more in the last third of the simulation than in the one before, at wall_margin "
+         "times the smallest mass or more; a failure"},
+        {"contact_want_more",
+         "points that do at 1.02 times or more: eigenvalues know no impacts, each of which goes round the loop as a "
+         "pulse that hardly fades where the hand is about as heavy as the proxy"},
+        {"contact_bears_from_max", "the multiple of the smallest mass from which on no point does"},
         {"d1_error_max", "ideal drive, no delay beyond one period: error of the prediction against K T^2/4 + D T/2"}}}};
 }
 
@@ -362,6 +416,7 @@ std::vector<std::string> StabilityMap::plot(const Table& table, const Options& o
                  .columns = 3,
                  .z_low = 1e-3,
                  .z_high = 100.0,
+                 .contours = {0.01, 0.1, 0.5, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 50.0},
                  .note = "white: no mass up to 1000 kg is stable"};
   const std::vector<double> delays = options.quick ? grid.L : std::vector<double>{0.0, 4e-3, 16e-3};
   for (const Grip& grip : {Grip{10.0, 0.0}, Grip{20.0, 1.0}}) {
@@ -431,8 +486,12 @@ std::string StabilityMap::text(const json& headline) const {
   text << line << "not found " << headline.at("not_found") << ", disagreeing where no mass is stable "
        << headline.at("no_stable_mass_disagree") << "; K T²/4 + D T/2 to " << headline.at("d1_error_max").get<double>()
        << "\nagainst a wall: " << headline.at("contact_points") << " points, " << headline.at("contact_cycles")
-       << " that don't settle\n";
+       << " that go on touching, " << headline.at("contact_diverged") << " that diverge at "
+       << headline.at("wall_margin") << " times the smallest mass; " << headline.at("contact_want_more")
+       << " want more than 1.02 times, " << headline.at("contact_bears_from_max") << " at most\n";
   return text.str();
 }
+
+bool StabilityMap::failed(const json& headline) const { return headline.at("contact_diverged").get<int>() > 0; }
 
 }  // namespace proxarm::studies

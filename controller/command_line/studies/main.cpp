@@ -21,7 +21,8 @@ using command_line::whole_number;
 
 void add_study_options(CLI::App& app, StudyOptions& options) {
   app.add_option("study", options.words,
-                 "figure5, stress, stress_meshes, stress_layers, error, stability, fidelity or skip; or merge and the "
+                 "figure5, stress, stress_meshes, stress_layers, stress_order2, error, stability, fidelity or skip; or "
+                 "merge and the "
                  "folders of its parts")
       ->type_name("NAME")
       ->required();
@@ -39,7 +40,7 @@ void add_study_options(CLI::App& app, StudyOptions& options) {
                  "how many (default: one per core)")
       ->type_name("N");
   app.add_option("--replay", whole_number("--replay", [&](std::uint64_t n) { options.replay = n; }),
-                 "stress, stress_meshes and stress_layers: one run again, by the seed that was printed for it")
+                 "stress and its kin: one run again, by the seed that was printed for it")
       ->type_name("SEED");
 }
 

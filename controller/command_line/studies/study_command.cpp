@@ -49,6 +49,7 @@ constexpr StudyText study_texts[] = {
      "seed is printed, for --replay. Default: 1,000,000 runs, 1000 with --quick."},
     {"stress_meshes", "The same as stress, among concave meshes and meshes that move."},
     {"stress_layers", "The same as stress, among objects with elastic layers."},
+    {"stress_order2", "The same worlds as stress, all of them by order 2."},
     {"merge", "Joins the parts of a study (--shard) in the named folders to the files of one run, in --out."},
 };
 
@@ -68,7 +69,7 @@ int study_command(const StudyOptions& options) {
     const auto& known = studies::Stress::worlds_names;
     const auto which = std::find(known.begin(), known.end(), name);
     require(which != known.end() && options.words.size() == 1, "--replay", "another study",
-            "study stress --replay SEED, or stress_meshes, stress_layers");
+            "study stress --replay SEED, or stress_meshes, stress_layers, stress_order2");
     std::string text;
     const auto worlds = static_cast<studies::Stress::Worlds>(which - known.begin());
     const bool violated = studies::Stress::replay(*options.replay, text, worlds);

@@ -143,6 +143,52 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   return controller::draw_svg("gnuplot", gp.str(), data.str(), svg);
 }
 
+namespace {
+
+// Where z is `level`: a line "x y" to "x y" across each mesh of the grid, linear in what is drawn.
+struct Contour {
+  std::string lines{};
+  double label_x = 0.0, label_y = 0.0;  // a place on it
+};
+
+Contour contour(const Map& map, double level) {
+  const auto scaled = [](double v, bool log) { return log ? std::log(v) : v; };
+  const auto between = [&scaled](double from, double to, double share, bool log) {
+    const double v = scaled(from, log) + share * (scaled(to, log) - scaled(from, log));
+    return log ? std::exp(v) : v;
+  };
+  std::ostringstream lines;
+  Contour found;
+  std::size_t count = 0;
+  for (std::size_t j = 0; j + 1 < map.y.size(); ++j) {
+    for (std::size_t i = 0; i + 1 < map.x.size(); ++i) {
+      // Around the mesh: on each side where z passes the level, a point.
+      const std::array<std::array<std::size_t, 2>, 5> corners{{{i, j}, {i + 1, j}, {i + 1, j + 1}, {i, j + 1}, {i, j}}};
+      std::vector<std::array<double, 2>> points;
+      for (std::size_t side = 0; side < 4; ++side) {
+        const auto [i_a, j_a] = corners[side];
+        const auto [i_b, j_b] = corners[side + 1];
+        const double a = scaled(map.z[j_a * map.x.size() + i_a], map.log_z),
+                     b = scaled(map.z[j_b * map.x.size() + i_b], map.log_z), z = scaled(level, map.log_z);
+        if (!std::isfinite(a) || !std::isfinite(b) || (a < z) == (b < z)) continue;
+        const double share = (z - a) / (b - a);
+        points.push_back(
+            {between(map.x[i_a], map.x[i_b], share, map.log_x), between(map.y[j_a], map.y[j_b], share, map.log_y)});
+      }
+      if (points.size() != 2) continue;  // at a saddle, or beside a white cell, the line is left open
+      for (const auto& [x, y] : points) lines << x << " " << y << "\n";
+      lines << "\n";
+      if (++count > 4) continue;  // the label goes to the fourth mesh, away from the border
+      found.label_x = points[0][0];
+      found.label_y = points[0][1];
+    }
+  }
+  found.lines = lines.str();
+  return found;
+}
+
+}  // namespace
+
 std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
   std::ostringstream gp, data;
   data.precision(8);
@@ -155,6 +201,7 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
      << "set multiplot\nset label 1000 " << plain(chart.title) << " at screen 0.5, screen " << 1.0 - 26.0 / height
      << " center font 'sans,22'\nset label 1001 " << plain(chart.note) << " at screen 0.5, screen " << 18.0 / height
      << " center\nunset key\n";
+  std::size_t block = 0;
   for (std::size_t i = 0; i < chart.maps.size(); ++i) {
     const Map& map = chart.maps[i];
     place(gp, i, chart.columns, chart.maps.size(), 50.0 / height, 40.0 / height);
@@ -186,8 +233,18 @@ std::string draw(const MapChart& chart, const std::filesystem::path& svg) {
       }
     }
     data << (drawn > 0 ? cells.str() : "1 1 1 1 1 1 nan\n") << "\n\n";
-    gp << "plot 'data' index " << i << " using 1:2:3:4:5:6:7 with boxxyerror fillstyle solid 1.0 noborder lc palette\n"
-       << "unset label 1000\nunset label 1001\n";
+    std::string plot = "plot 'data' index " + std::to_string(block++) +
+                       " using 1:2:3:4:5:6:7 with boxxyerror fillstyle solid 1.0 noborder lc palette";
+    int label = 2000;
+    for (const double level : chart.contours) {
+      const Contour line = contour(map, level);
+      if (line.lines.empty()) continue;
+      data << line.lines << "\n";
+      plot += ", 'data' index " + std::to_string(block++) + " using 1:2 with lines lw 1.5 lc rgb '#2060c0'";
+      gp << "set label " << label++ << " '" << level << "' at " << line.label_x << "," << line.label_y
+         << " center front font 'sans,15' textcolor rgb '#2060c0' boxed\n";
+    }
+    gp << "set style textbox opaque noborder fillcolor rgb '#ffffff'\n" << plot << "\nunset label\n";
   }
   gp << "unset multiplot\n";
   return controller::draw_svg("gnuplot", gp.str(), data.str(), svg);

@@ -38,7 +38,7 @@ struct Chart {
 // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
 [[nodiscard]] std::string draw(const Chart& chart, const std::filesystem::path& svg);
 
-// z over x and y, each a grid's lines; values that aren't finite stay white. Contours are drawn at `contours`.
+// z over x and y, each a grid's lines; values that aren't finite stay white.
 struct Map {
   std::string title{}, x_label{}, y_label{};  // what z is stands in the chart's title
   bool log_x = false, log_y = false, log_z = false;
@@ -51,6 +51,7 @@ struct MapChart {
   int columns = 1;
   std::vector<Map> maps{};
   double z_low = 0.0, z_high = 0.0;  // equal: as the data are
+  std::vector<double> contours{};    // values of z at which lines are drawn, each with its value
   std::string note{};                // below: what white is
 };
 

@@ -13,8 +13,8 @@
 // closed form (penalty_world.hpp).
 //
 // Error: rms of the position error over 60 instants of the motion (over all steps where there are fewer). Where an
-// event falls within a step is chance: each run is repeated with 50 beginnings spread over a step (10 with more than
-// 1920 steps a motion), and what counts is what nine of ten of them keep below, at that timestep and all finer ones.
+// event falls within a step is chance: each run is repeated with 50 beginnings spread over a step, and what counts is
+// what nine of ten of them keep below, at that timestep and all finer ones.
 // Run time: steps times the time of a step, which is measured in turn with a step of (26) on the same motion.
 #pragma once
 

@@ -69,7 +69,7 @@ json keys(const std::string& study) {
       {"edge", "steps in which an edge of a box, cylinder or mesh did work on the proxy"},
       {"not_judged",
        "steps in contact whose work isn't judged: moving objects, layers (they give back what they took), order 2 "
-       "(its q is no place of the proxy), several contacts with a convex one"},
+       "from another point than the proxy's, several contacts with a convex one"},
       {"deepest_m", "the deepest that any proxy was inside of anything in a resolved step, per metre of coordinates"},
       {"failing", "up to 50 runs with a violation: proxarm study " + study + " --replay RUN_SEED shows one"},
       {"seed", "of the study; run seeds follow from it"}};

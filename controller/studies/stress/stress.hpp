@@ -14,7 +14,8 @@
 //   several         another κ' gave another point that obeys (17) as well: Coulomb's law has several solutions there
 //   edge            work on the edges of boxes, cylinders and meshes, where R is zero
 //   not judged      work with several contacts of which one is convex, with objects that move (they do work), with
-//                   layers (they give back what they took), and at order 2, whose q is no place where the proxy was
+//                   layers (they give back what they took), and steps of order 2 that ask 𝒢 from another point than
+//                   where the proxy was
 #pragma once
 
 #include <array>
@@ -29,7 +30,8 @@ namespace proxarm::studies {
 class Stress final : public Study {
  public:
   using Worlds = StressWorlds;
-  static constexpr std::array<std::string_view, 3> worlds_names{"stress", "stress_meshes", "stress_layers"};
+  static constexpr std::array<std::string_view, 4> worlds_names{"stress", "stress_meshes", "stress_layers",
+                                                                "stress_order2"};
   explicit Stress(Worlds worlds = Worlds::all) : worlds_(worlds) {}
 
   std::string name() const override { return std::string(worlds_names[static_cast<std::size_t>(worlds_)]); }

@@ -23,6 +23,8 @@ TEST(StabilityMap, MeasuresWhatEigenvaluesPredict) {
   EXPECT_GT(headline.at("compared").get<int>(), 80);
   EXPECT_EQ(headline.at("no_stable_mass_disagree").get<int>(), 0);
   EXPECT_EQ(headline.at("not_found").get<int>(), 0);
+  EXPECT_GT(headline.at("contact_points").get<int>(), 10);
+  EXPECT_EQ(headline.at("contact_diverged").get<int>(), 0);
   EXPECT_LT(headline.at("d1_error_max").get<double>(), 1e-6);
 }
 

@@ -30,6 +30,8 @@ TEST(Stress, HoldsAmongMeshes) { expect_no_violation(2, 1'000, Stress::Worlds::m
 
 TEST(Stress, HoldsAmongLayers) { expect_no_violation(2, 400, Stress::Worlds::layers); }
 
+TEST(Stress, HoldsAtOrder2) { expect_no_violation(3, 2'000, Stress::Worlds::order_2); }
+
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
   const Options options{.seed = 5};
