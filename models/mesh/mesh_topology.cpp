@@ -129,11 +129,14 @@ constexpr std::size_t longest_loop = 2000;
 
 using Cover = std::vector<std::array<std::uint32_t, 3>>;
 
+double area_of(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& corners) {
+  const Vec3& a = mesh.vertex(corners[0]);
+  return 0.5 * (mesh.vertex(corners[1]) - a).cross(mesh.vertex(corners[2]) - a).norm();
+}
+
 double area_of(const TriangleMesh& mesh, const Cover& cover) {
   double area = 0.0;
-  for (const auto& [a, b, c] : cover) {
-    area += 0.5 * (mesh.vertex(b) - mesh.vertex(a)).cross(mesh.vertex(c) - mesh.vertex(a)).norm();
-  }
+  for (const auto& triangle : cover) area += area_of(mesh, triangle);
   return area;
 }
 
@@ -148,7 +151,7 @@ Cover slivers_first(const TriangleMesh& mesh, std::vector<std::uint32_t> loop) {
     std::size_t smallest = 0;
     double smallest_m2 = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < loop.size(); ++k) {
-      const double area_m2 = area_of(mesh, {triangle_at(k)});
+      const double area_m2 = area_of(mesh, triangle_at(k));
       if (area_m2 < smallest_m2) std::tie(smallest, smallest_m2) = std::pair(k, area_m2);
     }
     triangles.push_back(triangle_at(smallest));

@@ -15,6 +15,7 @@ import argparse
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -129,7 +130,7 @@ class Bisection:
 
     def bears(self, mass):
         record = self.folder / "record"
-        subprocess.run(["rm", "-rf", record])
+        shutil.rmtree(record, ignore_errors=True)
         done = self.run(mass, "--force-unstable", "--duration", "11s", "--record", record)
         if not (record / "signals.csv").exists():
             raise RuntimeError(done.stderr)

@@ -131,12 +131,17 @@ bool fades(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
   return late < early || late == 0.0;
 }
 
+// Draws from the generator, whose seed each test prints.
+auto log_uniform_from(std::mt19937_64& generator) {
+  return [&generator](double low, double high) {
+    return std::exp(std::uniform_real_distribution<>(std::log(low), std::log(high))(generator));
+  };
+}
+
 TEST(Stability, PredictsWhatTheIntegratorDoes) {
   std::mt19937_64 generator(9);
   std::printf("seed 9\n");
-  const auto log_uniform = [&generator](double low, double high) {
-    return std::exp(std::uniform_real_distribution<>(std::log(low), std::log(high))(generator));
-  };
+  const auto log_uniform = log_uniform_from(generator);
   int stable = 0, unstable = 0;
   for (int run = 0; run < 120; ++run) {
     const HandModel hand{log_uniform(100, 5000), log_uniform(3, 80), run % 3 == 0 ? 0.0 : log_uniform(0.1, 3)};
@@ -163,9 +168,7 @@ TEST(Stability, PredictsWhatTheIntegratorDoes) {
 TEST(Stability, CountsTheEventsOfOrderTwo) {
   std::mt19937_64 generator(11);
   std::printf("seed 11\n");
-  const auto log_uniform = [&generator](double low, double high) {
-    return std::exp(std::uniform_real_distribution<>(std::log(low), std::log(high))(generator));
-  };
+  const auto log_uniform = log_uniform_from(generator);
   int heavier_by_events = 0;
   for (int run = 0; run < 40; ++run) {
     const HandModel hand{log_uniform(50, 5000), log_uniform(5, 80), log_uniform(0.01, 3)};
@@ -188,9 +191,7 @@ TEST(Stability, CountsTheEventsOfOrderTwo) {
 TEST(Stability, NamesTheMassAboveWhichAllAreStable) {
   std::mt19937_64 generator(10);
   std::printf("seed 10\n");
-  const auto log_uniform = [&generator](double low, double high) {
-    return std::exp(std::uniform_real_distribution<>(std::log(low), std::log(high))(generator));
-  };
+  const auto log_uniform = log_uniform_from(generator);
   int islands = 0;
   for (int run = 0; run < 60; ++run) {
     const HandModel hand{log_uniform(50, 20000), log_uniform(1, 300), log_uniform(0.01, 3)};
