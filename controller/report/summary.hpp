@@ -140,6 +140,19 @@ struct PassivitySummary {
   double felt_damping_min_Ns_per_m = 0.0;  // b̂ while it oscillated
 };
 
+// Whether the mass was stable where the arm came by (controller/stability/passed_poses.hpp).
+struct PosesSummary {
+  struct Unstable {
+    double first_s = 0.0, worst_s = 0.0;            // after the first cycle
+    double felt_mass_kg = 0.0;                      // at the worst
+    std::optional<double> smallest_stable_mass_kg;  // there; absent: none is
+  };
+  std::size_t judged = 0;
+  std::optional<Unstable> unstable;  // absent: it was
+};
+// "at 3.2 s the arm came …". Precondition: unstable.
+std::string poses_text(const PosesSummary& poses);
+
 struct Summary {
   double simulated_time_s = 0.0;  // all cycles, whatever the phase
   double rendered_time_s = 0.0;
@@ -172,6 +185,7 @@ struct Summary {
   std::map<std::string, LimitSummary> active_limits;  // by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
   std::optional<Oscillation> oscillation;  // the longest; absent: not looked for
+  std::optional<PosesSummary> poses;       // set by the caller; absent: impedance type
   double lookahead_s = 0.0;                // horizon at the start; 0: none
   double hands_off_s = 0.0;                // nobody held the handle
   std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor

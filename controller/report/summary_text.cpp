@@ -85,6 +85,18 @@ Json passivity(const std::optional<PassivitySummary>& summary) {
           {"felt_damping_min_Ns_per_m", summary->felt_damping_min_Ns_per_m}};
 }
 
+Json poses(const std::optional<PosesSummary>& summary) {
+  if (!summary) return nullptr;
+  Json json{{"judged", summary->judged}, {"unstable", nullptr}};
+  if (!summary->unstable) return json;
+  const PosesSummary::Unstable& there = *summary->unstable;
+  json["unstable"] = {{"first_s", there.first_s},
+                      {"worst_s", there.worst_s},
+                      {"felt_mass_kg", there.felt_mass_kg},
+                      {"smallest_stable_mass_kg", there.smallest_stable_mass_kg}};
+  return json;
+}
+
 Json view(const std::optional<ViewSummary>& summary) {
   if (!summary) return nullptr;
   return {{"address", "127.0.0.1"},
@@ -156,6 +168,7 @@ void add_repeatable(Json& json, const Summary& s) {
   }
   json["lookahead_s"] = s.lookahead_s;
   json["oscillation"] = oscillation(s.oscillation);
+  json["poses"] = poses(s.poses);
   json["passivity"] = passivity(s.passivity);
   json["hands_off_s"] = s.hands_off_s;
   json["held_samples"] = s.held_samples;
@@ -334,6 +347,16 @@ std::string oscillation_text(const Oscillation& o) {
          format(" to either side, for %.2f s ", o.duration_s) + format("from %.2f s on", o.from_s);
 }
 
+std::string poses_text(const PosesSummary& poses) {
+  const PosesSummary::Unstable& there = *poses.unstable;
+  const std::string came = format("at %.2f s the arm came where ", there.first_s) +
+                           format("%.3g kg isn't stable with this hand", there.felt_mass_kg);
+  if (!there.smallest_stable_mass_kg) return came + ", nor is any other mass";
+  return came + (there.worst_s > there.first_s ? format("; it takes up to %.3g kg", *there.smallest_stable_mass_kg) +
+                                                     format(" (at %.2f s)", there.worst_s)
+                                               : format("; it takes %.3g kg there", *there.smallest_stable_mass_kg));
+}
+
 namespace {
 
 // Whether the loop was stable with this hand.
@@ -398,6 +421,7 @@ std::string summary_text(const Summary& s) {
   tell_time(s, line);
   tell_motion(s, line);
   tell_oscillation(s, line);
+  if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses));
   tell_limits(s, line);
   if (s.hands_off_s > 0.0) line("hands off", format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s));
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");

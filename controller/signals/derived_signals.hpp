@@ -13,6 +13,9 @@ class SignalDeriver {
   // The cell must outlive it. Throws SetupError.
   explicit SignalDeriver(const description::Cell& cell);
   [[nodiscard]] DerivedSignals derive(const CycleRecord& record) const;
+  // The links' angles, by the encoders.
+  [[nodiscard]] models::JointVector link_rad(const CycleRecord& record) const;
+  [[nodiscard]] const models::Arm& arm() const noexcept { return arm_; }
 
  private:
   const description::Cell& cell_;

@@ -76,6 +76,26 @@ class Oscillation(ProgramTest):
             with self.subTest(arguments):
                 self.assert_refused(self.call("run", *arguments), said, "--force-unstable")
 
+    def test_a_pose_in_which_the_mass_is_not_stable_is_told_and_the_steel_swings_there(self):
+        """4 kg at 2 ms are stable where the arm starts, and not 0.3 m from there. 5.5 kg are in both."""
+        hand = self.written("far.yaml", "name: far\nmass_kg: 1\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
+                            "waypoints:\n" + "".join(f"  - {{time_s: {t}, offset_m: {p}}}\n" for t, p in (
+                                (0.5, [0, 0, 0]), (2.0, [0.3, 0, -0.1]), (2.2, [0.3, 0.01, -0.1]))))
+        for mass, stable in ((4, False), (5.5, True)):
+            with self.subTest(mass=mass):
+                outcome, (seconds, _, _) = self.run_of("--timestep", "2ms", "--mass", mass, "--hand", hand, "--scene",
+                                                       SOURCE / "scenes/free.yaml", "--passivity", "observe")
+                poses = outcome.summary["poses"]
+                self.assertGreater(poses["judged"], 3)
+                self.assertEqual("isn't stable with this hand" in outcome.err, not stable, outcome.err)
+                self.assertEqual(seconds < 0.5, stable)
+                if stable:
+                    self.assertIsNone(poses["unstable"])
+                else:
+                    self.assertEqual(poses["unstable"]["felt_mass_kg"], mass)
+                    self.assertAlmostEqual(poses["unstable"]["smallest_stable_mass_kg"], 5.28, delta=0.05)
+                    self.assertLess(poses["unstable"]["first_s"], 2.5)
+
     def test_it_is_damped_by_default_and_told_all_the_same(self):
         """Before: it swung for 5.9 s, by 9 and 13 mm."""
         for arguments in (("--timestep", "2ms", "--mass", "2"), ("--timestep", "4ms", "--mass", "3.4")):
@@ -124,6 +144,7 @@ class Oscillation(ProgramTest):
                 self.assertEqual(outcome.status, 0, outcome.err)
                 self.assertFalse(outcome.summary["oscillation"]["lasts"])
                 self.assertLess(seconds, 1.0)
+                self.assertIsNone(outcome.summary["poses"]["unstable"])
 
     def test_no_shipped_scene_is_blamed(self):
         for scene in sorted((SOURCE / "scenes").glob("*.yaml")):
@@ -134,6 +155,8 @@ class Oscillation(ProgramTest):
                     self.assertEqual(outcome.status, 0, outcome.err)
                     self.assertFalse(outcome.summary["oscillation"]["lasts"])
                     self.assertEqual(outcome.summary["passivity"]["added_time_s"], 0.0)
+                    if outcome.summary["poses"]:
+                        self.assertIsNone(outcome.summary["poses"]["unstable"])
 
     def test_who_doesnt_look_says_nothing(self):
         outcome = self.call("run", "--json", "--no-plot", "--passivity", "off", "--timestep", "2ms", "--mass", "2",

@@ -177,14 +177,20 @@ controller::SessionLength session_length(const PreparedSession& session, const R
 }
 
 SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
-    : session_(session), options_(options), builder_(summary_config(session)), progress_(session.duration_s) {
+    : session_(session),
+      options_(options),
+      builder_(summary_config(session)),
+      progress_(session.duration_s),
+      deriver_(session.cell) {
   refuse_lost_plot();
+  if (!session.impedance()) {
+    poses_ = std::make_unique<controller::PassedPoses>(deriver_.arm(), session.cell, hand_model(session), session.loop);
+  }
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
   writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, joint_names(session.cell), with_truth);
   writer_->write_file("effective.yaml", effective_config(session));
-  deriver_ = std::make_unique<controller::SignalDeriver>(session.cell);
 }
 
 // Better now than after the run that it was to show. By its name nothing but an earlier plot can be overwritten.
@@ -277,6 +283,8 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
     if (told_period_ns_ > 0) {
       std::fprintf(stderr, "proxarm: timestep %.4g ms from %.4g s on, all drives have confirmed it\n",
                    1e-6 * static_cast<double>(record.period_ns), 1e-9 * static_cast<double>(record.time_ns));
+      const double period_s = 1e-9 * static_cast<double>(record.period_ns);
+      if (poses_) poses_->change(with_timestep(session_, options_, period_s).loop);
     }
     told_period_ns_ = record.period_ns;
   }
@@ -293,6 +301,28 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
+namespace {
+controller::PosesSummary poses_summary(const controller::PassedPoses& poses) {
+  controller::PosesSummary summary{.judged = poses.judged(), .unstable = {}};
+  if (!poses.unstable()) return summary;
+  const controller::PassedPoses::Unstable& there = *poses.unstable();
+  summary.unstable = {there.first_s, there.worst_s, there.felt_mass_kg, there.smallest_stable_mass_kg};
+  return summary;
+}
+}  // namespace
+
+// On standard error, once: at the start only the start pose was judged.
+void SessionOutput::judge_pose(const CycleRecord& record) {
+  if (!poses_ || record.phase != controller::Phase::rendering) return;
+  const auto joints_rad = [&] { return deriver_.link_rad(record); };
+  const double felt_mass_kg = record.proxy_mass_kg + session_.cell.tool.mass_kg;
+  const bool first = poses_->pass(1e-9 * static_cast<double>(record.time_ns), controller::vec3(record.tool_W_m),
+                                  felt_mass_kg, record.proxy_damping_Ns_per_m, joints_rad);
+  if (!first) return;
+  std::fprintf(stderr, "proxarm: %s; if it swings: a larger mass, or lead it elsewhere\n",
+               controller::poses_text(poses_summary(*poses_)).c_str());
+}
+
 void SessionOutput::add(CycleRecord record) {
   if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
   // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
@@ -304,7 +334,8 @@ void SessionOutput::add(CycleRecord record) {
   say_timestep(record);
   builder_.add(record);
   say_oscillation();
-  if (writer_) writer_->add(record, deriver_->derive(record));
+  judge_pose(record);
+  if (writer_) writer_->add(record, deriver_.derive(record));
   if (plot_) plot_->add(record);
   if (progress_.enabled()) {
     const bool rendering = record.phase == controller::Phase::rendering;
@@ -339,6 +370,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
   Summary summary = builder_.finish();
   summary.end = end_summary(end, cause, session_, summary.rendered_time_s);
   summary.drives_lack = fieldbus::losses_of(cycle.parts().can_drives);
+  if (poses_) summary.poses = poses_summary(*poses_);
   // A medium takes its share along the surface, too, which the ratio would count as friction.
   if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {

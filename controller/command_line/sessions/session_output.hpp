@@ -15,6 +15,7 @@
 #include "controller/report/summary.hpp"
 #include "controller/session/session.hpp"
 #include "controller/signals/derived_signals.hpp"
+#include "controller/stability/passed_poses.hpp"
 
 namespace proxarm::command_line {
 
@@ -52,6 +53,7 @@ class SessionOutput {
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);
   void say_oscillation();
+  void judge_pose(const controller::CycleRecord& record);
   void say_how_to_get_free(controller::Phase phase) const;
 
   const PreparedSession& session_;
@@ -60,7 +62,8 @@ class SessionOutput {
   controller::Progress progress_;
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
-  std::unique_ptr<controller::SignalDeriver> deriver_;  // with the writer
+  controller::SignalDeriver deriver_;
+  std::unique_ptr<controller::PassedPoses> poses_;  // admittance type
   std::int64_t rendered_ns_ = 0;
   std::int64_t told_period_ns_ = 0;  // that the user knows of
   bool told_oscillation_ = false;    // of the present spell

@@ -1,0 +1,124 @@
+// The mass is judged where the arm comes by, not only where it starts.
+#include "controller/stability/passed_poses.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "models/arm/inverse_kinematics.hpp"
+#include "tests/source_file.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using models::JointVector;
+using models::Vec3;
+
+// The default cell at 2 ms, where it starts and with the tool elsewhere.
+class PassedPosesTest : public ::testing::Test {
+ protected:
+  PassedPosesTest() {
+    loop_.period_s = 2e-3;
+    loop_.delay_s = 0.020;
+    loop_.handle_mass_kg = cell_.tool.mass_kg;
+  }
+
+  JointVector joints_at(const Vec3& offset_W) const {
+    const models::InverseKinematics inverse(arm_);
+    models::InverseKinematicsResult solution;
+    JointVector q = arm_.start_rad();
+    for (int step = 1; step <= 100; ++step) {
+      models::Pose X_WT = arm_.tool_pose(arm_.start_rad());
+      X_WT.translation() += step / 100.0 * offset_W;
+      inverse.solve(q, X_WT, solution);
+      EXPECT_EQ(solution.status, models::InverseKinematicsResult::Status::converged);
+      q = solution.q;
+    }
+    return q;
+  }
+
+  // The felt mass at which the loop there is just stable, by halving: a way to it that shares nothing with the sweep of
+  // smallest_stable_mass().
+  double least_kg_at(const JointVector& joints_rad) const {
+    LoopModel loop = loop_;
+    loop.arms = std::make_shared<const std::vector<ElasticArm>>(1, elastic_arm(arm_, joints_rad, cell_));
+    double low = 0.1, high = 100.0;
+    while (high > 1.0001 * low) {
+      const double middle = std::sqrt(low * high);
+      (spectral_radius(hand_, loop, middle) < 1.0 ? high : low) = middle;
+    }
+    return high + loop_.handle_mass_kg;
+  }
+
+  // Two cycles, since in the first the mass may have just changed.
+  bool pass(PassedPoses& poses, double time_s, const Vec3& offset_W, double felt_kg) const {
+    const auto joints = [&] { return joints_at(offset_W); };
+    const Vec3 tool_W_m = arm_.tool_pose(arm_.start_rad()).translation() + offset_W;
+    const bool told = poses.pass(time_s, tool_W_m, felt_kg, 0.0, joints);
+    return poses.pass(time_s, tool_W_m, felt_kg, 0.0, joints) || told;
+  }
+
+  const description::Cell cell_ = description::load_cell(source_file("models/cells/default.yaml"));
+  const models::Arm arm_{cell_};
+  const HandModel hand_;
+  LoopModel loop_;
+};
+
+TEST_F(PassedPosesTest, AMassThatIsStableAtTheStartIsToldWhereItIsNot) {
+  const Vec3 away(0.25, 0.0, 0.0);
+  const double at_start_kg = least_kg_at(arm_.start_rad()), away_kg = least_kg_at(joints_at(away));
+  ASSERT_GT(away_kg, 1.1 * at_start_kg);
+  PassedPoses poses(arm_, cell_, hand_, loop_);
+  const double felt_kg = std::sqrt(at_start_kg * away_kg);
+  EXPECT_FALSE(pass(poses, 1.0, Vec3::Zero(), felt_kg));
+  EXPECT_FALSE(poses.unstable());
+  EXPECT_TRUE(pass(poses, 2.0, away, felt_kg));
+  ASSERT_TRUE(poses.unstable());
+  EXPECT_EQ(poses.unstable()->first_s, 2.0);
+  EXPECT_EQ(poses.unstable()->felt_mass_kg, felt_kg);
+  // The sweep's own resolution: tests/controller/stability/elastic_loop_test.cpp holds it to a per mille.
+  EXPECT_NEAR(*poses.unstable()->smallest_stable_mass_kg, away_kg, 2e-3 * away_kg);
+  EXPECT_FALSE(pass(poses, 3.0, Vec3(0.0, 0.25, 0.0), felt_kg)) << "it is told once";
+}
+
+TEST_F(PassedPosesTest, AMassThatIsStableInBothIsNot) {
+  const Vec3 away(0.25, 0.0, 0.0);
+  const double felt_kg = 1.001 * std::max(least_kg_at(arm_.start_rad()), least_kg_at(joints_at(away)));
+  PassedPoses poses(arm_, cell_, hand_, loop_);
+  EXPECT_FALSE(pass(poses, 1.0, Vec3::Zero(), felt_kg));
+  EXPECT_FALSE(pass(poses, 2.0, away, felt_kg));
+  EXPECT_EQ(poses.judged(), 2u);
+}
+
+TEST_F(PassedPosesTest, APlaceIsJudgedOnceForEachMassAndNotWhileTheMassChanges) {
+  PassedPoses poses(arm_, cell_, hand_, loop_);
+  for (int round = 0; round < 3; ++round) {
+    pass(poses, 1.0, Vec3::Zero(), 10.0);
+    pass(poses, 1.0, Vec3(0.049, 0.0, 0.0), 10.0);
+    pass(poses, 1.0, Vec3(0.051, 0.0, 0.0), 10.0);
+  }
+  EXPECT_EQ(poses.judged(), 2u);
+  pass(poses, 2.0, Vec3::Zero(), 12.0);
+  EXPECT_EQ(poses.judged(), 3u);
+  const auto joints = [&] { return arm_.start_rad(); };
+  for (int cycle = 0; cycle < 100; ++cycle) {
+    poses.pass(3.0, arm_.tool_pose(arm_.start_rad()).translation(), 12.0 + 0.01 * cycle, 0.0, joints);
+  }
+  EXPECT_EQ(poses.judged(), 3u);
+}
+
+TEST_F(PassedPosesTest, AnotherTimestepIsJudgedAnew) {
+  const double felt_kg = 1.1 * least_kg_at(arm_.start_rad());
+  PassedPoses poses(arm_, cell_, hand_, loop_);
+  EXPECT_FALSE(pass(poses, 1.0, Vec3::Zero(), felt_kg));
+  LoopModel slow = loop_;
+  slow.period_s = 8e-3;
+  slow.delay_s = 0.026;
+  poses.change(slow);
+  EXPECT_TRUE(pass(poses, 2.0, Vec3::Zero(), felt_kg));
+}
+
+}  // namespace
+}  // namespace proxarm::controller
