@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "controller/stability/order2_polynomials.hpp"
 #include "controller/stability/stability.hpp"
 #include "models/arm/held_orientation.hpp"
 #include "models/arm/inverse_kinematics.hpp"
@@ -39,10 +40,11 @@ MatrixXd exponential(MatrixXd A) {
 std::array<double, 6> proxy_polynomial(int order, double M, double BT, double KTT) {
   if (order == 1) return {M + BT + KTT, -2.0 * M - BT, M, 0.0, 0.0, 0.0};
   std::array<double, 6> a{M, -2.0 * M, M, 0.0, 0.0, 0.0};
-  const std::array<double, 4> W{8.0 / 27.0, 12.0 / 27.0, 6.0 / 27.0, 1.0 / 27.0};
-  const std::array<double, 3> own{1.5 * BT + KTT, -2.0 * BT, 0.5 * BT};
-  for (std::size_t i = 0; i < W.size(); ++i) {
-    for (std::size_t j = 0; j < own.size(); ++j) a[i + j] += W[i] * own[j];
+  for (std::size_t i = 0; i < order2_weights.size(); ++i) {
+    for (std::size_t j = 0; j < order2_difference.size(); ++j) {
+      const double own = order2_difference[j] * BT + (j == 0 ? KTT : 0.0);
+      a[i + j] += order2_weights[i] * own;
+    }
   }
   return a;
 }
@@ -202,7 +204,7 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   const double rest = std::max(0.0, force_age_periods_ - static_cast<double>(whole));
   const auto read = [&](Index age) -> Place { return (1.0 - rest) * force(age) + rest * force(age + 1); };
   Place h = read(whole);
-  if (order_ == 2) h = (13.0 * h - 2.0 * read(whole + 1) + read(whole + 2)) / 12.0;
+  if (order_ == 2) h = order2_force[0] * h + order2_force[1] * read(whole + 1) + order2_force[2] * read(whole + 2);
 
   const std::array<double, 6> a = proxy_polynomial(order_, M, damping_ * T, spring_ * T * T);
   Place q = T * T * h;

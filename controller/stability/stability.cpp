@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "controller/stability/order2_polynomials.hpp"
 #include "models/base/option_check.hpp"
 #include "models/geometry/eigenvalues.hpp"
 
@@ -40,6 +41,11 @@ Polynomial operator+(Polynomial a, const Polynomial& b) {
   return a;
 }
 
+template <std::size_t N>
+Polynomial polynomial(const std::array<double, N>& coefficients) {
+  return {coefficients.begin(), coefficients.end()};
+}
+
 // w^n for n ≥ 0, which needn't be an integer.
 Polynomial delay(double periods) {
   // L/T is a quotient of decimal numbers; if rounding puts it just below a whole number, that number is meant.
@@ -64,7 +70,7 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   const Polynomial lag = Polynomial{1.0, -beta} * (one_lag * one_lag);
   const double delay_s = std::max(0.0, loop.delay_s - 2.0 * loop.filter_s);
   const Polynomial damper = loop.explicit_damping ? Polynomial{0.0, 1.0} * difference
-                            : loop.order == 2     ? Polynomial{1.5, -2.0, 0.5}
+                            : loop.order == 2     ? polynomial(order2_difference)
                                                   : difference;  // times T
   const double m = hand.mass_kg + loop.handle_mass_kg;
   const Polynomial grip = Polynomial{hand.stiffness_N_per_m * T * T} + hand.damping_Ns_per_m * T * difference +
@@ -75,8 +81,8 @@ Loop make_loop(const HandModel& hand, const LoopModel& loop) {
   }
   Polynomial own = B * T * damper + Polynomial{loop.spring_N_per_m * T * T};
   if (loop.order == 2) {
-    own = Polynomial{8.0 / 27.0, 12.0 / 27.0, 6.0 / 27.0, 1.0 / 27.0} * own;
-    force = Polynomial{13.0 / 12.0, -2.0 / 12.0, 1.0 / 12.0} * force;
+    own = polynomial(order2_weights) * own;
+    force = polynomial(order2_force) * force;
   }
   return {lag * (difference * difference), lag * own + force};
 }
