@@ -145,9 +145,9 @@ std::vector<std::string> Figure5::plot(const Table& table, const Options& /*opti
     double factor, low, high;
   };
   const std::array<Quantity, 4> quantities{{{"tool_x_m", "p_x (mm)", 1e3, -35, 35},
-                                            {"tool_y_m", "p_y (mm)", 1e3, -12, 20},
-                                            {"force_x_N", "f_x (N)", 1.0, -2, 2},
-                                            {"force_y_N", "f_y (N)", 1.0, -1.5, 5}}};
+                                            {"tool_y_m", "p_y (mm)", 1e3, -15, 25},
+                                            {"force_x_N", "f_x (N)", 1.0, -3, 3},
+                                            {"force_y_N", "f_y (N)", 1.0, -2, 10}}};
   for (const Quantity& quantity : quantities) {
     const std::size_t column = table.column(quantity.column);
     for (const Law& each : laws) {
