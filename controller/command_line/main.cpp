@@ -360,7 +360,8 @@ class Commands {
     add_orders();
     add_files();
     add_judges();
-    // Both are programs of their own: become().
+    // These are programs of their own: become().
+    app_.add_subcommand("new-cell", "a cell of your own arm out of its URDF or xacro: runs at once in simulation");
     app_.add_subcommand("study", "accuracy, stability and speed measured: CSV, JSON and plots");
     app_.add_subcommand("view", "a recorded session or a black box in the browser");
   }
@@ -565,6 +566,7 @@ int main(int argc, char** argv) {
   }
   return command_line::run_program([&] {
     const std::string command = words.size() > 1 ? words[1] : "";
+    if (command == "new-cell") return become("proxarm-new-cell", words, "makes cells", "./dev new-cell");
     if (command == "study") return become("proxarm-study", words, "measures", "./dev study");
     if (command == "view") return become("proxarm-view", words, "shows", "./dev view");
     return run(static_cast<int>(words.size()), words.data());

@@ -9,7 +9,7 @@
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/command_line/trials/mass_trial.hpp"
+#include "controller/command_line/trials/mass_advice.hpp"
 #include "controller/report/summary.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -27,61 +27,10 @@ std::optional<double> smallest_felt(const HandModel& hand, const LoopModel& loop
   return mass ? std::optional<double>(*mass + loop.handle_mass_kg) : std::nullopt;
 }
 
-// The same with the margins: the worst of the hand as described and of one that is stiffer and heavier, and of the
-// delay as it is and longer.
-std::optional<double> with_margin(const HandModel& hand, const LoopModel& loop) {
-  double worst = 0.0;
-  const bool all = controller::with_margins(hand, loop, [&](const HandModel& other, const LoopModel& slower) {
-    const auto mass = smallest_felt(other, slower);
-    worst = std::max(worst, mass.value_or(0.0));
-    return mass.has_value();
-  });
-  return all ? std::optional<double>(worst) : std::nullopt;
-}
-
-double round_up(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1.0);
-  return std::ceil(value / unit * (1.0 - 1e-9)) * unit;
-}
-
-// What came of the advice on the simulated arm. Heavier masses are tried where it isn't steady, a quarter more each
-// time.
-struct TriedAdvice {
-  std::optional<double> mass_kg;  // that is steady; none: of six none was
-  std::string text;
-};
-
-TriedAdvice tried_advice(const PreparedSession& session, double mass_kg) {
-  TriedAdvice out;
-  for (int tries = 0; tries < 6; ++tries, mass_kg = round_up(1.25 * mass_kg)) {
-    std::array<char, 200> text{};
-    bool steady = true;
-    for (const double factor : {1.0, hand_margin}) {
-      const MassTrial trial = try_mass(session, mass_kg, factor);
-      if (trial.steady()) continue;
-      const std::string what =
-          trial.fault.empty() ? "swings: " + oscillation_text(trial.oscillation) : "is stopped by " + trial.fault;
-      std::snprintf(text.data(), text.size(), "%.3g kg%s %s; ", mass_kg,
-                    factor > 1.0 ? " with the stiffer and heavier hand" : "", what.c_str());
-      steady = false;
-      break;
-    }
-    out.text += text.data();
-    if (!steady) continue;
-    std::snprintf(text.data(), text.size(), "%.3g kg is steady for %.3g s, with the stiffer and heavier hand, too",
-                  mass_kg, session.duration_s);
-    out.text += text.data();
-    out.mass_kg = mass_kg;
-    return out;
-  }
-  out.text += "none of these is steady";
-  return out;
-}
-
 std::string mass_text(const std::optional<double>& mass) {
   if (!mass) return "none up to 1000 kg";
   std::array<char, 40> text{};
-  std::snprintf(text.data(), text.size(), "%.2g kg", round_up(*mass));
+  std::snprintf(text.data(), text.size(), "%.2g kg", rounded_up(*mass));
   return text.data();
 }
 
@@ -89,7 +38,7 @@ std::string mass_text(const std::optional<double>& mass) {
 std::optional<double> damping_needed(const HandModel& hand, LoopModel loop) {
   for (const double damping : {0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
     loop.damping_Ns_per_m = std::max(damping, loop.damping_Ns_per_m);
-    if (with_margin(hand, loop)) return loop.damping_Ns_per_m;
+    if (smallest_with_margins(hand, loop)) return loop.damping_Ns_per_m;
   }
   return std::nullopt;
 }
@@ -140,7 +89,7 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
     LoopModel other = loop;
     other.period_s = 1e-3 * ms;
     other.delay_s += other.period_s - loop.period_s;
-    const auto smallest = with_margin(hand, other);
+    const auto smallest = smallest_with_margins(hand, other);
     if (!smallest || *smallest > mass_kg) break;
     largest = other.period_s;
   }
@@ -179,8 +128,8 @@ void print_mass(const Tuned& of, const std::optional<double>& smallest) {
   std::printf(
       "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
       mass_text(smallest).c_str(), of.loop.handle_mass_kg, mass_text(smallest_felt(of.hand, start)).c_str());
-  const auto safe = with_margin(of.hand, of.loop);
-  const TriedAdvice tried = safe ? tried_advice(of.session, round_up(*safe)) : TriedAdvice{};
+  const auto safe = smallest_with_margins(of.hand, of.loop);
+  const TriedAdvice tried = safe ? tried_advice(of.session, rounded_up(*safe)) : TriedAdvice{};
   std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
               tried.mass_kg ? ("--mass " + mass_text(tried.mass_kg)).c_str() : "no mass up to 1000 kg",
               tried.mass_kg ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
@@ -196,12 +145,12 @@ void print_damping(const Tuned& of) {
   } else if (*damping > loop.damping_Ns_per_m) {
     LoopModel damped = loop;
     damped.damping_Ns_per_m = *damping;
-    const auto least = with_margin(of.hand, damped);
+    const auto least = smallest_with_margins(of.hand, damped);
     std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", *damping,
                 mass_text(least).c_str());
     PreparedSession with_damping = of.session;
     with_damping.settings.damping_Ns_per_m = *damping;
-    if (least) std::printf("  tried: %s\n", tried_advice(with_damping, round_up(*least)).text.c_str());
+    if (least) std::printf("  tried: %s\n", tried_advice(with_damping, rounded_up(*least)).text.c_str());
   } else {
     std::printf(
         "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "

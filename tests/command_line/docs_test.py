@@ -10,6 +10,7 @@ ELSEWHERE = {
     "--view": "stays until Ctrl-C: view_test.py runs it",
     "--bus vcan": "needs a kernel with CAN: tests/vcan runs it",
     "models/cells/mine.yaml": "somebody's own copy: axes_test.py makes one",
+    "my_arm": "somebody's own arm: new_cell_test.py makes some",
     "--bus can0": "needs an interface",
     "view DIR": "stays until Ctrl-C: view_test.py makes some records",
     "proxarm set ": "needs a session that runs: change_test.py asks one",

@@ -1,0 +1,23 @@
+// What a drive, its gear and its motor are about like, where no data sheet is at hand.
+#pragma once
+
+#include <vector>
+
+#include "controller/command_line/new_cell/arm_source.hpp"
+#include "models/description/cell.hpp"
+
+namespace proxarm::command_line {
+
+// Fills in the drives of a cell whose arm can be built, one for each joint. By rules of thumb, with I the mean and I'
+// the largest inertia that the joint moves over all poses (links and tool), g' the largest torque of gravity:
+//   rotor      half of I, as motors are matched to their loads; wrists not below 3 % of the heaviest joint's
+//   stiffness  with I alone the gear would swing at 25 Hz, which leaves arms a first mode of 10 to 16 Hz, as industrial
+//              ones have; wrists not below a tenth of the stiffest, nor above 150 Hz of their own link
+//   damping    a twentieth of what is critical for that
+//   torque     what the URDF says (effort) if it bears the arm; else 1.5 g' + 0.7 (I' + rotor) · acceleration, and a
+//              hand of 100 N at the tool, which is all that the light wrist of an arm feels
+//   friction   1 % of the torque by Coulomb, 0.8 % at 1 rad/s
+//   speed      the URDF's (at most 4 rad/s), acceleration 15 times that
+void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints);
+
+}  // namespace proxarm::command_line

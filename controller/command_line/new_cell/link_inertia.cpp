@@ -1,0 +1,113 @@
+#include "controller/command_line/new_cell/link_inertia.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace proxarm::command_line {
+namespace {
+
+using models::Vec3;
+using tinyxml2::XMLElement;
+
+// Of an arm, times its reach cubed: a collaborative arm of a metre has 20 to 30, an industrial one of 2.5 m 70.
+constexpr double usual_kg_per_m3 = 40.0;
+constexpr double least_reach_m = 0.1;  // of an arm that only slides, or whose joints are in one place
+// Less is a placeholder: a gram, and a gram's moment at 3 mm.
+constexpr double least_mass_kg = 1e-3, least_moment_kg_m2 = 1e-8;
+
+// What <inertial> says, where a body can have it: MuJoCo refuses principal moments of which one is larger than the
+// other two together, and that is how inertia tensors look whose numbers were put into the wrong places.
+enum class Inertial { missing, mass_alone, whole };
+Inertial inertial_of(const XMLElement* link) {
+  const XMLElement* inertial = link->FirstChildElement("inertial");
+  const XMLElement* mass = inertial != nullptr ? inertial->FirstChildElement("mass") : nullptr;
+  if (mass == nullptr || !(mass->DoubleAttribute("value") >= least_mass_kg)) return Inertial::missing;
+  const XMLElement* inertia = inertial->FirstChildElement("inertia");
+  if (inertia == nullptr) return Inertial::mass_alone;
+  const double xy = inertia->DoubleAttribute("ixy"), xz = inertia->DoubleAttribute("ixz"),
+               yz = inertia->DoubleAttribute("iyz");
+  models::Mat3 I;
+  I << inertia->DoubleAttribute("ixx"), xy, xz, xy, inertia->DoubleAttribute("iyy"), yz, xz, yz,
+      inertia->DoubleAttribute("izz");
+  const Vec3 moments = Eigen::SelfAdjointEigenSolver<models::Mat3>(I, Eigen::EigenvaluesOnly).eigenvalues();
+  const bool of_a_body = moments[0] >= least_moment_kg_m2 && moments[0] + moments[1] >= moments[2];
+  return of_a_body ? Inertial::whole : Inertial::mass_alone;
+}
+
+// A rod from the link's joint to the next one, a tenth of it (and at least 4 cm) thick.
+void set_rod(XMLElement* link, double mass_kg, const Vec3& to, double least_length_m) {
+  while (auto* old = link->FirstChildElement("inertial")) link->DeleteChild(old);
+  const double length = std::max(to.norm(), least_length_m), radius = std::max(0.05 * length, 0.04);
+  const double across = mass_kg * (length * length / 12.0 + radius * radius / 4.0);
+  const double along = 0.5 * mass_kg * radius * radius;
+  // I = across E + (along − across) n nᵀ
+  const Vec3 n = to.norm() > 0.0 ? Vec3(to.normalized()) : Vec3::UnitZ();
+  const models::Mat3 I = across * models::Mat3::Identity() + (along - across) * n * n.transpose();
+  XMLElement* inertial = link->InsertNewChildElement("inertial");
+  inertial->InsertFirstChild(link->GetDocument()->NewComment(" estimated by proxarm new-cell: a rod "));
+  const auto number = [](double x) { return description::number_text(std::round(1e6 * x) / 1e6); };
+  XMLElement* origin = inertial->InsertNewChildElement("origin");
+  origin->SetAttribute("xyz", (number(0.5 * to.x()) + " " + number(0.5 * to.y()) + " " + number(0.5 * to.z())).c_str());
+  inertial->InsertNewChildElement("mass")->SetAttribute("value", number(mass_kg).c_str());
+  XMLElement* inertia = inertial->InsertNewChildElement("inertia");
+  inertia->SetAttribute("ixx", number(I(0, 0)).c_str());
+  inertia->SetAttribute("ixy", number(I(0, 1)).c_str());
+  inertia->SetAttribute("ixz", number(I(0, 2)).c_str());
+  inertia->SetAttribute("iyy", number(I(1, 1)).c_str());
+  inertia->SetAttribute("iyz", number(I(1, 2)).c_str());
+  inertia->SetAttribute("izz", number(I(2, 2)).c_str());
+}
+
+// A link of the chain that moves, and where the next one's joint is in it; fixed joints between are counted in.
+struct MovingLink {
+  XMLElement* element;
+  Vec3 to_next = Vec3::Zero();
+};
+
+}  // namespace
+
+void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<double> said_kg,
+                      std::vector<std::string>& remarks) {
+  std::vector<MovingLink> moving;
+  double reach_m = 0.0;  // from the first joint on: what stands below it is no part of the arm's reach
+  for (const UrdfTreeJoint* joint : path) {
+    if (!moving.empty()) {
+      reach_m += joint->origin().norm();
+      moving.back().to_next += joint->origin();
+    }
+    if (joint->moves()) moving.push_back({tree.links().at(joint->child)});
+  }
+  reach_m = std::max(reach_m, least_reach_m);
+  const double arm_kg = said_kg.value_or(usual_kg_per_m3 * std::pow(reach_m, 3));
+  std::vector<double> share;
+  double shares = 0.0;
+  for (const MovingLink& link : moving) {
+    const double outwards = std::pow(0.75, static_cast<double>(share.size()));
+    share.push_back((link.to_next.norm() + 0.1 * reach_m) * outwards);
+    shares += share.back();
+  }
+  std::string estimated;
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    XMLElement* const link = moving[k].element;
+    const Inertial given = inertial_of(link);
+    if (given == Inertial::whole) continue;
+    const double mass_kg =
+        given == Inertial::mass_alone
+            ? link->FirstChildElement("inertial")->FirstChildElement("mass")->DoubleAttribute("value")
+            : std::max(arm_kg * share[k] / shares, 0.2);
+    set_rod(link, mass_kg, moving[k].to_next, 0.05 * reach_m);
+    char part[160];
+    std::snprintf(part, sizeof part, "%s%s (%.3g kg%s)", estimated.empty() ? "" : ", ", text_of(link, "name").c_str(),
+                  mass_kg, given == Inertial::mass_alone ? ", as the file says" : "");
+    estimated += part;
+  }
+  if (estimated.empty()) return;
+  char total[64];
+  std::snprintf(total, sizeof total, "%.3g kg", arm_kg);
+  remarks.push_back("ESTIMATED inertia of links for which the file has none that a body can have: " + estimated +
+                    "; rods, of an arm of " + total + (said_kg ? "" : " by its reach (--arm-mass says better)"));
+}
+
+}  // namespace proxarm::command_line

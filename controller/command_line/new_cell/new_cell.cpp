@@ -1,0 +1,306 @@
+#include "controller/command_line/new_cell/new_cell.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+
+#include "controller/command_line/new_cell/arm_source.hpp"
+#include "controller/command_line/new_cell/cell_text.hpp"
+#include "controller/command_line/new_cell/drive_rules.hpp"
+#include "controller/command_line/new_cell/start_pose.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/trials/mass_advice.hpp"
+#include "models/arm/arm.hpp"
+#include "models/arm/tool_space.hpp"
+#include "models/base/setup_error.hpp"
+#include "models/description/hand.hpp"
+#include "models/description/sensor.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+namespace fs = std::filesystem;
+using description::SetupError;
+
+// The wall is this far in front of the start, as the hand of the default cell expects it.
+constexpr double wall_ahead_m = 0.2;
+// Of the mass above the least that was steady: what is tried are two hands, and gears that are estimates.
+constexpr double margin = 1.25;
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary);
+  out << text;
+  out.flush();
+  if (!out) throw SetupError({.file = file.string(), .message = "can't be written"});
+}
+
+// The robot's name as a folder's: what shells and paths take for something else becomes "_".
+std::string folder_name(std::string name) {
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '.') c = '_';
+  }
+  return name.empty() || name.front() == '.' ? "cell" : name;
+}
+
+class NewCell {
+ public:
+  explicit NewCell(const NewCellOptions& options) : options_(options), source_(read_arm(options)) {
+    folder_ = options.out.empty() ? fs::path(folder_name(source_.name)) : options.out;
+    // Until it is complete it has another name: what went wrong can be looked at, and the next try isn't in its way.
+    file_ = folder_ / "unfinished-cell.yaml";
+    std::error_code ignored;
+    if (!options.force && fs::exists(folder_ / "cell.yaml", ignored)) {
+      throw SetupError({.key = "--out",
+                        .found = (folder_ / "cell.yaml").string() + ", which is there already",
+                        .expected = "a folder without a cell",
+                        .advice = "--force writes over it"});
+    }
+    fs::create_directories(folder_);
+    write(folder_ / "arm.urdf", source_.urdf);
+    copy_sensor();
+    begin();
+  }
+
+  int make() {
+    aim_sensor();
+    save();
+    size_drives(cell_, source_.joints);
+    choose_start();
+    choose_buses();
+    save();
+    advise_mass();
+    save();
+    require_runnable(prepare(run_), run_);
+    fs::rename(file_, folder_ / "cell.yaml");
+    file_ = folder_ / "cell.yaml";
+    tell();
+    return 0;
+  }
+
+ private:
+  void copy_sensor() {
+    fs::path file = options_.sensor;
+    std::error_code ignored;
+    if (!fs::exists(file, ignored)) file = shipped_file("models/sensors/" + options_.sensor + ".yaml");
+    sensor_ = description::load_sensor(file);
+    if (sensor_.described && sensor_.described->registers) {
+      throw SetupError({.key = "--sensor",
+                        .found = options_.sensor + ", a sensor on Modbus",
+                        .expected = "one on CAN, such as ati_net_can_oem",
+                        .advice = "models/cells/rail.yaml shows a cell with Modbus lines"});
+    }
+    fs::copy_file(file, folder_ / "sensor.yaml", fs::copy_options::overwrite_existing);
+    if (sensor_.protocol == "ati_net_can_oem") {
+      // Before all others on a bus that it shares.
+      sensor_keys_ = "  base_id: 0x12\n  sample_rate_Hz: 7147\n  bandwidth_Hz: 800\n";
+      return;
+    }
+    if (sensor_.described && sensor_.described->has_base_id) {
+      sensor_keys_ = "  base_id: " + std::to_string(sensor_.described->base_id_min) + "\n";
+    }
+    const double stream_Hz = sensor_.described ? sensor_.described->rate_Hz : 0.0;
+    sensor_keys_ += "  sample_rate_Hz: " + description::number_text(stream_Hz > 0.0 ? stream_Hz : 1000.0) + "\n";
+  }
+
+  void begin() {
+    cell_.name = source_.name.empty() ? "own arm" : source_.name;
+    cell_.tool = {.mass_kg = 0.25,
+                  .centre_of_mass_S_m = {0, 0, 0.06},
+                  .inertia_kg_m2 = {3.25e-4, 3.25e-4, 5.0e-5, 0, 0, 0},
+                  .handle_S = {.position_m = {0, 0, 0.1}}};
+    cell_.sensor.link = source_.tip;
+    cell_.default_mass_kg = 10.0;
+    cell_.default_period_s = 1e-3;
+    for (std::size_t i = 0; i < source_.joints.size(); ++i) {
+      const ChainJoint& joint = source_.joints[i];
+      description::DriveDescription drive;
+      drive.joint = joint.name;
+      drive.node = static_cast<std::uint8_t>(i + 1);
+      drive.gear_ratio = 120.0;
+      drive.range_rad = joint.range;
+      drive.eds = options_.eds.empty() ? "" : fs::absolute(options_.eds).string();
+      drive.max_speed_rad_per_s = drive.max_acceleration_rad_per_s2 = drive.rotor_inertia_kg_m2 = 1.0;
+      drive.gear_stiffness_Nm_per_rad = 1e4;
+      drive.gear_damping_Nms_per_rad = drive.simulation.gear_damping_Nms_per_rad = 1.0;
+      drive.max_torque_Nm = drive.simulation.max_torque_Nm = 100.0;
+      drive.simulation.position_gain_per_s = 350.0;
+      drive.simulation.velocity_bandwidth_Hz = 200.0;
+      cell_.drives.push_back(drive);
+      cell_.start_rad.push_back(0.5 * (joint.range[0] + joint.range[1]));
+    }
+    place_on_buses(3);
+    save();
+  }
+
+  void save() {
+    write(file_, cell_text(cell_, source_.remarks, with_scene_, sensor_keys_));
+    description::Cell loaded = description::load_cell(file_);
+    cell_.file = loaded.file;
+    cell_.urdf = loaded.urdf;
+    run_.cell = file_;
+  }
+
+  void aim_sensor() {
+    const models::Arm arm(cell_);
+    const models::Mat3 R =
+        Eigen::Quaterniond::FromTwoVectors(models::Vec3::UnitZ(), outwards_in_sensor(arm)).toRotationMatrix();
+    const models::Vec3 ypr = R.eulerAngles(2, 1, 0);
+    const auto rounded = [](double x) { return std::round(1e6 * x) / 1e6 + 0.0; };
+    cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};
+  }
+
+  void choose_start() {
+    const models::Arm arm(cell_);
+    const description::HandDescription hand = description::load_hand(shipped_file("sim/hands/touch.yaml"));
+    const StartPose start = find_start(arm, hand);
+    for (int i = 0; i < arm.axes(); ++i) cell_.start_rad[static_cast<std::size_t>(i)] = start.q[i];
+    start_W_ = arm.tool_pose(start.q).translation();
+    if (start.way < 1.0) write_hand(with_shorter_way(hand, start.way), start.way);
+    with_scene_ = models::tool_space(arm).dimensions == 3 && start.way > 0.0;
+    if (!with_scene_) {
+      source_.remarks.push_back("no scene of its own: the tool can't go ahead and to the side from where it starts");
+      return;
+    }
+    char text[320];
+    std::snprintf(
+        text, sizeof text,
+        "# A wall across x, %.3g m in front of where the tool starts (x %.4f, y %.4f, z %.4f m).\nname: wall\n"
+        "objects:\n  - plane: {name: wall, point_m: [%.4f, 0, 0], normal: [-1, 0, 0], friction: 0.3}\n",
+        wall_ahead_m * start.way, start_W_.x(), start_W_.y(), start_W_.z(), start_W_.x() + wall_ahead_m * start.way);
+    write(folder_ / "scene.yaml", text);
+  }
+
+  // For an arm that is too small for the default one's way of 0.22 m; without any room it holds still.
+  void write_hand(const description::HandDescription& hand, double share) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "# sim/hands/touch.yaml with %.3g of its way: for that of 0.22 m the arm has no room.\n", share);
+    std::string file = text;
+    std::snprintf(text, sizeof text,
+                  "name: touch with a shorter way\nmass_kg: %.6g\nstiffness_N_per_m: %.6g\ndamping_Ns_per_m: %.6g\n"
+                  "waypoints:\n",
+                  hand.mass_kg, hand.stiffness_N_per_m, hand.damping_Ns_per_m);
+    file += text;
+    for (const description::Waypoint& waypoint : hand.waypoints) {
+      const auto& to = waypoint.offset_m;
+      std::snprintf(text, sizeof text, "  - {time_s: %.6g, offset_m: [%.6g, %.6g, %.6g]}\n", waypoint.time_s, to[0],
+                    to[1], to[2]);
+      file += text;
+    }
+    write(folder_ / "hand.yaml", file);
+    cell_.default_hand = folder_ / "hand.yaml";
+    std::snprintf(text, sizeof text,
+                  "a hand of its own, with %.3g of the default one's way, for which there is no room", share);
+    source_.remarks.emplace_back(text);
+  }
+
+  // Axes in turn, as many on each bus, and fewest on the last one, which has the sensor.
+  void place_on_buses(int count) {
+    const int axes = static_cast<int>(cell_.drives.size());
+    constexpr double sensor_as_axes = 1.5;  // its frames are about as long as those of so many drives
+    const int each = count == 1 ? axes : static_cast<int>(std::ceil((axes + sensor_as_axes) / count));
+    cell_.buses.clear();
+    for (int b = 0; b < count; ++b) {
+      cell_.buses.push_back({.name = "bus_" + std::to_string(b + 1)});
+    }
+    for (int i = 0; i < axes; ++i) {
+      cell_.drives[static_cast<std::size_t>(i)].bus =
+          cell_.buses[static_cast<std::size_t>(std::min(i / each, count - 1))].name;
+    }
+    cell_.sensor.bus = cell_.buses.back().name;
+  }
+
+  // Whether these buses carry this timestep, with a window for the frames that is as short as possible.
+  bool carries(int buses, double period_s) {
+    place_on_buses(buses);
+    cell_.default_period_s = period_s;
+    for (const double window : {0.45, 0.55, 0.65, 0.75}) {
+      cell_.receive_window = window;
+      save();
+      if (is_carried(prepare(run_))) return true;
+    }
+    return false;
+  }
+
+  void choose_buses() {
+    const int most = static_cast<int>(cell_.drives.size()) + 1;
+    for (const double period_ms : {1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 8.0, 10.0}) {
+      for (int buses = options_.buses.value_or(1); buses <= options_.buses.value_or(most); ++buses) {
+        if (carries(buses, 1e-3 * period_ms)) return;
+      }
+    }
+    throw SetupError({.key = "--buses",
+                      .found = std::to_string(options_.buses.value_or(most)),
+                      .expected = "buses that carry a timestep of 10 ms or less"});
+  }
+
+  // With the hand of the default scene, which moves in a plane, and in free space in all directions.
+  std::optional<double> advised_mass() {
+    const PreparedSession session = prepare(run_);
+    controller::LoopModel loop = led_loop(session);
+    loop.horizon_s = 0.0;
+    const auto least = smallest_with_margins(hand_model(session), loop);
+    if (!least) {
+      advice_ = "by the model of the loop none is";
+      return std::nullopt;
+    }
+    const TriedAdvice touching = tried_advice(session, rounded_up(*least));
+    advice_ = touching.text;
+    if (!touching.mass_kg) return std::nullopt;
+    RunOptions sweep = run_;
+    sweep.scene = shipped_file("scenes/free.yaml");
+    sweep.hand = shipped_file("sim/hands/sweep.yaml");
+    sweep.duration_s = 20.0;
+    const TriedAdvice free = tried_advice(prepare(sweep), *touching.mass_kg);
+    advice_ += "; in free space " + free.text;
+    return free.mass_kg;
+  }
+
+  // Where none is stable or steady the arm's gears are too soft for the filter: a slower one is tried.
+  void advise_mass() {
+    for (const double bandwidth_Hz : {25.0, 15.0, 10.0}) {
+      cell_.limits.setpoint_bandwidth_Hz = bandwidth_Hz;
+      save();
+      const auto mass_kg = advised_mass();
+      if (!mass_kg) continue;
+      cell_.default_mass_kg = rounded_up(margin * *mass_kg);
+      return;
+    }
+    throw SetupError({.file = file_.string(),
+                      .key = "default_mass_kg",
+                      .message = "no mass up to 1000 kg is stable with margins and steady: " + advice_,
+                      .advice = "stiffer gears, or a shorter timestep (--buses)"});
+  }
+
+  void tell() const {
+    std::printf("%s: a cell of %zu axes, sensor on %s, %zu %s, T = %.4g ms, %.3g kg\n", file_.c_str(),
+                cell_.drives.size(), cell_.sensor.link.c_str(), cell_.buses.size(),
+                cell_.buses.size() == 1 ? "bus" : "buses", 1e3 * cell_.default_period_s, cell_.default_mass_kg);
+    std::printf("the tool starts at x %.4f, y %.4f, z %.4f m; %s\n", start_W_.x(), start_W_.y(), start_W_.z(),
+                advice_.c_str());
+    for (const std::string& remark : source_.remarks) std::printf("  - %s\n", remark.c_str());
+    std::printf("gears, rotors and friction are ESTIMATED; so are encoders' counts. Now:\n  proxarm run %s\n",
+                file_.c_str());
+  }
+
+  const NewCellOptions& options_;
+  ArmSource source_;
+  fs::path folder_, file_;
+  description::Cell cell_;
+  description::SensorDescription sensor_;
+  std::string sensor_keys_, advice_;
+  bool with_scene_ = false;
+  models::Vec3 start_W_ = models::Vec3::Zero();
+  RunOptions run_;
+};
+
+}  // namespace
+
+int new_cell_command(const NewCellOptions& options) { return NewCell(options).make(); }
+
+}  // namespace proxarm::command_line

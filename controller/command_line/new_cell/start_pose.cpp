@@ -1,0 +1,148 @@
+#include "controller/command_line/new_cell/start_pose.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "models/arm/inverse_kinematics.hpp"
+#include "models/arm/tool_space.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using models::JointVector;
+using models::Vec3;
+
+constexpr int poses = 4000;
+constexpr std::size_t tried = 600;  // of them, whether the hand's way can be gone
+// Of that way, per metre of reach up to one: less than what a call of the inverse kinematics may turn joints by.
+constexpr double step_share = 2e-3;
+constexpr double least_share = 0.4;  // of the start's smallest singular value, anywhere on the way
+
+// From 0 at an end of a joint's range to 1 in its middle; of the joint that is nearest to its end.
+double room(const models::Arm& arm, const JointVector& q) {
+  double least = 1.0;
+  for (int i = 0; i < arm.axes(); ++i) {
+    const double half = 0.5 * (arm.upper_rad()[i] - arm.lower_rad()[i]);
+    least = std::min(least, 1.0 - std::abs(q[i] - arm.lower_rad()[i] - half) / half);
+  }
+  return least;
+}
+
+// The largest distance of the tool from an axis that turns, over the poses; of an arm without one, a metre.
+double reach_of(const models::Arm& arm) {
+  double reach_m = 0.0;
+  for (int k = 0; k < poses; ++k) {
+    models::ToolKinematics tool;
+    arm.kinematics(models::spread_pose(arm, k), tool);
+    for (int i = 0; i < arm.axes(); ++i) {
+      if (!arm.slides(i)) reach_m = std::max(reach_m, tool.J_W.col(i).head<3>().norm());
+    }
+  }
+  return reach_m > 0.0 ? reach_m : 1.0;
+}
+
+double smallest_singular_value(const models::InverseKinematics& inverse, const models::Arm& arm, const JointVector& q) {
+  models::InverseKinematicsResult result;
+  inverse.solve(q, arm.tool_pose(q), result);
+  return result.smallest_singular_value_m_per_rad;
+}
+
+// Each part is between 0 and its weight.
+double score(const models::Arm& arm, const models::InverseKinematics& inverse, const JointVector& q, double reach_m) {
+  const models::Pose X_WT = arm.tool_pose(q);
+  const Vec3 p = X_WT.translation(), z = X_WT.linear().col(2);
+  const double singular = std::min(smallest_singular_value(inverse, arm, q) / (0.25 * reach_m), 1.0);
+  const double free = std::min(room(arm, q) / 0.4, 1.0);
+  const double points = std::max({z.x(), -z.z(), 0.0});
+  const double ahead = std::clamp(p.x() / (0.5 * reach_m), -1.0, 1.0) - std::min(std::abs(p.y()) / reach_m, 1.0);
+  const double low = 0.2 * reach_m, high = 0.8 * reach_m;
+  const double off = std::max({low - p.z(), p.z() - high, 0.0}) / reach_m;
+  models::ArmPoints points_W;
+  arm.points(q, points_W);
+  double below = 0.0;
+  for (int i = 1; i < arm.axes(); ++i) {
+    below = std::max(below, -points_W.joint_W[static_cast<std::size_t>(i)].z() / reach_m);
+  }
+  return 2.0 * singular + free + points + ahead - 4.0 * off - 4.0 * below;
+}
+
+bool can_be_gone(const models::Arm& arm, models::InverseKinematics inverse, const JointVector& start,
+                 const description::HandDescription& hand, double step_m) {
+  inverse.set_posture(start);
+  const double least = least_share * smallest_singular_value(inverse, arm, start);
+  const models::Pose X_start = arm.tool_pose(start);
+  JointVector q = start;
+  Vec3 at = Vec3::Zero();
+  for (const description::Waypoint& waypoint : hand.waypoints) {
+    const Vec3 to(waypoint.offset_m.data());
+    const int steps = static_cast<int>(std::ceil((to - at).norm() / step_m));
+    for (int k = 1; k <= steps; ++k) {
+      models::Pose X_WT = X_start;
+      X_WT.translation() += at + (to - at) * k / steps;
+      models::InverseKinematicsResult result;
+      inverse.solve(q, X_WT, result);
+      if (result.status != models::InverseKinematicsResult::Status::converged || result.out_of_range ||
+          result.smallest_singular_value_m_per_rad < least) {
+        return false;
+      }
+      q = result.q;
+    }
+    at = to;
+  }
+  return true;
+}
+
+}  // namespace
+
+StartPose find_start(const models::Arm& arm, const description::HandDescription& hand) {
+  const models::InverseKinematics inverse(arm);
+  const double reach_m = reach_of(arm), step_m = step_share * std::min(reach_m, 1.0);
+  struct Candidate {
+    double score;
+    JointVector q;
+  };
+  std::vector<Candidate> candidates;
+  candidates.reserve(poses);
+  for (int k = 0; k < poses; ++k) {
+    JointVector q = models::spread_pose(arm, k);
+    for (int i = 0; i < arm.axes(); ++i) q[i] = std::round(1e4 * q[i]) / 1e4;  // as it is written
+    candidates.push_back({score(arm, inverse, q, reach_m), q});
+  }
+  std::sort(candidates.begin(), candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  for (const double share : {1.0, 0.5, 0.25, 0.1}) {
+    const description::HandDescription shorter = with_shorter_way(hand, share);
+    for (std::size_t k = 0; k < tried; ++k) {
+      if (can_be_gone(arm, inverse, candidates[k].q, shorter, step_m)) return {candidates[k].q, share};
+    }
+  }
+  return {candidates[0].q, 0.0};
+}
+
+description::HandDescription with_shorter_way(description::HandDescription hand, double share) {
+  for (description::Waypoint& waypoint : hand.waypoints) {
+    for (double& x : waypoint.offset_m) x *= share;
+  }
+  return hand;
+}
+
+Vec3 outwards_in_sensor(const models::Arm& arm) {
+  models::ToolKinematics tool;
+  const JointVector q = arm.start_rad();
+  arm.kinematics(q, tool);
+  int last = arm.axes() - 1;
+  while (last > 0 && arm.slides(last)) --last;
+  if (arm.slides(last)) last = arm.axes() - 1;
+  const Vec3 axis_W = (arm.slides(last) ? tool.J_W.col(last).head<3>() : tool.J_W.col(last).tail<3>()).normalized();
+  models::ArmPoints points;
+  arm.points(q, points);
+  // From the nearest joint before it that isn't on its axis.
+  double along = 0.0;
+  for (int i = arm.axes() - 1; i >= 0 && std::abs(along) < 1e-3; --i) {
+    along = axis_W.dot(tool.X_WS.translation() - points.joint_W[static_cast<std::size_t>(i)]);
+  }
+  return tool.X_WS.linear().transpose() * (along < 0.0 ? Vec3(-axis_W) : axis_W);
+}
+
+}  // namespace proxarm::command_line

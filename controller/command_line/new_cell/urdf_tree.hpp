@@ -1,0 +1,66 @@
+// The links and joints of a URDF, whatever else stands in it: where the chain to the sensor goes.
+#pragma once
+
+#include <tinyxml2.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "models/base/setup_error.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::command_line {
+
+// Empty where there is no such element or attribute.
+std::string text_of(const tinyxml2::XMLElement* element, const char* name);
+
+struct UrdfTreeJoint {
+  tinyxml2::XMLElement* element = nullptr;
+  std::string name, type, parent, child;
+  bool mimic = false;
+  [[nodiscard]] bool moves() const { return !mimic && (turns() || type == "prismatic"); }
+  [[nodiscard]] bool turns() const { return type == "revolute" || type == "continuous"; }
+  [[nodiscard]] models::Vec3 origin() const;  // in the parent's link
+};
+
+class UrdfTree {
+ public:
+  using Path = std::vector<const UrdfTreeJoint*>;
+
+  // `file` is for messages. Throws SetupError, with its line.
+  UrdfTree(const std::filesystem::path& file, const std::string& xml);
+
+  [[nodiscard]] tinyxml2::XMLElement* robot() const { return robot_; }
+  [[nodiscard]] tinyxml2::XMLDocument& document() { return document_; }
+  [[nodiscard]] std::vector<UrdfTreeJoint>& joints() { return joints_; }
+  [[nodiscard]] const std::map<std::string, tinyxml2::XMLElement*>& links() const { return links_; }
+  [[nodiscard]] const std::string& root() const { return root_; }
+
+  // From the root to that link. Throws where there is no such link.
+  [[nodiscard]] Path path_to(const std::string& link) const;
+  // The link to put the sensor on, where none was named: at the end of the joints that move, or where they branch, and
+  // there the one that is called for it.
+  [[nodiscard]] std::string found_tip() const;
+
+ private:
+  void require_numbers(const tinyxml2::XMLElement* element) const;
+  void add_link(tinyxml2::XMLElement* element);
+  void add_joint(tinyxml2::XMLElement* element);
+  void find_root();
+  [[nodiscard]] Path below(const std::string& link) const;
+  // How many joints move one after the other from this one on, itself included, at most; mimic ones (a gripper's second
+  // finger) among them.
+  [[nodiscard]] int motion_beyond(const UrdfTreeJoint& joint) const;
+  [[nodiscard]] description::SetupError mistake(const tinyxml2::XMLElement* where, std::string message) const;
+
+  std::filesystem::path file_;
+  std::string root_;
+  tinyxml2::XMLDocument document_;
+  tinyxml2::XMLElement* robot_ = nullptr;
+  std::map<std::string, tinyxml2::XMLElement*> links_;
+  std::vector<UrdfTreeJoint> joints_;
+};
+
+}  // namespace proxarm::command_line
