@@ -17,6 +17,7 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 #include "tests/models/surfaces/random_states.hpp"
@@ -156,9 +157,12 @@ struct Failure {
 
 void inject(Session& session, const Failure& failure, double t) {
   session.options.device_faults.push_back(span_of(failure.device_fault, t, 1.0));
-  session.injected.push_back({{failure.fault}, t, t + 1.05});
+  // A drive that has lost its power has lost its configuration, too: it is silent at every reset of the session.
+  const bool for_good = std::string_view(failure.device_fault).find(":power") != std::string_view::npos;
+  const double until_s = for_good ? std::numeric_limits<double>::infinity() : t + 1.05;
+  session.injected.push_back({{failure.fault}, t, until_s});
   // Who says nothing doesn't say that it is off, either; a second after the stop.
-  if (failure.fault == Fault::drive_silent) session.injected.push_back({{Fault::drive_not_disabled}, t, t + 2.05});
+  if (failure.fault == Fault::drive_silent) session.injected.push_back({{Fault::drive_not_disabled}, t, until_s + 1.0});
 }
 
 // Stops the arm by a fault that goes away; a reset and a resume later it moves again.
