@@ -17,7 +17,6 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
-#include <string_view>
 
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 #include "tests/models/surfaces/random_states.hpp"
@@ -157,9 +156,9 @@ struct Failure {
 
 void inject(Session& session, const Failure& failure, double t) {
   session.options.device_faults.push_back(span_of(failure.device_fault, t, 1.0));
-  // A drive that has lost its power has lost its configuration, too: it is silent at every reset of the session.
-  const bool for_good = std::string_view(failure.device_fault).find(":power") != std::string_view::npos;
-  const double until_s = for_good ? std::numeric_limits<double>::infinity() : t + 1.05;
+  // A drive that was without power, or heard nothing, isn't operational any more: it is silent at every reset of the
+  // session, which doesn't set drives up anew.
+  const double until_s = failure.fault == Fault::drive_silent ? std::numeric_limits<double>::infinity() : t + 1.05;
   session.injected.push_back({{failure.fault}, t, until_s});
   // Who says nothing doesn't say that it is off, either; a second after the stop.
   if (failure.fault == Fault::drive_silent) session.injected.push_back({{Fault::drive_not_disabled}, t, until_s + 1.0});
