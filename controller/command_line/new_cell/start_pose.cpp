@@ -29,8 +29,12 @@ double room(const models::Arm& arm, const JointVector& q) {
   return least;
 }
 
-// The largest distance of the tool from an axis that turns, over the poses; of an arm without one, a metre.
+// How far the tool comes from an axis that turns: of arms that only turn by their length when stretched; of others, in
+// whose bound the ways of all sliding joints are counted, over the poses. Of an arm that only slides, a metre.
 double reach_of(const models::Arm& arm) {
+  bool slides = false;
+  for (int i = 0; i < arm.axes(); ++i) slides = slides || arm.slides(i);
+  if (!slides) return std::max(arm.path_curvature().maxCoeff(), 0.1);
   double reach_m = 0.0;
   for (int k = 0; k < poses; ++k) {
     models::ToolKinematics tool;
