@@ -281,8 +281,8 @@ class NewCell {
     std::printf("%s: a cell of %zu axes, sensor on %s, %zu %s, T = %.4g ms, %.3g kg\n", file_.c_str(),
                 cell_.drives.size(), cell_.sensor.link.c_str(), cell_.buses.size(),
                 cell_.buses.size() == 1 ? "bus" : "buses", 1e3 * cell_.default_period_s, cell_.default_mass_kg);
-    std::printf("the tool starts at x %.4f, y %.4f, z %.4f m; %s\n", start_W_.x(), start_W_.y(), start_W_.z(),
-                advice_.c_str());
+    std::printf("the tool starts at x %.4f, y %.4f, z %.4f m\ntried on the simulated arm: %s\n", start_W_.x(),
+                start_W_.y(), start_W_.z(), advice_.c_str());
     for (const std::string& remark : source_.remarks) std::printf("  - %s\n", remark.c_str());
     std::printf("gears, rotors and friction are ESTIMATED; so are encoders' counts. Now:\n  proxarm run %s\n",
                 file_.c_str());
