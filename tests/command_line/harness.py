@@ -51,7 +51,10 @@ class ProgramTest(unittest.TestCase):
         """Of a run that must end well."""
         outcome = self.call("run", "--json", *arguments)
         self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
-        self.assertEqual(outcome.err, "")
+        # Light masses aren't stable in every pose that their hands lead to; whether that is told rightly,
+        # oscillation_test judges.
+        told = [line for line in outcome.err.splitlines() if "isn't stable with this hand; it takes" not in line]
+        self.assertEqual(told, [])
         return outcome.summary
 
     def copies(self):

@@ -311,14 +311,14 @@ controller::PosesSummary poses_summary(const controller::PassedPoses& poses) {
 }
 }  // namespace
 
-// On standard error, once: at the start only the start pose was judged.
+// On standard error, once: at the start only the start pose was judged. Who forced an unstable mass knows.
 void SessionOutput::judge_pose(const CycleRecord& record) {
   if (!poses_ || record.phase != controller::Phase::rendering) return;
   const auto joints_rad = [&] { return deriver_.link_rad(record); };
   const double felt_mass_kg = record.proxy_mass_kg + session_.cell.tool.mass_kg;
   const bool first = poses_->pass(1e-9 * static_cast<double>(record.time_ns), controller::vec3(record.tool_W_m),
                                   felt_mass_kg, record.proxy_damping_Ns_per_m, joints_rad);
-  if (!first) return;
+  if (!first || options_.force_unstable) return;
   std::fprintf(stderr, "proxarm: %s; if it swings: a larger mass, or lead it elsewhere\n",
                controller::poses_text(poses_summary(*poses_)).c_str());
 }
