@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 
 #include "controller/command_line/entry/exit_status.hpp"
@@ -43,6 +44,16 @@ int refuse_options(const CLI::App& command, const std::string& called, const std
   }
   std::fprintf(stderr, "proxarm: %s; see %s --help\n", message.c_str(), called.c_str());
   return set_up_mistake;
+}
+
+std::optional<int> parse_options(CLI::App& app, int argc, const char* const* argv) {
+  try {
+    app.parse(argc, argv);
+    return std::nullopt;
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);
+    return refuse_options(app, app.get_name(), {argv + 1, argv + argc}, error);
+  }
 }
 
 }  // namespace proxarm::command_line

@@ -2,10 +2,7 @@
 //
 // Exit status: 0 fine, 2 set-up mistake.
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "controller/command_line/entry/help.hpp"
 #include "controller/command_line/entry/options.hpp"
@@ -46,14 +43,8 @@ int run(int argc, char** argv) {
   CLI::App app{"a cell of your own arm out of its URDF or xacro: runs at once in simulation", "proxarm new-cell"};
   app.formatter(std::make_shared<command_line::HelpFormatter>());
   NewCellOptions options;
-  const std::vector<std::string> words(argv + 1, argv + argc);
   add_options(app, options);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);
-    return command_line::refuse_options(app, "proxarm new-cell", words, error);
-  }
+  if (const auto status = command_line::parse_options(app, argc, argv)) return *status;
   return command_line::new_cell_command(options);
 }
 

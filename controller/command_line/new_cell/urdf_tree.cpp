@@ -171,7 +171,7 @@ UrdfTree::Path UrdfTree::path_to(const std::string& link) const {
   for (std::string at = link;;) {
     const auto up =
         std::find_if(joints_.begin(), joints_.end(), [&](const UrdfTreeJoint& joint) { return joint.child == at; });
-    if (up == joints_.end() || path.size() > joints_.size()) break;
+    if (up == joints_.end()) break;
     path.push_back(&*up);
     at = up->parent;
   }

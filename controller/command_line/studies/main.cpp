@@ -3,7 +3,6 @@
 //
 // Exit status: 0 fine, 1 an invariant was violated, 2 set-up mistake.
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,12 +52,7 @@ int run(int argc, char** argv) {
   add_study_options(app, options);
   const std::string description = words.empty() ? "" : command_line::study_description(words.front());
   if (!description.empty()) app.description(description);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);
-    return command_line::refuse_options(app, "proxarm study", words, error);
-  }
+  if (const auto status = command_line::parse_options(app, argc, argv)) return *status;
   return command_line::study_command(options);
 }
 

@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <cstdlib>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -100,12 +99,7 @@ int run(const std::vector<std::string>& words, char** argv) {
   app.formatter(std::make_shared<command_line::HelpFormatter>());
   command_line::ViewOptions options;
   add_options(app, options);
-  try {
-    app.parse(static_cast<int>(words.size()) + 1, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error, std::cout, std::cerr);
-    return command_line::refuse_options(app, "proxarm view", words, error);
-  }
+  if (const auto status = command_line::parse_options(app, static_cast<int>(words.size()) + 1, argv)) return *status;
   require_picture(options);
   return command_line::play_view(options);
 }
