@@ -112,7 +112,8 @@ void Plant::step() noexcept {
   if (all_powered && !hand_started_) start_hand(time_ns_);
   const double hand_time_s = hand_started_ ? 1e-9 * static_cast<double>(time_ns_ - hand_start_ns_) : 0.0;
   const ToolState& tool = arm_.tool();
-  models::Vec3 hand_W = hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W);
+  models::Vec3 hand_W = hand_force_ ? hand_force_(hand_time_s, tool.X_WT.translation(), tool.velocity_W)
+                                    : hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W);
   models::Vec3 arm_W = models::Vec3::Zero();
   if (clamp_) (clamp_->felt ? hand_W : arm_W) += clamp_->force_W(tool.X_WT.translation());
   arm_.apply(torque_Nm_, hand_W, arm_W);

@@ -6,7 +6,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "models/description/cell.hpp"
@@ -25,6 +27,11 @@ struct PlantConfig {
   std::int64_t finer = 1;  // steps of the mechanics in the shortest servo period; more is slower and more accurate
   std::uint64_t noise_seed = 1;
 };
+
+// In N, on the handle, at this time of the hand's own clock (negative never; 0 until it starts), where the tool is and
+// as fast as it is. Called each step.
+using HandForce =
+    std::function<models::Vec3(double time_s, const models::Vec3& position_W, const models::Vec3& velocity_W)>;
 
 class Plant {
  public:
@@ -67,6 +74,9 @@ class Plant {
   // From now on there is a body in the tool's way.
   void set_clamp(const Clamp& clamp) noexcept { clamp_ = clamp; }
 
+  // From now on the hand pulls so; of its description only its mass counts. Precondition: `force` doesn't throw.
+  void set_hand(HandForce force) { hand_force_ = std::move(force); }
+
   // Truth, for summaries and studies; the controller never sees it.
   [[nodiscard]] const ToolState& tool() const noexcept { return arm_.tool(); }
   [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return arm_.handle_force_W(); }
@@ -90,6 +100,7 @@ class Plant {
   std::vector<std::int64_t> servo_period_ns_;
   std::vector<Brake> brakes_;
   std::optional<Clamp> clamp_;
+  HandForce hand_force_;  // empty: as the hand's description says
   std::vector<double> torque_Nm_;
   std::vector<models::Wrench> sensed_;  // on their way through the sensor, a step each; the next one is the oldest
   std::size_t next_sensed_ = 0;

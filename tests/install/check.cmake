@@ -1,5 +1,5 @@
 set(folder ${build}/tests/install)
-file(REMOVE_RECURSE ${folder}/prefix ${folder}/own_world)
+file(REMOVE_RECURSE ${folder}/prefix ${folder}/own_world ${folder}/examples)
 
 function(run)
   execute_process(COMMAND ${ARGV} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
@@ -40,3 +40,12 @@ run(${CMAKE_COMMAND} -G Ninja -S ${CMAKE_CURRENT_LIST_DIR}/own_world -B ${folder
 run(${CMAKE_COMMAND} --build ${folder}/own_world)
 run(${folder}/own_world/own_world)
 message(STATUS "${output}")
+
+# The examples of docs/library.md, as they are installed, with the data that is installed.
+run(${CMAKE_COMMAND} -G Ninja -S ${folder}/prefix/share/doc/proxarm/docs/examples -B ${folder}/examples
+    -D CMAKE_PREFIX_PATH=${folder}/prefix -D CMAKE_CXX_COMPILER=${compiler} -D CMAKE_BUILD_TYPE=Debug)
+run(${CMAKE_COMMAND} --build ${folder}/examples)
+foreach(example closed_loop own_world own_sensor own_drive)
+  run(${CMAKE_COMMAND} -E env PROXARM_DATA=${folder}/prefix/share/proxarm ${folder}/examples/${example})
+  message(STATUS "${example}: ${output}")
+endforeach()

@@ -16,6 +16,7 @@
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
+#include "controller/library/session_summary.hpp"
 #include "controller/signals/derived_signals.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -172,13 +173,13 @@ void BlackBoxKeeper::keep(int said) {
 }
 
 void BlackBoxKeeper::write(const std::string& reason) const {
-  controller::SessionWriter files(folder_, joint_names(session_.cell), false);
+  controller::SessionWriter files(folder_, controller::joint_names(session_.cell), false);
   files.write_file("reason.txt", reason + "\n");
   files.write_file("effective.yaml", effective_config(session_));
   controller::ReplayRecorder replay(box_, folder_, replay_files(session_));
   replay.drain(shared_->head);
   replay.finish();
-  controller::SummaryBuilder figures(summary_config(session_));
+  controller::SummaryBuilder figures(controller::summary_config(session_));
   const controller::SignalDeriver deriver(session_.cell);
   BoxCycle cycle;
   std::vector<BoxFrame> frames;
@@ -189,7 +190,7 @@ void BlackBoxKeeper::write(const std::string& reason) const {
   };
   for (std::uint64_t k = box_.oldest_cycle(); k < box_.cycles(); ++k) {
     if (!box_.read(k, cycle, frames)) continue;
-    complete(cycle.record, session_, cycle.rendered_ns);
+    controller::complete(cycle.record, session_, cycle.rendered_ns);
     figures.add(cycle.record);
     files.add(cycle.record, deriver.derive(cycle.record));
     add_frames();

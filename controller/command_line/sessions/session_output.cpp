@@ -10,8 +10,7 @@
 #include "controller/command_line/live/live_parameters.hpp"
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/preparation/effective_config.hpp"
-#include "controller/signals/clearances.hpp"
-#include "fieldbus/cia402/cia402_bring_up.hpp"
+#include "controller/library/session_summary.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -20,88 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using controller::CycleRecord;
-using controller::Fault;
 using controller::Summary;
 
 constexpr const char* default_plot = "proxarm-run.svg";
-
-}  // namespace
-
-std::vector<std::string> joint_names(const description::Cell& cell) {
-  std::vector<std::string> names;
-  for (const description::DriveDescription& drive : cell.drives) names.push_back(drive.joint);
-  return names;
-}
-
-controller::SummaryConfig summary_config(const PreparedSession& session) {
-  controller::SummaryConfig config;
-  config.period_s = session.settings.period_s;
-  config.wanted_mass_kg = session.settings.mass_kg;
-  if (!session.impedance()) config.handle_mass_kg = session.cell.tool.mass_kg;
-  config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
-  config.spring_N_per_m = session.settings.spring_N_per_m;
-  // What is looked ahead isn't behind.
-  config.lookahead_s = session.settings.horizon_s;
-  config.setpoint_filter_s = motion_delay_s(session) - 2.0 * session.settings.period_s - session.settings.horizon_s;
-  const double behind_s = std::max(0.0, motion_delay_s(session) - session.settings.horizon_s);
-  config.setpoint_delay_cycles = static_cast<int>(std::lround(behind_s / session.settings.period_s));
-  config.passivity = session.settings.passivity != controller::Passivity::off;
-  config.axis_names = joint_names(session.cell);
-  return config;
-}
-
-void complete(CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns) {
-  controller::add_clearances(record, session.scene, rendered_ns);
-  if (!session.impedance()) return;
-  if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {
-    record.friction = session.scene.objects[static_cast<std::size_t>(record.contact_object)].friction;
-  }
-}
-
-namespace {
-
-// Which cable, what was wrong with what came through it, and what the sensor says itself.
-std::string sensor_text(const controller::FaultReport& report, const fieldbus::ForceSensor& sensor,
-                        const std::string& bus) {
-  std::string text = "bus " + bus;
-  if (report.fault == Fault::sensor_status) {
-    text += ": " + sensor.describe_status(static_cast<std::uint32_t>(report.value));
-  } else if (report.fault == Fault::sensor_lost || report.fault == Fault::sensor_late) {
-    const std::string losses = sensor.describe_losses();
-    text += losses.empty() ? ": no faulty frame" : ": so far " + losses;
-  }
-  return text;
-}
-
-bool is_of_sensor(Fault fault) noexcept {
-  return fault == Fault::sensor_lost || fault == Fault::sensor_late || fault == Fault::sensor_status ||
-         fault == Fault::sensor_saturated || fault == Fault::sensor_frozen || fault == Fault::sensor_drifts ||
-         fault == Fault::force_reversed;
-}
-
-std::string place_of(const controller::FaultReport& report, const controller::CycleParts& parts,
-                     const description::Cell& cell) {
-  if (is_of_sensor(report.fault)) return sensor_text(report, *parts.sensor, cell.sensor.bus);
-  if (report.where < 0) return "";
-  const auto where = static_cast<std::size_t>(report.where);
-  if (report.fault == Fault::bus_off || report.fault == Fault::error_passive || report.fault == Fault::interface_down ||
-      report.fault == Fault::send_failed || report.fault == Fault::receive_overflow) {
-    return "bus " + parts.network.bus(where).name();
-  }
-  if (report.fault == Fault::second_master) {
-    char id[8];
-    std::snprintf(id, sizeof id, "%03Xh", static_cast<unsigned>(report.value));
-    return "bus " + parts.network.bus(where).name() + ", identifier " + id;
-  }
-  const fieldbus::CyclicDrive& drive = parts.drives[where].drive;
-  std::string place = "drive of " + drive.description().joint + ", bus " + drive.description().bus + ", node " +
-                      std::to_string(drive.description().node);
-  if (report.fault == Fault::drive_fault || report.fault == Fault::drive_disabled ||
-      report.fault == Fault::modbus_silent) {
-    place += ": " + drive.describe();
-  }
-  return place;
-}
 
 std::string rendered_text(const PreparedSession& session) {
   const controller::SessionSettings& s = session.settings;
@@ -138,34 +58,6 @@ std::string clocks_text(const Summary& summary, const RunOptions& options) {
   return text + "\n";
 }
 
-// The session's end, as the summary has it.
-controller::EndSummary end_summary(controller::SessionEnd end, const EndingCause& cause, const PreparedSession& session,
-                                   double rendered_s) {
-  using controller::SessionEnd;
-  const auto text = [&](const char* pattern, double value) {
-    char filled[160];
-    std::snprintf(filled, sizeof filled, pattern, value);
-    char of_wanted[64];
-    std::snprintf(of_wanted, sizeof of_wanted, "; %.4g of %.4g s were rendered", rendered_s, session.duration_s);
-    return filled + std::string(end == SessionEnd::duration ? "" : of_wanted);
-  };
-  switch (end) {
-    case SessionEnd::duration:
-      return {"duration", text("%.4g s were rendered, as asked for", session.duration_s)};
-    case SessionEnd::asked:
-      return {cause.word, text(("stopped: " + cause.text).c_str(), 0.0)};
-    case SessionEnd::hold_expired:
-      return {"hold_expired",
-              text("nobody ended the hold within %.4g s (supervision.hold_s)", session.cell.supervision.hold_s)};
-    case SessionEnd::release_expired:
-      return {"release_expired",
-              text("a release that no order could end any more lasted for %.4g s", session.duration_s)};
-    case SessionEnd::fault:
-      return {"fault", text("stopped by a fault", 0.0)};
-  }
-  return {};
-}
-
 }  // namespace
 
 controller::SessionLength session_length(const PreparedSession& session, const RunOptions& options) {
@@ -179,7 +71,7 @@ controller::SessionLength session_length(const PreparedSession& session, const R
 SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth)
     : session_(session),
       options_(options),
-      builder_(summary_config(session)),
+      builder_(controller::summary_config(session)),
       progress_(session.duration_s),
       deriver_(session.cell) {
   refuse_lost_plot();
@@ -189,7 +81,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
-  writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, joint_names(session.cell), with_truth);
+  writer_ = std::make_unique<controller::SessionWriter>(options.record_dir, controller::joint_names(session.cell),
+                                                        with_truth);
   writer_->write_file("effective.yaml", effective_config(session));
 }
 
@@ -277,7 +170,7 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
                  "spring that were scripted for it are left out (a new session with --timestep has its "
                  "drives told before they are enabled)\n",
                  1e-6 * static_cast<double>(record.refused_period_ns),
-                 controller::refusal_text(record.timestep_refusal, joint_names(session_.cell)).c_str(),
+                 controller::refusal_text(record.timestep_refusal, controller::joint_names(session_.cell)).c_str(),
                  1e-6 * static_cast<double>(told_period_ns_));
   } else if (!record.has(controller::RecordFlag::timestep) && record.period_ns != told_period_ns_) {
     if (told_period_ns_ > 0) {
@@ -330,7 +223,7 @@ void SessionOutput::add(CycleRecord record) {
     if (record.phase != last_phase_) say_how_to_get_free(record.phase);
     last_phase_ = record.phase;
   }
-  complete(record, session_, rendered_ns_);
+  controller::complete(record, session_, rendered_ns_);
   say_timestep(record);
   builder_.add(record);
   say_oscillation();
@@ -349,30 +242,10 @@ void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& fr
   if (writer_) writer_->add_frame(bus, frame, time_ns);
 }
 
-// What ended the session. A drive that doesn't confirm that it is off is told of by what a fault's text says then.
-controller::FaultSummary SessionOutput::final_fault(const controller::Cycle& cycle) const {
-  const auto place = [&](const controller::FaultReport& r) { return place_of(r, cycle.parts(), session_.cell); };
-  const controller::FaultReport& report = cycle.supervisor().report();
-  const controller::FaultReport& then = cycle.supervisor().escalation();
-  controller::FaultSummary fault;
-  fault.fault = report.fault;
-  fault.cycle = report.cycle;
-  if (then.fault == Fault::none || then.fault == Fault::drive_not_disabled) {
-    fault.text = describe(report, place(report), cycle.drives_off());
-  } else {
-    fault.text = describe(report, place(report), then, place(then), cycle.drives_off());
-    fault.escalation = then.fault;
-  }
-  return fault;
-}
-
 Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end, const EndingCause& cause) {
-  Summary summary = builder_.finish();
-  summary.end = end_summary(end, cause, session_, summary.rendered_time_s);
-  summary.drives_lack = fieldbus::losses_of(cycle.parts().can_drives);
+  Summary summary =
+      controller::session_summary(builder_, cycle, end, {.reason = cause.word, .text = cause.text}, session_);
   if (poses_) summary.poses = poses_summary(*poses_);
-  // A medium takes its share along the surface, too, which the ratio would count as friction.
-  if (!session_.scene.media.empty() || session_.scene.coulomb_force_N) summary.friction_ratio_error.reset();
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
     if (order.taken && order.refusal == nullptr) continue;
     summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,
@@ -380,23 +253,6 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
   }
   for (const IdleChange& change : idle_changes(cycle, options_.changes)) {
     summary.idle_orders.push_back({"set " + change.text, change.time_s, change.refusal});
-  }
-  for (const controller::FaultReport& report : cycle.past_faults()) {
-    summary.faults.push_back(
-        {report.fault, report.cycle, describe(report, place_of(report, cycle.parts(), session_.cell)), true});
-  }
-  const controller::FaultReport& report = cycle.supervisor().report();
-  if (report.fault != Fault::none) {
-    summary.faults.push_back(final_fault(cycle));
-    const std::string& brakes = session_.cell.supervision.brake_release;
-    if (!brakes.empty()) summary.faults.back().text += "; somebody pinned: open the brakes by " + brakes;
-  }
-  for (std::size_t i = 1; i < controller::fault_count; ++i) {
-    const auto fault = static_cast<Fault>(i);
-    const controller::Notice& notice = cycle.supervisor().notice(fault);
-    const controller::Reaction reaction = cycle.supervisor().reaction(fault);
-    if (notice.times == 0 || reaction >= controller::Reaction::stop_1) continue;
-    summary.notices.push_back({fault, reaction, notice.times, notice.cycles});
   }
   return summary;
 }

@@ -19,11 +19,6 @@
 
 namespace proxarm::command_line {
 
-std::vector<std::string> joint_names(const description::Cell& cell);
-controller::SummaryConfig summary_config(const PreparedSession& session);
-// Fills in what only the scene knows, distances and friction, after so much rendering.
-void complete(controller::CycleRecord& record, const PreparedSession& session, std::int64_t rendered_ns);
-
 // How long the session lasts, and how long a release in it that nobody could end any more.
 controller::SessionLength session_length(const PreparedSession& session, const RunOptions& options);
 
@@ -48,7 +43,6 @@ class SessionOutput {
   int finish(controller::Summary summary, BlackBoxKeeper& keeper);
 
  private:
-  [[nodiscard]] controller::FaultSummary final_fault(const controller::Cycle& cycle) const;
   void refuse_lost_plot() const;
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);

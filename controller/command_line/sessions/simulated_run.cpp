@@ -11,6 +11,7 @@
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/modbus_rates.hpp"
+#include "controller/library/simulated_loop.hpp"
 #include "controller/report/latency.hpp"
 #include "controller/session/session.hpp"
 #include "models/base/setup_error.hpp"
@@ -53,27 +54,6 @@ sim::SimulatedCellConfig far_end_config(const RunOptions& options) {
   return config;
 }
 
-// Faster than any tool by far; what explodes is there within some steps.
-constexpr double impossible_m_per_s = 1000.0;
-
-bool is_possible(const sim::Truth& truth) {
-  return truth.X_WT.matrix().allFinite() && truth.acceleration_W.allFinite() &&
-         truth.velocity_W.norm() < impossible_m_per_s;
-}
-
-// Not a fault of the session: no arm can move as this one does.
-[[noreturn]] void refuse_explosion(double time_s) {
-  char found[80];
-  std::snprintf(found, sizeof found, "a motion that is no longer finite, %.3f s after power-on", time_s);
-  throw description::SetupError(
-      {.key = "simulation",
-       .message = "the simulated arm has exploded: its integration was unstable; nothing that this session says counts",
-       .found = found,
-       .expected = "gears, rotors and hand that the simulation's step can follow",
-       .advice = "raise servo_rate_Hz (the step is a servo period), lower simulation.gear_damping_Nms_per_rad or "
-                 "velocity_bandwidth_Hz, or a hand's stiffness and damping"});
-}
-
 }  // namespace
 
 SimulatedRun::SimulatedRun(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
@@ -102,18 +82,12 @@ int SimulatedRun::run() {
   far_end_.attach_to(network_);
   far_end_.power_on();
   power_on_ns_ = network_.now_ns();
-  controller::bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(line, network_.now_ns()); });
+  controller::bring_up(parts,
+                       [this](fieldbus::ModbusLine& line) { controller::pump(network_, line, network_.now_ns()); });
   report_modbus_rates(session_, parts);
   output_.introduce(parts);
   if (options_.pace == Pace::realtime) network_.follow_real_time();
   return run_cycles(std::move(parts));
-}
-
-// A line's worker on the virtual clock: an exchange takes as long as it does on the wire.
-void SimulatedRun::pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
-  const std::int64_t earliest_ns = time_ns + std::llround(1e9 * line.exchange_s());
-  const std::int64_t next_ns = std::max<std::int64_t>(line.step(time_ns), earliest_ns);
-  network_.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
 }
 
 int SimulatedRun::run_cycles(controller::CycleParts parts) {
@@ -133,7 +107,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                          if (!first_cycle_ns) first_cycle_ns = t_k_ns;
                                          wake_up.add(network_.woken_late_ns());
                                          truth_ = far_end_.truth();
-                                         if (!exploded_at_ns_ && !is_possible(truth_)) {
+                                         if (!exploded_at_ns_ && !controller::is_possible(truth_)) {
                                            exploded_at_ns_ = t_k_ns;
                                            cycle.request_stop();
                                          }
@@ -141,7 +115,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                        [&] { drain(cycle.records()); }};
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_length(session_, options_), hooks);
-  if (exploded_at_ns_) refuse_explosion(1e-9 * static_cast<double>(*exploded_at_ns_ - power_on_ns_));
+  if (exploded_at_ns_) controller::refuse_explosion(1e-9 * static_cast<double>(*exploded_at_ns_ - power_on_ns_));
   const double wall_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
   controller::Summary summary = output_.summary(cycle, tally.end, signals.cause());
   summary.wall_time_s = wall_s;
@@ -162,12 +136,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
 void SimulatedRun::drain(controller::SpscRing<CycleRecord>& records) {
   CycleRecord record;
   while (records.pop(record)) {
-    record.set(controller::RecordFlag::truth);
-    record.true_tool_W_m = controller::triple(truth_.X_WT.translation());
-    record.hand_force_W_N = controller::triple(truth_.hand_force_W);
-    const Eigen::Quaterniond q(truth_.X_WT.linear());
-    record.true_tool_q_W = {q.x(), q.y(), q.z(), q.w()};
-    record.true_acceleration_W_m_per_s2 = controller::triple(truth_.acceleration_W);
+    controller::add_truth(record, truth_);
     output_.add(record);
   }
   if (replay_) replay_->drain(keeper_.head());

@@ -24,7 +24,6 @@ class SimulatedRun {
 
  private:
   int run_cycles(controller::CycleParts parts);
-  void pump(fieldbus::ModbusLine& line, std::int64_t time_ns);
   void drain(controller::SpscRing<controller::CycleRecord>& records);
 
   const PreparedSession& session_;

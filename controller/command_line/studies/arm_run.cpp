@@ -5,7 +5,7 @@
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/trials/cycle_work.hpp"
-#include "controller/command_line/trials/quiet_run.hpp"
+#include "controller/library/simulated_loop.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -43,7 +43,7 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
   std::vector<studies::ArmSample> samples;
   double rendered_s = 0.0;
-  run_quietly(session_of(setup), [&](const controller::CycleRecord& record, const sim::Truth& truth) {
+  controller::run_quietly(session_of(setup), [&](const controller::CycleRecord& record, const sim::Truth& truth) {
     if (record.phase != controller::Phase::rendering) return;
     rendered_s += setup.period_s;
     if (rendered_s > setup.settling_s) samples.push_back({truth.hand_force_W, truth.X_WT.translation()});

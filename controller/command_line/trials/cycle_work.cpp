@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <sstream>
 
-#include "controller/command_line/trials/quiet_run.hpp"
+#include "controller/library/simulated_loop.hpp"
 
 namespace proxarm::command_line {
 
 controller::MotionWork count_work(const PreparedSession& session) {
-  return run_quietly(session, [](const controller::CycleRecord&, const sim::Truth&) {}).work;
+  return controller::run_quietly(session, [](const controller::CycleRecord&, const sim::Truth&) {}).work;
 }
 
 std::string work_text(const PreparedSession& session, const controller::MotionWork& work) {

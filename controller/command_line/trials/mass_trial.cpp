@@ -1,6 +1,6 @@
 #include "controller/command_line/trials/mass_trial.hpp"
 
-#include "controller/command_line/trials/quiet_run.hpp"
+#include "controller/library/simulated_loop.hpp"
 #include "controller/report/summary.hpp"
 
 namespace proxarm::command_line {
@@ -14,7 +14,7 @@ MassTrial try_mass(PreparedSession session, double felt_mass_kg, double hand_fac
   for (description::Grip& grip : session.hand.grips) grip.stiffness_N_per_m *= hand_factor;
   controller::SummaryBuilder summary({.period_s = session.settings.period_s, .passivity = true});
   MassTrial out;
-  out.fault = run_quietly(session, [&](controller::CycleRecord record, const sim::Truth& truth) {
+  out.fault = controller::run_quietly(session, [&](controller::CycleRecord record, const sim::Truth& truth) {
                 record.set(controller::RecordFlag::truth);
                 record.true_tool_W_m = controller::triple(truth.X_WT.translation());
                 summary.add(record);

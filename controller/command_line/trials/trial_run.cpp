@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/library/simulated_loop.hpp"
 #include "controller/session/bring_up.hpp"
 #include "controller/session/session.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
@@ -89,7 +90,8 @@ class TrialArm {
     };
     controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
                                                            network_, buses_in_order(session.cell), open_line);
-    controller::bring_up(parts, [this](fieldbus::ModbusLine& line) { pump(line, network_.now_ns()); });
+    controller::bring_up(parts,
+                         [this](fieldbus::ModbusLine& line) { controller::pump(network_, line, network_.now_ns()); });
     controller::Cycle cycle(std::move(parts), session.settings, session.cell.limits, 64);
     const controller::SessionHooks hooks{[&](std::int64_t) { intervene(cycle); },
                                          [&] {
@@ -124,12 +126,6 @@ class TrialArm {
     if (now_s < seen_s_ || cycle.stop_requested()) return;
     end_ = end_of(cycle.supervisor());
     cycle.request_stop();
-  }
-
-  void pump(fieldbus::ModbusLine& line, std::int64_t time_ns) {
-    const std::int64_t earliest_ns = time_ns + std::llround(1e9 * line.exchange_s());
-    const std::int64_t next_ns = std::max<std::int64_t>(line.step(time_ns), earliest_ns);
-    network_.events().schedule(next_ns, [this, &line](std::int64_t t_ns) { pump(line, t_ns); });
   }
 
   const assessment::Trial& trial_;

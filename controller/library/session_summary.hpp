@@ -1,0 +1,27 @@
+// What a session says of itself, out of its records and of what its cycle found: the same for the command line and for
+// programs of one's own.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/cycle/cycle.hpp"
+#include "controller/record/cycle_record.hpp"
+#include "controller/report/summary.hpp"
+#include "controller/session/session.hpp"
+
+namespace proxarm::controller {
+
+std::vector<std::string> joint_names(const description::Cell& cell);
+SummaryConfig summary_config(const command_line::PreparedSession& session);
+// Fills in what only the scene knows, distances and friction, after so much rendering.
+void complete(CycleRecord& record, const command_line::PreparedSession& session, std::int64_t rendered_ns);
+
+// Of all that was added to `builder` and what the cycle found; the caller fills in what only it knows. `asked`: who
+// asked for the end, of SessionEnd::asked.
+Summary session_summary(SummaryBuilder& builder, const Cycle& cycle, SessionEnd end, const EndSummary& asked,
+                        const command_line::PreparedSession& session);
+
+}  // namespace proxarm::controller
