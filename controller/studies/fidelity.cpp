@@ -19,7 +19,7 @@ using nlohmann::json;
 using Complex = std::complex<double>;
 
 constexpr std::array<double, 3> limits{0.05, 0.1, 0.25};
-constexpr std::array<double, 13> frequencies_Hz{0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0};
+constexpr std::array<double, 13> frequencies_Hz{0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0};
 
 // At low frequencies as much travel as a hand takes, above a velocity of 5 cm/s each.
 std::vector<ArmSine> sines(bool wall) {
@@ -183,7 +183,11 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
 std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*options*/,
                                         const std::filesystem::path& out) const {
   const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  Chart chart{.title = "What the hand feels at the simulated arm", .panel_width = 1100, .panel_height = 500};
+  Chart chart{.title = "What the hand feels at the simulated arm",
+              .columns = 2,
+              .panel_width = 640,
+              .panel_height = 460,
+              .common_key = true};
   Panel mass{.title = "Free motion: mass felt, as a share of the wanted one (below 0 it pulls)",
              .x_label = "frequency (Hz)",
              .y_label = "Re(F/a)/M",
@@ -224,20 +228,22 @@ std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*opt
     of_job[2].y.push_back(180.0 / std::numbers::pi *
                           std::atan2(value(row, "mass_imag_kg"), value(row, "mass_real_kg")));
   }
+  std::map<std::string, int> styles;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const auto found = curves.find(table.job(row));
     if (found == curves.end()) continue;
-    const auto add = [](Panel& panel, Curve& curve) {
-      curve.style = static_cast<int>(panel.curves.size());
-      panel.curves.push_back(std::move(curve));
-    };
     // Drives of half the speed feel the same, to some tenths of a per cent: they aren't drawn.
-    if (value(row, "wall") != 0.0) {
-      add(wall, found->second[0]);
-    } else if (value(row, "drive_factor") == 1.0) {
-      add(mass, found->second[0]);
-      add(error, found->second[1]);
-      add(phase, found->second[2]);
+    if (value(row, "drive_factor") == 1.0) {
+      auto& [felt, of_error, of_phase] = found->second;
+      const int style = styles.emplace(felt.name, static_cast<int>(styles.size())).first->second;
+      felt.style = of_error.style = of_phase.style = style;
+      if (value(row, "wall") != 0.0) {
+        wall.curves.push_back(felt);
+      } else {
+        mass.curves.push_back(felt);
+        error.curves.push_back(of_error);
+        phase.curves.push_back(of_phase);
+      }
     }
     curves.erase(found);
   }

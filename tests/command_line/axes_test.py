@@ -43,7 +43,7 @@ class Axes(ProgramTest):
         shipped = SOURCE / "models/cells"
         return {1: [shipped / "linear.yaml"], 2: [shipped / "bench.yaml"],
                 3: [shipped / "gantry.yaml", self.without_drive("scara.yaml", "turn")], 4: [shipped / "scara.yaml"],
-                5: [self.without_drive("default.yaml", "axis_4")], 6: [shipped / "default.yaml"],
+                5: [self.without_drive("default.yaml", "axis_4")], 6: [shipped / "default.yaml", shipped / "cobot.yaml"],
                 7: [shipped / "seven.yaml"]}
 
     def for_each(self, judge):

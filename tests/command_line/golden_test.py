@@ -36,6 +36,7 @@ SESSIONS = {
     "one linear axis": ("@models/cells/linear.yaml",),
     "gantry of three": ("@models/cells/gantry.yaml",),
     "scara of four": ("@models/cells/scara.yaml",),
+    "collaborative arm of six": ("@models/cells/cobot.yaml",),
     "seven axes": ("@models/cells/seven.yaml",),
     "sensor frozen": ("--fault", "sensor:frozen@4s"),
     "drive silent": ("--fault", "axis_2:silent@4s"),

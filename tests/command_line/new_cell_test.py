@@ -106,6 +106,7 @@ class NewCell(ProgramTest):
         text = (self.folder / "mine/arm.urdf").read_text()
         self.assertIn('izz="0.15"', text)
         self.assertEqual(text.count("estimated by proxarm"), 5)
+        self.assertIn("counts_per_motor_revolution: 1048576\n", (self.folder / "mine/cell.yaml").read_text())
 
     def test_finds_meshes_of_packages(self):
         package = self.folder / "ros/made_description"

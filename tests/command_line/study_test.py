@@ -36,6 +36,17 @@ class Study(ProgramTest):
             self.assertIn(key, figures["keys"])
         self.assertIn("<svg", (self.folder / "out/figure5.svg").read_text()[:1000])
 
+    def test_what_the_hand_feels_of_ten_kilograms_that_are_looked_ahead_of(self):
+        self.assertEqual(self.call("study", "fidelity", "--quick", "--out", "out").status, 0)
+        figures = self.figures("fidelity", "out")
+        self.assertEqual(figures["ended_by_fault"], 0)
+        by_setup = figures["apparent_mass_error_by_setup"]
+        for frequency, at_most in (("2", 0.02), ("5", 0.07), ("10", 0.2)):  # what the project has promised
+            self.assertLessEqual(by_setup["10 kg, T = 1 ms, lookahead"][frequency], at_most)
+        # Without it: the loop's 16.6 ms alone would be 2 sin(pi f L) = 0.21 at 2 Hz.
+        self.assertGreater(by_setup["10 kg, T = 1 ms"]["2"], 0.1)
+        self.assertLess(by_setup["10 kg, T = 1 ms"]["2"], 0.21)
+
     def test_mistakes_are_named(self):
         for arguments, words in ((("figur5", "--out", "x"), ("'figur5'", "figure5")),
                                  (("figure5",), ("--out",)),

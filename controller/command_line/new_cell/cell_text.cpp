@@ -9,7 +9,7 @@ namespace {
 
 std::string number(double x) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.6g", x);
+  std::snprintf(text, sizeof text, "%.7g", x);
   return text;
 }
 

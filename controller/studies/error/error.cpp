@@ -192,7 +192,9 @@ Chart at_a_glance(const RunsByCase& all) {
     time.curves.push_back(of_time);
   }
   for (const ErrorCase& which : error_cases()) {
-    if (all.contains(which.name)) error.x_names.push_back(which.name);
+    if (!all.contains(which.name)) continue;
+    error.x_names.push_back(which.name);
+    std::ranges::replace(error.x_names.back(), '_', ' ');
   }
   time.x_names = error.x_names;
   return {.title = "Error and time of a step at 1 ms (1e-10 m: rounding)",
@@ -305,9 +307,9 @@ std::vector<std::string> ErrorStudy::plot(const Table& table, const Options& /*o
   const RunsByCase all = collect(table);
   const Fixed fixed = best_fixed(all);
   Chart work{.title = "Position error against run time",
-             .columns = 3,
-             .panel_width = 520,
-             .panel_height = 370,
+             .columns = 2,
+             .panel_width = 640,
+             .panel_height = 420,
              .common_key = true};
   Chart order = work;
   order.title = "Position error against timestep";
