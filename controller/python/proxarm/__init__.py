@@ -1,0 +1,205 @@
+"""proxarm from Python: worlds, simulated sessions, records, studies, and sessions that run (docs/python.md).
+
+A simulated session takes a world and a hand that are Python functions. A real one is `proxarm run`, a process of its
+own, which `run` starts and `Live` talks to: no interpreter is ever in its cycle.
+"""
+import collections.abc
+import json
+import os
+import pathlib
+import re
+import shutil
+import socket
+import subprocess
+
+import numpy
+
+from ._proxarm import SetupError, World, _Session, _bare, _read_table
+
+__all__ = ["Live", "Record", "Result", "Session", "SetupError", "Signals", "Study", "World", "load", "run", "study"]
+
+
+class Signals(collections.abc.Mapping):
+    """Columns by name, as numpy arrays: numbers as float64 (NaN where a field is empty), words as strings."""
+
+    def __init__(self, columns):
+        self._columns = {column[0]: column[1:] for column in columns}
+
+    def __getitem__(self, name):
+        values, *words = self._columns[name]
+        return numpy.array(words[0])[values] if words else values
+
+    def __iter__(self):
+        return iter(self._columns)
+
+    def __len__(self):
+        return len(self._columns)
+
+    def vector(self, name):
+        """Three columns as one array of n times 3: "proxy_W_m" for proxy_W_x_m, proxy_W_y_m and proxy_W_z_m."""
+        columns = [self[column] for column in self if re.sub("_[xyz](?=_)", "", column, count=1) == name]
+        if len(columns) != 3:
+            raise KeyError(name)
+        return numpy.column_stack(columns)
+
+    def save(self, folder):
+        """A file for each column, which load() maps into memory: however long it is, that takes some milliseconds."""
+        folder = pathlib.Path(folder)
+        folder.mkdir(parents=True)
+        for name, (values, *words) in self._columns.items():
+            numpy.save(folder / f"{name}.npy", values)
+            if words:
+                (folder / f"{name}.words.json").write_text(json.dumps(words[0]))
+        (folder / "saved.json").write_text(json.dumps(list(self._columns)))
+
+
+class Result:
+    """What a simulated session gives: `summary`, a dict as `proxarm run --json` prints it, and its `signals`."""
+
+    def __init__(self, summary, signals):
+        self.summary, self.signals = summary, signals
+
+
+class Record(Result):
+    """A session that was kept by `proxarm run --record`."""
+
+    def __init__(self, summary, signals, meanings):
+        super().__init__(summary, signals)
+        self.meanings = meanings  # of each column: unit, frame and meaning
+
+
+class Session:
+    """A session of the simulated arm. Options are those of `proxarm run`: numbers in SI units, or text with its unit.
+
+    Session(scene="scenes/wall.yaml", mass="4kg").run() -> Result
+    """
+
+    def __init__(self, cell="", scene="", hand="", *, mass=None, timestep=None, duration=10.0, damping=0.0, spring=0.0,
+                 order=1, lookahead="off", force_unstable=False, bus="sim"):
+        self._options = (os.fspath(cell), os.fspath(scene), os.fspath(hand), mass, timestep, duration, damping, spring,
+                         order, lookahead, force_unstable, bus)
+        _Session(*self._options)  # what is wrong is said here
+
+    def run(self, world=None, hand=None):
+        """world(kappa, p, q) -> where the proxy goes, in place of the scene; hand(time_s, position, velocity) -> N, in
+        place of the hand's motion and grip. All in W, three numbers each. What either raises comes out of here."""
+        summary, columns = _Session(*self._options).run(world, hand)
+        return Result(json.loads(summary), Signals(columns))
+
+
+def load(folder, columns=None):
+    """A Record, or what Signals.save() wrote. `columns`: names of those that are wanted; reading takes as long as these
+    do, and a pass over the rest."""
+    folder = pathlib.Path(folder)
+    if (folder / "saved.json").exists():
+        return _load_saved(folder, columns)
+    described = _json(folder / "columns.json")
+    text = [column["name"] for column in described if "unit" not in column]
+    signals = Signals(_read_table(str(folder / "signals.csv"), list(columns or ()), text))
+    summary = _json(folder / "summary.json") if (folder / "summary.json").exists() else None
+    return Record(summary, signals, {column.pop("name"): column for column in described})
+
+
+def _load_saved(folder, columns):
+    found = []
+    for name in columns or _json(folder / "saved.json"):
+        words = folder / f"{name}.words.json"
+        values = numpy.load(folder / f"{name}.npy", mmap_mode="r")
+        found.append((name, values, _json(words)) if words.exists() else (name, values))
+    return Signals(found)
+
+
+def _json(file):
+    try:
+        return json.loads(file.read_text())
+    except OSError as error:
+        raise SetupError(f"{file}: {error.strerror}; is this the folder of a record?") from None
+
+
+def program():
+    """The program proxarm: PROXARM_PROGRAM, else that of this build, else the one on the path."""
+    built = pathlib.Path(__file__).resolve().parents[2] / "proxarm"
+    found = os.environ.get("PROXARM_PROGRAM") or (str(built) if built.is_file() else shutil.which("proxarm"))
+    if not found:
+        raise SetupError("no program proxarm on the path, and PROXARM_PROGRAM doesn't name it")
+    return found
+
+
+def _call(*words):
+    done = subprocess.run([program(), *map(str, words)], stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    if done.returncode == 2:
+        raise SetupError(done.stderr.strip().removeprefix("proxarm: "))
+    return done
+
+
+def run(*words):
+    """`proxarm run` with these words, as a process of its own, simulated or real; its summary once it has ended."""
+    return json.loads(_call("run", "--json", *words).stdout)
+
+
+class Study:
+    """What a study wrote: `headline` (its JSON, with the meaning of each key) and `table`, every run, as Signals."""
+
+    def __init__(self, folder, name):
+        self.folder = pathlib.Path(folder)
+        self.headline = _json(self.folder / f"{name}.json")
+        self.table = Signals(_read_table(str(self.folder / f"{name}.csv"), [], []))
+
+
+def study(name, out, **options):
+    """`proxarm study NAME --out OUT`, with options such as quick=True, runs=100, seed=2, threads=1."""
+    words = []
+    for option, value in options.items():
+        words += [f"--{option}"] if value is True else [f"--{option}", value]
+    _call("study", name, "--out", out, *words)
+    return Study(out, name)
+
+
+class Live:
+    """A session that runs and was started with `--control`, through its socket, as `proxarm set` and `hold` ask it."""
+
+    def __init__(self, path=None):
+        runtime = os.environ.get("XDG_RUNTIME_DIR")
+        folder = pathlib.Path(runtime) / "proxarm" if runtime else pathlib.Path(f"/tmp/proxarm-{os.geteuid()}")
+        self.path = pathlib.Path(path) if path else folder / "control"
+
+    def ask(self, line):
+        """What the session answers. SetupError: it refuses, in its own words, or nobody is there."""
+        with socket.socket(socket.AF_UNIX) as ear:
+            ear.settimeout(5.0)
+            try:
+                ear.connect(str(self.path))
+                ear.sendall(line.encode() + b"\n")
+                answer = b""
+                while not answer.endswith(b"\n") and (part := ear.recv(65536)):
+                    answer += part
+            except OSError as error:
+                raise SetupError(f"{self.path}: --control: found {error.strerror or error}, expected a session that "
+                                 "listens there") from None
+        text = answer.decode().rstrip("\n")
+        if not text.startswith("ok: "):
+            raise SetupError(text)
+        return text.removeprefix("ok: ")
+
+    def status(self):
+        """As `proxarm status --json`."""
+        return json.loads(self.ask("status"))
+
+    def set(self, changes=None, **more):
+        """set(mass=3, damping="5Ns/m") or set({"wall.friction": 0.2}): all of them or none."""
+        return self.ask("\t".join(f"{name}={value}" for name, value in {**(changes or {}), **more}.items()))
+
+    def hold(self):
+        return self.ask("hold")
+
+    def resume(self):
+        return self.ask("resume")
+
+    def release(self):
+        return self.ask("release")
+
+    def back_off(self, distance="20mm"):
+        return self.ask(f"back-off {distance}")
+
+    def reset(self):
+        return self.ask("reset")

@@ -1,0 +1,229 @@
+#!/usr/bin/python3
+"""The Python package, with numpy: against closed forms, against the program's own files, and for what a call costs."""
+import csv
+import json
+import math
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import threading
+import time
+import unittest
+
+from harness import SOURCE, ProgramTest, program
+
+PACKAGE = pathlib.Path(program()).parent / "python"
+if not (PACKAGE / "proxarm").is_dir():
+    print("no Python package in this build: pybind11-dev or python3-dev isn't installed, or sanitizers are on")
+    sys.exit(77)
+sys.path.insert(0, str(PACKAGE))
+os.environ["PROXARM_DATA"] = str(SOURCE)
+
+import numpy  # noqa: E402
+import proxarm  # noqa: E402
+
+
+class World(unittest.TestCase):
+    def test_a_wall_with_friction_is_equation_4(self):
+        # The wall x = 0.9, free at smaller x, mu 0.3: r = p where p is free; else on the wall, dragged back by at most
+        # mu times the depth.
+        world = proxarm.World("scenes/wall.yaml")
+        random = numpy.random.default_rng(1)
+        for _ in range(1000):
+            q = numpy.array([0.9 - random.uniform(0, 0.01), *random.uniform(-0.1, 0.1, 2)])
+            p = q + random.uniform(-0.02, 0.02, 3)
+            got = world(random.uniform(10, 1e6), p, q)
+            expected = p.copy()
+            if p[0] > 0.9:
+                expected[0] = 0.9
+                way = p[1:] - q[1:]  # where it sticks: at q's own place along the wall
+                most = 0.3 * (p[0] - 0.9)
+                expected[1:] = q[1:] if numpy.linalg.norm(way) <= most else p[1:] - most * way / numpy.linalg.norm(way)
+            # Rounding of positions of a metre, some ten operations.
+            numpy.testing.assert_allclose(got, expected, rtol=0, atol=1e-14)
+
+    def test_takes_arrays_tuples_and_lists_alike(self):
+        world = proxarm.World("scenes/wall.yaml")
+        p, q = [0.95, 0.0, 0.6], [0.9, 0.0, 0.6]
+        expected = world(4000.0, numpy.array(p), numpy.array(q))
+        for kind in (tuple, list, lambda x: numpy.array(x, dtype=numpy.float32).astype(float),
+                     lambda x: numpy.repeat(x, 2)[::2]):
+            numpy.testing.assert_allclose(world(4000, kind(p), kind(q)), expected, atol=1e-7)
+        self.assertEqual(world.dimensions, 3)
+        self.assertEqual(world.objects, ["wall"])
+        [(number, _, slips, normal)] = world.contacts
+        self.assertEqual((number, slips), (0, False))
+        numpy.testing.assert_array_equal(normal, [-1, 0, 0])
+        self.assertAlmostEqual(world.clearance_m([0.8, 0, 0]), 0.1, delta=1e-15)
+
+    def test_what_isnt_a_point_is_refused(self):
+        world = proxarm.World("scenes/wall.yaml")
+        for arguments in ((0.0, [0, 0, 0], [0, 0, 0]), (math.nan, [0, 0, 0], [0, 0, 0]), (1.0, [0, 0], [0, 0, 0]),
+                          (1.0, [0, 0, math.inf], [0, 0, 0]), (1.0, ["a", 0, 0], [0, 0, 0]), (1.0, 3, [0, 0, 0])):
+            with self.subTest(arguments), self.assertRaises(ValueError):
+                world(*arguments)
+
+
+class Sessions(ProgramTest):
+    def test_moves_the_arm_as_the_program_does(self):
+        here = self.summary("--mass", "5", "--duration", "2s")
+        result = proxarm.Session(mass="5kg", duration="2s").run()
+        self.assertEqual(result.summary["setpoint_sha256"], here["setpoint_sha256"])
+        self.assertEqual(set(result.summary), set(here))
+
+    def test_signals_are_the_records(self):
+        self.summary("--duration", "2s", "--record", self.folder / "record")
+        record = proxarm.load(self.folder / "record")
+        signals = proxarm.Session(duration="2s").run().signals
+        self.assertEqual(list(signals), list(record.signals))
+        with open(self.folder / "record" / "signals.csv", newline="") as file:
+            rows = list(csv.DictReader(file))
+        for name, values in record.signals.items():
+            numpy.testing.assert_array_equal(values, signals[name], name)
+            told = [row[name] for row in rows]
+            if values.dtype.kind == "U":
+                self.assertEqual(list(values), told)
+            else:
+                numpy.testing.assert_array_equal(values, [float(text or "nan") for text in told], name)
+        self.assertEqual(set(record.meanings), set(rows[0]))
+        self.assertEqual(record.signals.vector("proxy_W_m").shape, (len(rows), 3))
+        chosen = proxarm.load(self.folder / "record", columns=["phase", "tool_W_x_m"]).signals
+        self.assertEqual(list(chosen), ["phase", "tool_W_x_m"])
+        numpy.testing.assert_array_equal(chosen["tool_W_x_m"], signals["tool_W_x_m"])
+        record.signals.save(self.folder / "saved")
+        saved = proxarm.load(self.folder / "saved")
+        for name in signals:
+            numpy.testing.assert_array_equal(saved[name], signals[name], name)
+
+    def test_a_world_and_a_hand_in_python(self):
+        stop_m = 0.75
+
+        def wall(kappa, p, q):
+            return [min(p[0], stop_m), p[1], p[2]]
+
+        def hand(time_s, position, velocity):  # not before the sensor is tared
+            return 5 * (time_s > 0.5) - 20 * velocity[0], -20 * velocity[1], -20 * velocity[2]
+
+        result = proxarm.Session(duration=3.0).run(world=wall, hand=hand)
+        proxy = result.signals.vector("proxy_W_m")
+        self.assertEqual(proxy[:, 0].max(), stop_m)
+        self.assertGreater(result.summary["contact_time_s"], 1.0)
+        self.assertEqual(result.summary["faults"], [])
+        # At rest on the wall: the wall holds what the hand pushes. 2 % of 5 N for the sensor's noise.
+        self.assertAlmostEqual(result.signals["contact_force_W_x_N"][2500:3000].mean(), -5.0, delta=0.1)
+
+    def test_what_the_functions_raise_comes_out(self):
+        def world(kappa, p, q):
+            raise LookupError("no world here")
+
+        def hand(time_s, position, velocity):
+            return [0.0, math.nan, 0.0]
+
+        for functions, error in (({"world": world}, LookupError), ({"hand": hand}, ValueError),
+                                 ({"world": lambda k, p, q: "nowhere"}, ValueError), ({"hand": lambda: None}, TypeError)):
+            with self.subTest(error=error), self.assertRaises(error):
+                proxarm.Session(duration=1).run(**functions)
+
+    def test_is_refused_with_the_words_of_the_command_line(self):
+        cases = [({"mass": -1}, ["--mass", "-1"]), ({"mass": "3 furlongs"}, ["--mass", "3 furlongs"]),
+                 ({"mass": 0.5}, ["--mass", "0.5"]), ({"timestep": "0.5ms"}, ["--timestep", "0.5ms"]),
+                 ({"scene": "absent.yaml"}, ["--scene", "absent.yaml"]), ({"lookahead": "far"}, ["--lookahead", "far"]),
+                 ({"scene": "models/cells/default.yaml"}, ["--scene", "models/cells/default.yaml"])]
+        for options, words in cases:
+            with self.subTest(options):
+                outcome = self.call("run", *words)
+                self.assertEqual(outcome.status, 2)
+                with self.assertRaises(proxarm.SetupError) as caught:
+                    proxarm.Session(**options)
+                self.assertEqual(f"proxarm: {caught.exception}\n", outcome.err)
+        with self.assertRaises(proxarm.SetupError) as caught:
+            proxarm.World(str(self.written("bad.yaml", "objects:\n  - plane: {friction: -1}\n")))
+        self.assertEqual(caught.exception.line, 2)
+        self.assertTrue(caught.exception.file.endswith("bad.yaml"))
+        with self.assertRaisesRegex(proxarm.SetupError, "cycle of a real session"):
+            proxarm.Session(bus="can0")
+
+    def test_other_threads_go_on_meanwhile(self):
+        seen = []
+        watcher = threading.Thread(target=lambda: [seen.append(time.monotonic()) or time.sleep(0.01) for _ in range(10)])
+        begun = time.monotonic()
+        watcher.start()
+        proxarm.Session(duration=10).run()
+        ended = time.monotonic()
+        watcher.join()
+        self.assertGreater(sum(begun < moment < ended for moment in seen), 2)
+
+
+class Around(ProgramTest):
+    def setUp(self):
+        super().setUp()
+        os.environ["PROXARM_PROGRAM"] = program()
+
+    def test_a_live_session_is_asked_and_changed(self):
+        path = self.folder / "control"
+        self.folder.chmod(0o700)
+        with subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "60s", "--control", path, "--no-plot"],
+                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=self.folder) as session:
+            try:
+                live = proxarm.Live(path)
+                deadline = time.monotonic() + 60
+                while True:
+                    try:
+                        if live.status()["phase"] == "rendering":
+                            break
+                    except proxarm.SetupError:
+                        self.assertLess(time.monotonic(), deadline)
+                    time.sleep(0.1)
+                live.set(mass=6)
+                deadline = time.monotonic() + 60
+                while live.status()["felt_mass_kg"] != 6.0:
+                    self.assertLess(time.monotonic(), deadline)
+                    time.sleep(0.05)
+                with self.assertRaisesRegex(proxarm.SetupError, "mass"):
+                    live.set(mass=0.3)
+                live.hold()
+            finally:
+                session.terminate()
+        with self.assertRaisesRegex(proxarm.SetupError, "a session that listens there"):
+            live.status()
+
+    def test_a_process_of_its_own_gives_its_summary(self):
+        self.assertEqual(proxarm.run("--duration", "1s")["rendered_time_s"], 1.0)
+        with self.assertRaisesRegex(proxarm.SetupError, "^--mass: "):
+            proxarm.run("--mass", "-1")
+
+    def test_the_examples_of_the_page_are_the_files_and_run(self):
+        page = (SOURCE / "docs/python.md").read_text()
+        blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+        for name, expected in (("figure5.py", r"\(5\): pulls with 0\.421 N, kicks with 0\.313 N"), ("torus.py", r"^[1-9]\.\d\d s of touch; .* x = 0\.9\d\d\d m")):
+            file = SOURCE / "docs/examples" / name
+            self.assertEqual(sum(block in file.read_text() for block in blocks), 1, name)
+            done = subprocess.run(["/usr/bin/python3", file], cwd=self.folder, capture_output=True, text=True,
+                                  env={**os.environ, "PYTHONPATH": str(PACKAGE)})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stdout, expected)
+        self.assertEqual(json.loads((self.folder / "figure5/figure5.json").read_text())["pull_force_N"]["23"], 0.0)
+
+
+class CallTiming(unittest.TestCase):
+    def test_a_step_costs_a_microsecond_more_than_a_bare_call(self):
+        # What the machine does beside comes and goes: the quickest of many short rounds, each of both by turns.
+        world, bare = proxarm.World("scenes/wall.yaml"), proxarm._bare
+        p, q = numpy.array([0.95, 0.0, 0.6]), numpy.array([0.9, 0.0, 0.6])
+
+        def took_s(function, times=2000):
+            begun = time.perf_counter()
+            for _ in range(times):
+                function(4000.0, p, q)
+            return (time.perf_counter() - begun) / times
+
+        rounds = [(took_s(world), took_s(bare)) for _ in range(100)]
+        step_s, bare_s = (min(column) for column in zip(*rounds))
+        print(f"a step {1e9 * step_s:.0f} ns, a bare call {1e9 * bare_s:.0f} ns, ratio {step_s / bare_s:.1f}")
+        self.assertLess(step_s - bare_s, 1e-6)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
