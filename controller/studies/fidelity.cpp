@@ -188,7 +188,7 @@ std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*opt
               .panel_width = 640,
               .panel_height = 460,
               .common_key = true};
-  Panel mass{.title = "Free motion: mass felt, as a share of the wanted one (below 0 it pulls)",
+  Panel mass{.title = "Free motion: mass felt over wanted (below 0 it pulls)",
              .x_label = "frequency (Hz)",
              .y_label = "Re(F/a)/M",
              .log_x = true,

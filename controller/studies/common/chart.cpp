@@ -1,5 +1,6 @@
 #include "controller/studies/common/chart.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <sstream>
@@ -87,12 +88,27 @@ void name_places(std::ostream& gp, const std::vector<std::string>& names) {
 
 }  // namespace
 
+namespace {
+
+// Rows of the common key, in columns of the width that the longest names take.
+int key_rows(const Chart& chart) {
+  if (!chart.common_key || chart.panels.empty()) return 0;
+  constexpr int column_width = 500;
+  const auto named = std::ranges::count_if(chart.panels[0].curves,
+                                           [](const Curve& curve) { return !curve.name.empty() && !curve.x.empty(); });
+  const auto columns = std::max(1, chart.columns * chart.panel_width / column_width);
+  return static_cast<int>((named + columns - 1) / columns);
+}
+
+}  // namespace
+
 std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   std::ostringstream gp, data;
   data.precision(8);
   const auto columns = static_cast<std::size_t>(chart.columns);
   const std::size_t rows = (chart.panels.size() + columns - 1) / columns;
-  const int extra = 70 + (chart.common_key ? 80 : 0);
+  const int named_rows = key_rows(chart), key_height = 26 * named_rows;
+  const int extra = 70 + key_height;
   const int height = static_cast<int>(rows) * chart.panel_height + extra;
   gp << "set terminal svg size " << chart.columns * chart.panel_width << "," << height
      << " font 'sans,19' background 'white' enhanced\nset output 'plot.svg'\nset encoding utf8\n";
@@ -103,7 +119,7 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
   std::size_t block = 0;
   for (std::size_t i = 0; i < chart.panels.size(); ++i) {
     const Panel& panel = chart.panels[i];
-    place(gp, i, chart.columns, chart.panels.size(), 50.0 / height, (chart.common_key ? 100.0 : 20.0) / height);
+    place(gp, i, chart.columns, chart.panels.size(), 50.0 / height, (20.0 + key_height) / height);
     range(gp, 'x', panel.x_low, panel.x_high, panel.log_x);
     range(gp, 'y', panel.y_low, panel.y_high, panel.log_y);
     // Many decades: every other one is labelled.
@@ -113,7 +129,8 @@ std::string draw(const Chart& chart, const std::filesystem::path& svg) {
     gp << "set title " << plain(panel.title) << "\nset xlabel " << plain(panel.x_label) << "\nset ylabel "
        << plain(panel.y_label) << "\n";
     if (chart.common_key && i == 0) {
-      gp << "set key at screen 0.5, screen " << 50.0 / height << " center vertical maxrows 3 samplen 4 width 3\n";
+      gp << "set key at screen 0.5, screen " << (12.0 + 0.5 * key_height) / height << " center vertical maxrows "
+         << named_rows << " samplen 4 width 3\n";
     } else if (chart.common_key || !panel.key) {
       gp << "unset key\n";
     } else {
