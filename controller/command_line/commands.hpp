@@ -57,6 +57,11 @@ struct AssessOptions {
   int poses = 4;
 };
 
+struct SchemaOptions {
+  std::string kind;       // cell, hand, scene, sensor, drive
+  bool markdown = false;  // tables of keys in place of a JSON Schema
+};
+
 int run_command(const RunOptions& options);
 int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
@@ -66,6 +71,7 @@ int set_command(const SetOptions& options);           // of a running session
 int status_command(const StatusOptions& options);     // of a running session
 int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
+int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);          // 1: not proven
 int calibrate_command(const CalibrateOptions& options);  // 1: poses that don't fit one another

@@ -470,6 +470,20 @@ class Commands {
     add("explain", "what a scene compiles to, what is skipped and why", [this] { return explain_command(explain_); })
         ->add_option("scene", explain_.files, "scene file")
         ->required();
+    CLI::App* schema =
+        add("schema", "what cell, hand, scene, sensor or drive files may say, as JSON Schema for editors",
+            [this] { return schema_command(schema_); });
+    schema
+        ->add_option(
+            "kind",
+            choice<std::string>(
+                "kind",
+                {{"cell", "cell"}, {"hand", "hand"}, {"scene", "scene"}, {"sensor", "sensor"}, {"drive", "drive"}},
+                [this](const std::string& kind) { schema_.kind = kind; }),
+            "which: cell, hand, scene, sensor, or drive (on Modbus)")
+        ->required()
+        ->type_name("KIND");
+    schema->add_flag("--markdown", schema_.markdown, "tables of the keys: unit, default, range and meaning");
   }
 
   void add_judges() {
@@ -510,6 +524,7 @@ class Commands {
   std::string distance_;
   command_line::CheckFilesOptions check_;
   command_line::FileOptions explain_;
+  command_line::SchemaOptions schema_;
   command_line::ProveOptions prove_;
   command_line::CalibrateOptions calibrate_;
   command_line::AssessOptions assess_;

@@ -1,7 +1,5 @@
 #include "models/description/cell.hpp"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +9,7 @@
 #include "models/base/text.hpp"
 #include "models/description/profile.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -34,15 +33,7 @@ std::string absolute_path_or_empty(const YamlNode& node, std::string_view key) {
 
 // A name for the command line (--bus NAME=IFACE,…), for files and for messages.
 std::string read_name(const YamlNode& node, std::string_view key) {
-  const std::string name = node.string(key);
-  const auto plain = [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
-           c == '.';
-  };
-  if (name.size() > 64 || !std::all_of(name.begin(), name.end(), plain)) {
-    throw node.error_at(key, "a name of letters, digits, _, - and . (at most 64)");
-  }
-  return name;
+  return text_like(node, key, {"[A-Za-z0-9_.-]{1,64}", "a name of letters, digits, _, - and . (at most 64)"});
 }
 
 // A physical inertia: positive semidefinite, and principal moments that satisfy the triangle inequality. Both together
@@ -77,13 +68,10 @@ ToolDescription read_tool(const YamlNode& node) {
 }
 
 BusDescription read_bus(const YamlNode& node) {
-  constexpr std::int64_t rates[] = {10'000, 20'000, 50'000, 100'000, 125'000, 250'000, 500'000, 800'000, 1'000'000};
   BusDescription bus;
   bus.name = read_name(node, "name");
-  bus.bitrate = node.integer_or("bitrate", bus.bitrate, rates[0], 1'000'000);
-  if (std::find(std::begin(rates), std::end(rates), bus.bitrate) == std::end(rates)) {
-    throw node.error_at("bitrate", "10000, 20000, 50000, 100000, 125000, 250000, 500000, 800000 or 1000000 bit/s");
-  }
+  bus.bitrate = integer_of_or(node, "bitrate", bus.bitrate,
+                              {10'000, 20'000, 50'000, 100'000, 125'000, 250'000, 500'000, 800'000, 1'000'000});
   bus.data_bitrate = node.integer_or("data_bitrate", 0, 0, 8'000'000);
   if (bus.data_bitrate != 0 && bus.data_bitrate < bus.bitrate) {
     throw node.error_at("data_bitrate", "0 (a classic bus), or at least the bitrate, " + std::to_string(bus.bitrate));
@@ -94,15 +82,12 @@ BusDescription read_bus(const YamlNode& node) {
 ModbusLineDescription read_modbus_line(const YamlNode& node) {
   ModbusLineDescription line;
   line.name = read_name(node, "name");
-  if (node.has("host") == node.has("device")) {
-    throw node.error_at("host", "either host (and port) of a TCP connection, or device (and baud) of a serial line");
-  }
-  if (node.has("host")) {
-    line.host = node.string("host");
-    in_addr address{};
-    if (inet_pton(AF_INET, line.host.c_str(), &address) != 1) {
-      throw node.error_at("host", "a numeric address, such as 192.168.0.10");
-    }
+  const std::string where = exactly_one(
+      node, {"host", "device"}, "either host (and port) of a TCP connection, or device (and baud) of a serial line");
+  if (where == "host") {
+    line.host = text_like(node, "host",
+                          {R"(((25[0-5]|2[0-4][0-9]|1[0-9][0-9]|[1-9]?[0-9])(\.(?!$)|$)){4})",
+                           "a numeric address, such as 192.168.0.10"});
     line.port = static_cast<int>(node.integer_or("port", line.port, 1, 65535));
     return line;
   }
@@ -118,12 +103,7 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
 constexpr double least_bandwidth_Hz = 5.0;
 
 double bandwidth_or(const YamlNode& node, std::string_view key, double otherwise, double max_Hz) {
-  const double bandwidth_Hz = node.number_or(key, otherwise, 0.0, max_Hz);
-  if (bandwidth_Hz > 0.0 && bandwidth_Hz < least_bandwidth_Hz) {
-    throw node.error_at(key,
-                        "0 (no filter), or " + number_text(least_bandwidth_Hz) + " to " + number_text(max_Hz) + " Hz");
-  }
-  return bandwidth_Hz;
+  return number_or_zero(node, key, otherwise, between(least_bandwidth_Hz, max_Hz));
 }
 
 SimulatedDrive read_simulation(const YamlNode& node) {
@@ -148,12 +128,15 @@ SimulatedDrive read_simulation(const YamlNode& node) {
 
 // Where the encoder is incremental, and only there.
 std::optional<HomingDescription> read_homing(const YamlNode& node, const DriveDescription& drive) {
-  const bool incremental = node.choice_or("encoder", "absolute", {"absolute", "incremental"}) == "incremental";
+  // Drives on Modbus can't be homed from here.
+  const bool incremental = (drive.on_can() ? node.choice_or("encoder", "absolute", {"absolute", "incremental"})
+                                           : node.choice_or("encoder", "absolute", {"absolute"})) == "incremental";
+  if (!incremental) {
+    refuse_key(node, "homing", "no `homing` without encoder: incremental");
+    return std::nullopt;
+  }
+  require_key(node, "homing", "a map: an incremental encoder has no zero until it is homed");
   const auto map = node.find_map("homing");
-  if (incremental && !map) throw node.error_at("homing", "a map: an incremental encoder has no zero until it is homed");
-  if (!incremental && map) throw node.error_at("encoder", "incremental, where there is `homing`");
-  if (!map) return std::nullopt;
-  if (!drive.on_can()) throw node.error_at("encoder", "absolute: drives on Modbus can't be homed from here");
   HomingDescription homing;
   homing.method = static_cast<int>(map->integer("method", -128, 127));
   homing.speed_rad_per_s = map->number("speed_rad_per_s", above(0.0, drive.max_speed_rad_per_s));
@@ -180,15 +163,12 @@ void check_counts(const YamlNode& node, const DriveDescription& drive) {
 
 // "0x60C1:02", or with sub-index 0 "0x607A".
 std::uint32_t read_object(const YamlNode& node, const std::string& key) {
-  const std::string text = node.string(key);
-  const std::size_t colon = text.find(':');
-  const auto index = strict_integer(text.substr(0, colon));
-  const auto sub =
-      colon == std::string::npos ? std::optional<std::int64_t>(0) : strict_integer("0x" + text.substr(colon + 1));
-  if (!index || !sub || *index < 0x1000 || *index > 0xFFFF || *sub < 0 || *sub > 0xFF) {
-    throw node.error_at(key, "an object, index and sub-index in hexadecimal: \"0x607A\" or \"0x60C1:02\"");
-  }
-  return static_cast<std::uint32_t>(*index << 8 | *sub);
+  const std::string text = text_like(node, key,
+                                     {"0x[1-9A-Fa-f][0-9A-Fa-f]{3}(:[0-9A-Fa-f]{1,2})?",
+                                      "an object, index and sub-index in hexadecimal: \"0x607A\" or \"0x60C1:02\""});
+  const std::int64_t index = *strict_integer(text.substr(0, 6));
+  const std::int64_t sub = text.size() > 7 ? *strict_integer("0x" + text.substr(7)) : 0;
+  return static_cast<std::uint32_t>(index << 8 | sub);
 }
 
 DriveObjects read_objects(const YamlNode& node) {
@@ -215,10 +195,8 @@ std::vector<DriveFeedback> read_feedback(const YamlNode& node, const DriveDescri
   int bytes = drive.mode == "cst" ? 8 : 6;
   const int most = drive.fd ? 64 : 8;
   for (const YamlNode& each : node.list("feedback", 1, 64)) {
-    feedback.push_back({read_object(each, "object"), static_cast<std::uint8_t>(each.integer("bits", 8, 32))});
-    const int bits = feedback.back().bits;
-    if (bits % 8 != 0 || bits == 24) throw each.error_at("bits", "8, 16 or 32");
-    bytes += bits / 8;
+    feedback.push_back({read_object(each, "object"), static_cast<std::uint8_t>(integer_of(each, "bits", {8, 16, 32}))});
+    bytes += feedback.back().bits / 8;
   }
   if (bytes > most) {
     throw node.error_at("feedback",
@@ -236,9 +214,10 @@ DriveDescription read_drive(const YamlNode& node) {
   d.profile = node.choice_or("profile", d.profile, {"cia402", "modbus"});
   d.node = static_cast<std::uint8_t>(node.integer("node", 1, d.on_can() ? 127 : 247));
   if (!d.on_can()) d.description = node.existing_file("description").string();
-  d.mode = node.choice_or("mode", d.mode, {"csp", "ip", "cst"});
+  // A drive on Modbus takes positions.
+  d.mode =
+      d.on_can() ? node.choice_or("mode", d.mode, {"csp", "ip", "cst"}) : node.choice_or("mode", d.mode, {"csp", "ip"});
   if (d.mode == "cst") {
-    if (!d.on_can()) throw node.error_at("mode", "csp: a drive on Modbus takes positions");
     d.rated_torque_Nm = node.number("rated_torque_Nm", above(0.0, 1e5));
     d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 10.0 * d.rated_torque_Nm));
   } else if (node.has("max_torque_Nm")) {
@@ -256,8 +235,7 @@ DriveDescription read_drive(const YamlNode& node) {
   d.counts_per_motor_revolution =
       node.number_or("counts_per_motor_revolution", d.counts_per_motor_revolution, 1.0, 4294967296.0);
   d.gear_ratio = node.number_or("gear_ratio", d.gear_ratio, above(0.0, 1e5));
-  d.direction = static_cast<int>(node.integer_or("direction", d.direction, -1, 1));
-  if (d.direction == 0) throw node.error_at("direction", "1 or -1");
+  d.direction = static_cast<int>(integer_of_or(node, "direction", d.direction, {1, -1}));
   d.offset_counts = static_cast<std::int32_t>(node.integer_or(
       "offset_counts", 0, std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()));
   const auto range = node.numbers("range_rad", 2, 2, between(-1000.0, 1000.0));

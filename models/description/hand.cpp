@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -34,7 +35,7 @@ void begin_at_zero(std::vector<TimedVector>& trajectory) {
 
 void read_hand_data(const YamlNode& root, HandDescription& hand) {
   if (root.has("trajectory")) {
-    if (root.has("waypoints")) throw root.error_at("trajectory", "either waypoints or a trajectory", "both");
+    refuse_key(root, "waypoints", "either waypoints or a trajectory", "both");
     hand.trajectory = read_data(root, "trajectory", {"time_s", "x_m", "y_m", "z_m"}, place_range, hand);
     begin_at_zero(hand.trajectory);
   }
@@ -75,7 +76,7 @@ HandDescription read_hand(const YamlNode& root) {
   hand.file = std::filesystem::absolute(file).lexically_normal();
   hand.name = root.string_or("name", file.stem().string());
   hand.mass_kg = root.number_or("mass_kg", hand.mass_kg, 0.0, 100.0);
-  const bool follows = root.has("waypoints") || root.has("trajectory") || root.has("multisine");
+  const bool follows = root.has("trajectory") || root.has("waypoints") || root.has("multisine");
   if (root.has("force") && !follows) hand.stiffness_N_per_m = hand.damping_Ns_per_m = 0.0;
   hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, stiffness_range);
   hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, damping_range);

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -16,11 +17,12 @@ std::uint16_t read_register(const YamlNode& node, std::string_view key) {
   return static_cast<std::uint16_t>(node.integer(key, 0, highest_register));
 }
 
-int read_width(const YamlNode& node) { return static_cast<int>(node.integer_or("registers", 2, 1, 2)); }
+int read_width(const YamlNode& node) { return static_cast<int>(integer_of_or(node, "registers", 2, {1, 2})); }
 
 // The range of values that fit one or two registers, signed or unsigned.
-std::int64_t read_value(const YamlNode& node, std::string_view key, std::int64_t otherwise, int registers) {
-  const std::int64_t low = registers == 1 ? -0x8000 : std::numeric_limits<std::int32_t>::min();
+std::int64_t read_value(const YamlNode& node, std::string_view key, std::int64_t otherwise, int registers,
+                        bool is_signed = true) {
+  const std::int64_t low = !is_signed ? 0 : registers == 1 ? -0x8000 : std::numeric_limits<std::int32_t>::min();
   const std::int64_t high = registers == 1 ? 0xFFFF : 0xFFFFFFFF;
   return node.integer_or(key, otherwise, low, high);
 }
@@ -34,14 +36,13 @@ ModbusValue read_command_value(const YamlNode& node) {
              : signal == "speed"   ? Signal::speed
              : signal == "control" ? Signal::control
                                    : Signal::constant;
-  if (v.signal == Signal::constant && !node.has("value")) throw node.error_at("value", "a number, or a signal");
+  if (v.signal == Signal::constant) require_key(node, "value", "a number, or a signal");
   const bool has_value = v.signal == Signal::constant || v.signal == Signal::speed;
-  if (node.has("value") && !has_value) throw node.error_at("value", "no value for signal: " + signal);
-  if (node.has("scale") && v.signal != Signal::position && v.signal != Signal::speed) {
-    throw node.error_at("scale", "a scale for signal: position or speed only");
+  if (!has_value) refuse_key(node, "value", "no value for signal: " + signal);
+  if (v.signal != Signal::position && v.signal != Signal::speed) {
+    refuse_key(node, "scale", "a scale for signal: position or speed only");
   }
-  v.value = read_value(node, "value", 0, v.registers);
-  if (v.signal == Signal::speed && v.value < 0) throw node.error_at("value", "a lowest speed from 0 up");
+  v.value = read_value(node, "value", 0, v.registers, v.signal != Signal::speed);  // the lowest speed is from 0 up
   v.scale = node.number_or("scale", 1.0, above(0.0, 1e9));
   return v;
 }

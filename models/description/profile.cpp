@@ -5,6 +5,7 @@
 #include "models/base/text.hpp"
 #include "models/description/cell.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -12,12 +13,11 @@ namespace {
 constexpr const char* asked = " (profile: hand_guiding)";
 
 void require_at_most(const YamlNode& limits, const char* key, double value, double most, const char* unit) {
-  if (value <= most) return;
-  throw limits.error_at(key, "at most " + number_text(most) + " " + unit + asked, number_text(value));
+  description::require_at_most(limits, key, value, most, "at most " + number_text(most) + " " + unit + asked);
 }
 
 void require_there(const YamlNode& node, const char* key, const char* what) {
-  if (!node.has(key)) throw node.error_at(key, std::string(what) + asked, "nothing");
+  require_key(node, key, std::string(what) + asked);
 }
 
 void require_limits(const YamlNode& limits, const CellLimits& given) {

@@ -6,6 +6,7 @@
 
 #include "models/description/sensor_sources.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -72,13 +73,11 @@ SensorSimulation read_simulation(const YamlNode& node) {
 }  // namespace
 
 SensorSources read_sensor_sources(const YamlNode& root) {
-  constexpr std::size_t longest = 400;
   SensorSources sources;
   if (root.has("sources")) {
     for (const YamlNode& source : root.list("sources", 1, 16)) sources.sources.push_back(source.as_string());
   }
-  sources.one_source_only = root.string_or("one_source_only", "");
-  if (sources.one_source_only.size() > longest) throw root.error_at("one_source_only", "at most 400 characters");
+  sources.one_source_only = text_up_to(root, "one_source_only", "", 400);
   return sources;
 }
 

@@ -8,6 +8,7 @@
 
 #include "models/description/dbc_file.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 namespace {
@@ -32,7 +33,9 @@ struct Reader {
   void read_settings() {
     if (const auto node = root.find_map("settings")) {
       protocol.has_settings = true;
-      for (const std::string& name : node->keys()) settings.emplace(name, read_setting(node->map(name), name));
+      const Pattern pattern{"[A-Za-z].*", "a setting whose name begins with a letter"};
+      for (const std::string& name : names_like(*node, pattern))
+        settings.emplace(name, read_setting(node->map(name), name));
     }
     for (const SensorSettingChoice& choice : choices.settings) {
       if (settings.contains(choice.name)) continue;
@@ -49,9 +52,6 @@ struct Reader {
   }
 
   [[nodiscard]] Setting read_setting(const YamlNode& node, const std::string& name) const {
-    if (std::isalpha(static_cast<unsigned char>(name.front())) == 0) {
-      throw node.error("a setting whose name begins with a letter");
-    }
     constexpr std::int64_t most = 0xFFFFFFFF;
     const std::int64_t min = node.integer("min", 0, most), max = node.integer("max", min, most);
     Setting setting{node.integer("default", min, max)};
@@ -212,13 +212,13 @@ struct Reader {
       frame.id = read_id(node);
     }
     const auto capacity = static_cast<std::int64_t>(protocol.frame_capacity());
-    const auto bytes = named ? std::int64_t{frame.bytes} : node.integer("bytes", 1, capacity);
-    if (named && (bytes < 1 || bytes > capacity)) {
-      throw node.error_at("message", "one of 1 to " + std::to_string(capacity) + " bytes");
+    const std::vector<std::int64_t> lengths{1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};  // CAN FD's
+    const auto bytes = named ? std::int64_t{frame.bytes} : integer_of(node, "bytes", lengths);
+    if (bytes < 1 || bytes > capacity) {
+      throw node.error_at(named ? "message" : "bytes", "one of 1 to " + std::to_string(capacity) + " bytes");
     }
-    constexpr std::array<std::int64_t, 7> fd_lengths{12, 16, 20, 24, 32, 48, 64};
-    if (bytes > 8 && std::find(fd_lengths.begin(), fd_lengths.end(), bytes) == fd_lengths.end()) {
-      throw node.error_at(named ? "message" : "bytes", "a length of CAN FD: up to 8, 12, 16, 20, 24, 32, 48 or 64");
+    if (std::find(lengths.begin(), lengths.end(), bytes) == lengths.end()) {
+      throw node.error_at("message", "a length of CAN FD: up to 8, 12, 16, 20, 24, 32, 48 or 64");
     }
     frame.bytes = static_cast<std::uint8_t>(bytes);
     if (node.has("starts_with")) frame.starts_with = read_bytes(node, "starts_with", frame.bytes);
@@ -240,7 +240,7 @@ struct Reader {
       }
     }
     if (node.has("divisor")) {
-      if (node.has("scale")) throw node.error_at("divisor", "either `divisor` or `scale`");
+      refuse_key(node, "scale", "either `divisor` or `scale`");
       scale = 1.0 / static_cast<double>(number_of(node.at("divisor"), 1, 1'000'000'000));
     }
     signal.scale = node.number_or("scale", scale, -1e9, 1e9);
@@ -309,10 +309,7 @@ struct Reader {
     status.error_mask = static_cast<std::uint32_t>(node->integer_or("error_mask", 0xFFFFFFFF, 0, 0xFFFFFFFF));
     status.overload_mask = static_cast<std::uint32_t>(node->integer_or("overload_mask", 0, 0, 0xFFFFFFFF));
     if (const auto names = node->find_map("bits_named")) {
-      for (const std::string& key : names->keys()) {
-        if (key.size() > 2 || key.find_first_not_of("0123456789") != std::string::npos || std::stoi(key) > 31) {
-          throw names->error_at(key, "the number of a bit, 0 to 31, as the key", in_quotes(key));
-        }
+      for (const std::string& key : names_like(*names, {"[0-2]?[0-9]|3[01]", "the number of a bit, 0 to 31,"})) {
         status.bits_named.emplace_back(std::stoi(key), names->string(key));
       }
     }
@@ -356,8 +353,9 @@ struct Reader {
     command.id = read_id(*node);
     command.data = read_bytes(*node, "data", 64);
     command.sum16 = node->boolean_or("sum16", false);
-    if (const auto value = node->find_map("value")) {
-      if (key != "rate") throw value->error("no value but in the command `rate`");
+    if (key != "rate") {
+      refuse_key(*node, "value", "no value but in the command `rate`");
+    } else if (const auto value = node->find_map("value")) {
       if (command.data.empty()) throw node->error_at("data", "bytes that hold the value");
       command.value = read_number(*value, command.data.size());
       command.divides_Hz = node->number("divides_Hz", above(0.0, 1e9));

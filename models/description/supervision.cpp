@@ -2,6 +2,7 @@
 
 #include "models/base/text.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 
 namespace proxarm::description {
 
@@ -40,12 +41,11 @@ SupervisionDescription read_supervision(const YamlNode& node) {
   s.ramp_in_s = node.number_or("ramp_in_s", s.ramp_in_s, 0.0, 10.0);
   s.slow_speed_m_per_s = node.number_or("slow_speed_m_per_s", s.slow_speed_m_per_s, 0.01, 1.0);
   s.release_speed_m_per_s = node.number_or("release_speed_m_per_s", s.release_speed_m_per_s, 0.005, 0.25);
-  const std::string let_go = node.has("let_go") ? node.choice("let_go", {"rest", "coast", "hold"}) : "rest";
+  const std::string let_go = node.choice_or("let_go", "rest", {"rest", "coast", "hold"});
   s.let_go = let_go == "coast" ? LetGo::coast : let_go == "hold" ? LetGo::hold : LetGo::rest;
   s.empty_handle_N = node.number_or("empty_handle_N", s.empty_handle_N, 0.001, 10.0);
   s.max_bias_drift_N = node.number_or("max_bias_drift_N", s.max_bias_drift_N, 0.01, 100.0);
-  s.brake_release = node.string_or("brake_release", "");
-  if (s.brake_release.size() > 120) throw node.error_at("brake_release", "at most 120 characters");
+  s.brake_release = text_up_to(node, "brake_release", "", 120);
   s.monitored_standstill = node.boolean_or("monitored_standstill", s.monitored_standstill);
   s.bus_loss_stop_s = node.number_or("bus_loss_stop_s", s.bus_loss_stop_s, 0.006, 1.0);
   const auto reactions = node.find_map("reactions");
@@ -78,20 +78,19 @@ void read_three_position(const YamlNode& node, EnablingInputDescription& input) 
 
 EnablingInputDescription read_enabling_input(const YamlNode& node) {
   EnablingInputDescription input;
-  if (node.has("drive") == node.has("identifier")) {
-    throw node.error("either drive (and bit, of its object 60FDh) or bus, identifier, byte and bit of a CAN message");
-  }
+  const std::string where =
+      exactly_one(node, {"drive", "identifier"},
+                  "either drive (and bit, of its object 60FDh) or bus, identifier, byte and bit of a CAN message");
   input.pressed_is = node.integer_or("pressed_is", 1, 0, 1) == 1;
   input.timeout_s = node.number_or("timeout_s", input.timeout_s, 0.002, 1.0);
-  if (node.has("drive")) {
+  if (where == "drive") {
     input.drive = node.string("drive");
     input.bit = static_cast<int>(node.integer("bit", 0, 31));
     if (node.has("object")) {
-      const auto index = strict_integer(node.string("object"));
-      if (!index || *index < 0x1000 || *index > 0xFFFF) {
-        throw node.error_at("object", "an object of 32 bits, its index in hexadecimal: \"0x60FD\"");
-      }
-      input.object = static_cast<std::uint32_t>(*index << 8);
+      const std::string object =
+          text_like(node, "object",
+                    {"0x[1-9A-Fa-f][0-9A-Fa-f]{3}", "an object of 32 bits, its index in hexadecimal: \"0x60FD\""});
+      input.object = static_cast<std::uint32_t>(*strict_integer(object) << 8);
     }
     read_three_position(node, input);
     return input;

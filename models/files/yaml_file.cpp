@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "models/base/text.hpp"
+#include "models/files/yaml_journal.hpp"
 #include "models/files/yaml_tree.hpp"
 
 namespace proxarm::description {
@@ -89,6 +90,15 @@ std::string size_text(std::size_t min, std::size_t max, std::string_view noun) {
 
 std::vector<std::string> to_vector(std::initializer_list<std::string> words) { return words; }
 
+using Note = YamlFact::Kind;  // what listeners are told
+
+Range whole(std::int64_t min, std::int64_t max) { return between(static_cast<double>(min), static_cast<double>(max)); }
+
+void note_default(const YamlNode& node, std::string_view key, const YamlFact& fact, const Json& otherwise) {
+  note(node, key, {.kind = Note::otherwise, .otherwise = otherwise});
+  note(node, key, fact);
+}
+
 }  // namespace
 
 std::string unit_of_key(std::string_view key) {
@@ -97,6 +107,11 @@ std::string unit_of_key(std::string_view key) {
     if (key.ends_with(unit.suffix)) return std::string(unit.unit);
   }
   return {};
+}
+
+// To who listens: what this value is.
+void YamlNode::Item::heard(const std::shared_ptr<const Document>& document, const YamlFact& fact) const {
+  if (parent != nullptr) note(YamlNode(document, *parent), key, fact);
 }
 
 // ---- where ----------------------------------------------------------------------------------------------------------
@@ -172,6 +187,7 @@ const YamlNode::Item* YamlNode::child(std::string_view key) const {
   if (!is_map()) return nullptr;
   std::vector<std::string>& asked = item_->asked;
   if (std::find(asked.begin(), asked.end(), key) == asked.end()) asked.emplace_back(key);
+  if (is_heard()) note(*this, key, {.kind = Note::asked});
   for (const Item* item : item_->children) {
     if (item->key == key) return item;
   }
@@ -192,6 +208,7 @@ SetupError YamlNode::missing(std::string_view key, std::string expected) const {
 
 YamlNode YamlNode::required(std::string_view key, const std::string& expected) const {
   require_map();
+  if (is_heard()) note(*this, key, {.kind = Note::required});
   const Item* item = child(key);
   if (item == nullptr) throw missing(key, expected);
   YamlNode node(document_, *item);
@@ -212,12 +229,14 @@ std::optional<YamlNode> YamlNode::find(std::string_view key) const {
 }
 
 YamlNode YamlNode::map(std::string_view key) const {
+  if (is_heard()) note(*this, key, {.kind = Note::map});
   const YamlNode node = required(key, "a map (key: value)");
   node.require_map();
   return node;
 }
 
 std::optional<YamlNode> YamlNode::find_map(std::string_view key) const {
+  if (is_heard()) note(*this, key, {.kind = Note::map});
   if (!has(key)) return std::nullopt;
   return map(key);
 }
@@ -231,6 +250,7 @@ std::vector<std::string> YamlNode::keys() const {
   std::vector<std::string> names;
   for (const Item* item : item_->children) names.push_back(item->key);
   for (const std::string& name : names) static_cast<void>(child(name));
+  if (is_heard()) note(*this, {}, {.kind = Note::names});
   return names;
 }
 
@@ -241,6 +261,7 @@ double YamlNode::number(std::string_view key, Range range) const {
 }
 double YamlNode::number(std::string_view key, double min, double max) const { return number(key, between(min, max)); }
 double YamlNode::number_or(std::string_view key, double otherwise, Range range) const {
+  if (is_heard()) note_default(*this, key, {.kind = Note::number, .range = range}, otherwise);
   return has(key) ? number(key, range) : otherwise;
 }
 double YamlNode::number_or(std::string_view key, double otherwise, double min, double max) const {
@@ -252,14 +273,19 @@ std::int64_t YamlNode::integer(std::string_view key, std::int64_t min, std::int6
 }
 std::int64_t YamlNode::integer_or(std::string_view key, std::int64_t otherwise, std::int64_t min,
                                   std::int64_t max) const {
+  if (is_heard()) note_default(*this, key, {.kind = Note::integer, .range = whole(min, max)}, otherwise);
   return has(key) ? integer(key, min, max) : otherwise;
 }
 
 bool YamlNode::boolean(std::string_view key) const { return required(key, "true or false").as_boolean(); }
-bool YamlNode::boolean_or(std::string_view key, bool otherwise) const { return has(key) ? boolean(key) : otherwise; }
+bool YamlNode::boolean_or(std::string_view key, bool otherwise) const {
+  if (is_heard()) note_default(*this, key, {.kind = Note::boolean}, otherwise);
+  return has(key) ? boolean(key) : otherwise;
+}
 
 std::string YamlNode::string(std::string_view key) const { return required(key, "a text").as_string(); }
 std::string YamlNode::string_or(std::string_view key, std::string_view otherwise) const {
+  if (is_heard()) note_default(*this, key, {.kind = Note::text}, otherwise);
   return has(key) ? string(key) : std::string(otherwise);
 }
 
@@ -271,6 +297,7 @@ std::string YamlNode::choice(std::string_view key, std::initializer_list<std::st
 }
 std::string YamlNode::choice_or(std::string_view key, std::string_view otherwise,
                                 std::initializer_list<std::string> allowed) const {
+  if (is_heard()) note_default(*this, key, {.kind = Note::choice, .choices = allowed}, otherwise);
   return has(key) ? choice(key, allowed) : std::string(otherwise);
 }
 
@@ -279,6 +306,10 @@ std::array<double, 3> YamlNode::vec3(std::string_view key, Range range) const {
 }
 std::array<double, 3> YamlNode::vec3_or(std::string_view key, const std::array<double, 3>& otherwise,
                                         Range range) const {
+  if (is_heard()) {
+    note_default(*this, key, {.kind = Note::numbers, .range = range, .min_size = 3, .max_size = 3},
+                 std::vector<double>(otherwise.begin(), otherwise.end()));
+  }
   return has(key) ? vec3(key, range) : otherwise;
 }
 std::vector<double> YamlNode::numbers(std::string_view key, std::size_t min_size, std::size_t max_size,
@@ -288,7 +319,9 @@ std::vector<double> YamlNode::numbers(std::string_view key, std::size_t min_size
 }
 
 std::filesystem::path YamlNode::path_of(std::string_view key) const {
-  const std::string text = required(key, "a file's path").as_string();
+  const YamlNode node = required(key, "a file's path");
+  if (is_heard()) node.item_->heard(document_, {.kind = Note::path});
+  const std::string text = node.as_string();
   const std::filesystem::path given(text);
   return (given.is_absolute() ? given : document_->folder / given).lexically_normal();
 }
@@ -311,6 +344,7 @@ std::filesystem::path YamlNode::existing_file(std::string_view key) const {
 // ---- this node ------------------------------------------------------------------------------------------------------
 
 double YamlNode::as_number(Range range) const {
+  if (is_heard()) item_->heard(document_, {.kind = Note::number, .range = range});
   const std::string expected = range_text(range, item_->named(), "a number");
   if (!is_scalar()) throw error(expected);
   if (item_->is_quoted) throw error(expected, "the text " + in_quotes(item_->text), "numbers stand without quotes");
@@ -321,6 +355,7 @@ double YamlNode::as_number(Range range) const {
 }
 
 std::int64_t YamlNode::as_integer(std::int64_t min, std::int64_t max) const {
+  if (is_heard()) item_->heard(document_, {.kind = Note::integer, .range = whole(min, max)});
   const std::string expected = integer_text(min, max, item_->named());
   if (!is_scalar()) throw error(expected);
   if (item_->is_quoted) throw error(expected, "the text " + in_quotes(item_->text), "numbers stand without quotes");
@@ -331,6 +366,7 @@ std::int64_t YamlNode::as_integer(std::int64_t min, std::int64_t max) const {
 }
 
 bool YamlNode::as_boolean() const {
+  if (is_heard()) item_->heard(document_, {.kind = Note::boolean});
   if (is_scalar() && !item_->is_quoted) {
     if (item_->text == "true") return true;
     if (item_->text == "false") return false;
@@ -339,12 +375,14 @@ bool YamlNode::as_boolean() const {
 }
 
 std::string YamlNode::as_string() const {
+  if (is_heard()) item_->heard(document_, {.kind = Note::text});
   if (!is_scalar() || item_->text.empty()) throw error("a text");
   if (item_->text.size() > 4096) throw error("a text of at most 4096 bytes");
   return item_->text;
 }
 
 std::string YamlNode::as_choice(std::span<const std::string> allowed) const {
+  if (is_heard()) item_->heard(document_, {.kind = Note::choice, .choices = {allowed.begin(), allowed.end()}});
   if (!is_scalar()) throw error(one_of(allowed));
   if (std::find(allowed.begin(), allowed.end(), item_->text) != allowed.end()) return item_->text;
   const std::string meant = nearest(item_->text, allowed);
@@ -352,6 +390,7 @@ std::string YamlNode::as_choice(std::span<const std::string> allowed) const {
 }
 
 std::vector<YamlNode> YamlNode::as_list(std::size_t min_size, std::size_t max_size) const {
+  if (is_heard()) item_->heard(document_, {.kind = Note::list, .min_size = min_size, .max_size = max_size});
   const std::size_t size = item_->children.size();
   if (!is_list() || size < min_size || size > max_size) throw error(size_text(min_size, max_size, "entries"));
   std::vector<YamlNode> nodes;
@@ -361,6 +400,9 @@ std::vector<YamlNode> YamlNode::as_list(std::size_t min_size, std::size_t max_si
 }
 
 std::vector<double> YamlNode::as_numbers(std::size_t min_size, std::size_t max_size, Range range) const {
+  if (is_heard()) {
+    item_->heard(document_, {.kind = Note::numbers, .range = range, .min_size = min_size, .max_size = max_size});
+  }
   const std::size_t size = item_->children.size();
   if (!is_list() || size < min_size || size > max_size) {
     throw error(size_text(min_size, max_size, range_text(range, item_->named(), "numbers")));

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <deque>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_journal.hpp"
 
 namespace proxarm::description {
 
@@ -28,6 +30,8 @@ struct YamlNode::Item {
     while (item->key.empty() && item->parent != nullptr) item = item->parent;
     return item->key;
   }
+
+  void heard(const std::shared_ptr<const Document>& document, const YamlFact& fact) const;
 };
 
 struct YamlNode::Document {

@@ -1,11 +1,15 @@
 #include "scenes/format/scene_file.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <utility>
 
+#include "models/base/text.hpp"
 #include "models/files/yaml_file.hpp"
+#include "models/files/yaml_rules.hpp"
 #include "scenes/mesh_files/mesh_file.hpp"
 
 namespace proxarm::scenes {
@@ -112,14 +116,18 @@ Shape read_shape(const std::string& kind, const YamlNode& node) {
   return read_plane(node);
 }
 
-// The one entry of `node` that names a shape.
+// The one entry of `node` whose key is among `kinds`.
+std::pair<std::string, YamlNode> entry_of(const YamlNode& node, const std::vector<std::string>& kinds,
+                                          const std::string& what, const std::string& example) {
+  if (!node.is_map()) throw node.error(what + ", such as `" + example + "`");
+  const bool known = std::any_of(kinds.begin(), kinds.end(), [&](const std::string& kind) { return node.has(kind); });
+  if (!known) node.finish();  // names an unknown kind, and the nearest known one
+  const std::string kind = exactly_one(node, kinds, what + ": " + description::one_of(kinds));
+  return {kind, node.map(kind)};
+}
+
 std::pair<std::string, YamlNode> shape_node(const YamlNode& node) {
-  if (!node.is_map()) throw node.error("an object, such as `plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}`");
-  for (const std::string& kind : kinds()) {
-    if (const auto found = node.find_map(kind)) return {kind, *found};
-  }
-  node.finish();  // names an unknown kind, and the nearest known one
-  throw node.error("an object: plane, box, sphere, capsule, cylinder or mesh", "an empty map");
+  return entry_of(node, kinds(), "an object", "plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}");
 }
 
 Motion read_motion(const YamlNode& node) {
@@ -141,8 +149,10 @@ Motion read_motion(const YamlNode& node) {
 
 // The shape of a region; a mesh can't be one.
 Shape read_region(const YamlNode& within) {
-  const auto [kind, shape] = shape_node(within);
-  if (kind == "mesh") throw within.error("a box, sphere, capsule, cylinder or plane as a region", "a mesh");
+  if (within.is_map()) refuse_key(within, "mesh", "a box, sphere, capsule, cylinder or plane as a region", "a mesh");
+  std::vector<std::string> solid = kinds();
+  std::erase(solid, "mesh");
+  const auto [kind, shape] = entry_of(within, solid, "a region", "sphere: {centre_m: [0.8, 0, 0.6], radius_m: 0.1}");
   return read_shape(kind, shape);
 }
 
@@ -160,6 +170,7 @@ Object read_object(const YamlNode& entry) {
                                          .line = region.line()});
     }
   }
+  if (kind == "mesh") refuse_key(node, "layer", "a layer on an object that is no mesh", "a layer on a mesh");
   if (const auto layer = node.find_map("layer")) {
     object.layer = ElasticLayer{.thickness_m = layer->number("thickness_m", length_range),
                                 .stiffness_N_per_m = layer->number("stiffness_N_per_m", above(0.0, 1e12))};
@@ -170,14 +181,12 @@ Object read_object(const YamlNode& entry) {
 
 Space read_space(const YamlNode& root) {
   Space space;
-  space.dimensions = static_cast<int>(root.integer_or("dimensions", 3, 1, 3));
-  const auto node = root.find_map("space");
-  if (!node) {
-    if (space.dimensions < 3) {
-      throw root.error_at("space", "origin_m and axes of the line or plane that the proxy lives on", "nothing");
-    }
-    return space;
+  space.dimensions = static_cast<int>(integer_of_or(root, "dimensions", 3, {1, 2, 3}));
+  if (space.dimensions < 3) {
+    require_key(root, "space", "origin_m and axes of the line or plane that the proxy lives on");
   }
+  const auto node = root.find_map("space");
+  if (!node) return space;
   space.origin_m = vector_of(node->vec3_or("origin_m", {0, 0, 0}, coordinate_range));
   const auto axes =
       node->list("axes", static_cast<std::size_t>(space.dimensions), static_cast<std::size_t>(space.dimensions));
@@ -206,51 +215,45 @@ Space read_space(const YamlNode& root) {
 }
 
 MediumDescription read_medium(const YamlNode& entry) {
-  if (!entry.is_map()) throw entry.error("a medium, such as `viscous: {damping_Ns_per_m: 20}`");
+  const auto [kind, node] = entry_of(entry, {"viscous", "coulomb"}, "a medium", "viscous: {damping_Ns_per_m: 20}");
   MediumDescription medium;
-  auto node = entry.find_map("viscous");
-  if (node) {
-    medium.damping_Ns_per_m = node->number("damping_Ns_per_m", above(0.0, 1e6));
-  } else if ((node = entry.find_map("coulomb"))) {
-    medium.force_N = node->number("force_N", above(0.0, 1e6));
+  if (kind == "viscous") {
+    medium.damping_Ns_per_m = node.number("damping_Ns_per_m", above(0.0, 1e6));
   } else {
-    entry.finish();
-    throw entry.error("a medium: viscous or coulomb", "an empty map");
+    medium.force_N = node.number("force_N", above(0.0, 1e6));
   }
-  medium.line = node->line();
-  if (const auto within = node->find_map("within")) medium.within = read_region(*within);
+  medium.line = node.line();
+  if (const auto within = node.find_map("within")) medium.within = read_region(*within);
   return medium;
 }
 
 GuideDescription read_guide(const YamlNode& guide_node) {
+  const auto [kind, node] = entry_of(guide_node, {"line", "plane", "polyline"}, "a guide",
+                                     "line: {point_m: [0, 0, 0], direction: [1, 0, 0]}");
   GuideDescription guide;
-  auto node = guide_node.find_map("line");
-  if (node) {
-    guide.points_m = {point_of(*node, "point_m")};
-    guide.direction = direction_of(*node, "direction");
-  } else if ((node = guide_node.find_map("plane"))) {
+  if (kind == "line") {
+    guide.points_m = {point_of(node, "point_m")};
+    guide.direction = direction_of(node, "direction");
+  } else if (kind == "plane") {
     guide.kind = GuideDescription::Kind::plane;
-    guide.points_m = {point_of(*node, "point_m")};
-    guide.direction = direction_of(*node, "normal");
-  } else if ((node = guide_node.find_map("polyline"))) {
+    guide.points_m = {point_of(node, "point_m")};
+    guide.direction = direction_of(node, "normal");
+  } else {
     guide.kind = GuideDescription::Kind::polyline;
-    for (const YamlNode& point : node->list("points_m", 2, 100'000)) {
+    for (const YamlNode& point : node.list("points_m", 2, 100'000)) {
       guide.points_m.push_back(vector_of(point.as_vec3(coordinate_range)));
       const std::size_t n = guide.points_m.size();
       if (n > 1 && guide.points_m[n - 1] == guide.points_m[n - 2]) {
         throw point.error("another point than the one before");
       }
     }
-    guide.closed = node->boolean_or("closed", false);
+    guide.closed = node.boolean_or("closed", false);
     if (guide.closed && guide.points_m.front() == guide.points_m.back()) {
-      throw node->error_at("points_m", "a last point that isn't the first again; `closed` leads back to it");
+      throw node.error_at("points_m", "a last point that isn't the first again; `closed` leads back to it");
     }
-  } else {
-    guide_node.finish();
-    throw guide_node.error("a guide: line, plane or polyline", "an empty map");
   }
-  guide.friction = node->number_or("friction", 0.0, friction_range);
-  guide.line_number = node->line();
+  guide.friction = node.number_or("friction", 0.0, friction_range);
+  guide.line_number = node.line();
   return guide;
 }
 

@@ -96,8 +96,8 @@ class Docs(ProgramTest):
             self.assertTrue(any(re.fullmatch(pattern, column) for pattern in patterns), column)
 
     def test_every_key_of_a_cell_that_is_read_stands_in_its_reference(self):
-        text = (SOURCE / "docs/files.md").read_text()
-        text = text[text.index("### Every key"):text.index("## Hand files")]
+        text = (SOURCE / "docs/keys.md").read_text()
+        text = text[text.index("## Keys of a cell"):text.index("## Keys of a hand")]
         named = set(re.findall(r"`([a-z_A-Z0-9]+)`", text))
         getters = ("number|number_or|integer|integer_or|boolean_or|string|string_or|choice|choice_or|vec3|vec3_or|numbers|map|find_map|"
                    "list|has|existing_file|at")
@@ -105,7 +105,8 @@ class Docs(ProgramTest):
         for source in ("cell.cpp", "supervision.cpp"):
             code = (SOURCE / "models/description" / source).read_text()
             read |= set(re.findall(rf"(?:->|\.)(?:{getters})\(\s*\"(\w+)\"", code))
-            read |= set(re.findall(r"(?:read_name|pose_or_identity|bandwidth_or|read_object|absolute_path_or_empty)\(\w+, \"(\w+)\"", code))
+            read |= set(re.findall(r"(?:read_name|pose_or_identity|bandwidth_or|read_object|absolute_path_or_empty|integer_of|integer_of_or|text_like|"
+                                   r"text_up_to|require_key|refuse_key)\(\s*\w+, \"(\w+)\"", code))
         read -= {"min", "max"}
         self.assertGreater(len(read), 90)
         self.assertEqual(read - named, set(), "read, but not described")

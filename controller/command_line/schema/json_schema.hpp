@@ -1,0 +1,18 @@
+// A model of a kind of file as JSON Schema, draft 2020-12, by which editors complete and check YAML.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "controller/command_line/schema/file_model.hpp"
+#include "models/files/json.hpp"
+
+namespace proxarm::command_line {
+
+description::Json schema_of(const std::vector<Alternative>& value);
+description::Json schema_of(const MapModel& map);
+
+// The whole, with its title.
+description::Json schema_of_file(const MapModel& root, const std::string& kind);
+
+}  // namespace proxarm::command_line

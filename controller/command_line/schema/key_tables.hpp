@@ -1,0 +1,12 @@
+// A model of a kind of file as tables in Markdown: each key with unit, default, range and meaning.
+#pragma once
+
+#include <string>
+
+#include "controller/command_line/schema/file_model.hpp"
+
+namespace proxarm::command_line {
+
+std::string key_tables(const MapModel& root, const std::string& kind);
+
+}  // namespace proxarm::command_line
