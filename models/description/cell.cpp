@@ -103,7 +103,7 @@ ModbusLineDescription read_modbus_line(const YamlNode& node) {
 constexpr double least_bandwidth_Hz = 5.0;
 
 double bandwidth_or(const YamlNode& node, std::string_view key, double otherwise, double max_Hz) {
-  return number_or_zero(node, key, otherwise, between(least_bandwidth_Hz, max_Hz));
+  return number_or_zero(node, key, otherwise, between(least_bandwidth_Hz, max_Hz), "no filter");
 }
 
 SimulatedDrive read_simulation(const YamlNode& node) {

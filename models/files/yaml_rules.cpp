@@ -70,12 +70,13 @@ std::int64_t integer_of_or(const YamlNode& node, std::string_view key, std::int6
   return node.has(key) ? integer_of(node, key, values) : otherwise;
 }
 
-double number_or_zero(const YamlNode& node, std::string_view key, double otherwise, Range range) {
+double number_or_zero(const YamlNode& node, std::string_view key, double otherwise, Range range,
+                      const std::string& zero) {
   const double value = node.number_or(key, otherwise, 0.0, range.max);
   if (is_heard()) note(node, key, {.kind = YamlFact::Kind::zero, .range = range});
   if (value != 0.0 && !range.contains(value)) {
     const std::string unit = unit_of_key(key);
-    throw node.error_at(key, "0 (none), or " + number_text(range.min) + " to " + number_text(range.max) +
+    throw node.error_at(key, "0 (" + zero + "), or " + number_text(range.min) + " to " + number_text(range.max) +
                                  (unit.empty() ? "" : " " + unit));
   }
   return value;

@@ -30,8 +30,9 @@ std::int64_t integer_of(const YamlNode& node, std::string_view key, const std::v
 std::int64_t integer_of_or(const YamlNode& node, std::string_view key, std::int64_t otherwise,
                            const std::vector<std::int64_t>& values);
 
-// 0, or a number in the range.
-double number_or_zero(const YamlNode& node, std::string_view key, double otherwise, Range range);
+// 0, which means `zero`, or a number in the range.
+double number_or_zero(const YamlNode& node, std::string_view key, double otherwise, Range range,
+                      const std::string& zero);
 
 // `node` must have exactly one of these keys; returns which. `expected` says so in words.
 std::string exactly_one(const YamlNode& node, const std::vector<std::string>& keys, std::string_view expected);
