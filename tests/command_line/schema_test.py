@@ -33,7 +33,7 @@ UNKNOWABLE = {
         r"(settings\.\w+|base_id)\.(min|max|default)|frames\[\d+\]\.(bytes|starts_with)|control\.(on|off)): |"
         r"expected (0 \(a classic bus\), or|\[lowest|angles whose counts|an angle in the range|a time (after|at least)|at least two periods|a setting of|a rate )",
     "what doesn't go together":
-        r"expected (registers (of its own|among)|bits |identifiers that|no register above|another |a node that is free|the same as|a control word|"
+        r"expected (registers (of its own|among)|bits |the bits that say|identifiers that|no register above|another |a node that is free|the same as|a control word|"
         r"exactly one value|at most (one value|121|\d+ bytes)|fd: true|a classic bus|false: bus|a first frame|a sample that|a checksum|a counter|"
         r"bytes that hold|a poll of|no rate for|off: drives|stop_1 or stop_0|none: drives|the key `dbc`|one (of|that)|a last point|a drive on CAN|"
         r"32 for a float|a number that ends|up to 256 bytes)|unknown key|format:",

@@ -431,7 +431,7 @@ settings:
   EXPECT_THAT(told("on: 1", "on: 0"), HasSubstr("a control word other than `off`"));
   EXPECT_THAT(told("on: 1", "on: 70000"), HasSubstr("control.on: found 70000"));
   EXPECT_THAT(told("{signal: speed, value: 1}", "{signal: control}"), HasSubstr("at most one value with signal"));
-  EXPECT_THAT(told("{signal: speed, value: 1}", "{signal: speed, value: -1}"), HasSubstr("from 0 up"));
+  EXPECT_THAT(told("{signal: speed, value: 1}", "{signal: speed, value: -1}"), HasSubstr("from 0 to 4294967295"));
   EXPECT_THAT(told("{signal: position}", "{signal: position, value: 3}"), HasSubstr("no value for signal: position"));
   EXPECT_THAT(told("{signal: control, registers: 1}", "{value: 1, registers: 1}"), HasSubstr("the same as `off`"));
 }
