@@ -9,7 +9,7 @@
 
 using proxarm::Vec3;
 
-// All points within `tube_m` of a circle about the x axis through `centre`.
+// All points within `tube_m_` of a circle about the x axis through `centre_`.
 class Torus final : public proxarm::GeometricAlgorithm<3> {
  public:
   // 𝒢: the point outside of the torus that is nearest to p. It doesn't depend on K, so that Assumption 1 holds.
@@ -19,7 +19,7 @@ class Torus final : public proxarm::GeometricAlgorithm<3> {
     const Vec3 on_circle = nearest_on_circle(p), way = p - on_circle;
     const Vec3 out = way.norm() > 0.0 ? way : Vec3(q - on_circle);  // from the circle itself: to where it came from
     contact_[0].normal = out.normalized();
-    return on_circle + tube_m * contact_[0].normal;
+    return on_circle + tube_m_ * contact_[0].normal;
   }
   // What presses, for records and summary.
   [[nodiscard]] std::span<const proxarm::models::Contact<3>> contacts() const noexcept override {
@@ -27,16 +27,16 @@ class Torus final : public proxarm::GeometricAlgorithm<3> {
   }
   [[nodiscard]] bool wants_time() const noexcept override { return false; }
 
-  [[nodiscard]] double distance_m(const Vec3& p) const noexcept { return (p - nearest_on_circle(p)).norm() - tube_m; }
+  [[nodiscard]] double distance_m(const Vec3& p) const noexcept { return (p - nearest_on_circle(p)).norm() - tube_m_; }
 
  private:
   [[nodiscard]] Vec3 nearest_on_circle(const Vec3& p) const noexcept {
-    const Vec3 aside(0.0, p.y() - centre.y(), p.z() - centre.z());
-    return centre + circle_m * (aside.norm() > 0.0 ? Vec3(aside.normalized()) : Vec3::UnitZ());
+    const Vec3 aside(0.0, p.y() - centre_.y(), p.z() - centre_.z());
+    return centre_ + circle_m_ * (aside.norm() > 0.0 ? Vec3(aside.normalized()) : Vec3::UnitZ());
   }
 
-  const Vec3 centre{0.94, 0.0, 0.5};
-  const double circle_m = 0.1, tube_m = 0.04;
+  const Vec3 centre_{0.94, 0.0, 0.5};
+  const double circle_m_ = 0.1, tube_m_ = 0.04;
   std::array<proxarm::models::Contact<3>, 1> contact_;
   bool pressed_ = false;
 };
