@@ -15,7 +15,7 @@ import unittest
 from harness import SOURCE, ProgramTest, program
 
 PACKAGE = pathlib.Path(program()).parent / "python"
-if not (PACKAGE / "proxarm").is_dir():
+if not (PACKAGE / "proxarm/__init__.py").exists():
     print("no Python package in this build: pybind11-dev or python3-dev isn't installed, or sanitizers are on")
     sys.exit(77)
 sys.path.insert(0, str(PACKAGE))
