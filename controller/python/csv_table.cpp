@@ -13,6 +13,7 @@
 #include <exception>
 #include <limits>
 #include <thread>
+#include <utility>
 
 #include "models/base/setup_error.hpp"
 
@@ -23,12 +24,13 @@ using description::SetupError;
 
 constexpr std::size_t worth_a_thread = 1 << 20;  // bytes; less is read before a thread has begun
 
-// A part of the text, whole rows, and what was read of it.
+// A part of the text, whole rows. Its numbers go where they belong in the whole table; its words it numbers by itself.
 struct Part {
   const char* begin;
   const char* end;
-  std::vector<TableColumn> columns;
-  std::exception_ptr failed;
+  std::size_t first_row = 0;
+  std::vector<std::vector<std::string>> words{};  // by column
+  std::exception_ptr failed{};
 };
 
 // Which field of a row goes into which column.
@@ -83,24 +85,20 @@ bool is_number(std::string_view text) noexcept {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-std::int32_t code_of(TableColumn& column, std::string_view word) {
-  // A column has few words, and the last row's is nearly always this one's.
-  if (!column.codes.empty() && column.words[static_cast<std::size_t>(column.codes.back())] == word) {
-    return column.codes.back();
-  }
-  const auto found = std::find(column.words.begin(), column.words.end(), word);
-  if (found == column.words.end()) {
-    column.words.emplace_back(word);
-    return static_cast<std::int32_t>(column.words.size() - 1);
-  }
-  return static_cast<std::int32_t>(found - column.words.begin());
+// The place of a word among those of its column, which are few.
+std::int32_t code_of(std::vector<std::string>& words, std::string_view word) {
+  const auto found = std::find(words.begin(), words.end(), word);
+  const auto code = static_cast<std::int32_t>(found - words.begin());
+  if (found == words.end()) words.emplace_back(word);
+  return code;
 }
 
-// One field; returns its end.
-const char* read_field(const char* at, const char* row_end, TableColumn& column, const std::string& file) {
+// One field, into a row of a column; returns its end.
+const char* read_field(const char* at, const char* row_end, TableColumn& column, std::size_t row,
+                       std::vector<std::string>& words, const std::string& file) {
   if (column.is_text) {
     const char* const end = std::find(at, row_end, ',');
-    column.codes.push_back(code_of(column, {at, end}));
+    column.codes[row] = code_of(words, {at, end});
     return end;
   }
   double value = std::numeric_limits<double>::quiet_NaN();
@@ -111,23 +109,30 @@ const char* read_field(const char* at, const char* row_end, TableColumn& column,
     }
     at = end;
   }
-  column.numbers.push_back(value);
+  column.numbers[row] = value;
   return at;
 }
 
-void read_part(Part& part, const std::vector<Place>& places, const std::string& file) {
-  for (const char* row = part.begin; row < part.end;) {
-    const auto* newline = static_cast<const char*>(std::memchr(row, '\n', static_cast<std::size_t>(part.end - row)));
-    const char* const row_end = newline == nullptr ? part.end : newline;
+// The end of the row that begins here.
+const char* end_of_row(const char* row, const char* end) noexcept {
+  const void* const newline = std::memchr(row, '\n', static_cast<std::size_t>(end - row));
+  return newline == nullptr ? end : static_cast<const char*>(newline);
+}
+
+void read_part(Part& part, std::vector<TableColumn>& columns, const std::vector<Place>& places,
+               const std::string& file) {
+  std::size_t number = part.first_row;
+  for (const char* row = part.begin; row < part.end; ++number) {
+    const char* const row_end = end_of_row(row, part.end);
     const char* at = row;
     std::size_t field = 0;
     for (const Place& place : places) {
       const char* const there = pass_fields(at, row_end, place.field - field);
       if (there == row_end && place.field > field && (there == at || there[-1] != ',')) {
-        refuse(file, part.columns[place.column].name, {row, std::min<std::size_t>(40, row_end - row)},
+        refuse(file, columns[place.column].name, {row, std::min<std::size_t>(40, row_end - row)},
                "as many fields as the first row has");
       }
-      at = read_field(there, row_end, part.columns[place.column], file);
+      at = read_field(there, row_end, columns[place.column], number, part.words[place.column], file);
       field = place.field;
     }
     row = row_end + 1;
@@ -135,38 +140,58 @@ void read_part(Part& part, const std::vector<Place>& places, const std::string& 
 }
 
 // Whole rows for each thread.
-std::vector<Part> parts_of(std::string_view rows, const std::vector<TableColumn>& columns) {
+std::vector<Part> parts_of(std::string_view rows) {
   const std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
   const std::size_t count = std::clamp<std::size_t>(rows.size() / worth_a_thread, 1, threads);
   std::vector<Part> parts;
   const char *begin = rows.data(), *const end = rows.data() + rows.size();
   for (std::size_t i = 0; i < count && begin < end; ++i) {
     const char* stop = i + 1 == count ? end : std::max(begin, rows.data() + rows.size() / count * (i + 1));
-    stop = std::find(stop, end, '\n');
+    stop = end_of_row(stop, end);
     if (stop < end) ++stop;
-    parts.push_back({begin, stop, columns, nullptr});
+    parts.push_back({.begin = begin, .end = stop});
     begin = stop;
   }
   return parts;
 }
 
-// All parts' rows, one after the other; each part has numbered its words by itself.
-void join(const std::vector<Part>& parts, std::vector<TableColumn>& columns) {
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    TableColumn& whole = columns[i];
-    std::size_t rows = 0;
-    for (const Part& part : parts) rows += part.columns[i].numbers.size() + part.columns[i].codes.size();
-    (whole.is_text ? whole.codes.reserve(rows) : whole.numbers.reserve(rows));
-    for (const Part& part : parts) {
-      const TableColumn& of_part = part.columns[i];
-      whole.numbers.insert(whole.numbers.end(), of_part.numbers.begin(), of_part.numbers.end());
-      std::vector<std::int32_t> codes;
-      for (const std::string& word : of_part.words) {
-        const auto found = std::find(whole.words.begin(), whole.words.end(), word);
-        codes.push_back(static_cast<std::int32_t>(found - whole.words.begin()));
-        if (found == whole.words.end()) whole.words.push_back(word);
-      }
-      for (const std::int32_t code : of_part.codes) whole.codes.push_back(codes[static_cast<std::size_t>(code)]);
+// Does something with each part, in a thread of its own; the first exception comes out of here.
+template <typename Work>
+void for_each_part(std::vector<Part>& parts, const Work& work) {
+  const auto guarded = [&](Part& part) noexcept {
+    try {
+      work(part);
+    } catch (...) {
+      part.failed = std::current_exception();
+    }
+  };
+  std::vector<std::thread> threads;
+  for (std::size_t i = 1; i < parts.size(); ++i) threads.emplace_back(guarded, std::ref(parts[i]));
+  if (!parts.empty()) guarded(parts[0]);
+  for (std::thread& thread : threads) thread.join();
+  for (const Part& part : parts) {
+    if (part.failed) std::rethrow_exception(part.failed);
+  }
+}
+
+// Tells each part where its rows go; returns how many there are.
+std::size_t count_rows(std::vector<Part>& parts) {
+  for_each_part(parts, [](Part& part) {
+    for (const char* row = part.begin; row < part.end; row = end_of_row(row, part.end) + 1) ++part.first_row;
+  });
+  std::size_t rows = 0;
+  for (Part& part : parts) rows += std::exchange(part.first_row, rows);
+  return rows;
+}
+
+// One numbering of the words of a column, in place of each part's own.
+void join_words(const std::vector<Part>& parts, std::size_t place, TableColumn& column) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::size_t end = i + 1 < parts.size() ? parts[i + 1].first_row : column.codes.size();
+    std::vector<std::int32_t> codes;
+    for (const std::string& word : parts[i].words[place]) codes.push_back(code_of(column.words, word));
+    for (std::size_t row = parts[i].first_row; row < end; ++row) {
+      column.codes[row] = codes[static_cast<std::size_t>(column.codes[row])];
     }
   }
 }
@@ -223,23 +248,16 @@ std::vector<TableColumn> read_table(std::string_view csv, const std::vector<std:
                                         [](const Place& a, const Place& b) { return a.field == b.field; });
   if (twice != places.end()) refuse(file, "columns", columns[twice->column].name, "each name once");
 
-  std::vector<Part> parts = parts_of(rows, columns);
-  const auto read = [&](Part& part) noexcept {
-    try {
-      read_part(part, places, file);
-    } catch (...) {
-      part.failed = std::current_exception();
-    }
-  };
-  std::vector<std::thread> threads;
-  for (std::size_t i = 1; i < parts.size(); ++i) threads.emplace_back(read, std::ref(parts[i]));
-  if (!parts.empty()) read(parts[0]);
-  for (std::thread& thread : threads) thread.join();
-  for (const Part& part : parts) {
-    if (part.failed) std::rethrow_exception(part.failed);
+  std::vector<Part> parts = parts_of(rows);
+  const std::size_t count = count_rows(parts);
+  for (TableColumn& column : columns) column.is_text ? column.codes.resize(count) : column.numbers.resize(count);
+  for_each_part(parts, [&](Part& part) {
+    part.words.resize(columns.size());
+    read_part(part, columns, places, file);
+  });
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    if (columns[i].is_text) join_words(parts, i, columns[i]);
   }
-  if (parts.size() == 1) return std::move(parts[0].columns);
-  join(parts, columns);
   return columns;
 }
 

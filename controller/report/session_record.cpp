@@ -29,10 +29,24 @@ bool is_ours(std::string_view name) {
   return std::find(std::begin(file_names), std::end(file_names), name) != std::end(file_names);
 }
 
-// A session's replay, or its black box: folders with nothing else in them, and no links to such.
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::symlink_status(path, error).type() == fs::file_type::directory;
+}
+
+// What the Python package keeps of signals.csv (controller/python/proxarm): a folder of columns.
+bool is_kept_columns(const fs::path& path) {
+  std::error_code error;
+  return is_folder(path) && std::all_of(fs::directory_iterator(path, error), {}, [](const fs::directory_entry& entry) {
+           return entry.path().extension() == ".npy" || entry.path().extension() == ".json";
+         });
+}
+
+// A session's replay, its black box, or its columns: folders with nothing else in them, and no links to such.
 bool is_our_folder(const fs::path& path) {
   std::error_code error;
-  if (fs::symlink_status(path, error).type() != fs::file_type::directory) return false;
+  if (!is_folder(path)) return false;
+  if (path.filename() == "numpy") return std::all_of(fs::directory_iterator(path, error), {}, is_kept_columns);
   const bool replay = path.filename() == "replay";
   if (!replay && path.filename() != "black-box") return false;
   return std::all_of(fs::directory_iterator(path, error), {}, [&](const fs::directory_entry& entry) {
@@ -70,7 +84,7 @@ SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::stri
   }
   if (error) fail("", error.message());
   for (const char* name : file_names) fs::remove(folder_ / name, error);
-  for (const char* name : {"replay", "black-box"}) fs::remove_all(folder_ / name, error);
+  for (const char* name : {"replay", "black-box", "numpy"}) fs::remove_all(folder_ / name, error);
   open(signals_, "signals.csv");
   open(frames_, "frames.log");
   const std::vector<std::string> axes{axis_names.begin(), axis_names.begin() + static_cast<std::ptrdiff_t>(axes_)};

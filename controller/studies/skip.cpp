@@ -137,8 +137,8 @@ std::vector<OptionScene> option_scenes() {
 
 constexpr std::array cycle_setups{
     CycleSetup{.name = "default session"},
-    CycleSetup{.name = "default session, lookahead", .looks_ahead = true},
-    CycleSetup{.name = "room, a hand that explores", .scene = "scenes/room.yaml", .hand = "sim/hands/explore.yaml"},
+    CycleSetup{.name = "default session with lookahead", .looks_ahead = true},
+    CycleSetup{.name = "room with a hand that explores", .scene = "scenes/room.yaml", .hand = "sim/hands/explore.yaml"},
     CycleSetup{.name = "seven axes", .cell = "models/cells/seven.yaml"},
 };
 

@@ -97,6 +97,54 @@ class Sessions(ProgramTest):
         for name in signals:
             numpy.testing.assert_array_equal(saved[name], signals[name], name)
 
+    def test_a_long_records_columns_are_kept_until_it_changes(self):
+        record = self.folder / "record"
+        words = ("--duration", "1s", "--record", record)
+        self.summary(*words)
+        whole = proxarm.load(record).signals
+        self.assertFalse((record / "numpy").exists(), "it isn't long")
+        before, proxarm.KEEP_FROM_BYTES = proxarm.KEEP_FROM_BYTES, 1
+        self.addCleanup(setattr, proxarm, "KEEP_FROM_BYTES", before)
+        proxarm.load(record, keep=False)
+        self.assertFalse((record / "numpy").exists(), "nobody wants it to be kept")
+        for columns in (["phase", "tool_W_x_m"], ["tool_W_x_m", "flags"], None, None):
+            signals = proxarm.load(record, columns).signals
+            self.assertEqual(list(signals), columns or list(whole))
+            self.assertIsInstance(signals["tool_W_x_m"], numpy.memmap)
+            for name in signals:
+                numpy.testing.assert_array_equal(signals[name], whole[name], name)
+        # A file that has changed is read again, and what was kept of the old one goes.
+        text = (record / "signals.csv").read_text().splitlines(keepends=True)
+        (record / "signals.csv").write_text("".join(text[:100]))
+        self.assertEqual(proxarm.load(record, ["time_s"]).signals["time_s"].size, 99)
+        self.assertEqual(len(list((record / "numpy").iterdir())), 1)
+        # So does all of it, by a session that is recorded in its place; not where there is something of somebody's.
+        self.summary(*words)
+        self.assertFalse((record / "numpy").exists())
+        proxarm.load(record)
+        kept = next((record / "numpy").iterdir())
+        (kept / "thesis.txt").write_text("ten years")
+        self.assert_refused(self.call("run", *words), "numpy")
+        # Where nothing can be written it is read all the same.
+        for file in (*kept.iterdir(), kept, record / "numpy"):
+            file.unlink() if file.is_file() else file.rmdir()
+        (record / "numpy").write_text("no folder")
+        numpy.testing.assert_array_equal(proxarm.load(record).signals["time_s"], whole["time_s"])
+
+    def test_a_table_of_many_parts_is_read_whole(self):
+        # A part is a MiB at least, with a thread each; words come in another order in each part.
+        rows = [(i, f"{i / 7!r}", "abc"[i // 20000 % 3], "" if i % 3 else "1e300") for i in range(200_000)]
+        for end in ("", "\n"):
+            file = self.written("many.csv", "count,seventh,word,some\n" + "\n".join(",".join(map(str, row)) for row in rows) + end)
+            count, seventh, word, some = (values for _, *values in proxarm._read_table(str(file), [], []))
+            numpy.testing.assert_array_equal(count[0], [row[0] for row in rows])
+            numpy.testing.assert_array_equal(seventh[0], [row[0] / 7 for row in rows])
+            numpy.testing.assert_array_equal(numpy.array(word[1])[word[0]], [row[2] for row in rows])
+            numpy.testing.assert_array_equal(some[0], [float(row[3] or "nan") for row in rows])
+        for wrong, found in (("3,4,x\n", "3,4,x"), ("3,y,x,1\n", '"y"')):
+            with self.subTest(wrong), self.assertRaisesRegex(proxarm.SetupError, found):
+                proxarm._read_table(str(self.written("wrong.csv", file.read_text() + wrong)), [], [])
+
     def test_a_world_and_a_hand_in_python(self):
         stop_m = 0.75
 
@@ -194,6 +242,12 @@ class Around(ProgramTest):
         with self.assertRaisesRegex(proxarm.SetupError, "^--mass: "):
             proxarm.run("--mass", "-1")
 
+    def test_every_studys_table_is_one(self):
+        # That of `skip` had commas in its words, and five rows of more fields than names.
+        study = proxarm.study("skip", out=self.folder / "skip", quick=True)
+        self.assertIn("default session with lookahead", study.table["name"])
+        self.assertEqual(study.table["kind"][0], "objects")
+
     def test_the_examples_of_the_page_are_the_files_and_run(self):
         page = (SOURCE / "docs/python.md").read_text()
         blocks = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
@@ -222,7 +276,8 @@ class CallTiming(unittest.TestCase):
         rounds = [(took_s(world), took_s(bare)) for _ in range(100)]
         step_s, bare_s = (min(column) for column in zip(*rounds))
         print(f"a step {1e9 * step_s:.0f} ns, a bare call {1e9 * bare_s:.0f} ns, ratio {step_s / bare_s:.1f}")
-        self.assertLess(step_s - bare_s, 1e-6)
+        # A guest's processor is at times half as fast, and the bare call (150 ns) as well.
+        self.assertLess(step_s - bare_s, 1e-6 * max(1.0, bare_s / 150e-9))
 
 
 if __name__ == "__main__":

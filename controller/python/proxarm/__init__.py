@@ -46,11 +46,17 @@ class Signals(collections.abc.Mapping):
         """A file for each column, which load() maps into memory: however long it is, that takes some milliseconds."""
         folder = pathlib.Path(folder)
         folder.mkdir(parents=True)
-        for name, (values, *words) in self._columns.items():
-            numpy.save(folder / f"{name}.npy", values)
-            if words:
-                (folder / f"{name}.words.json").write_text(json.dumps(words[0]))
+        for column in self._columns:
+            self._save_column(folder, column)
         (folder / "saved.json").write_text(json.dumps(list(self._columns)))
+
+    def _save_column(self, folder, name):
+        values, *words = self._columns[name]
+        if words:
+            (folder / f"{name}.words.json").write_text(json.dumps(words[0]))
+        unfinished = folder / f"{name}.{os.getpid()}.npy"
+        numpy.save(unfinished, values)
+        unfinished.replace(folder / f"{name}.npy")  # whole, or not there
 
 
 class Result:
@@ -87,22 +93,49 @@ class Session:
         return Result(json.loads(summary), Signals(columns))
 
 
-def load(folder, columns=None):
+KEEP_FROM_BYTES = 100_000_000  # of a signals.csv that takes about half a second to read
+
+
+def load(folder, columns=None, keep=True):
     """A Record, or what Signals.save() wrote. `columns`: names of those that are wanted; reading takes as long as these
-    do, and a pass over the rest."""
+    do, and a pass over the rest. What was read of a long record is kept in its folder (`numpy`), as files that the next
+    load maps into memory, for as long as its signals.csv stays as it is; not where nothing can be written there."""
     folder = pathlib.Path(folder)
     if (folder / "saved.json").exists():
-        return _load_saved(folder, columns)
+        return _load_saved(folder, columns or _json(folder / "saved.json"))
     described = _json(folder / "columns.json")
-    text = [column["name"] for column in described if "unit" not in column]
-    signals = Signals(_read_table(str(folder / "signals.csv"), list(columns or ()), text))
     summary = _json(folder / "summary.json") if (folder / "summary.json").exists() else None
+    wanted = list(columns or (column["name"] for column in described))
+    text = [column["name"] for column in described if "unit" not in column]
+    signals = _load_signals(folder, wanted, text, keep)
     return Record(summary, signals, {column.pop("name"): column for column in described})
+
+
+def _load_signals(folder, wanted, text, keep):
+    file = folder / "signals.csv"
+    state = file.stat() if file.exists() else None
+    if not keep or state is None or state.st_size < KEEP_FROM_BYTES:
+        return Signals(_read_table(str(file), wanted, text))
+    kept = folder / "numpy" / f"{state.st_size}-{state.st_mtime_ns}"  # another file's columns are in another folder
+    missing = [name for name in wanted if not (kept / f"{name}.npy").exists()]
+    if not missing:
+        return _load_saved(kept, wanted)
+    read = Signals(_read_table(str(file), missing, text))
+    try:
+        for old in kept.parent.glob("*"):
+            if old != kept:
+                shutil.rmtree(old)
+        kept.mkdir(parents=True, exist_ok=True)
+        for name in missing:
+            read._save_column(kept, name)
+    except OSError:  # a folder of somebody else's, or a full disk
+        return read if missing == wanted else Signals(_read_table(str(file), wanted, text))
+    return _load_saved(kept, wanted)
 
 
 def _load_saved(folder, columns):
     found = []
-    for name in columns or _json(folder / "saved.json"):
+    for name in columns:
         words = folder / f"{name}.words.json"
         values = numpy.load(folder / f"{name}.npy", mmap_mode="r")
         found.append((name, values, _json(words)) if words.exists() else (name, values))

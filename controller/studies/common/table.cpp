@@ -47,6 +47,7 @@ bool parse_number(const std::string& text, double& value) {
 Table::Table(std::vector<Column> columns) : columns_(std::move(columns)) {}
 
 std::size_t Table::word(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") != std::string::npos) throw std::logic_error("no word of a table: " + text);
   const auto [found, is_new] = word_index_.emplace(text, words_.size());
   if (is_new) words_.push_back(text);
   return found->second;
