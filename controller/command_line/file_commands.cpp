@@ -78,7 +78,7 @@ void check_cell(const fs::path& file, const fs::path& scene) {
   run.scene = scene;
   const PreparedSession session = prepare(run);
   require_runnable(session, run);
-  for (const std::string& line : scene_surprises(session)) std::printf("%s\n", line.c_str());
+  for (const std::string& line : surprises(session)) std::printf("%s\n", line.c_str());
   require_simulable(session);
   std::vector<fieldbus::DriveSlot> slots;
   for (fieldbus::ServoDrive& servo : servos) slots.push_back({&servo, 0});

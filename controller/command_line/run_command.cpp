@@ -87,7 +87,7 @@ int run_command(const RunOptions& given) {
   if (!options.bus.simulated()) refuse_for_interfaces(options);
   const PreparedSession session = prepare(options);
   require_runnable(session, options);
-  for (const std::string& line : scene_surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
+  for (const std::string& line : surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
   refuse_view(session, options);
   require_changes(session, options);
   BlackBoxKeeper keeper(session, options);

@@ -77,7 +77,8 @@ class NewCell {
     save();
     require_runnable(prepare(run_), run_);
     fs::rename(file_, folder_ / "cell.yaml");
-    file_ = folder_ / "cell.yaml";
+    run_.cell = file_ = folder_ / "cell.yaml";
+    for (const std::string& line : surprises(prepare(run_))) source_.remarks.push_back(line);
     tell();
     return 0;
   }

@@ -6,6 +6,8 @@
 #include <limits>
 
 #include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/setpoints/held_weight.hpp"
+#include "controller/setpoints/torque_share.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/arm/tool_space.hpp"
@@ -184,6 +186,43 @@ void require_allowed(const PreparedSession& session, const models::Vec3& start_W
   }
 }
 
+// "axis_2 148"
+std::string weight_text(const PreparedSession& session, const controller::HeldWeight& held) {
+  char text[32];
+  std::snprintf(text, sizeof text, " %.3g", held.weight_Nm);
+  return session.cell.drives[static_cast<std::size_t>(held.axis)].joint + text;
+}
+
+std::string torque_text(const models::Arm& arm, const controller::HeldWeight& held, double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g %s", share * held.rated_Nm, arm.slides(held.axis) ? "N" : "Nm");
+  return text;
+}
+
+// A drive that can't hold the arm's weight can't hold its start.
+void require_weight_held(const PreparedSession& session, const models::Arm& arm) {
+  const controller::HeldWeight held = controller::held_weight(arm, session.cell, arm.start_rad());
+  if (held.share() < 1.0) return;
+  throw SetupError({.file = session.cell.file.string(),
+                    .key = "start_rad",
+                    .found = "a pose in which the arm's weight takes of " + weight_text(session, held) + " of the " +
+                             torque_text(arm, held, 1.0) + " that its drive has (max_torque_Nm)",
+                    .expected = "a start that the drives can hold",
+                    .advice = "start nearer to the base, or correct max_torque_Nm or the masses of the URDF"});
+}
+
+// Where the weight takes all of a drive's torque that setpoints may ask for.
+std::vector<std::string> weight_surprises(const PreparedSession& session, const models::Arm& arm) {
+  if (session.impedance()) return {};  // renders torques, beside the weight's
+  const controller::HeldWeight most = controller::heaviest_weight(arm, session.cell);
+  if (most.share() < controller::strained_share) return {};
+  return {session.cell.file.string() + ": at the worst the arm's weight takes of " + weight_text(session, most) +
+          " of the " + torque_text(arm, most, controller::strained_share) +
+          " that setpoints may ask for (two fifths of max_torque_Nm): near " +
+          (most.share() < 1.0 ? "full stretch the tool lags behind the proxy, and stands in what that touches"
+                              : "such poses the drive can't hold it")};
+}
+
 }  // namespace
 
 void require_usable_start(const PreparedSession& session) {
@@ -196,6 +235,7 @@ void require_usable_start(const PreparedSession& session) {
   require_outside(session, start_W);
   require_on_guide(session, start_W);
   require_allowed(session, start_W);
+  require_weight_held(session, arm);
 }
 
 void require_runnable(const PreparedSession& session, const RunOptions& options) {
@@ -205,11 +245,11 @@ void require_runnable(const PreparedSession& session, const RunOptions& options)
   if (options.bus.simulated()) require_carried(session, options);
 }
 
-std::vector<std::string> scene_surprises(const PreparedSession& session) {
+std::vector<std::string> surprises(const PreparedSession& session) {
   const models::Arm arm(session.cell);
   // No joint's axis is further from the tool than the arm can reach.
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
-  std::vector<std::string> lines;
+  std::vector<std::string> lines = weight_surprises(session, arm);
   for (const scenes::Object& object : session.scene.objects) {
     const auto* const mesh = std::get_if<scenes::MeshShape>(&object.shape);
     if (mesh == nullptr || !mesh->mesh) continue;

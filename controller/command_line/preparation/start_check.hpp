@@ -12,12 +12,14 @@ namespace proxarm::command_line {
 // masses that aren't stable, and in simulation a timestep that a bus can't carry. Throws SetupError.
 void require_runnable(const PreparedSession& session, const RunOptions& options);
 
-// What isn't wrong with the scene's meshes but would surprise, a line each (scenes/mesh_files/mesh_report.hpp).
-std::vector<std::string> scene_surprises(const PreparedSession& session);
+// What isn't wrong but would surprise, a line each: of the scene's meshes (scenes/mesh_files/mesh_report.hpp), and
+// where the arm's weight takes all that setpoints may ask of a drive (controller/setpoints/held_weight.hpp).
+std::vector<std::string> surprises(const PreparedSession& session);
 
 // Throws SetupError for an arm that can't be built (URDF without a drive's joint, and the like), for axes whose tool
 // can't go straight in any direction, for a start pose in a singularity, from which the tool can't move in some
-// direction, for one inside an object of the scene, and for a scene in dimensions in which the tool can't move.
+// direction, for one inside an object of the scene, for one in which the arm is too heavy for a drive, and for a scene
+// in dimensions in which the tool can't move.
 void require_usable_start(const PreparedSession& session);
 
 // Throws SetupError where `--enabling` has no simulated enabling switch that it could press.
