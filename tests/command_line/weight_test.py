@@ -50,7 +50,8 @@ class Weight(ProgramTest):
         return "".join(lines)
 
     def assert_figures(self, told, weight_Nm, torque_Nm):
-        found = re.search(r"weight takes of shoulder ([0-9.]+) of the ([0-9.]+) Nm that", told)
+        found = re.search(r"weight takes ([0-9.]+) of the ([0-9.]+) Nm that", told)
+        self.assertIn("shoulder", told)
         # Three digits are shown, and the search misses the heaviest pose by 0.2 % at most.
         self.assertAlmostEqual(float(found[1]) / weight_Nm, 1.0, delta=7e-3)
         self.assertAlmostEqual(float(found[2]) / torque_Nm, 1.0, delta=5e-3)

@@ -147,6 +147,13 @@ void place_shapes(UrdfTree& tree, const fs::path& file, const Packages& packages
 
 // Of a joint between base and sensor.
 void require_drivable(const UrdfTreeJoint& joint, const fs::path& file) {
+  if (joint.moves() && !(joint.axis().norm() > 0.0)) {
+    throw SetupError({.file = file.string(),
+                      .line = joint.element->FirstChildElement("axis")->GetLineNum(),
+                      .key = "axis of joint " + in_quotes(joint.name),
+                      .found = in_quotes(text_of(joint.element->FirstChildElement("axis"), "xyz")),
+                      .expected = "a direction"});
+  }
   if (!joint.mimic && (joint.moves() || joint.type == "fixed")) return;
   throw SetupError({.file = file.string(),
                     .line = joint.element->GetLineNum(),

@@ -2,14 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_space.hpp"
+#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
+namespace fs = std::filesystem;
 using std::numbers::pi;
 
 constexpr int poses = 200;
@@ -51,9 +54,23 @@ double rounded(double x) {
   return std::round(x / unit) * unit;
 }
 
+// What a cell may say of a drive ends somewhere, and arms of kilometres or of a thousand tons are mistakes.
+void require_possible(const models::Arm& arm, const description::DriveDescription& drive, const fs::path& urdf) {
+  constexpr double most_Nm = 1e6;  // of max_torque_Nm in cell files
+  if (drive.max_torque_Nm <= most_Nm) return;
+  char found[160];
+  std::snprintf(found, sizeof found, "an arm that reaches %.3g m and takes %.3g Nm at joint %.60s",
+                arm.path_curvature().maxCoeff(), drive.max_torque_Nm, drive.joint.c_str());
+  throw description::SetupError({.file = urdf.string(),
+                                 .found = found,
+                                 .expected = "at most 1e+06 Nm",
+                                 .advice = "a URDF's lengths are in m and its masses in kg; --arm-mass says what the "
+                                           "arm weighs where the URDF doesn't"});
+}
+
 }  // namespace
 
-void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints) {
+void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints, const fs::path& urdf) {
   const models::Arm arm(cell);
   const std::vector<Load> loads = loads_of(arm);
   double heaviest = 0.0;  // of the joints that turn
@@ -78,6 +95,7 @@ void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints)
                           hand_N * load.most_lever;
     const bool said = joint.max_effort > 1.3 * load.most_gravity && joint.max_effort < 20.0 * needed;
     drive.max_torque_Nm = rounded(said ? joint.max_effort : needed);
+    require_possible(arm, drive, urdf);
     drive.rotor_inertia_kg_m2 = rounded(rotor);
     drive.gear_stiffness_Nm_per_rad = rounded(stiffness);
     drive.gear_damping_Nms_per_rad = rounded(damping);

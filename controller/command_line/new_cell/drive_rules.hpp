@@ -1,6 +1,7 @@
 // What a drive, its gear and its motor are about like, where no data sheet is at hand.
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "controller/command_line/new_cell/arm_source.hpp"
@@ -18,6 +19,7 @@ namespace proxarm::command_line {
 //              hand of 100 N at the tool, which is all that the light wrist of an arm feels
 //   friction   1 % of the torque by Coulomb, 0.8 % at 1 rad/s
 //   speed      the URDF's (at most 4 rad/s), acceleration 15 times that
-void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints);
+// Throws SetupError, which names the URDF, for an arm that is too large or too heavy for any drive.
+void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints, const std::filesystem::path& urdf);
 
 }  // namespace proxarm::command_line

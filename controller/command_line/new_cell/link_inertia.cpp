@@ -23,7 +23,8 @@ enum class Inertial { missing, mass_alone, whole };
 Inertial inertial_of(const XMLElement* link) {
   const XMLElement* inertial = link->FirstChildElement("inertial");
   const XMLElement* mass = inertial != nullptr ? inertial->FirstChildElement("mass") : nullptr;
-  if (mass == nullptr || !(mass->DoubleAttribute("value") >= least_mass_kg)) return Inertial::missing;
+  const double mass_kg = mass != nullptr ? mass->DoubleAttribute("value") : 0.0;
+  if (!(mass_kg >= least_mass_kg) || !std::isfinite(mass_kg)) return Inertial::missing;
   const XMLElement* inertia = inertial->FirstChildElement("inertia");
   if (inertia == nullptr) return Inertial::mass_alone;
   const double xy = inertia->DoubleAttribute("ixy"), xz = inertia->DoubleAttribute("ixz"),
@@ -47,7 +48,11 @@ void set_rod(XMLElement* link, double mass_kg, const Vec3& to, double least_leng
   const models::Mat3 I = across * models::Mat3::Identity() + (along - across) * n * n.transpose();
   XMLElement* inertial = link->InsertNewChildElement("inertial");
   inertial->InsertFirstChild(link->GetDocument()->NewComment(" estimated by proxarm new-cell: a rod "));
-  const auto number = [](double x) { return description::number_text(std::round(1e6 * x) / 1e6); };
+  const auto number = [](double x) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g", std::abs(x) < 1e-12 ? 0.0 : x);
+    return std::string(text);
+  };
   XMLElement* origin = inertial->InsertNewChildElement("origin");
   origin->SetAttribute("xyz", (number(0.5 * to.x()) + " " + number(0.5 * to.y()) + " " + number(0.5 * to.z())).c_str());
   inertial->InsertNewChildElement("mass")->SetAttribute("value", number(mass_kg).c_str());

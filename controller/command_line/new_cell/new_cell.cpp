@@ -69,13 +69,8 @@ class NewCell {
   int make() {
     aim_sensor();
     save();
-    size_drives(cell_, source_.joints);
-    choose_start();
-    choose_buses();
-    save();
-    advise_mass();
-    save();
-    require_runnable(prepare(run_), run_);
+    size_drives(cell_, source_.joints, options_.arm);
+    choose();
     fs::rename(file_, folder_ / "cell.yaml");
     run_.cell = file_ = folder_ / "cell.yaml";
     for (const std::string& line : surprises(prepare(run_))) source_.remarks.push_back(line);
@@ -155,14 +150,49 @@ class NewCell {
     cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};
   }
 
-  void choose_start() {
+  // Where the arm isn't steady from the best start, or can't begin there, others are tried.
+  void choose() {
+    constexpr std::size_t most = 3;
     const models::Arm arm(cell_);
-    const description::HandDescription hand = description::load_hand(shipped_file("sim/hands/touch.yaml"));
-    const StartPose start = find_start(arm, hand);
+    const models::ToolSpace space = models::tool_space(arm);
+    const description::HandDescription hand =
+        with_way_in(space, description::load_hand(shipped_file("sim/hands/touch.yaml")));
+    const std::vector<std::string> remarks = source_.remarks;
+    std::optional<SetupError> first;
+    for (const StartPose& start : find_starts(arm, hand, most)) {
+      source_.remarks = remarks;
+      if (first)
+        source_.remarks.push_back("from a start that looked better it wasn't fine: " + first->problem().message);
+      begin_at(start, arm, space, hand);
+      try {
+        choose_buses();
+        save();
+        advise_mass();
+        save();
+        return require_runnable(prepare(run_), run_);
+      } catch (const SetupError& error) {
+        if (!first) first = error;
+        if (start.way == 0.0) refuse_without_way();
+      }
+    }
+    throw SetupError(*first);
+  }
+
+  [[noreturn]] void refuse_without_way() const {
+    throw SetupError(
+        {.file = options_.arm.string(),
+         .found = "an arm whose tool can't go straight for 22 mm, a tenth of the hand's way, from any pose",
+         .expected = "joints that move it ahead and to the side",
+         .advice = "do joints coincide, are their ranges too narrow, are lengths in another unit than m?"});
+  }
+
+  void begin_at(const StartPose& start, const models::Arm& arm, const models::ToolSpace& space,
+                const description::HandDescription& hand) {
     for (int i = 0; i < arm.axes(); ++i) cell_.start_rad[static_cast<std::size_t>(i)] = start.q[i];
     start_W_ = arm.tool_pose(start.q).translation();
-    if (start.way < 1.0) write_hand(with_shorter_way(hand, start.way), start.way);
-    with_scene_ = models::tool_space(arm).dimensions == 3 && start.way > 0.0;
+    cell_.default_hand.clear();
+    if (start.way < 1.0 || space.dimensions < 3) write_hand(with_shorter_way(hand, start.way), start.way);
+    with_scene_ = space.dimensions == 3 && start.way > 0.0;
     if (!with_scene_) {
       source_.remarks.push_back("no scene of its own: the tool can't go ahead and to the side from where it starts");
       return;
@@ -176,15 +206,16 @@ class NewCell {
     write(folder_ / "scene.yaml", text);
   }
 
-  // For an arm that is too small for the default one's way of 0.22 m; without any room it holds still.
+  // For an arm that is too small for the default one's way of 0.22 m (without any room it holds still), or whose tool
+  // moves in a plane or on a line.
   void write_hand(const description::HandDescription& hand, double share) {
-    char text[200];
+    char text[200], way[80] = "a way that is turned to where the tool can go";
+    if (share < 1.0) std::snprintf(way, sizeof way, "%.3g of its way: for that of 0.22 m the arm has no room", share);
+    source_.remarks.push_back("a hand of its own, the default one with " + std::string(way));
+    std::string file = "# sim/hands/touch.yaml with " + std::string(way) + ".\n";
     std::snprintf(text, sizeof text,
-                  "# sim/hands/touch.yaml with %.3g of its way: for that of 0.22 m the arm has no room.\n", share);
-    std::string file = text;
-    std::snprintf(text, sizeof text,
-                  "name: touch with a shorter way\nmass_kg: %.6g\nstiffness_N_per_m: %.6g\ndamping_Ns_per_m: %.6g\n"
-                  "waypoints:\n",
+                  "name: touch with a way of its own\nmass_kg: %.6g\nstiffness_N_per_m: %.6g\n"
+                  "damping_Ns_per_m: %.6g\nwaypoints:\n",
                   hand.mass_kg, hand.stiffness_N_per_m, hand.damping_Ns_per_m);
     file += text;
     for (const description::Waypoint& waypoint : hand.waypoints) {
@@ -195,9 +226,6 @@ class NewCell {
     }
     write(folder_ / "hand.yaml", file);
     cell_.default_hand = folder_ / "hand.yaml";
-    std::snprintf(text, sizeof text,
-                  "a hand of its own, with %.3g of the default one's way, for which there is no room", share);
-    source_.remarks.emplace_back(text);
   }
 
   // Axes in turn, as many on each bus, and fewest on the last one, which has the sensor.

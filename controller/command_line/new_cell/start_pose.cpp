@@ -17,6 +17,7 @@ constexpr int poses = 4000;
 constexpr std::size_t tried = 600;  // of them, whether the hand's way can be gone
 // Of that way, per metre of reach up to one: less than what a call of the inverse kinematics may turn joints by.
 constexpr double step_share = 2e-3;
+constexpr double another_rad = 0.3;  // m of a joint that slides: half of the way of a hand
 constexpr double least_share = 0.4;  // of the start's smallest singular value, anywhere on the way
 
 // From 0 at an end of a joint's range to 1 in its middle; of the joint that is nearest to its end.
@@ -99,7 +100,7 @@ bool can_be_gone(const models::Arm& arm, models::InverseKinematics inverse, cons
 
 }  // namespace
 
-StartPose find_start(const models::Arm& arm, const description::HandDescription& hand) {
+std::vector<StartPose> find_starts(const models::Arm& arm, const description::HandDescription& hand, std::size_t most) {
   const models::InverseKinematics inverse(arm);
   const double reach_m = reach_of(arm), step_m = step_share * std::min(reach_m, 1.0);
   struct Candidate {
@@ -115,18 +116,35 @@ StartPose find_start(const models::Arm& arm, const description::HandDescription&
   }
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+  std::vector<StartPose> found;
+  const auto is_another = [&](const JointVector& q) {
+    return std::all_of(found.begin(), found.end(),
+                       [&](const StartPose& start) { return (start.q - q).cwiseAbs().maxCoeff() > another_rad; });
+  };
   for (const double share : {1.0, 0.5, 0.25, 0.1}) {
     const description::HandDescription shorter = with_shorter_way(hand, share);
-    for (std::size_t k = 0; k < tried; ++k) {
-      if (can_be_gone(arm, inverse, candidates[k].q, shorter, step_m)) return {candidates[k].q, share};
+    for (std::size_t k = 0; k < tried && found.size() < most; ++k) {
+      const JointVector& q = candidates[k].q;
+      if (is_another(q) && can_be_gone(arm, inverse, q, shorter, step_m)) found.push_back({q, share});
     }
+    if (!found.empty()) return found;
   }
-  return {candidates[0].q, 0.0};
+  return {{candidates[0].q, 0.0}};
 }
 
 description::HandDescription with_shorter_way(description::HandDescription hand, double share) {
   for (description::Waypoint& waypoint : hand.waypoints) {
     for (double& x : waypoint.offset_m) x *= share;
+  }
+  return hand;
+}
+
+description::HandDescription with_way_in(const models::ToolSpace& space, description::HandDescription hand) {
+  for (description::Waypoint& waypoint : hand.waypoints) {
+    Vec3 to(waypoint.offset_m.data());
+    for (int i = space.dimensions; i < 3; ++i) to[i] = 0.0;
+    if (space.dimensions < 3) to = space.axes * to;
+    for (std::size_t i = 0; i < 3; ++i) waypoint.offset_m[i] = to[static_cast<Eigen::Index>(i)];
   }
   return hand;
 }

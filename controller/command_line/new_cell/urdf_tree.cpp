@@ -51,11 +51,19 @@ std::string text_of(const XMLElement* element, const char* name) {
   return value != nullptr ? value : "";
 }
 
-Vec3 UrdfTreeJoint::origin() const {
-  std::istringstream in(text_of(element->FirstChildElement("origin"), "xyz"));
+namespace {
+
+// The attribute xyz of the joint's <origin> or <axis>; without it, what the format says.
+Vec3 vector_of(const XMLElement* element, const Vec3& otherwise) {
+  std::istringstream in(text_of(element, "xyz"));
   double x = 0.0, y = 0.0, z = 0.0;
-  return in >> x >> y >> z ? Vec3(x, y, z) : Vec3::Zero();
+  return in >> x >> y >> z ? Vec3(x, y, z) : otherwise;
 }
+
+}  // namespace
+
+Vec3 UrdfTreeJoint::origin() const { return vector_of(element->FirstChildElement("origin"), Vec3::Zero()); }
+Vec3 UrdfTreeJoint::axis() const { return vector_of(element->FirstChildElement("axis"), Vec3::UnitX()); }
 
 UrdfTree::UrdfTree(const std::filesystem::path& file, const std::string& xml) : file_(file) {
   if (document_.Parse(xml.c_str(), xml.size()) != tinyxml2::XML_SUCCESS) {

@@ -23,6 +23,7 @@ struct UrdfTreeJoint {
   [[nodiscard]] bool moves() const { return !mimic && (turns() || type == "prismatic"); }
   [[nodiscard]] bool turns() const { return type == "revolute" || type == "continuous"; }
   [[nodiscard]] models::Vec3 origin() const;  // in the parent's link
+  [[nodiscard]] models::Vec3 axis() const;    // as it is written
 };
 
 class UrdfTree {

@@ -186,17 +186,16 @@ void require_allowed(const PreparedSession& session, const models::Vec3& start_W
   }
 }
 
-// "axis_2 148"
-std::string weight_text(const PreparedSession& session, const controller::HeldWeight& held) {
-  char text[32];
-  std::snprintf(text, sizeof text, " %.3g", held.weight_Nm);
-  return session.cell.drives[static_cast<std::size_t>(held.axis)].joint + text;
+// "148 of the 132 Nm", of a share of what the drive has.
+std::string weight_text(const models::Arm& arm, const controller::HeldWeight& held, double share) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.3g of the %.3g %s", held.weight_Nm, share * held.rated_Nm,
+                arm.slides(held.axis) ? "N" : "Nm");
+  return text;
 }
 
-std::string torque_text(const models::Arm& arm, const controller::HeldWeight& held, double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g %s", share * held.rated_Nm, arm.slides(held.axis) ? "N" : "Nm");
-  return text;
+const std::string& joint_of(const PreparedSession& session, const controller::HeldWeight& held) {
+  return session.cell.drives[static_cast<std::size_t>(held.axis)].joint;
 }
 
 // A drive that can't hold the arm's weight can't hold its start.
@@ -205,8 +204,8 @@ void require_weight_held(const PreparedSession& session, const models::Arm& arm)
   if (held.share() < 1.0) return;
   throw SetupError({.file = session.cell.file.string(),
                     .key = "start_rad",
-                    .found = "a pose in which the arm's weight takes of " + weight_text(session, held) + " of the " +
-                             torque_text(arm, held, 1.0) + " that its drive has (max_torque_Nm)",
+                    .found = "a pose in which the arm's weight takes " + weight_text(arm, held, 1.0) +
+                             " that the drive of " + joint_of(session, held) + " has (max_torque_Nm)",
                     .expected = "a start that the drives can hold",
                     .advice = "start nearer to the base, or correct max_torque_Nm or the masses of the URDF"});
 }
@@ -216,8 +215,8 @@ std::vector<std::string> weight_surprises(const PreparedSession& session, const 
   if (session.impedance()) return {};  // renders torques, beside the weight's
   const controller::HeldWeight most = controller::heaviest_weight(arm, session.cell);
   if (most.share() < controller::strained_share) return {};
-  return {session.cell.file.string() + ": at the worst the arm's weight takes of " + weight_text(session, most) +
-          " of the " + torque_text(arm, most, controller::strained_share) +
+  return {session.cell.file.string() + ": " + joint_of(session, most) + ": at the worst the arm's weight takes " +
+          weight_text(arm, most, controller::strained_share) +
           " that setpoints may ask for (two fifths of max_torque_Nm): near " +
           (most.share() < 1.0 ? "full stretch the tool lags behind the proxy, and stands in what that touches"
                               : "such poses the drive can't hold it")};
