@@ -52,6 +52,17 @@ class OddArms(ProgramTest):
                 if not touches:
                     self.folder.joinpath("out/hand.yaml").unlink()
 
+    def test_other_starts_are_tried_where_the_best_one_isnt_steady(self):
+        # Behind the world's origin: of the poses that are ahead of it the best is near full stretch.
+        kind, _, axis = SIX[0]
+        told = self.assert_steady(arm([(kind, "-3 0 0.3", axis), *SIX[1:]]))
+        self.assertIn("from a start that looked better it wasn't fine: no mass", told)
+
+    def test_drives_that_are_too_weak_are_told_of(self):
+        # Efforts that bear the light wrist's weight, and no hand. A slower filter isn't stable: that isn't the reason.
+        made = self.made(arm(SIX).replace('effort="0"', 'effort="1"'))
+        self.assert_refused(made, "default_mass_kg", "is stopped by", "effort")
+
     def test_what_no_arm_is_is_refused_with_the_reason(self):
         for name, text, *told in (
                 ("millimetres", arm(scaled(SIX, 1000)), "arm.urdf", "reaches", "at most 1e+06 Nm", "in m"),

@@ -292,18 +292,21 @@ class NewCell {
 
   // Where none is stable or steady the arm's gears are too soft for the filter: a slower one is tried.
   void advise_mass() {
+    std::string with_the_fastest;  // what went wrong with the filter that an arm should bear
     for (const double bandwidth_Hz : {25.0, 15.0, 10.0}) {
       cell_.limits.setpoint_bandwidth_Hz = bandwidth_Hz;
       save();
       const auto mass_kg = advised_mass();
+      if (with_the_fastest.empty()) with_the_fastest = advice_;
       if (!mass_kg) continue;
       cell_.default_mass_kg = rounded_up(margin * *mass_kg);
       return;
     }
     throw SetupError({.file = file_.string(),
                       .key = "default_mass_kg",
-                      .message = "no mass up to 1000 kg is stable with margins and steady: " + advice_,
-                      .advice = "stiffer gears, or a shorter timestep (--buses)"});
+                      .message = "no mass up to 1000 kg is stable with margins and steady: " + with_the_fastest,
+                      .advice = "stiffer gears, stronger drives (the URDF's effort and velocity), or a shorter "
+                                "timestep (--buses)"});
   }
 
   void tell() const {
