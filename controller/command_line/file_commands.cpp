@@ -25,7 +25,10 @@
 #include "scenes/compiler/check.hpp"
 #include "scenes/compiler/explain.hpp"
 #include "scenes/format/scene_file.hpp"
+#include "scenes/format/tool_file.hpp"
 #include "scenes/mesh_files/mesh_report.hpp"
+#include "scenes/rigid/compile_rigid.hpp"
+#include "scenes/rigid/explain_rigid.hpp"
 #include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
@@ -50,6 +53,12 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
       break;
   }
   return nullptr;
+}
+
+// The laws are those of a point's 𝒢. With a tool, what it can't be rendered in is refused beside that.
+const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOptions& options) {
+  if (scene.tool) scenes::compile_rigid(scene, scene.tool->shape);
+  return check_laws(scene, options);
 }
 
 // Throws SetupError for what the simulated arm can't be, such as gears that are too stiff for its step.
@@ -118,6 +127,9 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       description::load_sensor(file);
       tell_sources(file);
       return "sensor";
+    case FileKind::tool:
+      scenes::load_tool(file);
+      return "tool";
     case FileKind::hand:
       description::load_hand(file);
       return "hand";
@@ -129,7 +141,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       return "mesh";
     case FileKind::scene:
     case FileKind::unknown:
-      return check_laws(scenes::load_scene(file), options.states);
+      return check_scene_file(scenes::load_scene(file), options.states);
   }
   return "";
 }
@@ -179,8 +191,9 @@ int explain_command(const FileOptions& options) {
   for (const fs::path& given : options.files) {
     const fs::path file = user_file(given);
     require_kind(file, FileKind::scene);
-    std::printf("%s: %s%s", given.c_str(), scenes::explain(scenes::load_scene(file)).c_str(),
-                explain_cycle(file).c_str());
+    const scenes::Scene scene = scenes::load_scene(file);
+    const std::string of_step = scene.tool ? scenes::explain_rigid(scene) : scenes::explain(scene);
+    std::printf("%s: %s%s", given.c_str(), of_step.c_str(), explain_cycle(file).c_str());
   }
   return 0;
 }

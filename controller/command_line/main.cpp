@@ -233,9 +233,32 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option(
          "--orientation",
          choice<OrientationMode>("--orientation", {{"held", OrientationMode::held}, {"free", OrientationMode::free}},
-                                 [&](OrientationMode value) { options.settings.orientation = value; }),
-         "held (default) or free")
+                                 [&](OrientationMode value) { options.orientation = value; }),
+         "held (default): the tool keeps its orientation, as with an inertia beyond all bounds; free: the hand turns it "
+         "(the default with --inertia)")
       ->type_name("held|free");
+  app.add_option("--tool", options.tool,
+                 "file of the tool's shape, whose sides touch as well, such as scenes/tools/rod.yaml, or point (default: "
+                 "the scene's, else the cell's, else a point)")
+      ->type_name("FILE|point");
+  app.add_option("--inertia",
+                 quantity([](const std::string& w) { return description::parse_inertia(w, "--inertia"); },
+                          [&](double value) { options.inertia_kg_m2 = value; }),
+                 "moment of inertia that the hand feels about each axis through the handle's point, in kg m², handle "
+                 "included; the tool turns under the hand's torque (default of a tool that turns: 0.05 more than the "
+                 "handle's)")
+      ->type_name("KGM2");
+  app.add_option("--turning-damping",
+                 quantity([](const std::string& w) { return description::parse_turning_damping(w, "--turning-damping"); },
+                          [&](double value) { options.turning_damping_Nms_per_rad = value; }),
+                 "damping of a tool that turns, in Nms/rad (default 0 with --inertia, else 0.5)")
+      ->type_name("NMS/RAD");
+  app.add_option(
+         "--turning-spring",
+         quantity([](const std::string& w) { return description::parse_turning_stiffness(w, "--turning-spring"); },
+                  [&](double value) { options.turning_spring_Nm_per_rad = value; }),
+         "spring of a tool that turns to its orientation at the start, in Nm/rad (default 0)")
+      ->type_name("NM/RAD");
   using controller::Passivity;
   app.add_option(
          "--passivity",
@@ -251,7 +274,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
   app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
   app.add_option("--set", options.changes,
                  "change a parameter when so much time has been rendered (holds and stops don't count), such as "
-                 "mass=3@4s (mass, damping, spring, lookahead, timestep, "
+                 "mass=3@4s (mass, damping, spring, inertia, turning_damping, turning_spring, lookahead, timestep, "
                  "OBJECT.friction, OBJECT.position_m); may be repeated")
       ->type_name("NAME=VALUE@TIME")
       ->expected(1)
@@ -415,13 +438,15 @@ class Commands {
   void add_orders() {
     constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
     CLI::App* set =
-        add("set", "change mass, damping, spring, timestep, or an object's friction or place, in a running session",
+        add("set", "change mass, inertia, damping, spring, timestep, or an object's friction or place, in a running session",
             [this] { return set_command(set_); });
     set->add_option("changes", set_.changes,
                     "one or more of:\n"
                     "mass=6kg: mass that the hand feels, in kg, handle included\n"
                     "damping=20Ns/m: against the world\n"
                     "spring=100N/m: to the start position\n"
+                    "inertia=0.05: moment of inertia that the hand feels of a tool that turns, in kg m²\n"
+                    "turning_damping=0.5, turning_spring=20: of a tool that turns, in Nms/rad and Nm/rad\n"
                     "timestep=2ms: the arm stops for it, and goes on\n"
                     "OBJECT.friction=0.6: of an object, by its name in the scene\n"
                     "OBJECT.position_m=X,Y,Z: of an object with motion: {driven: true}, in metres from where the scene "
@@ -478,7 +503,7 @@ class Commands {
             "kind",
             choice<std::string>(
                 "kind",
-                {{"cell", "cell"}, {"hand", "hand"}, {"scene", "scene"}, {"sensor", "sensor"}, {"drive", "drive"}},
+                {{"cell", "cell"}, {"hand", "hand"}, {"scene", "scene"}, {"tool", "tool"}, {"sensor", "sensor"}, {"drive", "drive"}},
                 [this](const std::string& kind) { schema_.kind = kind; }),
             "which: cell, hand, scene, sensor, or drive (on Modbus)")
         ->required()

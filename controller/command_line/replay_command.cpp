@@ -44,7 +44,9 @@ class Replay {
         cell_(description::load_cell(controller::recorded_file(folder, log_.head().cell.data()))),
         sensor_(description::load_sensor(cell_.sensor.description, cell_.sensor.choices)),
         scene_(scenes::compile(controller::reachable_scene(
-            scenes::load_scene(controller::recorded_file(folder, log_.head().scene.data())), cell_))),
+            scenes::load_scene_with(controller::recorded_file(folder, log_.head().scene.data()),
+                                    controller::recorded_tool(folder, log_.head())),
+            cell_))),
         network_(log_.head()) {
     const controller::ReplayHead& head = log_.head();
     if (cell_.drives.size() != head.axes || cell_.buses.size() > controller::max_buses) {

@@ -22,6 +22,10 @@ SummaryConfig summary_config(const command_line::PreparedSession& session) {
   if (!session.impedance()) config.handle_mass_kg = session.cell.tool.mass_kg;
   config.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   config.spring_N_per_m = session.settings.spring_N_per_m;
+  if (session.settings.orientation == OrientationMode::free) {
+    config.wanted_inertia_kg_m2 = command_line::felt_inertia_kg_m2(session);
+    config.turning_spring_Nm_per_rad = session.settings.rotational_spring_Nm_per_rad;
+  }
   // What is looked ahead isn't behind.
   config.lookahead_s = session.settings.horizon_s;
   config.setpoint_filter_s =
@@ -34,6 +38,7 @@ SummaryConfig summary_config(const command_line::PreparedSession& session) {
 }
 
 void complete(CycleRecord& record, const command_line::PreparedSession& session, std::int64_t rendered_ns) {
+  if (session.rigid) return add_clearances(record, *session.rigid);
   add_clearances(record, session.scene, rendered_ns);
   if (!session.impedance()) return;
   if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {

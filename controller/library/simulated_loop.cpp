@@ -153,6 +153,7 @@ void add_truth(CycleRecord& record, const sim::Truth& truth) {
   record.set(RecordFlag::truth);
   record.true_tool_W_m = triple(truth.X_WT.translation());
   record.hand_force_W_N = triple(truth.hand_force_W);
+  record.hand_torque_W_Nm = triple(truth.hand_torque_W);
   const Eigen::Quaterniond q(truth.X_WT.linear());
   record.true_tool_q_W = {q.x(), q.y(), q.z(), q.w()};
   record.true_acceleration_W_m_per_s2 = triple(truth.acceleration_W);

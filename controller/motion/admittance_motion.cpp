@@ -83,6 +83,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   parts_.elastic.start(state_.link_rad);
   state_.link_step_rad.setZero();
   start_guards(target_rad);
+  if (pose() != nullptr) pose()->turn_to(orientation_of(X_WT), Vec3::Zero());
   world().start(state_.q_k1_W);
   if (sent_) sent_->start(state_.q_k1_W);
   if (passivity_) passivity_->start(measured.tool_W);
@@ -140,6 +141,9 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
 // With another mass, damping or spring the prediction yields another point, to which the arm moves slowly.
 void AdmittanceMotion::set(const Change& change) noexcept {
   parts_.world->set(change);
+  if (change.parameter == Parameter::inertia) parts_.orientation.set_inertia(change.value, parts_.behind_sensor_T);
+  if (change.parameter == Parameter::turning_damping) parts_.orientation.set_damping(change.value);
+  if (change.parameter == Parameter::turning_spring) parts_.orientation.set_spring(change.value);
   if (!sent_) return;
   switch (change.parameter) {
     case Parameter::lookahead:
@@ -150,6 +154,9 @@ void AdmittanceMotion::set(const Change& change) noexcept {
       return sent_->take_up_change();
     case Parameter::friction:
     case Parameter::position:
+    case Parameter::inertia:
+    case Parameter::turning_damping:
+    case Parameter::turning_spring:
     case Parameter::none:
       return;
   }
@@ -175,8 +182,9 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   if (passivity_) parts_.world->add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
   let_force_in(cycle.record);
   const models::Wrench h_W = acting_wrench_W(cycle);
+  if (parts_.pose != nullptr) parts_.pose->set_torque_W(h_W.torque);
   const WorldStep step = parts_.world->step(h_W.force, step_limits_);
-  const ProxyFault turned = parts_.orientation.step(h_W.torque);
+  const ProxyFault turned = turn(h_W.torque);
   if (step.fault != ProxyFault::none || turned != ProxyFault::none) {
     cycle.alarm.raise(step.fault == ProxyFault::squeezed ? Fault::proxy_squeezed : Fault::proxy_not_finite);
     return false;
@@ -191,8 +199,10 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
   if (passivity_) record_passivity(step, cycle.record);
   if (sent_) send_ahead();
-  cycle.record.set(RecordFlag::limit_orientation,
-                   parts_.orientation.speed_limited() || parts_.orientation.angle_limited());
+  const bool turning_limited = parts_.pose != nullptr
+                                   ? parts_.pose->turning_limited()
+                                   : parts_.orientation.speed_limited() || parts_.orientation.angle_limited();
+  cycle.record.set(RecordFlag::limit_orientation, turning_limited);
   follow_proxy(cycle);
   count_work(step);
   const double distance_m = (measured.tool_W - state_.q_k1_W).norm();
@@ -200,6 +210,13 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
     cycle.alarm.raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
   }
   return true;
+}
+
+// A rigid tool has turned in its world's step.
+ProxyFault AdmittanceMotion::turn(const Vec3& torque_W) noexcept {
+  if (parts_.pose == nullptr) return parts_.orientation.step(torque_W);
+  parts_.orientation.resume(parts_.pose->orientation(), parts_.pose->angular_velocity_W());
+  return ProxyFault::none;
 }
 
 // Makes the sets that limit this step: around the proxy, and around the motion commanded behind the setpoints' filter.
@@ -256,6 +273,8 @@ void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   double& limit = state_.speed_limit_m_per_s;
   limit = std::clamp(wanted, limit - step, limit + step);
   if (state_.q_k1_W == state_.q_k2_W && guard_.at_rest()) limit = std::min(limit, wanted);
+  parts_.orientation.limit_speed(std::min(1.0, limit / most));
+  if (parts_.pose != nullptr) parts_.pose->limit_turning(std::min(1.0, limit / most));
   cycle.record.set(RecordFlag::slowed, !state_.freeing && limit < most);
 }
 
@@ -286,7 +305,7 @@ models::Wrench AdmittanceMotion::acting_wrench_W(const MotionCycle& cycle) noexc
   cycle.record.set(RecordFlag::hands_off, empty);
   judge_force(cycle, v_W, empty && !empty_handle_->led());
   if (!empty) return hand_W;
-  return {empty_handle_->braking_force_W(state_.mass_kg, v_W), Vec3::Zero()};
+  return {empty_handle_->braking_force_W(state_.mass_kg, v_W), parts_.orientation.braking_torque_W()};
 }
 
 // Judges whether a hand can have made this force, given the motion that followed.
@@ -388,7 +407,11 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   models::Pose X_WT = models::Pose::Identity();
   X_WT.translation() = sent_W();
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
+  const Eigen::Quaterniond& R_WT = parts_.orientation.R_WT();
+  cycle.record.proxy_q_W = {R_WT.x(), R_WT.y(), R_WT.z(), R_WT.w()};
+  if (parts_.orientation.config().free) cycle.record.proxy_inertia_kg_m2 = parts_.orientation.config().inertia_kg_m2;
   const Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
+  const models::Mat3 reached_k1_rotation = solution_.kinematics.X_WT.linear();
   const JointVector link_k1_rad = state_.link_rad;
   parts_.inverse.solve(state_.link_rad, X_WT, solution_);
   if (solution_.status == models::InverseKinematicsResult::Status::invalid) return cycle.alarm.raise(Fault::singular);
@@ -398,10 +421,20 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     tool_guard_.strain();
     shorten_step(link_k1_rad, reached_k1_W);
     const Vec3& reached_W = solution_.kinematics.X_WT.translation();
+    if (parts_.orientation.config().free) turn_on_from(reached_k1_rotation);
     go_on_from(reached_W, (reached_W - reached_k1_W) / period_s_);
   }
   state_.link_step_rad = state_.link_rad - link_k1_rad;
   move_motors(parts_.elastic.step(state_.link_rad), cycle.measured);
+}
+
+// The tool turns on from the orientation that the arm has reached.
+void AdmittanceMotion::turn_on_from(const models::Mat3& reached_k1) noexcept {
+  const Eigen::Quaterniond reached = orientation_of(solution_.kinematics.X_WT);
+  const Eigen::AngleAxisd turn(reached * Eigen::Quaterniond(reached_k1).conjugate());
+  const Vec3 omega_W = turn.angle() / period_s_ * turn.axis();
+  parts_.orientation.resume(reached, omega_W);
+  if (pose() != nullptr) pose()->turn_to(reached, omega_W);
 }
 
 // If inverse kinematics doesn't converge, its step may be as large as the joints' speeds allow and may change direction
@@ -520,9 +553,13 @@ void AdmittanceMotion::wind_back(std::uint8_t blocked) noexcept {
   state_.link_step_rad = period_s_ * speed;
   arm_.kinematics(state_.link_rad, solution_.kinematics);
   const Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
+  const Vec3 omega_W = solution_.kinematics.J_W.bottomRows<3>() * speed;
+  const Eigen::Quaterniond R_WT = orientation_of(solution_.kinematics.X_WT);
+  parts_.orientation.resume(R_WT, omega_W);
+  if (pose() != nullptr) pose()->turn_to(R_WT, omega_W);
   go_on_from(solution_.kinematics.X_WT.translation(), velocity_W);
+  if (pose() != nullptr) parts_.orientation.resume(pose()->orientation(), omega_W);
   state_.q_k2_W = state_.q_k1_W - period_s_ * velocity_W;
-  parts_.orientation.start(orientation_of(solution_.kinematics.X_WT));
 }
 
 }  // namespace proxarm::controller

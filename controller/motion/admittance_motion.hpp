@@ -87,6 +87,9 @@ class AdmittanceMotion final : public Motion {
     bool freeing = false;                               // the tool is being freed: it moves without the scene
   };
 
+  // Null while the tool is freed, which is without the scene.
+  [[nodiscard]] PoseWorld* pose() noexcept { return state_.freeing ? nullptr : parts_.pose; }
+  [[nodiscard]] ProxyFault turn(const models::Vec3& torque_W) noexcept;
   [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
   void make_limits(const MotionCycle& cycle) noexcept;
   void make_sent_limits(StepStart start) noexcept;
@@ -94,6 +97,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
   // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
+  void turn_on_from(const models::Mat3& reached_k1) noexcept;
   void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
   void let_force_in(CycleRecord& record) noexcept;

@@ -11,6 +11,7 @@
 #include "controller/motion/release.hpp"
 #include "controller/motion/wrench_compensation.hpp"
 #include "controller/proxies/orientation_proxy.hpp"
+#include "controller/rendering/pose_world.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/torque_rendering.hpp"
 #include "controller/setpoints/elastic_setpoint.hpp"
@@ -47,7 +48,9 @@ struct AdmittanceParts {
   models::InverseKinematics inverse;
   ElasticSetpoint elastic;
   std::unique_ptr<RenderedWorld> world;
+  PoseWorld* pose;  // the same world, where a rigid tool is rendered; null: a point
   OrientationProxy orientation;
+  models::Mat3 behind_sensor_T;  // inertia of the tool behind the sensor, as in OrientationConfig
   std::unique_ptr<Release> release;
 };
 

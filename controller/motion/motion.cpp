@@ -10,6 +10,7 @@ namespace proxarm::controller {
 void record_world(const WorldStep& step, CycleRecord& record) noexcept {
   record.p_hat_W_m = triple(step.p_hat_W);
   record.contact_force_W_N = triple(step.f_W);
+  record.contact_torque_W_Nm = triple(step.torque_W);
   record.normal_W = triple(step.normal_W);
   record.contact_object = step.object;
   record.friction = step.friction;
@@ -20,6 +21,7 @@ void record_world(const WorldStep& step, CycleRecord& record) noexcept {
   }
   record.proxy_mass_kg = step.mass_kg;
   record.proxy_damping_Ns_per_m = step.damping_Ns_per_m;
+  record.set(RecordFlag::unresolved, step.unresolved);
   record.contact_count = static_cast<std::uint8_t>(step.contacts);
   record.contact = step.contacts == 0 ? ContactPhase::free : step.slips ? ContactPhase::slip : ContactPhase::stick;
 }

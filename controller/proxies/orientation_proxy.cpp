@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "models/base/option_check.hpp"
 
 namespace proxarm::controller {
 namespace {
 
+using models::Mat3;
 using models::Vec3;
 
 // exp([φ]ₓ) as a unit quaternion. Below 1e-8 rad, sin(φ/2)/φ is ½ to the last bit of double.
@@ -28,10 +28,16 @@ Vec3 rotation_vector(const Eigen::Quaterniond& q) noexcept {
   return 2.0 * std::atan2(sine, std::abs(q.w())) / sine * axis;
 }
 
+bool is_unit(const Eigen::Quaterniond& R) noexcept {
+  const double norm = R.norm();
+  return std::isfinite(norm) && std::abs(norm - 1.0) <= 1e-6;
+}
+
 }  // namespace
 
 void OrientationConfig::validate() const {
   require_option(is_positive(inertia_kg_m2), "orientation.inertia", inertia_kg_m2, "kg m², above 0");
+  require_option(is_not_negative(spring_Nm_per_rad), "orientation.spring", spring_Nm_per_rad, "Nm/rad, 0 or more");
   require_option(is_not_negative(damping_Nms_per_rad), "orientation.damping", damping_Nms_per_rad,
                  "Nm s/rad, 0 or more");
   require_option(is_positive(max_speed_rad_per_s), "orientation.max_speed", max_speed_rad_per_s, "rad/s, above 0");
@@ -46,23 +52,76 @@ void OrientationConfig::validate() const {
 OrientationProxy::OrientationProxy(const OrientationConfig& config) : config_(config) { config_.validate(); }
 
 bool OrientationProxy::start(const Eigen::Quaterniond& R_WT) noexcept {
-  const double norm = R_WT.norm();
-  if (!std::isfinite(norm) || std::abs(norm - 1.0) > 1e-6) return false;
-  R_WT_ = R_start_ = R_WT.normalized();
-  omega_W_.setZero();
+  if (!resume(R_WT, Vec3::Zero())) return false;
+  R_ref_ = R_WT_;
+  if (!started_) R_start_ = R_WT_;
+  started_ = true;
+  return true;
+}
+
+bool OrientationProxy::resume(const Eigen::Quaterniond& R_WT, const Vec3& omega_W) noexcept {
+  if (!is_unit(R_WT) || !omega_W.allFinite()) return false;
+  R_WT_ = R_WT.normalized();
+  omega_W_ = omega_W;
   speed_limited_ = angle_limited_ = false;
   return true;
+}
+
+void OrientationProxy::set_inertia(double inertia_kg_m2, const Mat3& behind_sensor_T) noexcept {
+  if (!is_positive(inertia_kg_m2)) return;
+  config_.inertia_kg_m2 = inertia_kg_m2;
+  config_.behind_sensor_T = behind_sensor_T;
+}
+
+void OrientationProxy::set_damping(double damping_Nms_per_rad) noexcept {
+  if (is_not_negative(damping_Nms_per_rad)) config_.damping_Nms_per_rad = damping_Nms_per_rad;
+}
+
+// K'φ' = Kφ keeps the torque when K becomes K'. A spring that becomes softer throws nobody, so its reference stays.
+void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
+  if (!is_not_negative(spring_Nm_per_rad)) return;
+  const double before = config_.spring_Nm_per_rad;
+  config_.spring_Nm_per_rad = spring_Nm_per_rad;
+  if (!(spring_Nm_per_rad > before)) return;
+  const Vec3 phi = rotation_vector(R_WT_ * R_ref_.conjugate());
+  R_ref_ = (rotation(-before / spring_Nm_per_rad * phi) * R_WT_).normalized();
+}
+
+// With the default damping, J/D is `braking_s` already, and nothing is added.
+Vec3 OrientationProxy::braking_torque_W() const noexcept {
+  const double wanted = config_.inertia_kg_m2 / braking_s;
+  if (!(wanted > config_.damping_Nms_per_rad)) return Vec3::Zero();
+  return -(wanted - config_.damping_Nms_per_rad) * omega_W_;
+}
+
+void OrientationProxy::return_reference() noexcept {
+  const Vec3 way = rotation_vector(R_start_ * R_ref_.conjugate());
+  const double left = way.norm(), step = reference_rad_per_s * config_.period_s;
+  if (left == 0.0) return;
+  R_ref_ = left <= step ? R_start_ : (rotation(step / left * way) * R_ref_).normalized();
+}
+
+Vec3 OrientationProxy::next_velocity(const Vec3& torque_W_Nm) noexcept {
+  const double J = config_.inertia_kg_m2, D = config_.damping_Nms_per_rad, T = config_.period_s;
+  const double K = config_.spring_Nm_per_rad;
+  if (K == 0.0 && config_.behind_sensor_T.isZero(0.0)) return (J * omega_W_ + T * torque_W_Nm) / (J + T * D);
+  const Mat3 R = R_WT_.toRotationMatrix(), I = R * config_.behind_sensor_T * R.transpose();
+  const Vec3 impulse = T * (torque_W_Nm + omega_W_.cross(Vec3(I * omega_W_)));
+  const Mat3 A = (J + T * D + T * T * K) * Mat3::Identity() - I;
+  return A.inverse() * (J * omega_W_ - I * omega_W_ + impulse - T * K * rotation_vector(R_WT_ * R_ref_.conjugate()));
 }
 
 ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
   if (!torque_W_Nm.allFinite()) return ProxyFault::input_not_finite;
   if (!config_.free) return ProxyFault::none;
-  const double J = config_.inertia_kg_m2, D = config_.damping_Nms_per_rad, T = config_.period_s;
-  Vec3 omega = (J * omega_W_ + T * torque_W_Nm) / (J + T * D);
+  const double T = config_.period_s;
+  if (config_.spring_Nm_per_rad > 0.0) return_reference();
+  Vec3 omega = next_velocity(torque_W_Nm);
   if (!std::isfinite(omega.norm())) return ProxyFault::result_not_finite;
 
-  const bool too_fast = omega.norm() > config_.max_speed_rad_per_s;
-  if (too_fast) omega *= config_.max_speed_rad_per_s / omega.norm();
+  const double fastest = speed_share_ * config_.max_speed_rad_per_s;
+  const bool too_fast = omega.norm() > fastest;
+  if (too_fast) omega *= fastest / omega.norm();
   Eigen::Quaterniond R = (rotation(T * omega) * R_WT_).normalized();
 
   // With R = exp([φ]ₓ) R_start, ‖φ‖ ≤ max_angle. A step that leaves this set is projected onto its border (the nearest

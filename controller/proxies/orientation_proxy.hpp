@@ -1,13 +1,24 @@
-// The tool's orientation: it is held, or it turns freely with an inertia and a damping of its own.
+// The tool's orientation: it is held, or it turns freely with an inertia, a damping and a spring of its own. Held is the
+// same with J → ∞.
 //
-//   J dω/dt + Dω = τ,  dR/dt = [ω]ₓ R     J, D scalars: a ball, so no gyroscopic terms and no preferred axis
-//   ω(k) = (J ω(k−1) + T τ(k)) / (J + T D)          implicit in D: no damping is too strong
+//   J dω/dt + Dω + K φ = τ,  dR/dt = [ω]ₓ R     J, D, K scalars: a ball, so no preferred axis; R = exp([φ]ₓ) R_ref
+//   ω(k) = (J + T D + T² K)⁻¹ (J ω(k−1) + T τ(k) − T K φ(k−1))      implicit in D and K: none is too strong
 //   R(k) = exp([T ω(k)]ₓ) R(k−1)
-// For small angles this is (26) with B, its label included: R(k) is the orientation at t_{k+1}. Without damping a
-// constant torque gives the exact parabola of angles; with it ω tends to τ/D for any T.
+// For small angles this is (26) with B and K_v, its label included: R(k) is the orientation at t_{k+1}. Without damping
+// a constant torque gives the exact parabola of angles; with it ω tends to τ/D for any T.
 //
-// Two limits, neither of which depends on T: the speed, and the angle from the orientation at the start. They are sets
-// onto which the motion is projected. The projected motion becomes the history, so nothing winds up.
+// What hangs behind the sensor is felt by itself, as it is with the mass. Its inertia I about the rendered point is a
+// tensor that turns with the tool, so the proxy has J E − R I Rᵀ in the place of J, and gets back the gyroscopic torque
+// that the sensor reads, ω × R I Rᵀ ω. What the hand feels is then J about every axis. (The tool's centre of mass beside
+// the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
+// pose_proxy.hpp.)
+//
+// Two limits, neither of which depends on T: the speed, and the angle from the orientation at the first start. They are
+// sets onto which the motion is projected. The projected motion becomes the history, so nothing winds up.
+//
+// The spring's R_ref is the orientation at the first start, but for a while after the spring has become stiffer and
+// after a hold: then it is where the spring's torque is what it was (zero after a hold), and returns at
+// `reference_rad_per_s`. So nothing jumps.
 //
 // τ is the torque about the rendered point, in W; R_WT is a quaternion that is kept unit. One caller at a time. step()
 // is for the cycle: it neither allocates, locks, throws nor prints.
@@ -22,9 +33,11 @@
 namespace proxarm::controller {
 
 struct OrientationConfig {
-  bool free = false;                 // false: held as it was at the start
-  double inertia_kg_m2 = 0.05;       // J > 0
-  double damping_Nms_per_rad = 0.5;  // D ≥ 0
+  bool free = false;                              // false: held as it was at the start
+  double inertia_kg_m2 = 0.05;                    // J > 0; the felt one, more than `behind_sensor_T` has about any axis
+  models::Mat3 behind_sensor_T = models::Mat3::Zero();  // I, about the rendered point, along T's axes; kg m²
+  double damping_Nms_per_rad = 0.5;               // D ≥ 0
+  double spring_Nm_per_rad = 0.0;                 // K ≥ 0
   double max_speed_rad_per_s = 2.0;  // > 0, at most 0.1 rad in a period
   double max_angle_rad = 0.7;        // from the orientation at the start; 0..3
   double period_s = 1e-3;            // T > 0
@@ -39,8 +52,20 @@ class OrientationProxy {
 
   // Precondition: the configuration with this period passes validate().
   void set_period(double period_s) noexcept { config_.period_s = period_s; }
-  // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing.
+  // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing. The first start
+  // is where the range of angles and the spring are counted from; a later one is after a hold.
   bool start(const Eigen::Quaterniond& R_WT) noexcept;
+  // The arm couldn't follow: the motion goes on from here with this angular velocity.
+  bool resume(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
+  // Take effect with the next step, without a jump. A value out of range changes nothing.
+  void set_inertia(double inertia_kg_m2, const models::Mat3& behind_sensor_T) noexcept;
+  void set_damping(double damping_Nms_per_rad) noexcept;
+  void set_spring(double spring_Nm_per_rad) noexcept;
+  // The torque of a damping that brings the tool to rest within `braking_s`, for the next step: beyond its own D.
+  // Precondition: nobody holds the handle.
+  [[nodiscard]] models::Vec3 braking_torque_W() const noexcept;
+  // A share of the speed limit, from 0 to 1, while the tool is slowed.
+  void limit_speed(double share) noexcept { speed_share_ = share; }
   // One period under the torque τ(k). After a fault nothing has changed.
   [[nodiscard]] ProxyFault step(const models::Vec3& torque_W_Nm) noexcept;
 
@@ -49,13 +74,25 @@ class OrientationProxy {
   [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }        // in the last step
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
   [[nodiscard]] const OrientationConfig& config() const noexcept { return config_; }
-  void archive(fieldbus::StateArchive& state) noexcept { state(R_WT_, R_start_, omega_W_); }
+  void archive(fieldbus::StateArchive& state) noexcept {
+    state(R_WT_, R_start_, R_ref_, omega_W_, speed_share_, started_, config_.inertia_kg_m2, config_.behind_sensor_T,
+          config_.damping_Nms_per_rad, config_.spring_Nm_per_rad);
+  }
+
+  static constexpr double reference_rad_per_s = 0.1;  // of R_ref on its way back
+  static constexpr double braking_s = 0.1;            // J/D with the default inertia and damping
 
  private:
+  [[nodiscard]] models::Vec3 next_velocity(const models::Vec3& torque_W_Nm) noexcept;
+  void return_reference() noexcept;
+
   OrientationConfig config_;
   Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();
   Eigen::Quaterniond R_start_ = Eigen::Quaterniond::Identity();
+  Eigen::Quaterniond R_ref_ = Eigen::Quaterniond::Identity();
   models::Vec3 omega_W_ = models::Vec3::Zero();
+  double speed_share_ = 1.0;
+  bool started_ = false;
   bool speed_limited_ = false, angle_limited_ = false;
 };
 

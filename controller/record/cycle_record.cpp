@@ -56,6 +56,8 @@ const char* flag_name(RecordFlag flag) noexcept {
       return "oscillation";
     case RecordFlag::power_cut:
       return "power_cut";
+    case RecordFlag::unresolved:
+      return "unresolved";
     case RecordFlag::timestep:
       return "timestep";
     case RecordFlag::guard_speed:

@@ -49,6 +49,7 @@ enum class RecordFlag : std::uint32_t {
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
   oscillation_lasts = 1u << 26,
   power_cut = 1u << 27,  // the drives are told to lose their power at once: a stop of category 0
+  unresolved = 1u << 28,  // of a rigid tool: no solution was found that keeps all laws of contact
 };
 
 // As signals.csv has it.
@@ -128,6 +129,10 @@ struct CycleRecord {
 
   double proxy_mass_kg = 0.0, proxy_damping_Ns_per_m = 0.0;  // M and B of this step; impedance type: 0
 
+  std::array<double, 4> proxy_q_W{0.0, 0.0, 0.0, 1.0};  // the proxy's orientation: x y z w
+  Triple contact_torque_W_Nm{};                         // of the contacts on the proxy, about the rendered point
+  double proxy_inertia_kg_m2 = 0.0;                     // J of this step, felt; 0: the orientation is held
+
   // Of PassivityObserver, where it is wanted.
   PortEnergies energies_J{};
   double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
@@ -137,7 +142,7 @@ struct CycleRecord {
 
   // The simulation's truth at t_k (flag `truth`).
   Triple true_tool_W_m{};
-  Triple hand_force_W_N{};                                  // of the hand on the tool
+  Triple hand_force_W_N{}, hand_torque_W_Nm{};              // of the hand on the tool, about the rendered point
   std::array<double, 4> true_tool_q_W{0.0, 0.0, 0.0, 1.0};  // its orientation: x y z w
   Triple true_acceleration_W_m_per_s2{};
 

@@ -13,24 +13,24 @@ using description::SetupError;
 // An upper bound of what a file may claim, far above what a cycle gets: a period of 100 ms on eight buses at 1 Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
-constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', ' ', '7'};
+constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', ' ', '8'};
 
 [[noreturn]] void cannot_write(const fs::path& file, const std::string& found) {
   throw SetupError({.file = file.string(), .found = found, .expected = "a file that can be written"});
 }
 
 void archive(fieldbus::StateArchive& state, SessionSettings& s) noexcept {
-  static_assert(sizeof(SessionSettings) == 176, "a new setting belongs into this list");
+  static_assert(sizeof(SessionSettings) == 184, "a new setting belongs into this list");
   state(s.scheme, s.coupling_stiffness_N_per_m, s.coupling_damping_Ns_per_m, s.period_s, s.receive_window, s.mass_kg,
         s.damping_Ns_per_m, s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.orientation, s.passivity,
-        s.force_age_s, s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad, s.tare_s, s.tare_spread_N,
+        s.force_age_s, s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad, s.rotational_spring_Nm_per_rad, s.tare_s, s.tare_spread_N,
         s.enable_timeout_s, s.enabling_timeout_s, s.wait_after_fault_s, s.without_enabling_input, s.max_missed_samples,
         s.max_repeated_samples, s.max_missed_feedback, s.max_overruns);
 }
 
 void archive(fieldbus::StateArchive& state, ReplayHead& head) noexcept {
   archive(state, head.settings);
-  state(head.axes, head.buses, head.bus_of_cell_bus, head.bus_names, head.cell, head.scene, head.first_cycle);
+  state(head.axes, head.buses, head.bus_of_cell_bus, head.bus_names, head.cell, head.scene, head.tool, head.first_cycle);
 }
 
 // False where the counts are out of range.
@@ -92,6 +92,10 @@ fs::path recorded_file(const fs::path& folder, const char* name) {
       {.file = folder.string(), .found = description::in_quotes(name), .expected = "a file of the record"});
 }
 
+fs::path recorded_tool(const fs::path& folder, const ReplayHead& head) {
+  return head.tool[0] == '\0' ? fs::path() : recorded_file(folder, head.tool.data());
+}
+
 // ---- writing
 
 ReplayWriter::ReplayWriter(const fs::path& file, ReplayHead head, std::vector<std::byte> state)
@@ -138,7 +142,8 @@ void ReplayRecorder::drain(const ReplayHead& head) {
     if (!box_.oldest_state(next_, state)) return;
     ReplayHead written = head;
     written.first_cycle = next_;
-    for (auto* name : {&written.cell, &written.scene}) {
+    for (auto* name : {&written.cell, &written.scene, &written.tool}) {
+      if ((*name)[0] == '\0') continue;
       const std::string relative = fs::path(name->data()).lexically_relative(common_).string();
       if (relative.size() >= name->size()) cannot_write(folder_, "a path that is too long");
       name->fill('\0');
@@ -194,7 +199,7 @@ ReplayReader::ReplayReader(const fs::path& file) : name_(file) {
   const auto ended = [](const auto& text) { return is_ended(text); };
   const auto known = [this](std::uint8_t bus) { return bus < head_.buses; };
   if (head_.axes > max_axes || head_.buses == 0 || head_.buses > max_buses || !is_ended(head_.cell) ||
-      !is_ended(head_.scene) || !std::all_of(head_.bus_names.begin(), head_.bus_names.end(), ended) ||
+      !is_ended(head_.scene) || !is_ended(head_.tool) || !std::all_of(head_.bus_names.begin(), head_.bus_names.end(), ended) ||
       !std::all_of(head_.bus_of_cell_bus.begin(), head_.bus_of_cell_bus.end(), known)) {
     refuse("a head that is damaged");
   }

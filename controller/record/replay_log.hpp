@@ -28,7 +28,8 @@ struct ReplayHead {
   std::uint32_t buses = 0;                                  // of the network
   std::array<std::uint8_t, max_buses> bus_of_cell_bus{};    // index in the network
   std::array<std::array<char, 32>, max_buses> bus_names{};  // of the network's, ended by 0
-  std::array<char, 512> cell{}, scene{};                    // files, ended by 0; in a file relative to files/
+  std::array<char, 512> cell{}, scene{}, tool{};            // files, ended by 0; in a file relative to files/. An empty
+                                                            // tool is a point; the scene's own has the scene's file
   std::uint64_t first_cycle = 0;
 };
 static_assert(std::is_trivially_copyable_v<ReplayHead>);
@@ -73,6 +74,8 @@ class ReplayRecorder {
 
 // A file of the record (ReplayHead::cell, scene), and nowhere else. Throws SetupError.
 std::filesystem::path recorded_file(const std::filesystem::path& folder, const char* name);
+// That of ReplayHead::tool; empty where a point was rendered.
+std::filesystem::path recorded_tool(const std::filesystem::path& folder, const ReplayHead& head);
 
 // Reads cycles.bin. Throws SetupError for a file of another kind or of another version.
 class ReplayReader {

@@ -8,11 +8,24 @@
 
 namespace proxarm::controller {
 
-enum class Parameter : std::uint8_t { none, mass, damping, spring, friction, position, lookahead };
+enum class Parameter : std::uint8_t {
+  none,
+  mass,
+  damping,
+  spring,
+  friction,
+  position,
+  lookahead,
+  inertia,
+  turning_damping,
+  turning_spring
+};
 
 struct Change {
   Parameter parameter = Parameter::none;
-  double value = 0.0;  // for the proxy: kg (felt mass less the tool's), Ns/m, N/m; for an object: μ; for the horizon: s
+  // For the proxy: kg (felt mass less the tool's), Ns/m, N/m; for its rotation kg m² (felt), Nms/rad, Nm/rad; for an
+  // object: μ; for the horizon: s.
+  double value = 0.0;
   std::int32_t object = -1;            // index of the object in the scene
   std::array<double, 3> position_m{};  // displacement of a driven object from where the scene describes it
   double period_s = 0.0;    // T that it was checked for; at another one the change is left out. 0: good for any

@@ -150,6 +150,9 @@ class WorldOfDimension final : public RenderedWorld {
         changes_.set(change);
         break;
       case Parameter::lookahead:
+      case Parameter::inertia:
+      case Parameter::turning_damping:
+      case Parameter::turning_spring:
       case Parameter::none:
         break;
     }

@@ -6,8 +6,8 @@
 namespace proxarm::controller {
 
 enum class OrientationMode : std::uint8_t {
-  held,  // the tool keeps the orientation of the start
-  free,  // the tool turns under the hand's torque with an inertia and a damping of its own
+  held,  // the tool keeps the orientation of the start, as with an inertia beyond all bounds
+  free,  // the tool turns under the hand's torque with an inertia, a damping and a spring of its own
 };
 
 enum class Scheme : std::uint8_t {
@@ -21,6 +21,9 @@ enum class Passivity : std::uint8_t {
   automatic,  // besides, damping is added against oscillations that last
   on,         // damping is added against any oscillation at once
 };
+
+// The inertia beyond the tool's own where none is asked for.
+inline constexpr double default_inertia_kg_m2 = 0.05;
 
 struct SessionSettings {
   Scheme scheme = Scheme::admittance;
@@ -37,8 +40,10 @@ struct SessionSettings {
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
   double force_age_s = 0.0;  // the age of the sensor's readings on arrival, for the passivity observer
-  double rotational_inertia_kg_m2 = 0.05;
+  // What the hand feels of the tool's rotation, tool behind the sensor included; 0: `default_inertia_kg_m2` more.
+  double rotational_inertia_kg_m2 = 0.0;
   double rotational_damping_Nms_per_rad = 0.5;
+  double rotational_spring_Nm_per_rad = 0.0;  // to the orientation of the start
 
   double tare_s = 0.2;         // how long readings at rest are averaged before rendering
   double tare_spread_N = 5.0;  // a reading that differs from the mean by this much means that a hand is on the handle

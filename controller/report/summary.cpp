@@ -92,7 +92,11 @@ bool limited(const CycleRecord& record) {
 
 struct SummaryBuilder::State {
   explicit State(const SummaryConfig& c)
-      : config(c), apparent(c.period_s), felt(c.period_s), period_ns(std::llround(1e9 * c.period_s)) {}
+      : config(c),
+        apparent(c.period_s),
+        felt(c.period_s),
+        apparent_turning(c.period_s),
+        period_ns(std::llround(1e9 * c.period_s)) {}
 
   void count(const CycleRecord& record);
   void count_limit(const std::string& parameter, RecordFlag flag, const CycleRecord& record);
@@ -103,6 +107,7 @@ struct SummaryBuilder::State {
   void take_period(std::int64_t period_ns);
   void penetrate(const CycleRecord& record);
   void middle(const CycleRecord& before, const CycleRecord& now, const CycleRecord& after);
+  void turn(const CycleRecord& now);
   void slide(const CycleRecord& now, const Vec3& resistance);
 
   SummaryConfig config;
@@ -112,6 +117,9 @@ struct SummaryBuilder::State {
   Spread tracking, lagging, contact_force;
   ApparentMass apparent;
   FeltMassCurve felt;
+  ApparentMass apparent_turning;         // the same with angles and torques
+  std::optional<Eigen::Quaterniond> R0;  // where rendering began
+  double inertia_kg_m2 = 0.0;            // of the proxy, in the record before
   OscillationWatch oscillation;
   Slide sliding;
   double contact_s = 0.0;  // how long the contact has lasted
@@ -138,6 +146,7 @@ void SummaryBuilder::add(const CycleRecord& record) {
     s.recent.clear();
     s.apparent.end_segment();
     s.felt.end_segment();
+    s.apparent_turning.end_segment();
     s.oscillation.reset();
     s.contact_s = 0.0;
   }
@@ -167,6 +176,7 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (record.has(RecordFlag::overrun)) ++summary.overruns;
   if (record.phase != Phase::rendering) return;
   if (record.has(RecordFlag::sample_held)) ++summary.held_samples;
+  if (record.has(RecordFlag::unresolved)) ++summary.unresolved_steps;
   if (record.has(RecordFlag::hands_off)) summary.hands_off_s += 1e-9 * static_cast<double>(record.period_ns);
   if (limited(record)) ++summary.limited_cycles;
   if (record.has(RecordFlag::limit_orientation)) count_limit("orientation", RecordFlag::limit_orientation, record);
@@ -196,6 +206,11 @@ void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
     mass_kg = record.proxy_mass_kg;
   }
   if (mass_kg > 0.0) config.damping_Ns_per_m = record.proxy_damping_Ns_per_m;
+  if (inertia_kg_m2 > 0.0 && record.proxy_inertia_kg_m2 != inertia_kg_m2) {
+    config.wanted_inertia_kg_m2 = record.proxy_inertia_kg_m2;
+    apparent_turning = ApparentMass(config.period_s);
+  }
+  inertia_kg_m2 = record.proxy_inertia_kg_m2;
 }
 
 // Nothing is rendered while the timestep is being changed, and the figures go on with the new one. The apparent mass is
@@ -224,7 +239,7 @@ void SummaryBuilder::State::take_period(std::int64_t ns) {
   period_ns = ns;
   config.period_s = seconds(ns);
   config.setpoint_delay_cycles = 2 + static_cast<int>(std::lround(config.setpoint_filter_s / config.period_s));
-  apparent = ApparentMass(config.period_s);
+  apparent = apparent_turning = ApparentMass(config.period_s);
   felt = FeltMassCurve(config.period_s);
 }
 
@@ -298,11 +313,13 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
     if (vec3(now.contact_force_W_N).norm() < free_force_N && !limited(now) && !now.has(RecordFlag::ramp_in) &&
         !now.has(RecordFlag::hands_off)) {
       felt.add(hand - spring, x);
+      if (truth && now.proxy_inertia_kg_m2 > 0.0) turn(now);
       return apparent.add(hand - spring, x);
     }
   }
   apparent.end_segment();
   felt.end_segment();
+  apparent_turning.end_segment();
   if (now.contact == ContactPhase::free) return;
   // `contact_s` is that of `after`: one period more than that of `now`, unless the contact ends there.
   const bool established = after.contact != ContactPhase::free && contact_s - T > config.touch_s;
@@ -321,6 +338,15 @@ void SummaryBuilder::State::middle(const CycleRecord& before, const CycleRecord&
   }
 }
 
+void SummaryBuilder::State::turn(const CycleRecord& now) {
+  const auto& q = now.true_tool_q_W;
+  const Eigen::Quaterniond R(q[3], q[0], q[1], q[2]);
+  if (!R0) R0 = R;
+  const Eigen::AngleAxisd turned(R * R0->conjugate());
+  const Vec3 phi = turned.angle() * turned.axis();
+  apparent_turning.add(vec3(now.hand_torque_W_Nm) - config.turning_spring_Nm_per_rad * phi, phi);
+}
+
 void SummaryBuilder::State::slide(const CycleRecord& now, const Vec3& resistance) {
   if (now.contact != ContactPhase::slip || !(now.friction > 0.0) || now.contact_count > 1) return;
   const Vec3 n = vec3(now.normal_W);
@@ -337,6 +363,7 @@ Oscillation SummaryBuilder::oscillation() const { return state_->oscillation.pre
 Summary SummaryBuilder::finish() {
   State& s = *state_;
   s.apparent.end_segment();
+  s.apparent_turning.end_segment();
   Summary summary = s.summary;
   summary.simulated_time_s = seconds(s.all_ns);
   summary.rendered_time_s = seconds(s.rendered_ns);
@@ -353,6 +380,11 @@ Summary SummaryBuilder::finish() {
     summary.apparent_mass_kg = apparent->mass_kg;
     summary.apparent_damping_Ns_per_m = apparent->damping_Ns_per_m;
   }
+  if (const auto apparent = s.apparent_turning.estimate()) {
+    summary.apparent_inertia_kg_m2 = apparent->mass_kg;
+    summary.apparent_turning_damping_Nms_per_rad = apparent->damping_Ns_per_m;
+  }
+  summary.wanted_inertia_kg_m2 = s.config.wanted_inertia_kg_m2;
   summary.contact_force_error_N = s.contact_force.rms();
   summary.contact_force_error_max_N = s.contact_force.largest();
   if (s.sliding.length_s >= shortest_slide_s && s.sliding.limit > 0.0) {

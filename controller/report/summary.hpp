@@ -20,15 +20,15 @@
 //   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while no limit acts and the world's
 //                           force on the proxy is below 1 mN (apparent_mass.hpp);
 //                           apparent_damping_Ns_per_m is its Im
-//   felt_mass, _band_Hz     F_h/a by frequency, and up to which one |F_h/a − M|/M is at most so much, where the same
-//   free
+//   felt_mass, _band_Hz     F_h/a by frequency, and up to which one |F_h/a − M|/M is at most so much, where the same free
 //                           motion excites it (FeltMassCurve)
+//   apparent_inertia_kg_m2  the same of the tool's rotation, from the hand's torque about the rendered point and the
+//                           tool's rotation vector from where rendering began; of simulations whose tool turns
 //   contact_force_error_N   root mean square, over cycles of established contact, of n·f − push, where
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
 //                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
 //                           Impedance type: push = −n·F_h, so that it has the device's own friction and inertia, too
-//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, and t against the friction in
-//   f,
+//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, and t against the friction in f,
 //                           which is the direction of the slide relative to the surface, also where that moves: over
 //                           all cycles that slip on one thing, from settle_s after the contact began; at least 0.1 s
 //   pulling_force_max_N     max(0, −n·f) over all cycles in contact with one thing
@@ -58,6 +58,8 @@ struct SummaryConfig {
   double handle_mass_kg = 0.0;    // m: what moves after the sensor
   double damping_Ns_per_m = 0.0;  // B
   double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
+  double wanted_inertia_kg_m2 = 0.0;      // what the hand is to feel; 0: the orientation is held
+  double turning_spring_Nm_per_rad = 0.0;  // to the orientation at the start
   int setpoint_delay_cycles = 2;
   double setpoint_filter_s = 0.0;            // of that delay, what the filter takes: for another period
   double touch_s = 0.1;                      // how long a contact counts as a touch
@@ -175,6 +177,7 @@ struct Summary {
   std::optional<double> tracking_lag_rms_m, tracking_lag_max_m;  // and not
   double tracking_delay_s = 0.0;                                 // what is taken off
   std::optional<double> apparent_mass_kg, apparent_damping_Ns_per_m;
+  std::optional<double> apparent_inertia_kg_m2, apparent_turning_damping_Nms_per_rad;
   std::optional<double> contact_force_error_N, contact_force_error_max_N;
   std::optional<double> friction_ratio_error;
   double pulling_force_max_N = 0.0, drag_force_max_N = 0.0;
@@ -189,6 +192,7 @@ struct Summary {
   double lookahead_s = 0.0;                // horizon at the start; 0: none
   double hands_off_s = 0.0;                // nobody held the handle
   std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor
+  std::size_t unresolved_steps = 0;  // of a rigid tool: steps of 𝒢 that keep not all laws
   EndSummary end;                          // set by the caller
   std::vector<OrderSummary> idle_orders;   // set by the caller
   std::vector<std::string> drives_lack;    // what drives haven't got, and what is lost by it; set by the caller
@@ -200,6 +204,7 @@ struct Summary {
   bool from_truth = false;
   std::string setpoint_sha256;
   double wanted_mass_kg = 0.0;  // as configured or set, for comparison
+  double wanted_inertia_kg_m2 = 0.0;  // likewise; 0: the orientation is held
 };
 
 class SummaryBuilder {

@@ -146,6 +146,10 @@ void add_repeatable(Json& json, const Summary& s) {
   json["apparent_damping_Ns_per_m"] = s.apparent_damping_Ns_per_m;
   json["felt_mass"] = felt_mass(s);
   json["felt_mass_band_Hz"] = felt_bands(s);
+  json["unresolved_steps"] = s.unresolved_steps;
+  json["wanted_inertia_kg_m2"] = s.wanted_inertia_kg_m2 > 0.0 ? Json(s.wanted_inertia_kg_m2) : Json(nullptr);
+  json["apparent_inertia_kg_m2"] = s.apparent_inertia_kg_m2;
+  json["apparent_turning_damping_Nms_per_rad"] = s.apparent_turning_damping_Nms_per_rad;
   json["contact_force_error_N"] = s.contact_force_error_N;
   json["contact_force_error_max_N"] = s.contact_force_error_max_N;
   json["friction_ratio_error"] = s.friction_ratio_error;
@@ -314,6 +318,13 @@ void tell_motion(const Summary& s, Lines& line) {
            (s.wanted_mass_kg > 0.0 ? format(", wanted %.3f kg", s.wanted_mass_kg) : ", the device's own") +
            (s.apparent_damping_Ns_per_m ? format("; damping %.2f Ns/m", *s.apparent_damping_Ns_per_m) : "") +
            (s.limited_cycles > 0 ? "; where no limit acts" : ""));
+  if (s.wanted_inertia_kg_m2 > 0.0) {
+    line("apparent inertia", number(s.apparent_inertia_kg_m2, "%.5f kg m²") +
+                                 format(", wanted %.5f kg m²", s.wanted_inertia_kg_m2) +
+                                 (s.apparent_turning_damping_Nms_per_rad
+                                      ? format("; damping %.3f Nms/rad", *s.apparent_turning_damping_Nms_per_rad)
+                                      : ""));
+  }
   if (s.lookahead_s > 0.0)
     line("lookahead", format("%.3g ms: the arm is sent to where the proxy will be", 1e3 * s.lookahead_s));
   tell_felt_mass(s, line);
@@ -327,6 +338,9 @@ void tell_motion(const Summary& s, Lines& line) {
   } else {
     line("contact", std::to_string(s.contacts) + (s.contacts == 1 ? " touch, " : " touches, ") +
                         format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s));
+  }
+  if (s.unresolved_steps > 0) {
+    line("unresolved", std::to_string(s.unresolved_steps) + " steps that keep not all laws of contact");
   }
   line("penetration, proxy", length(s.penetration_max_m));
   line("penetration, tool", length(s.tool_penetration_max_m) + "; at the touch " +

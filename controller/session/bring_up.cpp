@@ -9,8 +9,10 @@
 #include "fieldbus/canopen/canopen_pdo.hpp"
 #include "fieldbus/sensors/ati_net_can_oem.hpp"
 #include "fieldbus/sensors/described_sensor.hpp"
+#include "models/arm/tool_inertia.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/eds_bitrates.hpp"
+#include "scenes/rigid/compile_rigid.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -163,12 +165,44 @@ double proxy_mass(const description::Cell& cell, const SessionSettings& settings
                     .advice = "ask for more mass, or use a lighter tool"});
 }
 
-OrientationConfig orientation_config(const SessionSettings& settings) {
+OrientationConfig orientation_config(const description::Cell& cell, const SessionSettings& settings) {
   OrientationConfig config;
   config.free = settings.orientation == OrientationMode::free;
-  config.inertia_kg_m2 = settings.rotational_inertia_kg_m2;
+  config.inertia_kg_m2 = default_inertia_kg_m2;
+  if (settings.rotational_inertia_kg_m2 > 0.0) {
+    config.inertia_kg_m2 = settings.rotational_inertia_kg_m2;
+    config.behind_sensor_T = models::tool_inertia(cell.tool).about_T_kg_m2;
+  }
   config.damping_Nms_per_rad = settings.rotational_damping_Nms_per_rad;
+  config.spring_Nm_per_rad = settings.rotational_spring_Nm_per_rad;
+  config.max_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
+  config.max_angle_rad = cell.limits.max_turn_rad;
   config.period_s = settings.period_s;
+  return config;
+}
+
+// Of a rigid tool. What hangs behind the sensor is taken off of the mass as of the inertia, also where none was asked
+// for.
+PoseWorldConfig pose_config(const description::Cell& cell, const scenes::CompiledScene& scene,
+                            const SessionSettings& settings) {
+  const models::ToolInertia behind = models::tool_inertia(cell.tool);
+  const double asked = settings.rotational_inertia_kg_m2;
+  PoseWorldConfig config;
+  config.proxy = {.mass_kg = proxy_mass(cell, settings),
+                  .inertia_kg_m2 = asked > 0.0 ? asked : default_inertia_kg_m2 + behind.largest_kg_m2,
+                  .damping_Ns_per_m = settings.damping_Ns_per_m,
+                  .spring_N_per_m = settings.spring_N_per_m,
+                  .turning_damping_Nms_per_rad = settings.rotational_damping_Nms_per_rad,
+                  .turning_spring_Nm_per_rad = settings.rotational_spring_Nm_per_rad,
+                  .held = settings.orientation == OrientationMode::held,
+                  .period_s = settings.period_s,
+                  .behind_mass_kg = behind.mass_kg,
+                  .behind_centre_T_m = behind.centre_T_m,
+                  .behind_inertia_T_kg_m2 = behind.about_T_kg_m2};
+  config.max_turning_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
+  config.max_turn_rad = cell.limits.max_turn_rad;
+  config.object_friction = scene.frictions;
+  for (const models::ToolPart& part : scene.source->tool->shape.parts) config.part_friction.push_back(part.friction);
   return config;
 }
 
@@ -184,10 +218,22 @@ decltype(CycleParts::rendering) build_rendering(const description::Cell& cell, s
     return make_torque_rendering(scene, arm, cell.drives, cell.limits, impedance_config(settings));
   }
   const models::InverseKinematicsConfig steps{.max_step_rad = max_steps_rad(cell.drives, settings.period_s)};
+  std::unique_ptr<RenderedWorld> world;
+  PoseWorld* pose = nullptr;
+  if (scene.source->tool) {
+    auto rigid = std::make_unique<PoseWorld>(scenes::compile_rigid(*scene.source, scene.source->tool->shape),
+                                             pose_config(cell, scene, settings));
+    pose = rigid.get();
+    world = std::move(rigid);
+  } else {
+    world = make_rendered_world(scene, settings, proxy_mass(cell, settings));
+  }
   return AdmittanceParts{.inverse = models::InverseKinematics(arm, steps),
                          .elastic = ElasticSetpoint(arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s),
-                         .world = make_rendered_world(scene, settings, proxy_mass(cell, settings)),
-                         .orientation = OrientationProxy(orientation_config(settings)),
+                         .world = std::move(world),
+                         .pose = pose,
+                         .orientation = OrientationProxy(orientation_config(cell, settings)),
+                         .behind_sensor_T = models::tool_inertia(cell.tool).about_T_kg_m2,
                          .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
 }
 
@@ -244,7 +290,7 @@ void require_timestep(const description::Cell& cell, const SessionSettings& sett
   for (const description::DriveDescription& drive : cell.drives) {
     if (drive.on_can()) (void)make_can_drive(cell, drive, settings);
   }
-  orientation_config(settings).validate();
+  orientation_config(cell, settings).validate();
 }
 
 ModbusOpener opener_of(fieldbus::ModbusPeers peers) {

@@ -12,4 +12,14 @@ void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_
   record.tool_clearance_m = scenes::tool_clearance_m(scene, tool_W, proxy_W, scene_time_s, scenes::Driven::left_out);
 }
 
+void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid) {
+  const auto clearance_m = [&](const Triple& x_W, const std::array<double, 4>& q) {
+    return rigid.clearance_m({vec3(x_W), models::Quaternion(q[3], q[0], q[1], q[2])});
+  };
+  const bool truth = record.has(RecordFlag::truth);
+  record.proxy_clearance_m = clearance_m(record.proxy_W_m, record.proxy_q_W);
+  record.tool_clearance_m = truth ? clearance_m(record.true_tool_W_m, record.true_tool_q_W)
+                                  : clearance_m(record.tool_W_m, record.proxy_q_W);
+}
+
 }  // namespace proxarm::controller

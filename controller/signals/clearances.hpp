@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "controller/record/cycle_record.hpp"
+#include "models/geometry/pose_algorithm.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::controller {
@@ -11,5 +12,9 @@ namespace proxarm::controller {
 // Sets both clearances of a record, after so much rendering. The tool is where the
 // simulation's truth has it, else where the encoders do.
 void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_t rendered_ns);
+
+// The same of a rigid tool, by the poses of proxy and tool. Without the simulation's truth the tool is taken to have the
+// proxy's orientation: the record has no other.
+void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid);
 
 }  // namespace proxarm::controller

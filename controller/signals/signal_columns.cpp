@@ -62,6 +62,7 @@ constexpr std::array written_flags{RecordFlag::sample_held,
                                    RecordFlag::ramp_in,
                                    RecordFlag::slowed,
                                    RecordFlag::power_cut,
+                                   RecordFlag::unresolved,
                                    RecordFlag::hands_off};
 
 void append_flags(std::string& row, const CycleRecord& record) {
@@ -103,6 +104,18 @@ void append_more(std::string& row, const CycleRecord& r, std::size_t axes, bool 
     append_triple(row, r.true_acceleration_W_m_per_s2);
   } else {
     row += ",,,,,,,";
+  }
+}
+
+void append_turning(std::string& row, const CycleRecord& r, bool with_truth) {
+  for (const double value : r.proxy_q_W) append_value(row, value);
+  append_triple(row, r.contact_torque_W_Nm);
+  append_value(row, r.proxy_inertia_kg_m2);
+  if (!with_truth) return;
+  if (r.has(RecordFlag::truth)) {
+    append_triple(row, r.hand_torque_W_Nm);
+  } else {
+    row += ",,,";
   }
 }
 
@@ -177,12 +190,21 @@ void add_more(Columns& columns, const std::vector<std::string>& axis_names, bool
   columns.add_vector("true_acceleration_W", "m/s²", "W", "of the simulated tool");
 }
 
+// What came with tools that turn.
+void add_turning(Columns& columns, bool with_truth) {
+  columns.add_orientation("proxy_W", "orientation of the proxy");
+  columns.add_vector("contact_torque_W", "Nm", "W", "the world's torque on the proxy, about the rendered point");
+  columns.add("proxy_inertia_kg_m2", "kg m²", "", "moment of inertia that the hand feels; 0: the orientation is held");
+  if (with_truth) columns.add_vector("hand_torque_W", "Nm", "W", "the simulated hand's torque on the tool");
+}
+
 }  // namespace
 
 std::vector<SignalColumn> signal_columns(const std::vector<std::string>& axis_names, bool with_truth) {
   Columns columns;
   add_first(columns, axis_names, with_truth);
   add_more(columns, axis_names, with_truth);
+  add_turning(columns, with_truth);
   return std::move(columns.all);
 }
 
@@ -239,6 +261,7 @@ void append_signals(std::string& row, const CycleRecord& r, std::size_t axes, bo
     }
   }
   append_more(row, r, axes, with_truth, derived);
+  append_turning(row, r, with_truth);
 }
 
 }  // namespace proxarm::controller

@@ -81,6 +81,18 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
   return out;
 }
 
+ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector& pose_rad,
+                               const description::Cell& cell, double hand_mass_kg) {
+  ElasticArm out = elastic_arm(arm, pose_rad, cell);
+  models::ToolKinematics kinematics;
+  arm.kinematics(pose_rad, kinematics);
+  const MatrixXd moved = kinematics.J_W.topRows<3>();
+  out.mass += hand_mass_kg * moved.transpose() * moved;
+  out.jacobian = kinematics.J_W.bottomRows<3>();
+  out.joints_per_m = models::joints_per_rad(kinematics.J_W);
+  return out;
+}
+
 std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
                                      const std::vector<models::Vec3>& offsets_W) {
   constexpr double step_m = 0.005;  // away from singularities, this turns no joint by the inverse kinematics' 0.01 rad

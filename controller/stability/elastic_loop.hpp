@@ -44,6 +44,11 @@ struct ElasticArm {
 // damping in the arm's first mode. This is little, because unmodelled effects must not make a loop seem stable.
 ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell);
 
+// The same for the tool's rotation, with its place held: J and G are of angles, so that M, m_h, K_h and D_h are read as
+// kg m², Nm/rad and Nms/rad. The hand's mass at T moves with the links. Precondition: six axes or more.
+ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector& pose_rad,
+                               const description::Cell& cell, double hand_mass_kg);
+
 // The arm at the start, and at the places to which the tool is led from there, one after the other, as far as it gets.
 // Modes change with the pose: over 0.3 m, the default cell's smallest stable mass changes by a third. Places within 50
 // mm of another one are left out, and so are those after the sixteenth.

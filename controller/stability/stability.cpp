@@ -336,29 +336,52 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
   return steps * T;
 }
 
-void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable) {
-  const double handle_kg = loop.handle_mass_kg;
-  const auto refuse = [felt_mass_kg](const std::string& expected, const std::string& advice) {
+namespace {
+
+// The words of a check: of a mass in space, or of an inertia about a point.
+struct Words {
+  const char *option, *unit, *what, *damping_option;
+  const char *stiffness_unit, *damping_unit;
+};
+constexpr Words of_mass{"--mass", "kg", "mass", "--damping", "N/m", "Ns/m"};
+constexpr Words of_inertia{"--inertia", "kg m²", "inertia", "--turning-damping", "Nm/rad", "Nms/rad"};
+
+void require_stable(double felt, const HandModel& hand, const LoopModel& loop, bool force_unstable, const Words& w) {
+  const double handle = loop.handle_mass_kg;
+  const std::string unit = std::string(" ") + w.unit;
+  const auto refuse = [&](const std::string& expected, const std::string& advice) {
     throw description::SetupError(
-        {.key = "--mass", .found = text("%.6g kg", felt_mass_kg), .expected = expected, .advice = advice});
+        {.key = w.option, .found = text("%.6g", felt) + unit, .expected = expected, .advice = advice});
   };
-  if (!std::isfinite(felt_mass_kg) || !(felt_mass_kg > handle_kg)) {
-    refuse(text("more than the handle's own %.3g kg", handle_kg),
+  if (!std::isfinite(felt) || !(felt > handle)) {
+    refuse(text("more than the handle's own %.3g", handle) + unit,
            "the handle sits after the sensor, so no control can make it lighter");
   }
-  if (force_unstable || spectral_radius(hand, loop, felt_mass_kg - handle_kg) < 1.0) return;
-  const std::string grip = text("with a hand of %.4g N/m", hand.stiffness_N_per_m) +
-                           text(", %.4g Ns/m", hand.damping_Ns_per_m) + text(", %.3g kg", hand.mass_kg) +
-                           text(" and a delay of %.3g ms", 1e3 * (loop.period_s + loop.delay_s)) +
+  if (force_unstable || spectral_radius(hand, loop, felt - handle) < 1.0) return;
+  const std::string grip = text("with a hand of %.4g ", hand.stiffness_N_per_m) + w.stiffness_unit +
+                           text(", %.4g ", hand.damping_Ns_per_m) + w.damping_unit + text(", %.3g", hand.mass_kg) +
+                           unit + text(" and a delay of %.3g ms", 1e3 * (loop.period_s + loop.delay_s)) +
                            text(" (drives: %.3g ms)", 1e3 * loop.drive_time_constant_s);
   const auto smallest = smallest_stable_mass(hand, loop);
   if (!smallest) {
     // For B + D_h ≤ K_h L no mass helps.
-    refuse("a loop that some mass makes stable; " + grip + " none does",
-           "add --damping, or shorten the delay by a smaller --timestep (--force-unstable overrides, in simulation)");
+    refuse(std::string("a loop that some ") + w.what + " makes stable; " + grip + " none does",
+           std::string("add ") + w.damping_option +
+               ", or shorten the delay by a smaller --timestep (--force-unstable overrides, in simulation)");
   }
-  refuse(text("at least %.2g kg, the smallest that is stable ", round_up(*smallest + handle_kg)) + grip,
-         "choose a larger mass (--force-unstable overrides, in simulation)");
+  refuse(text("at least %.2g", round_up(*smallest + handle)) + unit + ", the smallest that is stable " + grip,
+         std::string("choose a larger ") + w.what + " (--force-unstable overrides, in simulation)");
+}
+
+}  // namespace
+
+void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable) {
+  require_stable(felt_mass_kg, hand, loop, force_unstable, of_mass);
+}
+
+void require_stable_inertia(double felt_inertia_kg_m2, const HandModel& hand, const LoopModel& loop,
+                            bool force_unstable) {
+  require_stable(felt_inertia_kg_m2, hand, loop, force_unstable, of_inertia);
 }
 
 }  // namespace proxarm::controller

@@ -96,4 +96,10 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double pro
 // With `force_unstable` only the latter is checked.
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable);
 
+// The check of --inertia, which is the same question about the tool's rotation: `hand` and `loop` hold the hand's
+// turning stiffness, damping and inertia, the handle's inertia, and the proxy's rotational damping and spring, in
+// Nm/rad, Nms/rad and kg m²; `loop.arms` are elastic_turning_arm()'s.
+void require_stable_inertia(double felt_inertia_kg_m2, const HandModel& hand, const LoopModel& loop,
+                            bool force_unstable);
+
 }  // namespace proxarm::controller

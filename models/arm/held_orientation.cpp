@@ -26,6 +26,22 @@ Jacobian weighted(const Jacobian& J_W) noexcept {
   return J;
 }
 
+// Three columns of Jᵀ(J Jᵀ + λ²E)⁻¹, from `first` on, of a J whose rotations are weighted with the length.
+SmallColumns3 columns_of_inverse(const Jacobian& J_W, Eigen::Index first) noexcept {
+  const Jacobian J = weighted(J_W);
+  Mat6 A = J.lazyProduct(J.transpose());
+  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
+  Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
+  right.middleRows<3>(first).setIdentity();
+  const Eigen::Matrix<double, 6, 3> solved = solve_positive_definite(A, right);
+  SmallColumns3 G(J.cols(), 3);
+  for (Eigen::Index i = 0; i < J.cols(); ++i) {
+    const Vec3 row = solved.transpose() * J.col(i);
+    G.row(i) = row.transpose();
+  }
+  return G;
+}
+
 }  // namespace
 
 double least_singular_value(const Jacobian& J_W) noexcept {
@@ -37,19 +53,9 @@ double least_singular_value(const Jacobian& J_W) noexcept {
 }
 
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept {
-  if (J_W.cols() < 6) return joints_of_few_axes(J_W);
-  const Jacobian J = weighted(J_W);
-  Mat6 A = J.lazyProduct(J.transpose());
-  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
-  Eigen::Matrix<double, 6, 3> right = Eigen::Matrix<double, 6, 3>::Zero();
-  right.topRows<3>().setIdentity();
-  const Eigen::Matrix<double, 6, 3> solved = solve_positive_definite(A, right);
-  SmallColumns3 G(J.cols(), 3);
-  for (Eigen::Index i = 0; i < J.cols(); ++i) {
-    const Vec3 row = solved.transpose() * J.col(i);
-    G.row(i) = row.transpose();
-  }
-  return G;
+  return J_W.cols() < 6 ? joints_of_few_axes(J_W) : columns_of_inverse(J_W, 0);
 }
+
+SmallColumns3 joints_per_rad(const Jacobian& J_W) noexcept { return turning_length_m * columns_of_inverse(J_W, 3); }
 
 }  // namespace proxarm::models

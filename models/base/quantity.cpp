@@ -28,6 +28,9 @@ constexpr Unit durations[] = {{"s", 1, 1},    {"ms", 1, 1e3}, {"us", 1, 1e6},   
                               {"μs", 1, 1e6}, {"ns", 1, 1e9}, {"min", 60, 1.0}, {"h", 3600, 1}};
 constexpr Unit masses[] = {{"kg", 1, 1}, {"g", 1, 1e3}};
 constexpr Unit dampings[] = {{"Ns/m", 1, 1}, {"N*s/m", 1, 1}, {"N·s/m", 1, 1}};
+constexpr Unit inertias[] = {{"kgm²", 1, 1}, {"kg m²", 1, 1}, {"kgm2", 1, 1}, {"kg*m^2", 1, 1}};
+constexpr Unit turning_dampings[] = {{"Nms/rad", 1, 1}, {"Nms", 1, 1}};
+constexpr Unit turning_stiffnesses[] = {{"Nm/rad", 1, 1}, {"Nm", 1, 1}};
 constexpr Unit lengths[] = {{"m", 1, 1}, {"mm", 1, 1e3}, {"cm", 1, 1e2}};
 constexpr Unit forces[] = {{"N", 1, 1}};
 constexpr Unit torques[] = {{"Nm", 1, 1}, {"N*m", 1, 1}};
@@ -91,6 +94,15 @@ double parse_damping(std::string_view text, std::string_view option) {
 }
 double parse_stiffness(std::string_view text, std::string_view option) {
   return parse(text, option, {"a stiffness", "500N/m", stiffnesses, false, true});
+}
+double parse_inertia(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a moment of inertia", "0.02kgm²", inertias, false, false});
+}
+double parse_turning_damping(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a damping of turning", "0.5Nms/rad", turning_dampings, false, true});
+}
+double parse_turning_stiffness(std::string_view text, std::string_view option) {
+  return parse(text, option, {"a stiffness of turning", "20Nm/rad", turning_stiffnesses, false, true});
 }
 double parse_length(std::string_view text, std::string_view option) {
   return parse(text, option, {"a length", "20mm", lengths, true, false});

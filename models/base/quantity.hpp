@@ -20,6 +20,15 @@ double parse_damping(std::string_view text, std::string_view option = "damping")
 // "500", "500N/m" → N/m, zero or more.
 double parse_stiffness(std::string_view text, std::string_view option = "stiffness");
 
+// "0.02", "0.02kgm2", "0.02kgm²" → kg m², above zero.
+double parse_inertia(std::string_view text, std::string_view option = "inertia");
+
+// "0.5", "0.5Nms/rad" → Nms/rad, zero or more.
+double parse_turning_damping(std::string_view text, std::string_view option = "turning-damping");
+
+// "20", "20Nm/rad" → Nm/rad, zero or more.
+double parse_turning_stiffness(std::string_view text, std::string_view option = "turning-spring");
+
 // "20mm", "0.02m" → m, above zero. The unit is required.
 double parse_length(std::string_view text, std::string_view option = "length");
 

@@ -64,6 +64,7 @@ ToolDescription read_tool(const YamlNode& node) {
     }
   }
   tool.handle_S = read_pose(node.map("handle_S"));
+  if (node.has("shape")) tool.shape = node.existing_file("shape").string();
   return tool;
 }
 
@@ -304,6 +305,10 @@ CellLimits read_limits(const YamlNode& node) {
       node.number_or("max_elbow_speed_m_per_s", limits.max_tool_speed_m_per_s, above(0.0, 10.0));
   limits.max_tool_acceleration_m_per_s2 =
       node.number_or("max_tool_acceleration_m_per_s2", limits.max_tool_acceleration_m_per_s2, above(0.0, 1000.0));
+  limits.max_turning_speed_rad_per_s =
+      node.number_or("max_turning_speed_rad_per_s", limits.max_turning_speed_rad_per_s, above(0.0, 20.0));
+  // Less than π by more than a step, so that no step can jump to the other side of the limit.
+  limits.max_turn_rad = node.number_or("max_turn_rad", limits.max_turn_rad, 0.0, 3.0);
   limits.max_force_N = node.number_or("max_force_N", limits.max_force_N, above(0.0, 1e5));
   limits.max_power_W = node.number_or("max_power_W", limits.max_power_W, 0.0, 1e5);
   limits.following_error_rad = node.number_or("following_error_rad", limits.following_error_rad, above(0.0, 1.0));

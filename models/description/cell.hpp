@@ -130,6 +130,7 @@ struct ToolDescription {
   std::array<double, 3> centre_of_mass_S_m{};
   std::array<double, 6> inertia_kg_m2{};  // ixx iyy izz ixy ixz iyz about the centre of mass, axes of S
   PoseDescription handle_S;               // X_ST: the rendered point and its axes
+  std::string shape;                      // path of a tool file, absolute; empty: what is rendered is a point
 };
 
 struct SensorPlacement {
@@ -159,6 +160,8 @@ struct CellLimits {
   double max_tool_speed_m_per_s = 0.5;
   double max_elbow_speed_m_per_s = 0.5;  // of elbow and wrist; a cell that doesn't say has the tool's
   double max_tool_acceleration_m_per_s2 = 20.0;
+  double max_turning_speed_rad_per_s = 2.0;  // of the tool, where the hand may turn it
+  double max_turn_rad = 0.7;                 // of the tool, from its orientation at the start; 0 to 3
   double max_force_N = 200.0;         // above it the sensor's reading is taken as a fault
   double max_power_W = 80.0;          // that the arm gives to the hand or takes from it; 0: no limit
   double leash_m = 0.02;              // from the tool, as measured, to the proxy

@@ -1,5 +1,6 @@
 #include "models/description/hand.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -41,18 +42,43 @@ void read_hand_data(const YamlNode& root, HandDescription& hand) {
   }
   if (root.has("force")) hand.force = read_data(root, "force", {"time_s", "x_N", "y_N", "z_N"}, force_range, hand);
 }
+constexpr Range turning_range = between(0.0, 1e4);
+
+// A hand that has no grip on the orientation would leave what it intends undone, without a word.
+void require_turning_grip(const YamlNode& root, const HandDescription& hand) {
+  if (hand.twists()) return;
+  const bool wanted = std::any_of(hand.waypoints.begin(), hand.waypoints.end(),
+                                  [](const Waypoint& point) { return point.turn_rad != std::array<double, 3>{}; }) ||
+                      std::any_of(hand.multisine.begin(), hand.multisine.end(),
+                                  [](const Sine& sine) { return sine.amplitude_rad > 0.0; });
+  if (!wanted) return;
+  throw root.error("turn_rad or amplitude_rad",
+                   "turning_stiffness_Nm_per_rad above 0, with which the hand turns the tool");
+}
+
+double length_of(const std::array<double, 3>& v) noexcept { return std::hypot(v[0], v[1], v[2]); }
 
 Waypoint read_waypoint(const YamlNode& node) {
-  return {.time_s = node.number("time_s", 0.0, 1e6), .offset_m = node.vec3("offset_m", between(-10.0, 10.0))};
+  Waypoint waypoint{.time_s = node.number("time_s", 0.0, 1e6)};
+  if (!node.has("turn_rad")) require_key(node, "offset_m", "offset_m, turn_rad or both");
+  waypoint.offset_m = node.vec3_or("offset_m", {0, 0, 0}, between(-10.0, 10.0));
+  if (node.has("turn_rad")) {
+    waypoint.turn_rad = node.vec3("turn_rad", between(-3.0, 3.0));
+    const double angle = length_of(waypoint.turn_rad);
+    if (angle > 3.0) throw node.error_at("turn_rad", "a rotation of at most 3 rad", number_text(angle));
+  }
+  return waypoint;
 }
 
 Sine read_sine(const YamlNode& node) {
   Sine sine;
   sine.frequency_Hz = node.number("frequency_Hz", above(0.0, 1000.0));
-  sine.amplitude_m = node.number("amplitude_m", 0.0, 1.0);
+  if (!node.has("amplitude_rad")) require_key(node, "amplitude_m", "amplitude_m, amplitude_rad or both");
+  sine.amplitude_m = node.number_or("amplitude_m", 0.0, 0.0, 1.0);
+  sine.amplitude_rad = node.number_or("amplitude_rad", 0.0, 0.0, 1.0);
   sine.phase_rad = node.number_or("phase_rad", 0.0, -2.0 * std::numbers::pi, 2.0 * std::numbers::pi);
   sine.direction = node.vec3("direction", between(-1e3, 1e3));
-  const double length = std::hypot(sine.direction[0], sine.direction[1], sine.direction[2]);
+  const double length = length_of(sine.direction);
   if (length < 1e-3) throw node.error_at("direction", "a direction of length 0.001 or more", number_text(length));
   for (double& x : sine.direction) x /= length;
   return sine;
@@ -81,6 +107,15 @@ HandDescription read_hand(const YamlNode& root) {
   hand.stiffness_N_per_m = root.number_or("stiffness_N_per_m", hand.stiffness_N_per_m, stiffness_range);
   hand.damping_Ns_per_m = root.number_or("damping_Ns_per_m", hand.damping_Ns_per_m, damping_range);
   hand.max_force_N = root.number_or("max_force_N", hand.max_force_N, between(1.0, 1e5));
+  hand.inertia_kg_m2 = root.number_or("inertia_kg_m2", hand.inertia_kg_m2, 0.0, 10.0);
+  if (hand.inertia_kg_m2 > 0.0 && !(hand.mass_kg > 0.0)) {
+    throw root.error_at("inertia_kg_m2", "0 of a hand without mass_kg", number_text(hand.inertia_kg_m2));
+  }
+  hand.turning_stiffness_Nm_per_rad =
+      root.number_or("turning_stiffness_Nm_per_rad", hand.turning_stiffness_Nm_per_rad, turning_range);
+  hand.turning_damping_Nms_per_rad =
+      root.number_or("turning_damping_Nms_per_rad", hand.turning_damping_Nms_per_rad, turning_range);
+  hand.max_torque_Nm = root.number_or("max_torque_Nm", hand.max_torque_Nm, between(0.1, 1e4));
   if (root.has("grips")) {
     for (const YamlNode& node : root.list("grips", 1, 1000)) {
       const Grip grip{node.number("time_s", 0.0, 1e6), node.number("stiffness_N_per_m", stiffness_range),
@@ -106,6 +141,7 @@ HandDescription read_hand(const YamlNode& root) {
     for (const YamlNode& node : root.list("multisine", 1, 1000)) hand.multisine.push_back(read_sine(node));
   }
   read_hand_data(root, hand);
+  require_turning_grip(root, hand);
   root.finish();
   return hand;
 }

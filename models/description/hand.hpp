@@ -3,6 +3,8 @@
 // The hand holds the tool's point T through stiffness and damping and follows its intention: waypoints, joined by
 // minimum-jerk motions, plus a sum of sines. With s = (t − t_i)/(t_{i+1} − t_i) in [0, 1]:
 //   x(t) = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵) + Σ_j a_j d_j sin(2π f_j t + φ_j)
+// The tool's orientation is held and led in the same way: the intention is a rotation vector in W, from the orientation
+// of the start. Without a turning stiffness and damping the hand doesn't twist the handle.
 // It rests at the first waypoint before its time and at the last one after it. No waypoint: it holds the start.
 //
 // Or both come as data, from CSV files: a trajectory in the place of waypoints, and a force that it exerts beside that
@@ -25,11 +27,13 @@ class YamlNode;
 struct Waypoint {
   double time_s = 0.0;               // strictly rising along the list
   std::array<double, 3> offset_m{};  // in W, from where the tool is at the start
+  std::array<double, 3> turn_rad{};  // rotation vector in W, from the tool's orientation at the start
 };
 
 struct Sine {
   double frequency_Hz = 1.0;
-  double amplitude_m = 0.0;
+  double amplitude_m = 0.0;    // of the tool's place, along `direction`
+  double amplitude_rad = 0.0;  // of its orientation, about `direction`
   double phase_rad = 0.0;
   std::array<double, 3> direction{1.0, 0.0, 0.0};  // in W; scaled to length 1 by load_hand
 };
@@ -49,12 +53,21 @@ struct HandDescription {
   double stiffness_N_per_m = 500.0;
   double damping_Ns_per_m = 20.0;
   double max_force_N = std::numeric_limits<double>::infinity();  // it pulls by this at most
+  // Of the hand's rotation about the tool's point; all 0: it doesn't twist the handle.
+  double inertia_kg_m2 = 0.0;  // beyond the handle's, the same about each axis; the sensor feels it
+  double turning_stiffness_Nm_per_rad = 0.0;
+  double turning_damping_Nms_per_rad = 0.0;
+  double max_torque_Nm = std::numeric_limits<double>::infinity();
   std::vector<Grip> grips;                                       // after the one above
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
   std::vector<TimedVector> trajectory;            // instead of waypoints; m, in W, from its first row on
   std::vector<TimedVector> force;                 // N, in W; none before its first row and after its last
   std::vector<std::filesystem::path> data_files;  // that both were read from
+
+  [[nodiscard]] bool twists() const noexcept {
+    return turning_stiffness_Nm_per_rad > 0.0 || turning_damping_Nms_per_rad > 0.0;
+  }
 };
 
 // The stiffest of all its grips.

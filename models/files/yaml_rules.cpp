@@ -90,6 +90,15 @@ std::string exactly_one(const YamlNode& node, const std::vector<std::string>& ke
   throw node.error_at(found.back(), std::string(expected), found.front() + " and " + found.back());
 }
 
+std::pair<std::string, YamlNode> one_entry(const YamlNode& node, const std::vector<std::string>& kinds,
+                                           const std::string& what, const std::string& example) {
+  if (!node.is_map()) throw node.error(what + ", such as `" + example + "`");
+  const bool known = std::any_of(kinds.begin(), kinds.end(), [&](const std::string& kind) { return node.has(kind); });
+  if (!known) node.finish();  // names an unknown kind, and the nearest known one
+  const std::string kind = exactly_one(node, kinds, what + ": " + one_of(kinds));
+  return {kind, node.map(kind)};
+}
+
 void require_key(const YamlNode& node, std::string_view key, const std::string& expected, const std::string& advice) {
   if (is_heard()) note(node, key, {.kind = YamlFact::Kind::needed});
   if (!node.has(key)) throw node.error_at(key, expected, "nothing", advice);

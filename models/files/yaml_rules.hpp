@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "models/files/yaml_file.hpp"
@@ -36,6 +37,10 @@ double number_or_zero(const YamlNode& node, std::string_view key, double otherwi
 
 // `node` must have exactly one of these keys; returns which. `expected` says so in words.
 std::string exactly_one(const YamlNode& node, const std::vector<std::string>& keys, std::string_view expected);
+
+// The one entry of `node` whose key is among `kinds`, and what it says. `what` and `example` are for whoever wrote another.
+std::pair<std::string, YamlNode> one_entry(const YamlNode& node, const std::vector<std::string>& kinds,
+                                           const std::string& what, const std::string& example);
 
 // The key must be there, must be a number of at most that, or must not be there, because of what else the file says.
 // `expected`, `found` and `advice` are as of error_at().

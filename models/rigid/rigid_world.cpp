@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "models/rigid/rigid_features.hpp"
+#include "models/rigid_shapes/overlap.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -290,7 +291,25 @@ double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
     for (std::size_t i = 0; i < copy.found_count_; ++i) least = std::min(least, copy.found_[i].touch.gap);
     if (least < far) break;
   }
-  return least;
+  return std::min(least, overlap_m(pose));
+}
+
+// Features have their gaps on the side on which the tool was. Where it is inside of a solid, that says nothing.
+double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
+  double deepest = std::numeric_limits<double>::infinity();
+  Pose X = Pose::Identity();
+  X.linear() = pose.orientation.toRotationMatrix();
+  X.translation() = pose.position;
+  for (const Entry& entry : shared_->entries) {
+    const auto* solid = std::get_if<Solid>(&entry.object.shape);
+    if (solid == nullptr) continue;
+    for (const Part& part : shared_->parts) {
+      if (part.solid.faces.empty() && solid->faces.empty()) continue;
+      const double gap = separation_of_hulls(part.solid, X, *solid);
+      if (gap < 0.0) deepest = std::min(deepest, gap - part.solid.radius - solid->radius);
+    }
+  }
+  return deepest;
 }
 
 }  // namespace proxarm::models

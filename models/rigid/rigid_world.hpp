@@ -129,6 +129,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
   void report(const ToolPose& q_old) noexcept;
+  [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
 
   std::shared_ptr<const Shared> shared_;
   std::vector<Held> held_;  // of each entry

@@ -15,6 +15,7 @@
 #include "models/geometry/geometry.hpp"
 #include "models/mesh/mesh.hpp"
 #include "scenes/mesh_files/face_account.hpp"
+#include "scenes/format/tool_file.hpp"
 
 namespace proxarm::scenes {
 
@@ -138,6 +139,7 @@ struct Scene {
   std::optional<double> coulomb_force_N;  // dry friction everywhere, equation (3); like a medium without `within`
   int coulomb_line = 0;
   std::optional<GuideDescription> guide;
+  std::shared_ptr<const RigidTool> tool;  // that is held in it; null: a point
 };
 
 // What a shape is called in files and messages: "plane".

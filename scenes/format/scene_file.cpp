@@ -116,18 +116,8 @@ Shape read_shape(const std::string& kind, const YamlNode& node) {
   return read_plane(node);
 }
 
-// The one entry of `node` whose key is among `kinds`.
-std::pair<std::string, YamlNode> entry_of(const YamlNode& node, const std::vector<std::string>& kinds,
-                                          const std::string& what, const std::string& example) {
-  if (!node.is_map()) throw node.error(what + ", such as `" + example + "`");
-  const bool known = std::any_of(kinds.begin(), kinds.end(), [&](const std::string& kind) { return node.has(kind); });
-  if (!known) node.finish();  // names an unknown kind, and the nearest known one
-  const std::string kind = exactly_one(node, kinds, what + ": " + description::one_of(kinds));
-  return {kind, node.map(kind)};
-}
-
 std::pair<std::string, YamlNode> shape_node(const YamlNode& node) {
-  return entry_of(node, kinds(), "an object", "plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}");
+  return one_entry(node, kinds(), "an object", "plane: {point_m: [0, 0, 0], normal: [0, 0, 1]}");
 }
 
 Motion read_motion(const YamlNode& node) {
@@ -152,7 +142,7 @@ Shape read_region(const YamlNode& within) {
   if (within.is_map()) refuse_key(within, "mesh", "a box, sphere, capsule, cylinder or plane as a region", "a mesh");
   std::vector<std::string> solid = kinds();
   std::erase(solid, "mesh");
-  const auto [kind, shape] = entry_of(within, solid, "a region", "sphere: {centre_m: [0.8, 0, 0.6], radius_m: 0.1}");
+  const auto [kind, shape] = one_entry(within, solid, "a region", "sphere: {centre_m: [0.8, 0, 0.6], radius_m: 0.1}");
   return read_shape(kind, shape);
 }
 
@@ -215,7 +205,7 @@ Space read_space(const YamlNode& root) {
 }
 
 MediumDescription read_medium(const YamlNode& entry) {
-  const auto [kind, node] = entry_of(entry, {"viscous", "coulomb"}, "a medium", "viscous: {damping_Ns_per_m: 20}");
+  const auto [kind, node] = one_entry(entry, {"viscous", "coulomb"}, "a medium", "viscous: {damping_Ns_per_m: 20}");
   MediumDescription medium;
   if (kind == "viscous") {
     medium.damping_Ns_per_m = node.number("damping_Ns_per_m", above(0.0, 1e6));
@@ -228,8 +218,8 @@ MediumDescription read_medium(const YamlNode& entry) {
 }
 
 GuideDescription read_guide(const YamlNode& guide_node) {
-  const auto [kind, node] = entry_of(guide_node, {"line", "plane", "polyline"}, "a guide",
-                                     "line: {point_m: [0, 0, 0], direction: [1, 0, 0]}");
+  const auto [kind, node] = one_entry(guide_node, {"line", "plane", "polyline"}, "a guide",
+                                      "line: {point_m: [0, 0, 0], direction: [1, 0, 0]}");
   GuideDescription guide;
   if (kind == "line") {
     guide.points_m = {point_of(node, "point_m")};
@@ -279,6 +269,7 @@ Scene read_scene(const YamlNode& root) {
     scene.coulomb_line = field->line();
   }
   if (const auto guide = root.find_map("guide")) scene.guide = read_guide(*guide);
+  if (const auto tool = root.find_map("tool")) scene.tool = std::make_shared<const RigidTool>(read_tool(*tool));
   root.finish();
   return scene;
 }
@@ -288,6 +279,13 @@ Scene read_scene(const YamlNode& root) {
 std::string kind_of(const Shape& shape) { return kinds()[shape.index()]; }
 
 Scene load_scene(const std::filesystem::path& file) { return read_scene(YamlNode::load(file)); }
+
+Scene load_scene_with(const std::filesystem::path& file, const std::filesystem::path& tool) {
+  Scene scene = load_scene(file);
+  if (tool == file) return scene;
+  scene.tool = tool.empty() ? nullptr : std::make_shared<const RigidTool>(load_tool(tool));
+  return scene;
+}
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& file) {
   return read_scene(YamlNode::parse(text, file));

@@ -397,6 +397,7 @@ Truth SimulatedCell::present_truth() const noexcept {
           .velocity_W = tool.velocity_W,
           .acceleration_W = tool.acceleration_W,
           .hand_force_W = plant_.handle_force_W(),
+          .hand_torque_W = plant_.handle_torque_W(),
           .sensor_wrench_S = plant_.arm().sensor_wrench_S(),
           .hand_started = plant_.hand_started(),
           .hand_start_ns = plant_.hand_start_ns()};

@@ -51,6 +51,7 @@ struct Truth {
   models::Vec3 velocity_W = models::Vec3::Zero();      // m/s
   models::Vec3 acceleration_W = models::Vec3::Zero();  // m/s²
   models::Vec3 hand_force_W = models::Vec3::Zero();    // N, of the hand on the handle at T
+  models::Vec3 hand_torque_W = models::Vec3::Zero();   // Nm, of the hand on the handle about T
   models::Wrench sensor_wrench_S;                      // load on the sensor, handle's weight and inertia included
   bool hand_started = false;                           // all drives have been enabled once
   std::int64_t hand_start_ns = 0;

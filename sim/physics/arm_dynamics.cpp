@@ -53,10 +53,14 @@ struct ArmDynamics::Links {
 
 ArmDynamics::~ArmDynamics() = default;
 
-ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, double step_s)
-    : links_(std::make_unique<Links>()), handle_(cell.tool), hand_mass_kg_(hand_mass_kg), step_s_(step_s) {
+ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, double step_s, double hand_inertia_kg_m2)
+    : links_(std::make_unique<Links>()),
+      handle_(cell.tool),
+      hand_mass_kg_(hand_mass_kg),
+      hand_inertia_kg_m2_(hand_inertia_kg_m2),
+      step_s_(step_s) {
   Links& l = *links_;
-  l.model = load_links(cell, hand_mass_kg);
+  l.model = load_links(cell, hand_mass_kg, hand_inertia_kg_m2);
   l.data.reset(mj_makeData(l.model.get()));
   const mjModel& m = *l.model;
   l.body = mj_name2id(&m, mjOBJ_BODY, cell.sensor.link.c_str());
@@ -175,10 +179,11 @@ void ArmDynamics::advance() noexcept {
 }
 
 void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W,
-                        const Vec3& arm_force_W) noexcept {
+                        const Vec3& arm_force_W, const Vec3& hand_torque_W) noexcept {
   for (std::size_t i = 0; i < axes_.size(); ++i) axes_[i].torque_Nm = motor_torque_Nm[i];
   hand_force_W_ = hand_force_W;
   arm_force_W_ = arm_force_W;
+  hand_torque_W_ = hand_torque_W;
   update_accelerations();
 }
 
@@ -233,8 +238,9 @@ void ArmDynamics::update_accelerations() noexcept {
     d->qfrc_applied[axis.dof] = axis.gear_torque_Nm + stop - d->qfrc_bias[axis.dof];
   }
   const Vec3 force_B = X_WB_.linear().transpose() * (hand_force_W_ + arm_force_W_ - hand_mass_kg_ * gravity_W_);
-  const Vec3 point_B = l.p_BL + l.arm_B, no_torque = Vec3::Zero();
-  mj_applyFT(m, d, force_B.data(), no_torque.data(), point_B.data(), l.body, d->qfrc_applied);
+  const Vec3 torque_B = X_WB_.linear().transpose() * hand_torque_W_;
+  const Vec3 point_B = l.p_BL + l.arm_B;
+  mj_applyFT(m, d, force_B.data(), torque_B.data(), point_B.data(), l.body, d->qfrc_applied);
   mj_solveM(m, d, d->qacc, d->qfrc_applied, 1);
   update_tool_acceleration();
 }
@@ -242,7 +248,7 @@ void ArmDynamics::update_accelerations() noexcept {
 // The sensor, about S's origin: handle (mass m, centre of mass C) and hand (m_h at T) follow the arm, so the load they
 // put on it is what acts on them less what they need to move:
 //   F = F_hand − m_h a_T + m (g − a_C)
-//   τ = r_T × (F_hand − m_h a_T) + r_C × m (g − a_C) − (I α + ω × I ω)
+//   τ = r_T × (F_hand − m_h a_T) + (τ_hand − I_h α) + r_C × m (g − a_C) − (I α + ω × I ω)
 void ArmDynamics::update_tool_acceleration() noexcept {
   const Links& l = *links_;
   mj_rnePostConstraint(l.model.get(), l.data.get());
@@ -261,14 +267,16 @@ void ArmDynamics::update_tool_acceleration() noexcept {
   const Vec3 p_LC_W = R_WL * (l.X_LS * Vec3(handle_.centre_of_mass_S_m.data()));
 
   tool_.acceleration_W = at(p_LT_W) + gravity_W_;
+  tool_.angular_acceleration_W = alpha_W;
   handle_force_W_ = hand_force_W_ - hand_mass_kg_ * tool_.acceleration_W;
+  handle_torque_W_ = hand_torque_W_ - hand_inertia_kg_m2_ * alpha_W;
   const Vec3 handle_S = R_WS.transpose() * (-handle_.mass_kg * at(p_LC_W));  // m (g − a_C)
   const Vec3 hand_S = R_WS.transpose() * handle_force_W_;
   const Vec3 omega_S = R_WS.transpose() * omega_W, alpha_S = R_WS.transpose() * alpha_W;
   const Mat3& I = handle_inertia_S_;
   sensor_S_.force = hand_S + handle_S;
   sensor_S_.torque = X_ST_.translation().cross(hand_S) + Vec3(handle_.centre_of_mass_S_m.data()).cross(handle_S) -
-                     (I * alpha_S + omega_S.cross(Vec3(I * omega_S)));
+                     (I * alpha_S + omega_S.cross(Vec3(I * omega_S))) + R_WS.transpose() * handle_torque_W_;
 }
 
 double ArmDynamics::joint_angle_rad(std::size_t axis) const noexcept { return links_->data->qpos[axes_[axis].dof]; }

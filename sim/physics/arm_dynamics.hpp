@@ -30,6 +30,7 @@ struct ToolState {
   models::Vec3 velocity_W = models::Vec3::Zero();          // of T's origin, m/s
   models::Vec3 acceleration_W = models::Vec3::Zero();      // of T's origin, m/s²
   models::Vec3 angular_velocity_W = models::Vec3::Zero();  // rad/s
+  models::Vec3 angular_acceleration_W = models::Vec3::Zero();  // rad/s²
 };
 
 struct Energy {
@@ -38,8 +39,8 @@ struct Energy {
   double elastic_J = 0.0;    // gears
 };
 
-// The arm of a cell, its handle, and the mass of the hand that holds it (a point mass at T, rigid with the handle; its
-// weight is carried by the person, so gravity doesn't act on it).
+// The arm of a cell, its handle, and the mass of the hand that holds it (at T, with the same inertia about each axis,
+// rigid with the handle; its weight is carried by the person, so gravity doesn't act on it).
 //
 // A step is advance(), then apply(): advance() goes to t + h with the accelerations found by the last apply();
 // apply() takes the torques and the force that act from now on and finds accelerations and the sensor's wrench.
@@ -47,7 +48,8 @@ struct Energy {
 class ArmDynamics {
  public:
   // Throws description::SetupError: unreadable or bad URDF, <mimic>, missing joint or link, joint without a drive.
-  ArmDynamics(const description::Cell& cell, double hand_mass_kg, double step_s = 0.25e-3);
+  ArmDynamics(const description::Cell& cell, double hand_mass_kg, double step_s = 0.25e-3,
+              double hand_inertia_kg_m2 = 0.0);
   ArmDynamics(const ArmDynamics&) = delete;
   ArmDynamics& operator=(const ArmDynamics&) = delete;
   ~ArmDynamics();
@@ -58,9 +60,11 @@ class ArmDynamics {
 
   void advance() noexcept;
   // Motor torques, as torques at the joint, and the force of the hand's muscles on hand and handle at T, in W.
-  // `arm_force_W` acts at the same point on the arm in front of the sensor, which doesn't feel it.
+  // `arm_force_W` acts at the same point on the arm in front of the sensor, which doesn't feel it. `hand_torque_W` is
+  // the torque of the hand's muscles on hand and handle.
   void apply(std::span<const double> motor_torque_Nm, const models::Vec3& hand_force_W,
-             const models::Vec3& arm_force_W = models::Vec3::Zero()) noexcept;
+             const models::Vec3& arm_force_W = models::Vec3::Zero(),
+             const models::Vec3& hand_torque_W = models::Vec3::Zero()) noexcept;
 
   // A jam holds the rotor where it is, at once and without limit; the gear stays elastic. So does a closed brake,
   // unless the cell says its torque: then it is dry friction of that torque, and a rotor that turns runs out.
@@ -84,6 +88,8 @@ class ArmDynamics {
   [[nodiscard]] const models::Wrench& sensor_wrench_S() const noexcept { return sensor_S_; }
   // What the hand feels: force of the hand on the handle at T, the hand's own inertia taken off, in W.
   [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return handle_force_W_; }
+  // The same of the torque about T.
+  [[nodiscard]] models::Vec3 handle_torque_W() const noexcept { return handle_torque_W_; }
 
   // For tests and for what is printed about an arm. These may allocate.
   [[nodiscard]] Energy energy() const;
@@ -122,11 +128,12 @@ class ArmDynamics {
   models::Pose X_ST_ = models::Pose::Identity();
   models::Vec3 gravity_W_ = models::Vec3::Zero();
   models::Mat3 handle_inertia_S_ = models::Mat3::Zero();  // about its centre of mass
-  double hand_mass_kg_ = 0.0;
+  double hand_mass_kg_ = 0.0, hand_inertia_kg_m2_ = 0.0;
   double step_s_ = 0.0;
   models::Vec3 hand_force_W_ = models::Vec3::Zero();
   models::Vec3 arm_force_W_ = models::Vec3::Zero();
   models::Vec3 handle_force_W_ = models::Vec3::Zero();
+  models::Vec3 hand_torque_W_ = models::Vec3::Zero(), handle_torque_W_ = models::Vec3::Zero();
   ToolState tool_;
   models::Wrench sensor_S_;
 };

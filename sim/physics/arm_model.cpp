@@ -2,6 +2,7 @@
 
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <string>
@@ -99,12 +100,12 @@ void add_payload(tinyxml2::XMLElement& robot, const Payload& payload) {
 }
 
 // MuJoCo wants an inertia above zero: 0.4 m r² of a ball of 1 mm, 1e-5 of the smallest inertia of a wrist.
-std::array<double, 6> point_inertia(double mass_kg) {
-  const double i = 0.4e-6 * mass_kg;
+std::array<double, 6> point_inertia(double mass_kg, double inertia_kg_m2 = 0.0) {
+  const double i = std::max(inertia_kg_m2, 0.4e-6 * mass_kg);
   return {i, i, i, 0.0, 0.0, 0.0};
 }
 
-void add_payloads(const Cell& cell, double hand_mass_kg, tinyxml2::XMLElement& robot) {
+void add_payloads(const Cell& cell, double hand_mass_kg, double hand_inertia_kg_m2, tinyxml2::XMLElement& robot) {
   const auto& tool = cell.tool;
   if (tool.mass_kg > 0.0) {
     const bool point = tool.inertia_kg_m2 == std::array<double, 6>{};
@@ -113,9 +114,12 @@ void add_payloads(const Cell& cell, double hand_mass_kg, tinyxml2::XMLElement& r
   }
   if (hand_mass_kg > 0.0) {
     const models::Vec3 p = (to_pose(cell.sensor.pose_link) * to_pose(tool.handle_S)).translation();
-    add_payload(
-        robot,
-        {hand_link, cell.sensor.link, {{p.x(), p.y(), p.z()}, {}}, hand_mass_kg, {}, point_inertia(hand_mass_kg)});
+    add_payload(robot, {hand_link,
+                        cell.sensor.link,
+                        {{p.x(), p.y(), p.z()}, {}},
+                        hand_mass_kg,
+                        {},
+                        point_inertia(hand_mass_kg, hand_inertia_kg_m2)});
   }
 }
 
@@ -145,14 +149,14 @@ ModelPointer compile(const Cell& cell, const std::string& urdf) {
 
 }  // namespace
 
-ModelPointer load_links(const Cell& cell, double hand_mass_kg) {
+ModelPointer load_links(const Cell& cell, double hand_mass_kg, double hand_inertia_kg_m2) {
   tinyxml2::XMLDocument document;
   read_urdf(cell, document);
   auto* robot = document.FirstChildElement("robot");
   if (!robot) throw SetupError({.file = cell.urdf.string(), .expected = "a <robot> element"});
   refuse_and_strip(cell, *robot);
   require_link(cell, *robot);
-  add_payloads(cell, hand_mass_kg, *robot);
+  add_payloads(cell, hand_mass_kg, hand_inertia_kg_m2, *robot);
   // Without fusestatic="false" MuJoCo merges the links behind fixed joints, and with them the flange.
   auto* compiler = document.NewElement("mujoco");
   compiler->InsertNewChildElement("compiler")->SetAttribute("fusestatic", "false");

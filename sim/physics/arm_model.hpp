@@ -18,6 +18,6 @@ using DataPointer = std::unique_ptr<mjData, MujocoDelete>;
 
 // The links of the URDF, with the handle and the hand's point mass fixed to the sensor's link, in the base's frame
 // (gravity turned into it). Shapes are left out: nothing collides here. Throws description::SetupError.
-ModelPointer load_links(const description::Cell& cell, double hand_mass_kg);
+ModelPointer load_links(const description::Cell& cell, double hand_mass_kg, double hand_inertia_kg_m2 = 0.0);
 
 }  // namespace proxarm::sim

@@ -7,8 +7,30 @@ namespace proxarm::sim {
 
 using models::Vec3;
 
-Hand::Hand(const description::HandDescription& description, const Vec3& start_W)
-    : description_(description), start_W_(start_W) {}
+namespace {
+
+constexpr double small_rad = 1e-4;  // the next term of each series below is smaller by small_rad²/20 or more
+
+models::Mat3 exponential(const Vec3& phi) noexcept {
+  const double angle = phi.norm();
+  if (!(angle > 0.0)) return models::Mat3::Identity();
+  return Eigen::AngleAxisd(angle, phi / angle).toRotationMatrix();
+}
+
+// ω of R = exp([φ]ₓ):  ω = φ̇ + (1 − cos θ)/θ² φ × φ̇ + (θ − sin θ)/θ³ φ × (φ × φ̇), θ = |φ|
+Vec3 angular_velocity(const Vec3& phi, const Vec3& rate) noexcept {
+  const double angle = phi.norm();
+  const bool small = angle < small_rad;
+  const double a = small ? 0.5 : (1.0 - std::cos(angle)) / (angle * angle);
+  const double b = small ? 1.0 / 6.0 : (angle - std::sin(angle)) / (angle * angle * angle);
+  const Vec3 across = phi.cross(rate);
+  return rate + a * across + b * phi.cross(across);
+}
+
+}  // namespace
+
+Hand::Hand(const description::HandDescription& description, const models::Pose& start_W)
+    : description_(description), start_W_(start_W.translation()), R_start_(start_W.linear()) {}
 
 // Minimum jerk between waypoints, with s = (t − t_i)/(t_{i+1} − t_i):
 //   x = x_i + (x_{i+1} − x_i)(10 s³ − 15 s⁴ + 6 s⁵),   ẋ = (x_{i+1} − x_i)(30 s² − 60 s³ + 30 s⁴)/(t_{i+1} − t_i)
@@ -16,13 +38,20 @@ void Hand::add_waypoints(double time_s, Intention& want) const noexcept {
   const auto& points = description_.waypoints;
   std::size_t next = 0;
   while (next < points.size() && points[next].time_s <= time_s) ++next;
-  if (!points.empty()) want.position_W += Vec3(points[next == 0 ? 0 : next - 1].offset_m.data());
+  if (!points.empty()) {
+    const auto& last = points[next == 0 ? 0 : next - 1];
+    want.position_W += Vec3(last.offset_m.data());
+    want.turn_W = Vec3(last.turn_rad.data());
+  }
   if (next > 0 && next < points.size()) {
     const auto &a = points[next - 1], &b = points[next];
     const double duration = b.time_s - a.time_s, s = (time_s - a.time_s) / duration;
     const Vec3 way = Vec3(b.offset_m.data()) - Vec3(a.offset_m.data());
     want.position_W += way * (s * s * s * (10.0 + s * (-15.0 + s * 6.0)));
     want.velocity_W = way * (30.0 * s * s * (1.0 - s) * (1.0 - s) / duration);
+    const Vec3 turn = Vec3(b.turn_rad.data()) - Vec3(a.turn_rad.data());
+    want.turn_W += turn * (s * s * s * (10.0 + s * (-15.0 + s * 6.0)));
+    want.turn_rate_W = turn * (30.0 * s * s * (1.0 - s) * (1.0 - s) / duration);
   }
 }
 
@@ -90,6 +119,9 @@ Intention Hand::intention(double time_s) const noexcept {
     const Vec3 way = sine.amplitude_m * Vec3(sine.direction.data());
     result.position_W += way * std::sin(angle);
     if (time_s > 0.0) result.velocity_W += way * (omega * std::cos(angle));
+    const Vec3 turn = sine.amplitude_rad * Vec3(sine.direction.data());
+    result.turn_W += turn * std::sin(angle);
+    if (time_s > 0.0) result.turn_rate_W += turn * (omega * std::cos(angle));
   }
   return result;
 }
@@ -113,6 +145,17 @@ Vec3 Hand::force_W(double time_s, const Vec3& position_W, const Vec3& velocity_W
   if (!description_.force.empty()) F += data_force_W(time_s);
   const double length_N = F.norm();
   return length_N > description_.max_force_N ? Vec3(description_.max_force_N / length_N * F) : F;
+}
+
+Vec3 Hand::torque_W(double time_s, const models::Mat3& R_WT, const Vec3& angular_velocity_W) const noexcept {
+  if (!description_.twists()) return Vec3::Zero();
+  const Intention want = intention(time_s);
+  const Eigen::AngleAxisd twist(exponential(want.turn_W) * R_start_ * R_WT.transpose());
+  const Vec3 torque =
+      description_.turning_stiffness_Nm_per_rad * twist.angle() * twist.axis() +
+      description_.turning_damping_Nms_per_rad * (angular_velocity(want.turn_W, want.turn_rate_W) - angular_velocity_W);
+  const double length_Nm = torque.norm();
+  return length_Nm > description_.max_torque_Nm ? Vec3(description_.max_torque_Nm / length_Nm * torque) : torque;
 }
 
 }  // namespace proxarm::sim

@@ -45,8 +45,8 @@ std::int64_t shortest_servo_period_ns(const Cell& cell) {
 Plant::Plant(const Cell& cell, const description::SensorDescription& sensor, const description::HandDescription& hand,
              std::int64_t start_ns, const PlantConfig& config)
     : step_ns_(shortest_servo_period_ns(cell) / config.finer),
-      arm_(cell, hand.mass_kg, 1e-9 * static_cast<double>(step_ns_)),
-      hand_(hand, arm_.tool().X_WT.translation()),
+      arm_(cell, hand.mass_kg, 1e-9 * static_cast<double>(step_ns_), hand.inertia_kg_m2),
+      hand_(hand, arm_.tool().X_WT),
       force_sensor_(cell.sensor, sensor.simulation, config.noise_seed),
       start_ns_(start_ns),
       time_ns_(start_ns) {
@@ -116,7 +116,7 @@ void Plant::step() noexcept {
                                     : hand_.force_W(hand_time_s, tool.X_WT.translation(), tool.velocity_W);
   models::Vec3 arm_W = models::Vec3::Zero();
   if (clamp_) (clamp_->felt ? hand_W : arm_W) += clamp_->force_W(tool.X_WT.translation());
-  arm_.apply(torque_Nm_, hand_W, arm_W);
+  arm_.apply(torque_Nm_, hand_W, arm_W, hand_.torque_W(hand_time_s, tool.X_WT.linear(), tool.angular_velocity_W));
   models::Wrench wrench_S = arm_.sensor_wrench_S();
   if (!sensed_.empty()) {
     std::swap(wrench_S, sensed_[next_sensed_]);

@@ -80,6 +80,7 @@ class Plant {
   // Truth, for summaries and studies; the controller never sees it.
   [[nodiscard]] const ToolState& tool() const noexcept { return arm_.tool(); }
   [[nodiscard]] models::Vec3 handle_force_W() const noexcept { return arm_.handle_force_W(); }
+  [[nodiscard]] models::Vec3 handle_torque_W() const noexcept { return arm_.handle_torque_W(); }
 
  private:
   // What is left to be done by a brake.

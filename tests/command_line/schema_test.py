@@ -17,7 +17,7 @@ from harness import SOURCE, ProgramTest
 
 KINDS = {"cell": ["models/cells", "schema/specimens/cell"], "hand": ["sim/hands", "schema/specimens/hand"],
          "scene": ["scenes", "schema/specimens/scene"], "sensor": ["models/sensors", "schema/specimens/sensor"],
-         "drive": ["models/drives", "schema/specimens/drive"]}
+         "tool": ["scenes/tools", "schema/specimens/tool"], "drive": ["models/drives", "schema/specimens/drive"]}
 MUTATIONS = int(os.environ.get("PROXARM_MUTATIONS", "400"))  # of each kind
 SEED = int(os.environ.get("PROXARM_SEED", "19"))
 
@@ -34,11 +34,12 @@ UNKNOWABLE = {
         r"expected (0 \(a classic bus\), or|\[lowest|angles whose counts|an angle in the range|a time (after|at least)|at least two periods|a setting of|a rate )",
     "what doesn't go together":
         r"expected (registers (of its own|among)|bits |the bits that say|identifiers that|no register above|another |a node that is free|the same as|a control word|"
+        r"offset_m, turn_rad or both|amplitude_m, amplitude_rad or both|a rotation of at most|turning_stiffness_Nm_per_rad above|0 of a hand without|"
         r"exactly one value|at most (one value|121|\d+ bytes)|fd: true|a classic bus|false: bus|a first frame|a sample that|a checksum|a counter|"
         r"bytes that hold|a poll of|no rate for|off: drives|stop_1 or stop_0|none: drives|the key `dbc`|one (of|that)|a last point|a drive on CAN|"
         r"32 for a float|a number that ends|up to 256 bytes)|unknown key|format:",
     "the arm, and what runs": r"^bus |expected (a joint of|a link of|a range within the URDF's|a mass|a timestep|a start|a start pose)",
-    "geometry": r"expected (a direction|axes of nonzero|a physical inertia|an invertible matrix|a closed mesh|a number other than 0|a shape, in W)",
+    "geometry": r"expected (a direction|axes of nonzero|a physical inertia|an invertible matrix|a closed mesh|less than half of how thick|a number other than 0|a shape, in W)",
 }
 
 
@@ -158,7 +159,7 @@ class Schema(ProgramTest):
 
     def test_arguments_are_refused_clearly(self):
         for arguments, said in ((("schema",), "kind"), (("schema", "cell", "--json"), "--json"),
-                                (("schema", "cells"), "expected cell, drive, hand, scene or sensor")):
+                                (("schema", "cells"), "expected cell, drive, hand, scene, sensor or tool")):
             outcome = self.call(*arguments)
             self.assertEqual(outcome.status, 2)
             self.assertIn(said, outcome.err)
@@ -196,6 +197,8 @@ class Schema(ProgramTest):
         for i in range(MUTATIONS):
             file, document = rng.choice(documents)
             what, mutant = spoil(rng, root, document)
+            if kind == "tool" and not set(mutant) & set(root["properties"]) - {"name"}:
+                continue  # without a shape it is no tool's file
             path = file.with_name(f"mutant_{i}.yaml")
             path.write_text(yaml.safe_dump(mutant, sort_keys=False, allow_unicode=True))
             spoilt[str(path)] = (f"{file.name}: {what}", judge.is_valid(mutant))
@@ -222,6 +225,9 @@ class Schema(ProgramTest):
 
     def test_sensors_get_the_same_verdict(self):
         self.agree("sensor")
+
+    def test_tools_get_the_same_verdict(self):
+        self.agree("tool")
 
     def test_drives_get_the_same_verdict(self):
         self.agree("drive")

@@ -147,6 +147,10 @@ class Page(ProgramTest):
                         browser.until(f"""{of_kind} <= (() => {{ let n = 0;
                             proxarm.world.objects.traverse((o) => {{ n += o.name === '{name}'; }}); return n; }})()""",
                                       f"each {kind}")
+                    parts = browser.run("""let n = 0; proxarm.world.arm.traverse((o) => { n += o.name === 'tool'; });
+                                           return [n, proxarm.stage.tool.parts.length]""")
+                    self.assertEqual(parts[0], parts[1])
+                    self.assertEqual(parts[0] > 0, "tool:" in scene.read_text())
                     regions = browser.run("return proxarm.world.objects.children.filter((o) => o.name === 'medium').length")
                     self.assertEqual(regions, sum(medium["within"] is not None for medium in stage["media"]))
                     notes = browser.run("return document.getElementById('notes').textContent")

@@ -34,7 +34,15 @@ bool is_lookahead(const std::string& text) { return text.compare(0, 10, "lookahe
 
 constexpr Live live[] = {{"mass", Parameter::mass, description::parse_mass},
                          {"damping", Parameter::damping, description::parse_damping},
-                         {"spring", Parameter::spring, description::parse_stiffness}};
+                         {"spring", Parameter::spring, description::parse_stiffness},
+                         {"inertia", Parameter::inertia, description::parse_inertia},
+                         {"turning_damping", Parameter::turning_damping, description::parse_turning_damping},
+                         {"turning_spring", Parameter::turning_spring, description::parse_turning_stiffness}};
+
+bool turns(Parameter parameter) {
+  return parameter == Parameter::inertia || parameter == Parameter::turning_damping ||
+         parameter == Parameter::turning_spring;
+}
 
 const Live& find(const std::string& text) {
   const std::string name = text.substr(0, text.find('='));
@@ -154,6 +162,10 @@ controller::Change LiveParameters::take(const std::string& text) {
   if (is_lookahead(text)) return take_lookahead(text);
   const Live& parameter = find(text);
   const double value = parameter.parse(text.substr(text.find('=') + 1), parameter.name);
+  if (turns(parameter.parameter) && session_.settings.orientation == controller::OrientationMode::held) {
+    refuse(parameter.name, "a session whose tool keeps its orientation", "one that was started with --orientation free",
+           "start a new session with --inertia or --orientation free");
+  }
   PreparedSession changed = session_;
   switch (parameter.parameter) {
     case Parameter::mass:
@@ -164,6 +176,15 @@ controller::Change LiveParameters::take(const std::string& text) {
       break;
     case Parameter::spring:
       changed.settings.spring_N_per_m = changed.loop.spring_N_per_m = value;
+      break;
+    case Parameter::inertia:
+      changed.settings.rotational_inertia_kg_m2 = value;
+      break;
+    case Parameter::turning_damping:
+      changed.settings.rotational_damping_Nms_per_rad = value;
+      break;
+    case Parameter::turning_spring:
+      changed.settings.rotational_spring_Nm_per_rad = value;
       break;
     case Parameter::friction:
     case Parameter::position:

@@ -108,7 +108,8 @@ class NewCell {
     cell_.tool = {.mass_kg = 0.25,
                   .centre_of_mass_S_m = {0, 0, 0.06},
                   .inertia_kg_m2 = {3.25e-4, 3.25e-4, 5.0e-5, 0, 0, 0},
-                  .handle_S = {.position_m = {0, 0, 0.1}}};
+                  .handle_S = {.position_m = {0, 0, 0.1}},
+                  .shape = {}};
     cell_.sensor.link = source_.tip;
     cell_.default_mass_kg = 10.0;
     cell_.default_period_s = 1e-3;

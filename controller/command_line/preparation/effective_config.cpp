@@ -25,6 +25,8 @@ std::string effective_config(const PreparedSession& session) {
   out << YAML::Key << "cell" << YAML::Value << name_of(session.cell.file);
   out << YAML::Key << "scene" << YAML::Value << name_of(session.scene.file);
   out << YAML::Key << "hand" << YAML::Value << name_of(session.hand.file);
+  out << YAML::Key << "tool" << YAML::Value
+      << (session.scene.tool ? name_of(session.scene.tool->file) : std::string("point"));
   number(out, "period_s", settings.period_s);
   number(out, "duration_s", session.duration_s);
   if (session.impedance()) {
@@ -43,8 +45,11 @@ std::string effective_config(const PreparedSession& session) {
   constexpr const char* passivity[] = {"off", "observe", "auto", "on"};
   out << YAML::Key << "passivity" << YAML::Value << passivity[static_cast<int>(settings.passivity)];
   number(out, "sensor_delay_s", session.cell.sensor.delay_s);
-  number(out, "rotational_inertia_kg_m2", settings.rotational_inertia_kg_m2);
-  number(out, "rotational_damping_Nms_per_rad", settings.rotational_damping_Nms_per_rad);
+  if (settings.orientation == controller::OrientationMode::free) {
+    number(out, "inertia_kg_m2", felt_inertia_kg_m2(session));
+    number(out, "turning_damping_Nms_per_rad", settings.rotational_damping_Nms_per_rad);
+    number(out, "turning_spring_Nm_per_rad", settings.rotational_spring_Nm_per_rad);
+  }
   number(out, "tare_s", settings.tare_s);
   number(out, "total_delay_s", total_delay_s(session));
   out << YAML::EndMap;

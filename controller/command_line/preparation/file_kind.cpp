@@ -22,6 +22,9 @@ FileKind kind_of_yaml(const description::YamlNode& root) {
   for (const char* key : {"objects", "media", "coulomb_field", "guide", "space", "dimensions"}) {
     if (root.has(key)) return FileKind::scene;
   }
+  for (const char* key : {"parts", "sphere", "capsule", "box", "cylinder", "convex"}) {
+    if (root.has(key)) return FileKind::tool;
+  }
   return FileKind::unknown;
 }
 
@@ -31,6 +34,8 @@ const char* name_of(FileKind kind) {
       return "a cell file";
     case FileKind::scene:
       return "a scene file";
+    case FileKind::tool:
+      return "a tool file";
     case FileKind::hand:
       return "a hand file";
     case FileKind::sensor:
@@ -58,6 +63,8 @@ const char* advice_for(FileKind kind) {
       return "give it without an option";
     case FileKind::scene:
       return "give it as --scene FILE";
+    case FileKind::tool:
+      return "give it as --tool FILE";
     case FileKind::hand:
       return "give it as --hand FILE";
     case FileKind::mesh:

@@ -5,7 +5,7 @@
 
 namespace proxarm::command_line {
 
-enum class FileKind { cell, scene, hand, sensor, registers, urdf, eds, dbc, mesh, unknown };
+enum class FileKind { cell, scene, tool, hand, sensor, registers, urdf, eds, dbc, mesh, unknown };
 
 // By its extension, or by a key that only its kind has. A YAML file without any, or that can't be read: unknown.
 FileKind kind_of(const std::filesystem::path& file);

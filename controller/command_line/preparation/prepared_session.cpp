@@ -14,10 +14,13 @@
 #include "controller/session/reachable_scene.hpp"
 #include "fieldbus/cia402/cia402_units.hpp"
 #include "models/arm/arm.hpp"
+#include "models/arm/tool_inertia.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/key_line.hpp"
 #include "scenes/format/scene_file.hpp"
+#include "scenes/format/tool_file.hpp"
+#include "scenes/rigid/compile_rigid.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -166,12 +169,68 @@ void choose_scheme(PreparedSession& session, const RunOptions& options) {
   if (settings.spring_N_per_m > 0.0) refuse("--spring", "the impedance type", "--scheme admittance");
   if (settings.order != 1) refuse("--order", "2 with the impedance type", "1");
   if (settings.orientation != controller::OrientationMode::held) {
-    refuse("--orientation", "free with the impedance type", "none: the tool's orientation isn't rendered");
+    refuse(options.inertia_kg_m2 ? "--inertia" : "--orientation",
+           options.inertia_kg_m2 ? "the impedance type" : "free with the impedance type",
+           "none: the tool's orientation isn't rendered");
   }
   settings.coupling_stiffness_N_per_m = options.stiffness_N_per_m.value_or(settings.coupling_stiffness_N_per_m);
   if (settings.damping_Ns_per_m > 0.0) settings.coupling_damping_Ns_per_m = settings.damping_Ns_per_m;
   settings.damping_Ns_per_m = 0.0;
   settings.mass_kg = 0.0;
+}
+
+// Held is J → ∞: an inertia, a damping or a spring of turning has no meaning beside it.
+void choose_orientation(PreparedSession& session, const RunOptions& options) {
+  using controller::OrientationMode;
+  controller::SessionSettings& settings = session.settings;
+  const char* const turns = options.inertia_kg_m2                 ? "--inertia"
+                            : options.turning_damping_Nms_per_rad ? "--turning-damping"
+                            : options.turning_spring_Nm_per_rad   ? "--turning-spring"
+                                                                  : nullptr;
+  settings.orientation = options.orientation.value_or(turns ? OrientationMode::free : OrientationMode::held);
+  if (turns && settings.orientation == OrientationMode::held) {
+    throw description::SetupError(
+        {.key = turns, .found = "--orientation held", .expected = "--orientation free, or none of the two"});
+  }
+  settings.rotational_inertia_kg_m2 = options.inertia_kg_m2.value_or(settings.rotational_inertia_kg_m2);
+  // As with a mass, nothing is felt beside an inertia that was asked for.
+  if (options.inertia_kg_m2) settings.rotational_damping_Nms_per_rad = 0.0;
+  settings.rotational_damping_Nms_per_rad =
+      options.turning_damping_Nms_per_rad.value_or(settings.rotational_damping_Nms_per_rad);
+  settings.rotational_spring_Nm_per_rad =
+      options.turning_spring_Nm_per_rad.value_or(settings.rotational_spring_Nm_per_rad);
+}
+
+// The tool that was named on the command line, the scene's, or the cell's.
+void choose_tool(PreparedSession& session, const RunOptions& options) {
+  const std::string& of_cell = session.cell.tool.shape;
+  if (options.tool == "point") {
+    session.scene.tool = nullptr;
+  } else if (!options.tool.empty() || (!session.scene.tool && !of_cell.empty())) {
+    const fs::path file = options.tool.empty() ? fs::path(of_cell) : user_file(options.tool);
+    require_file(options.tool, "--tool", "scenes/tools/rod.yaml");
+    session.scene.tool = std::make_shared<const scenes::RigidTool>(loaded(file, FileKind::tool, scenes::load_tool));
+  }
+}
+
+// What a rigid tool can't be rendered with, and why.
+void require_renderable_tool(PreparedSession& session) {
+  if (!session.scene.tool) return;
+  const auto refuse = [&](const char* key, const std::string& found, const char* expected) {
+    throw description::SetupError({.key = key, .found = found + " with a rigid tool", .expected = expected});
+  };
+  if (session.impedance()) {
+    refuse("--scheme", "the impedance type", "admittance, or --tool point: torques are rendered at a point alone");
+  }
+  if (session.settings.order != 1) {
+    refuse("--order", "2", "1: order 2 needs the contacts of the step before, which a pose's aren't labelled with");
+  }
+  if (session.settings.looks_ahead) refuse("--lookahead", "a lookahead", "off: only a point's way is predicted");
+  const std::size_t axes = session.cell.drives.size();
+  if (axes < 6) {
+    refuse("--tool", std::to_string(axes) + " axes", "six axes or more: fewer can't hold an orientation");
+  }
+  session.rigid = scenes::compile_rigid(session.scene, session.scene.tool->shape);
 }
 
 // A wall's K and B must be stable on the device alone, in its lightest and in its heaviest direction.
@@ -248,6 +307,30 @@ std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const Prepare
 }
 
 }  // namespace
+
+controller::HandModel turning_hand_model(const PreparedSession& session) {
+  return {session.hand.turning_stiffness_Nm_per_rad, session.hand.turning_damping_Nms_per_rad,
+          session.hand.inertia_kg_m2};
+}
+
+double felt_inertia_kg_m2(const PreparedSession& session) {
+  const double asked = session.settings.rotational_inertia_kg_m2;
+  return asked > 0.0 ? asked
+                     : controller::default_inertia_kg_m2 + models::tool_inertia(session.cell.tool).largest_kg_m2;
+}
+
+controller::LoopModel turning_loop(const PreparedSession& session) {
+  const models::Arm arm(session.cell);
+  controller::LoopModel loop = session.loop;
+  loop.horizon_s = 0.0;  // only the tool's place is predicted
+  loop.order = 1;
+  loop.handle_mass_kg = models::tool_inertia(session.cell.tool).largest_kg_m2;
+  loop.damping_Ns_per_m = session.settings.rotational_damping_Nms_per_rad;
+  loop.spring_N_per_m = session.settings.rotational_spring_Nm_per_rad;
+  loop.arms = std::make_shared<const std::vector<controller::ElasticArm>>(
+      1, controller::elastic_turning_arm(arm, arm.start_rad(), session.cell, session.hand.mass_kg));
+  return loop;
+}
 
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options) {
   if (options.period_s) return {.key = "--timestep"};
@@ -326,12 +409,14 @@ PreparedSession prepare(const RunOptions& options) {
       loaded(chosen(options.scene, session.cell, "default_scene", session.cell.default_scene, "scenes/free.yaml"),
              FileKind::scene, scenes::load_scene);
   session.scene = controller::reachable_scene(std::move(session.scene), session.cell);
+  choose_tool(session, options);
   add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
   session.settings.receive_window = session.cell.receive_window;
   session.duration_s = options.duration_s;
   set_timestep(session, options, options.period_s.value_or(session.cell.default_period_s));
+  choose_orientation(session, options);
   choose_scheme(session, options);
   choose_passivity(session, options);
   require_profile(session);
@@ -341,6 +426,7 @@ PreparedSession prepare(const RunOptions& options) {
   if (session.impedance()) {
     if (options.lookahead && session.lookahead.kind != LookaheadChoice::Kind::off) refuse_lookahead();
     session.lookahead = {};
+    require_renderable_tool(session);
     return session;
   }
   session.loop.drive_time_constant_s = drive_time_constant_s(session.cell);
@@ -351,6 +437,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.arms = arms_at(session, {});
   session.settings.force_age_s = session.cell.sensor.delay_s;
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
+  require_renderable_tool(session);
   choose_horizon(session);
   return session;
 }
@@ -393,6 +480,19 @@ void require_stable_horizon(const PreparedSession& session) {
 
 }  // namespace
 
+namespace {
+void require_inertia_above_handle(const PreparedSession& session) {
+  const double handle_kg_m2 = models::tool_inertia(session.cell.tool).largest_kg_m2, felt = felt_inertia_kg_m2(session);
+  if (felt > handle_kg_m2) return;
+  std::array<char, 80> expected{};
+  std::snprintf(expected.data(), expected.size(), "more than the handle's own %.3g kg m²", handle_kg_m2);
+  throw description::SetupError({.key = "--inertia",
+                                 .found = description::number_text(felt) + " kg m²",
+                                 .expected = expected.data(),
+                                 .advice = "the handle sits after the sensor, so no control can make it lighter"});
+}
+}  // namespace
+
 void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (session.impedance()) return require_stable_coupling(session);
   require_mass_in_range(session, options);
@@ -414,6 +514,12 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
     throw description::SetupError(problem);
   }
   if (!options.force_unstable) require_stable_horizon(session);
+  if (session.settings.orientation == controller::OrientationMode::held || session.cell.drives.size() < 6) return;
+  require_inertia_above_handle(session);
+  // A hand that doesn't twist the handle closes no loop: the proxy's own pole at 1 would be taken for an unstable one.
+  if (!session.hand.twists()) return;
+  controller::require_stable_inertia(felt_inertia_kg_m2(session), turning_hand_model(session), turning_loop(session),
+                                     options.force_unstable);
 }
 
 double motion_delay_s(const PreparedSession& session) {

@@ -9,6 +9,7 @@
 #include "models/description/cell.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
+#include "models/geometry/pose_algorithm.hpp"
 #include "scenes/format/scene.hpp"
 
 namespace proxarm::command_line {
@@ -18,6 +19,7 @@ struct PreparedSession {
   description::SensorDescription sensor;
   description::HandDescription hand;
   scenes::Scene scene;
+  std::shared_ptr<const models::PoseAlgorithm> rigid;  // scene and tool, for questions of room; null: the tool is a point
   controller::SessionSettings settings;
   double duration_s = 10.0;
   LookaheadChoice lookahead;   // what was asked for; settings.horizon_s is what came of it
@@ -28,6 +30,12 @@ struct PreparedSession {
 
 // The hand at its tightest grip, as the stability check takes it.
 controller::HandModel hand_model(const PreparedSession& session);
+
+// The same of the tool's rotation, in Nm/rad, Nms/rad and kg m².
+controller::HandModel turning_hand_model(const PreparedSession& session);
+controller::LoopModel turning_loop(const PreparedSession& session);
+// What the hand feels, the tool behind the sensor included. Precondition: the orientation is free.
+double felt_inertia_kg_m2(const PreparedSession& session);
 
 // The loop in all poses that the hand means to lead the arm to, whatever the scene has in its way.
 controller::LoopModel led_loop(const PreparedSession& session);

@@ -51,6 +51,7 @@ struct RunOptions {
   std::filesystem::path cell;   // empty: the default cell
   std::filesystem::path scene;  // empty: the cell's
   std::filesystem::path hand;   // empty: the cell's
+  std::filesystem::path tool;   // empty: the scene's, else the cell's; point: a point
   std::filesystem::path arm;    // cell file of the simulated arm; empty: it is as the cell says
   std::optional<double> mass_kg;
   std::optional<double> period_s;
@@ -59,6 +60,8 @@ struct RunOptions {
   std::optional<controller::Scheme> scheme;        // unset: what the drives' modes say
   std::optional<controller::Passivity> passivity;  // unset: the cell's
   std::optional<double> stiffness_N_per_m;         // impedance type
+  std::optional<controller::OrientationMode> orientation;  // unset: free where one of the next three is given, else held
+  std::optional<double> inertia_kg_m2, turning_damping_Nms_per_rad, turning_spring_Nm_per_rad;
   std::optional<LookaheadChoice> lookahead;        // unset: off
   controller::SessionSettings settings;            // all that isn't optional above
   BusMapping bus;

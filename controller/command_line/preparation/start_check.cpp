@@ -127,6 +127,23 @@ void require_outside(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move or turn the object, or change start_rad in the cell file"});
 }
 
+// A rigid tool must start outside of everything: 𝒢 has no way out of a solid. The start is known as well as start_rad,
+// and so is a touch.
+void require_room(const PreparedSession& session, const models::Pose& start) {
+  const double clearance_m = session.rigid->clearance_m(models::tool_pose(start));
+  if (clearance_m >= 0.0) return;
+  char depth[64];
+  std::snprintf(depth, sizeof depth, "%.3g mm inside of the scene's objects", -1e3 * clearance_m);
+  throw SetupError({.file = session.scene.tool->file.string(),
+                    .line = session.scene.tool->line,
+                    .key = "tool",
+                    .found = std::string("a tool that starts ") + depth,
+                    .expected = "one that has room where it starts, at " + point_text(start.translation()),
+                    .advice =
+                        "a smaller tool (or a larger hole), another position_m of its parts, or another start_rad "
+                        "in the cell file"});
+}
+
 template <int N>
 double first_step_m(const scenes::CompiledScene& world, const Vec3& start_W) {
   const models::Vec<N> start = world.from_W<N>(start_W);
@@ -231,7 +248,11 @@ void require_usable_start(const PreparedSession& session) {
   const models::Vec3 start_W = arm.tool_pose(arm.start_rad()).translation();
   require_reachable_space(session, arm, start_W);
   require_in_space(session, start_W);
-  require_outside(session, start_W);
+  if (session.scene.tool) {
+    require_room(session, arm.tool_pose(arm.start_rad()));
+  } else {
+    require_outside(session, start_W);
+  }
   require_on_guide(session, start_W);
   require_allowed(session, start_W);
   require_weight_held(session, arm);

@@ -11,6 +11,7 @@
 #include "models/description/modbus_drive.hpp"
 #include "models/description/sensor.hpp"
 #include "scenes/format/scene_file.hpp"
+#include "scenes/format/tool_file.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -130,6 +131,7 @@ void read_as(const fs::path& file, const std::string& kind) {
   if (kind == "cell") description::load_cell(file);
   if (kind == "hand") description::load_hand(file);
   if (kind == "scene") scenes::load_scene(file);
+  if (kind == "tool") scenes::load_tool(file);
   if (kind == "sensor") description::load_sensor(file);
   if (kind == "drive") description::load_modbus_drive(file);
 }

@@ -71,6 +71,7 @@ controller::ReplayHead replay_head(const PreparedSession& session, const std::ve
   for (std::size_t i = 0; i < indices.size(); ++i) head.bus_of_cell_bus[i] = static_cast<std::uint8_t>(indices[i]);
   put(head.cell, session.cell.file.string());
   put(head.scene, fs::absolute(session.scene.file).lexically_normal().string());
+  if (session.scene.tool) put(head.tool, fs::absolute(session.scene.tool->file).lexically_normal().string());
   return head;
 }
 
@@ -85,6 +86,10 @@ std::vector<fs::path> replay_files(const PreparedSession& session) {
   }
   for (const scenes::Object& object : session.scene.objects) {
     if (const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape)) files.push_back(mesh->file);
+  }
+  if (session.scene.tool) {
+    files.push_back(session.scene.tool->file);
+    files.insert(files.end(), session.scene.tool->meshes.begin(), session.scene.tool->meshes.end());
   }
   std::erase_if(files, [](const fs::path& file) { return file.empty(); });
   for (fs::path& file : files) file = fs::absolute(file).lexically_normal();

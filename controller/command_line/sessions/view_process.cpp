@@ -53,6 +53,7 @@ Json hello_of(const PreparedSession& session, const RunOptions& options, ViewPro
   if (options.view_control) control = options.control == "default" ? default_control_path() : options.control;
   return {{"cell", readable_twice(session.cell.file, "cell")},
           {"scene", arm_alone && options.scene.empty() ? "" : readable_twice(session.scene.file, "--scene")},
+          {"tool", session.scene.tool ? readable_twice(session.scene.tool->file, "--tool") : ""},
           {"arm_alone", arm_alone},
           {"control", control.empty() ? "" : fs::absolute(control).string()},
           {"port", options.view_port},

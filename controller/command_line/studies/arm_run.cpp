@@ -26,10 +26,10 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   }
   for (std::size_t i = 0; i < setup.sines.size(); ++i) {
     // By turns with and against each other: at first the hand rests where the tool is.
-    session.hand.multisine.push_back({setup.sines[i].frequency_Hz,
-                                      setup.sines[i].amplitude_m,
-                                      i % 2 == 0 ? 0.0 : std::numbers::pi,
-                                      {1.0, 0.0, 0.0}});
+    session.hand.multisine.push_back({.frequency_Hz = setup.sines[i].frequency_Hz,
+                                      .amplitude_m = setup.sines[i].amplitude_m,
+                                      .phase_rad = i % 2 == 0 ? 0.0 : std::numbers::pi,
+                                      .direction = {1.0, 0.0, 0.0}});
   }
   for (description::DriveDescription& drive : session.cell.drives) {
     drive.position_bandwidth_Hz *= setup.drive_factor;

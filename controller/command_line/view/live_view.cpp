@@ -35,7 +35,7 @@ constexpr auto between_moments = std::chrono::microseconds(16'667);  // 60 a sec
 
 scenes::Scene scene_of(const json& hello) {
   const auto file = hello.at("scene").get<std::string>();
-  if (!file.empty()) return scenes::load_scene(file);
+  if (!file.empty()) return scenes::load_scene_with(file, hello.at("tool").get<std::string>());
   scenes::Scene none;
   none.name = "no scene";
   return none;

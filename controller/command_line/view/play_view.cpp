@@ -28,7 +28,8 @@ view::Stage stage_of(const fs::path& folder) {
   const controller::ReplayHead& head = log.head();
   const controller::SessionSettings& settings = head.settings;
   return {description::load_cell(controller::recorded_file(folder, head.cell.data())),
-          scenes::load_scene(controller::recorded_file(folder, head.scene.data())),
+          scenes::load_scene_with(controller::recorded_file(folder, head.scene.data()),
+                                  controller::recorded_tool(folder, head)),
           {.period_s = settings.period_s,
            .mass_kg = settings.mass_kg,
            .damping_Ns_per_m = settings.damping_Ns_per_m,

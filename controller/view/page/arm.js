@@ -1,6 +1,6 @@
 // The arm as its URDF draws it, and the handle behind the sensor.
 import * as THREE from './three/build/three.module.js';
-import { capsuleGeometry, cylinderGeometry, fetchMesh, setPose, vec } from './shapes.js';
+import { capsuleGeometry, cylinderGeometry, fetchMesh, hullGeometry, setPose, vec } from './shapes.js';
 import { isDark, onTheme } from './theme.js';
 
 const EDGE_ANGLE_DEG = 30;
@@ -13,6 +13,7 @@ export class ArmView extends THREE.Group {
     const behind = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
     this.materials = [new THREE.MeshLambertMaterial(behind), new THREE.MeshLambertMaterial(behind)];
     this.handleMaterial = new THREE.MeshLambertMaterial();
+    this.toolMaterial = new THREE.MeshLambertMaterial({ flatShading: true });
     this.edgeMaterial = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.65 });
     this.links = stage.links.map((link, i) => this.makeLink(link, i));
     this.add(...this.links);
@@ -25,6 +26,7 @@ export class ArmView extends THREE.Group {
     this.materials[0].color.set(dark ? 0x8fa0b1 : 0xe3e8ed);
     this.materials[1].color.set(dark ? 0x5d6e80 : 0x94a3b2);
     this.handleMaterial.color.set(dark ? 0xc98a2b : 0xd9923b);
+    this.toolMaterial.color.set(dark ? 0x7f9fd6 : 0x7c9bd0);
     this.edgeMaterial.color.set(dark ? 0x0b1016 : 0x51606f);
   }
 
@@ -48,17 +50,23 @@ export class ArmView extends THREE.Group {
       }).catch(() => {});  // what can't be had leaves a gap
       return;
     }
+    group.add(this.makeSolid(shape, material));
+  }
+
+  makeSolid(shape, material) {
     const geometry =
       shape.kind === 'box' ? new THREE.BoxBufferGeometry(...shape.size)
       : shape.kind === 'sphere' ? new THREE.SphereBufferGeometry(shape.radius, 32, 20)
+      : shape.kind === 'capsule' ? capsuleGeometry(shape.radius, shape.length)
+      : shape.kind === 'hull' ? hullGeometry(shape)
       : cylinderGeometry(shape.radius, shape.length);
     const mesh = new THREE.Mesh(geometry, material);
     mesh.add(new THREE.LineSegments(new THREE.EdgesGeometry(geometry, EDGE_ANGLE_DEG), this.edgeMaterial));
     setPose(mesh, shape.pose);
-    group.add(mesh);
+    return mesh;
   }
 
-  // From the sensor to the rendered point, and a little beyond: what the hand holds.
+  // From the sensor to the rendered point, and a little beyond: what the hand holds. With a rigid tool its shape, too.
   addHandle(tool) {
     const link = this.links[tool.link];
     if (!link) return;
@@ -68,6 +76,11 @@ export class ArmView extends THREE.Group {
     setPose(sensor, tool.sensor);
     sensor.translateZ(0.002);
     link.add(sensor);
+    for (const part of tool.parts) {
+      const solid = this.makeSolid(part, this.toolMaterial);
+      solid.name = 'tool';
+      link.add(solid);
+    }
     if (length < 0.01) return;
     const handle = new THREE.Mesh(capsuleGeometry(0.016, Math.max(0.01, length - 0.026)), this.handleMaterial);
     handle.name = 'handle';

@@ -32,6 +32,16 @@ export function capsuleGeometry(radius, length, rings = 10) {
   return new THREE.LatheBufferGeometry(profile, 32).rotateX(Math.PI / 2);
 }
 
+// Corners, and three of them for each triangle.
+export function hullGeometry({ points, triangles }) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points.flat()), 3));
+  geometry.setIndex(triangles.flat());
+  const separate = geometry.toNonIndexed();
+  separate.computeVertexNormals();
+  return separate;
+}
+
 // Puts a body that lies along z between two points.
 export function placeBetween(object, from, to) {
   const a = vec(from), b = vec(to);

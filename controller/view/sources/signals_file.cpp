@@ -89,6 +89,7 @@ constexpr std::array singles{
     Named{"friction_1", store_value<&CycleRecord::friction>},
     Named{"proxy_mass_kg", store_value<&CycleRecord::proxy_mass_kg>},
     Named{"proxy_damping_Ns_per_m", store_value<&CycleRecord::proxy_damping_Ns_per_m>},
+    Named{"proxy_inertia_kg_m2", store_value<&CycleRecord::proxy_inertia_kg_m2>},
     Named{"energy_hand_J",
           [](CycleRecord& r, std::size_t, std::string_view t) { r.energies_J.hand = number_of<double>(t); }},
     Named{"energy_proxy_J",
@@ -111,7 +112,9 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
                              NamedVector{"normal_W", "1", store_part<&CycleRecord::normal_W>},
                              NamedVector{"tool_W", "m", store_part<&CycleRecord::tool_W_m>},
                              NamedVector{"true_tool_W", "m", store_part<&CycleRecord::true_tool_W_m>},
-                             NamedVector{"hand_force_W", "N", store_part<&CycleRecord::hand_force_W_N>}};
+                             NamedVector{"hand_force_W", "N", store_part<&CycleRecord::hand_force_W_N>},
+                             NamedVector{"contact_torque_W", "Nm", store_part<&CycleRecord::contact_torque_W_Nm>},
+                             NamedVector{"hand_torque_W", "Nm", store_part<&CycleRecord::hand_torque_W_Nm>}};
 
 // "contact_object_2", "friction_2", "normal_2_W_x_1": of further contacts.
 constexpr std::array<std::string_view, 3> axes_in_names{"_x_", "_y_", "_z_"};
@@ -162,6 +165,12 @@ SignalsFile::Column SignalsFile::column_named(std::string_view name, const std::
   for (std::size_t axis = 0; axis < axis_names.size() && axis < controller::max_axes; ++axis) {
     if (name == axis_names[axis] + "_target_counts") return {store_count<&CycleRecord::target_counts>, axis};
     if (name == axis_names[axis] + "_actual_counts") return {store_count<&CycleRecord::actual_counts>, axis};
+  }
+  constexpr std::array<std::string_view, 4> of_proxy{"proxy_W_qx", "proxy_W_qy", "proxy_W_qz", "proxy_W_qw"};
+  for (std::size_t part = 0; part < of_proxy.size(); ++part) {
+    if (name == of_proxy[part]) {
+      return {[](CycleRecord& r, std::size_t at, std::string_view t) { r.proxy_q_W[at] = number_of<double>(t); }, part};
+    }
   }
   const OtherColumn other = column_of_other(name);
   return {other.store, other.part};

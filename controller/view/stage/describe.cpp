@@ -6,6 +6,7 @@
 #include "controller/view/stage/json_text.hpp"
 #include "controller/view/stage/stage.hpp"
 #include "controller/view/stage/words.hpp"
+#include "models/rigid_shapes/solid.hpp"
 
 namespace proxarm::view {
 namespace {
@@ -179,7 +180,40 @@ void put_words(JsonText& json, bool arm_alone) {
   json.end().end();
 }
 
-void put_tool(JsonText& json, const description::Cell& cell, const models::LinkTree& tree) {
+// Faces of a hull as triangles: corners, and three of them for each.
+void add_hull(JsonText& json, const models::ConvexTool& hull) {
+  const models::Solid solid = models::solid_of(hull, Pose::Identity());
+  json.add("kind", "hull").name("points").begin_list();
+  for (const Vec3& point : solid.points) put(json, point);
+  json.end().name("triangles").begin_list();
+  for (const models::Solid::Face& face : solid.faces) {
+    const auto corners = solid.corners(face);
+    for (std::size_t i = 2; i < corners.size(); ++i) {
+      json.begin_list().value(corners[0]).value(corners[i - 1]).value(corners[i]).end();
+    }
+  }
+  json.end();
+}
+
+// A part of a rigid tool, in its link's frame.
+void put(JsonText& json, const models::ToolPart& part, const Pose& X_LT) {
+  json.begin_object();
+  add(json, "pose", Pose(X_LT * part.X_TP));
+  if (const auto* box = std::get_if<models::BoxTool>(&part.shape)) {
+    add(json.add("kind", "box"), "size", box->size_m);
+  } else if (const auto* sphere = std::get_if<models::SphereTool>(&part.shape)) {
+    json.add("kind", "sphere").add("radius", sphere->radius_m);
+  } else if (const auto* capsule = std::get_if<models::CapsuleTool>(&part.shape)) {
+    json.add("kind", "capsule").add("radius", capsule->radius_m).add("length", capsule->length_m);
+  } else if (const auto* cylinder = std::get_if<models::CylinderTool>(&part.shape)) {
+    json.add("kind", "cylinder").add("radius", cylinder->radius_m).add("length", cylinder->length_m);
+  } else if (const auto* hull = std::get_if<models::ConvexTool>(&part.shape)) {
+    add_hull(json, *hull);
+  }
+  json.end();
+}
+
+void put_tool(JsonText& json, const description::Cell& cell, const models::LinkTree& tree, const scenes::Scene& scene) {
   const auto& links = tree.links();
   const auto link =
       std::find_if(links.begin(), links.end(), [&](const models::DrawnLink& l) { return l.name == cell.sensor.link; });
@@ -188,7 +222,11 @@ void put_tool(JsonText& json, const description::Cell& cell, const models::LinkT
   json.add("link", link != links.end() ? link - links.begin() : static_cast<std::ptrdiff_t>(links.size()) - 1);
   add(json, "sensor", X_LS);
   add(json, "handle", Pose(X_LS * X_ST));
-  json.add("mass_kg", cell.tool.mass_kg).end();
+  json.add("mass_kg", cell.tool.mass_kg).name("parts").begin_list();
+  if (scene.tool) {
+    for (const models::ToolPart& part : scene.tool->shape.parts) put(json, part, X_LS * X_ST);
+  }
+  json.end().end();
 }
 
 }  // namespace
@@ -198,7 +236,7 @@ std::string Stage::describe() const {
   json.begin_object().add("cell", cell_.name).name("fields").begin_list();
   for (const std::string& field : field_names()) json.value(field);
   put_links(json.end().name("links"), tree_);
-  put_tool(json.name("tool"), cell_, tree_);
+  put_tool(json.name("tool"), cell_, tree_, scene_);
   put_scene(json.name("scene"), scene_, compiled_);
   put_limits(json.name("limits"), cell_.limits);
   put_words(json.name("words"), options_.arm_alone);

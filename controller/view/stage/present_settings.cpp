@@ -43,6 +43,9 @@ bool PresentSettings::follow(const controller::Change& change, double period_s_n
       other_value = of_object && take(position_m[object], models::Vec3(change.position_m.data()));
       break;
     case Parameter::lookahead:
+    case Parameter::inertia:
+    case Parameter::turning_damping:
+    case Parameter::turning_spring:
     case Parameter::none:
       break;
   }

@@ -79,7 +79,7 @@ TEST(Session, AHandOfOnesOwnThatPullsAsTheFilesDoesMovesTheArmAlike) {
   const command_line::PreparedSession& prepared = with_own.prepared();
   // What the simulated arm is made of, for the place at which its hand takes hold of it.
   const sim::Plant there(prepared.cell, prepared.sensor, prepared.hand);
-  const sim::Hand hand(prepared.hand, there.tool().X_WT.translation());
+  const sim::Hand hand(prepared.hand, there.tool().X_WT);
   int calls = 0;
   with_own.set_hand([&](double time_s, const Vec3& position_W, const Vec3& velocity_W) -> Vec3 {
     ++calls;

@@ -30,7 +30,9 @@ struct AdmittanceMotionTest : ::testing::Test {
         .inverse = models::InverseKinematics(arm, {.max_step_rad = max_steps_rad(cell.drives, settings.period_s)}),
         .elastic = ElasticSetpoint(arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s),
         .world = make_rendered_world(scene, settings, settings.mass_kg),
+        .pose = nullptr,
         .orientation = OrientationProxy({}),
+        .behind_sensor_T = models::Mat3::Zero(),
         .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
     return std::make_unique<AdmittanceMotion>(std::move(parts), arm, cell.drives, cell.limits, cell.supervision,
                                               settings);

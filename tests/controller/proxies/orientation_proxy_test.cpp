@@ -112,6 +112,70 @@ TEST(OrientationProxy, RefusesWhatIsNoNumberAndKeepsItsState) {
   EXPECT_EQ(proxy.velocity_W(), omega);
 }
 
+// The hand's torque is J α about every axis: part of it moves what hangs behind the sensor, which the sensor doesn't
+// read.
+TEST(OrientationProxy, FeelsLikeABallWhateverHangsBehindTheSensor) {
+  constexpr double J = 0.02, T = 1e-5;
+  models::Mat3 I;
+  I << 4e-3, 1e-3, 0.0, 1e-3, 6e-3, -5e-4, 0.0, -5e-4, 2e-3;
+  OrientationProxy proxy({.free = true,
+                          .inertia_kg_m2 = J,
+                          .behind_sensor_T = I,
+                          .damping_Nms_per_rad = 0.0,
+                          .max_speed_rad_per_s = 100.0,
+                          .max_angle_rad = 3.0,
+                          .period_s = T});
+  ASSERT_TRUE(proxy.start(tilted));
+  for (int k = 0; k < 100'000; ++k) {
+    const double t = k * T;
+    const Vec3 hand(0.05 * std::cos(5.0 * t), 0.08 * std::sin(7.0 * t), 0.03 * std::cos(3.0 * t));
+    const models::Mat3 R = proxy.R_WT().toRotationMatrix(), I_W = R * I * R.transpose();
+    const Vec3 omega = proxy.velocity_W();
+    // The sensor's reading, of the acceleration that this torque causes: J α = hand.
+    const Vec3 sensor = hand - I_W * (hand / J) - omega.cross(Vec3(I_W * omega));
+    ASSERT_EQ(proxy.step(sensor), ProxyFault::none);
+    const Vec3 alpha = (proxy.velocity_W() - omega) / T;
+    ASSERT_LT((J * alpha - hand).norm(), 1e-9);  // rounding of ω over T: 1e-16 · 10/1e-5
+  }
+}
+
+TEST(OrientationProxy, RestsOnItsSpringWhereTheTorqueIsMetAndReturns) {
+  OrientationProxy proxy({.free = true,
+                          .inertia_kg_m2 = 0.1,
+                          .damping_Nms_per_rad = 1.0,
+                          .spring_Nm_per_rad = 40.0,
+                          .period_s = 1e-3});
+  ASSERT_TRUE(proxy.start(tilted));
+  for (int k = 0; k < 5000; ++k) ASSERT_EQ(proxy.step(Vec3(4.0, 0.0, 0.0)), ProxyFault::none);
+  EXPECT_NEAR(angle_between(tilted, proxy.R_WT()), 0.1, 1e-6);  // τ/K
+  proxy.set_spring(1e6);                                        // far beyond what an explicit step would survive
+  for (int k = 0; k < 5000; ++k) ASSERT_EQ(proxy.step(Vec3::Zero()), ProxyFault::none);
+  EXPECT_LT(angle_between(tilted, proxy.R_WT()), 1e-6);
+}
+
+// Whatever is set while it turns, angle and velocity go on, and the spring's torque is what it was.
+TEST(OrientationProxy, ChangesWithoutABump) {
+  OrientationProxy proxy({.free = true, .inertia_kg_m2 = 0.1, .damping_Nms_per_rad = 0.2, .spring_Nm_per_rad = 5.0});
+  ASSERT_TRUE(proxy.start(tilted));
+  for (int k = 0; k < 200; ++k) ASSERT_EQ(proxy.step(Vec3(0.5, 0.2, 0.0)), ProxyFault::none);
+  proxy.set_inertia(0.03, models::Mat3::Zero());
+  proxy.set_damping(0.6);
+  proxy.set_spring(50.0);
+  const Vec3 before = proxy.velocity_W();
+  ASSERT_EQ(proxy.step(Vec3(0.5, 0.2, 0.0)), ProxyFault::none);
+  // What the torques of a step do at most: the hand's 0.55 Nm, 0.6 Nms/rad at 1 rad/s, the old spring's 5 Nm/rad at 0.2
+  // rad and the new one's on the reference's way back, 0.1 rad/s · 1 ms.
+  EXPECT_LT((proxy.velocity_W() - before).norm(), (0.55 + 0.6 + 1.0 + 0.005) * 1e-3 / 0.03);
+}
+
+TEST(OrientationProxy, GoesOnWithItsVelocityAfterTheArmCouldNotFollow) {
+  OrientationProxy proxy({.free = true, .damping_Nms_per_rad = 0.0});
+  ASSERT_TRUE(proxy.start(tilted));
+  ASSERT_TRUE(proxy.resume(Quaterniond::Identity(), Vec3(0.0, 0.3, 0.0)));
+  ASSERT_EQ(proxy.step(Vec3::Zero()), ProxyFault::none);
+  EXPECT_NEAR(angle_between(Quaterniond::Identity(), proxy.R_WT()), 0.3e-3, 1e-12);
+}
+
 TEST(OrientationProxy, NamesTheKeyThatIsOutOfRange) {
   try {
     OrientationProxy proxy({.inertia_kg_m2 = 0.0});

@@ -12,6 +12,8 @@ namespace {
 
 using models::Vec3;
 
+models::Pose at(const Vec3& place) { return models::Pose(Eigen::Translation3d(place)); }
+
 description::HandDescription two_points() {
   description::HandDescription hand;
   hand.waypoints = {{1.0, {0.0, 0.0, 0.0}}, {3.0, {0.2, -0.1, 0.0}}};
@@ -20,7 +22,7 @@ description::HandDescription two_points() {
 
 TEST(Hand, RestsBeforeItsFirstWaypointAndAfterItsLast) {
   const Vec3 start(0.7, 0.0, 0.6);
-  const Hand hand(two_points(), start);
+  const Hand hand(two_points(), at(start));
   EXPECT_EQ(hand.intention(-1.0).position_W, start);
   EXPECT_EQ(hand.intention(1.0).position_W, start);
   EXPECT_EQ(hand.intention(1.0).velocity_W, Vec3::Zero());
@@ -30,14 +32,14 @@ TEST(Hand, RestsBeforeItsFirstWaypointAndAfterItsLast) {
 
 // Minimum jerk (Flash and Hogan 1985): half way at half time, with 15/8 of the mean speed.
 TEST(Hand, MovesWithMinimumJerkBetweenWaypoints) {
-  const Hand hand(two_points(), Vec3::Zero());
+  const Hand hand(two_points(), at(Vec3::Zero()));
   const Intention middle = hand.intention(2.0);
   EXPECT_LT((middle.position_W - Vec3(0.1, -0.05, 0.0)).norm(), 1e-15);
   EXPECT_LT((middle.velocity_W - 1.875 * Vec3(0.1, -0.05, 0.0)).norm(), 1e-15);
 }
 
 TEST(Hand, HoldsTheStartWithoutWaypoints) {
-  const Hand hand(description::HandDescription{}, Vec3(1.0, 2.0, 3.0));
+  const Hand hand(description::HandDescription{}, at(Vec3(1.0, 2.0, 3.0)));
   EXPECT_EQ(hand.intention(5.0).position_W, Vec3(1.0, 2.0, 3.0));
   EXPECT_EQ(hand.force_W(5.0, Vec3(1.0, 2.0, 3.0), Vec3::Zero()), Vec3::Zero());
 }
@@ -46,8 +48,9 @@ TEST(Hand, HasTheVelocityThatIsItsPositionsDerivative) {
   constexpr unsigned seed = 4711;
   std::mt19937 random(seed);
   description::HandDescription description = two_points();
-  description.multisine = {{0.5, 0.01, 0.3, {1.0, 0.0, 0.0}}, {1.7, 0.02, -1.0, {0.0, 0.6, 0.8}}};
-  const Hand hand(description, Vec3(0.7, 0.0, 0.6));
+  description.multisine = {{.frequency_Hz = 0.5, .amplitude_m = 0.01, .phase_rad = 0.3, .direction = {1.0, 0.0, 0.0}},
+                           {.frequency_Hz = 1.7, .amplitude_m = 0.02, .phase_rad = -1.0, .direction = {0.0, 0.6, 0.8}}};
+  const Hand hand(description, at(Vec3(0.7, 0.0, 0.6)));
   for (int n = 0; n < scaled(1000); ++n) {
     const double t = std::uniform_real_distribution(0.01, 5.0)(random);
     constexpr double h = 1e-5;  // error h² x'''/6 below 1e-9 m/s, rounding 1e-16/h = 1e-11
@@ -60,7 +63,7 @@ TEST(Hand, PullsThroughItsStiffnessAndDamping) {
   description::HandDescription description;
   description.stiffness_N_per_m = 400.0;
   description.damping_Ns_per_m = 10.0;
-  const Hand hand(description, Vec3::Zero());
+  const Hand hand(description, at(Vec3::Zero()));
   const Vec3 force = hand.force_W(0.0, Vec3(0.01, 0.0, 0.0), Vec3(0.0, 0.3, 0.0));
   EXPECT_LT((force - Vec3(-4.0, -3.0, 0.0)).norm(), 1e-14);
 }
@@ -70,7 +73,7 @@ TEST(Hand, PullsNoHarderThanItCan) {
   weak.stiffness_N_per_m = 400.0;
   weak.damping_Ns_per_m = 10.0;
   weak.max_force_N = 50.0;
-  const Hand hand(weak, Vec3::Zero());
+  const Hand hand(weak, at(Vec3::Zero()));
   // 400 N/m · 0.1 m = 40 N, and 10 Ns/m · 0.5 m/s = 5 N: as it is. A metre would be 400 N, along the same line.
   EXPECT_LT((hand.force_W(0.0, Vec3(-0.1, 0.0, 0.0), Vec3(-0.5, 0.0, 0.0)) - Vec3(45.0, 0.0, 0.0)).norm(), 1e-12);
   EXPECT_LT((hand.force_W(0.0, Vec3(-0.6, 0.0, 0.8), Vec3::Zero()) - Vec3(30.0, 0.0, -40.0)).norm(), 1e-12);
@@ -86,7 +89,7 @@ description::HandDescription with_trajectory() {
 
 TEST(Hand, GoesThroughTheRowsOfItsTrajectoryAndRestsAtBothEnds) {
   const Vec3 start(0.7, 0.0, 0.6);
-  const Hand hand(with_trajectory(), start);
+  const Hand hand(with_trajectory(), at(start));
   for (const description::TimedVector& row : with_trajectory().trajectory) {
     EXPECT_LT((hand.intention(row.time_s).position_W - start - Vec3(row.value.data())).norm(), 1e-15) << row.time_s;
   }
@@ -104,7 +107,7 @@ TEST(Hand, FollowsAParabolaExactlyWhateverTheRowsTimes) {
     const Vec3 x = at(t);
     description.trajectory.push_back({t, {x.x(), x.y(), x.z()}});
   }
-  const Hand hand(description, Vec3::Zero());
+  const Hand hand(description, models::Pose::Identity());
   for (double t = 0.1; t <= 0.5; t += 0.0123) {
     EXPECT_LT((hand.intention(t).position_W - at(t)).norm(), 1e-15) << t;
     EXPECT_LT((hand.intention(t).velocity_W - Vec3(0.6 * t, -0.1, 0.05 - 0.1 * t)).norm(), 1e-14) << t;
@@ -112,7 +115,7 @@ TEST(Hand, FollowsAParabolaExactlyWhateverTheRowsTimes) {
 }
 
 TEST(Hand, HasTheVelocityThatIsItsTrajectorysDerivative) {
-  const Hand hand(with_trajectory(), Vec3::Zero());
+  const Hand hand(with_trajectory(), at(Vec3::Zero()));
   for (double t = 0.45; t < 1.7; t += 0.00377) {
     constexpr double h = 1e-6;  // slopes bend at rows: error h x''/2, with x'' below 10 m/s²
     const Vec3 slope = (hand.intention(t + h).position_W - hand.intention(t - h).position_W) / (2.0 * h);
@@ -125,7 +128,7 @@ TEST(Hand, ExertsTheForceOfItsDataBesideThatOfItsGrip) {
   description.force = {{1.0, {2, 0, 0}}, {1.5, {4, -2, 0}}};
   description.stiffness_N_per_m = 100.0;
   description.damping_Ns_per_m = 0.0;
-  const Hand hand(description, Vec3::Zero());
+  const Hand hand(description, at(Vec3::Zero()));
   const auto force = [&](double t) { return hand.force_W(t, Vec3(0.01, 0, 0), Vec3::Zero()); };
   EXPECT_LT((force(0.9) - Vec3(-1, 0, 0)).norm(), 1e-14) << "not yet";
   EXPECT_LT((force(1.0) - Vec3(1, 0, 0)).norm(), 1e-14);
@@ -136,12 +139,51 @@ TEST(Hand, ExertsTheForceOfItsDataBesideThatOfItsGrip) {
 
 // The hands that come with the project start at rest on the handle, or the arm would feel a push when it wakes up.
 TEST(Hand, ComesInFilesThatStartWithoutAForce) {
-  for (const char* file : {"sim/hands/touch.yaml", "sim/hands/sweep.yaml"}) {
-    const Hand hand(description::load_hand(source_file(file)), Vec3::Zero());
+  for (const char* file : {"sim/hands/touch.yaml", "sim/hands/sweep.yaml", "sim/hands/wobble.yaml"}) {
+    const Hand hand(description::load_hand(source_file(file)), at(Vec3::Zero()));
     EXPECT_LT(hand.force_W(0.0, Vec3::Zero(), Vec3::Zero()).norm(), 1e-9) << file;
     EXPECT_LT(hand.force_W(1e-6, Vec3::Zero(), Vec3::Zero()).norm(), 1.0)
         << file;  // its velocity may begin with a step
   }
+}
+
+description::HandDescription turning() {
+  description::HandDescription hand;
+  hand.turning_stiffness_Nm_per_rad = 20.0;
+  hand.turning_damping_Nms_per_rad = 0.5;
+  hand.waypoints = {{0.5, {}, {0.1, 0.0, 0.3}}, {2.5, {}, {-0.4, 0.7, 0.2}}};
+  hand.multisine = {{.frequency_Hz = 1.3, .amplitude_rad = 0.1, .direction = {0.6, 0.0, 0.8}}};
+  return hand;
+}
+
+// Followed exactly, it twists nothing: its angular velocity is its orientation's derivative.
+TEST(Hand, DoesNotTwistAToolThatTurnsAsItIntends) {
+  const models::Mat3 start = Eigen::AngleAxisd(0.7, Vec3(0.0, 0.6, 0.8)).toRotationMatrix();
+  models::Pose X = models::Pose::Identity();
+  X.linear() = start;
+  const Hand hand(turning(), X);
+  const auto orientation = [&](double t) -> models::Mat3 {
+    const Vec3 phi = hand.intention(t).turn_W;
+    return Eigen::AngleAxisd(phi.norm(), phi.normalized()).toRotationMatrix() * start;
+  };
+  for (double t = 0.05; t < 3.0; t += 0.05) {
+    constexpr double h = 1e-5;  // error below 1e-8 rad/s (h² times a third derivative), rounding 1e-16/h = 1e-11
+    const models::Mat3 rate = (orientation(t + h) - orientation(t - h)) / (2.0 * h) * orientation(t).transpose();
+    const Vec3 omega(rate(2, 1), rate(0, 2), rate(1, 0));
+    EXPECT_LT(hand.torque_W(t, orientation(t), omega).norm(), 1e-7) << t;
+  }
+}
+
+TEST(Hand, TwistsThroughItsStiffnessAndDampingAndNoHarderThanItCan) {
+  description::HandDescription description;
+  description.turning_stiffness_Nm_per_rad = 20.0;
+  description.turning_damping_Nms_per_rad = 0.5;
+  const models::Mat3 turned = Eigen::AngleAxisd(0.1, Vec3::UnitY()).toRotationMatrix();
+  const Vec3 torque = Hand(description, at(Vec3::Zero())).torque_W(0.0, turned, Vec3(0.0, 0.0, 2.0));
+  EXPECT_LT((torque - Vec3(0.0, -2.0, -1.0)).norm(), 1e-13);
+  description.max_torque_Nm = 1.0;
+  EXPECT_NEAR(Hand(description, at(Vec3::Zero())).torque_W(0.0, turned, Vec3::Zero()).y(), -1.0, 1e-13);
+  EXPECT_EQ(Hand(description::HandDescription{}, at(Vec3::Zero())).torque_W(0.0, turned, Vec3::Ones()), Vec3::Zero());
 }
 
 }  // namespace

@@ -1,0 +1,215 @@
+#include "controller/rendering/pose_world.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Mat3;
+using models::ToolPose;
+using models::Twist;
+using models::Vec3;
+
+// How fast the spring's reference returns to where the tool started, after the spring has become stiffer and after a
+// hold: slowly enough to be led by hand.
+constexpr double reference_m_per_s = 0.05, reference_rad_per_s = 0.1;
+// A tool that starts in touch with something is outside to rounding: some metres in double precision.
+constexpr double rounding_m = 1e-12;
+
+Vec3 shortened(const Vec3& v, double most) noexcept {
+  const double length = v.norm();
+  return length > most ? Vec3(most / length * v) : v;
+}
+
+}  // namespace
+
+PoseWorld::PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, PoseWorldConfig config)
+    : config_(std::move(config)),
+      g_(std::move(g)),
+      limits_(no_world_),
+      proxy_(config_.proxy, *g_),
+      damping_Ns_per_m_(config_.proxy.damping_Ns_per_m) {}
+
+void PoseWorld::turn_to(const Eigen::Quaterniond& R_WT, const Vec3& omega_W) noexcept {
+  R_WT_ = R_WT;
+  omega_W_ = omega_W;
+}
+
+void PoseWorld::start(const Vec3& q_W) noexcept {
+  const ToolPose q{q_W, R_WT_};
+  // After a hold the scene goes on from where it stopped.
+  proxy_.start(q, started_ ? proxy_.time_s() : 0.0);
+  if (!started_) home_ = q;
+  started_ = true;
+  no_room_ = g_->clearance_m(q) < -rounding_m;
+  last_ = {};
+  last_.q_W = last_.p_hat_W = q_W;
+}
+
+// One step of 𝒢 from the last pose goes as far towards the wanted one as the scene allows, and through nothing.
+Vec3 PoseWorld::resume(const Vec3& q_W, const Vec3& v_W) noexcept {
+  const ToolPose wanted{q_W, R_WT_};
+  if (!q_W.allFinite() || !v_W.allFinite() || !R_WT_.coeffs().allFinite() || !omega_W_.allFinite()) return last_.q_W;
+  Twist velocity;
+  velocity << v_W, omega_W_;
+  proxy_.resume(g_->step(proxy_.K(), wanted, proxy_.q()), velocity);
+  last_.q_W = proxy_.q().position;
+  return last_.q_W;
+}
+
+WorldStep PoseWorld::step(const Vec3& h_W, const StepLimits& limits) noexcept {
+  turning_limited_ = false;
+  last_.fault = ProxyFault::none;
+  if (no_room_) {
+    last_.fault = ProxyFault::squeezed;
+    return last_;
+  }
+  if (!h_W.allFinite() || !torque_W_.allFinite()) {
+    last_.fault = ProxyFault::input_not_finite;
+    return last_;
+  }
+  if (proxy_.config().spring_N_per_m > 0.0 || proxy_.config().turning_spring_Nm_per_rad > 0.0) return_reference();
+  const ToolPose p_hat = proxy_.predict({h_W, torque_W_});
+  ToolPose limited = p_hat;
+  if (p_hat.position.allFinite()) limit_place(limits, limited);
+  limit_rotation(limited);
+  last_.fault = proxy_.step(limited);
+  if (last_.fault == ProxyFault::none && g_->squeezed()) last_.fault = ProxyFault::squeezed;
+  if (last_.fault == ProxyFault::none) report(p_hat, limited);
+  return last_;
+}
+
+void PoseWorld::limit_place(const StepLimits& limits, ToolPose& p_hat) noexcept {
+  limits_.set_limits(limits, Mat3::Identity(), proxy_.q().position);
+  p_hat.position = limits_(proxy_.K()(0, 0), p_hat.position, proxy_.q().position);
+}
+
+void PoseWorld::limit_rotation(ToolPose& p_hat) noexcept {
+  const ToolPose& q = proxy_.q();
+  const Vec3 turn = models::rotation_vector(p_hat.orientation * q.orientation.conjugate());
+  const double most = speed_share_ * config_.max_turning_speed_rad_per_s * proxy_.config().period_s;
+  if (turn.norm() > most) {
+    p_hat.orientation = (models::rotation_by(shortened(turn, most)) * q.orientation).normalized();
+    turning_limited_ = true;
+  }
+  const Vec3 angle = models::rotation_vector(p_hat.orientation * home_.orientation.conjugate());
+  if (angle.norm() <= config_.max_turn_rad) return;
+  p_hat.orientation =
+      (models::rotation_by(shortened(angle, config_.max_turn_rad)) * home_.orientation).normalized();
+  turning_limited_ = true;
+}
+
+void PoseWorld::return_reference() noexcept {
+  const Twist way = models::difference(home_, proxy_.reference());
+  if (way.isZero(0.0)) return;
+  const double T = proxy_.config().period_s;
+  Twist step;
+  step << shortened(way.head<3>(), reference_m_per_s * T), shortened(way.tail<3>(), reference_rad_per_s * T);
+  proxy_.set_reference(step == way ? home_ : models::moved(proxy_.reference(), step));
+}
+
+// The force of the limits on the proxy is what holds p̂ back.
+void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept {
+  last_ = {};
+  last_.q_W = proxy_.q().position;
+  last_.p_hat_W = p_hat.position;
+  last_.f_W = proxy_.wrench_W().head<3>();
+  last_.torque_W = proxy_.wrench_W().tail<3>();
+  const Twist held_back = models::difference(limited, p_hat);
+  last_.limit_force_W = (proxy_.K() * held_back).head<3>();
+  last_.limits = limits_.active();
+  last_.soft_limits_met = limits_.soft_limits_met();
+  last_.v_W = proxy_.move().head<3>() / proxy_.config().period_s;
+  last_.mass_kg = proxy_.config().mass_kg;
+  last_.damping_Ns_per_m = proxy_.config().damping_Ns_per_m;
+  last_.unresolved = g_->unresolved();
+  report_contacts();
+}
+
+// The hardest contact first; what touches without a force doesn't count.
+void PoseWorld::report_contacts() noexcept {
+  double hardest_N = 0.0;
+  for (const models::PoseContact& contact : g_->contacts()) {
+    const double force_N = contact.force_W.norm();
+    if (!(force_N > 0.0)) continue;
+    const int other = last_.contacts++ - 1;
+    last_.slips = last_.slips || contact.slips;
+    WorldStep::Contact told{contact.normal_W, contact.object, friction(contact)};
+    if (force_N > hardest_N) {
+      hardest_N = force_N;
+      const WorldStep::Contact first{last_.normal_W, last_.object, last_.friction};
+      last_.normal_W = told.normal_W;
+      last_.object = told.object;
+      last_.friction = told.friction;
+      told = first;
+    }
+    if (other >= 0 && other < static_cast<int>(last_.others.size())) last_.others[static_cast<std::size_t>(other)] = told;
+  }
+}
+
+// √(μ_tool μ_object), the object's where the tool says nothing (models/rigid_shapes/tool.hpp).
+double PoseWorld::friction(const models::PoseContact& contact) const noexcept {
+  const auto object = static_cast<std::size_t>(contact.object), part = static_cast<std::size_t>(contact.part);
+  const double of_object = object < config_.object_friction.size() ? config_.object_friction[object] : 0.0;
+  if (part >= config_.part_friction.size() || !config_.part_friction[part]) return of_object;
+  return std::sqrt(*config_.part_friction[part] * of_object);
+}
+
+void PoseWorld::set(const Change& change) noexcept {
+  PoseConfig changed = proxy_.config();
+  switch (change.parameter) {
+    case Parameter::mass:
+      changed.mass_kg = change.value;
+      break;
+    case Parameter::damping:
+      changed.damping_Ns_per_m = change.value + added_Ns_per_m_;
+      if (proxy_.set(changed)) damping_Ns_per_m_ = change.value;
+      return;
+    case Parameter::inertia:
+      changed.inertia_kg_m2 = change.value;
+      break;
+    case Parameter::turning_damping:
+      changed.turning_damping_Nms_per_rad = change.value;
+      break;
+    case Parameter::spring:
+      changed.spring_N_per_m = change.value;
+      return set_springs(changed);
+    case Parameter::turning_spring:
+      changed.turning_spring_Nm_per_rad = change.value;
+      return set_springs(changed);
+    case Parameter::friction:
+    case Parameter::position:
+    case Parameter::lookahead:
+    case Parameter::none:
+      return;
+  }
+  proxy_.set(changed);
+}
+
+// K'e' = Ke keeps the force when K becomes K'. A spring that becomes softer throws nobody, so its reference stays.
+void PoseWorld::set_springs(PoseConfig changed) noexcept {
+  const PoseConfig before = proxy_.config();
+  if (!proxy_.set(changed)) return;
+  Twist e = models::difference(proxy_.q(), proxy_.reference());
+  const auto keep = [](double K, double K_before) { return K > K_before ? K_before / K : 1.0; };
+  e.head<3>() *= keep(changed.spring_N_per_m, before.spring_N_per_m);
+  e.tail<3>() *= keep(changed.turning_spring_Nm_per_rad, before.turning_spring_Nm_per_rad);
+  proxy_.set_reference({proxy_.q().position - e.head<3>(),
+                        (models::rotation_by(-e.tail<3>()) * proxy_.q().orientation).normalized()});
+}
+
+void PoseWorld::add_damping(double damping_Ns_per_m) noexcept {
+  PoseConfig changed = proxy_.config();
+  changed.damping_Ns_per_m = damping_Ns_per_m_ + damping_Ns_per_m;
+  if (changed.damping_Ns_per_m == proxy_.config().damping_Ns_per_m || proxy_.set(changed)) {
+    added_Ns_per_m_ = damping_Ns_per_m;
+  }
+}
+
+void PoseWorld::archive(fieldbus::StateArchive& state) noexcept {
+  state(proxy_, torque_W_, omega_W_, R_WT_, home_.position, home_.orientation, last_.q_W, damping_Ns_per_m_,
+        added_Ns_per_m_, speed_share_, started_, no_room_);
+}
+
+}  // namespace proxarm::controller

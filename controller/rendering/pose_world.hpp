@@ -1,0 +1,82 @@
+// A rigid tool and its scene as the cycle sees them: a wrench goes in, the tool's next pose comes out.
+//
+// The tool's place goes through RenderedWorld, as that of a point does. What turns is beside it: set_torque_W() before a
+// step, orientation() after it, turn_to() before start() and resume().
+//
+// Limits act on p̂, before 𝒢: its place is projected onto the step's sets (step_limits.hpp), and its rotation onto those
+// of speed and of the angle from the orientation at the first start. Contacts come after them. So q keeps the limits as
+// long as contacts lead nearer to q(k−1), as they do with everything that stands still; beyond that the guards of the
+// setpoints have the last word, as always (docs/tool.md).
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "controller/limits/limited_algorithm.hpp"
+#include "controller/proxies/pose_proxy.hpp"
+#include "controller/rendering/rendered_world.hpp"
+#include "models/geometry/pose_algorithm.hpp"
+#include "models/surfaces/free_space.hpp"
+
+namespace proxarm::controller {
+
+struct PoseWorldConfig {
+  PoseConfig proxy;
+  double max_turning_speed_rad_per_s = 2.0;
+  double max_turn_rad = 0.7;                       // from the orientation at the first start
+  std::vector<double> object_friction;             // by index in the scene
+  std::vector<std::optional<double>> part_friction;  // by part of the tool; none: the object's counts alone
+};
+
+class PoseWorld final : public RenderedWorld {
+ public:
+  PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, PoseWorldConfig config);
+
+  // The hand's torque about the rendered point, for the next step.
+  void set_torque_W(const models::Vec3& torque_W) noexcept { torque_W_ = torque_W; }
+  // For the next start() or resume(): the tool's orientation and angular velocity there.
+  void turn_to(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
+  // A share of the speed limit of turning, from 0 to 1.
+  void limit_turning(double share) noexcept { speed_share_ = share; }
+  [[nodiscard]] const Eigen::Quaterniond& orientation() const noexcept { return proxy_.q().orientation; }
+  [[nodiscard]] models::Vec3 angular_velocity_W() const noexcept {
+    return proxy_.move().tail<3>() / proxy_.config().period_s;
+  }
+  [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }  // in the last step
+
+  void start(const models::Vec3& q_W) noexcept override;
+  WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept override;
+  models::Vec3 look_ahead(const models::Vec3& /*h_W*/, const StepLimits& /*limits*/,
+                          double /*horizon_s*/) noexcept override {
+    return proxy_.q().position;
+  }
+  models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override;
+  void set(const Change& change) noexcept override;
+  void set_period(double period_s) noexcept override { proxy_.set_period(period_s); }
+  void add_damping(double damping_Ns_per_m) noexcept override;
+  void archive(fieldbus::StateArchive& state) noexcept override;
+
+ private:
+  void limit_place(const StepLimits& limits, models::ToolPose& p_hat) noexcept;
+  void limit_rotation(models::ToolPose& p_hat) noexcept;
+  void return_reference() noexcept;
+  void report(const models::ToolPose& p_hat, const models::ToolPose& limited) noexcept;
+  void report_contacts() noexcept;
+  [[nodiscard]] double friction(const models::PoseContact& contact) const noexcept;
+  void set_springs(PoseConfig changed) noexcept;
+
+  PoseWorldConfig config_;
+  std::unique_ptr<models::PoseAlgorithm> g_;
+  models::FreeSpace<3> no_world_;
+  LimitedAlgorithm<3> limits_;
+  PoseProxy proxy_;
+  WorldStep last_;
+  models::Vec3 torque_W_ = models::Vec3::Zero(), omega_W_ = models::Vec3::Zero();
+  Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()
+  models::ToolPose home_;                                     // of the first start
+  double damping_Ns_per_m_, added_Ns_per_m_ = 0.0, speed_share_ = 1.0;
+  bool started_ = false, turning_limited_ = false;
+  bool no_room_ = false;  // the tool was to start inside of something
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,29 @@
+// The tool that an arm holds, as a file states it: shapes that are fixed to each other, in the tool's frame T, whose origin
+// is the rendered point. docs/tool.md has the keys.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "models/rigid_shapes/tool.hpp"
+
+namespace proxarm::description {
+class YamlNode;
+}
+
+namespace proxarm::scenes {
+
+struct RigidTool {
+  std::filesystem::path file;  // that it was read from, for messages
+  int line = 0;
+  std::string name;
+  models::Tool shape;                         // one part or more
+  std::vector<std::filesystem::path> meshes;  // whose vertices span a hull
+};
+
+// Of a file of its own, or of a scene's key `tool`. Throw description::SetupError with file, line and key.
+RigidTool load_tool(const std::filesystem::path& file);
+RigidTool read_tool(const description::YamlNode& node);
+
+}  // namespace proxarm::scenes

@@ -1,0 +1,154 @@
+"""A rigid tool that touches with its sides, from the files through the chain: what is judged here is judged from the record
+alone, by the shapes that the files state."""
+import csv
+import math
+import unittest
+
+from harness import SOURCE, ProgramTest
+
+SCENES, HANDS = SOURCE / "scenes", SOURCE / "sim/hands"
+# A position of a metre in double precision, turned once.
+ROUNDING_M = 1e-12
+
+
+def turned(q, v):
+    """The vector v, turned by the quaternion x y z w."""
+    x, y, z, w = q
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return (v[0] + w * tx + y * tz - z * ty, v[1] + w * ty + z * tx - x * tz, v[2] + w * tz + x * ty - y * tx)
+
+
+def vector(row, name, unit):
+    return [float(row[f"{name}_{axis}_{unit}"]) for axis in "xyz"]
+
+
+def pose(row):
+    return vector(row, "proxy_W", "m"), [float(row[f"proxy_W_q{part}"]) for part in "xyzw"]
+
+
+def placed(row, point):
+    place, q = pose(row)
+    return [a + b for a, b in zip(place, turned(q, point))]
+
+
+class RigidTool(ProgramTest):
+    def session(self, scene, hand, *options, folder="session"):
+        summary = self.summary("--scene", SCENES / scene, "--hand", HANDS / hand, "--inertia", "0.05", "--duration", "8s",
+                               "--record", folder, *options)
+        with open(self.folder / folder / "signals.csv", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
+        return summary, rows
+
+    def test_a_box_stands_on_its_table(self):
+        summary, rows = self.session("box_on_table.yaml", "tip.yaml")
+        corners = [(sx * 0.06, sy * 0.04, 0.01 + sz * 0.02) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]
+        lowest = [min(placed(row, corner)[2] for corner in corners) for row in rows]
+        self.assertGreaterEqual(min(lowest), 0.55 - ROUNDING_M)
+        self.assertFalse(summary["oscillation"] and summary["oscillation"]["lasts"])
+        touching = [row for row in rows if row["contact"] != "free" and "unresolved" not in row["flags"]]
+        self.assertLessEqual(summary["unresolved_steps"], 8)  # of 8000, none of them hidden
+        self.assertGreater(len(touching), 2000)
+        # On its face it touches with more than an edge: the third contact is there.
+        self.assertGreater(sum(int(row["contacts"]) >= 3 for row in rows), 500)
+        # The table doesn't pull, and friction stays in its cone.
+        for row in touching:
+            x, y, z = vector(row, "contact_force_W", "N")
+            self.assertGreater(z, -1e-9)
+            self.assertLessEqual(math.hypot(x, y), 0.4 * z * (1 + 1e-9) + 1e-9)
+
+    def test_the_torque_of_an_edge_is_felt(self):
+        """While it leans on an edge at rest, the hand's torque is the contact's: to less than the sensor's noise."""
+        still = self.written("lean.yaml", (HANDS / "tip.yaml").read_text().split("waypoints:")[0] + "waypoints:\n"
+                             "  - {time_s: 0.5, offset_m: [0, 0, 0]}\n"
+                             "  - {time_s: 2, offset_m: [0, 0, -0.03], turn_rad: [0, 0.2, 0]}\n")
+        _, rows = self.session("box_on_table.yaml", still)
+        rest = rows[-1000:]
+        self.assertTrue(all(row["contact"] != "free" for row in rest))
+        error = [sum(vector(row, "hand_torque_W", "Nm")[axis] + vector(row, "contact_torque_W", "Nm")[axis]
+                     for row in rest) / len(rest) for axis in range(3)]
+        largest = max(abs(value) for row in rest for value in vector(row, "contact_torque_W", "Nm"))
+        self.assertGreater(largest, 0.1)
+        self.assertLess(math.hypot(*error), 0.001)  # noise_Nm of the default cell
+
+    def test_a_key_stays_in_its_slot(self):
+        _, rows = self.session("key_in_slot.yaml", "wiggle.yaml")
+        corners = [(sx * 0.015, sy * 0.004991, z) for sx in (-1, 1) for sy in (-1, 1) for z in (0.0, 0.04)]
+        furthest = max(abs(placed(row, corner)[1]) for row in rows for corner in corners)
+        self.assertLessEqual(furthest, 0.005009 + ROUNDING_M)
+        self.assertGreater(furthest, 0.005009 - 1e-8)  # it has touched
+        travel = [pose(row)[0][2] for row in rows]
+        self.assertGreater(max(travel) - min(travel), 0.05)  # and gone up and down
+
+    def test_replays_to_the_bit(self):
+        pin = self.written("pin.yaml", "capsule: {length_m: 0.02, radius_m: 0.01, position_m: [0.03, 0, 0]}\n")
+        self.session("box_on_table.yaml", "tip.yaml", "--tool", pin)
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
+
+    def test_a_point_is_what_it_was(self):
+        with_option = self.summary("--tool", "point", "--duration", "3s")
+        without = self.summary("--duration", "3s")
+        self.assertEqual(with_option["setpoint_sha256"], without["setpoint_sha256"])
+
+    def refuse(self, *arguments):
+        outcome = self.call("run", "--json", *arguments)
+        self.assertEqual(outcome.status, 2, outcome.err)
+        self.assertEqual(len(outcome.err.splitlines()), 1, outcome.err)
+        return outcome.err
+
+    def test_what_is_refused(self):
+        rod = SCENES / "tools/rod.yaml"
+        self.assertIn("order 2", self.refuse("--tool", rod, "--order", "2"))
+        self.assertIn("--lookahead", self.refuse("--tool", rod, "--lookahead", "auto", "--mass", "10"))
+        self.assertIn("impedance", self.refuse(SOURCE / "models/cells/light.yaml", "--tool", rod))
+        self.assertIn("six axes", self.refuse(SOURCE / "models/cells/scara.yaml", "--tool", rod))
+        self.assertIn("has a layer", self.refuse("--tool", rod, "--scene", SCENES / "soft_wall.yaml"))
+        self.assertIn("a medium acts on a point", self.refuse("--tool", rod, "--scene", SCENES / "honey.yaml"))
+        self.assertIn("--tool", self.refuse("--tool", "nothing.yaml"))
+        self.assertIn("give it as --scene", self.refuse("--tool", SCENES / "wall.yaml"))
+
+    def test_a_tool_that_is_larger_than_its_hole(self):
+        thick = self.written("thick.yaml", "box: {size_m: [0.03, 0.0102, 0.04], position_m: [0, 0, 0.02]}\n")
+        told = self.refuse("--scene", SCENES / "key_in_slot.yaml", "--tool", thick)
+        self.assertIn("thick.yaml", told)
+        self.assertIn("0.091 mm inside", told)  # (10.2 − 10.018)/2
+        self.assertIn("a smaller tool (or a larger hole)", told)
+
+    def test_how_deep_the_steel_is_in_something(self):
+        """The key's steel is as deep in its slot as its corners say, which the controller's filter and the arm's gears
+        let it be."""
+        summary, rows = self.session("key_in_slot.yaml", "wiggle.yaml")
+        corners = [(sx * 0.015, sy * 0.004991, z) for sx in (-1, 1) for sy in (-1, 1) for z in (0.0, 0.04)]
+        deepest = 0.0
+        for row in rows:
+            place = vector(row, "true_tool_W", "m")
+            q = [float(row[f"true_tool_W_q{part}"]) for part in "xyzw"]
+            for corner in corners:
+                deepest = max(deepest, abs(place[1] + turned(q, corner)[1]) - 0.005009)
+        self.assertGreater(deepest, 1e-5)
+        self.assertAlmostEqual(summary["tool_penetration_max_m"], deepest, delta=1e-9)
+
+    def test_a_mesh_that_is_not_convex(self):
+        # A cube of 20 mm whose top has a dent of 5 mm in the middle.
+        corners = [(x, y, z) for x in (0, 20) for y in (0, 20) for z in (0, 20)] + [(10, 10, 15)]
+        faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),
+                 (0, 6, 4), (1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+        self.written("dented.obj", "".join("v %g %g %g\n" % c for c in corners) +
+                     "".join("f %d %d %d\n" % tuple(i + 1 for i in f) for f in faces))
+        tool = self.written("tool.yaml", "convex: {file: dented.obj, scale_m: 0.001}\n")
+        told = self.refuse("--scene", SCENES / "free.yaml", "--tool", tool)
+        self.assertIn("tool.yaml", told)
+        self.assertIn("a convex mesh", told)
+        self.assertIn("hull: true", told)
+        hull = self.written("hull.yaml", "convex: {file: dented.obj, scale_m: 0.001, hull: true}\n")
+        self.summary("--scene", SCENES / "wall.yaml", "--tool", hull, "--duration", "1s")
+
+    def test_check_and_explain_know_tools(self):
+        outcome = self.call("check", SCENES / "tools/rod.yaml", SCENES / "box_on_table.yaml")
+        self.assertEqual(outcome.status, 0, outcome.err)
+        self.assertIn("a tool", outcome.out)
+        self.assertIn("a rigid tool", self.call("explain", SCENES / "box_on_table.yaml").out)
+
+
+if __name__ == "__main__":
+    unittest.main()

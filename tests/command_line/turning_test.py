@@ -1,0 +1,152 @@
+"""A tool that turns: the moment of inertia that a hand feels, from a record; what is refused; and changes while it turns."""
+import cmath
+import csv
+import math
+import unittest
+
+from harness import SOURCE, ProgramTest
+
+PERIOD_S = 1e-3
+# About each axis, x y z: whole periods in four seconds, below 2 Hz.
+FREQUENCIES_HZ = ((0.5, 1.25), (0.75, 1.75), (1.0, 1.5))
+AMPLITUDE_RAD = 0.04
+FREE = ("--scene", str(SOURCE / "scenes/free.yaml"))
+
+
+def hand():
+    lines = ["name: turning sines", "mass_kg: 1.0", "stiffness_N_per_m: 500", "damping_Ns_per_m: 20",
+             "inertia_kg_m2: 0.003", "turning_stiffness_Nm_per_rad: 20", "turning_damping_Nms_per_rad: 2",
+             "multisine:"]
+    for axis, frequencies in enumerate(FREQUENCIES_HZ):
+        direction = [int(i == axis) for i in range(3)]
+        for frequency_Hz in frequencies:
+            lines.append(f"  - {{frequency_Hz: {frequency_Hz}, amplitude_rad: {AMPLITUDE_RAD}, "
+                         f"direction: {direction}}}")
+    return "\n".join(lines) + "\n"
+
+
+def coefficient(values, frequency_Hz):
+    mean = sum(values) / len(values)
+    return sum((value - mean) * cmath.exp(-2j * math.pi * frequency_Hz * PERIOD_S * k)
+               for k, value in enumerate(values))
+
+
+def product(a, b):
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
+
+
+def rotation_vector(q, start):
+    x, y, z, w = product(q, (-start[0], -start[1], -start[2], start[3]))
+    sine = math.sqrt(x * x + y * y + z * z)
+    scale = 2 * math.atan2(sine, w) / sine if sine > 0 else 2
+    return [scale * x, scale * y, scale * z]
+
+
+class Turning(ProgramTest):
+    def rows(self, folder):
+        with open(self.folder / folder / "signals.csv", newline="") as file:
+            return [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
+
+    def felt_inertia(self, inertia_kg_m2):
+        """Re(torque / angular acceleration) about each axis, at all frequencies, over the last four seconds."""
+        folder = f"inertia-{inertia_kg_m2}"
+        self.summary(*FREE, "--hand", self.written("turning.yaml", hand()), "--inertia", inertia_kg_m2,
+                     "--duration", "8s", "--record", folder)
+        rows = self.rows(folder)[-4000:]
+        turns = [rotation_vector([float(row[f"true_tool_W_q{part}"]) for part in "xyzw"],
+                                 [float(rows[0][f"true_tool_W_q{part}"]) for part in "xyzw"]) for row in rows]
+        felt = []
+        for axis, frequencies in enumerate(FREQUENCIES_HZ):
+            torque = [float(row[f"hand_torque_W_{'xyz'[axis]}_Nm"]) for row in rows]
+            turn = [vector[axis] for vector in turns]
+            for f in frequencies:
+                felt.append((coefficient(torque, f) / (-(2 * math.pi * f) ** 2 * coefficient(turn, f))).real)
+        return felt
+
+    def test_the_inertia_that_is_felt_below_two_hertz(self):
+        for inertia_kg_m2 in (0.05, 0.1, 0.2, 0.3):
+            for felt in self.felt_inertia(inertia_kg_m2):
+                self.assertAlmostEqual(felt / inertia_kg_m2, 1.0, delta=0.05)
+
+    def test_the_summary_says_what_was_felt(self):
+        summary = self.summary(*FREE, "--hand", SOURCE / "sim/hands/wobble.yaml", "--inertia", "0.1")
+        self.assertAlmostEqual(summary["apparent_inertia_kg_m2"], 0.1, delta=0.005)
+        self.assertEqual(summary["wanted_inertia_kg_m2"], 0.1)
+        held = self.summary(*FREE, "--hand", SOURCE / "sim/hands/wobble.yaml", "--duration", "1s")
+        self.assertIsNone(held["apparent_inertia_kg_m2"])
+
+    def test_what_is_refused(self):
+        def refuse(words, *texts):
+            outcome = self.call("run", "--json", *words.split())
+            self.assertEqual(outcome.status, 2, outcome.err)
+            self.assertEqual(len(outcome.err.splitlines()), 1, outcome.err)
+            for text in texts:
+                self.assertIn(text, outcome.err)
+
+        # 3.25e-4 kg m² of the default cell's handle, and 0.25 kg at 0.04 m from the rendered point.
+        refuse("--inertia 0.0007", "--inertia", "0.0007 kg m²", "more than the handle's own 0.000725 kg m²")
+        refuse("--inertia -1", '--inertia: found "-1"', "moment of inertia")
+        refuse("--inertia 0.1 --orientation held", "--inertia", "--orientation held", "--orientation free")
+        refuse("--turning-spring 10 --orientation held", "--turning-spring")
+        refuse(f"{SOURCE}/models/cells/light.yaml --inertia 0.1", "--inertia", "the impedance type")
+        refuse(f"{SOURCE}/models/cells/scara.yaml --inertia 0.1", "fewer than six axes")
+        refuse("--set inertia=0.1@1s", "inertia", "keeps its orientation")
+        refuse("--inertia 0.1 --set inertia=0.0001@1s", "handle's own")
+        still = self.written("still.yaml", "name: still\nwaypoints: [{time_s: 1, turn_rad: [0, 0, 1]}]\n")
+        refuse(f"--hand {still}", "still.yaml", "turning_stiffness_Nm_per_rad")
+
+    def test_the_smallest_stable_inertia_is_what_it_says(self):
+        stiff = self.written("stiff.yaml", hand().replace("rad: 20", "rad: 60").replace("rad: 2\n", "rad: 0.5\n").replace("0.003", "0.02"))
+        few = ("--hand", stiff, *FREE, "--turning-damping", "0.5")
+        outcome = self.call("run", "--json", *few, "--inertia", "0.002")
+        self.assertEqual(outcome.status, 2, outcome.err)
+        self.assertIn("the smallest that is stable", outcome.err)
+        smallest = outcome.err.split("at least ")[1].split(" kg m²")[0]
+        self.assertGreater(float(smallest), 0.002)
+        calm = self.summary(*few, "--inertia", smallest, "--duration", "4s")
+        self.assertFalse(calm["oscillation"] and calm["oscillation"]["lasts"])
+
+    def test_changes_while_it_turns_make_no_bump(self):
+        """The angular velocity goes on: no step of the proxy's rotation differs from the one before by more than the
+        torques of a period explain."""
+        self.summary(*FREE, "--hand", SOURCE / "sim/hands/wobble.yaml", "--inertia", "0.1", "--set", "inertia=0.3@2s",
+                     "--set", "inertia=0.06@3s", "--set", "turning_damping=1@4s", "--set", "turning_spring=5@4.5s",
+                     "--duration", "6s", "--record", "changes")
+        rows = self.rows("changes")
+        self.assertEqual({float(row["proxy_inertia_kg_m2"]) for row in rows}, {0.1, 0.3, 0.06})
+        poses = [[float(row[f"proxy_W_q{part}"]) for part in "xyzw"] for row in rows]
+        steps = [rotation_vector(b, a) for a, b in zip(poses, poses[1:])]
+        for (a, b), row in zip(zip(steps, steps[1:]), rows[2:]):
+            torque = math.hypot(*(float(row[f"torque_W_{axis}_Nm"]) for axis in "xyz"))
+            # The hand's torque, 1 Nms/rad at 2 rad/s and 5 Nm/rad at 0.7 rad at most, on 0.06 kg m² less the handle's.
+            most = (torque + 2.0 + 3.5) / 0.059 * PERIOD_S**2
+            self.assertLess(math.dist(a, b), most)
+
+    def test_a_session_that_turns_replays_to_the_bit(self):
+        self.summary("--inertia", "0.05", "--hand", SOURCE / "sim/hands/wobble.yaml", "--duration", "3s", "--set",
+                     "inertia=0.1@1s", "--record", "session")
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
+        self.assertIn("the same to the bit", outcome.out)
+
+    def test_limits_of_turning(self):
+        text = (SOURCE / "models/cells/default.yaml").read_text()
+        text = text.replace("../../", f"{SOURCE}/").replace("../", f"{SOURCE}/models/")
+        text = text.replace("limits:\n", "limits:\n  max_turning_speed_rad_per_s: 0.2\n  max_turn_rad: 0.1\n")
+        cell = self.written("slow.yaml", text)
+        turn = self.written("turn.yaml", "turning_stiffness_Nm_per_rad: 20\nturning_damping_Nms_per_rad: 0.5\n"
+                            "waypoints: [{time_s: 0.5, turn_rad: [0, 0, 0]}, {time_s: 1.5, turn_rad: [0, 0.3, 0.2]}]\n")
+        summary = self.summary(cell, *FREE, "--hand", turn, "--inertia", "0.05", "--duration", "4s", "--record", "limits")
+        self.assertIn("orientation", summary["active_limits"])
+        poses = [[float(row[f"proxy_W_q{part}"]) for part in "xyzw"] for row in self.rows("limits")]
+        angles = [math.hypot(*rotation_vector(pose, poses[0])) for pose in poses]
+        self.assertAlmostEqual(max(angles), 0.1, delta=1e-9)
+        fastest = max(math.hypot(*rotation_vector(b, a)) for a, b in zip(poses, poses[1:]))
+        self.assertAlmostEqual(fastest / PERIOD_S, 0.2, delta=1e-9)
+
+
+if __name__ == "__main__":
+    unittest.main()
