@@ -16,6 +16,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "models/geometry/small_matrix.hpp"
@@ -45,6 +46,11 @@ class ContactProblem {
   // Gauss-Seidel got. Precondition: at most `most` contacts.
   bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept;
 
+  // How much solve() may still do, all calls together: contacts that a step of Newton's or a sweep of Gauss and
+  // Seidel's looks at. Without a call it may do all that it knows.
+  void allow(int work) noexcept { work_ = work; }
+  [[nodiscard]] bool exhausted() const noexcept { return work_ <= 0; }
+
   // The number of different y among all combinations of free, stick and slip, for up to four contacts: 1 where the
   // solution is unique. Costs up to 3⁴ Newton iterations.
   int count_solutions(const Twist& e, std::span<const LinearContact> contacts) noexcept;
@@ -64,15 +70,21 @@ class ContactProblem {
   using Rows = std::span<Row>;
 
   static bool newton_step(Rows rows, Twist& y) noexcept;
-  static bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
-  static bool newton_with_states(Rows rows, Twist& y, double size, Twist tangent) noexcept;
-  static void gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept;
-  static bool is_solved(Rows rows, const Twist& y, double size) noexcept;
+  bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
+  bool newton_with_states(Rows rows, Twist& y, double size, Twist tangent) noexcept;
+  void gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept;
+  static bool is_solved(Rows rows, const Twist& y, double size, double tolerance) noexcept;
   static void balance(Rows rows, const Twist& y) noexcept;
   static double violation(Rows rows, const Twist& y) noexcept;
   bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
   double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;
 
+  [[nodiscard]] bool may_look_at(Rows rows) noexcept {
+    work_ -= static_cast<int>(rows.size());
+    return work_ > 0;
+  }
+
+  int work_ = std::numeric_limits<int>::max();
   Mat6 K_ = Mat6::Zero();
   Mat6 L_ = Mat6::Identity(), L_inverse_ = Mat6::Identity();
   std::array<Row, most> rows_;

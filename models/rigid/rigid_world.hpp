@@ -156,6 +156,7 @@ class RigidWorld final : public PoseAlgorithm {
   std::array<PoseContact, ContactProblem::most> contacts_;
   std::size_t count_ = 0;
   bool unresolved_ = false, overflow_ = false;
+  bool without_friction_ = false;  // in the present attempt
 };
 
 }  // namespace proxarm::models
