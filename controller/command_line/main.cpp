@@ -234,12 +234,14 @@ void add_run_options(CLI::App& app, RunOptions& options) {
          "--orientation",
          choice<OrientationMode>("--orientation", {{"held", OrientationMode::held}, {"free", OrientationMode::free}},
                                  [&](OrientationMode value) { options.orientation = value; }),
-         "held (default): the tool keeps its orientation, as with an inertia beyond all bounds; free: the hand turns it "
+         "held (default): the tool keeps its orientation, as with an inertia beyond all bounds; free: the hand turns "
+         "it "
          "(the default with --inertia)")
       ->type_name("held|free");
-  app.add_option("--tool", options.tool,
-                 "file of the tool's shape, whose sides touch as well, such as scenes/tools/rod.yaml, or point (default: "
-                 "the scene's, else the cell's, else a point)")
+  app.add_option(
+         "--tool", options.tool,
+         "file of the tool's shape, whose sides touch as well, such as scenes/tools/rod.yaml, or point (default: "
+         "the scene's, else the cell's, else a point)")
       ->type_name("FILE|point");
   app.add_option("--inertia",
                  quantity([](const std::string& w) { return description::parse_inertia(w, "--inertia"); },
@@ -248,10 +250,11 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                  "included; the tool turns under the hand's torque (default of a tool that turns: 0.05 more than the "
                  "handle's)")
       ->type_name("KGM2");
-  app.add_option("--turning-damping",
-                 quantity([](const std::string& w) { return description::parse_turning_damping(w, "--turning-damping"); },
-                          [&](double value) { options.turning_damping_Nms_per_rad = value; }),
-                 "damping of a tool that turns, in Nms/rad (default 0 with --inertia, else 0.5)")
+  app.add_option(
+         "--turning-damping",
+         quantity([](const std::string& w) { return description::parse_turning_damping(w, "--turning-damping"); },
+                  [&](double value) { options.turning_damping_Nms_per_rad = value; }),
+         "damping of a tool that turns, in Nms/rad (default 0 with --inertia, else 0.5)")
       ->type_name("NMS/RAD");
   app.add_option(
          "--turning-spring",
@@ -438,7 +441,8 @@ class Commands {
   void add_orders() {
     constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
     CLI::App* set =
-        add("set", "change mass, inertia, damping, spring, timestep, or an object's friction or place, in a running session",
+        add("set",
+            "change mass, inertia, damping, spring, timestep, or an object's friction or place, in a running session",
             [this] { return set_command(set_); });
     set->add_option("changes", set_.changes,
                     "one or more of:\n"
@@ -499,13 +503,16 @@ class Commands {
         add("schema", "what cell, hand, scene, sensor or drive files may say, as JSON Schema for editors",
             [this] { return schema_command(schema_); });
     schema
-        ->add_option(
-            "kind",
-            choice<std::string>(
-                "kind",
-                {{"cell", "cell"}, {"hand", "hand"}, {"scene", "scene"}, {"tool", "tool"}, {"sensor", "sensor"}, {"drive", "drive"}},
-                [this](const std::string& kind) { schema_.kind = kind; }),
-            "which: cell, hand, scene, sensor, or drive (on Modbus)")
+        ->add_option("kind",
+                     choice<std::string>("kind",
+                                         {{"cell", "cell"},
+                                          {"hand", "hand"},
+                                          {"scene", "scene"},
+                                          {"tool", "tool"},
+                                          {"sensor", "sensor"},
+                                          {"drive", "drive"}},
+                                         [this](const std::string& kind) { schema_.kind = kind; }),
+                     "which: cell, hand, scene, sensor, or drive (on Modbus)")
         ->required()
         ->type_name("KIND");
     schema->add_flag("--markdown", schema_.markdown, "tables of the keys: unit, default, range and meaning");

@@ -1,5 +1,5 @@
-// The tool's orientation: it is held, or it turns freely with an inertia, a damping and a spring of its own. Held is the
-// same with J → ∞.
+// The tool's orientation: it is held, or it turns freely with an inertia, a damping and a spring of its own. Held is
+// the same with J → ∞.
 //
 //   J dω/dt + Dω + K φ = τ,  dR/dt = [ω]ₓ R     J, D, K scalars: a ball, so no preferred axis; R = exp([φ]ₓ) R_ref
 //   ω(k) = (J + T D + T² K)⁻¹ (J ω(k−1) + T τ(k) − T K φ(k−1))      implicit in D and K: none is too strong
@@ -9,8 +9,8 @@
 //
 // What hangs behind the sensor is felt by itself, as it is with the mass. Its inertia I about the rendered point is a
 // tensor that turns with the tool, so the proxy has J E − R I Rᵀ in the place of J, and gets back the gyroscopic torque
-// that the sensor reads, ω × R I Rᵀ ω. What the hand feels is then J about every axis. (The tool's centre of mass beside
-// the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
+// that the sensor reads, ω × R I Rᵀ ω. What the hand feels is then J about every axis. (The tool's centre of mass
+// beside the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
 // pose_proxy.hpp.)
 //
 // Two limits, neither of which depends on T: the speed, and the angle from the orientation at the first start. They are
@@ -33,14 +33,14 @@
 namespace proxarm::controller {
 
 struct OrientationConfig {
-  bool free = false;                              // false: held as it was at the start
-  double inertia_kg_m2 = 0.05;                    // J > 0; the felt one, more than `behind_sensor_T` has about any axis
+  bool free = false;            // false: held as it was at the start
+  double inertia_kg_m2 = 0.05;  // J > 0; the felt one, more than `behind_sensor_T` has about any axis
   models::Mat3 behind_sensor_T = models::Mat3::Zero();  // I, about the rendered point, along T's axes; kg m²
-  double damping_Nms_per_rad = 0.5;               // D ≥ 0
-  double spring_Nm_per_rad = 0.0;                 // K ≥ 0
-  double max_speed_rad_per_s = 2.0;  // > 0, at most 0.1 rad in a period
-  double max_angle_rad = 0.7;        // from the orientation at the start; 0..3
-  double period_s = 1e-3;            // T > 0
+  double damping_Nms_per_rad = 0.5;                     // D ≥ 0
+  double spring_Nm_per_rad = 0.0;                       // K ≥ 0
+  double max_speed_rad_per_s = 2.0;                     // > 0, at most 0.1 rad in a period
+  double max_angle_rad = 0.7;                           // from the orientation at the start; 0..3
+  double period_s = 1e-3;                               // T > 0
 
   // Throws description::SetupError that names the key.
   void validate() const;
@@ -52,8 +52,8 @@ class OrientationProxy {
 
   // Precondition: the configuration with this period passes validate().
   void set_period(double period_s) noexcept { config_.period_s = period_s; }
-  // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing. The first start
-  // is where the range of angles and the spring are counted from; a later one is after a hold.
+  // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing. The first
+  // start is where the range of angles and the spring are counted from; a later one is after a hold.
   bool start(const Eigen::Quaterniond& R_WT) noexcept;
   // The arm couldn't follow: the motion goes on from here with this angular velocity.
   bool resume(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;

@@ -45,10 +45,8 @@ Mat6 PoseConfig::mass_T() const noexcept {
 }
 
 void PoseConfig::validate() const {
-  AdmittanceConfig{.mass_kg = mass_kg,
-                   .damping_Ns_per_m = damping_Ns_per_m,
-                   .spring_N_per_m = spring_N_per_m,
-                   .period_s = period_s}
+  AdmittanceConfig{
+      .mass_kg = mass_kg, .damping_Ns_per_m = damping_Ns_per_m, .spring_N_per_m = spring_N_per_m, .period_s = period_s}
       .validate();
   require_option(is_positive(inertia_kg_m2), "--inertia", inertia_kg_m2, "kg m², above 0");
   require_option(is_not_negative(turning_damping_Nms_per_rad), "--turning-damping", turning_damping_Nms_per_rad,

@@ -28,7 +28,7 @@
 namespace proxarm::controller {
 
 struct PoseConfig {
-  double mass_kg = 4.0;       // M of the proxy: the felt one, less what hangs behind the sensor
+  double mass_kg = 4.0;         // M of the proxy: the felt one, less what hangs behind the sensor
   double inertia_kg_m2 = 0.05;  // J, the felt one
   double damping_Ns_per_m = 0.0, spring_N_per_m = 0.0;
   double turning_damping_Nms_per_rad = 0.0, turning_spring_Nm_per_rad = 0.0;
@@ -36,7 +36,7 @@ struct PoseConfig {
   double period_s = 1e-3;
   // What hangs behind the sensor: its mass is in mass_kg already.
   double behind_mass_kg = 0.0;
-  models::Vec3 behind_centre_T_m = models::Vec3::Zero();     // c, along T's axes
+  models::Vec3 behind_centre_T_m = models::Vec3::Zero();       // c, along T's axes
   models::Mat3 behind_inertia_T_kg_m2 = models::Mat3::Zero();  // I about T
 
   // M₆ along T's axes.

@@ -23,14 +23,15 @@ void archive(fieldbus::StateArchive& state, SessionSettings& s) noexcept {
   static_assert(sizeof(SessionSettings) == 184, "a new setting belongs into this list");
   state(s.scheme, s.coupling_stiffness_N_per_m, s.coupling_damping_Ns_per_m, s.period_s, s.receive_window, s.mass_kg,
         s.damping_Ns_per_m, s.spring_N_per_m, s.order, s.looks_ahead, s.horizon_s, s.orientation, s.passivity,
-        s.force_age_s, s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad, s.rotational_spring_Nm_per_rad, s.tare_s, s.tare_spread_N,
-        s.enable_timeout_s, s.enabling_timeout_s, s.wait_after_fault_s, s.without_enabling_input, s.max_missed_samples,
-        s.max_repeated_samples, s.max_missed_feedback, s.max_overruns);
+        s.force_age_s, s.rotational_inertia_kg_m2, s.rotational_damping_Nms_per_rad, s.rotational_spring_Nm_per_rad,
+        s.tare_s, s.tare_spread_N, s.enable_timeout_s, s.enabling_timeout_s, s.wait_after_fault_s,
+        s.without_enabling_input, s.max_missed_samples, s.max_repeated_samples, s.max_missed_feedback, s.max_overruns);
 }
 
 void archive(fieldbus::StateArchive& state, ReplayHead& head) noexcept {
   archive(state, head.settings);
-  state(head.axes, head.buses, head.bus_of_cell_bus, head.bus_names, head.cell, head.scene, head.tool, head.first_cycle);
+  state(head.axes, head.buses, head.bus_of_cell_bus, head.bus_names, head.cell, head.scene, head.tool,
+        head.first_cycle);
 }
 
 // False where the counts are out of range.
@@ -199,7 +200,8 @@ ReplayReader::ReplayReader(const fs::path& file) : name_(file) {
   const auto ended = [](const auto& text) { return is_ended(text); };
   const auto known = [this](std::uint8_t bus) { return bus < head_.buses; };
   if (head_.axes > max_axes || head_.buses == 0 || head_.buses > max_buses || !is_ended(head_.cell) ||
-      !is_ended(head_.scene) || !is_ended(head_.tool) || !std::all_of(head_.bus_names.begin(), head_.bus_names.end(), ended) ||
+      !is_ended(head_.scene) || !is_ended(head_.tool) ||
+      !std::all_of(head_.bus_names.begin(), head_.bus_names.end(), ended) ||
       !std::all_of(head_.bus_of_cell_bus.begin(), head_.bus_of_cell_bus.end(), known)) {
     refuse("a head that is damaged");
   }

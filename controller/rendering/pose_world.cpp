@@ -95,8 +95,7 @@ void PoseWorld::limit_rotation(ToolPose& p_hat) noexcept {
   }
   const Vec3 angle = models::rotation_vector(p_hat.orientation * home_.orientation.conjugate());
   if (angle.norm() <= config_.max_turn_rad) return;
-  p_hat.orientation =
-      (models::rotation_by(shortened(angle, config_.max_turn_rad)) * home_.orientation).normalized();
+  p_hat.orientation = (models::rotation_by(shortened(angle, config_.max_turn_rad)) * home_.orientation).normalized();
   turning_limited_ = true;
 }
 
@@ -144,7 +143,8 @@ void PoseWorld::report_contacts() noexcept {
       last_.friction = told.friction;
       told = first;
     }
-    if (other >= 0 && other < static_cast<int>(last_.others.size())) last_.others[static_cast<std::size_t>(other)] = told;
+    if (other >= 0 && other < static_cast<int>(last_.others.size()))
+      last_.others[static_cast<std::size_t>(other)] = told;
   }
 }
 
@@ -195,8 +195,8 @@ void PoseWorld::set_springs(PoseConfig changed) noexcept {
   const auto keep = [](double K, double K_before) { return K > K_before ? K_before / K : 1.0; };
   e.head<3>() *= keep(changed.spring_N_per_m, before.spring_N_per_m);
   e.tail<3>() *= keep(changed.turning_spring_Nm_per_rad, before.turning_spring_Nm_per_rad);
-  proxy_.set_reference({proxy_.q().position - e.head<3>(),
-                        (models::rotation_by(-e.tail<3>()) * proxy_.q().orientation).normalized()});
+  proxy_.set_reference(
+      {proxy_.q().position - e.head<3>(), (models::rotation_by(-e.tail<3>()) * proxy_.q().orientation).normalized()});
 }
 
 void PoseWorld::add_damping(double damping_Ns_per_m) noexcept {

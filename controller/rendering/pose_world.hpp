@@ -1,7 +1,7 @@
 // A rigid tool and its scene as the cycle sees them: a wrench goes in, the tool's next pose comes out.
 //
-// The tool's place goes through RenderedWorld, as that of a point does. What turns is beside it: set_torque_W() before a
-// step, orientation() after it, turn_to() before start() and resume().
+// The tool's place goes through RenderedWorld, as that of a point does. What turns is beside it: set_torque_W() before
+// a step, orientation() after it, turn_to() before start() and resume().
 //
 // Limits act on p̂, before 𝒢: its place is projected onto the step's sets (step_limits.hpp), and its rotation onto those
 // of speed and of the angle from the orientation at the first start. Contacts come after them. So q keeps the limits as
@@ -23,8 +23,8 @@ namespace proxarm::controller {
 struct PoseWorldConfig {
   PoseConfig proxy;
   double max_turning_speed_rad_per_s = 2.0;
-  double max_turn_rad = 0.7;                       // from the orientation at the first start
-  std::vector<double> object_friction;             // by index in the scene
+  double max_turn_rad = 0.7;                         // from the orientation at the first start
+  std::vector<double> object_friction;               // by index in the scene
   std::vector<std::optional<double>> part_friction;  // by part of the tool; none: the object's counts alone
 };
 

@@ -29,9 +29,9 @@ struct WorldStep {
     std::int32_t object = -1;
     double friction = 0.0;
   };
-  models::Vec3 q_W = models::Vec3::Zero();      // the new proxy
-  models::Vec3 p_hat_W = models::Vec3::Zero();  // p̂: the proxy's position without a world
-  models::Vec3 f_W = models::Vec3::Zero();      // the world's force on the proxy, (25a)
+  models::Vec3 q_W = models::Vec3::Zero();       // the new proxy
+  models::Vec3 p_hat_W = models::Vec3::Zero();   // p̂: the proxy's position without a world
+  models::Vec3 f_W = models::Vec3::Zero();       // the world's force on the proxy, (25a)
   models::Vec3 torque_W = models::Vec3::Zero();  // about q; of a rigid tool
   models::Vec3 v_W = models::Vec3::Zero();
   models::Vec3 normal_W = models::Vec3::Zero();  // of the first contact; zero when free
@@ -40,7 +40,7 @@ struct WorldStep {
   std::array<Contact, 2> others;                 // further contacts that press
   int contacts = 0;
   bool slips = false;
-  bool unresolved = false;  // of a rigid tool (pose_algorithm.hpp)
+  bool unresolved = false;                            // of a rigid tool (pose_algorithm.hpp)
   ActiveLimits limits;                                // that held the proxy back
   bool soft_limits_met = true;                        // whether leash and power were satisfied
   models::Vec3 limit_force_W = models::Vec3::Zero();  // the limits' force on the proxy; not in f_W

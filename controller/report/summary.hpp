@@ -20,7 +20,8 @@
 //   apparent_mass_kg        Re(F_h/a) between 0.3 and 2 Hz in free motion, that is while no limit acts and the world's
 //                           force on the proxy is below 1 mN (apparent_mass.hpp);
 //                           apparent_damping_Ns_per_m is its Im
-//   felt_mass, _band_Hz     F_h/a by frequency, and up to which one |F_h/a − M|/M is at most so much, where the same free
+//   felt_mass, _band_Hz     F_h/a by frequency, and up to which one |F_h/a − M|/M is at most so much, where the same
+//   free
 //                           motion excites it (FeltMassCurve)
 //   apparent_inertia_kg_m2  the same of the tool's rotation, from the hand's torque about the rendered point and the
 //                           tool's rotation vector from where rendering began; of simulations whose tool turns
@@ -28,7 +29,8 @@
 //                           push = −n·(F_h − m a − M_p a_q − B v_q), a_q and v_q the proxy's own (zero along n on a
 //                           flat wall). "Established": touch_s after the contact began, so impact steps are apart
 //                           Impedance type: push = −n·F_h, so that it has the device's own friction and inertia, too
-//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, and t against the friction in f,
+//   friction_ratio_error    Σ t·R / Σ (−μ n·R) − 1 with R = F_h − m a − M_p a_q − B v_q, and t against the friction in
+//   f,
 //                           which is the direction of the slide relative to the surface, also where that moves: over
 //                           all cycles that slip on one thing, from settle_s after the contact began; at least 0.1 s
 //   pulling_force_max_N     max(0, −n·f) over all cycles in contact with one thing
@@ -54,11 +56,11 @@ namespace proxarm::controller {
 
 struct SummaryConfig {
   double period_s = 1e-3;
-  double wanted_mass_kg = 4.0;    // M: proxy and handle; impedance type: 0, and so is m
-  double handle_mass_kg = 0.0;    // m: what moves after the sensor
-  double damping_Ns_per_m = 0.0;  // B
-  double spring_N_per_m = 0.0;    // K_v, to where the proxy starts
-  double wanted_inertia_kg_m2 = 0.0;      // what the hand is to feel; 0: the orientation is held
+  double wanted_mass_kg = 4.0;             // M: proxy and handle; impedance type: 0, and so is m
+  double handle_mass_kg = 0.0;             // m: what moves after the sensor
+  double damping_Ns_per_m = 0.0;           // B
+  double spring_N_per_m = 0.0;             // K_v, to where the proxy starts
+  double wanted_inertia_kg_m2 = 0.0;       // what the hand is to feel; 0: the orientation is held
   double turning_spring_Nm_per_rad = 0.0;  // to the orientation at the start
   int setpoint_delay_cycles = 2;
   double setpoint_filter_s = 0.0;            // of that delay, what the filter takes: for another period
@@ -192,7 +194,7 @@ struct Summary {
   double lookahead_s = 0.0;                // horizon at the start; 0: none
   double hands_off_s = 0.0;                // nobody held the handle
   std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor
-  std::size_t unresolved_steps = 0;  // of a rigid tool: steps of 𝒢 that keep not all laws
+  std::size_t unresolved_steps = 0;        // of a rigid tool: steps of 𝒢 that keep not all laws
   EndSummary end;                          // set by the caller
   std::vector<OrderSummary> idle_orders;   // set by the caller
   std::vector<std::string> drives_lack;    // what drives haven't got, and what is lost by it; set by the caller
@@ -203,7 +205,7 @@ struct Summary {
   std::vector<TimestepSummary> timesteps;
   bool from_truth = false;
   std::string setpoint_sha256;
-  double wanted_mass_kg = 0.0;  // as configured or set, for comparison
+  double wanted_mass_kg = 0.0;        // as configured or set, for comparison
   double wanted_inertia_kg_m2 = 0.0;  // likewise; 0: the orientation is held
 };
 

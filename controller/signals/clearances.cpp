@@ -18,8 +18,8 @@ void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid) {
   };
   const bool truth = record.has(RecordFlag::truth);
   record.proxy_clearance_m = clearance_m(record.proxy_W_m, record.proxy_q_W);
-  record.tool_clearance_m = truth ? clearance_m(record.true_tool_W_m, record.true_tool_q_W)
-                                  : clearance_m(record.tool_W_m, record.proxy_q_W);
+  record.tool_clearance_m =
+      truth ? clearance_m(record.true_tool_W_m, record.true_tool_q_W) : clearance_m(record.tool_W_m, record.proxy_q_W);
 }
 
 }  // namespace proxarm::controller

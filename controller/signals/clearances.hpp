@@ -13,8 +13,8 @@ namespace proxarm::controller {
 // simulation's truth has it, else where the encoders do.
 void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_t rendered_ns);
 
-// The same of a rigid tool, by the poses of proxy and tool. Without the simulation's truth the tool is taken to have the
-// proxy's orientation: the record has no other.
+// The same of a rigid tool, by the poses of proxy and tool. Without the simulation's truth the tool is taken to have
+// the proxy's orientation: the record has no other.
 void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid);
 
 }  // namespace proxarm::controller

@@ -12,8 +12,7 @@ ToolInertia tool_inertia(const description::ToolDescription& tool) {
   about_centre_S << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
   const Vec3 r_S = Vec3(tool.centre_of_mass_S_m.data()) - Vec3(tool.handle_S.position_m.data());
   // Steiner: I_T = I_C + m (r·r E − r rᵀ)
-  const Mat3 about_T_S =
-      about_centre_S + tool.mass_kg * (r_S.squaredNorm() * Mat3::Identity() - r_S * r_S.transpose());
+  const Mat3 about_T_S = about_centre_S + tool.mass_kg * (r_S.squaredNorm() * Mat3::Identity() - r_S * r_S.transpose());
   ToolInertia out{.mass_kg = tool.mass_kg,
                   .centre_T_m = R_ST.transpose() * r_S,
                   .about_T_kg_m2 = R_ST.transpose() * about_T_S * R_ST};

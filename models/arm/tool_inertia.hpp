@@ -1,5 +1,5 @@
-// What hangs behind the force sensor, about the rendered point T and along T's axes. The sensor doesn't feel its inertia
-// as the hand's, so the hand feels it in full, whatever the controller renders.
+// What hangs behind the force sensor, about the rendered point T and along T's axes. The sensor doesn't feel its
+// inertia as the hand's, so the hand feels it in full, whatever the controller renders.
 #pragma once
 
 #include "models/description/cell.hpp"
@@ -9,9 +9,9 @@ namespace proxarm::models {
 
 struct ToolInertia {
   double mass_kg = 0.0;
-  Vec3 centre_T_m = Vec3::Zero();       // from T to the centre of mass
-  Mat3 about_T_kg_m2 = Mat3::Zero();    // Steiner's part included
-  double largest_kg_m2 = 0.0;           // about any axis through T
+  Vec3 centre_T_m = Vec3::Zero();     // from T to the centre of mass
+  Mat3 about_T_kg_m2 = Mat3::Zero();  // Steiner's part included
+  double largest_kg_m2 = 0.0;         // about any axis through T
 };
 
 ToolInertia tool_inertia(const description::ToolDescription& tool);

@@ -58,7 +58,7 @@ struct HandDescription {
   double turning_stiffness_Nm_per_rad = 0.0;
   double turning_damping_Nms_per_rad = 0.0;
   double max_torque_Nm = std::numeric_limits<double>::infinity();
-  std::vector<Grip> grips;                                       // after the one above
+  std::vector<Grip> grips;  // after the one above
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
   std::vector<TimedVector> trajectory;            // instead of waypoints; m, in W, from its first row on

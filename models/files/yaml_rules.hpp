@@ -38,7 +38,8 @@ double number_or_zero(const YamlNode& node, std::string_view key, double otherwi
 // `node` must have exactly one of these keys; returns which. `expected` says so in words.
 std::string exactly_one(const YamlNode& node, const std::vector<std::string>& keys, std::string_view expected);
 
-// The one entry of `node` whose key is among `kinds`, and what it says. `what` and `example` are for whoever wrote another.
+// The one entry of `node` whose key is among `kinds`, and what it says. `what` and `example` are for whoever wrote
+// another.
 std::pair<std::string, YamlNode> one_entry(const YamlNode& node, const std::vector<std::string>& kinds,
                                            const std::string& what, const std::string& example);
 

@@ -5,10 +5,10 @@
 
 namespace proxarm::models {
 
-// The largest gap that a plane leaves between the hulls of their points, over the planes that may leave the largest: the
-// faces of both, and those along an edge of each. Below 0 the hulls overlap, and this is the shortest way, turned
-// negative, by which one gets out of the other. Above 0 it is their distance or less. `X` leads from the frame of `a` to
-// that of `b`. Precondition: one of them has faces.
+// The largest gap that a plane leaves between the hulls of their points, over the planes that may leave the largest:
+// the faces of both, and those along an edge of each. Below 0 the hulls overlap, and this is the shortest way, turned
+// negative, by which one gets out of the other. Above 0 it is their distance or less. `X` leads from the frame of `a`
+// to that of `b`. Precondition: one of them has faces.
 double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b) noexcept;
 
 }  // namespace proxarm::models

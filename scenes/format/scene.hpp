@@ -14,8 +14,8 @@
 
 #include "models/geometry/geometry.hpp"
 #include "models/mesh/mesh.hpp"
-#include "scenes/mesh_files/face_account.hpp"
 #include "scenes/format/tool_file.hpp"
+#include "scenes/mesh_files/face_account.hpp"
 
 namespace proxarm::scenes {
 

@@ -1,5 +1,5 @@
-// The tool that an arm holds, as a file states it: shapes that are fixed to each other, in the tool's frame T, whose origin
-// is the rendered point. docs/tool.md has the keys.
+// The tool that an arm holds, as a file states it: shapes that are fixed to each other, in the tool's frame T, whose
+// origin is the rendered point. docs/tool.md has the keys.
 #pragma once
 
 #include <filesystem>

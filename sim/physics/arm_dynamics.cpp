@@ -178,8 +178,8 @@ void ArmDynamics::advance() noexcept {
   update_kinematics();
 }
 
-void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W,
-                        const Vec3& arm_force_W, const Vec3& hand_torque_W) noexcept {
+void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W, const Vec3& arm_force_W,
+                        const Vec3& hand_torque_W) noexcept {
   for (std::size_t i = 0; i < axes_.size(); ++i) axes_[i].torque_Nm = motor_torque_Nm[i];
   hand_force_W_ = hand_force_W;
   arm_force_W_ = arm_force_W;

@@ -27,9 +27,9 @@ namespace proxarm::sim {
 // The true state of the rendered point T of the handle.
 struct ToolState {
   models::Pose X_WT = models::Pose::Identity();
-  models::Vec3 velocity_W = models::Vec3::Zero();          // of T's origin, m/s
-  models::Vec3 acceleration_W = models::Vec3::Zero();      // of T's origin, m/s²
-  models::Vec3 angular_velocity_W = models::Vec3::Zero();  // rad/s
+  models::Vec3 velocity_W = models::Vec3::Zero();              // of T's origin, m/s
+  models::Vec3 acceleration_W = models::Vec3::Zero();          // of T's origin, m/s²
+  models::Vec3 angular_velocity_W = models::Vec3::Zero();      // rad/s
   models::Vec3 angular_acceleration_W = models::Vec3::Zero();  // rad/s²
 };
 

@@ -19,7 +19,8 @@ struct PreparedSession {
   description::SensorDescription sensor;
   description::HandDescription hand;
   scenes::Scene scene;
-  std::shared_ptr<const models::PoseAlgorithm> rigid;  // scene and tool, for questions of room; null: the tool is a point
+  std::shared_ptr<const models::PoseAlgorithm>
+      rigid;  // scene and tool, for questions of room; null: the tool is a point
   controller::SessionSettings settings;
   double duration_s = 10.0;
   LookaheadChoice lookahead;   // what was asked for; settings.horizon_s is what came of it

@@ -60,10 +60,11 @@ struct RunOptions {
   std::optional<controller::Scheme> scheme;        // unset: what the drives' modes say
   std::optional<controller::Passivity> passivity;  // unset: the cell's
   std::optional<double> stiffness_N_per_m;         // impedance type
-  std::optional<controller::OrientationMode> orientation;  // unset: free where one of the next three is given, else held
+  std::optional<controller::OrientationMode>
+      orientation;  // unset: free where one of the next three is given, else held
   std::optional<double> inertia_kg_m2, turning_damping_Nms_per_rad, turning_spring_Nm_per_rad;
-  std::optional<LookaheadChoice> lookahead;        // unset: off
-  controller::SessionSettings settings;            // all that isn't optional above
+  std::optional<LookaheadChoice> lookahead;  // unset: off
+  controller::SessionSettings settings;      // all that isn't optional above
   BusMapping bus;
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;     // empty: no record

@@ -140,11 +140,8 @@ TEST(OrientationProxy, FeelsLikeABallWhateverHangsBehindTheSensor) {
 }
 
 TEST(OrientationProxy, RestsOnItsSpringWhereTheTorqueIsMetAndReturns) {
-  OrientationProxy proxy({.free = true,
-                          .inertia_kg_m2 = 0.1,
-                          .damping_Nms_per_rad = 1.0,
-                          .spring_Nm_per_rad = 40.0,
-                          .period_s = 1e-3});
+  OrientationProxy proxy(
+      {.free = true, .inertia_kg_m2 = 0.1, .damping_Nms_per_rad = 1.0, .spring_Nm_per_rad = 40.0, .period_s = 1e-3});
   ASSERT_TRUE(proxy.start(tilted));
   for (int k = 0; k < 5000; ++k) ASSERT_EQ(proxy.step(Vec3(4.0, 0.0, 0.0)), ProxyFault::none);
   EXPECT_NEAR(angle_between(tilted, proxy.R_WT()), 0.1, 1e-6);  // τ/K
