@@ -80,7 +80,7 @@ class Script(ProgramTest):
 
     def test_what_would_be_refused_at_the_start_is_refused(self):
         for change, said in (("mass=0.1@1s", "kg"), ("mass=3", "NAME=VALUE@TIME"), ("mass=3@1", "--set"),
-                             ("weight=3@1s", "mass, damping or spring"), ("mass=-1@1s", "mass"),
+                             ("weight=3@1s", "mass, damping, spring, inertia"), ("mass=-1@1s", "mass"),
                              ("mass=nan@1s", "mass"), ("damping=3kg@1s", "damping"), ("=@1s", "NAME=VALUE")):
             with self.subTest(change):
                 self.assert_refused(self.call("run", "--set", change), said)
