@@ -19,7 +19,7 @@ constexpr double kPart = 0.2;
 constexpr int kBudget = 400, kHard = 40;
 // Beside that, so many contacts may be looked at in local problems, and so many more for each part of the step: some
 // 0.2 µs each. Without it local problems that have no solution took up to 13 ms of a cycle.
-constexpr int kWork = 2000, kWorkOfPart = 60;
+constexpr int kWork = 1200, kWorkOfPart = 60;
 constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
 
 // The least extent of a solid; features on its far side are that far away.
@@ -252,7 +252,8 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   budget_ = kBudget + 8 * parts;
   problem_.allow(kWork + kWorkOfPart * parts);
   bool fine = in_parts(goal, q, parts, q_);
-  if (!fine && budget_ > 0 && !problem_.exhausted()) {
+  if (!fine && budget_ > 0) {
+    problem_.allow(kWork + kWorkOfPart * 8 * parts);
     gather(q, gathered_reach_);
     fine = in_parts(goal, q, 8 * parts, q_);
   }
@@ -263,8 +264,10 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
     budget_ = kBudget;
     problem_.allow(kWork);
     without_friction_ = true;
+    const ToolPose reached = q_;
     fine = in_parts(goal, q, parts, q_);
     without_friction_ = false;
+    if (!fine) q_ = reached;
   }
   unresolved_ = !lawful || !whole || overflow_ || crowded_;
   report(q);

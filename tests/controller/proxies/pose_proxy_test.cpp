@@ -115,7 +115,8 @@ TEST(PoseProxy, IsHeldByTheWrenchThatTheHandExerts) {
     proxy.start(start, 0.0);
     const Wrench hand{Vec3(5.0, -3.0, 1.0), Vec3(0.3, 0.1, -0.2)};
     for (int k = 0; k < 10; ++k) ASSERT_EQ(proxy.step(proxy.predict(hand)), ProxyFault::none);
-    EXPECT_LT((proxy.wrench_W().head<3>() + hand.force).norm(), 1e-9) << held;  // of 3e8 N/m and 1e-16 m: 3e-8 N
+    // A place of half a metre is rounded by 1e-16 m, and K is up to 3e8 N/m.
+    EXPECT_LT((proxy.wrench_W().head<3>() + hand.force).norm(), 3e-8) << held;
     if (held) continue;
     EXPECT_LT((proxy.wrench_W().tail<3>() + hand.torque).norm(), 1e-9);
   }
