@@ -235,8 +235,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
          choice<OrientationMode>("--orientation", {{"held", OrientationMode::held}, {"free", OrientationMode::free}},
                                  [&](OrientationMode value) { options.orientation = value; }),
          "held (default): the tool keeps its orientation, as with an inertia beyond all bounds; free: the hand turns "
-         "it "
-         "(the default with --inertia)")
+         "it (the default with --inertia)")
       ->type_name("held|free");
   app.add_option(
          "--tool", options.tool,
@@ -512,7 +511,7 @@ class Commands {
                                           {"sensor", "sensor"},
                                           {"drive", "drive"}},
                                          [this](const std::string& kind) { schema_.kind = kind; }),
-                     "which: cell, hand, scene, sensor, or drive (on Modbus)")
+                     "which: cell, hand, scene, tool, sensor, or drive (on Modbus)")
         ->required()
         ->type_name("KIND");
     schema->add_flag("--markdown", schema_.markdown, "tables of the keys: unit, default, range and meaning");

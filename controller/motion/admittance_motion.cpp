@@ -273,8 +273,9 @@ void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   double& limit = state_.speed_limit_m_per_s;
   limit = std::clamp(wanted, limit - step, limit + step);
   if (state_.q_k1_W == state_.q_k2_W && guard_.at_rest()) limit = std::min(limit, wanted);
-  parts_.orientation.limit_speed(std::min(1.0, limit / most));
-  if (parts_.pose != nullptr) parts_.pose->limit_turning(std::min(1.0, limit / most));
+  const double share = std::min(1.0, limit / most);
+  parts_.orientation.limit_speed(share);
+  if (parts_.pose != nullptr) parts_.pose->limit_turning(share);
   cycle.record.set(RecordFlag::slowed, !state_.freeing && limit < most);
 }
 

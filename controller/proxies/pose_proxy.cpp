@@ -27,6 +27,16 @@ bool in_range(const PoseConfig& c) noexcept {
          is_not_negative(c.turning_spring_Nm_per_rad) && is_positive(c.period_s);
 }
 
+// M₆ along the axes that c and I are along.
+Mat6 mass_matrix(const PoseConfig& config, const Vec3& centre_m, const Mat3& inertia_kg_m2) noexcept {
+  Mat6 M = Mat6::Zero();
+  M.topLeftCorner<3, 3>() = config.mass_kg * Mat3::Identity();
+  M.bottomRightCorner<3, 3>() = config.inertia_kg_m2 * Mat3::Identity() - inertia_kg_m2;
+  M.topRightCorner<3, 3>() = config.behind_mass_kg * cross_matrix(centre_m);
+  M.bottomLeftCorner<3, 3>() = -config.behind_mass_kg * cross_matrix(centre_m);
+  return M;
+}
+
 // A matrix of six rows is factored here only at set-up and with a change.
 bool is_positive_definite(const Mat6& A) noexcept {
   const Eigen::LLT<Mat6> factor(A);
@@ -35,14 +45,7 @@ bool is_positive_definite(const Mat6& A) noexcept {
 
 }  // namespace
 
-Mat6 PoseConfig::mass_T() const noexcept {
-  Mat6 M = Mat6::Zero();
-  M.topLeftCorner<3, 3>() = mass_kg * Mat3::Identity();
-  M.bottomRightCorner<3, 3>() = inertia_kg_m2 * Mat3::Identity() - behind_inertia_T_kg_m2;
-  M.topRightCorner<3, 3>() = behind_mass_kg * cross_matrix(behind_centre_T_m);
-  M.bottomLeftCorner<3, 3>() = -behind_mass_kg * cross_matrix(behind_centre_T_m);
-  return M;
-}
+Mat6 PoseConfig::mass_T() const noexcept { return mass_matrix(*this, behind_centre_T_m, behind_inertia_T_kg_m2); }
 
 void PoseConfig::validate() const {
   AdmittanceConfig{
@@ -83,12 +86,11 @@ void PoseProxy::make_K() noexcept {
   const Mat3 R = q_k1_.orientation.toRotationMatrix();
   centre_W_ = R * config_.behind_centre_T_m;
   inertia_W_ = R * config_.behind_inertia_T_kg_m2 * R.transpose();
-  mass_W_.setZero();
-  mass_W_.topLeftCorner<3, 3>() = config_.mass_kg * Mat3::Identity();
-  if (!config_.held) {
-    mass_W_.bottomRightCorner<3, 3>() = config_.inertia_kg_m2 * Mat3::Identity() - inertia_W_;
-    mass_W_.topRightCorner<3, 3>() = config_.behind_mass_kg * cross_matrix(centre_W_);
-    mass_W_.bottomLeftCorner<3, 3>() = -config_.behind_mass_kg * cross_matrix(centre_W_);
+  if (config_.held) {
+    mass_W_.setZero();
+    mass_W_.topLeftCorner<3, 3>() = config_.mass_kg * Mat3::Identity();
+  } else {
+    mass_W_ = mass_matrix(config_, centre_W_, inertia_W_);
   }
   K_ = mass_W_ / (T * T);
   K_.diagonal().head<3>().array() += config_.damping_Ns_per_m / T + config_.spring_N_per_m;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/proxies/orientation_proxy.hpp"
+
 namespace proxarm::controller {
 namespace {
 
@@ -13,7 +15,7 @@ using models::Vec3;
 
 // How fast the spring's reference returns to where the tool started, after the spring has become stiffer and after a
 // hold: slowly enough to be led by hand.
-constexpr double reference_m_per_s = 0.05, reference_rad_per_s = 0.1;
+constexpr double reference_m_per_s = 0.05, reference_rad_per_s = OrientationProxy::reference_rad_per_s;
 // A tool that starts in touch with something is outside to rounding: some metres in double precision.
 constexpr double rounding_m = 1e-12;
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/geometry/tool_pose.hpp"
+
 namespace proxarm::sim {
 
 using models::Vec3;
@@ -10,12 +12,6 @@ using models::Vec3;
 namespace {
 
 constexpr double small_rad = 1e-4;  // the next term of each series below is smaller by small_rad²/20 or more
-
-models::Mat3 exponential(const Vec3& phi) noexcept {
-  const double angle = phi.norm();
-  if (!(angle > 0.0)) return models::Mat3::Identity();
-  return Eigen::AngleAxisd(angle, phi / angle).toRotationMatrix();
-}
 
 // ω of R = exp([φ]ₓ):  ω = φ̇ + (1 − cos θ)/θ² φ × φ̇ + (θ − sin θ)/θ³ φ × (φ × φ̇), θ = |φ|
 Vec3 angular_velocity(const Vec3& phi, const Vec3& rate) noexcept {
@@ -150,7 +146,7 @@ Vec3 Hand::force_W(double time_s, const Vec3& position_W, const Vec3& velocity_W
 Vec3 Hand::torque_W(double time_s, const models::Mat3& R_WT, const Vec3& angular_velocity_W) const noexcept {
   if (!description_.twists()) return Vec3::Zero();
   const Intention want = intention(time_s);
-  const Eigen::AngleAxisd twist(exponential(want.turn_W) * R_start_ * R_WT.transpose());
+  const Eigen::AngleAxisd twist(models::rotation_by(want.turn_W).toRotationMatrix() * R_start_ * R_WT.transpose());
   const Vec3 torque =
       description_.turning_stiffness_Nm_per_rad * twist.angle() * twist.axis() +
       description_.turning_damping_Nms_per_rad * (angular_velocity(want.turn_W, want.turn_rate_W) - angular_velocity_W);
