@@ -26,9 +26,11 @@ Vec3 shortened(const Vec3& v, double most) noexcept {
 
 }  // namespace
 
-PoseWorld::PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, PoseWorldConfig config)
-    : config_(std::move(config)),
+PoseWorld::PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledScene& scene,
+                     const PoseWorldConfig& config)
+    : config_(config),
       g_(std::move(g)),
+      changes_(scene, config.proxy.period_s),
       limits_(no_world_),
       proxy_(config_.proxy, *g_),
       damping_Ns_per_m_(config_.proxy.damping_Ns_per_m) {}
@@ -61,6 +63,7 @@ Vec3 PoseWorld::resume(const Vec3& q_W, const Vec3& v_W) noexcept {
 }
 
 WorldStep PoseWorld::step(const Vec3& h_W, const StepLimits& limits) noexcept {
+  changes_.step();
   turning_limited_ = false;
   last_.fault = ProxyFault::none;
   if (no_room_) {
@@ -136,7 +139,7 @@ void PoseWorld::report_contacts() noexcept {
     if (!(force_N > 0.0)) continue;
     const int other = last_.contacts++ - 1;
     last_.slips = last_.slips || contact.slips;
-    WorldStep::Contact told{contact.normal_W, contact.object, friction(contact)};
+    WorldStep::Contact told{contact.normal_W, contact.object, contact.friction};
     if (force_N > hardest_N) {
       hardest_N = force_N;
       const WorldStep::Contact first{last_.normal_W, last_.object, last_.friction};
@@ -148,14 +151,6 @@ void PoseWorld::report_contacts() noexcept {
     if (other >= 0 && other < static_cast<int>(last_.others.size()))
       last_.others[static_cast<std::size_t>(other)] = told;
   }
-}
-
-// √(μ_tool μ_object), the object's where the tool says nothing (models/rigid_shapes/tool.hpp).
-double PoseWorld::friction(const models::PoseContact& contact) const noexcept {
-  const auto object = static_cast<std::size_t>(contact.object), part = static_cast<std::size_t>(contact.part);
-  const double of_object = object < config_.object_friction.size() ? config_.object_friction[object] : 0.0;
-  if (part >= config_.part_friction.size() || !config_.part_friction[part]) return of_object;
-  return std::sqrt(*config_.part_friction[part] * of_object);
 }
 
 void PoseWorld::set(const Change& change) noexcept {
@@ -182,6 +177,7 @@ void PoseWorld::set(const Change& change) noexcept {
       return set_springs(changed);
     case Parameter::friction:
     case Parameter::position:
+      return changes_.set(change);
     case Parameter::lookahead:
     case Parameter::none:
       return;
@@ -212,6 +208,7 @@ void PoseWorld::add_damping(double damping_Ns_per_m) noexcept {
 void PoseWorld::archive(fieldbus::StateArchive& state) noexcept {
   state(proxy_, torque_W_, omega_W_, R_WT_, home_.position, home_.orientation, last_.q_W, damping_Ns_per_m_,
         added_Ns_per_m_, speed_share_, started_, no_room_);
+  changes_.archive(state);
 }
 
 }  // namespace proxarm::controller

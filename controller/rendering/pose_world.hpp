@@ -10,11 +10,11 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "controller/limits/limited_algorithm.hpp"
 #include "controller/proxies/pose_proxy.hpp"
 #include "controller/rendering/rendered_world.hpp"
+#include "controller/rendering/scene_changes.hpp"
 #include "models/geometry/pose_algorithm.hpp"
 #include "models/surfaces/free_space.hpp"
 
@@ -23,14 +23,13 @@ namespace proxarm::controller {
 struct PoseWorldConfig {
   PoseConfig proxy;
   double max_turning_speed_rad_per_s = 2.0;
-  double max_turn_rad = 0.7;                         // from the orientation at the first start
-  std::vector<double> object_friction;               // by index in the scene
-  std::vector<std::optional<double>> part_friction;  // by part of the tool; none: the object's counts alone
+  double max_turn_rad = 0.7;  // from the orientation at the first start
 };
 
 class PoseWorld final : public RenderedWorld {
  public:
-  PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, PoseWorldConfig config);
+  // Precondition: the scene outlives this object, and 𝒢 is that of its tool (scenes/rigid/compile_rigid.hpp).
+  PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledScene& scene, const PoseWorldConfig& config);
 
   // The hand's torque about the rendered point, for the next step.
   void set_torque_W(const models::Vec3& torque_W) noexcept { torque_W_ = torque_W; }
@@ -52,7 +51,10 @@ class PoseWorld final : public RenderedWorld {
   }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override;
-  void set_period(double period_s) noexcept override { proxy_.set_period(period_s); }
+  void set_period(double period_s) noexcept override {
+    changes_.set_period(period_s);
+    proxy_.set_period(period_s);
+  }
   void add_damping(double damping_Ns_per_m) noexcept override;
   void archive(fieldbus::StateArchive& state) noexcept override;
 
@@ -62,11 +64,11 @@ class PoseWorld final : public RenderedWorld {
   void return_reference() noexcept;
   void report(const models::ToolPose& p_hat, const models::ToolPose& limited) noexcept;
   void report_contacts() noexcept;
-  [[nodiscard]] double friction(const models::PoseContact& contact) const noexcept;
   void set_springs(PoseConfig changed) noexcept;
 
   PoseWorldConfig config_;
   std::unique_ptr<models::PoseAlgorithm> g_;
+  SceneChanges changes_;
   models::FreeSpace<3> no_world_;
   LimitedAlgorithm<3> limits_;
   PoseProxy proxy_;

@@ -183,13 +183,11 @@ OrientationConfig orientation_config(const description::Cell& cell, const Sessio
 
 // Of a rigid tool. What hangs behind the sensor is taken off of the mass as of the inertia, also where none was asked
 // for.
-PoseWorldConfig pose_config(const description::Cell& cell, const scenes::CompiledScene& scene,
-                            const SessionSettings& settings) {
+PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings& settings) {
   const models::ToolInertia behind = models::tool_inertia(cell.tool);
-  const double asked = settings.rotational_inertia_kg_m2;
   PoseWorldConfig config;
   config.proxy = {.mass_kg = proxy_mass(cell, settings),
-                  .inertia_kg_m2 = asked > 0.0 ? asked : default_inertia_kg_m2 + behind.largest_kg_m2,
+                  .inertia_kg_m2 = felt_inertia_kg_m2(cell, settings),
                   .damping_Ns_per_m = settings.damping_Ns_per_m,
                   .spring_N_per_m = settings.spring_N_per_m,
                   .turning_damping_Nms_per_rad = settings.rotational_damping_Nms_per_rad,
@@ -201,9 +199,18 @@ PoseWorldConfig pose_config(const description::Cell& cell, const scenes::Compile
                   .behind_inertia_T_kg_m2 = behind.about_T_kg_m2};
   config.max_turning_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
   config.max_turn_rad = cell.limits.max_turn_rad;
-  config.object_friction = scene.frictions;
-  for (const models::ToolPart& part : scene.source->tool->shape.parts) config.part_friction.push_back(part.friction);
   return config;
+}
+
+// The friction of the scene's objects is then that of the tool's 𝒢.
+std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes::CompiledScene& scene,
+                                           const SessionSettings& settings) {
+  std::unique_ptr<models::PoseAlgorithm> g = scenes::compile_rigid(*scene.source, scene.source->tool->shape);
+  scene.friction_setters.clear();
+  for (std::int32_t object = 0; static_cast<std::size_t>(object) < scene.frictions.size(); ++object) {
+    scene.friction_setters.emplace_back(object, [&g = *g, object](double mu) { g.set_friction(object, mu); });
+  }
+  return std::make_unique<PoseWorld>(std::move(g), scene, pose_config(cell, settings));
 }
 
 ImpedanceConfig impedance_config(const SessionSettings& settings) {
@@ -221,8 +228,7 @@ decltype(CycleParts::rendering) build_rendering(const description::Cell& cell, s
   std::unique_ptr<RenderedWorld> world;
   PoseWorld* pose = nullptr;
   if (scene.source->tool) {
-    auto rigid = std::make_unique<PoseWorld>(scenes::compile_rigid(*scene.source, scene.source->tool->shape),
-                                             pose_config(cell, scene, settings));
+    std::unique_ptr<PoseWorld> rigid = make_pose_world(cell, scene, settings);
     pose = rigid.get();
     world = std::move(rigid);
   } else {
@@ -265,6 +271,11 @@ void refuse_shared_identifiers(CycleParts& parts) {
 }
 
 }  // namespace
+
+double felt_inertia_kg_m2(const description::Cell& cell, const SessionSettings& settings) {
+  const double asked = settings.rotational_inertia_kg_m2;
+  return asked > 0.0 ? asked : default_inertia_kg_m2 + models::tool_inertia(cell.tool).largest_kg_m2;
+}
 
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor) {

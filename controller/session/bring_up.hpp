@@ -36,6 +36,9 @@ void require_scheme(const description::Cell& cell, const SessionSettings& settin
 // build_parts() finds the same in its parts.
 void require_timestep(const description::Cell& cell, const SessionSettings& settings);
 
+// What the hand feels of the tool's rotation, what is behind the sensor included: as asked, or the default above it.
+double felt_inertia_kg_m2(const description::Cell& cell, const SessionSettings& settings);
+
 // `scene` must outlive the parts.
 CycleParts build_parts(const description::Cell& cell, const description::SensorDescription& sensor,
                        scenes::CompiledScene& scene, const SessionSettings& settings, fieldbus::CanNetwork& network,

@@ -36,6 +36,7 @@ struct PoseContact {
   Vec3 normal_W = Vec3::Zero();  // unit, out of the object
   Vec3 force_W = Vec3::Zero();   // on the tool, N. Where more than six rows hold it, only the sum of wrenches is unique
   double gap_m = 0.0;
+  double friction = 0.0;  // μ between the two
 };
 
 // Calls neither allocate, lock nor throw. A call may remember where the tool was, so each proxy needs one of its own; a
@@ -52,6 +53,9 @@ class PoseAlgorithm {
   // To be called before each step of a world that moves.
   virtual void set_time(const StepTime& /*time*/) noexcept {}
   [[nodiscard]] virtual bool wants_time() const noexcept { return true; }
+
+  // From the next step on, of an object by its index in the scene. Precondition: finite and not negative.
+  virtual void set_friction(std::int32_t /*object*/, double /*friction*/) noexcept {}
 
   // Where the tool touches after the last step (empty: free). Valid until the next call.
   [[nodiscard]] virtual std::span<const PoseContact> contacts() const noexcept { return {}; }

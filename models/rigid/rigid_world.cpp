@@ -88,6 +88,7 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
       shared->thinness = std::min(shared->thinness, thickness(*solid));
     }
     const Bounds bounds = bounds_of(object);
+    friction_.push_back(object.friction);
     shared->entries.push_back({std::move(object), bounds});
   }
   held_.resize(shared->entries.size());
@@ -104,9 +105,15 @@ RigidWorld::View RigidWorld::view(const ToolPose& pose) noexcept {
 }
 
 double RigidWorld::friction(const Pair& pair) const noexcept {
-  const double mu = shared_->entries[pair.entry].object.friction;
+  const double mu = friction_[pair.entry];
   const std::optional<double>& own = shared_->parts[pair.part].friction;
   return own ? std::sqrt(*own * mu) : mu;
+}
+
+void RigidWorld::set_friction(std::int32_t object, double friction) noexcept {
+  for (std::size_t i = 0; i < friction_.size(); ++i) {
+    if (shared_->entries[i].object.object == object) friction_[i] = friction;
+  }
 }
 
 void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
@@ -288,6 +295,7 @@ void RigidWorld::report(const ToolPose& q_old) noexcept {
     contact.normal_W = found.touch.normal;
     contact.force_W = axes_[k] * linear_[k].f;
     contact.gap_m = found.touch.gap;
+    contact.friction = friction(pair);
   }
   if (count_ == 0) return;
   // What sticks stays, bit for bit.

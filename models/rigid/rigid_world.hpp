@@ -38,6 +38,7 @@ class RigidWorld final : public PoseAlgorithm {
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
   [[nodiscard]] bool wants_time() const noexcept override { return false; }
+  void set_friction(std::int32_t object, double friction) noexcept override;
 
   [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {contacts_.data(), count_}; }
   [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
@@ -132,7 +133,8 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
 
   std::shared_ptr<const Shared> shared_;
-  std::vector<Held> held_;  // of each entry
+  std::vector<Held> held_;        // of each entry
+  std::vector<double> friction_;  // of each entry, as it is now
 
   ToolPose q_;
   std::array<Pair, most_pairs> pairs_;

@@ -79,6 +79,21 @@ class RigidTool(ProgramTest):
         travel = [pose(row)[0][2] for row in rows]
         self.assertGreater(max(travel) - min(travel), 0.05)  # and gone up and down
 
+    def test_friction_changes_while_it_is_touched(self):
+        """set OBJECT.friction acts on a rigid tool as on a point: by 1 a second, felt where it slips, replayed."""
+        _, rows = self.session("box_on_table.yaml", "tip.yaml", "--set", "table.friction=0@1s")
+        begin = float(rows[0]["time_s"])
+        ratios = []
+        for row in rows:
+            x, y, z = vector(row, "contact_force_W", "N")
+            if float(row["time_s"]) - begin > 1.5 and z > 0.5 and "unresolved" not in row["flags"]:
+                ratios.append(math.hypot(x, y) / z)
+        self.assertGreater(len(ratios), 1000)
+        # Without friction the table gives no force along itself, beyond rounding of forces of some 10 N.
+        self.assertLess(max(ratios), 1e-9)
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
+
     def test_replays_to_the_bit(self):
         pin = self.written("pin.yaml", "capsule: {length_m: 0.02, radius_m: 0.01, position_m: [0.03, 0, 0]}\n")
         self.session("box_on_table.yaml", "tip.yaml", "--tool", pin)

@@ -93,7 +93,7 @@ std::optional<Change> change_of_object(const std::string& text, const scenes::Sc
   if (what == "friction") {
     change.parameter = Parameter::friction;
     change.value = number_of(value, key, "a friction coefficient from 0 to 10", 0.0, most_friction);
-    if (scenes::compile(scene).has_friction(static_cast<std::size_t>(change.object))) return change;
+    if (scene.tool || scenes::compile(scene).has_friction(static_cast<std::size_t>(change.object))) return change;
     refuse(key, "a single wall without friction, which is compiled without, or friction by region",
            "an object whose friction can change", "give it some in the scene file, such as friction: 0.001");
   }

@@ -314,9 +314,7 @@ controller::HandModel turning_hand_model(const PreparedSession& session) {
 }
 
 double felt_inertia_kg_m2(const PreparedSession& session) {
-  const double asked = session.settings.rotational_inertia_kg_m2;
-  return asked > 0.0 ? asked
-                     : controller::default_inertia_kg_m2 + models::tool_inertia(session.cell.tool).largest_kg_m2;
+  return controller::felt_inertia_kg_m2(session.cell, session.settings);
 }
 
 controller::LoopModel turning_loop(const PreparedSession& session) {
