@@ -39,6 +39,10 @@ struct ReplayOptions {
   bool json = false;
 };
 
+struct SignalsOptions {
+  std::filesystem::path folder;
+};
+
 struct ScanOptions {
   std::string interface;
   std::optional<std::uint32_t> sensor_base_id;
@@ -67,6 +71,7 @@ int sim_command(const RunOptions& options);
 int plan_command(const RunOptions& options);
 int scan_command(const ScanOptions& options);         // 1: nothing answers
 int replay_command(const ReplayOptions& options);     // 1: other setpoints
+int signals_command(const SignalsOptions& options);   // a record's, as text
 int set_command(const SetOptions& options);           // of a running session
 int status_command(const StatusOptions& options);     // of a running session
 int check_command(const CheckFilesOptions& options);  // 2: one is wrong

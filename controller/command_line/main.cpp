@@ -273,7 +273,15 @@ void add_run_options(CLI::App& app, RunOptions& options) {
          "observe: energies at the hand's and the proxy's port, and oscillations; auto (the default): add damping "
          "against those that last; on: against any at once; off: none of it")
       ->type_name("off|observe|auto|on");
-  app.add_option("--record", options.record_dir, "write the session to this folder")->type_name("DIR");
+  CLI::Option* record = app.add_option("--record", options.record_dir, "write the session to this folder");
+  record->type_name("DIR");
+  app.add_option(
+         "--signals",
+         choice<bool>("--signals", {{"csv", false}, {"binary", true}}, [&](bool is) { options.binary_signals = is; }),
+         "the record's rows as signals.csv (the default), or as numbers in columns, which load in no time: signals.bin "
+         "(`proxarm signals` makes text of it)")
+      ->type_name("csv|binary")
+      ->needs(record);
   app.add_option("--set", options.changes,
                  "change a parameter when so much time has been rendered (holds and stops don't count), such as "
                  "mass=3@4s (mass, damping, spring, inertia, turning_damping, turning_spring, lookahead, timestep, "
@@ -489,6 +497,9 @@ class Commands {
                            [this] { return replay_command(replay_); });
     replay->add_option("folder", replay_.folder, "folder of --record, or of a black box")->required();
     replay->add_flag("--json", replay_.json, "print the result as one JSON object");
+    add("signals", "the signals of a record as text, as in signals.csv", [this] { return signals_command(signals_); })
+        ->add_option("folder", signals_.folder, "folder of --record")
+        ->required();
     CLI::App* check = add("check", "whether cell, scene, hand, sensor and other files are fine. Status 2: one isn't",
                           [this] { return check_command(check_); });
     check->add_option("files", check_.files, "files to check")->required();
@@ -549,6 +560,7 @@ class Commands {
   CLI::App& app_;
   RunOptions run_, sim_, plan_, tune_;
   command_line::ReplayOptions replay_;
+  command_line::SignalsOptions signals_;
   command_line::ScanOptions scan_;
   command_line::SetOptions set_;
   command_line::StatusOptions status_;

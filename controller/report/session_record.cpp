@@ -20,10 +20,10 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t buffer_bytes = 1 << 16;
 // All files that a session's folder may hold, which a later session replaces.
-constexpr const char* file_names[] = {"signals.csv",    "columns.json",   "frames.log",   "session.mcap",
-                                      "effective.yaml", "effective.json", "summary.json", "timing.json",
-                                      "plot.svg",       "plot.png",       "cell.yaml",    "scene.yaml",
-                                      "hand.yaml",      "sensor.yaml",    "arm.urdf",     "reason.txt"};
+constexpr const char* file_names[] = {"signals.csv",    "signals.bin",    "columns.json", "frames.log",  "session.mcap",
+                                      "effective.yaml", "effective.json", "summary.json", "timing.json", "plot.svg",
+                                      "plot.png",       "cell.yaml",      "scene.yaml",   "hand.yaml",   "sensor.yaml",
+                                      "arm.urdf",       "reason.txt"};
 
 bool is_ours(std::string_view name) {
   return std::find(std::begin(file_names), std::end(file_names), name) != std::end(file_names);
@@ -67,7 +67,8 @@ SessionWriter::Lock::~Lock() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::string>& axis_names, bool with_truth)
+SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
+                             SignalsForm form)
     : folder_(folder), axes_(std::min(axis_names.size(), max_axes)), with_truth_(with_truth) {
   std::error_code error;
   if (fs::exists(folder_, error) && !fs::is_directory(folder_, error)) {
@@ -85,10 +86,15 @@ SessionWriter::SessionWriter(const fs::path& folder, const std::vector<std::stri
   if (error) fail("", error.message());
   for (const char* name : file_names) fs::remove(folder_ / name, error);
   for (const char* name : {"replay", "black-box", "numpy"}) fs::remove_all(folder_ / name, error);
-  open(signals_, "signals.csv");
   open(frames_, "frames.log");
   const std::vector<std::string> axes{axis_names.begin(), axis_names.begin() + static_cast<std::ptrdiff_t>(axes_)};
-  signals_.buffer = signals_header(axes, with_truth_) + "\n";
+  if (form == SignalsForm::binary) {
+    table_.emplace(folder_ / "signals.bin", signal_columns(axes, with_truth_));
+    if (table_->error() != 0) fail("signals.bin", std::strerror(table_->error()));
+  } else {
+    open(signals_, "signals.csv");
+    signals_.buffer = signals_header(axes, with_truth_) + "\n";
+  }
   write_file("columns.json", columns_json(axes, with_truth_));
 }
 
@@ -121,6 +127,7 @@ void SessionWriter::close(File& file) {
 }
 
 void SessionWriter::add(const CycleRecord& record, const DerivedSignals& derived) {
+  if (table_) return table_->add(record, axes_, with_truth_, derived);
   append_signals(signals_.buffer, record, axes_, with_truth_, derived);
   signals_.buffer += '\n';
   if (signals_.buffer.size() >= buffer_bytes) flush(signals_);
@@ -141,6 +148,10 @@ void SessionWriter::write_file(std::string_view name, std::string_view text) {
 }
 
 void SessionWriter::finish(const Summary& summary) {
+  if (table_) {
+    table_->finish();
+    if (table_->error() != 0) fail("signals.bin", std::strerror(table_->error()));
+  }
   close(signals_);
   close(frames_);
   write_file("summary.json", repeatable_json(summary));

@@ -2,6 +2,7 @@
 //
 //   signals.csv      a row per cycle (signals/signal_columns.hpp). The first row names columns with units and frames;
 //                    numbers are the shortest that read back to the same double
+//   signals.bin      the same in its place, where that is wanted (signals/signal_table.hpp)
 //   columns.json     unit, frame and meaning of each of them
 //   session.mcap     the same session for other tools (messages/mcap_writer.hpp)
 //   frames.log       every frame on every bus, as `candump -L` writes them, so canplayer and log2asc read it
@@ -17,6 +18,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,9 +26,12 @@
 #include "controller/record/cycle_record.hpp"
 #include "controller/report/summary.hpp"
 #include "controller/signals/signal_columns.hpp"
+#include "controller/signals/signal_table.hpp"
 #include "fieldbus/can/can_frame.hpp"
 
 namespace proxarm::controller {
+
+enum class SignalsForm : std::uint8_t { csv, binary };
 
 class SessionWriter {
  public:
@@ -36,7 +41,8 @@ class SessionWriter {
   // that were forked off meanwhile, live.
   // `axis_names` name the columns of the drives (at most max_axes); `with_truth` adds the columns of the simulation's
   // truth.
-  SessionWriter(const std::filesystem::path& folder, const std::vector<std::string>& axis_names, bool with_truth);
+  SessionWriter(const std::filesystem::path& folder, const std::vector<std::string>& axis_names, bool with_truth,
+                SignalsForm form = SignalsForm::csv);
 
   void add(const CycleRecord& record, const DerivedSignals& derived = {});
   // Time of the frame's last bit on the network's own clock (which is not the records' time: bring-up comes before the
@@ -80,6 +86,7 @@ class SessionWriter {
   std::size_t axes_;
   bool with_truth_;
   File signals_, frames_;
+  std::optional<SignalTableWriter> table_;  // in the place of signals_
 };
 
 }  // namespace proxarm::controller

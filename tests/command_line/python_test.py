@@ -131,6 +131,35 @@ class Sessions(ProgramTest):
         (record / "numpy").write_text("no folder")
         numpy.testing.assert_array_equal(proxarm.load(record).signals["time_s"], whole["time_s"])
 
+    def test_numbers_in_columns_are_those_of_the_text(self):
+        for folder, form in (("text", "csv"), ("numbers", "binary")):
+            self.call("run", "--no-plot", "--duration", "5s", "--fault", "axis_3:silent@4s", "--record", folder, "--signals", form)
+        text, numbers = (proxarm.load(self.folder / folder) for folder in ("text", "numbers"))
+        self.assertEqual(list(numbers.signals), list(text.signals))
+        self.assertEqual(numbers.meanings, text.meanings)
+        for name in text.signals:
+            numpy.testing.assert_array_equal(numbers.signals[name], text.signals[name], name)
+        self.assertGreater(len(set(numbers.signals["flags"])), 2)
+        self.assertIn("drive_silent", set(numbers.signals["fault"]))
+        chosen = proxarm.load(self.folder / "numbers", columns=["phase", "tool_W_x_m"]).signals
+        self.assertEqual(list(chosen), ["phase", "tool_W_x_m"])
+        numbers.signals.save(self.folder / "saved")
+        numpy.testing.assert_array_equal(proxarm.load(self.folder / "saved")["phase"], text.signals["phase"])
+        with self.assertRaisesRegex(proxarm.SetupError, '"torque"'):
+            proxarm.load(self.folder / "numbers", columns=["torque"])
+        file = self.folder / "numbers" / "signals.bin"
+        whole = file.read_bytes()
+        begin, columns = (int.from_bytes(whole[at:at + 4], "little") for at in (12, 20))
+        for blocks in (0, 3):  # cut off within the next one
+            file.write_bytes(whole[:begin + blocks * 4096 * columns + 4095])
+            numpy.testing.assert_array_equal(proxarm.load(self.folder / "numbers").signals["time_s"],
+                                             text.signals["time_s"][:512 * blocks])
+        for data, found in ((whole[:8] + b"\2" + whole[9:], "version 2"), (b"cycle,time_s\n0,0\n" * 9, "another kind"),
+                            (whole[:10], "another kind|cut off"), (whole[:4000], "cut off")):
+            file.write_bytes(data)
+            with self.subTest(found), self.assertRaisesRegex(proxarm.SetupError, found):
+                proxarm.load(self.folder / "numbers")
+
     def test_a_table_of_many_parts_is_read_whole(self):
         # A part is a MiB at least, with a thread each; words come in another order in each part.
         rows = [(i, f"{i / 7!r}", "abc"[i // 20000 % 3], "" if i % 3 else "1e300") for i in range(200_000)]

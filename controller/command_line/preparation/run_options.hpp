@@ -68,6 +68,7 @@ struct RunOptions {
   BusMapping bus;
   std::optional<Pace> pace;             // unset: virtual in-process, real time on an interface
   std::filesystem::path record_dir;     // empty: no record
+  bool binary_signals = false;          // signals.bin in the place of signals.csv
   std::vector<std::string> changes;     // NAME=VALUE@TIME
   std::vector<std::string> orders;      // ORDER@TIME
   bool without_proof = false;           // real drives of a cell that isn't proven

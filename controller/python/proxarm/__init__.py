@@ -4,7 +4,9 @@ A simulated session takes a world and a hand that are Python functions. A real o
 own, which `run` starts and `Live` talks to: no interpreter is ever in its cycle.
 """
 import collections.abc
+import functools
 import json
+import mmap
 import os
 import pathlib
 import re
@@ -25,8 +27,15 @@ class Signals(collections.abc.Mapping):
     def __init__(self, columns):
         self._columns = {column[0]: column[1:] for column in columns}
 
+    def _column(self, name):
+        """Values, and words where it has such: of a table, read when it is first asked for."""
+        column = self._columns[name]
+        if callable(column[0]):
+            column = self._columns[name] = column[0]()
+        return column
+
     def __getitem__(self, name):
-        values, *words = self._columns[name]
+        values, *words = self._column(name)
         return numpy.array(words[0])[values] if words else values
 
     def __iter__(self):
@@ -51,7 +60,7 @@ class Signals(collections.abc.Mapping):
         (folder / "saved.json").write_text(json.dumps(list(self._columns)))
 
     def _save_column(self, folder, name):
-        values, *words = self._columns[name]
+        values, *words = self._column(name)
         if words:
             (folder / f"{name}.words.json").write_text(json.dumps(words[0]))
         unfinished = folder / f"{name}.{os.getpid()}.npy"
@@ -111,7 +120,68 @@ def load(folder, columns=None, keep=True):
     return Record(summary, signals, {column.pop("name"): column for column in described})
 
 
+class _Table:
+    """signals.bin (docs/files.md), mapped into memory: a column is read when somebody asks for it."""
+
+    def __init__(self, file):
+        def refuse(found):
+            raise SetupError(f"{file}: found {found}, expected signals.bin of a record, version 1")
+
+        with open(file, "rb") as start:
+            head = start.read(24)
+            if head[:8] != b"PXSIGNAL":
+                refuse("another kind of file")
+            if len(head) < 24:
+                refuse("a head that is cut off")
+            version, begin, block_rows, columns = map(int, numpy.frombuffer(head[8:], "<u4"))
+            if version != 1:
+                refuse(f"version {version}")
+            try:
+                self.columns = json.loads(start.read(begin - 24))["columns"]
+            except ValueError:
+                refuse("a head that is cut off")
+        shape = ((file.stat().st_size - begin) // (8 * block_rows * columns), columns, block_rows)
+        self._blocks = numpy.memmap(file, "<f8", "r", begin, shape) if shape[0] else numpy.empty(shape)
+        self._file, self._begin = file, begin
+        # Rows of the last block that have no cycle number are none.
+        self._rows = self._blocks[:, 0].size - (int(numpy.isnan(self._blocks[-1, 0]).sum()) if shape[0] else 0)
+
+    def signals(self, wanted):
+        numbers = {column["name"]: number for number, column in enumerate(self.columns)}
+        for name in wanted:
+            if name not in numbers:
+                raise SetupError(f'columns: found "{name}", expected the name of a column')
+        self._fetch({numbers[name] for name in wanted})
+        return Signals((name, functools.partial(self._read, numbers[name])) for name in wanted)
+
+    def _fetch(self, wanted):
+        """Has the pages of some columns brought from the disk, all at once. Its reading ahead would bring all of them."""
+        blocks, columns, rows = self._blocks.shape
+        if blocks == 0 or 4 * len(wanted) > columns:
+            return
+        self._blocks._mmap.madvise(mmap.MADV_RANDOM)
+        begins = sorted(number for number in wanted if number - 1 not in wanted)  # of columns that lie side by side
+        ends = sorted(number + 1 for number in wanted if number + 1 not in wanted)
+        with open(self._file, "rb", buffering=0) as file:
+            for block in range(blocks):
+                for begin, end in zip(begins, ends):
+                    at = self._begin + 8 * rows * (block * columns + begin)
+                    os.posix_fadvise(file.fileno(), at, 8 * rows * (end - begin), os.POSIX_FADV_WILLNEED)
+
+    def _read(self, number):
+        values = self._blocks[:, number].reshape(-1)[: self._rows]
+        form, words = self.columns[number]["form"], self.columns[number].get("words", "").split("|")
+        if form == "word":
+            return values.astype(numpy.int32), words
+        if form != "flags":
+            return (values,)
+        sets, places = numpy.unique(values, return_inverse=True)
+        return places, ["|".join(word for bit, word in enumerate(words) if int(bits) >> bit & 1) for bits in sets]
+
+
 def _load_signals(folder, wanted, text, keep):
+    if (folder / "signals.bin").exists():
+        return _Table(folder / "signals.bin").signals(wanted)
     file = folder / "signals.csv"
     state = file.stat() if file.exists() else None
     if not keep or state is None or state.st_size < KEEP_FROM_BYTES:

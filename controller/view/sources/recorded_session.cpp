@@ -49,7 +49,7 @@ std::string words_of(std::uint32_t flags) {
 RecordedSession::RecordedSession(const std::filesystem::path& folder, Stage& stage)
     : stage_(stage),
       log_(folder / controller::replay_folder / "cycles.bin"),
-      signals_(folder / "signals.csv", axis_names(stage)),
+      signals_(folder, axis_names(stage)),
       first_cycle_(signals_.row(0).cycle) {
   read_fault(folder);
   find_events();

@@ -9,6 +9,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <system_error>
+#include <type_traits>
 
 #include "controller/view/stage/words.hpp"
 #include "models/base/setup_error.hpp"
@@ -20,48 +22,55 @@ using controller::CycleRecord;
 using controller::Triple;
 using description::SetupError;
 
+using Field = SignalsFile::Field;
+
 template <typename Number>
-Number number_of(std::string_view text) {
+Number number_of(const Field& field) {
   Number number{};
-  std::from_chars(text.data(), text.data() + text.size(), number);
+  if (!field.is_number) {
+    std::from_chars(field.text.data(), field.text.data() + field.text.size(), number);
+  } else if (std::is_floating_point_v<Number> || std::abs(field.number) < 9e18) {  // no whole number is beyond that
+    number = static_cast<Number>(field.number);
+  }
   return number;
 }
 
 template <Triple CycleRecord::*vector>
-void store_part(CycleRecord& record, std::size_t part, std::string_view text) {
-  (record.*vector)[part] = number_of<double>(text);
+void store_part(CycleRecord& record, std::size_t part, const Field& field) {
+  (record.*vector)[part] = number_of<double>(field);
 }
 
 template <double CycleRecord::*value>
-void store_value(CycleRecord& record, std::size_t /*part*/, std::string_view text) {
-  record.*value = number_of<double>(text);
+void store_value(CycleRecord& record, std::size_t /*part*/, const Field& field) {
+  record.*value = number_of<double>(field);
 }
 
 template <auto counts>
-void store_count(CycleRecord& record, std::size_t axis, std::string_view text) {
-  (record.*counts)[axis] = number_of<std::int32_t>(text);
+void store_count(CycleRecord& record, std::size_t axis, const Field& field) {
+  (record.*counts)[axis] = number_of<std::int32_t>(field);
   record.axes = static_cast<std::uint8_t>(std::max<std::size_t>(record.axes, axis + 1));
 }
 
-void store_time(CycleRecord& record, std::size_t /*part*/, std::string_view text) {
-  record.time_ns = std::llround(1e9 * number_of<double>(text));
+void store_time(CycleRecord& record, std::size_t /*part*/, const Field& field) {
+  record.time_ns = std::llround(1e9 * number_of<double>(field));
 }
 
-void store_phase(CycleRecord& record, std::size_t /*part*/, std::string_view text) {
+void store_phase(CycleRecord& record, std::size_t /*part*/, const Field& field) {
   for (std::size_t i = 0; i < controller::phase_count; ++i) {
     const auto phase = static_cast<controller::Phase>(i);
-    if (text == controller::phase_name(phase)) record.phase = phase;
+    if (field.text == controller::phase_name(phase)) record.phase = phase;
   }
 }
 
-void store_contact(CycleRecord& record, std::size_t /*part*/, std::string_view text) {
+void store_contact(CycleRecord& record, std::size_t /*part*/, const Field& field) {
   using controller::ContactPhase;
   for (const ContactPhase phase : {ContactPhase::free, ContactPhase::stick, ContactPhase::slip}) {
-    if (text == controller::contact_phase_name(phase)) record.contact = phase;
+    if (field.text == controller::contact_phase_name(phase)) record.contact = phase;
   }
 }
 
-void store_flags(CycleRecord& record, std::size_t /*part*/, std::string_view text) {
+void store_flags(CycleRecord& record, std::size_t /*part*/, const Field& field) {
+  std::string_view text = field.text;
   while (!text.empty()) {
     const std::string_view word = text.substr(0, text.find('|'));
     for (const FlagWords& flag : flag_words()) {
@@ -73,34 +82,34 @@ void store_flags(CycleRecord& record, std::size_t /*part*/, std::string_view tex
 
 struct Named {
   std::string_view name;
-  void (*store)(CycleRecord&, std::size_t, std::string_view);
+  void (*store)(CycleRecord&, std::size_t, const Field&);
 };
 
 constexpr std::array singles{
-    Named{"cycle", [](CycleRecord& r, std::size_t, std::string_view t) { r.cycle = number_of<std::uint64_t>(t); }},
+    Named{"cycle", [](CycleRecord& r, std::size_t, const Field& f) { r.cycle = number_of<std::uint64_t>(f); }},
     Named{"time_s", store_time},
     Named{"phase", store_phase},
     Named{"contact", store_contact},
     Named{"flags", store_flags},
     Named{"contacts",
-          [](CycleRecord& r, std::size_t, std::string_view t) { r.contact_count = number_of<std::uint8_t>(t); }},
+          [](CycleRecord& r, std::size_t, const Field& f) { r.contact_count = number_of<std::uint8_t>(f); }},
     Named{"contact_object",
-          [](CycleRecord& r, std::size_t, std::string_view t) { r.contact_object = number_of<std::int32_t>(t); }},
+          [](CycleRecord& r, std::size_t, const Field& f) { r.contact_object = number_of<std::int32_t>(f); }},
     Named{"friction_1", store_value<&CycleRecord::friction>},
     Named{"proxy_mass_kg", store_value<&CycleRecord::proxy_mass_kg>},
     Named{"proxy_damping_Ns_per_m", store_value<&CycleRecord::proxy_damping_Ns_per_m>},
     Named{"proxy_inertia_kg_m2", store_value<&CycleRecord::proxy_inertia_kg_m2>},
     Named{"energy_hand_J",
-          [](CycleRecord& r, std::size_t, std::string_view t) { r.energies_J.hand = number_of<double>(t); }},
+          [](CycleRecord& r, std::size_t, const Field& f) { r.energies_J.hand = number_of<double>(f); }},
     Named{"energy_proxy_J",
-          [](CycleRecord& r, std::size_t, std::string_view t) { r.energies_J.proxy = number_of<double>(t); }},
+          [](CycleRecord& r, std::size_t, const Field& f) { r.energies_J.proxy = number_of<double>(f); }},
     Named{"proxy_clearance_m", store_value<&CycleRecord::proxy_clearance_m>},
     Named{"tool_clearance_m", store_value<&CycleRecord::tool_clearance_m>}};
 
 // "force_W_x_N": a name, an axis, a unit.
 struct NamedVector {
   std::string_view name, unit;
-  void (*store)(CycleRecord&, std::size_t, std::string_view);
+  void (*store)(CycleRecord&, std::size_t, const Field&);
 };
 constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord::force_S_N>},
                              NamedVector{"torque_S", "Nm", store_part<&CycleRecord::torque_S_Nm>},
@@ -120,7 +129,7 @@ constexpr std::array vectors{NamedVector{"force_S", "N", store_part<&CycleRecord
 constexpr std::array<std::string_view, 3> axes_in_names{"_x_", "_y_", "_z_"};
 
 struct OtherColumn {
-  void (*store)(CycleRecord&, std::size_t, std::string_view) = nullptr;
+  void (*store)(CycleRecord&, std::size_t, const Field&) = nullptr;
   std::size_t part = 0;
 };
 
@@ -128,18 +137,16 @@ OtherColumn column_of_other(std::string_view name) {
   for (std::size_t i = 0; i < controller::other_contacts; ++i) {
     const std::string number = std::to_string(i + 2);
     if (name == "contact_object_" + number) {
-      return {
-          [](CycleRecord& r, std::size_t at, std::string_view t) { r.others[at].object = number_of<std::int32_t>(t); },
-          i};
+      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.others[at].object = number_of<std::int32_t>(f); },
+              i};
     }
     if (name == "friction_" + number) {
-      return {[](CycleRecord& r, std::size_t at, std::string_view t) { r.others[at].friction = number_of<double>(t); },
-              i};
+      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.others[at].friction = number_of<double>(f); }, i};
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (name != "normal_" + number + "_W" + std::string(axes_in_names[axis]) + "1") continue;
-      return {[](CycleRecord& r, std::size_t at, std::string_view t) {
-                r.others[at / 3].normal_W[at % 3] = number_of<double>(t);
+      return {[](CycleRecord& r, std::size_t at, const Field& f) {
+                r.others[at / 3].normal_W[at % 3] = number_of<double>(f);
               },
               3 * i + axis};
     }
@@ -169,14 +176,28 @@ SignalsFile::Column SignalsFile::column_named(std::string_view name, const std::
   constexpr std::array<std::string_view, 4> of_proxy{"proxy_W_qx", "proxy_W_qy", "proxy_W_qz", "proxy_W_qw"};
   for (std::size_t part = 0; part < of_proxy.size(); ++part) {
     if (name == of_proxy[part]) {
-      return {[](CycleRecord& r, std::size_t at, std::string_view t) { r.proxy_q_W[at] = number_of<double>(t); }, part};
+      return {[](CycleRecord& r, std::size_t at, const Field& f) { r.proxy_q_W[at] = number_of<double>(f); }, part};
     }
   }
   const OtherColumn other = column_of_other(name);
   return {other.store, other.part};
 }
 
-SignalsFile::SignalsFile(const std::filesystem::path& file, const std::vector<std::string>& axis_names) : name_(file) {
+SignalsFile::SignalsFile(const std::filesystem::path& folder, const std::vector<std::string>& axis_names) {
+  std::error_code error;
+  if (!std::filesystem::exists(folder / "signals.bin", error)) {
+    read_text(folder / "signals.csv", axis_names);
+    return;
+  }
+  table_ = std::make_unique<controller::SignalTable>(folder / "signals.bin");
+  for (const auto& column : table_->columns()) columns_.push_back(column_named(column.name, axis_names));
+  if (table_->rows() > 0) return;
+  throw SetupError({.file = (folder / "signals.bin").string(),
+                    .found = "a file without a cycle",
+                    .expected = "signals of a session that was recorded"});
+}
+
+void SignalsFile::read_text(const std::filesystem::path& file, const std::vector<std::string>& axis_names) {
   const auto refuse = [&](const char* found) {
     throw SetupError({.file = file.string(),
                       .found = found,
@@ -207,19 +228,42 @@ SignalsFile::SignalsFile(const std::filesystem::path& file, const std::vector<st
   if (rows_.empty()) refuse("a file without a cycle");
 }
 
-SignalsFile::~SignalsFile() { munmap(const_cast<char*>(text_.data()), text_.size()); }
+SignalsFile::~SignalsFile() {
+  if (!text_.empty()) munmap(const_cast<char*>(text_.data()), text_.size());
+}
 
 CycleRecord SignalsFile::row(std::size_t index) const {
   CycleRecord record;
+  if (table_) {
+    add_from_table(record, index);
+    return record;
+  }
   const std::string_view line = line_at(text_, rows_[index]);
   std::size_t at = 0;
   for (const Column& column : columns_) {
     if (at > line.size()) break;
     const std::string_view value = line.substr(at, line.find(',', at) - at);
-    if (column.store != nullptr) column.store(record, column.part, value);
+    if (column.store != nullptr) column.store(record, column.part, {.text = value});
     at += value.size() + 1;
   }
   return record;
+}
+
+void SignalsFile::add_from_table(CycleRecord& record, std::size_t index) const {
+  using Form = controller::SignalColumn::Form;
+  std::string words;
+  for (std::size_t i = 0; i < columns_.size(); ++i) {
+    const double value = table_->value(index, i);
+    if (columns_[i].store == nullptr || controller::is_empty(value)) continue;
+    const auto& of = table_->columns()[i];
+    if (of.form == Form::word || of.form == Form::flags) {
+      words.clear();
+      controller::append_stored(words, of.form, of.words, value);
+      columns_[i].store(record, columns_[i].part, {.text = words});
+    } else {
+      columns_[i].store(record, columns_[i].part, {.number = value, .is_number = true});
+    }
+  }
 }
 
 }  // namespace proxarm::view

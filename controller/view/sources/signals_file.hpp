@@ -1,4 +1,5 @@
-// Reads any row of a record's signals.csv. The rows' positions are found once; a row is parsed when it is asked for.
+// Reads any row of a record's signals.csv or signals.bin. A row of text is parsed when it is asked for; where each
+// begins is found once.
 //
 // Columns are identified by their names, so the columns that are known are read from records of other versions, too. An
 // incomplete last row counts as the end.
@@ -6,35 +7,47 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "controller/record/cycle_record.hpp"
+#include "controller/signals/signal_table.hpp"
 
 namespace proxarm::view {
 
 class SignalsFile {
  public:
-  // `axis_names` as in the cell. Throws SetupError if the file isn't a record's signals.
-  SignalsFile(const std::filesystem::path& file, const std::vector<std::string>& axis_names);
+  // `axis_names` as in the cell. Throws SetupError if the folder has no signals of a record.
+  SignalsFile(const std::filesystem::path& folder, const std::vector<std::string>& axis_names);
   SignalsFile(const SignalsFile&) = delete;
   SignalsFile& operator=(const SignalsFile&) = delete;
   ~SignalsFile();
 
-  [[nodiscard]] std::size_t size() const noexcept { return rows_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return table_ ? table_->rows() : rows_.size(); }
   // All that the file contains of a cycle. Precondition: index < size().
   [[nodiscard]] controller::CycleRecord row(std::size_t index) const;
 
+  // A value as the file has it.
+  struct Field {
+    std::string_view text{};
+    double number = 0.0;
+    bool is_number = false;  // then there is no text
+  };
+
  private:
-  using Store = void (*)(controller::CycleRecord& record, std::size_t part, std::string_view text);
+  using Store = void (*)(controller::CycleRecord& record, std::size_t part, const Field& field);
   struct Column {
     Store store = nullptr;  // null: an unknown column
     std::size_t part = 0;   // component of a vector, or axis
   };
   [[nodiscard]] Column column_named(std::string_view name, const std::vector<std::string>& axis_names) const;
 
-  std::filesystem::path name_;
+  void read_text(const std::filesystem::path& file, const std::vector<std::string>& axis_names);
+  void add_from_table(controller::CycleRecord& record, std::size_t index) const;
+
+  std::unique_ptr<controller::SignalTable> table_;  // null: text
   std::string_view text_;
   std::vector<Column> columns_;
   std::vector<std::uint64_t> rows_;  // where each begins

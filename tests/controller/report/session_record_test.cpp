@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -97,6 +99,54 @@ TEST(SessionRecord, NumbersReadBackToTheSameBits) {
     append_signals(row, r, 0, false);
     ASSERT_EQ(std::strtod(cells(row)[5].c_str(), nullptr), value);
   }
+}
+
+// Any bits of a double, and rows without a truth: what the table says of a row is what is written as text.
+TEST(SessionRecord, NumbersOfATableAreThoseOfTheText) {
+  const tests::ScratchFolder folder;
+  std::mt19937_64 generator(18);
+  std::printf("seed 18\n");
+  std::vector<std::string> expected;
+  SignalTableWriter writer(folder / "signals.bin", signal_columns(six_axes, true));
+  for (std::uint64_t k = 0; k < 3000; ++k) {
+    CycleRecord r = some_record(generator() >> 11);
+    r.time_ns = static_cast<std::int64_t>(generator() >> (13 + generator() % 40));
+    r.flags = static_cast<std::uint32_t>(generator());
+    r.phase = static_cast<Phase>(generator() % phase_count);
+    r.fault = static_cast<Fault>(generator() % fault_count);
+    for (Triple* triple : {&r.force_W_N, &r.tool_W_m, &r.hand_force_W_N}) {
+      for (double& value : *triple) value = std::bit_cast<double>(generator());
+    }
+    r.others[1].object = static_cast<std::int32_t>(generator());
+    DerivedSignals derived;
+    derived.torques = k % 2 == 0;
+    derived.target_Nm[2] = std::bit_cast<double>(generator());
+    append_signals(expected.emplace_back(), r, 6, true, derived);
+    writer.add(r, 6, true, derived);
+    if (k % 97 != 0) continue;
+    // What a session that is killed now leaves: 64 rows at a time, each whole.
+    const SignalTable table(folder / "signals.bin");
+    ASSERT_EQ(table.rows(), (k + 1) / 64 * 64);
+    if (table.rows() == 0) continue;
+    std::string last;
+    table.append_row(last, table.rows() - 1);
+    ASSERT_EQ(last, expected[table.rows() - 1]);
+  }
+  writer.finish();
+  EXPECT_EQ(writer.error(), 0);
+  const SignalTable table(folder / "signals.bin");
+  ASSERT_EQ(table.rows(), expected.size());
+  EXPECT_EQ(table.header(), signals_header(six_axes, true));
+  for (std::size_t row = 0; row < expected.size(); ++row) {
+    std::string text;
+    table.append_row(text, row);
+    ASSERT_EQ(text, expected[row]);
+  }
+}
+
+TEST(SessionRecord, ATableTellsOfAFullDisk) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  EXPECT_EQ(SignalTableWriter("/dev/full", signal_columns(six_axes, true)).error(), ENOSPC);
 }
 
 // Written by hand in candump -L's format (can-utils, lib.c: "id#data", "id##flags data", "id#R", 8 digits when
