@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <limits>
 
 #include "models/geometry/linear_systems.hpp"
 
@@ -35,6 +36,7 @@ constexpr double kTolerance = 1e-12;
 constexpr double kNoisyTolerance = 1e-10;
 constexpr int kQuiet = 18;
 constexpr double kRough = 1e-7;  // before the forces are balanced
+constexpr int kAttempts = 6;     // of Gauss and Seidel's, each with twice the sweeps of the one before
 
 }  // namespace
 
@@ -73,6 +75,17 @@ double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
     law = std::max(law, (row.f - project(row.f - u / row.w, row.mu).f).norm() * std::sqrt(row.w));
   }
   return std::max(law, off.norm());
+}
+
+// The same as a sum of squares.
+double ContactProblem::residual2(Rows rows, const Twist& y) noexcept {
+  Twist off = -y;
+  double law2 = 0.0;
+  for (const Row& row : rows) {
+    off += row.H.transpose() * row.f;
+    law2 += row.w * (row.f - project(row.f - (row.H * y + row.b) / row.w, row.mu).f).squaredNorm();
+  }
+  return law2 + off.squaredNorm();
 }
 
 // One step of semismooth Newton for y and f, with the states chosen before. Each contact's new force is linear in its
@@ -126,6 +139,48 @@ bool ContactProblem::newton(Rows rows, Twist& y, double size, int most_iteration
   return false;
 }
 
+ContactProblem::Iterate ContactProblem::kept(Rows rows, const Twist& y) noexcept {
+  Iterate out;
+  out.y = y;
+  for (std::size_t i = 0; i < rows.size(); ++i) out.f[i] = rows[i].f;
+  return out;
+}
+
+void ContactProblem::go_to(const Iterate& a, const Iterate& b, double share, Rows rows, Twist& y) noexcept {
+  y = a.y + share * (b.y - a.y);
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].f = a.f[i] + share * (b.f[i] - a.f[i]);
+}
+
+void ContactProblem::go_to(const Iterate& a, Rows rows, Twist& y) noexcept {
+  y = a.y;
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].f = a.f[i];
+}
+
+// Newton with a line search, where plain steps cycle between states: of the halves of a step the first that lessens the
+// residual is taken, or the least of all.
+bool ContactProblem::damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept {
+  for (int k = 0; k < most_iterations && may_look_at(rows); ++k) {
+    for (Row& row : rows) row.state = project(row.f - (row.H * y + row.b) / row.w, row.mu).state;
+    const Iterate before = kept(rows, y);
+    const double wanted = residual2(rows, y);
+    if (!newton_step(rows, y)) return false;
+    const Iterate after = kept(rows, y);
+    if (is_solved(rows, y, size, k < kQuiet ? kTolerance : kNoisyTolerance)) return true;
+    double best = 1.0, least = std::numeric_limits<double>::infinity();
+    for (double share = 1.0; share > 0.02; share *= 0.5) {
+      go_to(before, after, share, rows, y);
+      const double now = residual2(rows, y);
+      if (now < least) {
+        least = now;
+        best = share;
+      }
+      if (now < wanted) break;
+    }
+    go_to(before, after, best, rows, y);
+  }
+  return false;
+}
+
 bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double tolerance) noexcept {
   if (violation(rows, y) > kRough * size) return false;
   balance(rows, y);
@@ -167,13 +222,16 @@ void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
 
 void ContactProblem::gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept {
   y.setZero();
-  for (const Row& row : rows) y += row.H.transpose() * row.f;
+  std::array<double, most> yields;  // a bound of the largest eigenvalue of H Hᵀ, m/N
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    y += rows[i].H.transpose() * rows[i].f;
+    yields[i] = (rows[i].H * rows[i].H.transpose()).norm();
+  }
   for (int k = 0; k < sweeps && may_look_at(rows); ++k) {
-    for (Row& row : rows) {
-      // A few projections on the contact's own law; the trace bounds the largest eigenvalue of H Hᵀ.
-      for (int j = 0; j < 3; ++j) {
-        const Vec3 u = row.H * y + row.b;
-        const Projected now = project(row.f - u / row.w, row.mu);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      Row& row = rows[i];
+      for (int j = 0; j < 3; ++j) {  // a few projections on the contact's own law
+        const Projected now = project(row.f - (row.H * y + row.b) / yields[i], row.mu);
         y += row.H.transpose() * (now.f - row.f);
         row.f = now.f;
         row.state = now.state;
@@ -187,18 +245,19 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   const Rows rows(rows_.data(), contacts.size());
   Twist y = L_.transpose() * e;
   bool solved = newton(rows, y, size, 25);
-  for (int attempt = 0; attempt < 6 && !solved && !exhausted(); ++attempt) {
+  for (int attempt = 0; attempt < kAttempts && !solved && !exhausted(); ++attempt) {
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();
     }
     gauss_seidel(rows, y, 20 << attempt);
-    std::array<Vec3, most> kept;
-    for (std::size_t i = 0; i < rows.size(); ++i) kept[i] = rows[i].f;
-    const Twist y_kept = y;
+    const Iterate reached = kept(rows, y);
     solved = newton(rows, y, size, 25);
     if (solved) break;
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].f = kept[i];
-    y = y_kept;
+    go_to(reached, rows, y);
+    solved = damped_newton(rows, y, size, 40);
+    if (solved) break;
+    if (attempt % 2 == 1) solved = next_to(reached, rows, y, size);
+    if (!solved) go_to(reached, rows, y);
   }
   if (!solved && contacts.size() <= 4 && !exhausted()) solved = enumerate(rows, y, size, nullptr);
   for (std::size_t i = 0; i < contacts.size(); ++i) {
@@ -209,15 +268,34 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   return solved;
 }
 
-// Newton with the states held.
+// Newton with the states held that `reached` tells, but for one contact's: where contacts nearly wedge the tool, Gauss
+// and Seidel's creeps towards a state that it never reaches.
+bool ContactProblem::next_to(const Iterate& reached, Rows rows, Twist& y, double size) noexcept {
+  for (std::size_t flipped = 0; flipped < rows.size(); ++flipped) {
+    for (int turn = 1; turn <= 2; ++turn) {
+      go_to(reached, rows, y);
+      for (Row& row : rows) row.state = project(row.f - (row.H * y + row.b) / row.w, row.mu).state;
+      Row& row = rows[flipped];
+      row.state = static_cast<ContactState>((static_cast<int>(row.state) + turn) % 3);
+      if (held_newton(rows, y, size, 12)) return true;
+    }
+  }
+  return false;
+}
+
+bool ContactProblem::held_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept {
+  for (int k = 0; k < most_iterations && may_look_at(rows); ++k) {
+    if (!newton_step(rows, y)) return false;
+    if (is_solved(rows, y, size, 2 * k < most_iterations ? kTolerance : kNoisyTolerance)) return true;
+  }
+  return false;
+}
+
+// The same from no forces.
 bool ContactProblem::newton_with_states(Rows rows, Twist& y, double size, Twist start) noexcept {
   y = start;
   for (Row& row : rows) row.f.setZero();
-  for (int k = 0; k < 30 && may_look_at(rows); ++k) {
-    if (!newton_step(rows, y)) return false;
-    if (is_solved(rows, y, size, kNoisyTolerance)) return true;
-  }
-  return false;
+  return held_newton(rows, y, size, 30);
 }
 
 bool ContactProblem::enumerate(Rows rows, Twist& y, double size, int* different) noexcept {

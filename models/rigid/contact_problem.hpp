@@ -10,8 +10,9 @@
 // solution methods", 1991) writes the law as f = P(f − r u) for any r > 0, with P the projection on the cone's section.
 // Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
 // large, so the multipliers settle in two. Where Newton cycles, projected Gauss-Seidel over the contacts (Jean and
-// Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution; up to four contacts, all
-// combinations of free, stick and slip are tried as a last resort. What is returned has passed the law's own test.
+// Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution, and a line search keeps it there; up
+// to four contacts, all combinations of free, stick and slip are tried as a last resort. What is returned has passed the
+// law's own test.
 #pragma once
 
 #include <array>
@@ -68,14 +69,26 @@ class ContactProblem {
     ContactState state = ContactState::open;
   };
   using Rows = std::span<Row>;
+  struct Iterate {
+    Twist y;
+    std::array<Vec3, most> f;
+  };
 
   static bool newton_step(Rows rows, Twist& y) noexcept;
   bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
+  bool damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
+  bool next_to(const Iterate& reached, Rows rows, Twist& y, double size) noexcept;
+  bool held_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool newton_with_states(Rows rows, Twist& y, double size, Twist tangent) noexcept;
   void gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept;
   static bool is_solved(Rows rows, const Twist& y, double size, double tolerance) noexcept;
   static void balance(Rows rows, const Twist& y) noexcept;
   static double violation(Rows rows, const Twist& y) noexcept;
+  static double residual2(Rows rows, const Twist& y) noexcept;
+  static Iterate kept(Rows rows, const Twist& y) noexcept;
+  static void go_to(const Iterate& a, Rows rows, Twist& y) noexcept;
+  // a + share (b − a)
+  static void go_to(const Iterate& a, const Iterate& b, double share, Rows rows, Twist& y) noexcept;
   bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
   double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;
 
