@@ -74,7 +74,7 @@ double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
     off += row.H.transpose() * row.f;
     law = std::max(law, (row.f - project(row.f - u / row.w, row.mu).f).norm() * std::sqrt(row.w));
   }
-  return std::max(law, off.norm());
+  return std::max(off.norm(), law);  // in this order: what isn't a number stays so
 }
 
 // The same as a sum of squares.
@@ -200,7 +200,7 @@ void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
       size += row.w;
       if (row.state == ContactState::stick) {
         G.noalias() += row.H.transpose() * row.H;
-      } else {
+      } else if (row.f[0] > 0.0) {
         const Twist ray = row.H.transpose() * (row.f / row.f[0]);
         G.noalias() += ray * ray.transpose();
       }
@@ -212,7 +212,7 @@ void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
       if (row.state == ContactState::open) continue;
       if (row.state == ContactState::stick) {
         row.f += row.H * share;
-      } else {
+      } else if (row.f[0] > 0.0) {
         const Vec3 ray = row.f / row.f[0];
         row.f += ray * ray.dot(row.H * share);
       }

@@ -10,9 +10,9 @@
 // solution methods", 1991) writes the law as f = P(f − r u) for any r > 0, with P the projection on the cone's section.
 // Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
 // large, so the multipliers settle in two. Where Newton cycles, projected Gauss-Seidel over the contacts (Jean and
-// Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution, and a line search keeps it there; up
-// to four contacts, all combinations of free, stick and slip are tried as a last resort. What is returned has passed the
-// law's own test.
+// Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution, and a line search keeps it there;
+// up to four contacts, all combinations of free, stick and slip are tried as a last resort. What is returned has passed
+// the law's own test.
 #pragma once
 
 #include <array>
