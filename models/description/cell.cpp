@@ -115,6 +115,13 @@ SimulatedDrive read_simulation(const YamlNode& node) {
   s.gear_damping_Nms_per_rad = node.number_or("gear_damping_Nms_per_rad", s.gear_damping_Nms_per_rad, 0.0, 1e6);
   s.gear_stiffness_ratio = node.number_or("gear_stiffness_ratio", s.gear_stiffness_ratio, 0.1, 10.0);
   s.backlash_rad = node.number_or("backlash_rad", s.backlash_rad, 0.0, 0.1);
+  s.gear_hysteresis_rad = node.number_or("gear_hysteresis_rad", s.gear_hysteresis_rad, 0.0, 0.1);
+  if (s.gear_hysteresis_rad > 0.0 && s.backlash_rad > 0.0) {
+    throw node.error_at("gear_hysteresis_rad", "0 of a gear with backlash_rad", number_text(s.gear_hysteresis_rad));
+  }
+  s.torque_ripple_Nm = node.number_or("torque_ripple_Nm", s.torque_ripple_Nm, 0.0, 1e5);
+  s.torque_ripple_per_revolution =
+      static_cast<int>(node.integer_or("torque_ripple_per_revolution", s.torque_ripple_per_revolution, 1, 1000));
   s.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
   s.brake_torque_Nm = node.number_or("brake_torque_Nm", s.brake_torque_Nm, 0.0, 1e6);
   s.brake_delay_s = node.number_or("brake_delay_s", s.brake_delay_s, 0.0, 1.0);

@@ -55,6 +55,9 @@ struct SimulatedDrive {
   double gear_damping_Nms_per_rad = 0.0;  // of the gear's elasticity
   double gear_stiffness_ratio = 1.0;      // real stiffness over gear_stiffness_Nm_per_rad: no data sheet is exact
   double backlash_rad = 0.0;              // total play at the joint
+  double gear_hysteresis_rad = 0.0;       // how wide the loop of torque over windup is where the torque is 0
+  double torque_ripple_Nm = 0.0;          // amplitude of the motor's, at the joint, with current or without
+  int torque_ripple_per_revolution = 6;   // periods of it in a turn of the motor
   double max_torque_Nm = 0.0;             // current limit, as torque at the joint
   double brake_torque_Nm = 0.0;           // that the closed brake holds or brakes with; 0: without limit
   double brake_delay_s = 0.0;             // from the power being gone to the brake being closed

@@ -91,6 +91,8 @@ Grip tightest_grip(const HandDescription& hand) noexcept {
   for (const Grip& grip : hand.grips) {
     if (grip.stiffness_N_per_m > tightest.stiffness_N_per_m) tightest = grip;
   }
+  tightest.stiffness_N_per_m *= 1.0 + hand.variation.share;
+  tightest.damping_Ns_per_m *= 1.0 + hand.variation.share;
   return tightest;
 }
 
@@ -126,6 +128,11 @@ HandDescription read_hand(const YamlNode& root) {
       }
       hand.grips.push_back(grip);
     }
+  }
+  if (const auto map = root.find_map("variation")) {
+    hand.variation.share = map->number("share", 0.0, 0.9);
+    hand.variation.interval_s = map->number_or("interval_s", hand.variation.interval_s, 0.02, 1000.0);
+    hand.variation.seed = static_cast<std::uint64_t>(map->integer_or("seed", 1, 0, 1'000'000'000));
   }
   if (root.has("waypoints")) {
     for (const YamlNode& node : root.list("waypoints", 1, 100'000)) {

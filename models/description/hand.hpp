@@ -13,6 +13,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -46,6 +47,14 @@ struct Grip {
 };
 inline constexpr double grip_change_s = 0.1;
 
+// How a grip varies by itself: stiffness and damping times 1 + share u(t), with u from 0 at the hand's beginning to
+// another number between −1 and 1 every interval_s, evenly distributed and drawn by the seed, minimum jerk in between.
+struct GripVariation {
+  double share = 0.0;  // 0: it doesn't
+  double interval_s = 0.5;
+  std::uint64_t seed = 1;
+};
+
 struct HandDescription {
   std::filesystem::path file;
   std::string name;
@@ -59,6 +68,7 @@ struct HandDescription {
   double turning_damping_Nms_per_rad = 0.0;
   double max_torque_Nm = std::numeric_limits<double>::infinity();
   std::vector<Grip> grips;  // after the one above
+  GripVariation variation;  // of all of them, and of the grip on the orientation
   std::vector<Waypoint> waypoints;
   std::vector<Sine> multisine;
   std::vector<TimedVector> trajectory;            // instead of waypoints; m, in W, from its first row on
@@ -70,7 +80,7 @@ struct HandDescription {
   }
 };
 
-// The stiffest of all its grips.
+// The stiffest of all its grips, as stiff as it varies to.
 Grip tightest_grip(const HandDescription& hand) noexcept;
 
 // Throws SetupError, with file, line and key.

@@ -97,6 +97,9 @@ ArmDynamics::ArmDynamics(const description::Cell& cell, double hand_mass_kg, dou
     axis.stiffness_Nm_per_rad = drive.gear_stiffness_Nm_per_rad * drive.simulation.gear_stiffness_ratio;
     axis.damping_Nms_per_rad = drive.simulation.gear_damping_Nms_per_rad;
     axis.half_backlash_rad = 0.5 * drive.simulation.backlash_rad;
+    axis.hysteresis_rad = drive.simulation.gear_hysteresis_rad;
+    axis.ripple_Nm = drive.simulation.torque_ripple_Nm;
+    axis.ripple_per_rad = drive.simulation.torque_ripple_per_revolution * drive.gear_ratio;
     axes_.push_back(axis);
     const bool limited = m.jnt_limited[joint] != 0;
     l.lower_stop.push_back(limited ? m.jnt_range[2 * joint] - end_stop_margin_rad : -mjMAXVAL);
@@ -129,6 +132,8 @@ void ArmDynamics::reset(std::span<const double> joint_rad) {
     axis.angle_rad = l.data->qpos[axis.dof] + flank + torque / axis.stiffness_Nm_per_rad;
     axis.speed_rad_per_s = 0.0;
     axis.torque_Nm = torque;
+    axis.gear_friction_Nm = 0.0;
+    axis.windup_rad = axis.angle_rad - l.data->qpos[axis.dof];
     axis.braked = true;
     axis.jammed = false;
   }
@@ -174,17 +179,30 @@ void ArmDynamics::advance() noexcept {
       axis.speed_rad_per_s = free_speed - std::copysign(friction, free_speed);
       axis.angle_rad += h * axis.speed_rad_per_s;
     }
+    if (axis.hysteresis_rad > 0.0) rub(axis);
   }
   update_kinematics();
 }
 
 void ArmDynamics::apply(std::span<const double> motor_torque_Nm, const Vec3& hand_force_W, const Vec3& arm_force_W,
                         const Vec3& hand_torque_W) noexcept {
-  for (std::size_t i = 0; i < axes_.size(); ++i) axes_[i].torque_Nm = motor_torque_Nm[i];
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    Axis& axis = axes_[i];
+    axis.torque_Nm = motor_torque_Nm[i];
+    if (axis.ripple_Nm > 0.0) axis.torque_Nm += axis.ripple_Nm * std::sin(axis.ripple_per_rad * axis.angle_rad);
+  }
   hand_force_W_ = hand_force_W;
   arm_force_W_ = arm_force_W;
   hand_torque_W_ = hand_torque_W;
   update_accelerations();
+}
+
+// (d), for a step of δ: with s its sense, z goes from where it is towards s z_m by exp(−|step|/w).
+void ArmDynamics::rub(Axis& axis) noexcept {
+  const double windup = axis.angle_rad - links_->data->qpos[axis.dof], step = windup - axis.windup_rad;
+  axis.windup_rad = windup;
+  const double end = std::copysign(0.5 * axis.stiffness_Nm_per_rad * axis.hysteresis_rad, step);
+  axis.gear_friction_Nm = end + (axis.gear_friction_Nm - end) * std::exp(-std::abs(step) / axis.hysteresis_rad);
 }
 
 // (c): each flank can only push.
@@ -193,7 +211,7 @@ double ArmDynamics::gear_torque(const Axis& axis) const noexcept {
   const double windup = axis.angle_rad - d.qpos[axis.dof];
   const double rate = axis.speed_rad_per_s - d.qvel[axis.dof];
   const double k = axis.stiffness_Nm_per_rad, c = axis.damping_Nms_per_rad, half = axis.half_backlash_rad;
-  if (half <= 0.0) return k * windup + c * rate;
+  if (half <= 0.0) return k * windup + c * rate + axis.gear_friction_Nm;
   if (windup > half) return std::max(0.0, k * (windup - half) + c * rate);
   if (windup < -half) return std::min(0.0, k * (windup + half) + c * rate);
   return 0.0;
@@ -352,7 +370,9 @@ double ArmDynamics::step_share() const {
   for (const Axis& axis : axes_) {
     const Eigen::Index link = axis.dof, rotor = n + axis.dof;
     M(rotor, rotor) = axis.rotor_inertia_kg_m2;
-    const double gear = step_s_ * step_s_ * axis.stiffness_Nm_per_rad + 2.0 * step_s_ * axis.damping_Nms_per_rad;
+    // Where its motion turns, a gear with hysteresis is twice as stiff: k/2 (1 + 1) by (d) beside k.
+    const double stiffest = (axis.hysteresis_rad > 0.0 ? 2.0 : 1.0) * axis.stiffness_Nm_per_rad;
+    const double gear = step_s_ * step_s_ * stiffest + 2.0 * step_s_ * axis.damping_Nms_per_rad;
     F(link, link) += gear;
     F(rotor, rotor) += gear;
     F(link, rotor) -= gear;

@@ -6,6 +6,11 @@
 //   M(φ) φ̈ + c(φ, φ̇) + g(φ) = τ_gear + Jᵀ F_hand                                                 (a)
 //   J_r θ̈ = τ − τ_gear − b θ̇ − τ_friction,   |τ_friction| ≤ F_c                                   (b)
 //   τ_gear = k δ + d δ̇,  δ = θ − φ; with backlash, δ less the dead band, and never against the flank in contact   (c)
+// A motor's torque ripples: with A and n of the cell and N, the gear's ratio, τ is that of the drive and A sin(n N θ).
+// A gear with hysteresis has a friction z in parallel to its spring (Dahl, "A solid friction model", 1968), whose loop
+// is as wide as the cell says, w, where τ_gear is 0 after large swings:
+//   τ_gear = k δ + d δ̇ + z,   dz/dδ = (k/2) (1 − sgn(δ̇) z/z_m),   z_m = k w/2                              (d)
+// z is found exactly for a δ that goes one way within a step.
 // In this form rotors are coupled to nothing but their own gear, so that Coulomb friction has an exact solution per
 // axis: a stuck, braked or jammed rotor stays at its angle bit for bit (a friction constraint in MuJoCo creeps).
 //
@@ -109,9 +114,12 @@ class ArmDynamics {
     int dof = 0;  // of the link in MuJoCo's model; hinges only, so also the index in qpos
     double rotor_inertia_kg_m2 = 0.0, coulomb_Nm = 0.0, viscous_Nms_per_rad = 0.0;
     double stiffness_Nm_per_rad = 0.0, damping_Nms_per_rad = 0.0, half_backlash_rad = 0.0;
+    double hysteresis_rad = 0.0;                    // w of (d)
+    double ripple_Nm = 0.0, ripple_per_rad = 0.0;   // A and n N
     double brake_Nm = 0.0;                          // 0: without limit
     double angle_rad = 0.0, speed_rad_per_s = 0.0;  // of the motor, as at the joint
     double torque_Nm = 0.0, gear_torque_Nm = 0.0;
+    double gear_friction_Nm = 0.0, windup_rad = 0.0;  // z and δ of (d)
     bool braked = true, jammed = false;
   };
   struct Links;  // MuJoCo's model and data
@@ -120,6 +128,7 @@ class ArmDynamics {
   void update_accelerations() noexcept;
   void update_tool_acceleration() noexcept;
   [[nodiscard]] double gear_torque(const Axis& axis) const noexcept;
+  void rub(Axis& axis) noexcept;
 
   std::unique_ptr<Links> links_;
   std::vector<Axis> axes_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "models/geometry/tool_pose.hpp"
 
@@ -122,6 +123,26 @@ Intention Hand::intention(double time_s) const noexcept {
   return result;
 }
 
+namespace {
+// Evenly distributed between −1 and 1, the same for the same two numbers: SplitMix64's last step (Steele, Lea, Flood,
+// "Fast splittable pseudorandom number generators", 2014), and 53 of its bits.
+double drawn(std::uint64_t seed, std::uint64_t number) noexcept {
+  std::uint64_t z = (seed << 32) + (number + 1) * 0x9E3779B97F4A7C15U;
+  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9U;
+  z = (z ^ (z >> 27)) * 0x94D049BB133111EBU;
+  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-52 - 1.0;
+}
+}  // namespace
+
+double Hand::variation(double time_s) const noexcept {
+  const description::GripVariation& v = description_.variation;
+  if (v.share <= 0.0 || time_s <= 0.0) return 1.0;
+  const double intervals = time_s / v.interval_s, s = intervals - std::floor(intervals);
+  const auto number = static_cast<std::uint64_t>(intervals);
+  const double from = number == 0 ? 0.0 : drawn(v.seed, number - 1), to = drawn(v.seed, number);
+  return 1.0 + v.share * (from + (to - from) * (s * s * s * (10.0 + s * (-15.0 + s * 6.0))));
+}
+
 description::Grip Hand::grip(double time_s) const noexcept {
   description::Grip held{0.0, description_.stiffness_N_per_m, description_.damping_Ns_per_m};
   for (const description::Grip& next : description_.grips) {
@@ -130,6 +151,9 @@ description::Grip Hand::grip(double time_s) const noexcept {
     held.stiffness_N_per_m += share * (next.stiffness_N_per_m - held.stiffness_N_per_m);
     held.damping_Ns_per_m += share * (next.damping_Ns_per_m - held.damping_Ns_per_m);
   }
+  const double factor = variation(time_s);
+  held.stiffness_N_per_m *= factor;
+  held.damping_Ns_per_m *= factor;
   return held;
 }
 
@@ -147,9 +171,9 @@ Vec3 Hand::torque_W(double time_s, const models::Mat3& R_WT, const Vec3& angular
   if (!description_.twists()) return Vec3::Zero();
   const Intention want = intention(time_s);
   const Eigen::AngleAxisd twist(models::rotation_by(want.turn_W).toRotationMatrix() * R_start_ * R_WT.transpose());
-  const Vec3 torque =
-      description_.turning_stiffness_Nm_per_rad * twist.angle() * twist.axis() +
-      description_.turning_damping_Nms_per_rad * (angular_velocity(want.turn_W, want.turn_rate_W) - angular_velocity_W);
+  const Vec3 torque = variation(time_s) * (description_.turning_stiffness_Nm_per_rad * twist.angle() * twist.axis() +
+                                           description_.turning_damping_Nms_per_rad *
+                                               (angular_velocity(want.turn_W, want.turn_rate_W) - angular_velocity_W));
   const double length_Nm = torque.norm();
   return length_Nm > description_.max_torque_Nm ? Vec3(description_.max_torque_Nm / length_Nm * torque) : torque;
 }

@@ -5,7 +5,8 @@
 // start. Between the rows of a trajectory, x_int is a cubic through their places with the slopes of parabolas through
 // three of them (Hermite); F_data is straight between those of a force. With a grip on the orientation,
 //   τ = K_r log(R_int(t) Rᵀ) + D_r (ω_int(t) − ω),   R_int = exp([φ(t)]ₓ) R_start,   cut to max_torque_Nm along itself
-// acts as well. The hand's mass and inertia belong to ArmDynamics.
+// acts as well. K, D, K_r and D_r vary together, where the description says so. The hand's mass and inertia belong to
+// ArmDynamics.
 #pragma once
 
 #include "models/description/hand.hpp"
@@ -36,6 +37,7 @@ class Hand {
 
  private:
   [[nodiscard]] description::Grip grip(double time_s) const noexcept;
+  [[nodiscard]] double variation(double time_s) const noexcept;  // a factor of the grip
   void add_waypoints(double time_s, Intention& want) const noexcept;
   void add_trajectory(double time_s, Intention& want) const noexcept;
   [[nodiscard]] models::Vec3 data_force_W(double time_s) const noexcept;

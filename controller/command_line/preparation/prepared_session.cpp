@@ -309,7 +309,8 @@ std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const Prepare
 }  // namespace
 
 controller::HandModel turning_hand_model(const PreparedSession& session) {
-  return {session.hand.turning_stiffness_Nm_per_rad, session.hand.turning_damping_Nms_per_rad,
+  const double tightest = 1.0 + session.hand.variation.share;
+  return {tightest * session.hand.turning_stiffness_Nm_per_rad, tightest * session.hand.turning_damping_Nms_per_rad,
           session.hand.inertia_kg_m2};
 }
 

@@ -338,6 +338,67 @@ TEST(ArmDynamics, TurnsFreelyWithinTheBacklashAndNoFurther) {
   EXPECT_GT(lowest, -backlash);
 }
 
+// A force that rises and falls slowly, motors locked: where the gear carries nothing, what it is wound up by differs by
+// the width of its loop between the two ways.
+TEST(ArmDynamics, AGearWithHysteresisHasALoopAsWideAsTheCellSays) {
+  description::Cell cell = default_cell();
+  cell.gravity_W_m_per_s2 = {0.0, 0.0, 0.0};
+  constexpr double width_rad = 0.2e-3;
+  cell.drives[0].simulation.gear_hysteresis_rad = width_rad;
+  cell.drives[0].simulation.gear_damping_Nms_per_rad = 10.0;  // 0.015 Nm at this pace, of 11 Nm of friction
+  ArmDynamics arm(cell, 0.0);
+  const std::vector<double> torque(arm.axis_count(), 0.0);
+  double up_rad = 0.0, down_rad = 0.0, last_Nm = 0.0, largest_rad = 0.0;
+  for (int k = 0; k < 80'000; ++k) {
+    arm.advance();
+    // 400 N at 0.7 m wind a gear of 115 kNm/rad up by a dozen widths: the loop is closed but for exp(−12).
+    arm.apply(torque, Vec3(0.0, 400.0 * std::sin(2.0 * M_PI * 0.1 * k * arm.step_s()), 0.0));
+    const double windup_rad = arm.motor_angle_rad(0) - arm.joint_angle_rad(0), now_Nm = arm.gear_torque_Nm(0);
+    if (k > 20'000 && last_Nm < 0.0 && now_Nm >= 0.0) up_rad = windup_rad;
+    if (k > 20'000 && last_Nm > 0.0 && now_Nm <= 0.0) down_rad = windup_rad;
+    last_Nm = now_Nm;
+    largest_rad = std::max(largest_rad, windup_rad);
+  }
+  EXPECT_GT(largest_rad, 10.0 * width_rad);
+  EXPECT_NEAR(down_rad - up_rad, width_rad, 0.01 * width_rad);
+  EXPECT_NEAR(down_rad + up_rad, 0.0, 0.01 * width_rad);
+}
+
+// The ripple is a torque with a potential: a rotor without any other load swings in its valleys, at nNθ = π, with
+//   ω² = A n N/J
+TEST(ArmDynamics, AMotorWhoseTorqueRipplesSwingsInItsValleys) {
+  description::Cell cell = default_cell();
+  cell.gravity_W_m_per_s2 = {0.0, 0.0, 0.0};
+  description::DriveDescription& drive = cell.drives[0];
+  drive.gear_stiffness_Nm_per_rad = 1e-3;  // the rotor by itself
+  drive.simulation.gear_damping_Nms_per_rad = drive.simulation.coulomb_friction_Nm =
+      drive.simulation.viscous_friction_Nms_per_rad = 0.0;
+  drive.simulation.torque_ripple_Nm = 20.0;
+  drive.simulation.torque_ripple_per_revolution = 4;
+  const double per_rad = 4.0 * drive.gear_ratio, valley_rad = M_PI / per_rad;
+  cell.start_rad[0] = 0.98 * valley_rad;
+  ArmDynamics arm(cell, 0.0);
+  open_brakes(arm);
+  const std::vector<double> torque(arm.axis_count(), 0.0);
+  int crossings = 0;
+  double first_s = 0.0, last_s = 0.0, before_rad = arm.motor_angle_rad(0) - valley_rad;
+  for (int k = 1; k <= 20'000; ++k) {
+    arm.advance();
+    arm.apply(torque, Vec3::Zero());
+    const double now_rad = arm.motor_angle_rad(0) - valley_rad;
+    EXPECT_LT(std::abs(now_rad), 0.03 * valley_rad);
+    if (before_rad < 0.0 && now_rad >= 0.0) {
+      last_s = (k - now_rad / (now_rad - before_rad)) * arm.step_s();
+      if (crossings++ == 0) first_s = last_s;
+    }
+    before_rad = now_rad;
+  }
+  ASSERT_GT(crossings, 3);
+  const double expected_Hz = std::sqrt(20.0 * per_rad / drive.rotor_inertia_kg_m2) / (2.0 * M_PI);
+  // A swing of 2 % of the way to the top is slower by (0.02 π)²/16, the step's error is (ωh)²/24.
+  EXPECT_NEAR((crossings - 1) / (last_s - first_s), expected_Hz, 1e-3 * expected_Hz);
+}
+
 TEST(ArmDynamics, StopsAtItsMechanicalEndStop) {
   description::Cell cell = default_cell();
   cell.start_rad[0] = 2.7;

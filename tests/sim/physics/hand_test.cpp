@@ -44,6 +44,52 @@ TEST(Hand, HoldsTheStartWithoutWaypoints) {
   EXPECT_EQ(hand.force_W(5.0, Vec3(1.0, 2.0, 3.0), Vec3::Zero()), Vec3::Zero());
 }
 
+// The grip's stiffness, from what it pulls with a millimetre away.
+double stiffness_at(const Hand& hand, double time_s) {
+  return 1000.0 * hand.force_W(time_s, Vec3(-1e-3, 0.0, 0.0), Vec3::Zero()).x();
+}
+
+TEST(Hand, VariesBetweenTheBoundsThatWereAskedForAndReachesThem) {
+  description::HandDescription description;
+  description.variation = {.share = 0.4, .interval_s = 0.1, .seed = 7};
+  const Hand hand(description, at(Vec3::Zero()));
+  EXPECT_NEAR(stiffness_at(hand, 0.0), 500.0, 1e-9);
+  double least = 1e9, most = 0.0, sum = 0.0, last = 500.0, fastest = 0.0;
+  constexpr int samples = 200'000;
+  for (int k = 0; k < samples; ++k) {
+    const double now = stiffness_at(hand, 1e-3 * k);
+    least = std::min(least, now);
+    most = std::max(most, now);
+    sum += now;
+    fastest = std::max(fastest, std::abs(now - last));
+    last = now;
+  }
+  // 2,000 draws: one within 2 % of each end but for (1 − 0.01)^2000 = 2e-9.
+  EXPECT_GE(least, 300.0 - 1e-9);
+  EXPECT_LT(least, 304.0);
+  EXPECT_LE(most, 700.0 + 1e-9);
+  EXPECT_GT(most, 696.0);
+  // Evenly distributed: deviation 400/√12 of each, five of their mean's.
+  EXPECT_NEAR(sum / samples, 500.0, 5.0 * 400.0 / std::sqrt(12.0) / std::sqrt(2000.0));
+  EXPECT_LE(fastest, 1.875 * 400.0 * 0.01 + 1e-9);  // minimum jerk's top speed, in a hundredth of the interval
+}
+
+TEST(Hand, VariesTheSameForTheSameSeedOnlyAndItsDampingWithIt) {
+  description::HandDescription description;
+  description.variation = {.share = 0.4, .interval_s = 0.5, .seed = 7};
+  const Hand hand(description, at(Vec3::Zero())), same(description, at(Vec3::Zero()));
+  description.variation.seed = 8;
+  const Hand other(description, at(Vec3::Zero()));
+  for (double t = 0.25; t < 20.0; t += 0.5) {
+    EXPECT_EQ(stiffness_at(hand, t), stiffness_at(same, t));
+    EXPECT_NE(stiffness_at(hand, t), stiffness_at(other, t));
+    const double damping = -hand.force_W(t, Vec3::Zero(), Vec3::UnitX()).x();
+    EXPECT_NEAR(damping / 20.0, stiffness_at(hand, t) / 500.0, 1e-12);
+  }
+  EXPECT_NEAR(tightest_grip(description).stiffness_N_per_m, 700.0, 1e-9);
+  EXPECT_NEAR(tightest_grip(description).damping_Ns_per_m, 28.0, 1e-9);
+}
+
 TEST(Hand, HasTheVelocityThatIsItsPositionsDerivative) {
   constexpr unsigned seed = 4711;
   std::mt19937 random(seed);

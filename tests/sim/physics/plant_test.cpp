@@ -191,6 +191,36 @@ TEST(Plant, StaysQuietAtRest) {
   EXPECT_LT(worst, 1e-6);
 }
 
+// A drive that turns slowly takes the ripple of its motor off by its own torque, which is there to be read (6077h).
+TEST(Plant, ADrivesTorqueHasTheRippleThatTheCellSays) {
+  description::Cell cell = default_cell();
+  description::DriveDescription& drive = cell.drives[0];
+  constexpr double ripple_Nm = 30.0, speed_rad_per_s = 0.02;
+  drive.simulation.torque_ripple_Nm = ripple_Nm;
+  drive.simulation.torque_ripple_per_revolution = 3;
+  DefaultPlant plant(no_hand(), cell);
+  plant.enable_all();
+  const double per_rad = 3.0 * drive.gear_ratio, start_rad = plant.arm().motor_angle_rad(0);
+  const double counts_per_rad = drive.counts_per_motor_revolution * drive.gear_ratio * drive.direction / (2.0 * M_PI);
+  std::complex<double> sum = 0.0;
+  int count = 0;
+  const int whole_periods = static_cast<int>(speed_rad_per_s * 4.0 * per_rad / (2.0 * M_PI));
+  for (int k = 1; k <= 6000; ++k) {
+    const double target_rad = start_rad + speed_rad_per_s * 1e-3 * k;
+    plant.servo(0).set_target(static_cast<std::int32_t>(std::lround(target_rad * counts_per_rad + drive.offset_counts)),
+                              plant.time_ns());
+    plant.advance_to(k * ms);
+    const double angle_rad = plant.arm().motor_angle_rad(0), from_rad = start_rad + speed_rad_per_s;
+    if (angle_rad < from_rad || angle_rad >= from_rad + whole_periods * 2.0 * M_PI / per_rad) continue;
+    sum += plant.servo(0).torque_Nm() * std::polar(1.0, -per_rad * angle_rad);
+    ++count;
+  }
+  ASSERT_GT(count, 2000);
+  // −A sin(φ) against exp(−iφ): i A/2 in the mean. 5 %: quantised speeds, and friction that isn't the same everywhere.
+  EXPECT_NEAR(2.0 * (sum / static_cast<double>(count)).imag(), ripple_Nm, 0.05 * ripple_Nm);
+  EXPECT_NEAR(2.0 * (sum / static_cast<double>(count)).real(), 0.0, 0.05 * ripple_Nm);
+}
+
 TEST(Plant, HoldsAJammedAxisStillWhileItsServoPushes) {
   DefaultPlant plant;
   plant.enable_all();
