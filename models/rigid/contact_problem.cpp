@@ -38,6 +38,12 @@ constexpr int kQuiet = 18;
 constexpr double kRough = 1e-7;  // before the forces are balanced
 constexpr int kAttempts = 6;     // of Gauss and Seidel's, each with twice the sweeps of the one before
 
+Twist solved(const Mat6& A, const Twist& b) noexcept {
+  FactoredMatrix factors;
+  factors.factor(A);
+  return factors.solve(b);
+}
+
 }  // namespace
 
 void ContactProblem::set_stiffness(const Mat6& K) noexcept {
@@ -121,7 +127,7 @@ bool ContactProblem::newton_step(Rows rows, Twist& y) noexcept {
     off.noalias() += row.H.transpose() * (row.f - P[i] * u);
     A.noalias() += row.H.transpose() * (P[i] * row.H);
   }
-  const Twist step = solve_square<6>(A, off);
+  const Twist step = solved(A, off);
   if (!step.allFinite()) return false;
   y += step;
   for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -181,7 +187,8 @@ bool ContactProblem::damped_newton(Rows rows, Twist& y, double size, int most_it
   return false;
 }
 
-bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double tolerance) noexcept {
+bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double tolerance) const noexcept {
+  if (rough_ > 0.0) return violation(rows, y) <= rough_ * size;
   if (violation(rows, y) > kRough * size) return false;
   balance(rows, y);
   return violation(rows, y) <= tolerance * size;
@@ -207,7 +214,7 @@ void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
     }
     if (!(size > 0.0)) return;
     G.diagonal().array() += 1e-10 * size;
-    const Twist share = solve_square<6>(G, lack);
+    const Twist share = solved(G, lack);
     for (Row& row : rows) {
       if (row.state == ContactState::open) continue;
       if (row.state == ContactState::stick) {
@@ -240,7 +247,8 @@ void ContactProblem::gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept {
   }
 }
 
-bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept {
+bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta, double rough) noexcept {
+  rough_ = rough;
   const double size = make_rows(e, contacts);
   const Rows rows(rows_.data(), contacts.size());
   Twist y = L_.transpose() * e;

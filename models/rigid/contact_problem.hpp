@@ -45,7 +45,9 @@ class ContactProblem {
 
   // Fills in δ, and f and state of the contacts. False: no solution found; δ then holds all gaps open as far as
   // Gauss-Seidel got. Precondition: at most `most` contacts.
-  bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept;
+  // `rough`: what the law may be missed by, over the free motion's press, in a problem that is going to be put again
+  // from where this one leads; 0: nothing but rounding.
+  bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta, double rough = 0.0) noexcept;
 
   // How much solve() may still do, all calls together: contacts that a step of Newton's or a sweep of Gauss and
   // Seidel's looks at. Without a call it may do all that it knows.
@@ -81,7 +83,7 @@ class ContactProblem {
   bool held_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool newton_with_states(Rows rows, Twist& y, double size, Twist tangent) noexcept;
   void gauss_seidel(Rows rows, Twist& y, int sweeps) noexcept;
-  static bool is_solved(Rows rows, const Twist& y, double size, double tolerance) noexcept;
+  bool is_solved(Rows rows, const Twist& y, double size, double tolerance) const noexcept;
   static void balance(Rows rows, const Twist& y) noexcept;
   static double violation(Rows rows, const Twist& y) noexcept;
   static double residual2(Rows rows, const Twist& y) noexcept;
@@ -98,6 +100,7 @@ class ContactProblem {
   }
 
   int work_ = std::numeric_limits<int>::max();
+  double rough_ = 0.0;
   Mat6 K_ = Mat6::Zero();
   Mat6 L_ = Mat6::Identity(), L_inverse_ = Mat6::Identity();
   std::array<Row, most> rows_;

@@ -190,7 +190,7 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
   for (std::size_t i = 0; i < pair_count_ && kept_count < kept.size(); ++i) {
     if (pairs_[i].pressed) kept[kept_count++] = pairs_[i];
   }
-  pair_count_ = 0;
+  pair_count_ = pressed_count_ = 0;
   crowded_ = false;
   for (std::size_t entry = 0; entry < shared_->entries.size(); ++entry) {
     gather_entry(static_cast<std::uint16_t>(entry), pose, reach);

@@ -10,6 +10,9 @@ namespace proxarm::models {
 inline constexpr double kFront_m = 1e-9;
 inline constexpr double kGap_m = 1e-12;  // what a gap may be short of
 
+// A rim whose lowest point is lower than its middle by less is level: a tenth of what a gap may be short of.
+inline constexpr double kLevel_m = 1e-13;
+
 inline EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
   const Solid::Edge& e = solid.edges[i];
   return {solid.points[e.from], solid.points[e.to], e.left, e.right, false};

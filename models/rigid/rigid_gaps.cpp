@@ -108,6 +108,18 @@ bool RigidWorld::crossed(const Pair& pair, const Vec3& p) const noexcept {
       .has_value();
 }
 
+Solid::Rim RigidWorld::rim_at(const Solid::Rim& rim, const View& at) noexcept {
+  return {at * rim.centre, at.R * rim.u, at.R * rim.v, rim.radius};
+}
+
+// While a rim lies flat, where it was lowest before says where it would tip.
+void RigidWorld::remember_lowest(Pair& pair, const View& at) const noexcept {
+  const auto* flat = std::get_if<FlatSide>(&shared_->entries[pair.entry].object.shape);
+  if (flat == nullptr) return;
+  const Vec2 lowest = lowest_of_rim(*flat, rim_at(shared_->parts[pair.part].solid.rims[pair.own], at));
+  if (!lowest.isZero(0.0)) pair.level = {lowest.x(), lowest.y()};
+}
+
 template <typename Each>
 void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
@@ -120,12 +132,9 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
   if (pair.kind == Kind::point_field || pair.kind == Kind::rim_field) {
     with_flat_or_hollow(object, [&](const auto& shape) {
       if (pair.kind == Kind::point_field) return each(touch(shape, at * own.points[pair.own], own.radius), 0);
-      Solid::Rim rim = own.rims[pair.own];
-      rim.centre = at * rim.centre;
-      rim.u = at.R * rim.u;
-      rim.v = at.R * rim.v;
+      const Solid::Rim rim = rim_at(own.rims[pair.own], at);
       std::array<Vec3, 4> places;
-      const int count = nearest_of_rim(shape, rim, places);
+      const int count = nearest_of_rim(shape, rim, {pair.level[0], pair.level[1]}, places);
       for (int k = 0; k < count; ++k) each(touch(shape, places[static_cast<std::size_t>(k)], 0.0), k);
     });
     return;
@@ -208,6 +217,7 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
   found_count_ = 0;
   const View at = view(pose);
   for (std::size_t i = 0; i < pair_count_; ++i) {
+    if (pairs_[i].kind == Kind::rim_field) remember_lowest(pairs_[i], at);
     evaluate(pairs_[i], at, [&](const Touch& t, int which) {
       if (found_count_ == most_found) {
         overflow_ = true;

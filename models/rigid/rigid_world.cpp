@@ -20,6 +20,16 @@ constexpr int kBudget = 400, kHard = 40;
 // Beside that, so many contacts may be looked at in local problems, and so many more for each part of the step: some
 // 0.2 µs each. Without it local problems that have no solution took up to 13 ms of a cycle.
 constexpr int kWork = 1200, kWorkOfPart = 60;
+constexpr int kWorkInside = 600;  // of hollow objects, where a look costs 0.5 µs and most steps take thirty
+// Newton's iteration with the gaps' curvature: what comes before a step of this size needn't be exact. A local problem
+// that is solved to this share of the last step leads as near.
+constexpr double kRoughShare = 1e-5;
+constexpr double kNear_m = 1e-9;
+// And the last step turns normals by no more than 1e-10 of a clearance of ten micrometres.
+constexpr double kStill_m = 1e-15;
+// From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
+// may swing to and fro.
+constexpr double kLeastShare = 0.125;
 constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
 
 // The least extent of a solid; features on its far side are that far away.
@@ -65,6 +75,7 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     }
     shared->thinness = std::min(shared->thinness, thickness(solid));
     shared->reach = std::max(shared->reach, solid.reach);
+    shared->bends = shared->bends || !solid.rims.empty();
     shared->parts.push_back({std::move(solid), part.friction});
   }
   if (tool.parts.empty()) {
@@ -78,15 +89,20 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     }
     const bool has_features = std::holds_alternative<Solid>(object.shape) ||
                               std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
+    const auto* tube = std::get_if<HollowTube>(&object.shape);
+    const bool holds_no_rim = has_features || (tube != nullptr && !tube->endless);
     for (const Part& part : shared->parts) {
-      if (has_features && !part.solid.rims.empty()) {
-        throw std::invalid_argument("a cylinder as a tool touches planes and hollow objects only");
+      if (holds_no_rim && !part.solid.rims.empty()) {
+        throw std::invalid_argument("a cylinder as a tool touches planes, hollow spheres and endless tubes only");
       }
     }
     if (const Solid* solid = std::get_if<Solid>(&object.shape)) {
       if (!solid->rims.empty()) throw std::invalid_argument("the outside of a cylinder can't be touched");
       shared->thinness = std::min(shared->thinness, thickness(*solid));
     }
+    shared->hollow = shared->hollow || std::holds_alternative<HollowSphere>(object.shape) ||
+                     std::holds_alternative<HollowTube>(object.shape);
+    shared->bends = shared->bends || shared->hollow;
     const Bounds bounds = bounds_of(object);
     friction_.push_back(object.friction);
     shared->entries.push_back({std::move(object), bounds});
@@ -132,18 +148,20 @@ void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolP
   const Vec3 slip = found.touch.point - q_old * (pose.orientation.conjugate() * lever);
   out.c << found.touch.gap, axes.col(1).dot(slip), axes.col(2).dot(slip);
   out.mu = without_friction_ ? 0.0 : friction(pair);
-  out.f = pair.pressed && found.which == 0 ? Vec3(axes.transpose() * pair.force_W) : Vec3(Vec3::Zero());
+  const Vec3* force = found.which == 0 ? (pair.pressed ? &pair.force_W : nullptr) : last_force(found.pair, found.which);
+  out.f = force != nullptr ? Vec3(axes.transpose() * *force) : Vec3(Vec3::Zero());
 }
 
 // Solves the local problem at a pose. Contacts that neither pressed last time nor are passed on the way to p̂ join when
 // a solution passes them.
-bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old,
+bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, double rough,
                               Twist& delta) noexcept {
   const Twist e = difference(pose, p_hat);
   const auto approach = [&](const Found& found, const Twist& xi) {
     const Vec3 lever = found.touch.point - pose.position;
     return found.touch.gap + found.touch.normal.dot(xi.head<3>() + xi.tail<3>().cross(lever));
   };
+  const Twist e_coupled = couple(pose, e);
   linear_count_ = 0;
   bool solved = true;
   delta = -e;
@@ -164,28 +182,38 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const
       ++linear_count_;
     }
     if (!grew) break;
-    solved = problem_.solve(e, {linear_.data(), linear_count_}, delta);
+    solved = problem_.solve(e_coupled, {linear_.data(), linear_count_}, delta, rough);
     if (!solved) budget_ -= kHard;
   }
+  keep_forces();
+  return solved;
+}
+
+void RigidWorld::keep_forces() noexcept {
   for (std::size_t i = 0; i < pair_count_; ++i) pairs_[i].pressed = false;
+  pressed_count_ = 0;
   for (std::size_t k = 0; k < linear_count_; ++k) {
     if (linear_[k].state == ContactState::open) continue;
-    Pair& pair = pairs_[found_[of_linear_[k]].pair];
+    const Found& found = found_[of_linear_[k]];
+    Pair& pair = pairs_[found.pair];
     pair.pressed = true;
-    if (found_[of_linear_[k]].which == 0) pair.force_W = axes_[k] * linear_[k].f;
+    const Vec3 force = axes_[k] * linear_[k].f;
+    if (found.which == 0) pair.force_W = force;
+    pressed_[pressed_count_++] = {found.pair, found.which, force};
   }
-  return solved;
 }
 
 // From a pose on, until nothing moves.
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach);
-  double last = std::numeric_limits<double>::infinity();
+  double last = std::numeric_limits<double>::infinity(), share = 1.0;
   for (int k = 0; k < 50; ++k) {
     if (--budget_ < 0 || problem_.exhausted()) return false;
     find(q);
     Twist delta;
-    const bool solved = solve_linear(q, p_hat, q_old, delta);
+    const bool roughly = shared_->bends && last > kNear_m;
+    const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
+    const bool solved = solve_linear(q, p_hat, q_old, rough, delta);
     if (!delta.allFinite()) return false;
     const double size = delta.head<3>().norm() + shared_->reach * delta.tail<3>().norm();
     if (linear_count_ == 0) {
@@ -194,9 +222,16 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
       if (there) return true;
       continue;
     }
-    q = moved(q, delta);
-    // What is left after this is the last ratio times this.
-    if (size <= rounding || (k > 0 && size < 0.1 * last && size / last * size <= 0.1 * rounding)) return solved;
+    if (shared_->bends && k >= 3) {
+      const bool shrinks = size < (1.0 - 0.4 * share) * last;
+      share = shrinks ? std::min(2.0 * share, 1.0) : std::max(0.5 * share, kLeastShare);
+    }
+    q = moved(q, share * delta);
+    // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
+    // those of normals before it.
+    const bool whole = share == 1.0 && !roughly && (!shared_->bends || size <= kStill_m);
+    const bool small = k > 0 && size < 0.1 * last && size / last * size <= 0.1 * rounding;
+    if (whole && (size <= rounding || small)) return solved;
     last = size;
   }
   return false;
@@ -226,7 +261,7 @@ bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, int part
 
 // The tool begins anew, elsewhere: nothing is known about where it is.
 void RigidWorld::forget() noexcept {
-  pair_count_ = 0;
+  pair_count_ = pressed_count_ = 0;
   gathered_reach_ = -1.0;
   std::fill(held_.begin(), held_.end(), Held{});
 }
@@ -250,6 +285,7 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
     q_ = p_hat;
     return q_;
   }
+  K_ = K;
   problem_.set_stiffness(K);
   const double limit = std::min(kPart * shared_->thinness, gathered_reach_);
   const double wanted = std::max(std::ceil(far / limit), 1.0);
@@ -257,17 +293,19 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   const int parts = whole ? static_cast<int>(wanted) : kMostParts;
   const ToolPose goal = whole ? p_hat : moved(q, difference(p_hat, q) * (kMostParts / wanted));
   budget_ = kBudget + 8 * parts;
-  problem_.allow(kWork + kWorkOfPart * parts);
+  const int work = shared_->hollow ? kWorkInside : kWork;
+  problem_.allow(work + kWorkOfPart * parts);
   bool fine = in_parts(goal, q, parts, q_);
   if (!fine && budget_ > 0) {
-    problem_.allow(kWork + kWorkOfPart * 8 * parts);
+    problem_.allow(work + kWorkOfPart * 8 * parts);
     gather(q, gathered_reach_);
     fine = in_parts(goal, q, 8 * parts, q_);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
-  // would meet the same problem in the next one.
+  // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
+  // the law: there a jam is what most often has no solution, and without friction it would slip right through.
   const bool lawful = fine;
-  if (!fine) {
+  if (!fine && !shared_->hollow) {
     budget_ = kBudget;
     problem_.allow(kWork);
     without_friction_ = true;

@@ -7,8 +7,9 @@
 //    Linearised there, those that press or would be passed make a local problem (contact_problem.hpp); its solution is
 //    the next pose. Gaps and normals are taken again until nothing moves: a fixed point is exact, since at δ = 0
 //    nothing is linearised. It converges by the ratio of the step's penetration to the radius of curvature, a
-//    thousandth or less. Where surfaces conform (a peg in its hole) that ratio is near one, and the step may end
-//    unresolved.
+//    thousandth or less. Where surfaces conform (a peg in its hole) that radius is their clearance, and the ratio far
+//    above one: there the gaps' curvature goes into the problem as well (rigid_bends.cpp), which makes this Newton's
+//    method.
 // 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the
 //    way from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from
 //    q(k−1).
@@ -32,8 +33,9 @@ namespace proxarm::models {
 class RigidWorld final : public PoseAlgorithm {
  public:
   // Throws std::invalid_argument for a tool's shape without a size, points that span no solid, a friction below 0, a
-  // cylinder as an object, and one as a tool beside solids or meshes. A tool without parts is a point: a sphere of no
-  // radius. What else compile_rigid() refuses (a box beside a mesh) is held, but leaves more steps unresolved.
+  // cylinder as an object, and one as a tool beside solids, meshes or a tube with round ends. A tool without parts is a
+  // point: a sphere of no radius. What else compile_rigid() refuses (a box beside a mesh) is held, but leaves more
+  // steps unresolved.
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
@@ -66,7 +68,8 @@ class RigidWorld final : public PoseAlgorithm {
     std::uint32_t own = 0, other = 0;
     float side = 0.0F;  // of a two-sided surface: 1 or −1, or 0 where the pair is not to be judged in this step
     bool pressed = false;
-    Vec3 force_W = Vec3::Zero();  // of the last solution
+    Vec3 force_W = Vec3::Zero();            // of the last solution
+    std::array<double, 2> level{1.0, 0.0};  // where a rim that lies flat was lowest, in its u and v
   };
   // A pair at a pose.
   struct Found {
@@ -83,11 +86,18 @@ class RigidWorld final : public PoseAlgorithm {
     RigidObject object;
     Bounds bounds;
   };
+  struct Pressed {  // a place of a pair that pressed in the last solution, and how hard
+    std::uint16_t pair = 0;
+    std::uint8_t which = 0;
+    Vec3 force_W = Vec3::Zero();
+  };
   struct Shared {  // constant
     std::vector<Part> parts;
     std::vector<Entry> entries;
     double reach = 0.0;     // of the tool's points from the reference point
     double thinness = 0.0;  // the least thickness of the tool's parts
+    bool hollow = false;    // a sphere or a tube
+    bool bends = false;     // something is hollow, or the tool has rims: gaps' curvature counts
   };
   // Of a closed mesh: 1 or −1, the side of its faces on which the tool is, known from the first time that it comes near
   // after a start. Of other objects: 0.
@@ -121,12 +131,19 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
   void evaluate(const Pair& pair, const View& at, Each each) const noexcept;
+  [[nodiscard]] static Solid::Rim rim_at(const Solid::Rim& rim, const View& at) noexcept;
+  void remember_lowest(Pair& pair, const View& at) const noexcept;
   void find(const ToolPose& pose) noexcept;
   void drop_deeper() noexcept;
   [[nodiscard]] double friction(const Pair& pair) const noexcept;
   void linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
                  Mat3& frame) const noexcept;
-  bool solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, Twist& delta) noexcept;
+  [[nodiscard]] const Vec3* last_force(std::uint16_t pair, std::uint8_t which) const noexcept;
+  bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
+  Twist couple(const ToolPose& pose, const Twist& e) noexcept;
+  void keep_forces() noexcept;
+  bool solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, double rough,
+                    Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
   void report(const ToolPose& q_old) noexcept;
@@ -149,7 +166,10 @@ class RigidWorld final : public PoseAlgorithm {
 
   std::array<Found, most_found> found_;
   std::size_t found_count_ = 0;
+  Mat6 K_ = Mat6::Identity();
   ContactProblem problem_;
+  std::array<Pressed, ContactProblem::most> pressed_;
+  std::size_t pressed_count_ = 0;
   std::array<LinearContact, ContactProblem::most> linear_;
   std::array<std::uint16_t, ContactProblem::most> of_linear_{};  // in found_
   std::array<Mat3, ContactProblem::most> axes_;                  // normal and tangents, columns

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace proxarm::models {
 namespace {
@@ -14,6 +13,19 @@ constexpr double kBeside_m = 1e-10;
 // edge, the direction lies on the cone's border, and either side of it must do. At a place where both edges really
 // meet, solids that are outside of each other keep the cone; so this admits no false contact.
 constexpr double kAskew = 0.02;
+
+// A rim whose lowest point is lower than its middle by less is level: a tenth of what a gap may be short of.
+constexpr double kLevel_m = 1e-13;
+// Up to this angle, in radians, more than the lowest point of a rim is held.
+constexpr double kNearlyLevel = 0.05;
+
+// Where a hollow sphere is nearest, as a side.
+FlatSide side_of(const HollowSphere& hollow, const Vec3& p) noexcept {
+  const Vec3 out = p - hollow.centre;
+  const double distance = out.norm();
+  const Vec3 n = distance > 0.0 ? Vec3(-out / distance) : Vec3(Vec3::UnitZ());
+  return {n, n.dot(hollow.centre) - hollow.radius};
+}
 
 double in_unit(double s) noexcept { return std::clamp(s, 0.0, 1.0); }
 
@@ -65,45 +77,18 @@ Touch touch(const HollowTube& hollow, const Vec3& p, double radius) noexcept {
   return {p - radius * n, n, hollow.radius - distance - radius};
 }
 
-namespace {
-
-// The local maxima of a function of the angle on a rim, of which the first two derivatives are known: Newton from the
-// best of twelve places and from other places that are higher than their neighbours.
-template <typename Value, typename Slopes>
-int highest_on_rim(const Solid::Rim& rim, Value value, Slopes slopes, std::array<Vec3, 4>& out) noexcept {
-  constexpr int places = 12;
-  constexpr double step = 2.0 * std::numbers::pi / places;
-  const auto at = [&rim](double angle) {
-    return Vec3(rim.centre + rim.radius * (std::cos(angle) * rim.u + std::sin(angle) * rim.v));
-  };
-  std::array<double, places> height;
-  for (int k = 0; k < places; ++k) height[static_cast<std::size_t>(k)] = value(at(step * k));
-  int count = 0;
-  for (int k = 0; k < places && count < 2; ++k) {
-    const double h = height[static_cast<std::size_t>(k)];
-    if (h < height[static_cast<std::size_t>((k + 1) % places)]) continue;
-    if (h <= height[static_cast<std::size_t>((k + places - 1) % places)]) continue;
-    double angle = step * k;
-    for (int i = 0; i < 12; ++i) {
-      const auto [first, second] = slopes(angle);
-      if (!(second < 0.0)) break;
-      const double turn = std::clamp(-first / second, -0.5 * step, 0.5 * step);
-      angle += turn;
-      if (std::abs(turn) < 1e-15) break;
-    }
-    out[static_cast<std::size_t>(count++)] = at(angle);
-  }
-  return count;
+Vec2 lowest_of_rim(const FlatSide& side, const Solid::Rim& rim) noexcept {
+  const Vec2 down(-side.normal.dot(rim.u), -side.normal.dot(rim.v));
+  const double tilt = down.norm();
+  return rim.radius * tilt > kLevel_m ? Vec2(down / tilt) : Vec2(Vec2::Zero());
 }
 
-}  // namespace
-
-int nearest_of_rim(const FlatSide& side, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
-  const double u = side.normal.dot(rim.u), v = side.normal.dot(rim.v), tilt = std::hypot(u, v);
-  // The lowest point. Where the rim is nearly level, all of it comes near, and three points more hold it.
-  const Vec3 low = tilt > 0.0 ? Vec3(-(u * rim.u + v * rim.v) / tilt) : Vec3(-rim.u);
+int nearest_of_rim(const FlatSide& side, const Solid::Rim& rim, const Vec2& level, std::array<Vec3, 4>& out) noexcept {
+  const double tilt = std::hypot(side.normal.dot(rim.u), side.normal.dot(rim.v));
+  const Vec2 lowest = lowest_of_rim(side, rim), z = lowest.isZero(0.0) ? level : lowest;
+  const Vec3 low = z.x() * rim.u + z.y() * rim.v;
   out[0] = rim.centre + rim.radius * low;
-  if (tilt > 0.05) return 1;
+  if (tilt > kNearlyLevel) return 1;
   const Vec3 beside = rim.u.cross(rim.v).cross(low);
   out[1] = rim.centre + rim.radius * beside;
   out[2] = rim.centre - rim.radius * beside;
@@ -111,27 +96,27 @@ int nearest_of_rim(const FlatSide& side, const Solid::Rim& rim, std::array<Vec3,
   return 4;
 }
 
-int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
-  const Vec3 c = rim.centre - hollow.centre;
-  return nearest_of_rim(FlatSide{-c.normalized(), 0.0}, rim, out);
+int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, const Vec2& level,
+                   std::array<Vec3, 4>& out) noexcept {
+  return nearest_of_rim(side_of(hollow, rim.centre), rim, level, out);
 }
 
-int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept {
-  const Vec3 along = hollow.to - hollow.from;
-  const double length2 = along.squaredNorm();
-  const auto radial = [&](const Vec3& p) {
-    return Vec3(p - hollow.from - along * (along.dot(p - hollow.from) / length2));
-  };
-  const Vec3 c = radial(rim.centre), u = radial(hollow.from + rim.u), v = radial(hollow.from + rim.v);
-  const double r = rim.radius;
-  // The squared distance from the axis is |c + r (u cos α + v sin α)|².
-  const auto value = [&](const Vec3& p) { return radial(p).squaredNorm(); };
-  const auto slopes = [&](double angle) {
-    const double cos = std::cos(angle), sin = std::sin(angle);
-    const Vec3 x = c + r * (cos * u + sin * v), d = r * (cos * v - sin * u), dd = -r * (cos * u + sin * v);
-    return std::pair(2.0 * x.dot(d), 2.0 * (d.squaredNorm() + x.dot(dd)));
-  };
-  return highest_on_rim(rim, value, slopes, out);
+// The squared distance from the axis a is |P c|² + 2 r (c_u, c_v)ᵀz + r² − r² ((a_u, a_v)ᵀz)², with P across the axis
+// and z the place on the rim in u and v: half of it, over r, is circle.hpp's f with the y axis along (a_u, a_v).
+int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, const Vec2& /*level*/,
+                   std::array<Vec3, 4>& out) noexcept {
+  const Vec3 a = (hollow.to - hollow.from).normalized(), c = rim.centre - hollow.from, across = c - a * a.dot(c);
+  const Vec2 tilt(a.dot(rim.u), a.dot(rim.v));
+  const double sine = tilt.norm();
+  const Vec2 y = sine > 0.0 ? Vec2(tilt / sine) : Vec2(Vec2::UnitY()), x(y.y(), -y.x());
+  const Vec2 b(across.dot(rim.u), across.dot(rim.v));
+  std::array<Vec2, 2> places;
+  const int count = highest_on_circle({x.dot(b), y.dot(b)}, rim.radius * sine * sine, places);
+  for (int k = 0; k < count; ++k) {
+    const Vec2 z = places[static_cast<std::size_t>(k)].x() * x + places[static_cast<std::size_t>(k)].y() * y;
+    out[static_cast<std::size_t>(k)] = rim.centre + rim.radius * (z.x() * rim.u + z.y() * rim.v);
+  }
+  return count;
 }
 
 std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,

@@ -15,6 +15,7 @@
 #include <optional>
 #include <span>
 
+#include "models/rigid_shapes/circle.hpp"
 #include "models/rigid_shapes/solid.hpp"
 
 namespace proxarm::models {
@@ -46,10 +47,16 @@ Touch touch(const FlatSide& side, const Vec3& p, double radius) noexcept;
 Touch touch(const HollowSphere& hollow, const Vec3& p, double radius) noexcept;
 Touch touch(const HollowTube& hollow, const Vec3& p, double radius) noexcept;
 
-// The points of a rim that come nearest: one, or two where a rim lies askew in a tube. Returns their number.
-int nearest_of_rim(const FlatSide& side, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept;
-int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept;
-int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, std::array<Vec3, 4>& out) noexcept;
+// The points of a rim that come nearest, the nearest first. Returns their number: one; two where a rim lies askew in a
+// tube; four where it is nearly level, because all of it comes near then. `level` is the first one's place in u and v,
+// unit, where the rim is level to within rounding and has no lowest point. A tube counts as endless here.
+int nearest_of_rim(const FlatSide& side, const Solid::Rim& rim, const Vec2& level, std::array<Vec3, 4>& out) noexcept;
+int nearest_of_rim(const HollowSphere& hollow, const Solid::Rim& rim, const Vec2& level,
+                   std::array<Vec3, 4>& out) noexcept;
+int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, const Vec2& level,
+                   std::array<Vec3, 4>& out) noexcept;
+// Where the rim's lowest point over a side lies, in u and v, unit; zero where it is level to within rounding.
+Vec2 lowest_of_rim(const FlatSide& side, const Solid::Rim& rim) noexcept;
 
 // A segment, with the faces beside it if it is sharp.
 struct EdgeLine {

@@ -225,6 +225,9 @@ TEST(RigidWorld, RefusesCylindersBesideWhatTheyAreNotHeldBy) {
   can.shape = solid_of(CylinderTool{1.0, 1.0}, Pose::Identity());
   EXPECT_THROW(RigidWorld(one(CylinderTool{0.1, 0.1}), {box}), std::invalid_argument);
   EXPECT_THROW(RigidWorld(one(SphereTool{0.1}), {can}), std::invalid_argument);
+  RigidObject capsule;
+  capsule.shape = HollowTube{};
+  EXPECT_THROW(RigidWorld(one(CylinderTool{0.1, 0.1}), {capsule}), std::invalid_argument);
   EXPECT_THROW(RigidWorld(one(SphereTool{0.1}), {floor_with(-1.0)}), std::invalid_argument);
 }
 
