@@ -28,27 +28,51 @@ Pose at(const Vec3& place, const Vec3& axis) {
   return X;
 }
 
-// The shape of an object that why_not_beside() lets through.
-struct ShapeOf {
-  decltype(RigidObject::shape) operator()(const PlaneShape& s) const {
-    const Vec3 n = s.normal.normalized();
-    return FlatSide{n, n.dot(s.point_m)};
+using Shapes = std::vector<decltype(RigidObject::shape)>;
+
+// A tool inside of something stands before sides. A cylinder's and a box's are flat.
+FlatSide side(const Vec3& normal, const Vec3& through) { return {normal, normal.dot(through)}; }
+
+// What an object that why_not_beside() lets through is made of.
+struct ShapesOf {
+  Shapes operator()(const PlaneShape& s) const { return {side(s.normal.normalized(), s.point_m)}; }
+  Shapes operator()(const SphereShape& s) const {
+    if (s.inside_out) return {models::HollowSphere{s.centre_m, s.radius_m}};
+    return {models::solid_of(models::SphereTool{s.radius_m}, at(s.centre_m, Vec3::UnitZ()))};
   }
-  decltype(RigidObject::shape) operator()(const SphereShape& s) const {
-    return models::solid_of(models::SphereTool{s.radius_m}, at(s.centre_m, Vec3::UnitZ()));
-  }
-  decltype(RigidObject::shape) operator()(const CapsuleShape& s) const {
+  Shapes operator()(const CapsuleShape& s) const {
+    if (s.inside_out) return {models::HollowTube{s.from_m, s.to_m, s.radius_m, false}};
     const Vec3 along = s.to_m - s.from_m;
-    return models::solid_of(models::CapsuleTool{along.norm(), s.radius_m}, at(0.5 * (s.from_m + s.to_m), along));
+    return {models::solid_of(models::CapsuleTool{along.norm(), s.radius_m}, at(0.5 * (s.from_m + s.to_m), along))};
   }
-  decltype(RigidObject::shape) operator()(const BoxShape& s) const {
-    return models::solid_of(models::BoxTool{s.size_m}, s.pose_W);
+  Shapes operator()(const BoxShape& s) const {
+    if (!s.inside_out) return {models::solid_of(models::BoxTool{s.size_m}, s.pose_W)};
+    Shapes sides;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 axis = s.pose_W.linear().col(k), half = 0.5 * s.size_m[k] * axis;
+      sides.emplace_back(side(axis, s.pose_W.translation() - half));
+      sides.emplace_back(side(-axis, s.pose_W.translation() + half));
+    }
+    return sides;
   }
-  template <class Other>
-  decltype(RigidObject::shape) operator()(const Other& /*shape*/) const {
-    throw std::invalid_argument("an object that a rigid tool doesn't touch");
+  // From inside: the tube as if it had no end, and both ends.
+  Shapes operator()(const CylinderShape& s) const {
+    const Vec3 axis = (s.to_m - s.from_m).normalized();
+    return {models::HollowTube{s.from_m, s.to_m, s.radius_m, true}, side(axis, s.from_m), side(-axis, s.to_m)};
+  }
+  Shapes operator()(const MeshShape& /*shape*/) const {
+    throw std::invalid_argument("a mesh as an object that a rigid tool touches");
   }
 };
+
+bool is_inside_out(const Shape& shape) {
+  return std::visit(
+      [](const auto& s) {
+        if constexpr (requires { s.inside_out; }) return s.inside_out;
+        return false;
+      },
+      shape);
+}
 
 // What no test holds yet is refused. Empty: nothing stands against it.
 std::string why_not_beside(const Object& object, const models::Tool& tool) {
@@ -58,19 +82,19 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
   if (!object.friction_regions.empty()) {
     return "a rigid tool feels one friction for all of an object, and " + name + " has regions";
   }
-  const bool hollow = std::visit(
-      [](const auto& s) {
-        if constexpr (requires { s.inside_out; }) return s.inside_out;
-        return false;
-      },
-      object.shape);
-  if (hollow) return "a rigid tool isn't held inside of objects yet, and " + name + " is inside out";
   if (std::holds_alternative<MeshShape>(object.shape)) return "a rigid tool isn't held by meshes yet: " + name;
-  if (std::holds_alternative<CylinderShape>(object.shape)) {
-    return "contact of a rigid tool with a cylinder isn't built: take a capsule or a box for " + name;
+  const bool inside_out = is_inside_out(object.shape);
+  if (std::holds_alternative<CylinderShape>(object.shape) && !inside_out) {
+    return "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a box for " + name;
   }
-  if (has_cylinder(tool.parts))
-    return "a cylinder as a tool isn't held yet: take a convex tool or a capsule beside " + name;
+  if (!has_cylinder(tool.parts) || std::holds_alternative<PlaneShape>(object.shape)) return {};
+  if (!inside_out) {
+    return "a cylinder as a tool is held by planes and inside of objects: take a convex tool or a capsule beside " +
+           name;
+  }
+  if (std::holds_alternative<CapsuleShape>(object.shape)) {
+    return "a cylinder as a tool isn't held by the round ends of a hollow capsule: take a cylinder for " + name;
+  }
   return {};
 }
 
@@ -97,11 +121,13 @@ std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const m
   if (const std::optional<Refusal> no = why_not(scene, tool)) throw refusal(scene, no->line, no->why, "");
   std::vector<RigidObject> objects;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    RigidObject part;
-    part.shape = std::visit(ShapeOf{}, scene.objects[i].shape);
-    part.friction = scene.objects[i].friction;
-    part.object = static_cast<std::int32_t>(i);
-    objects.push_back(std::move(part));
+    for (auto& shape : std::visit(ShapesOf{}, scene.objects[i].shape)) {
+      RigidObject part;
+      part.shape = std::move(shape);
+      part.friction = scene.objects[i].friction;
+      part.object = static_cast<std::int32_t>(i);
+      objects.push_back(std::move(part));
+    }
   }
   try {
     auto world = std::make_unique<models::RigidWorld>(tool, std::move(objects));

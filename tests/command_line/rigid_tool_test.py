@@ -31,6 +31,24 @@ def placed(row, point):
     return [a + b for a, b in zip(place, turned(q, point))]
 
 
+def furthest_of_circle(x, y, u, v, radius):
+    """How far a circle about (x, y), spanned by u and v, comes from the z axis: by Newton's method in the angle, from the
+    farthest of 16 places."""
+    def place(angle):
+        c, s = radius * math.cos(angle), radius * math.sin(angle)
+        return (x + c * u[0] + s * v[0], y + c * u[1] + s * v[1]), (c * v[0] - s * u[0], c * v[1] - s * u[1])
+
+    angle = max((k * math.pi / 8 for k in range(16)), key=lambda a: math.hypot(*place(a)[0]))
+    for _ in range(8):
+        (px, py), (dx, dy) = place(angle)
+        slope = px * dx + py * dy
+        bend = dx * dx + dy * dy - (px * (px - x) + py * (py - y))
+        if bend >= 0.0:
+            break
+        angle -= max(-0.1, min(0.1, slope / bend))
+    return math.hypot(*place(angle)[0])
+
+
 class RigidTool(ProgramTest):
     def session(self, scene, hand, *options, folder="session"):
         summary = self.summary("--scene", SCENES / scene, "--hand", HANDS / hand, "--inertia", "0.05", "--duration", "8s",
@@ -93,6 +111,23 @@ class RigidTool(ProgramTest):
         self.assertLess(max(ratios), 1e-9)
         outcome = self.call("replay", "session")
         self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
+
+    def test_a_peg_stays_in_its_bore(self):
+        summary, rows = self.session("peg_in_hole.yaml", "insert.yaml")
+        furthest = 0.0
+        for row in rows:
+            _, q = pose(row)
+            u, v = turned(q, (1, 0, 0)), turned(q, (0, 1, 0))
+            for z in (0.0, 0.04):
+                x, y, _ = placed(row, (0, 0, z))
+                furthest = max(furthest, furthest_of_circle(x - 0.69998, y, u, v, 0.00999325))
+        self.assertLessEqual(furthest, 0.01000525 + ROUNDING_M)
+        self.assertGreater(furthest, 0.01000525 - 1e-9)  # it has touched
+        heights = [pose(row)[0][2] for row in rows]
+        self.assertGreater(max(heights) - min(heights), 0.1)  # and gone in and out
+        self.assertGreater(sum(int(row["contacts"]) >= 2 for row in rows), 4000)  # at both ends
+        self.assertLessEqual(summary["unresolved_steps"], 8)
+        self.assertFalse(summary["oscillation"]["lasts"])
 
     def test_replays_to_the_bit(self):
         pin = self.written("pin.yaml", "capsule: {length_m: 0.02, radius_m: 0.01, position_m: [0.03, 0, 0]}\n")

@@ -71,6 +71,28 @@ TEST(CompileRigid, EveryShapeHoldsATool) {
               1e-12);
 }
 
+TEST(CompileRigid, EveryHollowShapeHoldsATool) {
+  const double up = 0.002;
+  const Vec3 below(0.0, 0.0, -0.1), above(0.0, 0.0, 0.1);
+  for (const Tool& tool : {box(0.02), cylinder()}) {
+    EXPECT_NEAR(end_of_way(BoxShape{Pose::Identity(), Vec3::Constant(0.2), true}, tool, 0.0, up), 0.09, 1e-12);
+    EXPECT_NEAR(end_of_way(CylinderShape{below, above, 0.05, true}, tool, 0.0, up), 0.09, 1e-12);
+  }
+  EXPECT_NEAR(end_of_way(SphereShape{Vec3::Zero(), 0.1, true}, box(0.02), 0.0, up), std::sqrt(0.0098) - 0.01, 1e-12);
+  EXPECT_NEAR(end_of_way(SphereShape{Vec3::Zero(), 0.1, true}, cylinder(), 0.0, up), std::sqrt(0.0099) - 0.01, 1e-12);
+  EXPECT_NEAR(end_of_way(CapsuleShape{below, above, 0.05, true}, sphere(0.01), 0.0, up), 0.14, 1e-12);
+}
+
+TEST(CompileRigid, TellsHowDeepAPegIsThatIsTooThickForItsHole) {
+  const Shape hole = CylinderShape{{0.0, 0.0, -0.1}, {0.0, 0.0, 0.1}, 0.01, true};
+  const auto peg = [](double radius_m) { return Tool{{{models::CylinderTool{0.02, radius_m}, Pose::Identity(), {}}}}; };
+  EXPECT_NEAR(compile_rigid(scene_of(hole), peg(0.00999))->clearance_m({}), 1e-5, 1e-15);
+  EXPECT_NEAR(compile_rigid(scene_of(hole), peg(0.0105))->clearance_m({}), -5e-4, 1e-15);
+  models::ToolPose outside;
+  outside.position.x() = 0.05;
+  EXPECT_NEAR(compile_rigid(scene_of(hole), peg(0.005))->clearance_m(outside), -0.045, 1e-15);
+}
+
 // The reason is in why_not(), with the line, and compile_rigid() throws it.
 void expect_refused(const Scene& scene, const Tool& tool, const std::string& word, int line) {
   const std::optional<Refusal> no = why_not(scene, tool);
@@ -113,13 +135,13 @@ TEST(CompileRigid, RefusesAnObjectWithTheReason) {
   scene = scene_of(PlaneShape{});
   scene.objects[0].friction_regions.emplace_back();
   expect_refused(scene, sphere(0.01), "regions", 7);
-  expect_refused(scene_of(CylinderShape{}), sphere(0.01), "with a cylinder", 7);
+  expect_refused(scene_of(CylinderShape{}), sphere(0.01), "outside of a cylinder", 7);
 }
 
 TEST(CompileRigid, RefusesAToolBesideAnObjectWithTheReason) {
   expect_refused(scene_of(pyramid()), sphere(0.01), "isn't held by meshes", 7);
-  expect_refused(scene_of(PlaneShape{}), cylinder(), "cylinder as a tool", 7);
-  expect_refused(scene_of(SphereShape{Vec3::Zero(), 1.0, true}), sphere(0.01), "inside out", 7);
+  expect_refused(scene_of(SphereShape{}), cylinder(), "held by planes and inside of objects", 7);
+  expect_refused(scene_of(CapsuleShape{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}, 0.05, true}), cylinder(), "round ends", 7);
 }
 
 TEST(CompileRigid, RefusesAToolWithoutASizeAlsoWhereNothingIsToTouch) {
