@@ -329,9 +329,9 @@ PYBIND11_MODULE(_proxarm, module) {
            "Before a step of a world that moves: the time that the step leads to, and how long it is.")
       .def("clearance_m", &World::clearance_m, py::arg("x"), "To the nearest object; below 0 inside of one.")
       .def_property_readonly("contacts", &World::contacts, "Of the last step: (object, feature, slips, normal).")
-      .def_property_readonly("name", &World::name)
+      .def_property_readonly("name", &World::name, "Of the scene.")
       .def_property_readonly("objects", &World::objects, "Their names; contacts have their indices.")
-      .def_property_readonly("dimensions", &World::dimensions);
+      .def_property_readonly("dimensions", &World::dimensions, "Of the space in which it is touched: 1, 2 or 3.");
   module.def(
       "_bare", [](double, py::handle, py::handle) {}, "What a call costs that does nothing.");
 

@@ -5,6 +5,7 @@ import json
 import math
 import os
 import pathlib
+import pydoc
 import re
 import subprocess
 import sys
@@ -23,6 +24,22 @@ os.environ["PROXARM_DATA"] = str(SOURCE)
 
 import numpy  # noqa: E402
 import proxarm  # noqa: E402
+
+
+class Help(unittest.TestCase):
+    def test_each_public_name_says_what_it_is(self):
+        told = pydoc.render_doc(proxarm, renderer=pydoc.plaintext)
+        for name in proxarm.__all__:
+            thing = getattr(proxarm, name)
+            self.assertTrue((thing.__doc__ or "").strip(), name)
+            self.assertIn(name, told)
+            if not isinstance(thing, type) or issubclass(thing, Exception):
+                continue
+            for member, value in vars(thing).items():
+                if member.startswith("_") and member not in ("__call__",):
+                    continue
+                if callable(value) or isinstance(value, property):
+                    self.assertTrue((getattr(thing, member).__doc__ or "").strip(), f"{name}.{member}")
 
 
 class World(unittest.TestCase):

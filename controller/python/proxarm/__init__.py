@@ -293,16 +293,21 @@ class Live:
         return self.ask("\t".join(f"{name}={value}" for name, value in {**(changes or {}), **more}.items()))
 
     def hold(self):
+        """Holds the arm, drives enabled."""
         return self.ask("hold")
 
     def resume(self):
+        """Goes on after a hold."""
         return self.ask("resume")
 
     def release(self):
+        """Lets somebody free who is pinned: the arm yields to the hand, slowly."""
         return self.ask("release")
 
     def back_off(self, distance="20mm"):
+        """Moves the arm away from what it presses on."""
         return self.ask(f"back-off {distance}")
 
     def reset(self):
+        """Enables the drives again after a fault, into a hold."""
         return self.ask("reset")
