@@ -27,6 +27,9 @@ constexpr double kRoughShare = 1e-5;
 constexpr double kNear_m = 1e-9;
 // And the last step turns normals by no more than 1e-10 of a clearance of ten micrometres.
 constexpr double kStill_m = 1e-15;
+// A tool that rests among more contacts than hold it may have a solution at one pose and, for rounding, none at the
+// next. After a step below this the first one is taken: normals are right to 1e-8 then.
+constexpr double kRest_m = 1e-13;
 // From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
 // may swing to and fro.
 constexpr double kLeastShare = 0.125;
@@ -206,15 +209,17 @@ void RigidWorld::keep_forces() noexcept {
 // From a pose on, until nothing moves.
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach);
-  double last = std::numeric_limits<double>::infinity(), share = 1.0;
+  double last = std::numeric_limits<double>::infinity(), share = 1.0, rest = kRest_m;
+  ToolPose resting;
+  collected_ = false;
   for (int k = 0; k < 50; ++k) {
-    if (--budget_ < 0 || problem_.exhausted()) return false;
+    if (--budget_ < 0 || problem_.exhausted()) break;
     find(q);
     Twist delta;
-    const bool roughly = shared_->bends && last > kNear_m;
+    const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
     const bool solved = solve_linear(q, p_hat, q_old, rough, delta);
-    if (!delta.allFinite()) return false;
+    if (!delta.allFinite() || (!solved && collected_)) break;
     const double size = delta.head<3>().norm() + shared_->reach * delta.tail<3>().norm();
     if (linear_count_ == 0) {
       const bool there = q == p_hat;
@@ -231,10 +236,19 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     // those of normals before it.
     const bool whole = share == 1.0 && !roughly && (!shared_->bends || size <= kStill_m);
     const bool small = k > 0 && size < 0.1 * last && size / last * size <= 0.1 * rounding;
-    if (whole && (size <= rounding || small)) return solved;
+    if (whole && (size <= rounding || small)) {
+      collected_ = false;
+      return solved;
+    }
+    if (shared_->bends && solved && !roughly && size < rest) {
+      rest = size;
+      resting = q;
+      collect_contacts();
+    }
     last = size;
   }
-  return false;
+  if (collected_) q = resting;
+  return collected_;
 }
 
 bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept {
@@ -319,7 +333,9 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   return q_;
 }
 
-void RigidWorld::report(const ToolPose& q_old) noexcept {
+void RigidWorld::collect_contacts() noexcept {
+  count_ = 0;
+  collected_ = true;
   for (std::size_t k = 0; k < linear_count_; ++k) {
     const Found& found = found_[of_linear_[k]];
     const Pair& pair = pairs_[found.pair];
@@ -335,6 +351,10 @@ void RigidWorld::report(const ToolPose& q_old) noexcept {
     contact.gap_m = found.touch.gap;
     contact.friction = friction(pair);
   }
+}
+
+void RigidWorld::report(const ToolPose& q_old) noexcept {
+  if (!collected_) collect_contacts();
   if (count_ == 0) return;
   // What sticks stays, bit for bit.
   const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * (q_old.position.lpNorm<1>() + shared_->reach);

@@ -146,6 +146,7 @@ class RigidWorld final : public PoseAlgorithm {
                     Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
+  void collect_contacts() noexcept;
   void report(const ToolPose& q_old) noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
 
@@ -177,6 +178,7 @@ class RigidWorld final : public PoseAlgorithm {
 
   std::array<PoseContact, ContactProblem::most> contacts_;
   std::size_t count_ = 0;
+  bool collected_ = false;  // of a pose before the last one that was tried
   bool unresolved_ = false, overflow_ = false;
   bool without_friction_ = false;  // in the present attempt
 };
