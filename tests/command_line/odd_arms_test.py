@@ -52,16 +52,35 @@ class OddArms(ProgramTest):
                 if not touches:
                     self.folder.joinpath("out/hand.yaml").unlink()
 
-    def test_other_starts_are_tried_where_the_best_one_isnt_steady(self):
-        # Behind the world's origin: of the poses that are ahead of it the best is near full stretch.
-        kind, _, axis = SIX[0]
-        told = self.assert_steady(arm([(kind, "-3 0 0.3", axis), *SIX[1:]]))
-        self.assertIn("from a start that looked better it wasn't fine: no mass", told)
+    def test_an_arm_starts_alike_wherever_its_base_stands(self):
+        # Starts were judged from the world's origin: 3 m behind it the best one was near full stretch.
+        kind, origin, axis = SIX[0]
+        z = origin.split()[2]
+        starts = []
+        for place in (f"0 0 {z}", f"-3 0 {z}", f"2 -4 {z}"):
+            made = self.made(arm([(kind, place, axis), *SIX[1:]]))
+            self.assertEqual((made.status, made.err), (0, ""))
+            starts += [line for line in (self.folder / "out/cell.yaml").read_text().splitlines() if "start_rad:" in line]
+        self.assertEqual(len(starts), 3)
+        self.assertEqual(len(set(starts)), 1, starts)
+
+    def test_instructions_for_other_programs_are_passed_over(self):
+        # Behind a comment, or within the robot: well-formed, and refused as no XML.
+        text = arm(FOUR)
+        begun = text.index("<robot")
+        end = text.index(">", begun) + 1
+        text = ("<!-- made <?by?> hand -->\n<?xml-stylesheet type='text/css' href='arm.css'?>\n" + text[begun:end] +
+                "<?editor\nfold <link?>" + text[end:])
+        made = self.made(text)
+        self.assertEqual((made.status, made.err), (0, ""))
+        broken = self.made(text.replace("</robot>", "", 1))
+        self.assert_refused(broken, "arm.urdf", "not XML")
 
     def test_drives_that_are_too_weak_are_told_of(self):
         # Efforts that bear the light wrist's weight, and no hand. A slower filter isn't stable: that isn't the reason.
         made = self.made(arm(SIX).replace('effort="0"', 'effort="1"'))
-        self.assert_refused(made, "default_mass_kg", "is stopped by", "effort")
+        self.assert_refused(made, "arm.urdf: default_mass_kg", "is stopped by", "effort",
+                            "the cell that was tried is " + str(self.folder / "out/unfinished-cell.yaml"))
 
     def test_what_no_arm_is_is_refused_with_the_reason(self):
         for name, text, *told in (
@@ -70,6 +89,7 @@ class OddArms(ProgramTest):
                 ("a thousand tons", arm(SIX, inertial={2: body(1e6, 1e5)}), "arm.urdf", "at most 1e+06 Nm", "kg"),
                 ("one that turns", arm([TURN_Z]), "1 axis", "along a curve"),
                 ("two that cross", arm([TURN_Z, TURN_Y]).replace(*LONG_TOOL), "2 axes", "curved surface"),
+                ("five centimetres", arm(scaled(SIX, 0.05)), "arm.urdf: ", "reaches 0.", "room for a hand's motion"),
                 ("six joints in one place", arm([("revolute", "0 0 0", axis) for _, _, axis in SIX]), "arm.urdf", "22 mm"),
                 ("three on one axis", arm([TURN_Z] * 3), "arm.urdf", "22 mm"),
                 ("nothing that moves", '<robot name="f"><link name="a"/><link name="b"/><joint name="j" type="fixed">'
@@ -78,7 +98,7 @@ class OddArms(ProgramTest):
             with self.subTest(name):
                 made = self.made(text)
                 self.assert_refused(made, *told)
-                self.assertNotRegex(made.err, "unfinished-cell.yaml:[0-9]", "a line that nobody wrote")
+                self.assertNotRegex(made.err, "unfinished-cell.yaml:", "a file that nobody wrote")
 
 
 if __name__ == "__main__":

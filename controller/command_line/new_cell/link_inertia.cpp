@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
 
 namespace proxarm::command_line {
 namespace {
@@ -13,6 +14,11 @@ using tinyxml2::XMLElement;
 
 // Of an arm, times its reach cubed: a collaborative arm of a metre has 20 to 30, an industrial one of 2.5 m 70.
 constexpr double usual_kg_per_m3 = 40.0;
+// What an axis that turns gives at most, over the weight of the arm beyond it when stretched: 1.4 to 2 where makers say
+// both. More than an arm can lift it doesn't weigh; but efforts are often placeholders, and less than a third of what
+// is usual no arm of this reach weighs.
+constexpr double effort_over_weight = 1.4, least_of_usual = 1.0 / 3.0;
+constexpr double gravity_m_per_s2 = 9.80665;
 constexpr double least_reach_m = 0.1;  // of an arm that only slides, or whose joints are in one place
 // Less is a placeholder: a gram, and a gram's moment at 3 mm.
 constexpr double least_mass_kg = 1e-3, least_moment_kg_m2 = 1e-8;
@@ -71,6 +77,35 @@ struct MovingLink {
   Vec3 to_next = Vec3::Zero();
 };
 
+// The effort of the strongest joint that turns; 0 where none is said.
+double strongest_Nm(const UrdfTree::Path& path) {
+  double most = 0.0;
+  for (const UrdfTreeJoint* joint : path) {
+    const XMLElement* const limit = joint->element->FirstChildElement("limit");
+    const char* const type = joint->element->Attribute("type");
+    if (limit == nullptr || type == nullptr || std::string_view(type) == "prismatic") continue;
+    const double effort = limit->DoubleAttribute("effort");
+    if (std::isfinite(effort)) most = std::max(most, effort);
+  }
+  return most;
+}
+
+// Of an arm whose links have these shares of its mass, by its reach and by what its joints give: stretched from the
+// first one, with d_k from there to the middle of link k, its weight is g m Σ share_k d_k.
+double estimated_mass_kg(const UrdfTree::Path& path, const std::vector<MovingLink>& moving,
+                         const std::vector<double>& share, double shares, double reach_m) {
+  const double usual_kg = usual_kg_per_m3 * std::pow(reach_m, 3);
+  double lever_m = 0.0, from_m = 0.0;
+  for (std::size_t k = 0; k < moving.size(); ++k) {
+    const double length_m = moving[k].to_next.norm();
+    lever_m += share[k] / shares * (from_m + 0.5 * length_m);
+    from_m += length_m;
+  }
+  const double strongest = strongest_Nm(path);
+  if (!(strongest > 0.0) || !(lever_m > 0.0)) return usual_kg;
+  return std::clamp(strongest / effort_over_weight / (gravity_m_per_s2 * lever_m), least_of_usual * usual_kg, usual_kg);
+}
+
 }  // namespace
 
 void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<double> said_kg,
@@ -85,7 +120,6 @@ void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<
     if (joint->moves()) moving.push_back({tree.links().at(joint->child)});
   }
   reach_m = std::max(reach_m, least_reach_m);
-  const double arm_kg = said_kg.value_or(usual_kg_per_m3 * std::pow(reach_m, 3));
   std::vector<double> share;
   double shares = 0.0;
   for (const MovingLink& link : moving) {
@@ -93,6 +127,7 @@ void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<
     share.push_back((link.to_next.norm() + 0.1 * reach_m) * outwards);
     shares += share.back();
   }
+  const double arm_kg = said_kg ? *said_kg : estimated_mass_kg(path, moving, share, shares, reach_m);
   std::string estimated;
   for (std::size_t k = 0; k < moving.size(); ++k) {
     XMLElement* const link = moving[k].element;
@@ -112,7 +147,8 @@ void estimate_inertia(UrdfTree& tree, const UrdfTree::Path& path, std::optional<
   char total[64];
   std::snprintf(total, sizeof total, "%.3g kg", arm_kg);
   remarks.push_back("ESTIMATED inertia of links for which the file has none that a body can have: " + estimated +
-                    "; rods, of an arm of " + total + (said_kg ? "" : " by its reach (--arm-mass says better)"));
+                    "; rods, of an arm of " + total +
+                    (said_kg ? "" : " by its reach and what its joints can lift (--arm-mass says better)"));
 }
 
 }  // namespace proxarm::command_line

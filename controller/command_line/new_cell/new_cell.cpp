@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <iterator>
+#include <utility>
 
 #include "controller/command_line/new_cell/arm_source.hpp"
 #include "controller/command_line/new_cell/cell_text.hpp"
@@ -18,6 +20,7 @@
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
+#include "models/base/text.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
 
@@ -29,6 +32,8 @@ using description::SetupError;
 
 // The wall is this far in front of the start, as the hand of the default cell expects it.
 constexpr double wall_ahead_m = 0.2;
+// Below it, a tenth of the hand's way is a tenth of all that the tool can reach.
+constexpr double small_reach_m = 0.25;
 // Of the mass above the least that was steady: what is tried are two hands, and gears that are estimates.
 constexpr double margin = 1.25;
 
@@ -67,10 +72,11 @@ class NewCell {
   }
 
   int make() {
-    aim_sensor();
-    save();
-    size_drives(cell_, source_.joints, options_.arm);
-    choose();
+    try {
+      make_cell();
+    } catch (const SetupError& error) {
+      throw in_terms_of_the_arm(error);
+    }
     fs::rename(file_, folder_ / "cell.yaml");
     run_.cell = file_ = folder_ / "cell.yaml";
     for (const std::string& line : surprises(prepare(run_))) source_.remarks.push_back(line);
@@ -79,6 +85,25 @@ class NewCell {
   }
 
  private:
+  void make_cell() {
+    aim_sensor();
+    save();
+    size_drives(cell_, source_.joints, options_.arm);
+    choose();
+  }
+
+  // The user wrote the arm's file, not the cell that was tried: what is wrong with that is said of the arm.
+  [[nodiscard]] SetupError in_terms_of_the_arm(const SetupError& error) const {
+    description::SetupProblem problem = error.problem();
+    const fs::path mine[] = {file_, folder_ / "arm.urdf", fs::absolute(file_), fs::absolute(folder_ / "arm.urdf")};
+    if (std::find(std::begin(mine), std::end(mine), fs::path(problem.file)) == std::end(mine)) return error;
+    problem.file = options_.arm.string();
+    problem.line = problem.column = 0;
+    if (!problem.advice.empty()) problem.advice += "; ";
+    problem.advice += "the cell that was tried is " + file_.string();
+    return SetupError(std::move(problem));
+  }
+
   void copy_sensor() {
     fs::path file = options_.sensor;
     std::error_code ignored;
@@ -173,18 +198,24 @@ class NewCell {
         return require_runnable(prepare(run_), run_);
       } catch (const SetupError& error) {
         if (!first) first = error;
-        if (start.way == 0.0) refuse_without_way();
+        if (start.way == 0.0) refuse_without_way(arm);
       }
     }
     throw SetupError(*first);
   }
 
-  [[noreturn]] void refuse_without_way() const {
+  [[noreturn]] void refuse_without_way(const models::Arm& arm) const {
+    const double reach_m = arm.path_curvature().maxCoeff();  // 1 of an arm with a joint that slides
+    const bool small = reach_m > 0.0 && reach_m < small_reach_m;
+    const std::string which =
+        small ? "that reaches " + description::rounded_text(reach_m) + " m with its handle, and " : "";
     throw SetupError(
         {.file = options_.arm.string(),
-         .found = "an arm whose tool can't go straight for 22 mm, a tenth of the hand's way, from any pose",
-         .expected = "joints that move it ahead and to the side",
-         .advice = "do joints coincide, are their ranges too narrow, are lengths in another unit than m?"});
+         .found =
+             "an arm " + which + "whose tool can't go straight for 22 mm, a tenth of the hand's way, from any pose",
+         .expected = small ? "an arm that has room for a hand's motion" : "joints that move it ahead and to the side",
+         .advice = small ? "are its lengths in m?"
+                         : "do joints coincide, are their ranges too narrow, are lengths in another unit than m?"});
   }
 
   void begin_at(const StartPose& start, const models::Arm& arm, const models::ToolSpace& space,

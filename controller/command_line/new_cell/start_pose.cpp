@@ -53,21 +53,31 @@ double smallest_singular_value(const models::InverseKinematics& inverse, const m
   return result.smallest_singular_value_m_per_rad;
 }
 
+// What the tool's place is judged from: the first joint. Heights are from the floor, where z of W is 0, as arms stand
+// on it, hang above it or are bolted to a pedestal; of one that is further from it than it reaches, from the joint,
+// too.
+Vec3 judged_from(const models::ArmPoints& points_W, double reach_m) {
+  Vec3 from = points_W.joint_W[0];
+  if (std::abs(from.z()) <= reach_m) from.z() = 0.0;
+  return from;
+}
+
 // Each part is between 0 and its weight.
 double score(const models::Arm& arm, const models::InverseKinematics& inverse, const JointVector& q, double reach_m) {
   const models::Pose X_WT = arm.tool_pose(q);
-  const Vec3 p = X_WT.translation(), z = X_WT.linear().col(2);
+  models::ArmPoints points_W;
+  arm.points(q, points_W);
+  const Vec3 from = judged_from(points_W, reach_m);
+  const Vec3 p = X_WT.translation() - from, z = X_WT.linear().col(2);
   const double singular = std::min(smallest_singular_value(inverse, arm, q) / (0.25 * reach_m), 1.0);
   const double free = std::min(room(arm, q) / 0.4, 1.0);
   const double points = std::max({z.x(), -z.z(), 0.0});
   const double ahead = std::clamp(p.x() / (0.5 * reach_m), -1.0, 1.0) - std::min(std::abs(p.y()) / reach_m, 1.0);
   const double low = 0.2 * reach_m, high = 0.8 * reach_m;
   const double off = std::max({low - p.z(), p.z() - high, 0.0}) / reach_m;
-  models::ArmPoints points_W;
-  arm.points(q, points_W);
   double below = 0.0;
   for (int i = 1; i < arm.axes(); ++i) {
-    below = std::max(below, -points_W.joint_W[static_cast<std::size_t>(i)].z() / reach_m);
+    below = std::max(below, (from.z() - points_W.joint_W[static_cast<std::size_t>(i)].z()) / reach_m);
   }
   return 2.0 * singular + free + points + ahead - 4.0 * off - 4.0 * below;
 }

@@ -60,13 +60,38 @@ Vec3 vector_of(const XMLElement* element, const Vec3& otherwise) {
   return in >> x >> y >> z ? Vec3(x, y, z) : otherwise;
 }
 
+// With blanks in the place of processing instructions, so that lines stay what they are: tinyxml2 takes them at the
+// very beginning only, XML takes them anywhere, and they say nothing of an arm.
+std::string without_instructions(std::string xml) {
+  const auto end_of = [&](std::size_t from, const char* mark) {
+    const std::size_t found = xml.find(mark, from);
+    return found == std::string::npos ? xml.size() : found + std::strlen(mark);
+  };
+  for (std::size_t at = xml.find('<'); at < xml.size(); at = xml.find('<', at)) {
+    if (xml.compare(at, 4, "<!--") == 0) {
+      at = end_of(at + 4, "-->");
+    } else if (xml.compare(at, 9, "<![CDATA[") == 0) {
+      at = end_of(at, "]]>");
+    } else if (xml.compare(at, 2, "<?") == 0) {
+      const std::size_t end = end_of(at, "?>");
+      std::replace_if(
+          xml.begin() + static_cast<std::ptrdiff_t>(at), xml.begin() + static_cast<std::ptrdiff_t>(end),
+          [](char c) { return c != '\n'; }, ' ');
+      at = end;
+    } else {
+      ++at;
+    }
+  }
+  return xml;
+}
+
 }  // namespace
 
 Vec3 UrdfTreeJoint::origin() const { return vector_of(element->FirstChildElement("origin"), Vec3::Zero()); }
 Vec3 UrdfTreeJoint::axis() const { return vector_of(element->FirstChildElement("axis"), Vec3::UnitX()); }
 
 UrdfTree::UrdfTree(const std::filesystem::path& file, const std::string& xml) : file_(file) {
-  if (document_.Parse(xml.c_str(), xml.size()) != tinyxml2::XML_SUCCESS) {
+  if (document_.Parse(without_instructions(xml).c_str()) != tinyxml2::XML_SUCCESS) {
     throw SetupError({.file = file.string(), .line = document_.ErrorLineNum(), .message = "not XML"});
   }
   robot_ = document_.RootElement();
