@@ -167,6 +167,8 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record.force_W_N = triple(measured.hand_W.force);
   record.torque_W_Nm = triple(measured.hand_W.torque);
   record.proxy_W_m = triple(motion_->proxy_W());
+  const Eigen::Quaterniond R_WT = motion_->proxy_R_WT();
+  record.proxy_q_W = {R_WT.x(), R_WT.y(), R_WT.z(), R_WT.w()};
   record.tool_W_m = triple(measured.tool_W);
   bus_.write_record(record);
 }

@@ -54,6 +54,8 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
   state_.link_step_rad = state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
   start_guards(arm.start_rad());
+  arm.kinematics(arm.start_rad(), solution_.kinematics);
+  R_TS_ = solution_.kinematics.X_WT.linear().transpose() * solution_.kinematics.X_WS.linear();
   if (settings.looks_ahead) sent_.emplace(limits, settings.horizon_s, settings.period_s);
   if (supervision.let_go != description::LetGo::coast) {
     const bool turns = settings.orientation == OrientationMode::free;
@@ -205,11 +207,18 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   cycle.record.set(RecordFlag::limit_orientation, turning_limited);
   follow_proxy(cycle);
   count_work(step);
-  const double distance_m = (measured.tool_W - state_.q_k1_W).norm();
+  const double distance_m = std::max((measured.tool_W - state_.q_k1_W).norm(), turned_away_m(measured));
   if (!(distance_m <= limits_.leash_m + leash_tolerance_m)) {
     cycle.alarm.raise(Fault::leash_exceeded, -1, distance_m, limits_.leash_m);
   }
   return true;
+}
+
+// How far the end of a handle is from where the proxy would have it, by what the arm lags in turning.
+double AdmittanceMotion::turned_away_m(const Measured& measured) const noexcept {
+  if (!parts_.orientation.config().free) return 0.0;
+  const Eigen::Quaterniond R_WT(models::Mat3(measured.R_WS * R_TS_.transpose()));
+  return torque_lever_m * R_WT.angularDistance(parts_.orientation.R_WT());
 }
 
 // A rigid tool has turned in its world's step.
@@ -408,8 +417,6 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   models::Pose X_WT = models::Pose::Identity();
   X_WT.translation() = sent_W();
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
-  const Eigen::Quaterniond& R_WT = parts_.orientation.R_WT();
-  cycle.record.proxy_q_W = {R_WT.x(), R_WT.y(), R_WT.z(), R_WT.w()};
   if (parts_.orientation.config().free) cycle.record.proxy_inertia_kg_m2 = parts_.orientation.config().inertia_kg_m2;
   const Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
   const models::Mat3 reached_k1_rotation = solution_.kinematics.X_WT.linear();

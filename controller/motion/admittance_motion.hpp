@@ -65,6 +65,9 @@ class AdmittanceMotion final : public Motion {
     return supervision_.let_go == description::LetGo::hold && empty_handle_ && empty_handle_->empty();
   }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
+  [[nodiscard]] Eigen::Quaterniond proxy_R_WT() const noexcept override {
+    return parts_.pose != nullptr ? parts_.pose->orientation() : parts_.orientation.R_WT();
+  }
   [[nodiscard]] const MotionWork* work() const noexcept override { return &work_; }
 
   void archive(fieldbus::StateArchive& state) noexcept override;
@@ -97,6 +100,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
   // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
+  [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
   void turn_on_from(const models::Mat3& reached_k1) noexcept;
   void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
@@ -123,6 +127,7 @@ class AdmittanceMotion final : public Motion {
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
   double period_s_;
+  models::Mat3 R_TS_;                           // of the sensor in the tool
   std::optional<PassivityObserver> passivity_;  // nullopt: not wanted
   std::optional<EmptyHandle> empty_handle_;     // nullopt: the proxy coasts
   ReversedForce reversed_;

@@ -90,6 +90,7 @@ class Motion {
   // Nobody holds the handle, and the cell asks for a hold in this case.
   [[nodiscard]] virtual bool wants_hold() const noexcept { return false; }
   [[nodiscard]] virtual const models::Vec3& proxy_W() const noexcept = 0;
+  [[nodiscard]] virtual Eigen::Quaterniond proxy_R_WT() const noexcept { return Eigen::Quaterniond::Identity(); }
   // The limits that were active in this cycle.
   [[nodiscard]] const ActiveLimits& active() const noexcept { return active_; }
   // Null: nothing is counted.

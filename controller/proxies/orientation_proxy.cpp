@@ -124,12 +124,14 @@ ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
   if (too_fast) omega *= fastest / omega.norm();
   Eigen::Quaterniond R = (rotation(T * omega) * R_WT_).normalized();
 
-  // With R = exp([φ]ₓ) R_start, ‖φ‖ ≤ max_angle. A step that leaves this set is projected onto its border (the nearest
-  // orientation with the same axis), and the velocity is that of the actual rotation.
+  // With R = exp([φ]ₓ) R_start, ‖φ‖ ≤ the reachable angle. A step that leaves this set is projected onto its border
+  // (the nearest orientation with the same axis), and the velocity is that of the actual rotation.
   const Vec3 phi = rotation_vector(R * R_start_.conjugate());
-  const bool too_far = phi.norm() > config_.max_angle_rad;
+  const double before_rad = rotation_vector(R_WT_ * R_start_.conjugate()).norm();
+  const double reachable_rad = reachable_angle_rad(before_rad, config_.max_angle_rad, T);
+  const bool too_far = phi.norm() > reachable_rad;
   if (too_far) {
-    R = (rotation(config_.max_angle_rad / phi.norm() * phi) * R_start_).normalized();
+    R = (rotation(reachable_rad / phi.norm() * phi) * R_start_).normalized();
     omega = rotation_vector(R * R_WT_.conjugate()) / T;
   }
   R_WT_ = R;

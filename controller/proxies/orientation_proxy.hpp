@@ -13,8 +13,10 @@
 // beside the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
 // pose_proxy.hpp.)
 //
-// Two limits, neither of which depends on T: the speed, and the angle from the orientation at the first start. They are
-// sets onto which the motion is projected. The projected motion becomes the history, so nothing winds up.
+// Two limits: the speed, and the angle from the orientation at the first start. They are sets onto which the motion is
+// projected. The projected motion becomes the history, so nothing winds up. The set of angles is reached as a brake
+// reaches a wall, in `braking_s`, since joints can't stop at once; whoever is beyond it (an arm that couldn't brake,
+// and took the proxy along) is led back at `reference_rad_per_s`, not within a step.
 //
 // The spring's R_ref is the orientation at the first start, but for a while after the spring has become stiffer and
 // after a hold: then it is where the spring's torque is what it was (zero after a hold), and returns at
@@ -24,6 +26,7 @@
 // is for the cycle: it neither allocates, locks, throws nor prints.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "controller/proxies/proxy_step.hpp"
@@ -77,6 +80,13 @@ class OrientationProxy {
   void archive(fieldbus::StateArchive& state) noexcept {
     state(R_WT_, R_start_, R_ref_, omega_W_, speed_share_, started_, config_.inertia_kg_m2, config_.behind_sensor_T,
           config_.damping_Nms_per_rad, config_.spring_Nm_per_rad);
+  }
+
+  // How far from the start the next step may lead, from `angle_rad` away.
+  [[nodiscard]] static double reachable_angle_rad(double angle_rad, double max_angle_rad, double period_s) noexcept {
+    const double left = max_angle_rad - angle_rad;
+    if (left >= 0.0) return angle_rad + std::min(1.0, period_s / braking_s) * left;
+    return std::max(max_angle_rad, angle_rad - reference_rad_per_s * period_s);
   }
 
   static constexpr double reference_rad_per_s = 0.1;  // of R_ref on its way back

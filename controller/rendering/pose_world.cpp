@@ -99,8 +99,11 @@ void PoseWorld::limit_rotation(ToolPose& p_hat) noexcept {
     turning_limited_ = true;
   }
   const Vec3 angle = models::rotation_vector(p_hat.orientation * home_.orientation.conjugate());
-  if (angle.norm() <= config_.max_turn_rad) return;
-  p_hat.orientation = (models::rotation_by(shortened(angle, config_.max_turn_rad)) * home_.orientation).normalized();
+  const double before_rad = models::rotation_vector(q.orientation * home_.orientation.conjugate()).norm();
+  const double reachable_rad =
+      OrientationProxy::reachable_angle_rad(before_rad, config_.max_turn_rad, proxy_.config().period_s);
+  if (angle.norm() <= reachable_rad) return;
+  p_hat.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
   turning_limited_ = true;
 }
 

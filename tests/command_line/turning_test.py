@@ -132,6 +132,35 @@ class Turning(ProgramTest):
         self.assertEqual(outcome.status, 0, outcome.err + outcome.out)
         self.assertIn("the same to the bit", outcome.out)
 
+    def test_a_hand_that_turns_beyond_the_limit_is_held_there_and_gets_back(self):
+        """The proxy brakes before max_turn_rad (0.7 here), so no joint is asked to stop at once: neither does the arm pass
+        it by more than what its gears give, nor does it lose its proxy, nor stay where the hand doesn't want it."""
+        for axis in range(3):
+            turn = [1.2 if axis == i else 0.0 for i in range(3)]
+            hand = self.written("far.yaml", "\n".join([
+                "mass_kg: 1", "stiffness_N_per_m: 500", "damping_Ns_per_m: 20", "inertia_kg_m2: 0.003",
+                "turning_stiffness_Nm_per_rad: 10", "turning_damping_Nms_per_rad: 0.5", "waypoints:",
+                "  - {time_s: 0.2, turn_rad: [0, 0, 0]}", f"  - {{time_s: 1.2, turn_rad: {turn}}}",
+                "  - {time_s: 2.2, turn_rad: [0, 0, 0]}"]) + "\n")
+            self.summary(*FREE, "--hand", hand, "--inertia", "0.05", "--duration", "4s", "--record", "far")
+            rows = self.rows("far")
+            start = [float(rows[0][f"proxy_W_q{part}"]) for part in "xyzw"]
+
+            def turned(row, of, since):
+                return math.hypot(*rotation_vector([float(row[f"{of}_W_q{part}"]) for part in "xyzw"], since))
+            far = [turned(row, "true_tool", start) for row in rows]
+            self.assertGreater(max(far), 0.65)
+            # 0.01 rad: the twist of the gears, and a cycle at 2 rad/s, several times.
+            self.assertLess(max(far), 0.71)
+            self.assertLess(far[-1], 0.02)
+            # The delay of setpoints, 25 ms at 2 rad/s.
+            lag = max(turned(row, "tool", [float(row[f"proxy_W_q{part}"]) for part in "xyzw"]) for row in rows)
+            self.assertLess(lag, 0.06)
+            with open(self.folder / "far/signals.csv", newline="") as file:
+                ends = [row for row in csv.DictReader(file) if row["phase"] in ("stopping", "disabling", "done")]
+            for row in ends:  # what is recorded after the last step of the proxy is where it stopped
+                self.assertLess(turned(row, "proxy", [float(rows[-1][f"proxy_W_q{part}"]) for part in "xyzw"]), 0.02)
+
     def test_limits_of_turning(self):
         text = (SOURCE / "models/cells/default.yaml").read_text()
         text = text.replace("../../", f"{SOURCE}/").replace("../", f"{SOURCE}/models/")

@@ -95,6 +95,23 @@ TEST(OrientationProxy, StaysUnitAndWithinItsLimitsUnderAnyTorque) {
   }
 }
 
+// An arm that couldn't stop takes its proxy along beyond the limit. From there nothing leads further out, and nothing
+// leads back faster than the joints can follow.
+TEST(OrientationProxy, FromBeyondItsLimitItIsLedBackSlowly) {
+  OrientationProxy proxy({.free = true, .max_angle_rad = 0.5, .period_s = 1e-3});
+  ASSERT_TRUE(proxy.start(Quaterniond::Identity()));
+  const Quaterniond beyond(Eigen::AngleAxisd(0.6, Vec3::UnitX()));
+  ASSERT_TRUE(proxy.resume(beyond, Vec3(2.0, 0.0, 0.0)));
+  for (int k = 0; k < 2000; ++k) {
+    const Quaterniond before = proxy.R_WT();
+    ASSERT_EQ(proxy.step(Vec3(5.0, 0.0, 0.0)), ProxyFault::none);
+    const double angle = angle_between(Quaterniond::Identity(), proxy.R_WT());
+    ASSERT_LE(angle, std::max(0.5, angle_between(Quaterniond::Identity(), before)) + 1e-12);
+    ASSERT_LE(angle_between(before, proxy.R_WT()), OrientationProxy::reference_rad_per_s * 1e-3 + 1e-12);
+  }
+  EXPECT_NEAR(angle_between(Quaterniond::Identity(), proxy.R_WT()), 0.5, 1e-12);
+}
+
 TEST(OrientationProxy, RefusesWhatIsNoNumberAndKeepsItsState) {
   OrientationProxy proxy({.free = true});
   ASSERT_TRUE(proxy.start(tilted));
