@@ -189,6 +189,13 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const
     if (!solved) budget_ -= kHard;
   }
   keep_forces();
+  // What is reported is where the contact goes with this solution, not where it was linearised.
+  for (std::size_t k = 0; k < linear_count_; ++k) {
+    Touch& touch = found_[of_linear_[k]].touch;
+    const Vec3 lever = touch.point - pose.position;
+    touch.gap = approach(found_[of_linear_[k]], delta);
+    touch.point += delta.head<3>() + delta.tail<3>().cross(lever);
+  }
   return solved;
 }
 
