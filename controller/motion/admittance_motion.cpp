@@ -28,6 +28,13 @@ Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
   return Eigen::Quaterniond(X_WT.linear()).normalized();
 }
 
+// Who can't follow a motion, and is what the motion goes on from, gives it no energy: joints that turn the tool faster
+// than its proxy for a moment would make it swing by itself.
+Vec3 no_faster(const Vec3& omega_W, const Vec3& before_W) noexcept {
+  const double speed = omega_W.norm(), most = before_W.norm();
+  return speed > most ? Vec3(most / speed * omega_W) : omega_W;
+}
+
 Damping damping_by(Passivity passivity) noexcept {
   if (passivity == Passivity::on) return Damping::at_once;
   return passivity == Passivity::automatic ? Damping::what_lasts : Damping::never;
@@ -440,7 +447,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
 void AdmittanceMotion::turn_on_from(const models::Mat3& reached_k1) noexcept {
   const Eigen::Quaterniond reached = orientation_of(solution_.kinematics.X_WT);
   const Eigen::AngleAxisd turn(reached * Eigen::Quaterniond(reached_k1).conjugate());
-  const Vec3 omega_W = turn.angle() / period_s_ * turn.axis();
+  const Vec3 omega_W = no_faster(turn.angle() / period_s_ * turn.axis(), parts_.orientation.velocity_W());
   parts_.orientation.resume(reached, omega_W);
   if (pose() != nullptr) pose()->turn_to(reached, omega_W);
 }
@@ -561,7 +568,7 @@ void AdmittanceMotion::wind_back(std::uint8_t blocked) noexcept {
   state_.link_step_rad = period_s_ * speed;
   arm_.kinematics(state_.link_rad, solution_.kinematics);
   const Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
-  const Vec3 omega_W = solution_.kinematics.J_W.bottomRows<3>() * speed;
+  const Vec3 omega_W = no_faster(solution_.kinematics.J_W.bottomRows<3>() * speed, parts_.orientation.velocity_W());
   const Eigen::Quaterniond R_WT = orientation_of(solution_.kinematics.X_WT);
   parts_.orientation.resume(R_WT, omega_W);
   if (pose() != nullptr) pose()->turn_to(R_WT, omega_W);

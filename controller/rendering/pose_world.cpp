@@ -18,6 +18,9 @@ using models::Vec3;
 constexpr double reference_m_per_s = 0.05, reference_rad_per_s = OrientationProxy::reference_rad_per_s;
 // A tool that starts in touch with something is outside to rounding: some metres in double precision.
 constexpr double rounding_m = 1e-12;
+// After a hold in contact the arm stands some micrometres inside of what the tool touches, by the twist of its gears;
+// so much is led out of it.
+constexpr double settled_m = 1e-3, settled_rad = 0.01;
 
 Vec3 shortened(const Vec3& v, double most) noexcept {
   const double length = v.norm();
@@ -41,14 +44,24 @@ void PoseWorld::turn_to(const Eigen::Quaterniond& R_WT, const Vec3& omega_W) noe
 }
 
 void PoseWorld::start(const Vec3& q_W) noexcept {
-  const ToolPose q{q_W, R_WT_};
+  const ToolPose wanted{q_W, R_WT_};
+  const ToolPose q = started_ ? outside(wanted) : wanted;
   // After a hold the scene goes on from where it stopped.
   proxy_.start(q, started_ ? proxy_.time_s() : 0.0);
   if (!started_) home_ = q;
   started_ = true;
   no_room_ = g_->clearance_m(q) < -rounding_m;
   last_ = {};
-  last_.q_W = last_.p_hat_W = q_W;
+  last_.q_W = last_.p_hat_W = q.position;
+}
+
+// The pose next to a wanted one that is outside of everything, if there is one: on the way from the last one, which
+// was.
+ToolPose PoseWorld::outside(const ToolPose& wanted) noexcept {
+  if (g_->clearance_m(wanted) >= -rounding_m) return wanted;
+  const ToolPose reached = g_->step(proxy_.K(), wanted, proxy_.q());
+  const Twist off = models::difference(reached, wanted);
+  return off.head<3>().norm() <= settled_m && off.tail<3>().norm() <= settled_rad ? reached : wanted;
 }
 
 // One step of 𝒢 from the last pose goes as far towards the wanted one as the scene allows, and through nothing.

@@ -59,6 +59,7 @@ class PoseWorld final : public RenderedWorld {
   void archive(fieldbus::StateArchive& state) noexcept override;
 
  private:
+  [[nodiscard]] models::ToolPose outside(const models::ToolPose& wanted) noexcept;
   void limit_place(const StepLimits& limits, models::ToolPose& p_hat) noexcept;
   void limit_rotation(models::ToolPose& p_hat) noexcept;
   void return_reference() noexcept;
