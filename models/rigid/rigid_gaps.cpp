@@ -215,10 +215,12 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
 
 void RigidWorld::find(const ToolPose& pose) noexcept {
   found_count_ = 0;
+  looks_ -= static_cast<int>(pair_count_);
   const View at = view(pose);
   for (std::size_t i = 0; i < pair_count_; ++i) {
     if (pairs_[i].kind == Kind::rim_field) remember_lowest(pairs_[i], at);
     evaluate(pairs_[i], at, [&](const Touch& t, int which) {
+      if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far
       if (found_count_ == most_found) {
         overflow_ = true;
         return;

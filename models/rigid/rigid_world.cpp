@@ -33,7 +33,13 @@ constexpr double kRest_m = 1e-13;
 // From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
 // may swing to and fro.
 constexpr double kLeastShare = 0.125;
+// And at so many pairs of features, some 15 ns each: a step among hundreds of them took up to 50 ms.
+constexpr int kLooks = 60000;
 constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
+
+// More pairs of corners than a box has among twenty others: where most of them came near, a step would look at too
+// much.
+constexpr std::size_t kManyCorners = 1280;
 
 // The least extent of a solid; features on its far side are that far away.
 double thickness(const Solid& solid) {
@@ -50,20 +56,25 @@ double thickness(const Solid& solid) {
   return least;
 }
 
-Bounds bounds_of(const RigidObject& object) {
+Bounds bounds_of(const Solid& solid, double around) {
   Bounds bounds;
-  if (const Solid* solid = std::get_if<Solid>(&object.shape)) {
-    bounds.low = bounds.high = solid->points.front();
-    for (const Vec3& p : solid->points) {
-      bounds.low = bounds.low.cwiseMin(p);
-      bounds.high = bounds.high.cwiseMax(p);
-    }
-    bounds.low.array() -= solid->radius;
-    bounds.high.array() += solid->radius;
-  } else if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape)) {
-    bounds = (*mesh)->mesh().bounds();
+  if (solid.points.empty()) return bounds;
+  bounds.low = bounds.high = solid.points.front();
+  for (const Vec3& p : solid.points) {
+    bounds.low = bounds.low.cwiseMin(p);
+    bounds.high = bounds.high.cwiseMax(p);
   }
+  bounds.low.array() -= around;
+  bounds.high.array() += around;
   return bounds;
+}
+
+Bounds bounds_of(const RigidObject& object) {
+  if (const Solid* solid = std::get_if<Solid>(&object.shape)) return bounds_of(*solid, solid->radius);
+  if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape)) {
+    return (*mesh)->mesh().bounds();
+  }
+  return {};
 }
 
 }  // namespace
@@ -76,16 +87,20 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     if (part.friction && !(*part.friction >= 0.0 && std::isfinite(*part.friction))) {
       throw std::invalid_argument("a friction must be finite and not negative");
     }
+    if (solid.edges.size() > most_edges) throw std::invalid_argument("a hull of more than 2000 points");
     shared->thinness = std::min(shared->thinness, thickness(solid));
     shared->reach = std::max(shared->reach, solid.reach);
     shared->bends = shared->bends || !solid.rims.empty();
-    shared->parts.push_back({std::move(solid), part.friction});
+    const Bounds box = bounds_of(solid, 0.0);
+    shared->parts.push_back({std::move(solid), box, part.friction});
   }
   if (tool.parts.empty()) {
     Solid point;
     point.points = {Vec3::Zero()};
-    shared->parts.push_back({std::move(point), {}});
+    const Bounds box = bounds_of(point, 0.0);
+    shared->parts.push_back({std::move(point), box, {}});
   }
+  std::size_t corners = 0, own_corners = 0;
   for (RigidObject& object : objects) {
     if (!(object.friction >= 0.0 && std::isfinite(object.friction))) {
       throw std::invalid_argument("a friction must be finite and not negative");
@@ -107,9 +122,13 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
                      std::holds_alternative<HollowTube>(object.shape);
     shared->bends = shared->bends || shared->hollow;
     const Bounds bounds = bounds_of(object);
+    if (std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape)) shared->dense = true;
+    corners += std::holds_alternative<Solid>(object.shape) ? std::get_if<Solid>(&object.shape)->points.size() : 0;
     friction_.push_back(object.friction);
     shared->entries.push_back({std::move(object), bounds});
   }
+  for (const Part& part : shared->parts) own_corners += part.solid.points.size();
+  shared->dense = shared->dense || corners * own_corners > kManyCorners;
   held_.resize(shared->entries.size());
   shared_ = std::move(shared);
 }
@@ -155,25 +174,43 @@ void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolP
   out.f = force != nullptr ? Vec3(axes.transpose() * *force) : Vec3(Vec3::Zero());
 }
 
+// A pair's linearised gap after a twist.
+double RigidWorld::approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept {
+  const Vec3 lever = found.touch.point - pose.position;
+  return found.touch.gap + found.touch.normal.dot(xi.head<3>() + xi.tail<3>().cross(lever));
+}
+
+// A face that comes down on a fine mesh passes many of its vertices at once, and few of them will hold it: those that
+// it passes by most join first, four at a time.
+double RigidWorld::worst_passed(const Twist& xi, const ToolPose& pose) const noexcept {
+  std::array<double, 5> least;
+  least.fill(-1e-16);
+  for (std::size_t i = 0; i < found_count_; ++i) {
+    if (found_[i].working) continue;
+    double gap = approach(found_[i], pose, xi);
+    for (double& other : least) {
+      if (gap < other) std::swap(gap, other);
+    }
+  }
+  return least.back();
+}
+
 // Solves the local problem at a pose. Contacts that neither pressed last time nor are passed on the way to p̂ join when
 // a solution passes them.
 bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, double rough,
                               Twist& delta) noexcept {
   const Twist e = difference(pose, p_hat);
-  const auto approach = [&](const Found& found, const Twist& xi) {
-    const Vec3 lever = found.touch.point - pose.position;
-    return found.touch.gap + found.touch.normal.dot(xi.head<3>() + xi.tail<3>().cross(lever));
-  };
   const Twist e_coupled = couple(pose, e);
   linear_count_ = 0;
   bool solved = true;
   delta = -e;
-  for (int round = 0; round < 8; ++round) {
+  for (int round = 0; round < (shared_->dense ? 16 : 8); ++round) {
     bool grew = false;
+    const double worst = shared_->dense ? worst_passed(delta, pose) : -1e-16;
     for (std::size_t i = 0; i < found_count_; ++i) {
       Found& found = found_[i];
       if (found.working) continue;
-      const bool wanted = approach(found, delta) < -1e-16 || (round == 0 && pairs_[found.pair].pressed);
+      const bool wanted = approach(found, pose, delta) < worst || (round == 0 && pairs_[found.pair].pressed);
       if (!wanted) continue;
       if (linear_count_ == ContactProblem::most) {
         overflow_ = true;
@@ -193,7 +230,7 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const
   for (std::size_t k = 0; k < linear_count_; ++k) {
     Touch& touch = found_[of_linear_[k]].touch;
     const Vec3 lever = touch.point - pose.position;
-    touch.gap = approach(found_[of_linear_[k]], delta);
+    touch.gap = approach(found_[of_linear_[k]], pose, delta);
     touch.point += delta.head<3>() + delta.tail<3>().cross(lever);
   }
   return solved;
@@ -220,13 +257,13 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
   ToolPose resting;
   collected_ = false;
   for (int k = 0; k < 50; ++k) {
-    if (--budget_ < 0 || problem_.exhausted()) break;
+    if (--budget_ < 0 || looks_ < 0 || problem_.exhausted()) break;
     find(q);
     Twist delta;
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
     const bool solved = solve_linear(q, p_hat, q_old, rough, delta);
-    if (!delta.allFinite() || (!solved && collected_)) break;
+    if (!delta.allFinite() || (!solved && collected_) || overflow_) break;
     const double size = delta.head<3>().norm() + shared_->reach * delta.tail<3>().norm();
     if (linear_count_ == 0) {
       const bool there = q == p_hat;
@@ -262,8 +299,13 @@ bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, int part
   const Twist way = difference(p_hat, q_old);
   const double far = motion(p_hat, q_old);
   ToolPose reached = q_old;
+  overflow_ = false;
   set_sides(q_old, far / parts);
   for (int k = 1; k <= parts; ++k) {
+    if (crowded_) {  // what isn't known may be in the way
+      q = reached;
+      return false;
+    }
     const ToolPose p = k == parts ? p_hat : moved(q_old, way * (static_cast<double>(k) / parts));
     ToolPose next = reached;
     if (!settle(p, q_old, next)) {
@@ -297,7 +339,7 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
     return q_;
   }
   if (!(motion(q, gathered_at_) + 2.0 * far < gathered_reach_)) {
-    gather(q, 3.0 * far + std::max(8.0 * far, 0.01 * shared_->reach) + 1e-6);
+    gather_for(q, far);
   }
   clearance_ = -1.0;
   if (pair_count_ == 0) {
@@ -308,12 +350,14 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   }
   K_ = K;
   problem_.set_stiffness(K);
-  const double limit = std::min(kPart * shared_->thinness, gathered_reach_);
+  const double known = shared_->dense ? 0.25 * gathered_reach_ : gathered_reach_;
+  const double limit = std::min(kPart * shared_->thinness, known);
   const double wanted = std::max(std::ceil(far / limit), 1.0);
   const bool whole = wanted <= kMostParts;
   const int parts = whole ? static_cast<int>(wanted) : kMostParts;
   const ToolPose goal = whole ? p_hat : moved(q, difference(p_hat, q) * (kMostParts / wanted));
   budget_ = kBudget + 8 * parts;
+  looks_ = kLooks;
   const int work = shared_->hollow ? kWorkInside : kWork;
   problem_.allow(work + kWorkOfPart * parts);
   bool fine = in_parts(goal, q, parts, q_);
@@ -328,6 +372,7 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   const bool lawful = fine;
   if (!fine && !shared_->hollow) {
     budget_ = kBudget;
+    looks_ = kLooks / 2;
     problem_.allow(kWork);
     without_friction_ = true;
     const ToolPose reached = q_;

@@ -80,6 +80,7 @@ class RigidWorld final : public PoseAlgorithm {
   };
   struct Part {
     Solid solid;
+    Bounds box;  // of its points, in T
     std::optional<double> friction;
   };
   struct Entry {
@@ -98,6 +99,7 @@ class RigidWorld final : public PoseAlgorithm {
     double thinness = 0.0;  // the least thickness of the tool's parts
     bool hollow = false;    // a sphere or a tube
     bool bends = false;     // something is hollow, or the tool has rims: gaps' curvature counts
+    bool dense = false;     // there is a mesh, or there are many solids
   };
   // Of a closed mesh: 1 or −1, the side of its faces on which the tool is, known from the first time that it comes near
   // after a start. Of other objects: 0.
@@ -106,24 +108,29 @@ class RigidWorld final : public PoseAlgorithm {
     bool known = false;
   };
   static constexpr std::size_t most_pairs = 768;
-  static constexpr std::size_t most_found = 256;
+  static constexpr std::size_t most_found = 512;
+  static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
 
+  class NearFaces;
   // Where the tool is.
   struct View {
     Mat3 R;
     Vec3 x;
     [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + x; }
+    [[nodiscard]] Vec3 to_T(const Vec3& p) const noexcept { return R.transpose() * (p - x); }
   };
   [[nodiscard]] static View view(const ToolPose& pose) noexcept;
   [[nodiscard]] double motion(const ToolPose& a, const ToolPose& b) const noexcept;
 
   void forget() noexcept;
+  void gather_for(const ToolPose& q, double far) noexcept;
   void gather(const ToolPose& pose, double reach) noexcept;
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
   template <typename Add>
   void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
+  // False: there are more triangles than it looks at.
   template <typename Add>
-  void pairs_with(const Solid& own, const TriangleFeatures& other, const View& at, double reach,
+  bool pairs_with(const Part& part, const TriangleFeatures& other, double side, const View& at, double reach,
                   Add add) const noexcept;
   void set_sides(const ToolPose& from, double far) noexcept;
   [[nodiscard]] double side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept;
@@ -142,6 +149,8 @@ class RigidWorld final : public PoseAlgorithm {
   bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   Twist couple(const ToolPose& pose, const Twist& e) noexcept;
   void keep_forces() noexcept;
+  [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
+  [[nodiscard]] double worst_passed(const Twist& xi, const ToolPose& pose) const noexcept;
   bool solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, double rough,
                     Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
@@ -162,6 +171,7 @@ class RigidWorld final : public PoseAlgorithm {
   double gathered_reach_ = -1.0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
+  int looks_ = 0;         // pairs that it may still look at
   ToolPose clear_at_;
   double clearance_ = -1.0;
 
