@@ -30,8 +30,8 @@ Eigen::Quaterniond orientation_of(const models::Pose& X_WT) noexcept {
 
 // Who can't follow a motion, and is what the motion goes on from, gives it no energy: joints that turn the tool faster
 // than its proxy for a moment would make it swing by itself.
-Vec3 no_faster(const Vec3& omega_W, const Vec3& before_W) noexcept {
-  const double speed = omega_W.norm(), most = before_W.norm();
+Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
+  const double speed = omega_W.norm();
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
@@ -443,11 +443,17 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   move_motors(parts_.elastic.step(state_.link_rad), cycle.measured);
 }
 
+// How fast the tool turns on where the arm couldn't follow: as fast as the proxy did, or, where that was slow, up to a
+// quarter of the limit, since joints can't stop at once either.
+double AdmittanceMotion::most_turning_rad_per_s() const noexcept {
+  return std::max(parts_.orientation.velocity_W().norm(), 0.25 * limits_.max_turning_speed_rad_per_s);
+}
+
 // The tool turns on from the orientation that the arm has reached.
 void AdmittanceMotion::turn_on_from(const models::Mat3& reached_k1) noexcept {
   const Eigen::Quaterniond reached = orientation_of(solution_.kinematics.X_WT);
   const Eigen::AngleAxisd turn(reached * Eigen::Quaterniond(reached_k1).conjugate());
-  const Vec3 omega_W = no_faster(turn.angle() / period_s_ * turn.axis(), parts_.orientation.velocity_W());
+  const Vec3 omega_W = no_faster(turn.angle() / period_s_ * turn.axis(), most_turning_rad_per_s());
   parts_.orientation.resume(reached, omega_W);
   if (pose() != nullptr) pose()->turn_to(reached, omega_W);
 }
@@ -568,7 +574,7 @@ void AdmittanceMotion::wind_back(std::uint8_t blocked) noexcept {
   state_.link_step_rad = period_s_ * speed;
   arm_.kinematics(state_.link_rad, solution_.kinematics);
   const Vec3 velocity_W = solution_.kinematics.J_W.topRows<3>() * speed;
-  const Vec3 omega_W = no_faster(solution_.kinematics.J_W.bottomRows<3>() * speed, parts_.orientation.velocity_W());
+  const Vec3 omega_W = no_faster(solution_.kinematics.J_W.bottomRows<3>() * speed, most_turning_rad_per_s());
   const Eigen::Quaterniond R_WT = orientation_of(solution_.kinematics.X_WT);
   parts_.orientation.resume(R_WT, omega_W);
   if (pose() != nullptr) pose()->turn_to(R_WT, omega_W);

@@ -100,6 +100,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
   // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
+  [[nodiscard]] double most_turning_rad_per_s() const noexcept;
   [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
   void turn_on_from(const models::Mat3& reached_k1) noexcept;
   void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
