@@ -34,7 +34,7 @@ const std::vector<std::string> six_axes{"j1", "j2", "j3", "j4", "j5", "j6"};
 CycleRecord some_record(std::uint64_t k) {
   CycleRecord r;
   r.cycle = k;
-  r.time_ns = static_cast<std::int64_t>(k) * 1'000'000;
+  r.time_ns = static_cast<std::int64_t>(k * 1'000'000);  // of any k: it wraps
   r.phase = Phase::rendering;
   r.contact = ContactPhase::stick;
   r.axes = 6;
