@@ -170,16 +170,11 @@ Pushed inside_of(const Hollow& hollow, const Shaped& tool, std::uint64_t seed, i
   for (int k = 0; k < steps; ++k) {
     if (k % 25 == 0) way << random.log_arrow(1e-7, most[0]), random.log_arrow(1e-6, most[1]);
     const ToolPose p = moved(q, way), r = g.step(K, p, q);
-    out.deepest = std::min(out.deepest, apart(r));
-    ++out.judged;
-    if (g.unresolved()) {
-      ++out.unresolved;
-    } else if (!g.contacts().empty()) {
-      ++out.touching;
+    out.take(g, apart(r), [&] {
       LawFigures law = judge_law(g.contacts(), K, p, q, r, {mu});
       law.imbalance = imbalance(g.contacts(), K, p, r);
-      out.law.take(law);
-    }
+      return law;
+    });
     q = r;
   }
   return out;

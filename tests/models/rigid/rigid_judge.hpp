@@ -104,6 +104,19 @@ struct Pushed {
   int judged = 0, touching = 0, unresolved = 0;
   double deepest = 0.0;
   LawFigures law;
+
+  // A step, by how far the tool is from everything after it, and what judge() says of the law where it touches.
+  template <typename Judge>
+  void take(const PoseAlgorithm& g, double apart_m, Judge judge) {
+    deepest = std::min(deepest, apart_m);
+    ++judged;
+    if (g.unresolved()) {
+      ++unresolved;
+    } else if (!g.contacts().empty()) {
+      ++touching;
+      law.take(judge());
+    }
+  }
 };
 
 // Sends a tool about from a pose by up to 2 mm and 0.02 rad a step, towards `middle` or away from it, as a hand would.
@@ -122,14 +135,7 @@ void push_about(PoseAlgorithm& g, Random& random, ToolPose q, const Mat6& K, con
     }
     const ToolPose p = moved(q, way);
     const ToolPose r = g.step(K, p, q);
-    out.deepest = std::min(out.deepest, apart(r));
-    ++out.judged;
-    if (g.unresolved()) {
-      ++out.unresolved;
-    } else if (!g.contacts().empty()) {
-      ++out.touching;
-      out.law.take(judge_law(g.contacts(), K, p, q, r, mu));
-    }
+    out.take(g, apart(r), [&] { return judge_law(g.contacts(), K, p, q, r, mu); });
     q = r;
   }
 }
