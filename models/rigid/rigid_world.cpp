@@ -338,9 +338,7 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
     q_ = p_hat;
     return q_;
   }
-  if (!(motion(q, gathered_at_) + 2.0 * far < gathered_reach_)) {
-    gather_for(q, far);
-  }
+  if (crowded_ || !(motion(q, gathered_at_) + 2.0 * far < gathered_reach_)) gather_for(q, far);
   clearance_ = -1.0;
   if (pair_count_ == 0) {
     clear_at_ = gathered_at_;

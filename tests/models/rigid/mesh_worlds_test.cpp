@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <numbers>
 
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "tests/models/mesh/mesh_shapes.hpp"
+#include "tests/models/rigid/held_tool.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
 
 namespace proxarm::models {
@@ -96,6 +99,36 @@ TEST(RigidWorldsOfMeshes, ATouchedSideIsForgottenWhereTheToolBeginsAnew) {
     }
     EXPECT_NEAR(q.position.z(), inside ? top - 0.01 : top + 0.01, 1e-12) << (inside ? "inside" : "outside");
   }
+}
+
+// A step of 0.2 mm among triangles of a millimetre found more features than there is room for, and was unresolved;
+// the steps after it were so small that nothing was gathered anew, and the tool stood still for good.
+TEST(RigidWorldsOfMeshes, AfterAStepAmongTooManyFeaturesAToolGoesOn) {
+  RigidObject object;
+  object.shape = std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(tests::ball(5, 0.04)));
+  object.friction = 0.3;
+  ConvexTool pebble;
+  for (int i = 0; i < 200; ++i) {  // a spiral on a ball of 1 cm
+    const double z = 1.0 - (2.0 * i + 1.0) / 200.0, r = std::sqrt(1.0 - z * z),
+                 angle = 2.0 * std::numbers::pi * i / std::numbers::phi;
+    pebble.points_m.emplace_back(0.01 * r * std::cos(angle), 0.01 * r * std::sin(angle), 0.01 * z);
+  }
+  RigidWorld g({{{pebble, Pose::Identity(), {}}}}, {object});
+  ToolPose q;
+  q.position.x() = 0.052;
+  HeldTool held = realistic(q);
+  RoamingHand hand{.next_place = [](Random& random, const ToolPose& now) {
+    const Vec3 out = (now.position.normalized() + random.in_box(0.2)).normalized();
+    return Vec3((0.04 + random.uniform(-0.03, 0.02)) * out);
+  }};
+  Random random(4);
+  int unresolved = 0;
+  for (int k = 0; k < 1100; ++k) {
+    const ToolPose p = held.freely(hand.wrench(random, held, k));
+    held.arrive(g.step(held.K, p, held.q));
+    unresolved += g.unresolved() ? 1 : 0;
+  }
+  EXPECT_LT(unresolved, 10);
 }
 
 }  // namespace
