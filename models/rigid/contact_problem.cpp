@@ -195,31 +195,36 @@ bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double to
 }
 
 // Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the
-// states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
+// states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips. Twice, with the
+// same factors: rays turn by what the first one mended.
 void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
-  for (int k = 0; k < 2; ++k) {
-    Mat6 G = Mat6::Zero();
-    Twist lack = y;
-    double size = 0.0;
-    for (const Row& row : rows) {
-      if (row.state == ContactState::open) continue;
-      lack.noalias() -= row.H.transpose() * row.f;
-      size += row.w;
-      if (row.state == ContactState::stick) {
-        G.noalias() += row.H.transpose() * row.H;
-      } else if (row.f[0] > 0.0) {
-        const Twist ray = row.H.transpose() * (row.f / row.f[0]);
-        G.noalias() += ray * ray.transpose();
-      }
+  const auto slips = [](const Row& row) { return row.state == ContactState::slip && row.f[0] > 0.0; };
+  Mat6 G = Mat6::Zero();
+  double size = 0.0;
+  for (const Row& row : rows) {
+    if (row.state == ContactState::open) continue;
+    size += row.w;
+    if (row.state == ContactState::stick) {
+      G.noalias() += row.H.transpose() * row.H;
+    } else if (slips(row)) {
+      const Twist ray = row.H.transpose() * (row.f / row.f[0]);
+      G.noalias() += ray * ray.transpose();
     }
-    if (!(size > 0.0)) return;
-    G.diagonal().array() += 1e-10 * size;
-    const Twist share = solved(G, lack);
+  }
+  if (!(size > 0.0)) return;
+  G.diagonal().array() += 1e-10 * size;
+  FactoredMatrix factors;
+  factors.factor(G);
+  for (int k = 0; k < 2; ++k) {
+    Twist lack = y;
+    for (const Row& row : rows) {
+      if (row.state != ContactState::open) lack.noalias() -= row.H.transpose() * row.f;
+    }
+    const Twist share = factors.solve(lack);
     for (Row& row : rows) {
-      if (row.state == ContactState::open) continue;
       if (row.state == ContactState::stick) {
         row.f += row.H * share;
-      } else if (row.f[0] > 0.0) {
+      } else if (slips(row)) {
         const Vec3 ray = row.f / row.f[0];
         row.f += ray * ray.dot(row.H * share);
       }
@@ -252,7 +257,12 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   const double size = make_rows(e, contacts);
   const Rows rows(rows_.data(), contacts.size());
   Twist y = L_.transpose() * e;
-  bool solved = newton(rows, y, size, 25);
+  const Twist start = y;
+  bool solved = rows.size() == 1 && may_look_at(rows) && one_contact(rows[0], y, size, std::max(rough, kTolerance));
+  if (!solved) {
+    y = start;
+    solved = newton(rows, y, size, 25);
+  }
   for (int attempt = 0; attempt < kAttempts && !solved && !exhausted(); ++attempt) {
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();

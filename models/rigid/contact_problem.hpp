@@ -6,6 +6,8 @@
 //
 // With K = L Lᵀ, y = Lᵀ(e + δ) and H = J L⁻ᵀ this is y = Σ Hᵀf, u = H y + b: six unknowns, however many contacts.
 //
+// A single contact has a way of its own (one_contact.cpp).
+//
 // Method: Alart and Curnier's projection ("A mixed formulation for frictional contact problems prone to Newton like
 // solution methods", 1991) writes the law as f = P(f − r u) for any r > 0, with P the projection on the cone's section.
 // Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
@@ -76,6 +78,7 @@ class ContactProblem {
     std::array<Vec3, most> f;
   };
 
+  static bool one_contact(Row& row, Twist& y, double size, double tolerance) noexcept;
   static bool newton_step(Rows rows, Twist& y) noexcept;
   bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
