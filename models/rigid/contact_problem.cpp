@@ -195,36 +195,31 @@ bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double to
 }
 
 // Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the
-// states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips. Twice, with the
-// same factors: rays turn by what the first one mended.
+// states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
 void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
-  const auto slips = [](const Row& row) { return row.state == ContactState::slip && row.f[0] > 0.0; };
-  Mat6 G = Mat6::Zero();
-  double size = 0.0;
-  for (const Row& row : rows) {
-    if (row.state == ContactState::open) continue;
-    size += row.w;
-    if (row.state == ContactState::stick) {
-      G.noalias() += row.H.transpose() * row.H;
-    } else if (slips(row)) {
-      const Twist ray = row.H.transpose() * (row.f / row.f[0]);
-      G.noalias() += ray * ray.transpose();
-    }
-  }
-  if (!(size > 0.0)) return;
-  G.diagonal().array() += 1e-10 * size;
-  FactoredMatrix factors;
-  factors.factor(G);
   for (int k = 0; k < 2; ++k) {
+    Mat6 G = Mat6::Zero();
     Twist lack = y;
+    double size = 0.0;
     for (const Row& row : rows) {
-      if (row.state != ContactState::open) lack.noalias() -= row.H.transpose() * row.f;
+      if (row.state == ContactState::open) continue;
+      lack.noalias() -= row.H.transpose() * row.f;
+      size += row.w;
+      if (row.state == ContactState::stick) {
+        G.noalias() += row.H.transpose() * row.H;
+      } else if (row.f[0] > 0.0) {
+        const Twist ray = row.H.transpose() * (row.f / row.f[0]);
+        G.noalias() += ray * ray.transpose();
+      }
     }
-    const Twist share = factors.solve(lack);
+    if (!(size > 0.0)) return;
+    G.diagonal().array() += 1e-10 * size;
+    const Twist share = solved(G, lack);
     for (Row& row : rows) {
+      if (row.state == ContactState::open) continue;
       if (row.state == ContactState::stick) {
         row.f += row.H * share;
-      } else if (slips(row)) {
+      } else if (row.f[0] > 0.0) {
         const Vec3 ray = row.f / row.f[0];
         row.f += ray * ray.dot(row.H * share);
       }
