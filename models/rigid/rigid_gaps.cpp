@@ -62,7 +62,7 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
     const double height = signed_start(pair, at);
     const bool near = pair.pressed && std::abs(height) < kFront_m;
     if (!is_mesh) {
-      pair.side = pair.pressed || height >= -2.0 * far - kFront_m ? 1.0F : 0.0F;
+      pair.side = height >= -2.0 * far - kFront_m ? 1.0F : 0.0F;
     } else if (!near) {
       pair.side = static_cast<float>(side_of_mesh(pair, at, height, far));
     }
@@ -232,12 +232,36 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
       found.working = false;
     });
   }
-  drop_deeper();
+  drop_deeper(at);
+}
+
+// Two sharp edges that cross far behind each other hold nothing where another feature of the two solids keeps them
+// apart, as where a corner lies on a side of a box, below its top: along that feature's normal all of one solid is
+// before all of the other, or next to it. Crossing edges at a depth g leave no more than g cos φ along a normal at an
+// angle φ to their own, so that half of g comes from another side only.
+bool RigidWorld::beside(const Found& deep, const View& at) const noexcept {
+  const Pair& pair = pairs_[deep.pair];
+  const Solid* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
+  const Solid& own = shared_->parts[pair.part].solid;
+  if (other == nullptr || own.radius + other->radius > 0.0) return false;
+  const double half = 0.5 * deep.touch.gap;
+  for (std::size_t j = 0; j < found_count_; ++j) {
+    const Pair& by = pairs_[found_[j].pair];
+    const Vec3& n = found_[j].touch.normal;
+    if (by.entry != pair.entry || by.part != pair.part || found_[j].touch.gap < half) continue;
+    if (n.dot(deep.touch.normal) > 0.5) continue;
+    const Vec3 n_T = at.R.transpose() * n;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const Vec3& p : own.points) low = std::min(low, n_T.dot(p));
+    for (const Vec3& p : other->points) high = std::max(high, n.dot(p));
+    if (low + n.dot(at.x) - high > half) return true;
+  }
+  return false;
 }
 
 // A point inside of a convex solid, or under a ridge of a mesh, is behind several faces: only the one that it is least
 // deep under holds it. The same for an object's point in a part of the tool.
-void RigidWorld::drop_deeper() noexcept {
+void RigidWorld::drop_deeper(const View& at) noexcept {
   const auto same_point = [&](const Pair& a, const Pair& b) {
     if (a.kind != b.kind || a.part != b.part || a.entry != b.entry) return false;
     return a.kind == Kind::point_face ? a.own == b.own : a.kind == Kind::face_point && a.other == b.other;
@@ -250,6 +274,10 @@ void RigidWorld::drop_deeper() noexcept {
   for (std::size_t i = 0; i < found_count_; ++i) {
     if (!(found_[i].touch.gap < -kGap_m)) continue;
     const Pair& pair = pairs_[found_[i].pair];
+    if (pair.kind == Kind::edges && beside(found_[i], at)) {
+      found_[i--] = found_[--found_count_];
+      continue;
+    }
     if (pair.kind != Kind::point_face && pair.kind != Kind::face_point) continue;
     const bool is_mesh =
         std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(shared_->entries[pair.entry].object.shape);

@@ -35,6 +35,10 @@ constexpr double kRest_m = 1e-13;
 constexpr double kLeastShare = 0.125;
 // And at so many pairs of features, some 15 ns each: a step among hundreds of them took up to 50 ms.
 constexpr int kLooks = 60000;
+// What the wrench may lack after the last step of the iteration: of 10 N, a third of 1e-10 N.
+constexpr double kBalance = 3e-12;
+// Rounding of the work of 1000 N over a millimetre is ten thousand times less.
+constexpr double kNothing_J = 1e-12;
 constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
 
 // More pairs of corners than a box has among twenty others: where most of them came near, a step would look at too
@@ -195,11 +199,10 @@ double RigidWorld::worst_passed(const Twist& xi, const ToolPose& pose) const noe
   return least.back();
 }
 
-// Solves the local problem at a pose. Contacts that neither pressed last time nor are passed on the way to p̂ join when
-// a solution passes them.
-bool RigidWorld::solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, double rough,
+// Solves the local problem at a pose that is by e off p̂. Contacts that neither pressed last time nor are passed on the
+// way to p̂ join when a solution passes them.
+bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough,
                               Twist& delta) noexcept {
-  const Twist e = difference(pose, p_hat);
   const Twist e_coupled = couple(pose, e);
   linear_count_ = 0;
   bool solved = true;
@@ -250,6 +253,32 @@ void RigidWorld::keep_forces() noexcept {
   }
 }
 
+// Whether the wrench is balanced after δ from a pose that is by e off p̂ as the local problem has it. Rotations aren't
+// vectors: log(exp δ exp e) = δ + e + δ × e/2 to second order.
+bool RigidWorld::stays_balanced(const Twist& delta, const Twist& e) const noexcept {
+  Twist bent = Twist::Zero();
+  bent.tail<3>() = 0.5 * Vec3(delta.tail<3>()).cross(Vec3(e.tail<3>()));
+  return (K_ * bent).squaredNorm() <= kBalance * kBalance * (K_ * (e + delta)).squaredNorm();
+}
+
+// The local problem is solved to 1e-10 of the free motion's press where contacts hold each other. What forces are then
+// out of their cones by is taken off, and the tool moves by what wrenches lack to balance: 1e-9 N is 1e-16 m on a
+// coupling of 10 N/µm. Where gaps bend, the coupling isn't K, and the law is met more closely.
+void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
+  if (shared_->bends) return;
+  const Twist wrench = K_ * (e + delta);
+  Twist lack = -wrench;
+  for (std::size_t k = 0; k < linear_count_; ++k) {
+    LinearContact& contact = linear_[k];
+    if (contact.state == ContactState::open) continue;
+    contact.f[0] = std::max(contact.f[0], 0.0);
+    const double size = contact.f.tail<2>().norm(), limit = contact.mu * contact.f[0];
+    if (size > limit) contact.f.tail<2>() *= limit / size;
+    lack.noalias() += contact.J.transpose() * contact.f;
+  }
+  if (lack.squaredNorm() > kBalance * kBalance * wrench.squaredNorm()) delta += problem_.yield_to(lack);
+}
+
 // From a pose on, until nothing moves.
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach);
@@ -262,15 +291,18 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     Twist delta;
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
-    const bool solved = solve_linear(q, p_hat, q_old, rough, delta);
+    const Twist e = difference(q, p_hat);
+    const bool solved = solve_linear(q, e, q_old, rough, delta);
     if (!delta.allFinite() || (!solved && collected_) || overflow_) break;
     const double size = delta.head<3>().norm() + shared_->reach * delta.tail<3>().norm();
     if (linear_count_ == 0) {
       const bool there = q == p_hat;
       q = p_hat;
       if (there) return true;
+      last = std::numeric_limits<double>::infinity();  // that wasn't a step of the iteration
       continue;
     }
+    if (solved) balance(e, delta);
     if (shared_->bends && k >= 3) {
       const bool shrinks = size < (1.0 - 0.4 * share) * last;
       share = shrinks ? std::min(2.0 * share, 1.0) : std::max(0.5 * share, kLeastShare);
@@ -279,7 +311,8 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
     // those of normals before it.
     const bool whole = share == 1.0 && !roughly && (!shared_->bends || size <= kStill_m);
-    const bool small = k > 0 && size < 0.1 * last && size / last * size <= 0.1 * rounding;
+    const bool small =
+        std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding && stays_balanced(delta, e);
     if (whole && (size <= rounding || small)) {
       collected_ = false;
       return solved;
@@ -356,13 +389,12 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   const ToolPose goal = whole ? p_hat : moved(q, difference(p_hat, q) * (kMostParts / wanted));
   budget_ = kBudget + 8 * parts;
   looks_ = kLooks;
-  const int work = shared_->hollow ? kWorkInside : kWork;
-  problem_.allow(work + kWorkOfPart * parts);
+  allow_for(parts);
   bool fine = in_parts(goal, q, parts, q_);
-  if (!fine && budget_ > 0) {
-    problem_.allow(work + kWorkOfPart * 8 * parts);
-    gather(q, gathered_reach_);
-    fine = in_parts(goal, q, 8 * parts, q_);
+  if (fine && gives_energy(q)) {
+    look_again(goal, q, parts);
+  } else if (!fine && budget_ > 0) {
+    fine = in_smaller_parts(goal, q, parts, q_);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
@@ -383,6 +415,59 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   return q_;
 }
 
+// What the local problems of so many parts may cost.
+void RigidWorld::allow_for(int parts) noexcept {
+  problem_.allow((shared_->hollow ? kWorkInside : kWork) + kWorkOfPart * parts);
+}
+
+bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept {
+  allow_for(8 * parts);
+  gather(q_old, gathered_reach_);
+  return in_parts(p_hat, q_old, 8 * parts, q);
+}
+
+// In smaller parts; if they lead nowhere, what was found stays.
+void RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, int parts) noexcept {
+  const ToolPose found = q_;
+  const std::array<PoseContact, ContactProblem::most> contacts = contacts_;
+  const std::size_t count = count_;
+  if (in_smaller_parts(p_hat, q_old, parts, q_)) return;
+  q_ = found;
+  contacts_ = contacts;
+  count_ = count;
+  collected_ = true;
+}
+
+// Whether the contacts' work since q(k−1) is above 0 by more than what is of second order in the step: the way of a
+// point that turns by θ at a lever bends by θ² lever/2, a normal turns by θ while the point goes on by s, and something
+// round falls off by s²/2r. That is so of solutions on another side than the one that the tool came to: of a face, say,
+// which it was below and beside.
+bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
+  if (!collected_) collect_contacts();
+  if (count_ == 0) return false;
+  const View now = view(q_), old = view(q_old);
+  double work = 0.0, bends = 0.0;
+  const double turned = rotation_vector(q_.orientation * q_old.orientation.conjugate()).norm();
+  for (std::size_t k = 0; k < count_; ++k) {
+    const PoseContact& contact = contacts_[k];
+    const double force = contact.force_W.norm();
+    if (force == 0.0) continue;
+    const Vec3 way = contact.point_W - old * now.to_T(contact.point_W);
+    const double s = way.norm(), lever = (contact.point_W - q_.position).norm();
+    work += contact.force_W.dot(way);
+    bends += force * (turned * (0.5 * turned * lever + s) + 0.5 * bend_[k] * s * s);
+  }
+  return work > bends + kNothing_J;
+}
+
+double RigidWorld::bend_per_m(const Pair& pair) const noexcept {
+  const Solid& own = shared_->parts[pair.part].solid;
+  const Solid* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
+  double bend = own.radius > 0.0 ? 1.0 / own.radius : 0.0;
+  if (other != nullptr && other->radius > 0.0) bend += 1.0 / other->radius;
+  return bend;
+}
+
 void RigidWorld::collect_contacts() noexcept {
   count_ = 0;
   collected_ = true;
@@ -400,6 +485,7 @@ void RigidWorld::collect_contacts() noexcept {
     contact.force_W = axes_[k] * linear_[k].f;
     contact.gap_m = found.touch.gap;
     contact.friction = friction(pair);
+    bend_[count_ - 1] = bend_per_m(pair);
   }
 }
 

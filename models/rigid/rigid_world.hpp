@@ -12,7 +12,8 @@
 //    method.
 // 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the
 //    way from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from
-//    q(k−1).
+//    q(k−1). A solution in which the contacts did work on the tool is on a side to which it didn't come: then the parts
+//    are made smaller.
 //
 // Objects stand still.
 //
@@ -141,7 +142,8 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] static Solid::Rim rim_at(const Solid::Rim& rim, const View& at) noexcept;
   void remember_lowest(Pair& pair, const View& at) const noexcept;
   void find(const ToolPose& pose) noexcept;
-  void drop_deeper() noexcept;
+  void drop_deeper(const View& at) noexcept;
+  [[nodiscard]] bool beside(const Found& deep, const View& at) const noexcept;
   [[nodiscard]] double friction(const Pair& pair) const noexcept;
   void linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
                  Mat3& frame) const noexcept;
@@ -151,10 +153,16 @@ class RigidWorld final : public PoseAlgorithm {
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
   [[nodiscard]] double worst_passed(const Twist& xi, const ToolPose& pose) const noexcept;
-  bool solve_linear(const ToolPose& pose, const ToolPose& p_hat, const ToolPose& q_old, double rough,
-                    Twist& delta) noexcept;
+  bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, Twist& delta) noexcept;
+  [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
+  void balance(const Twist& e, Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
+  void allow_for(int parts) noexcept;
+  bool in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
+  void look_again(const ToolPose& p_hat, const ToolPose& q_old, int parts) noexcept;
+  [[nodiscard]] bool gives_energy(const ToolPose& q_old) noexcept;
+  [[nodiscard]] double bend_per_m(const Pair& pair) const noexcept;
   void collect_contacts() noexcept;
   void report(const ToolPose& q_old) noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
@@ -187,6 +195,7 @@ class RigidWorld final : public PoseAlgorithm {
   std::size_t linear_count_ = 0;
 
   std::array<PoseContact, ContactProblem::most> contacts_;
+  std::array<double, ContactProblem::most> bend_;  // of each contact, 1/m: 1/radius where tool or object is round
   std::size_t count_ = 0;
   bool collected_ = false;  // of a pose before the last one that was tried
   bool unresolved_ = false, overflow_ = false;

@@ -54,6 +54,13 @@ struct Figures {
   double created_J = 0.0;
 };
 
+// By how much the coupling yields at a contact to a newton along a direction, m.
+double yields(const Mat6& K, const PoseContact& contact, const ToolPose& q, const Vec3& along) {
+  Twist wrench;
+  wrench << along, (contact.point_W - q.position).cross(along);
+  return wrench.dot(K.inverse() * wrench);
+}
+
 // What isn't a number is more than any.
 void raise(double& most, double value) { most = std::max(std::isnan(value) ? 1e300 : value, most); }
 
@@ -74,12 +81,18 @@ void judge(std::span<const PoseContact> contacts, const std::vector<double>& mu,
     raise(out.pull_N, -f_n * share);
     raise(out.cone_N, (f_t.norm() - limit) * share);
     if (std::abs(contact.gap_m) > 1e-12) raise(out.apart_N, f_n * share);
-    // A slip far below what the force presses the coupling by is next to sticking: its direction counts as much less.
-    const double s = slip.norm(), least = std::max(limit / K(0, 0), 1e-9);
-    if (s > 0.0) raise(out.against_slip_N, (f_t + limit / s * slip).norm() * share * std::min(1.0, s / least));
+    // A slip far below what the friction would move the contact by is next to sticking: its direction counts as much
+    // less.
+    const double s = slip.norm();
+    if (s > 0.0) {
+      const double least = std::max(limit * yields(K, contact, q, slip / s), 1e-9);
+      raise(out.against_slip_N, (f_t + limit / s * slip).norm() * share * std::min(1.0, s / least));
+    }
     out.slipping += contact.slips ? 1 : 0;
   }
-  const double off = (sum - wrench).norm() * share;
+  // A coordinate is rounded by half of its last place, which the coupling makes a force of.
+  const double rounding_m = 0.5 * std::numeric_limits<double>::epsilon() * q.position.norm();
+  const double off = std::max(0.0, (sum - wrench).norm() - K(0, 0) * rounding_m) * share;
   raise(out.imbalance_N, off);
   out.noisy += off > 1e-10 ? 1 : 0;
 }
@@ -87,16 +100,26 @@ void judge(std::span<const PoseContact> contacts, const std::vector<double>& mu,
 // What contacts may add to the tool's energy in a step. Friction takes from it, and a normal force does nothing along a
 // plane; what is left is of second order: the path of a point that turns by θ at a lever bends by θ² lever / 2, the
 // normal of a face or an edge turns with the tool by θ while the point goes on by s, and something round falls off by
-// s²/2r.
-double curvature_J(const Hunted& world, std::span<const PoseContact> contacts, const ToolPose& before,
-                   const ToolPose& q) {
+// s²/2r. And where a sharp edge or corner leaves one feature of an object for another, the normal turns by α at once:
+// it has a share of sin α in the way s. But to slide from a plane on to another one by at most s, p̂ must not be deeper
+// below that than s cot α: a force that presses deeper is none of a path over the edge.
+double curvature_J(const Hunted& world, std::span<const PoseContact> contacts, const std::vector<PoseContact>& earlier,
+                   const ToolPose& before, const ToolPose& q) {
   const double turned = difference(q, before).tail<3>().norm();
   double sum = 0.0;
   for (const PoseContact& contact : contacts) {
     const Vec3 lever = contact.point_W - q.position;
     const double s = (contact.point_W - before * (q.orientation.conjugate() * lever)).norm();
     const double bend = world.bend_per_m[static_cast<std::size_t>(contact.object)] + world.tool_bend_per_m;
-    sum += contact.force_W.norm() * (turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s);
+    const double force = contact.force_W.norm();
+    sum += force * (turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s);
+    double cosine = -1.0;
+    for (const PoseContact& was : earlier) {
+      if (was.object == contact.object) cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
+    }
+    const double sine = std::sqrt(1.0 - cosine * cosine);
+    if (cosine > 0.0 && sine / cosine * yields(world.held.K, contact, q, contact.normal_W) * force <= s)
+      sum += force * s * sine;
   }
   return sum;
 }
@@ -136,6 +159,7 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
     const Twist w = hand.wrench(random, held, middle, k);
     const ToolPose before = held.q, p = held.freely(w);
     const double energy = held.energy_J();
+    const std::vector<PoseContact> earlier(g.contacts().begin(), g.contacts().end());
     held.arrive(g.step(held.K, p, held.q));
     ++out.steps;
     const double apart = world.apart(held.q);
@@ -143,7 +167,8 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
     EXPECT_GE(apart, -1e-12) << "seed " << seed << ", step " << k;
     if (apart < -1e-12) return;
     const Twist way = difference(held.q, before);
-    const double created = held.energy_J() - energy - w.dot(way) - curvature_J(world, g.contacts(), before, held.q);
+    const double created =
+        held.energy_J() - energy - w.dot(way) - curvature_J(world, g.contacts(), earlier, before, held.q);
     if (created > 1e-12) {  // J; rounding of a joule is ten thousand times less
       ++out.rises;
       raise(out.created_J, created);
@@ -158,8 +183,8 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
   }
 }
 
-// `most_unresolved` is a share of all steps; `most_rises` is so many steps of 10,000.
-void hunt(const char* name, std::uint64_t first_seed, double most_unresolved, std::int64_t most_rises,
+// `most_unresolved` is a share of all steps.
+void hunt(const char* name, std::uint64_t first_seed, double most_unresolved,
           const std::function<Hunted(Random&)>& make) {
   const std::int64_t each = 2000, worlds = std::max<std::int64_t>(1, tests::scaled(75'000) / each);
   const char* alone = std::getenv("PROXARM_RIGID_SEED");
@@ -179,20 +204,20 @@ void hunt(const char* name, std::uint64_t first_seed, double most_unresolved, st
             << ", pull " << out.pull_N << ", with a gap " << out.apart_N << "; energy created in " << out.rises
             << " steps, at most " << out.created_J << " J\n";
   if (alone != nullptr) return;
-  // Where contacts hold each other, the local problem is solved to 1e-10 of the free motion only: 1e-9 N of 10 N.
-  EXPECT_LE(out.imbalance_N, 1e-8);
-  EXPECT_LE(out.noisy, 1 + out.touching / 50);
-  EXPECT_LE(out.cone_N, 1e-8);
+  // The last step of the iteration still turns levers: seldom, of contacts that press each other, by more than 1e-10 N.
+  EXPECT_LE(out.imbalance_N, 1e-9);
+  EXPECT_LE(out.noisy, 1 + out.touching / 1000);
+  EXPECT_LE(out.cone_N, 1e-10);
   EXPECT_LE(out.against_slip_N, 1e-8);
   EXPECT_LE(out.pull_N, 1e-9);
   EXPECT_LE(out.apart_N, 1e-8);
   EXPECT_GT(out.touching, out.steps / 10) << "or else this looks at nothing";
   EXPECT_LE(static_cast<double>(out.unresolved), 1.0 + most_unresolved * static_cast<double>(out.steps));
-  EXPECT_LE(out.rises, most_rises * out.steps / 10'000);
+  EXPECT_EQ(out.rises, 0);
 }
 
 TEST(RigidHunt, AKeyInItsSlot) {
-  hunt("key", 1'000'000, 0.03, 0, [](Random& random) {
+  hunt("key", 1'000'000, 0.03, [](Random& random) {
     Hunted world;
     const Vec3 size(random.uniform(0.005, 0.04), random.uniform(0.004, 0.02), random.uniform(0.005, 0.04));
     const double half = 0.5 * size.y() + 0.5 * random.uniform(9e-6, 15e-6), mu = random.uniform(0.0, 0.6);
@@ -225,7 +250,7 @@ TEST(RigidHunt, AKeyInItsSlot) {
 
 // A tool of a tenth of a millimetre in a cell of sheets that are as thin, from which there is no way out.
 TEST(RigidHunt, ThinToolsAmongThinSheets) {
-  hunt("thin", 2'000'000, 0.005, 0, [](Random& random) {
+  hunt("thin", 2'000'000, 0.005, [](Random& random) {
     Hunted world;
     const double thin = 1e-4, half = random.uniform(0.001, 0.01);
     Body tool;
@@ -291,10 +316,8 @@ Hunted among_ten(Random& random, const Body& tool) {
   return world;
 }
 
-// Where a sharp edge leaves one feature for another within a step, the normal jumps, and a contact may lift the tool by
-// up to the step: once in some 40,000 steps.
 TEST(RigidHunt, ABoxAmongTenObjects) {
-  hunt("box", 3'000'000, 0.01, 1, [](Random& random) {
+  hunt("box", 3'000'000, 0.01, [](Random& random) {
     Body tool;
     tool.size = random_size(random, 0.01, 0.05);
     return among_ten(random, tool);
@@ -302,7 +325,7 @@ TEST(RigidHunt, ABoxAmongTenObjects) {
 }
 
 TEST(RigidHunt, ACapsuleOverEdges) {
-  hunt("capsule", 4'000'000, 0.001, 0, [](Random& random) {
+  hunt("capsule", 4'000'000, 0.001, [](Random& random) {
     Body tool;
     tool.size.z() = random.uniform(0.01, 0.08);
     tool.radius = random.uniform(0.001, 0.01);
