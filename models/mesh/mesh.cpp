@@ -382,6 +382,7 @@ TriangleMesh::Hit TriangleMesh::first_hit(const Vec3& x, const Vec3& y) const no
 // The parity of how often a ray passes the surface. A ray that meets an edge or a vertex isn't counted; another one is
 // taken instead.
 bool TriangleMesh::encloses(const Vec3& x) const noexcept {
+  if (!x.allFinite()) return false;
   const double reach = 2.0 * ((bounds().high - bounds().low).norm() + (x - bounds().low).norm());
   for (int attempt = 1; attempt <= 8; ++attempt) {
     const Vec3 away(std::sin(1.7 * attempt), std::cos(2.3 * attempt), std::sin(0.9 * attempt + 0.5));

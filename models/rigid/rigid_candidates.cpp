@@ -1,8 +1,8 @@
 // Which pairs of features may meet in the steps to come.
 #include <algorithm>
-#include <bitset>
 #include <cmath>
 
+#include "models/rigid/part_box.hpp"
 #include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
 
@@ -11,6 +11,8 @@ namespace {
 
 // More pairs than this are worth a smaller reach: a pair costs some 15 ns at each of the poses that a step looks at.
 constexpr std::size_t kFewPairs = 192;
+// And more triangles than this: one costs some 100 ns whenever pairs are gathered.
+constexpr std::size_t kFewFaces = 256;
 
 double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept {
   const Vec3 d1 = a.to - a.from, d2 = b.to - b.from, r = a.from - b.from;
@@ -28,14 +30,44 @@ double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept {
   return (r + s * d1 - t * d2).squaredNorm();
 }
 
-double distance2_to_segment(const Vec3& p, const EdgeLine& edge) noexcept {
-  const Vec3 along = edge.to - edge.from;
-  const double s = std::clamp(along.dot(p - edge.from) / along.squaredNorm(), 0.0, 1.0);
-  return (p - edge.from - s * along).squaredNorm();
+// Whether a unit direction misses the cone between the normals beside a sharp edge by more than `slack` (rad).
+bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) noexcept {
+  const Vec3 w = left.cross(right);
+  const double size = w.norm();
+  if (size < 1e-6) return false;  // two faces in one plane, or back to back: nothing is said
+  return left.cross(n).dot(w) < -slack * size || n.cross(right).dot(w) < -slack * size || n.dot(left + right) < -slack;
 }
 
-double distance2_to_box(const Vec3& p, const Bounds& box) noexcept {
-  return (box.low - p).cwiseMax(p - box.high).cwiseMax(0.0).squaredNorm();
+// Whether two sharp edges can't hold each other at any pose that is turned by up to `turn` (rad) from this one: their
+// common normal is outside of the faces' normals beside one of them (touch_edges_sharp() asks for that). It turns by
+// as much over the sine of the angle between the edges; twice that, for the normals it is compared with turn too. The
+// 0.02 rad are those that touch_edges_sharp() allows.
+bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept {
+  Vec3 n = (own.to - own.from).normalized().cross((other.to - other.from).normalized());
+  const double sine = n.norm();
+  const double slack = 0.02 + 2.0 * turn * (1.0 + 1.0 / sine);
+  if (!(slack < 0.3)) return false;
+  n /= sine;
+  const auto held = [&](const Vec3& normal) {
+    return !(!other.open && misses(normal, other.left, other.right, slack)) &&
+           !(!own.open && misses(-normal, own.left, own.right, slack));
+  };
+  return !held(n) && !held(-n);
+}
+
+// Whether a point may be so near to a triangle: by its height, and by how far its foot lies beyond the triangle's
+// sides.
+bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept {
+  const TriangleMesh::Face& face = mesh.face(index);
+  const double height = TriangleMesh::height(face, p);
+  if (!(std::abs(height) <= near)) return false;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& corner = mesh.corner(index, k);
+    const Vec3 outwards = (mesh.corner(index, (k + 1) % 3) - corner).cross(face.normal);
+    const double beyond = outwards.dot(p - corner);
+    if (beyond > 0.0 && beyond * beyond > (near * near - height * height) * outwards.squaredNorm()) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -45,12 +77,7 @@ void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at
                             Add add) const noexcept {
   const double radii = own.radius + other.radius, near = reach + radii, near2 = near * near;
   const bool round = radii > 0.0;
-  const auto own_edge = [&](std::uint32_t i) {
-    EdgeLine edge = edge_of(own, i);
-    edge.from = at * edge.from;
-    edge.to = at * edge.to;
-    return edge;
-  };
+  const double turn = reach / shared_->reach;
   for (std::uint32_t i = 0; i < own.points.size(); ++i) {
     const Vec3 p = at * own.points[i];
     for (std::uint32_t j = 0; j < other.faces.size(); ++j) {
@@ -77,9 +104,11 @@ void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at
     }
   }
   for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
-    const EdgeLine edge = own_edge(i);
+    const EdgeLine edge = moved_edge(edge_of(own, i), at);
     for (std::uint32_t j = 0; j < other.edges.size(); ++j) {
-      if (distance2_of_segments(edge, edge_of(other, j)) <= near2) add(Kind::edges, i, j);
+      const EdgeLine line = edge_of(other, j);
+      if (distance2_of_segments(edge, line) > near2 || (!round && never_hold(edge, line, turn))) continue;
+      add(Kind::edges, i, j);
     }
   }
 }
@@ -87,13 +116,27 @@ void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at
 // Which triangles come near a part of the tool, and what of the part comes near them.
 class RigidWorld::NearFaces {
  public:
-  NearFaces(const Part& part, const TriangleFeatures& mesh, const View& at, double near) noexcept
-      : part_(&part), mesh_(&mesh), at_(at), near_(near), middle_T_(0.5 * (part.box.low + part.box.high)) {
-    middle_ = at * middle_T_;
-    half_T_ = 0.5 * (part.box.high - part.box.low) + Vec3::Constant(near);
-    spread_ = at.R.cwiseAbs();
-    half_ = spread_ * half_T_;
-    collect();
+  // Of more triangles than `room` it takes none.
+  NearFaces(const Part& part, const TriangleFeatures& mesh, const View& at, double near, std::size_t room) noexcept
+      : solid_(&part.solid), near_(near) {
+    const PartBox around(part.solid, part.box, at, near);
+    around.each_face(mesh.mesh(), [&](std::uint32_t face, const Bounds& box) {
+      if (count_ == room) return all_ = false;
+      faces_[count_++] = face;
+      // Beyond the tool's own box nothing of it comes near.
+      const Vec3 low = box.low.cwiseMax(around.low_T()), high = box.high.cwiseMin(around.high_T());
+      region_.low = count_ == 1 ? low : region_.low.cwiseMin(low);
+      region_.high = count_ == 1 ? high : region_.high.cwiseMax(high);
+      return true;
+    });
+    if (count_ == 0 || !all_) return;
+    for (std::uint32_t i = 0; i < solid_->faces.size(); ++i) {
+      if (rises_to(solid_->faces[i])) rising_[rising_count_++] = static_cast<std::uint16_t>(i);
+    }
+    for (std::uint32_t i = 0; i < solid_->edges.size(); ++i) {
+      const Vec3 &from = solid_->points[solid_->edges[i].from], &to = solid_->points[solid_->edges[i].to];
+      if (meets(from.cwiseMin(to), from.cwiseMax(to))) crossing_[crossing_count_++] = static_cast<std::uint16_t>(i);
+    }
   }
 
   [[nodiscard]] bool all() const noexcept { return all_; }  // or there is no room for more
@@ -102,152 +145,129 @@ class RigidWorld::NearFaces {
   [[nodiscard]] bool meets(const Vec3& low, const Vec3& high) const noexcept {
     return (low.array() <= region_.high.array() + near_).all() && (high.array() >= region_.low.array() - near_).all();
   }
+  // The tool's faces over which triangles may be as high as −near, and its edges that may come near them.
+  [[nodiscard]] std::span<const std::uint16_t> rising() const noexcept { return {rising_.data(), rising_count_}; }
+  [[nodiscard]] std::span<const std::uint16_t> crossing() const noexcept { return {crossing_.data(), crossing_count_}; }
+
+  // Whether two points of T, and so all between them, are further than near before one of the tool's faces. What is
+  // asked next often is so for the same one.
+  [[nodiscard]] bool beyond(const Vec3& y, const Vec3& z) noexcept {
+    const auto out = [&](std::size_t i) {
+      const Solid::Face& face = solid_->faces[rising_[i]];
+      return std::min(face.normal.dot(y), face.normal.dot(z)) - face.offset > near_;
+    };
+    if (witness_ < rising_count_ && out(witness_)) return true;
+    for (std::size_t i = 0; i < rising_count_; ++i) {
+      if (!out(i)) continue;
+      witness_ = i;
+      return true;
+    }
+    return false;
+  }
+  // How far a point of T is before the tool's faces, or behind all.
+  [[nodiscard]] double out(const Vec3& y) const noexcept {
+    double most = -std::numeric_limits<double>::infinity();
+    for (const std::uint16_t i : rising())
+      most = std::max(most, solid_->faces[i].normal.dot(y) - solid_->faces[i].offset);
+    return most;
+  }
+
+ private:
   // Whether any place on the triangles is as high over a face of the tool as −near.
   [[nodiscard]] bool rises_to(const Solid::Face& face) const noexcept {
     const Vec3 middle = 0.5 * (region_.low + region_.high), half = 0.5 * (region_.high - region_.low);
     return face.normal.dot(middle) + face.normal.cwiseAbs().dot(half) - face.offset >= -near_;
   }
 
- private:
-  // The tool's box and one along the axes of W, by the six axes of both.
-  [[nodiscard]] bool reaches(const Vec3& low, const Vec3& high) const noexcept {
-    const Vec3 way = 0.5 * (low + high) - middle_, half = 0.5 * (high - low);
-    if ((way.cwiseAbs() - half - half_).maxCoeff() > 0.0) return false;
-    // Around a sphere there is less room than in its box.
-    if (part_->solid.points.size() == 1) return distance2_to_box(middle_, {low, high}) <= near_ * near_;
-    return ((at_.R.transpose() * way).cwiseAbs() - spread_.transpose() * half - half_T_).maxCoeff() <= 0.0;
-  }
-
-  void collect() noexcept {
-    constexpr std::size_t depth = 64;  // each level halves the number of faces
-    const std::vector<TriangleMesh::NodePair>& nodes = mesh_->mesh().structure().nodes;
-    std::array<std::uint32_t, depth> stack;
-    std::size_t top = 0;
-    stack[top++] = 0;
-    while (top > 0) {
-      const TriangleMesh::NodePair& pair = nodes[stack[--top]];
-      for (std::size_t k = 0; k < 2; ++k) {
-        const Vec3 low(pair.low(k, 0), pair.low(k, 1), pair.low(k, 2));
-        const Vec3 high(pair.high(k, 0), pair.high(k, 1), pair.high(k, 2));
-        if (!reaches(low, high)) continue;
-        if (pair.count[k] == 0) stack[top++] = pair.first[k];
-        for (std::uint32_t f = pair.first[k]; f < pair.first[k] + pair.count[k]; ++f) take(f);
-      }
-    }
-  }
-
-  void take(std::uint32_t face) noexcept {
-    const TriangleMesh& mesh = mesh_->mesh();
-    Vec3 low = at_.to_T(mesh.corner(face, 0)), high = low;
-    for (const std::size_t k : {1U, 2U}) {
-      const Vec3 corner = at_.to_T(mesh.corner(face, k));
-      low = low.cwiseMin(corner);
-      high = high.cwiseMax(corner);
-    }
-    const Vec3 top = middle_T_ + half_T_, bottom = middle_T_ - half_T_;
-    if ((low.array() > top.array()).any() || (high.array() < bottom.array()).any()) return;
-    if (part_->solid.radius > 0.0 && !near_round(0.5 * (low + high), 0.5 * (high - low).norm())) return;
-    if (count_ == faces_.size()) {
-      all_ = false;
-      return;
-    }
-    faces_[count_++] = face;
-    // Beyond the tool's own box nothing of it comes near.
-    low = low.cwiseMax(bottom);
-    high = high.cwiseMin(top);
-    region_.low = count_ == 1 ? low : region_.low.cwiseMin(low);
-    region_.high = count_ == 1 ? high : region_.high.cwiseMax(high);
-  }
-
-  // Whether a ball of T may come near a sphere or a capsule.
-  [[nodiscard]] bool near_round(const Vec3& centre, double radius) const noexcept {
-    const Solid& solid = part_->solid;
-    const double most = near_ + radius;
-    if (solid.edges.empty()) return (centre - solid.points.front()).squaredNorm() <= most * most;
-    return distance2_to_segment(centre, edge_of(solid, 0)) <= most * most;
-  }
-
-  const Part* part_;
-  const TriangleFeatures* mesh_;
-  View at_;
+  const Solid* solid_;
   double near_;
-  Vec3 middle_T_, half_T_;  // of the part's box, and so much around it
-  Vec3 middle_, half_;      // the same in W, along its axes
-  Mat3 spread_;
   Bounds region_;  // in T, of the triangles' part within the tool's box
-  std::array<std::uint32_t, 2048> faces_;
-  std::size_t count_ = 0;
+  std::array<std::uint32_t, most_faces> faces_;
+  std::array<std::uint16_t, most_edges> rising_, crossing_;
+  std::size_t count_ = 0, rising_count_ = 0, crossing_count_ = 0, witness_ = 0;
   bool all_ = true;
 };
 
+// The tool's points.
 template <typename Add>
-bool RigidWorld::pairs_with(const Part& part, const TriangleFeatures& other, double side, const View& at, double reach,
-                            Add add) const noexcept {
-  const Solid& own = part.solid;
-  const TriangleMesh& mesh = other.mesh();
-  const double near = reach + own.radius, near2 = near * near;
-  const bool round = own.radius > 0.0;
-  const NearFaces close(part, other, at, near);
+void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, const NearFaces& close, const View& at,
+                             double near, Add add) const noexcept {
+  const double near2 = near * near;
   for (std::uint32_t i = 0; i < own.points.size(); ++i) {
     if (!close.meets(own.points[i], own.points[i])) continue;
     const Vec3 p = at * own.points[i];
-    for (const std::uint32_t face : close.faces()) {
-      if (std::abs(TriangleMesh::height(mesh.face(face), p)) <= near) add(Kind::point_face, i, face);
-      if (!round) continue;
+    other.mesh().within(p, near, [&](std::uint32_t face) {
+      if (crowded_) return false;
+      if (!comes_near(other.mesh(), face, p, near)) return true;
+      add(Kind::point_face, i, face);
+      if (!(own.radius > 0.0)) return true;
       for (const std::uint32_t v : other.vertices_of(face)) {
         if ((p - other.vertex(v)).squaredNorm() <= near2) add(Kind::point_point, i, v);
       }
       for (const std::uint32_t e : other.edges_of(face)) {
         if (distance2_to_segment(p, other.edge(e).line) <= near2) add(Kind::point_edge, i, e);
       }
+      return true;
+    });
+  }
+}
+
+// A vertex of the mesh, at y in T, with the tool's faces and edges.
+template <typename Add>
+void RigidWorld::vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, NearFaces& close, double near,
+                             Add add) const noexcept {
+  if (!close.beyond(y, y) && close.out(y) >= -near) {
+    for (const std::uint16_t i : close.rising()) {
+      if (std::abs(own.faces[i].normal.dot(y) - own.faces[i].offset) <= near) add(Kind::face_point, i, v);
     }
   }
-  if (own.edges.empty()) return close.all();
-  // Faces and edges of the tool that come near.
-  std::bitset<most_edges> rising, crossing;
-  for (std::uint32_t i = 0; i < own.faces.size(); ++i) rising[i] = close.rises_to(own.faces[i]);
-  for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
-    const Vec3 &from = own.points[own.edges[i].from], &to = own.points[own.edges[i].to];
-    crossing[i] = close.meets(from.cwiseMin(to), from.cwiseMax(to));
+  if (!(own.radius > 0.0)) return;
+  for (const std::uint16_t i : close.crossing()) {
+    if (distance2_to_segment(y, edge_of(own, i)) <= near * near) add(Kind::edge_point, i, v);
   }
+}
+
+// An edge of the mesh, seen from T, with the tool's edges.
+template <typename Add>
+void RigidWorld::edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, double near,
+                           double turn, Add add) const noexcept {
+  if (close.beyond(line.from, line.to)) return;
+  const Vec3 middle = 0.5 * (line.from + line.to);
+  const double half = 0.5 * (line.to - line.from).norm();
+  for (const std::uint16_t i : close.crossing()) {
+    const EdgeLine edge = edge_of(own, i);
+    // The ball around an edge of the mesh is small.
+    const double most = near + half;
+    if (distance2_to_segment(middle, edge) > most * most || distance2_of_segments(edge, line) > near * near) continue;
+    if (!(own.radius > 0.0) && never_hold(edge, line, turn)) continue;
+    add(Kind::edges, i, e);
+  }
+}
+
+template <typename Add>
+std::optional<std::size_t> RigidWorld::pairs_with(const Part& part, const TriangleFeatures& other, double side,
+                                                  const View& at, double reach, Add add) const noexcept {
+  const Solid& own = part.solid;
+  const double near = reach + own.radius, turn = reach / shared_->reach;
+  NearFaces close(part, other, at, near, face_room_);
+  if (!close.all()) return {};
+  if (close.faces().empty()) return 0;
+  points_with(own, other, close, at, near, add);
+  if (own.edges.empty()) return close.faces().size();
   for (const std::uint32_t face : close.faces()) {
+    if (crowded_) return close.faces().size();
     for (const std::uint32_t v : other.vertices_of(face)) {
-      const Vec3 y = at.to_T(other.vertex(v));
-      double out = -std::numeric_limits<double>::infinity();
-      for (std::uint32_t i = 0; i < own.faces.size(); ++i) {
-        if (rising[i]) out = std::max(out, own.faces[i].normal.dot(y) - own.faces[i].offset);
-      }
-      if (std::abs(out) <= near) {
-        for (std::uint32_t i = 0; i < own.faces.size(); ++i) {
-          if (rising[i] && std::abs(own.faces[i].normal.dot(y) - own.faces[i].offset) <= near) {
-            add(Kind::face_point, i, v);
-          }
-        }
-      }
-      if (!round) continue;
-      for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
-        if (distance2_to_segment(y, edge_of(own, i)) <= near2) add(Kind::edge_point, i, v);
-      }
+      vertex_with(own, v, at.to_T(other.vertex(v)), close, near, add);
     }
     for (const std::uint32_t e : other.edges_of(face)) {
-      EdgeLine line = other.edge(e).line;
+      const TriangleFeatures::Edge& edge = other.edge(e);
       // A valley of a closed mesh is touched by nothing sharp.
-      if (side != 0.0 && !round && !line.open && other.edge(e).ridge != (side > 0.0)) continue;
-      line.from = at.to_T(line.from);
-      line.to = at.to_T(line.to);
-      double out = -std::numeric_limits<double>::infinity();
-      for (std::uint32_t i = 0; i < own.faces.size(); ++i) {
-        if (!rising[i]) continue;
-        const Solid::Face& f = own.faces[i];
-        out = std::max(out, std::min(f.normal.dot(line.from), f.normal.dot(line.to)) - f.offset);
-      }
-      if (out > near) continue;
-      for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
-        if (crossing[i] && distance2_of_segments(edge_of(own, i), line) <= near2) add(Kind::edges, i, e);
-      }
+      const bool is_valley = side != 0.0 && !edge.line.open && edge.ridge != (side > 0.0);
+      if (is_valley && !(own.radius > 0.0)) continue;
+      edge_with(own, e, seen_from(edge.line, at, edge.ridge ? 1.0 : -1.0), close, near, turn, add);
     }
   }
-  return close.all();
+  return close.faces().size();
 }
 
 void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept {
@@ -255,15 +275,7 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
   const View at = view(pose);
   const double around = shared_->reach + reach;
   if (distance2_to_box(at.x, e.bounds) > around * around) return;
-  if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape)) {
-    const Solid& first = shared_->parts.front().solid;
-    const Vec3 inside = first.points.empty() ? Vec3(Vec3::Zero()) : first.points.front();
-    if ((*mesh)->mesh().closed() && !held_[entry].known) {
-      held_[entry].side = (*mesh)->mesh().encloses(at * inside) ? -1.0 : 1.0;
-      held_[entry].known = true;
-    }
-  }
-  for (std::size_t part = 0; part < shared_->parts.size(); ++part) {
+  for (std::size_t part = 0; part < shared_->parts.size() && !crowded_; ++part) {
     const Solid& own = shared_->parts[part].solid;
     if (const Bounds& box = shared_->parts[part].box; box.finite()) {
       const double near = 0.5 * (box.high - box.low).norm() + own.radius + reach;
@@ -285,7 +297,9 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
     if (const Solid* solid = std::get_if<Solid>(&e.object.shape)) {
       pairs_with(own, *solid, at, reach, add);
     } else if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape)) {
-      if (!pairs_with(shared_->parts[part], **mesh, held_[entry].side, at, reach, add)) crowded_ = true;
+      const std::optional<std::size_t> looked = pairs_with(shared_->parts[part], **mesh, e.held, at, reach, add);
+      near_faces_ += looked.value_or(0);
+      if (!looked) crowded_ = true;
     } else {
       with_flat_or_hollow(e.object, [&](const auto& shape) {
         for (std::uint32_t i = 0; i < own.points.size(); ++i) {
@@ -300,22 +314,25 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
 }
 
 // As far around as steps like this one need for a while; among many triangles only as far as this one needs, since each
-// pair costs in every step. Where even those don't find room, the step is taken in parts that need less.
+// pair costs in every step, and each triangle in every gathering. Where even those don't find room, the step is taken
+// in parts that need less.
 void RigidWorld::gather_for(const ToolPose& q, double far) noexcept {
   const double least = 3.0 * far + 1e-6;
   double reach = 3.0 * far + std::max(8.0 * far, 0.01 * shared_->reach) + 1e-6;
   if (!shared_->dense) return gather(q, reach);
   if (gathered_reach_ > 0.0) {
-    const double wider = pair_count_ < kFewPairs / 4 ? 2.0 : 1.0;
-    reach = std::clamp(wider * gathered_reach_, least, reach);
+    const bool few = pair_count_ < kFewPairs / 4 && near_faces_ < kFewFaces / 4;
+    reach = std::clamp((few ? 2.0 : 1.0) * gathered_reach_, least, reach);
   }
+  face_room_ = kFewFaces;
   gather(q, reach);
-  while (!(pair_count_ <= kFewPairs) && reach > least) {
+  while ((crowded_ || pair_count_ > kFewPairs) && reach > least) {
     reach = std::max(least, 0.5 * reach);
     gather(q, reach);
   }
-  for (int k = 0; k < 9 && crowded_; ++k) {
-    reach *= 0.5;
+  face_room_ = most_faces;
+  for (int k = 0; k < 10 && crowded_; ++k) {
+    if (k > 0) reach *= 0.5;
     gather(q, reach);
   }
 }
@@ -327,7 +344,7 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
   for (std::size_t i = 0; i < pair_count_ && kept_count < kept.size(); ++i) {
     if (pairs_[i].pressed) kept[kept_count++] = pairs_[i];
   }
-  pair_count_ = pressed_count_ = 0;
+  pair_count_ = pressed_count_ = near_faces_ = 0;
   crowded_ = false;
   for (std::size_t entry = 0; entry < shared_->entries.size(); ++entry) {
     gather_entry(static_cast<std::uint16_t>(entry), pose, reach);

@@ -1,6 +1,7 @@
 // What the sources of RigidWorld have in common.
 #pragma once
 
+#include "models/geometry/tool_pose.hpp"
 #include "models/rigid/rigid_object.hpp"
 
 namespace proxarm::models {
@@ -13,9 +14,28 @@ inline constexpr double kGap_m = 1e-12;  // what a gap may be short of
 // A rim whose lowest point is lower than its middle by less is level: a tenth of what a gap may be short of.
 inline constexpr double kLevel_m = 1e-13;
 
+// Where the tool is.
+struct View {
+  Mat3 R;
+  Vec3 x;
+  [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + x; }
+  [[nodiscard]] Vec3 to_T(const Vec3& p) const noexcept { return R.transpose() * (p - x); }
+};
+
+inline View view(const ToolPose& pose) noexcept { return {pose.orientation.toRotationMatrix(), pose.position}; }
+
 inline EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
   const Solid::Edge& e = solid.edges[i];
   return {solid.points[e.from], solid.points[e.to], e.left, e.right, false};
+}
+
+inline EdgeLine moved_edge(const EdgeLine& edge, const View& at) noexcept {
+  return {at * edge.from, at * edge.to, at.R * edge.left, at.R * edge.right, edge.open};
+}
+// In T; `outwards` is −1 where the faces' normals are to be turned round.
+inline EdgeLine seen_from(const EdgeLine& edge, const View& at, double outwards) noexcept {
+  const Mat3 R = at.R.transpose();
+  return {at.to_T(edge.from), at.to_T(edge.to), outwards * (R * edge.left), outwards * (R * edge.right), edge.open};
 }
 
 inline const TriangleMesh::Face& face_of(const TriangleFeatures& mesh, std::uint32_t i) noexcept {

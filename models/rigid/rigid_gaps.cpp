@@ -73,7 +73,7 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
 // without having come through, as beside an edge: its foot wasn't on the face then.
 double RigidWorld::side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept {
   const auto& mesh = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&shared_->entries[pair.entry].object.shape);
-  const double held = held_[pair.entry].side;
+  const double held = shared_->entries[pair.entry].held;
   if (pair.kind == Kind::point_face) {
     if (held == 0.0) return height < 0.0 ? -1.0 : 1.0;
     if (held * height >= -kFront_m) return held;
@@ -147,14 +147,7 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
   const auto other_edge = [&] {
     return mesh != nullptr ? (*mesh)->edge(pair.other).line : edge_of(*solid, pair.other);
   };
-  const auto own_edge = [&] {
-    EdgeLine edge = edge_of(own, pair.own);
-    edge.from = at * edge.from;
-    edge.to = at * edge.to;
-    edge.left = at.R * edge.left;
-    edge.right = at.R * edge.right;
-    return edge;
-  };
+  const auto own_edge = [&] { return moved_edge(edge_of(own, pair.own), at); };
   const double side = static_cast<double>(pair.side);
   switch (pair.kind) {
     case Kind::point_face: {
@@ -163,24 +156,26 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
       if (mesh != nullptr) {
         const TriangleMesh::Face& face = face_of(**mesh, pair.other);
         const double height = side * TriangleMesh::height(face, p);
-        if (held_[pair.entry].side == 0.0 && own.radius == 0.0 && height < 0.0) {
+        if (shared_->entries[pair.entry].held == 0.0 && own.radius == 0.0 && height < 0.0) {
           // Come through the face, wherever it is now; or come around, and then another face holds it.
           if (crossed(pair, p)) emit(Touch{p, side * face.normal, height}, lift);
           return;
         }
-        return emit(touch_face(p, own.radius, face.normal, face.normal.dot(face.corner),
-                               (*mesh)->mesh().structure().vertices, (*mesh)->mesh().triangle(pair.other), side),
-                    lift);
+        return emit(
+            touch_face(p, own.radius, face.normal, face.normal.dot(face.corner), (*mesh)->mesh().structure().vertices,
+                       (*mesh)->mesh().triangle(pair.other), side, beside_),
+            lift);
       }
       const Solid::Face& face = solid->faces[pair.other];
-      return emit(touch_face(p, own.radius, face.normal, face.offset, solid->points, solid->corners(face), 1.0));
+      return emit(
+          touch_face(p, own.radius, face.normal, face.offset, solid->points, solid->corners(face), 1.0, beside_));
     }
     case Kind::face_point: {
       if (side == 0.0) return;
       const Solid::Face& face = own.faces[pair.own];
       const Vec3 y = at.R.transpose() * (other_point() - at.x);
       std::optional<Touch> t =
-          touch_face(y, other_radius, face.normal, face.offset, own.points, own.corners(face), 1.0);
+          touch_face(y, other_radius, face.normal, face.offset, own.points, own.corners(face), 1.0, beside_);
       if (!t) return;
       const Vec3 foot = y - (t->gap + other_radius) * face.normal;
       return emit(Touch{at * foot, -(at.R * face.normal), t->gap}, lift);
@@ -196,7 +191,7 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
       }
       const Vec3 n = (edge.to - edge.from).cross(other.to - other.from);
       const double orientation = other.open ? side : n.dot(other.left + other.right) < 0.0 ? -1.0 : 1.0;
-      return emit(touch_edges_sharp(edge, other, orientation), lift);
+      return emit(touch_edges_sharp(edge, other, orientation, beside_), lift);
     }
     case Kind::point_point: {
       std::optional<Touch> t = touch_point(at * own.points[pair.own], other_point(), radii);
@@ -285,7 +280,7 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
       if (j == i || found_[j].touch.gap < found_[i].touch.gap || !same_point(pair, pairs_[found_[j].pair])) continue;
       // An open mesh's face may hold the point from behind: only one that it has come through counts here.
       if (is_mesh && pair.kind == Kind::point_face) {
-        if (held_[pair.entry].side == 0.0 && !(found_[j].touch.gap < 0.0)) continue;
+        if (shared_->entries[pair.entry].held == 0.0 && !(found_[j].touch.gap < 0.0)) continue;
         if (!behind(found_[i], found_[j])) continue;
       }
       found_[i] = found_[--found_count_];

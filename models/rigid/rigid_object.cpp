@@ -1,6 +1,9 @@
 #include "models/rigid/rigid_object.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
 #include <tuple>
 
 namespace proxarm::models {
@@ -13,6 +16,7 @@ constexpr double kFlat = 1e-9;
 }  // namespace
 
 TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : mesh_(std::move(mesh)) {
+  if (mesh_->closed()) outwards_ = front_side();
   // All half-edges, sorted, so that those of one edge are neighbours.
   struct Half {
     std::uint32_t low, high, face, opposite;
@@ -38,6 +42,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
   for (std::size_t i = 0; i < halves.size();) {
     std::size_t end = i + 1;
     while (end < halves.size() && halves[end].low == halves[i].low && halves[end].high == halves[i].high) ++end;
+    if (mesh_->closed() && end - i != 2) throw std::invalid_argument("an edge that more than two faces share");
     const Half& first = halves[i];
     const TriangleMesh::Face& face = mesh_->face(first.face);
     Edge edge;
@@ -72,6 +77,40 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
   };
   sort_out(edges_by_face, owned_edges_, first_edge_);
   sort_out(vertices_by_face, owned_vertices_, first_vertex_);
+}
+
+// A mesh may be several bodies, and have hollows: of each piece that hangs together the largest face is asked.
+double TriangleFeatures::front_side() const {
+  const auto faces = static_cast<std::uint32_t>(mesh_->size());
+  std::vector<std::uint32_t> up(mesh_->structure().vertices.size());  // to the vertex that stands for its piece
+  std::iota(up.begin(), up.end(), 0U);
+  const auto piece_of = [&up](std::uint32_t v) {
+    while (up[v] != v) v = up[v] = up[up[v]];
+    return v;
+  };
+  const auto area = [this](std::uint32_t f) {
+    return (mesh_->corner(f, 1) - mesh_->corner(f, 0)).cross(mesh_->corner(f, 2) - mesh_->corner(f, 0)).norm();
+  };
+  for (std::uint32_t f = 0; f < faces; ++f) {
+    for (const std::size_t k : {1U, 2U}) up[piece_of(mesh_->triangle(f)[k])] = piece_of(mesh_->triangle(f)[0]);
+  }
+  constexpr std::uint32_t none = ~0U;
+  std::vector<std::uint32_t> largest(up.size(), none);
+  for (std::uint32_t f = 0; f < faces; ++f) {
+    std::uint32_t& best = largest[piece_of(mesh_->triangle(f)[0])];
+    if (best == none || area(f) > area(best)) best = f;
+  }
+  double side = 0.0;
+  for (const std::uint32_t f : largest) {
+    if (f == none) continue;
+    const Vec3 middle = (mesh_->corner(f, 0) + mesh_->corner(f, 1) + mesh_->corner(f, 2)) / 3.0;
+    // Before the face, nearer than another one is: a millionth of its size, and far above rounding.
+    const Vec3 before = middle + std::max(1e-6 * std::sqrt(area(f)), 16.0 * mesh_->lift_m()) * mesh_->face(f).normal;
+    const double here = mesh_->encloses(before) ? -1.0 : 1.0;
+    if (side != 0.0 && here != side) throw std::invalid_argument("some faces have their fronts outside, others inside");
+    side = here;
+  }
+  return side;
 }
 
 }  // namespace proxarm::models

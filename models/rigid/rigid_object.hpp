@@ -11,8 +11,9 @@
 
 namespace proxarm::models {
 
-// A surface of triangles. Both sides hold, as for a point proxy. Only what can be touched counts: an edge or a vertex
-// whose faces lie in one plane is left out, since the tool's points and edges meet the faces first.
+// A surface of triangles. Of a closed one, a body's, one side holds; of an open one both, as for a point proxy. Only
+// what can be touched counts: an edge or a vertex whose faces lie in one plane is left out, since the tool's points and
+// edges meet the faces first.
 class TriangleFeatures {
  public:
   struct Edge {
@@ -20,9 +21,13 @@ class TriangleFeatures {
     bool ridge = true;  // seen from the faces' front; otherwise a valley, which is a ridge from behind
   };
 
+  // Throws std::invalid_argument for a closed mesh with an edge that more than two faces share, or with faces of which
+  // some have their fronts outside and others inside.
   explicit TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh);
 
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
+  // Of a closed mesh: 1 if its faces' fronts are outside, −1 if inside. Of an open one: 0.
+  [[nodiscard]] double outwards() const noexcept { return outwards_; }
   [[nodiscard]] const Edge& edge(std::uint32_t i) const noexcept { return edges_[i]; }
   [[nodiscard]] const Vec3& vertex(std::uint32_t i) const noexcept { return mesh_->vertex(i); }
   // The edges and vertices that a face owns; each belongs to one face.
@@ -40,7 +45,10 @@ class TriangleFeatures {
     return std::span(all).subspan(first[face], first[face + 1] - first[face]);
   }
 
+  [[nodiscard]] double front_side() const;
+
   std::shared_ptr<const TriangleMesh> mesh_;
+  double outwards_ = 0.0;
   std::vector<Edge> edges_;
   std::vector<std::uint32_t> owned_edges_, first_edge_, owned_vertices_, first_vertex_;
 };
@@ -50,6 +58,7 @@ struct RigidObject {
   std::variant<FlatSide, HollowSphere, HollowTube, Solid, std::shared_ptr<const TriangleFeatures>> shape;
   double friction = 0.0;
   std::int32_t object = 0;  // what contacts report
+  bool inside_out = false;  // of a closed mesh: the tool is inside of it. Other shapes say that by themselves
 };
 
 // Calls with the object's shape where that is one that a point alone is held by: flat or hollow. (std::visit may

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "models/rigid/rigid_features.hpp"
+#include "models/rigid/part_box.hpp"
 #include "models/rigid_shapes/overlap.hpp"
 
 namespace proxarm::models {
@@ -20,6 +20,7 @@ constexpr int kBudget = 400, kHard = 40;
 // Beside that, so many contacts may be looked at in local problems, and so many more for each part of the step: some
 // 0.2 µs each. Without it local problems that have no solution took up to 13 ms of a cycle.
 constexpr int kWork = 1200, kWorkOfPart = 60;
+constexpr double kIdle = 1e-3;    // of the greatest force: what bears less may be left out where nothing else helps
 constexpr int kWorkInside = 600;  // of hollow objects, where a look costs 0.5 µs and most steps take thirty
 // Newton's iteration with the gaps' curvature: what comes before a step of this size needn't be exact. A local problem
 // that is solved to this share of the last step leads as near.
@@ -33,6 +34,11 @@ constexpr double kRest_m = 1e-13;
 // From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
 // may swing to and fro.
 constexpr double kLeastShare = 0.125;
+// From this pose on features count as far beside their ends as the last step went: two neighbours, of which either one
+// leads to where only the other is found, then hold together. As steps become smaller so does this, and what is found
+// in the end is theirs.
+constexpr int kToAndFro = 6;
+constexpr double kBesideAtMost_m = 1e-5;
 // And at so many pairs of features, some 15 ns each: a step among hundreds of them took up to 50 ms.
 constexpr int kLooks = 60000;
 // What the wrench may lack after the last step of the iteration: of 10 N, a third of 1e-10 N.
@@ -126,24 +132,23 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
                      std::holds_alternative<HollowTube>(object.shape);
     shared->bends = shared->bends || shared->hollow;
     const Bounds bounds = bounds_of(object);
-    if (std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape)) shared->dense = true;
+    double held = 0.0;
+    if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape)) {
+      shared->dense = true;
+      held = (object.inside_out ? -1.0 : 1.0) * (*mesh)->outwards();
+    }
     corners += std::holds_alternative<Solid>(object.shape) ? std::get_if<Solid>(&object.shape)->points.size() : 0;
     friction_.push_back(object.friction);
-    shared->entries.push_back({std::move(object), bounds});
+    shared->entries.push_back({std::move(object), bounds, held});
   }
   for (const Part& part : shared->parts) own_corners += part.solid.points.size();
   shared->dense = shared->dense || corners * own_corners > kManyCorners;
-  held_.resize(shared->entries.size());
   shared_ = std::move(shared);
 }
 
 double RigidWorld::motion(const ToolPose& a, const ToolPose& b) const noexcept {
   const Twist xi = difference(a, b);
   return xi.head<3>().norm() + shared_->reach * xi.tail<3>().norm();
-}
-
-RigidWorld::View RigidWorld::view(const ToolPose& pose) noexcept {
-  return {pose.orientation.toRotationMatrix(), pose.position};
 }
 
 double RigidWorld::friction(const Pair& pair) const noexcept {
@@ -226,7 +231,9 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
     }
     if (!grew) break;
     solved = problem_.solve(e_coupled, {linear_.data(), linear_count_}, delta, rough);
-    if (!solved) budget_ -= kHard;
+    if (solved) continue;
+    budget_ -= kHard;
+    solved = solve_fewer(pose, e_coupled, rough, delta);
   }
   keep_forces();
   // What is reported is where the contact goes with this solution, not where it was linearised.
@@ -237,6 +244,31 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
     touch.point += delta.head<3>() + delta.tail<3>().cross(lever);
   }
   return solved;
+}
+
+// Where an edge of the tool lies on a vertex of a mesh, all edges there hold it at one place, most of them with next to
+// nothing, and rounding decides which: no forces are found. Without those the others hold it alone, if then nothing is
+// passed by more than half of what a gap may be short of.
+bool RigidWorld::solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept {
+  double most = 0.0;
+  for (std::size_t k = 0; k < linear_count_; ++k) most = std::max(most, linear_[k].f[0]);
+  std::size_t bearing = 0;
+  for (std::size_t k = 0; k < linear_count_; ++k) {
+    if (!(linear_[k].f[0] > kIdle * most)) continue;
+    std::swap(linear_[k], linear_[bearing]);
+    std::swap(axes_[k], axes_[bearing]);
+    std::swap(of_linear_[k], of_linear_[bearing]);
+    ++bearing;
+  }
+  if (bearing == 0 || bearing == linear_count_) return false;
+  problem_.allow(kWork / 2);
+  if (!problem_.solve(e, {linear_.data(), bearing}, delta, rough)) return false;
+  for (std::size_t k = bearing; k < linear_count_; ++k) {
+    linear_[k].f.setZero();
+    linear_[k].state = ContactState::open;
+    if (approach(found_[of_linear_[k]], pose, delta) < -0.5 * kGap_m) return false;
+  }
+  return true;
 }
 
 void RigidWorld::keep_forces() noexcept {
@@ -287,6 +319,7 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
   collected_ = false;
   for (int k = 0; k < 50; ++k) {
     if (--budget_ < 0 || looks_ < 0 || problem_.exhausted()) break;
+    beside_ = k < kToAndFro ? beside_m : std::clamp(last, beside_m, kBesideAtMost_m);
     find(q);
     Twist delta;
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
@@ -310,14 +343,14 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     q = moved(q, share * delta);
     // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
     // those of normals before it.
-    const bool whole = share == 1.0 && !roughly && (!shared_->bends || size <= kStill_m);
+    const bool whole = share == 1.0 && !roughly && beside_ <= beside_m && (!shared_->bends || size <= kStill_m);
     const bool small =
         std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding && stays_balanced(delta, e);
     if (whole && (size <= rounding || small)) {
       collected_ = false;
       return solved;
     }
-    if (shared_->bends && solved && !roughly && size < rest) {
+    if (shared_->bends && solved && !roughly && beside_ <= beside_m && size < rest) {
       rest = size;
       resting = q;
       collect_contacts();
@@ -359,7 +392,6 @@ bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, int part
 void RigidWorld::forget() noexcept {
   pair_count_ = pressed_count_ = 0;
   gathered_reach_ = -1.0;
-  std::fill(held_.begin(), held_.end(), Held{});
 }
 
 const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {
@@ -410,6 +442,7 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
     without_friction_ = false;
     if (!fine) q_ = reached;
   }
+  beside_ = beside_m;
   unresolved_ = !lawful || !whole || overflow_ || crowded_;
   report(q);
   return q_;
@@ -501,19 +534,28 @@ void RigidWorld::report(const ToolPose& q_old) noexcept {
 
 double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
   RigidWorld copy(*this);
-  double far = 1e-3, least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 16; ++k, far *= 4.0) {
+  constexpr double first_m = 1e-3, furthest_m = 1e6, nearest_m = 1e-9;
+  double least = std::numeric_limits<double>::infinity(), empty = 0.0;
+  for (double far = first_m; far < furthest_m && far > nearest_m;) {
     copy.pair_count_ = 0;
     copy.gather(pose, far);
+    if (copy.crowded_) {  // nearer, or else what was empty last is all that is known
+      if (empty > 0.0) return std::min(empty, overlap_m(pose));
+      far *= 0.25;
+      continue;
+    }
     copy.set_sides(pose, 0.0);
     copy.find(pose);
     for (std::size_t i = 0; i < copy.found_count_; ++i) least = std::min(least, copy.found_[i].touch.gap);
     if (least < far) break;
+    empty = far;
+    far *= 4.0;
   }
   return std::min(least, overlap_m(pose));
 }
 
-// Features have their gaps on the side on which the tool was. Where it is inside of a solid, that says nothing.
+// Features have their gaps on the side on which the tool was. Where it is inside of a solid, or stands in a surface,
+// that says nothing.
 double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
   double deepest = std::numeric_limits<double>::infinity();
   Pose X = Pose::Identity();
@@ -521,14 +563,41 @@ double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
   X.translation() = pose.position;
   for (const Entry& entry : shared_->entries) {
     const auto* solid = std::get_if<Solid>(&entry.object.shape);
-    if (solid == nullptr) continue;
+    const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
     for (const Part& part : shared_->parts) {
-      if (part.solid.faces.empty() && solid->faces.empty()) continue;
-      const double gap = separation_of_hulls(part.solid, X, *solid);
-      if (gap < 0.0) deepest = std::min(deepest, gap - part.solid.radius - solid->radius);
+      double gap = 0.0;
+      if (mesh != nullptr) gap = overlap_with(part, entry, (*mesh)->mesh(), X);
+      if (solid != nullptr && !(part.solid.faces.empty() && solid->faces.empty())) {
+        gap = separation_of_hulls(part.solid, X, *solid);
+        if (gap < 0.0) gap -= part.solid.radius + solid->radius;
+      }
+      if (gap < 0.0) deepest = std::min(deepest, gap);
     }
   }
   return deepest;
+}
+
+// The deepest that a part of the tool stands in any triangle of a mesh, or how far it is from the surface on the wrong
+// side of it; 0 if neither.
+double RigidWorld::overlap_with(const Part& part, const Entry& entry, const TriangleMesh& mesh,
+                                const Pose& X) noexcept {
+  const Solid& own = part.solid;
+  if (own.points.empty()) return 0.0;
+  const View at{X.linear(), X.translation()};
+  double deepest = 0.0;
+  PartBox(own, part.box, at, own.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
+    const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
+    const double gap = own.faces.empty()
+                           ? distance_of_segment(at * own.points.front(), at * own.points.back(), triangle) - own.radius
+                           : separation_from_triangle(own, X, triangle);
+    deepest = std::min(deepest, gap);
+    return true;
+  });
+  if (deepest < 0.0 || entry.held == 0.0) return deepest;
+  const Vec3 inside = at * own.points.front();
+  if (mesh.encloses(inside) == entry.object.inside_out) return 0.0;
+  std::uint32_t near = 0;
+  return -mesh.distance(inside, std::numeric_limits<double>::infinity(), near);
 }
 
 }  // namespace proxarm::models

@@ -23,11 +23,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "models/geometry/pose_algorithm.hpp"
 #include "models/rigid/contact_problem.hpp"
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid/rigid_features.hpp"
 
 namespace proxarm::models {
 
@@ -87,6 +88,7 @@ class RigidWorld final : public PoseAlgorithm {
   struct Entry {
     RigidObject object;
     Bounds bounds;
+    double held = 0.0;  // of a closed mesh: 1 or −1, the side of its faces on which the tool is
   };
   struct Pressed {  // a place of a pair that pressed in the last solution, and how hard
     std::uint16_t pair = 0;
@@ -102,25 +104,12 @@ class RigidWorld final : public PoseAlgorithm {
     bool bends = false;     // something is hollow, or the tool has rims: gaps' curvature counts
     bool dense = false;     // there is a mesh, or there are many solids
   };
-  // Of a closed mesh: 1 or −1, the side of its faces on which the tool is, known from the first time that it comes near
-  // after a start. Of other objects: 0.
-  struct Held {
-    double side = 0.0;
-    bool known = false;
-  };
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 512;
+  static constexpr std::size_t most_faces = 2048;  // of a mesh, near a part
   static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
 
   class NearFaces;
-  // Where the tool is.
-  struct View {
-    Mat3 R;
-    Vec3 x;
-    [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + x; }
-    [[nodiscard]] Vec3 to_T(const Vec3& p) const noexcept { return R.transpose() * (p - x); }
-  };
-  [[nodiscard]] static View view(const ToolPose& pose) noexcept;
   [[nodiscard]] double motion(const ToolPose& a, const ToolPose& b) const noexcept;
 
   void forget() noexcept;
@@ -129,10 +118,19 @@ class RigidWorld final : public PoseAlgorithm {
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
   template <typename Add>
   void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
-  // False: there are more triangles than it looks at.
   template <typename Add>
-  bool pairs_with(const Part& part, const TriangleFeatures& other, double side, const View& at, double reach,
-                  Add add) const noexcept;
+  void points_with(const Solid& own, const TriangleFeatures& other, const NearFaces& close, const View& at, double near,
+                   Add add) const noexcept;
+  template <typename Add>
+  void vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, NearFaces& close, double near,
+                   Add add) const noexcept;
+  template <typename Add>
+  void edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, double near, double turn,
+                 Add add) const noexcept;
+  // The number of triangles that were near; none if that was more than it looks at.
+  template <typename Add>
+  std::optional<std::size_t> pairs_with(const Part& part, const TriangleFeatures& other, double side, const View& at,
+                                        double reach, Add add) const noexcept;
   void set_sides(const ToolPose& from, double far) noexcept;
   [[nodiscard]] double side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
@@ -154,6 +152,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
   [[nodiscard]] double worst_passed(const Twist& xi, const ToolPose& pose) const noexcept;
   bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, Twist& delta) noexcept;
+  bool solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
   void balance(const Twist& e, Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
@@ -166,9 +165,10 @@ class RigidWorld final : public PoseAlgorithm {
   void collect_contacts() noexcept;
   void report(const ToolPose& q_old) noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
+  [[nodiscard]] static double overlap_with(const Part& part, const Entry& entry, const TriangleMesh& mesh,
+                                           const Pose& X) noexcept;
 
   std::shared_ptr<const Shared> shared_;
-  std::vector<Held> held_;        // of each entry
   std::vector<double> friction_;  // of each entry, as it is now
 
   ToolPose q_;
@@ -177,6 +177,7 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;  // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
+  std::size_t face_room_ = most_faces, near_faces_ = 0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
   int looks_ = 0;         // pairs that it may still look at
@@ -200,6 +201,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool collected_ = false;  // of a pose before the last one that was tried
   bool unresolved_ = false, overflow_ = false;
   bool without_friction_ = false;  // in the present attempt
+  double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
 };
 
 }  // namespace proxarm::models

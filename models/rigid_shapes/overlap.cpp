@@ -1,39 +1,104 @@
 #include "models/rigid_shapes/overlap.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <span>
 
 namespace proxarm::models {
 namespace {
 
-// The points of `b` beyond those of `a`, along n.
-double gap_along(const Vec3& n, const Solid& a, const Pose& X, const Solid& b) noexcept {
+// The points of another body beyond those of `a`, along n.
+double gap_along(const Vec3& n, const Solid& a, const Pose& X, std::span<const Vec3> b) noexcept {
   const Vec3 n_a = X.linear().transpose() * n;
   double furthest = -std::numeric_limits<double>::infinity(), nearest = std::numeric_limits<double>::infinity();
   for (const Vec3& p : a.points) furthest = std::max(furthest, n_a.dot(p));
-  for (const Vec3& p : b.points) nearest = std::min(nearest, n.dot(p));
+  for (const Vec3& p : b) nearest = std::min(nearest, n.dot(p));
   return nearest - (furthest + n.dot(X.translation()));
+}
+
+// Tries the planes along two unit directions. Parallel ones have no plane of their own. Below a millionth of a radian
+// the faces beside them are as good: the gap along a direction changes by the solids' sizes times the angle.
+template <typename Try>
+void across(const Vec3& own, const Vec3& other, Try try_along) noexcept {
+  const Vec3 n = own.cross(other);
+  if (n.norm() < 1e-6) return;
+  try_along(n.normalized());
+  try_along(-n.normalized());
+}
+
+double to_segment(const Vec3& p, const Vec3& from, const Vec3& to) noexcept {
+  const Vec3 along = to - from;
+  const double length2 = along.squaredNorm();
+  const double s = length2 > 0.0 ? std::clamp(along.dot(p - from) / length2, 0.0, 1.0) : 0.0;
+  return (p - from - s * along).norm();
+}
+
+// Where the nearest points of the lines lie inside of both segments, they are nearest; otherwise an end is.
+double between_segments(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) noexcept {
+  double least = std::min({to_segment(a, c, d), to_segment(b, c, d), to_segment(c, a, b), to_segment(d, a, b)});
+  const Vec3 u = b - a, v = d - c, n = u.cross(v), w = c - a;
+  const double nn = n.squaredNorm();
+  if (nn > 0.0) {
+    const double s = w.cross(v).dot(n) / nn, t = w.cross(u).dot(n) / nn;
+    if (s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0) least = std::min(least, std::abs(w.dot(n)) / std::sqrt(nn));
+  }
+  return least;
 }
 
 }  // namespace
 
 double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b) noexcept {
   double largest = -std::numeric_limits<double>::infinity();
-  const auto try_along = [&](const Vec3& n) { largest = std::max(largest, gap_along(n, a, X, b)); };
+  const auto try_along = [&](const Vec3& n) { largest = std::max(largest, gap_along(n, a, X, b.points)); };
   for (const Solid::Face& face : a.faces) try_along(X.linear() * face.normal);
   for (const Solid::Face& face : b.faces) try_along(-face.normal);
   for (const Solid::Edge& own : a.edges) {
     const Vec3 along = X.linear() * (a.points[own.to] - a.points[own.from]).normalized();
     for (const Solid::Edge& other : b.edges) {
-      const Vec3 n = along.cross((b.points[other.to] - b.points[other.from]).normalized());
-      // Parallel edges have no plane of their own. Below a millionth of a radian the faces beside them are as good: the
-      // gap along a direction changes by the solids' sizes times the angle.
-      if (n.norm() < 1e-6) continue;
-      try_along(n.normalized());
-      try_along(-n.normalized());
+      across(along, (b.points[other.to] - b.points[other.from]).normalized(), try_along);
     }
   }
   return largest;
+}
+
+double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle) noexcept {
+  double largest = -std::numeric_limits<double>::infinity();
+  const auto try_along = [&](const Vec3& n) { largest = std::max(largest, gap_along(n, a, X, triangle)); };
+  const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
+  try_along(normal);
+  try_along(-normal);
+  for (const Solid::Face& face : a.faces) try_along(X.linear() * face.normal);
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3 side = (triangle[(k + 1) % 3] - triangle[k]).normalized();
+    try_along(side.cross(normal));
+    if (largest > 0.0) return largest;  // most are apart by now
+  }
+  for (const Solid::Edge& own : a.edges) {
+    const Vec3 along = X.linear() * (a.points[own.to] - a.points[own.from]).normalized();
+    for (std::size_t k = 0; k < 3; ++k) across(along, (triangle[(k + 1) % 3] - triangle[k]).normalized(), try_along);
+  }
+  return largest;
+}
+
+double distance_of_segment(const Vec3& from, const Vec3& to, const std::array<Vec3, 3>& triangle) noexcept {
+  const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
+  const auto over = [&](const Vec3& p) {
+    bool inside = true;
+    for (std::size_t k = 0; k < 3; ++k) {
+      inside = inside && normal.cross(triangle[(k + 1) % 3] - triangle[k]).dot(p - triangle[k]) >= 0.0;
+    }
+    return inside;
+  };
+  double least = std::numeric_limits<double>::infinity();
+  const double h_from = normal.dot(from - triangle[0]), h_to = normal.dot(to - triangle[0]);
+  if (over(from)) least = std::min(least, std::abs(h_from));
+  if (over(to)) least = std::min(least, std::abs(h_to));
+  if (h_from * h_to < 0.0 && over(from + h_from / (h_from - h_to) * (to - from))) return 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    least = std::min(least, between_segments(from, to, triangle[k], triangle[(k + 1) % 3]));
+  }
+  return least;
 }
 
 }  // namespace proxarm::models

@@ -1,6 +1,8 @@
 // How deep two convex solids are in each other, for figures and for the start of a session; 𝒢 never lets them.
 #pragma once
 
+#include <array>
+
 #include "models/rigid_shapes/solid.hpp"
 
 namespace proxarm::models {
@@ -10,5 +12,12 @@ namespace proxarm::models {
 // negative, by which one gets out of the other. Above 0 it is their distance or less. `X` leads from the frame of `a`
 // to that of `b`. Precondition: one of them has faces.
 double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b) noexcept;
+
+// The same of a solid with faces, without a radius, and a triangle. It counts from the triangle's nearest side, so it
+// is the way out of a surface that the solid went in by less than the triangles' size.
+double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle) noexcept;
+
+// The distance of a segment from a triangle; 0 where they meet.
+double distance_of_segment(const Vec3& from, const Vec3& to, const std::array<Vec3, 3>& triangle) noexcept;
 
 }  // namespace proxarm::models

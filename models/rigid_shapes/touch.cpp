@@ -6,9 +6,6 @@
 namespace proxarm::models {
 namespace {
 
-// How far beside a face or beyond an edge's end a foot may lie and still count: what rounding moves a point of a metre
-// by is 1e-16 m; this is far above it, and far below what a gap at a neighbouring feature would show.
-constexpr double kBeside_m = 1e-10;
 // By how much, in radians, a direction may miss the cone between the normals beside an edge. Where a face lies on an
 // edge, the direction lies on the cone's border, and either side of it must do. At a place where both edges really
 // meet, solids that are outside of each other keep the cone; so this admits no false contact.
@@ -35,14 +32,14 @@ struct Crossing {
 };
 
 // The nearest points of two lines, if they lie on both segments.
-std::optional<Crossing> cross(const EdgeLine& own, const EdgeLine& other) noexcept {
+std::optional<Crossing> cross(const EdgeLine& own, const EdgeLine& other, double beside) noexcept {
   const Vec3 a = own.to - own.from, b = other.to - other.from, d = other.from - own.from;
   const Vec3 n = a.cross(b);
   const double aa = a.squaredNorm(), bb = b.squaredNorm(), nn = n.squaredNorm();
   // Parallel within 1e-7 rad: their ends decide, with faces.
   if (nn <= 1e-14 * aa * bb) return {};
   const double s = d.cross(b).dot(n) / nn, t = d.cross(a).dot(n) / nn;
-  const double slack_s = kBeside_m / std::sqrt(aa), slack_t = kBeside_m / std::sqrt(bb);
+  const double slack_s = beside / std::sqrt(aa), slack_t = beside / std::sqrt(bb);
   if (s < -slack_s || s > 1.0 + slack_s || t < -slack_t || t > 1.0 + slack_t) return {};
   return Crossing{own.from + s * a, other.from + t * b, n};
 }
@@ -120,13 +117,13 @@ int nearest_of_rim(const HollowTube& hollow, const Solid::Rim& rim, const Vec2& 
 }
 
 std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,
-                                std::span<const Vec3> points, std::span<const std::uint32_t> ring,
-                                double side) noexcept {
+                                std::span<const Vec3> points, std::span<const std::uint32_t> ring, double side,
+                                double beside) noexcept {
   for (std::size_t k = 0; k < ring.size(); ++k) {
     const Vec3& corner = points[ring[k]];
     const Vec3 inwards = normal.cross(points[ring[k + 1 < ring.size() ? k + 1 : 0]] - corner);
     const double height = inwards.dot(p - corner);
-    if (height < 0.0 && height * height > kBeside_m * kBeside_m * inwards.squaredNorm()) return {};
+    if (height < 0.0 && height * height > beside * beside * inwards.squaredNorm()) return {};
   }
   const Vec3 n = side * normal;
   return Touch{p - radius * n, n, side * (normal.dot(p) - offset) - radius};
@@ -152,15 +149,16 @@ std::optional<Touch> touch_round(const Vec3& p, const EdgeLine& edge, double rad
 
 std::optional<Touch> touch_edges_round(const EdgeLine& own, const EdgeLine& other, double radii,
                                        double own_radius) noexcept {
-  const std::optional<Crossing> x = cross(own, other);
+  const std::optional<Crossing> x = cross(own, other, beside_m);
   if (!x) return {};
   std::optional<Touch> t = touch_point(x->own, x->other, radii);
   if (t) t->point -= own_radius * t->normal;
   return t;
 }
 
-std::optional<Touch> touch_edges_sharp(const EdgeLine& own, const EdgeLine& other, double orientation) noexcept {
-  const std::optional<Crossing> x = cross(own, other);
+std::optional<Touch> touch_edges_sharp(const EdgeLine& own, const EdgeLine& other, double orientation,
+                                       double beside) noexcept {
+  const std::optional<Crossing> x = cross(own, other, beside);
   if (!x) return {};
   const Vec3 n = orientation * x->across.normalized();
   if (!other.open && !between(n, other.left, other.right)) return {};

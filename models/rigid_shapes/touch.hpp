@@ -20,6 +20,10 @@
 
 namespace proxarm::models {
 
+// How far beside a face or beyond an edge's end, in metres, a foot may lie and still count: what rounding moves a point
+// of a metre by is 1e-16 m; this is far above it, and far below what a gap at a neighbouring feature would show.
+inline constexpr double beside_m = 1e-10;
+
 struct Touch {
   Vec3 point = Vec3::Zero();    // of the tool
   Vec3 normal = Vec3::UnitZ();  // unit, towards the tool
@@ -68,8 +72,8 @@ struct EdgeLine {
 // A point p with a radius over a face; none if its foot isn't on the face. `side` is 1 or −1, the side of the face that
 // the point is on.
 std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,
-                                std::span<const Vec3> points, std::span<const std::uint32_t> ring,
-                                double side) noexcept;
+                                std::span<const Vec3> points, std::span<const std::uint32_t> ring, double side,
+                                double beside = beside_m) noexcept;
 // Both with radii: the nearest points.
 std::optional<Touch> touch_point(const Vec3& own, const Vec3& other, double radii) noexcept;
 // None if the nearest point of the edge is one of its ends. `own_is_edge`: the tool's feature is the edge.
@@ -79,6 +83,7 @@ std::optional<Touch> touch_round(const Vec3& p, const EdgeLine& edge, double rad
 std::optional<Touch> touch_edges_round(const EdgeLine& own, const EdgeLine& other, double radii,
                                        double own_radius) noexcept;
 // Sharp ones; `orientation` is 1 or −1: the normal along or against own × other.
-std::optional<Touch> touch_edges_sharp(const EdgeLine& own, const EdgeLine& other, double orientation) noexcept;
+std::optional<Touch> touch_edges_sharp(const EdgeLine& own, const EdgeLine& other, double orientation,
+                                       double beside = beside_m) noexcept;
 
 }  // namespace proxarm::models

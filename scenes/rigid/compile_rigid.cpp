@@ -60,9 +60,7 @@ struct ShapesOf {
     const Vec3 axis = (s.to_m - s.from_m).normalized();
     return {models::HollowTube{s.from_m, s.to_m, s.radius_m, true}, side(axis, s.from_m), side(-axis, s.to_m)};
   }
-  Shapes operator()(const MeshShape& /*shape*/) const {
-    throw std::invalid_argument("a mesh as an object that a rigid tool touches");
-  }
+  Shapes operator()(const MeshShape& s) const { return {std::make_shared<const models::TriangleFeatures>(s.mesh)}; }
 };
 
 bool is_inside_out(const Shape& shape) {
@@ -74,6 +72,18 @@ bool is_inside_out(const Shape& shape) {
       shape);
 }
 
+// Of a mesh whose faces don't make a body it says so, at the object's line.
+Shapes shapes_of(const Scene& scene, const Object& object) {
+  try {
+    return std::visit(ShapesOf{}, object.shape);
+  } catch (const std::invalid_argument& problem) {
+    throw refusal(
+        scene, object.line,
+        "a rigid tool needs to know on which side of a mesh it is, and \"" + object.name + "\" has " + problem.what(),
+        "");
+  }
+}
+
 // What no test holds yet is refused. Empty: nothing stands against it.
 std::string why_not_beside(const Object& object, const models::Tool& tool) {
   const std::string name = "\"" + object.name + "\"";
@@ -82,13 +92,15 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
   if (!object.friction_regions.empty()) {
     return "a rigid tool feels one friction for all of an object, and " + name + " has regions";
   }
-  if (std::holds_alternative<MeshShape>(object.shape)) return "a rigid tool isn't held by meshes yet: " + name;
+  if (const auto* mesh = std::get_if<MeshShape>(&object.shape); mesh != nullptr && !mesh->mesh->closed()) {
+    return "a rigid tool is held by closed meshes only, and " + name + " is open (close_holes_m may close it)";
+  }
   const bool inside_out = is_inside_out(object.shape);
   if (std::holds_alternative<CylinderShape>(object.shape) && !inside_out) {
     return "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a box for " + name;
   }
   if (!has_cylinder(tool.parts) || std::holds_alternative<PlaneShape>(object.shape)) return {};
-  if (!inside_out) {
+  if (!inside_out || std::holds_alternative<MeshShape>(object.shape)) {
     return "a cylinder as a tool is held by planes and inside of objects: take a convex tool or a capsule beside " +
            name;
   }
@@ -121,11 +133,12 @@ std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const m
   if (const std::optional<Refusal> no = why_not(scene, tool)) throw refusal(scene, no->line, no->why, "");
   std::vector<RigidObject> objects;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    for (auto& shape : std::visit(ShapesOf{}, scene.objects[i].shape)) {
+    for (auto& shape : shapes_of(scene, scene.objects[i])) {
       RigidObject part;
       part.shape = std::move(shape);
       part.friction = scene.objects[i].friction;
       part.object = static_cast<std::int32_t>(i);
+      part.inside_out = is_inside_out(scene.objects[i].shape);
       objects.push_back(std::move(part));
     }
   }

@@ -1,0 +1,101 @@
+// Which triangles of a mesh come near a part of the tool.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "models/rigid/rigid_features.hpp"
+
+namespace proxarm::models {
+
+inline double distance2_to_segment(const Vec3& p, const EdgeLine& edge) noexcept {
+  const Vec3 along = edge.to - edge.from;
+  const double s = std::clamp(along.dot(p - edge.from) / along.squaredNorm(), 0.0, 1.0);
+  return (p - edge.from - s * along).squaredNorm();
+}
+
+inline double distance2_to_box(const Vec3& p, const Bounds& box) noexcept {
+  return (box.low - p).cwiseMax(p - box.high).cwiseMax(0.0).squaredNorm();
+}
+
+// The box of a part's points, which turns with the tool, the ball around them, and so much around both.
+class PartBox {
+ public:
+  PartBox(const Solid& solid, const Bounds& box, const View& at, double near) noexcept
+      : solid_(&solid), at_(at), near_(near), middle_T_(0.5 * (box.low + box.high)) {
+    middle_ = at * middle_T_;
+    half_T_ = 0.5 * (box.high - box.low) + Vec3::Constant(near);
+    double ball = 0.0;
+    for (const Vec3& p : solid.points) ball = std::max(ball, (p - middle_T_).squaredNorm());
+    ball2_ = (std::sqrt(ball) + near) * (std::sqrt(ball) + near);
+    spread_ = at.R.cwiseAbs();
+    half_ = spread_ * half_T_;
+  }
+
+  [[nodiscard]] Vec3 low_T() const noexcept { return middle_T_ - half_T_; }
+  [[nodiscard]] Vec3 high_T() const noexcept { return middle_T_ + half_T_; }
+
+  // Calls visit(face, its box in T) for each that comes so near, and a few that don't, until it returns false.
+  template <typename Visit>
+  void each_face(const TriangleMesh& mesh, Visit visit) const noexcept {
+    constexpr std::size_t depth = 64;  // each level halves the number of faces
+    const std::vector<TriangleMesh::NodePair>& nodes = mesh.structure().nodes;
+    std::array<std::uint32_t, depth> stack;
+    std::size_t top = 0;
+    stack[top++] = 0;
+    while (top > 0) {
+      const TriangleMesh::NodePair& pair = nodes[stack[--top]];
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Vec3 low(pair.low(k, 0), pair.low(k, 1), pair.low(k, 2));
+        const Vec3 high(pair.high(k, 0), pair.high(k, 1), pair.high(k, 2));
+        if (!reaches(low, high)) continue;
+        if (pair.count[k] == 0) stack[top++] = pair.first[k];
+        for (std::uint32_t f = pair.first[k]; f < pair.first[k] + pair.count[k]; ++f) {
+          if (!look_at(mesh, f, visit)) return;
+        }
+      }
+    }
+  }
+
+ private:
+  // This box and one along the axes of W, by the six axes of both.
+  [[nodiscard]] bool reaches(const Vec3& low, const Vec3& high) const noexcept {
+    const Vec3 way = 0.5 * (low + high) - middle_, half = 0.5 * (high - low);
+    if ((way.cwiseAbs() - half - half_).maxCoeff() > 0.0) return false;
+    if (distance2_to_box(middle_, {low, high}) > ball2_) return false;
+    return ((at_.R.transpose() * way).cwiseAbs() - spread_.transpose() * half - half_T_).maxCoeff() <= 0.0;
+  }
+
+  template <typename Visit>
+  bool look_at(const TriangleMesh& mesh, std::uint32_t face, Visit& visit) const noexcept {
+    Bounds box;
+    box.low = box.high = at_.to_T(mesh.corner(face, 0));
+    for (const std::size_t k : {1U, 2U}) {
+      const Vec3 corner = at_.to_T(mesh.corner(face, k));
+      box.low = box.low.cwiseMin(corner);
+      box.high = box.high.cwiseMax(corner);
+    }
+    if ((box.low.array() > high_T().array()).any() || (box.high.array() < low_T().array()).any()) return true;
+    if (solid_->radius > 0.0 && !near_round(0.5 * (box.low + box.high), 0.5 * (box.high - box.low).norm())) return true;
+    if (distance2_to_box(middle_T_, box) > ball2_) return true;
+    return visit(face, box);
+  }
+
+  // Whether a ball of T may come near a sphere or a capsule.
+  [[nodiscard]] bool near_round(const Vec3& centre, double radius) const noexcept {
+    const double most = near_ + radius;
+    if (solid_->edges.empty()) return (centre - solid_->points.front()).squaredNorm() <= most * most;
+    return distance2_to_segment(centre, edge_of(*solid_, 0)) <= most * most;
+  }
+
+  const Solid* solid_;
+  View at_;
+  double near_, ball2_ = 0.0;
+  Vec3 middle_T_, half_T_;  // of the part's box, and so much around it
+  Vec3 middle_, half_;      // the same in W, along its axes
+  Mat3 spread_;
+};
+
+}  // namespace proxarm::models
