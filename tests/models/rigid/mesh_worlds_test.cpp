@@ -57,6 +57,7 @@ Pushed about_block(const Tool& tool, bool inside, const std::function<double(con
     RigidObject object;
     object.shape = std::make_shared<const TriangleFeatures>(block());
     object.friction = 0.4;
+    object.inside_out = inside;
     std::vector<RigidObject> objects;
     objects.push_back(std::move(object));
     RigidWorld g(tool, std::move(objects));
@@ -82,53 +83,193 @@ TEST(RigidWorldsOfMeshes, ASphereKeepsTheLaw) {
                          [](const ToolPose& q) { return to_block(q.position) - 0.01; }));
 }
 
-TEST(RigidWorldsOfMeshes, ATouchedSideIsForgottenWhereTheToolBeginsAnew) {
-  // A session starts outside, the next one inside of the block, with the same world: each is held on its side.
+// How far a sphere of 10 mm gets along z in the block, from its middle or from above.
+double end_of_way(const std::shared_ptr<const TriangleMesh>& mesh, bool inside) {
   RigidObject object;
-  object.shape = std::make_shared<const TriangleFeatures>(block());
+  object.shape = std::make_shared<const TriangleFeatures>(mesh);
+  object.inside_out = inside;
   RigidWorld g({{{SphereTool{0.01}, Pose::Identity(), {}}}}, {object});
-  const Mat6 K = 1e6 * Mat6::Identity();
+  ToolPose q;
+  q.position.z() = inside ? 0.0 : 0.5 * block_size.z() + 0.02;
+  for (int k = 0; k < 50; ++k) {
+    ToolPose p = q;
+    p.position.z() += inside ? 1e-3 : -1e-3;
+    q = g.step(1e6 * Mat6::Identity(), p, q);
+  }
+  return q.position.z();
+}
+
+std::shared_ptr<const TriangleMesh> turned_round(const TriangleMesh& mesh) {
+  TriangleSoup soup{mesh.structure().vertices, mesh.structure().triangles};
+  for (auto& triangle : soup.triangles) std::swap(triangle[0], triangle[1]);
+  return std::make_shared<const TriangleMesh>(std::move(soup));
+}
+
+TEST(RigidWorldsOfMeshes, ABodyHoldsFromOutsideOrInsideWhicheverWayItsFacesLook) {
   const double top = 0.5 * block_size.z();
-  for (const bool inside : {false, true, false}) {
-    ToolPose q;
-    q.position.z() = inside ? 0.0 : top + 0.02;
-    for (int k = 0; k < 50; ++k) {
-      ToolPose p = q;
-      p.position.z() += inside ? 1e-3 : -1e-3;
-      q = g.step(K, p, q);
-    }
-    EXPECT_NEAR(q.position.z(), inside ? top - 0.01 : top + 0.01, 1e-12) << (inside ? "inside" : "outside");
+  for (const auto& mesh : {block(), turned_round(*block())}) {
+    EXPECT_NEAR(end_of_way(mesh, false), top + 0.01, 1e-12);
+    EXPECT_NEAR(end_of_way(mesh, true), top - 0.01, 1e-12);
   }
 }
 
-// A step of 0.2 mm among triangles of a millimetre found more features than there is room for, and was unresolved;
-// the steps after it were so small that nothing was gathered anew, and the tool stood still for good.
-TEST(RigidWorldsOfMeshes, AfterAStepAmongTooManyFeaturesAToolGoesOn) {
+// Two blocks in one mesh, the second one moved along x.
+std::shared_ptr<const TriangleMesh> two_blocks(double apart, bool second_is_turned) {
+  TriangleSoup soup{block()->structure().vertices, block()->structure().triangles};
+  const std::size_t corners = soup.vertices.size(), faces = soup.triangles.size();
+  for (std::size_t i = 0; i < corners; ++i) soup.vertices.emplace_back(soup.vertices[i] + apart * Vec3::UnitX());
+  for (std::size_t i = 0; i < faces; ++i) {
+    auto triangle = soup.triangles[i];
+    for (std::uint32_t& v : triangle) v += static_cast<std::uint32_t>(corners);
+    if (second_is_turned) std::swap(triangle[0], triangle[1]);
+    soup.triangles.push_back(triangle);
+  }
+  return std::make_shared<const TriangleMesh>(std::move(soup));
+}
+
+TEST(RigidWorldsOfMeshes, AMeshThatDoesntSayWhereItsInsideIsIsRefused) {
+  EXPECT_NO_THROW(TriangleFeatures{two_blocks(0.3, false)});
+  EXPECT_THROW(TriangleFeatures{two_blocks(0.3, true)}, std::invalid_argument);
+  // Blocks side by side share a face's border and corners: an edge has four faces there.
+  EXPECT_THROW(TriangleFeatures{two_blocks(block_size.x(), false)}, std::invalid_argument);
+}
+
+double clearance_of_box(const Vec3& place, bool inside_out) {
   RigidObject object;
-  object.shape = std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(tests::ball(5, 0.04)));
-  object.friction = 0.3;
-  ConvexTool pebble;
-  for (int i = 0; i < 200; ++i) {  // a spiral on a ball of 1 cm
-    const double z = 1.0 - (2.0 * i + 1.0) / 200.0, r = std::sqrt(1.0 - z * z),
-                 angle = 2.0 * std::numbers::pi * i / std::numbers::phi;
-    pebble.points_m.emplace_back(0.01 * r * std::cos(angle), 0.01 * r * std::sin(angle), 0.01 * z);
+  object.shape = std::make_shared<const TriangleFeatures>(block());
+  object.inside_out = inside_out;
+  ToolPose pose;
+  pose.position = place;
+  return RigidWorld({{{BoxTool{Vec3::Constant(0.02)}, Pose::Identity(), {}}}}, {object}).clearance_m(pose);
+}
+
+TEST(RigidWorldsOfMeshes, AToolThatStandsInAMeshIsNoticed) {
+  const double top = 0.5 * block_size.z();
+  EXPECT_NEAR(clearance_of_box({0.0, 0.0, top + 0.012}, false), 0.002, 1e-12);
+  EXPECT_NEAR(clearance_of_box({0.0, 0.0, top + 0.01}, false), 0.0, 1.1e-13) << "a mesh's faces stand out by 1e-13 m";
+  EXPECT_NEAR(clearance_of_box({0.0, 0.0, top + 0.007}, false), -0.003, 1e-12);
+  EXPECT_NEAR(clearance_of_box({0.0, 0.0, 0.0}, false), -(top - 0.01), 1e-12) << "a corner is so far from the surface";
+  EXPECT_NEAR(clearance_of_box({0.0, 0.0, 0.0}, true), top - 0.01, 1e-12);
+  EXPECT_NEAR(clearance_of_box({0.0, 0.0, top - 0.007}, true), -0.003, 1e-12);
+  EXPECT_LT(clearance_of_box({0.0, 0.0, top + 0.02}, true), 0.0) << "outside of what it should be in";
+}
+
+// A ball of 8 n² triangles with bumps of some per cent, as a scan has them.
+std::shared_ptr<const TriangleMesh> rough_ball(Random& random, double radius, int n) {
+  TriangleSoup soup;
+  const Vec3 first = 9.0 * random.direction(), second = 17.0 * random.direction();
+  // A face of an octahedron after the other, in n² triangles; what they share is welded.
+  for (int octant = 0; octant < 8; ++octant) {
+    const Vec3 sign((octant & 1) != 0 ? -1.0 : 1.0, (octant & 2) != 0 ? -1.0 : 1.0, (octant & 4) != 0 ? -1.0 : 1.0);
+    const auto at = [&](int i, int j) {
+      const Vec3 u = sign.cwiseProduct(Vec3(i, j, n - i - j)).normalized();
+      soup.vertices.emplace_back(radius * (1.0 + 0.03 * std::sin(first.dot(u)) + 0.02 * std::sin(second.dot(u))) * u);
+      return static_cast<std::uint32_t>(soup.vertices.size() - 1);
+    };
+    const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+      if (sign.prod() > 0.0) {
+        soup.triangles.push_back({a, b, c});
+      } else {
+        soup.triangles.push_back({a, c, b});
+      }
+    };
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; i + j < n; ++j) {
+        add(at(i, j), at(i + 1, j), at(i, j + 1));
+        if (i + j < n - 1) add(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+      }
+    }
   }
-  RigidWorld g({{{pebble, Pose::Identity(), {}}}}, {object});
-  ToolPose q;
-  q.position.x() = 0.052;
-  HeldTool held = realistic(q);
-  RoamingHand hand{.next_place = [](Random& random, const ToolPose& now) {
-    const Vec3 out = (now.position.normalized() + random.in_box(0.2)).normalized();
-    return Vec3((0.04 + random.uniform(-0.03, 0.02)) * out);
-  }};
-  Random random(4);
-  int unresolved = 0;
-  for (int k = 0; k < 1100; ++k) {
-    const ToolPose p = held.freely(hand.wrench(random, held, k));
-    held.arrive(g.step(held.K, p, held.q));
-    unresolved += g.unresolved() ? 1 : 0;
+  return std::make_shared<const TriangleMesh>(std::move(soup));
+}
+
+Polyhedron polyhedron_of(const TriangleMesh& mesh, std::uint32_t face) {
+  Polyhedron out;
+  out.corners = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
+  for (std::size_t k = 0; k < 3; ++k) out.edges.push_back((out.corners[(k + 1) % 3] - out.corners[k]).normalized());
+  out.normals.push_back(out.edges[0].cross(out.edges[1]).normalized());
+  for (std::size_t k = 0; k < 3; ++k) out.normals.push_back(out.normals[0].cross(out.edges[k]));
+  return out;
+}
+
+// The separation of boxes from a mesh's triangles, of those that may be near.
+double boxes_from_mesh(const std::vector<Polyhedron>& boxes, const std::vector<Polyhedron>& triangles) {
+  double least = 1.0;
+  for (const Polyhedron& box : boxes) {
+    Vec3 middle = Vec3::Zero();
+    for (const Vec3& x : box.corners) middle += x / 8.0;
+    const double reach = (box.corners[0] - middle).norm();
+    for (const Polyhedron& triangle : triangles) {
+      const double size = std::max((triangle.corners[1] - triangle.corners[0]).norm(),
+                                   (triangle.corners[2] - triangle.corners[0]).norm());
+      if ((triangle.corners[0] - middle).norm() < reach + size + 0.01) {
+        least = std::min(least, separation(box, triangle));
+      }
+    }
   }
-  EXPECT_LT(unresolved, 10);
+  return least;
+}
+
+// Boxes of the given sizes in a row along z, sent to a mesh.
+Pushed boxes_about(const std::function<std::shared_ptr<const TriangleMesh>(Random&)>& make,
+                   const std::vector<Vec3>& sizes, double furthest) {
+  Pushed out;
+  for (std::uint64_t world = 0; world < 30; ++world) {
+    Random random(900 + world);
+    const auto mesh = make(random);
+    RigidObject object;
+    object.shape = std::make_shared<const TriangleFeatures>(mesh);
+    object.friction = 0.4;
+    Tool tool;
+    double z = 0.0;
+    for (const Vec3& size : sizes) {
+      Pose X = Pose::Identity();
+      X.translation().z() = z;
+      tool.parts.push_back({BoxTool{size}, X, {}});
+      z += size.z();
+    }
+    std::vector<Polyhedron> triangles;
+    for (std::uint32_t f = 0; f < mesh->size(); ++f) triangles.push_back(polyhedron_of(*mesh, f));
+    const auto apart = [&](const ToolPose& pose) {
+      std::vector<Polyhedron> boxes;
+      for (std::size_t i = 0; i < sizes.size(); ++i) {
+        Pose X = Pose::Identity();
+        X.linear() = pose.orientation.toRotationMatrix();
+        X.translation() = pose.position;
+        boxes.push_back(polyhedron_of_box(sizes[i], X * tool.parts[i].X_TP));
+      }
+      return boxes_from_mesh(boxes, triangles);
+    };
+    RigidWorld g(tool, {object});
+    Mat6 K = Mat6::Zero();
+    K.diagonal() << Vec3::Constant(4e6), Vec3::Constant(4e3);
+    ToolPose q;
+    do {
+      q.position = random.uniform(0.5, 1.0) * furthest * random.direction();
+      q.orientation = rotation_by(random.arrow(0.0, 3.0));
+    } while (apart(q) < 1e-3 || mesh->encloses(q.position));
+    push_about(g, random, q, K, {0.4}, 600, Vec3::Zero(), false, apart, out);
+  }
+  return out;
+}
+
+TEST(RigidWorldsOfMeshes, ABoxOnARoughBodyKeepsTheLaw) {
+  expect_law(boxes_about([](Random& random) { return rough_ball(random, 0.06, 8); }, {{0.02, 0.03, 0.05}}, 0.15));
+}
+
+TEST(RigidWorldsOfMeshes, ACompoundOnARoughBodyKeepsTheLaw) {
+  expect_law(boxes_about([](Random& random) { return rough_ball(random, 0.06, 8); },
+                         {{0.02, 0.03, 0.02}, {0.004, 0.004, 0.06}}, 0.15));
+}
+
+TEST(RigidWorldsOfMeshes, ABladeDoesntPassASheetThatIsAsThin) {
+  // Both a tenth of a millimetre.
+  const auto sheet = [](Random& /*random*/) {
+    TriangleSoup soup{block()->structure().vertices, block()->structure().triangles};
+    for (Vec3& x : soup.vertices) x = Vec3(1.6 * x.x(), 2.0 * x.y(), x.z() / block_size.z() * 1e-4);
+    return std::make_shared<const TriangleMesh>(std::move(soup));
+  };
+  expect_law(boxes_about(sheet, {{1e-4, 0.02, 0.05}}, 0.06));
 }
 
 }  // namespace

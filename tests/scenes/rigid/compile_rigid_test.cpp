@@ -69,6 +69,26 @@ TEST(CompileRigid, EveryShapeHoldsATool) {
   EXPECT_NEAR(end_of_way(SphereShape{Vec3::Zero(), 0.1, false}, box(0.02), 0.3, down), 0.11, 1e-12);
   EXPECT_NEAR(end_of_way(CapsuleShape{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}, 0.05, false}, box(0.02), 0.3, down), 0.06,
               1e-12);
+  EXPECT_NEAR(end_of_way(pyramid(), box(0.02), 0.3, down), 0.11, 1e-12);
+}
+
+TEST(CompileRigid, AMeshWhoseFacesDisagreeAboutItsInsideIsRefusedAtItsLine) {
+  MeshShape shape = pyramid();
+  models::TriangleSoup soup{shape.mesh->structure().vertices, shape.mesh->structure().triangles};
+  const std::size_t faces = soup.triangles.size();
+  for (std::size_t i = 0; i < 5; ++i) soup.vertices.emplace_back(soup.vertices[i] + Vec3(1.0, 0.0, 0.0));
+  for (std::size_t i = 0; i < faces; ++i) {
+    const auto& [a, b, c] = soup.triangles[i];
+    soup.triangles.push_back({a + 5, c + 5, b + 5});
+  }
+  shape.mesh = std::make_shared<const models::TriangleMesh>(std::move(soup));
+  try {
+    compile_rigid(scene_of(shape), box(0.01));
+    ADD_FAILURE() << "not refused";
+  } catch (const description::SetupError& error) {
+    EXPECT_NE(std::string(error.what()).find("fronts"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("7"), std::string::npos) << error.what();
+  }
 }
 
 TEST(CompileRigid, EveryHollowShapeHoldsATool) {
@@ -139,7 +159,13 @@ TEST(CompileRigid, RefusesAnObjectWithTheReason) {
 }
 
 TEST(CompileRigid, RefusesAToolBesideAnObjectWithTheReason) {
-  expect_refused(scene_of(pyramid()), sphere(0.01), "isn't held by meshes", 7);
+  expect_refused(scene_of(pyramid()), cylinder(), "held by planes and inside of objects", 7);
+  models::TriangleSoup sheet;
+  sheet.vertices = {{0.2, 0.2, -0.1}, {-0.2, 0.2, -0.1}, {-0.2, -0.2, -0.1}};
+  sheet.triangles = {{0, 1, 2}};
+  MeshShape open;
+  open.mesh = std::make_shared<const models::TriangleMesh>(std::move(sheet));
+  expect_refused(scene_of(open), sphere(0.01), "is open", 7);
   expect_refused(scene_of(SphereShape{}), cylinder(), "held by planes and inside of objects", 7);
   expect_refused(scene_of(CapsuleShape{{-0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}, 0.05, true}), cylinder(), "round ends", 7);
 }
