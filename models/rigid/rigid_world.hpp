@@ -36,8 +36,8 @@ class RigidWorld final : public PoseAlgorithm {
  public:
   // Throws std::invalid_argument for a tool's shape without a size, points that span no solid, a friction below 0, a
   // cylinder as an object, and one as a tool beside solids, meshes or a tube with round ends. A tool without parts is a
-  // point: a sphere of no radius. What else compile_rigid() refuses (a box beside a mesh) is held, but leaves more
-  // steps unresolved.
+  // point: a sphere of no radius. An open mesh, which compile_rigid() refuses, is held from both sides, but what is sharp
+  // may pass its border by micrometres.
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
@@ -46,6 +46,8 @@ class RigidWorld final : public PoseAlgorithm {
 
   [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {contacts_.data(), count_}; }
   [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
+  // Where more is near than a step has room for, a lower bound. Between corners that face each other, where no feature
+  // holds another one, more than their distance.
   [[nodiscard]] double clearance_m(const ToolPose& pose) const noexcept override;
   [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<RigidWorld>(*this); }
   void copy_state(const PoseAlgorithm& other) noexcept override { *this = dynamic_cast<const RigidWorld&>(other); }
