@@ -53,6 +53,7 @@ double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b) noexce
   const auto try_along = [&](const Vec3& n) { largest = std::max(largest, gap_along(n, a, X, b.points)); };
   for (const Solid::Face& face : a.faces) try_along(X.linear() * face.normal);
   for (const Solid::Face& face : b.faces) try_along(-face.normal);
+  if (largest > 0.0) return largest;  // apart is all that is asked for
   for (const Solid::Edge& own : a.edges) {
     const Vec3 along = X.linear() * (a.points[own.to] - a.points[own.from]).normalized();
     for (const Solid::Edge& other : b.edges) {
