@@ -29,7 +29,8 @@ constexpr double kNear_m = 1e-9;
 // And the last step turns normals by no more than 1e-10 of a clearance of ten micrometres.
 constexpr double kStill_m = 1e-15;
 // A tool that rests among more contacts than hold it may have a solution at one pose and, for rounding, none at the
-// next. After a step below this the first one is taken: normals are right to 1e-8 then.
+// next, or steps that don't get smaller than rounding of its forces makes them. After a step below this the first one
+// is taken: normals are right to 1e-8 then.
 constexpr double kRest_m = 1e-13;
 // From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
 // may swing to and fro.
@@ -38,7 +39,7 @@ constexpr double kLeastShare = 0.125;
 // leads to where only the other is found, then hold together. As steps become smaller so does this, and what is found
 // in the end is theirs.
 constexpr int kToAndFro = 6;
-constexpr double kBesideAtMost_m = 1e-5;
+constexpr double kBesideAtMost_m = 1e-3;
 // And at so many pairs of features, some 15 ns each: a step among hundreds of them took up to 50 ms.
 constexpr int kLooks = 60000;
 // What the wrench may lack after the last step of the iteration: of 10 N, a third of 1e-10 N.
@@ -350,7 +351,7 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
       collected_ = false;
       return solved;
     }
-    if (shared_->bends && solved && !roughly && beside_ <= beside_m && size < rest) {
+    if (solved && !roughly && beside_ <= beside_m && size < rest) {
       rest = size;
       resting = q;
       collect_contacts();
