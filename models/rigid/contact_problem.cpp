@@ -258,6 +258,11 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
     y = start;
     solved = newton(rows, y, size, 25);
   }
+  const bool slippery = std::all_of(rows.begin(), rows.end(), [](const Row& row) { return row.mu == 0.0; });
+  if (!solved && slippery) {
+    solved = without_friction(rows, y);
+    if (!solved) y = start;
+  }
   for (int attempt = 0; attempt < kAttempts && !solved && !exhausted(); ++attempt) {
     if (attempt == 0) {
       for (Row& row : rows) row.f.setZero();

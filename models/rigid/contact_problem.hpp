@@ -94,6 +94,7 @@ class ContactProblem {
   static void go_to(const Iterate& a, Rows rows, Twist& y) noexcept;
   // a + share (b − a)
   static void go_to(const Iterate& a, const Iterate& b, double share, Rows rows, Twist& y) noexcept;
+  static bool without_friction(Rows rows, Twist& y) noexcept;
   bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
   double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;
 

@@ -20,7 +20,9 @@ constexpr int kBudget = 400, kHard = 40;
 // Beside that, so many contacts may be looked at in local problems, and so many more for each part of the step: some
 // 0.2 µs each. Without it local problems that have no solution took up to 13 ms of a cycle.
 constexpr int kWork = 1200, kWorkOfPart = 60;
-constexpr double kIdle = 1e-3;    // of the greatest force: what bears less may be left out where nothing else helps
+// What bears less than this share of the greatest force may be left out where nothing else helps, so often in a step.
+constexpr double kIdle = 1e-3;
+constexpr int kFewer = 6;
 constexpr int kWorkInside = 600;  // of hollow objects, where a look costs 0.5 µs and most steps take thirty
 // Newton's iteration with the gaps' curvature: what comes before a step of this size needn't be exact. A local problem
 // that is solved to this share of the last step leads as near.
@@ -261,7 +263,7 @@ bool RigidWorld::solve_fewer(const ToolPose& pose, const Twist& e, double rough,
     std::swap(of_linear_[k], of_linear_[bearing]);
     ++bearing;
   }
-  if (bearing == 0 || bearing == linear_count_) return false;
+  if (bearing == 0 || bearing == linear_count_ || --fewer_ < 0) return false;
   problem_.allow(kWork / 2);
   if (!problem_.solve(e, {linear_.data(), bearing}, delta, rough)) return false;
   for (std::size_t k = bearing; k < linear_count_; ++k) {
@@ -422,6 +424,7 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   const ToolPose goal = whole ? p_hat : moved(q, difference(p_hat, q) * (kMostParts / wanted));
   budget_ = kBudget + 8 * parts;
   looks_ = kLooks;
+  fewer_ = kFewer;
   allow_for(parts);
   bool fine = in_parts(goal, q, parts, q_);
   if (fine && gives_energy(q)) {

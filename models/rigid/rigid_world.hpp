@@ -183,6 +183,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
   int looks_ = 0;         // pairs that it may still look at
+  int fewer_ = 0;         // local problems that it may still try with fewer contacts
   ToolPose clear_at_;
   double clearance_ = -1.0;
 

@@ -1,0 +1,131 @@
+// The local problem without friction: y is the point nearest to 0 in the intersection of half-spaces H_n y + b_n ≥ 0.
+//
+// Goldfarb and Idnani's dual method ("A numerically stable dual method for solving strictly convex quadratic programs",
+// 1983) holds the half-spaces that are missed, one after the other, and lets go those whose force would become
+// negative; it ends after finitely many steps wherever there is a solution, however nearly the contacts depend on each
+// other.
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "models/rigid/contact_problem.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// Half-spaces that are missed by less are held: a tenth of what a mesh's faces stand out by.
+constexpr double kHeld_m = 1e-14;
+// A normal of which less than this share is new depends on those that hold already: what is left of it is rounding.
+constexpr double kNew = 1e-7;
+constexpr int kMostChanges = 96;  // four for each contact
+
+class Holding {
+ public:
+  // In place of the normals that hold, their factors: N = Q R.
+  void set(std::span<const Twist> normals, std::span<const std::size_t> held) noexcept {
+    count_ = held.size();
+    R_.setZero();
+    for (std::size_t i = 0; i < count_; ++i) {
+      Twist q = normals[held[i]];
+      // Twice is enough.
+      for (int round = 0; round < 2; ++round) {
+        for (std::size_t j = 0; j < i; ++j) {
+          const double along = Q_[j].dot(q);
+          R_(static_cast<int>(j), static_cast<int>(i)) += along;
+          q -= along * Q_[j];
+        }
+      }
+      const double size = q.norm();
+      R_(static_cast<int>(i), static_cast<int>(i)) = size;
+      Q_[i] = q / size;
+    }
+  }
+  // What of a normal is new, and how the forces that hold change as its own grows by one.
+  [[nodiscard]] Twist beyond(const Twist& normal, std::array<double, 6>& change) const noexcept {
+    Twist z = normal;
+    std::array<double, 6> along{};
+    for (int round = 0; round < 2; ++round) {
+      for (std::size_t j = 0; j < count_; ++j) {
+        const double part = Q_[j].dot(z);
+        along[j] += part;
+        z -= part * Q_[j];
+      }
+    }
+    for (std::size_t k = count_; k-- > 0;) {
+      double sum = along[k];
+      for (std::size_t j = k + 1; j < count_; ++j) sum -= R_(static_cast<int>(k), static_cast<int>(j)) * change[j];
+      change[k] = sum / R_(static_cast<int>(k), static_cast<int>(k));
+    }
+    return z;
+  }
+
+ private:
+  std::array<Twist, 6> Q_;
+  Mat6 R_ = Mat6::Zero();
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
+  std::array<Twist, most> normals;
+  std::array<std::size_t, 6> held{};
+  std::array<double, 6> force{};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) normals[i] = rows[i].H.row(0).transpose();
+  y.setZero();
+  Holding holding;
+  for (int changes = 0; changes < kMostChanges;) {
+    std::size_t worst = rows.size();
+    double missed = -kHeld_m;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double gap = normals[i].dot(y) + rows[i].b[0];
+      if (!(gap < missed)) continue;
+      missed = gap;
+      worst = i;
+    }
+    if (worst == rows.size()) {
+      for (Row& row : rows) {
+        row.f.setZero();
+        row.state = ContactState::open;
+      }
+      for (std::size_t j = 0; j < count; ++j) {
+        rows[held[j]].f[0] = force[j];
+        rows[held[j]].state = force[j] > 0.0 ? ContactState::slip : ContactState::open;
+      }
+      return y.allFinite();
+    }
+    double own = 0.0;
+    for (bool holds = false; !holds; ++changes) {
+      if (changes >= kMostChanges) return false;
+      std::array<double, 6> change{};
+      holding.set({normals.data(), rows.size()}, {held.data(), count});
+      const Twist z = holding.beyond(normals[worst], change);
+      const bool is_new = count < held.size() && z.norm() > kNew * normals[worst].norm();
+      double growth = is_new ? -(normals[worst].dot(y) + rows[worst].b[0]) / z.dot(normals[worst])
+                             : std::numeric_limits<double>::infinity();
+      std::size_t let_go = count;
+      for (std::size_t j = 0; j < count; ++j) {
+        if (!(change[j] > 0.0) || force[j] / change[j] >= growth) continue;
+        growth = force[j] / change[j];
+        let_go = j;
+      }
+      if (!std::isfinite(growth)) return false;  // nothing is in all half-spaces
+      for (std::size_t j = 0; j < count; ++j) force[j] -= growth * change[j];
+      own += growth;
+      if (is_new) y += growth * z;
+      holds = let_go == count;
+      if (holds) {
+        held[count] = worst;
+        force[count++] = own;
+      } else {
+        --count;
+        held[let_go] = held[count];
+        force[let_go] = force[count];
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace proxarm::models
