@@ -56,6 +56,9 @@ class PoseAlgorithm {
 
   // From the next step on, of an object by its index in the scene. Precondition: finite and not negative.
   virtual void set_friction(std::int32_t /*object*/, double /*friction*/) noexcept {}
+  // Where a driven object is from the next step on, relative to where it was described, by its index in the scene; it
+  // moves there within that step. To be called once before each step in which it moves.
+  virtual void drive(std::int32_t /*object*/, const Pose& /*X*/) noexcept {}
 
   // Where the tool touches after the last step (empty: free). Valid until the next call.
   [[nodiscard]] virtual std::span<const PoseContact> contacts() const noexcept { return {}; }
@@ -66,9 +69,13 @@ class PoseAlgorithm {
   [[nodiscard]] virtual bool unresolved() const noexcept { return false; }
   [[nodiscard]] virtual bool squeezed() const noexcept { return false; }
 
-  // The smallest signed gap between tool and objects at a pose, metres; infinite if there is nothing. Not for the
-  // cycle.
+  // The smallest signed gap between tool and objects at a pose, metres; infinite if there is nothing. Objects that move
+  // are where they were in the last step. Not for the cycle.
   [[nodiscard]] virtual double clearance_m(const ToolPose& pose) const noexcept = 0;
+  // The same with scripted objects where they are at time_s; driven ones are left out.
+  [[nodiscard]] virtual double clearance_at_m(const ToolPose& pose, double /*time_s*/) const noexcept {
+    return clearance_m(pose);
+  }
 
   // Another one in the same state. Allocates.
   [[nodiscard]] virtual std::unique_ptr<PoseAlgorithm> clone() const = 0;

@@ -4,19 +4,6 @@
 
 namespace proxarm::models {
 
-// Gram–Schmidt orthonormalisation, twice. A rotation that is orthonormal within rounding stays as it is.
-Pose MovingObstacle::rigid(Pose X) noexcept {
-  auto R = X.linear();
-  const double off = (R.transpose() * R - Mat3::Identity()).cwiseAbs().maxCoeff();
-  if (!(off > 8.0 * std::numeric_limits<double>::epsilon())) return X;
-  for (int pass = 0; pass < 2; ++pass) {
-    R.col(0).normalize();
-    R.col(1) = (R.col(1) - R.col(0) * R.col(0).dot(R.col(1))).normalized();
-    R.col(2) = R.col(0).cross(R.col(1));
-  }
-  return X;
-}
-
 void MovingObstacle::go_from(const Pose& before) noexcept {
   rests_ = now_.matrix() == before.matrix();
   now_inverse_ = now_.inverse(Eigen::Isometry);
@@ -39,11 +26,8 @@ void MovingObstacle::set_time(double time_s, double period_s) noexcept {
   const bool shorter = period_s < whole_period_s_;
   if (!shorter) whole_period_s_ = period_s;
   if (scripted_) {
-    // If t − T is the previous step's time within rounding, that step's pose is taken, bit for bit.
-    const double begin_s = time_s - period_s;
-    const double rounding_s = 4.0 * std::numeric_limits<double>::epsilon() * (std::abs(time_s) + period_s);
-    const bool as_before = std::abs(begin_s - last_time_s_) <= rounding_s;
-    go_from(!(period_s > 0.0) ? now_ : as_before ? last_ : motion_.at(begin_s));
+    const bool as_before = follows(time_s, period_s, last_time_s_);
+    go_from(!(period_s > 0.0) ? now_ : as_before ? last_ : motion_.at(time_s - period_s));
   } else if (shorter) {
     Pose before = now_;
     const double share = period_s / whole_period_s_;

@@ -12,31 +12,11 @@
 #pragma once
 
 #include <memory>
-#include <numbers>
 
+#include "models/geometry/scripted_motion.hpp"
 #include "models/obstacles/obstacle.hpp"
 
 namespace proxarm::models {
-
-// A scripted motion, relative to where the object was described: a turn about a point, a shift and a swing.
-//   x(t) = c + R(ω t) (x − c) + v t + a sin(2π f t + φ)
-struct ScriptedMotion {
-  Vec3 velocity_m_per_s = Vec3::Zero();
-  Vec3 amplitude_m = Vec3::Zero();
-  double frequency_Hz = 0.0;
-  double phase_rad = 0.0;
-  Vec3 axis = Vec3::UnitZ();  // unit
-  Vec3 centre_m = Vec3::Zero();
-  double turn_rad_per_s = 0.0;
-
-  [[nodiscard]] Pose at(double time_s) const noexcept {
-    Pose X = Pose::Identity();
-    X.linear() = Eigen::AngleAxisd(turn_rad_per_s * time_s, axis).toRotationMatrix();
-    X.translation() = centre_m - X.linear() * centre_m + velocity_m_per_s * time_s +
-                      amplitude_m * std::sin(2.0 * std::numbers::pi * frequency_Hz * time_s + phase_rad);
-    return X;
-  }
-};
 
 class MovingObstacle final : public Obstacle {
  public:
@@ -48,7 +28,7 @@ class MovingObstacle final : public Obstacle {
   }
   // A driven object, which stands at `start` until drive() is called.
   MovingObstacle(std::unique_ptr<Obstacle> still, const Pose& start)
-      : still_(std::move(still)), now_(rigid(start)), driven_from_(now_) {
+      : still_(std::move(still)), now_(orthonormalised(start)), driven_from_(now_) {
     go_from(now_);
   }
 
@@ -56,7 +36,7 @@ class MovingObstacle final : public Obstacle {
   // each step. A rotation that isn't orthonormal to within rounding is made so.
   void drive(const Pose& X) noexcept {
     driven_from_ = now_;
-    now_ = rigid(X);
+    now_ = orthonormalised(X);
     go_from(driven_from_);
   }
 
@@ -108,7 +88,6 @@ class MovingObstacle final : public Obstacle {
   [[nodiscard]] bool presses_at(const Vec3& r) const noexcept override { return still_->presses_at(now_inverse_ * r); }
 
  private:
-  static Pose rigid(Pose X) noexcept;
   void go_from(const Pose& before) noexcept;
   [[nodiscard]] Vec3 from(const Vec3& q) const noexcept;
   [[nodiscard]] Vec3 to_W(const Vec3& r_O, const Vec3& q_O, const Vec3& q) const noexcept;

@@ -57,11 +57,13 @@ bool RigidWorld::add_bend(const Found& found, const ToolPose& pose, double force
   const Vec3 m = -found.touch.normal, x = found.touch.point - own.radius * m;
   Round round;
   bool is_tube = false;
+  const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
   with_flat_or_hollow(shared_->entries[pair.entry].object, [&](const auto& shape) {
-    round = round_at(shape, x);
+    round = round_at(shape, on == nullptr ? x : on->back(x));
     is_tube = std::is_same_v<std::decay_t<decltype(shape)>, HollowTube>;
   });
   if (!std::isfinite(round.curvature)) return false;
+  if (on != nullptr) round.P = on->R * round.P * on->R.transpose();
   const Mat3 across = round.curvature * (round.P - m * m.transpose());
   const Vec3 lever = x - pose.position;
   Eigen::Matrix<double, 3, 6> G;

@@ -264,7 +264,7 @@ std::optional<std::size_t> RigidWorld::pairs_with(const Part& part, const Triang
       // A valley of a closed mesh is touched by nothing sharp.
       const bool is_valley = side != 0.0 && !edge.line.open && edge.ridge != (side > 0.0);
       if (is_valley && !(own.radius > 0.0)) continue;
-      edge_with(own, e, seen_from(edge.line, at, edge.ridge ? 1.0 : -1.0), close, near, turn, add);
+      edge_with(own, e, edge_in_T(edge.line, at, edge.ridge ? 1.0 : -1.0), close, near, turn, add);
     }
   }
   return close.faces().size();
@@ -272,7 +272,7 @@ std::optional<std::size_t> RigidWorld::pairs_with(const Part& part, const Triang
 
 void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept {
   const Entry& e = shared_->entries[entry];
-  const View at = view(pose);
+  const View at = seen_from(entry, view(pose));
   const double around = shared_->reach + reach;
   if (distance2_to_box(at.x, e.bounds) > around * around) return;
   for (std::size_t part = 0; part < shared_->parts.size() && !crowded_; ++part) {
@@ -346,8 +346,14 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
   }
   pair_count_ = pressed_count_ = near_faces_ = 0;
   crowded_ = false;
-  for (std::size_t entry = 0; entry < shared_->entries.size(); ++entry) {
+  for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
     gather_entry(static_cast<std::uint16_t>(entry), pose, reach);
+  }
+  still_count_ = pair_count_;
+  for (std::size_t entry = shared_->first_moving; entry < shared_->entries.size(); ++entry) {
+    gather_entry(static_cast<std::uint16_t>(entry), pose, reach);
+    Moving& m = moving(static_cast<std::uint16_t>(entry));
+    m.gathered = m.mover.at().back(pose);
   }
   gathered_at_ = pose;
   gathered_reach_ = reach;

@@ -16,14 +16,13 @@ inline constexpr double kLevel_m = 1e-13;
 
 // Where the tool is.
 struct View {
-  Mat3 R;
-  Vec3 x;
+  Mat3 R = Mat3::Identity();
+  Vec3 x = Vec3::Zero();
   [[nodiscard]] Vec3 operator*(const Vec3& p) const noexcept { return R * p + x; }
   [[nodiscard]] Vec3 to_T(const Vec3& p) const noexcept { return R.transpose() * (p - x); }
 };
 
 inline View view(const ToolPose& pose) noexcept { return {pose.orientation.toRotationMatrix(), pose.position}; }
-
 inline EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
   const Solid::Edge& e = solid.edges[i];
   return {solid.points[e.from], solid.points[e.to], e.left, e.right, false};
@@ -33,7 +32,7 @@ inline EdgeLine moved_edge(const EdgeLine& edge, const View& at) noexcept {
   return {at * edge.from, at * edge.to, at.R * edge.left, at.R * edge.right, edge.open};
 }
 // In T; `outwards` is −1 where the faces' normals are to be turned round.
-inline EdgeLine seen_from(const EdgeLine& edge, const View& at, double outwards) noexcept {
+inline EdgeLine edge_in_T(const EdgeLine& edge, const View& at, double outwards) noexcept {
   const Mat3 R = at.R.transpose();
   return {at.to_T(edge.from), at.to_T(edge.to), outwards * (R * edge.left), outwards * (R * edge.right), edge.open};
 }

@@ -48,10 +48,14 @@ double RigidWorld::signed_start(const Pair& pair, const View& at) const noexcept
 
 void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
   from_ = q_old;
-  const View at = view(q_old);
+  const View at_W = view(q_old);
+  for (std::size_t i = 0; i < moving_.size(); ++i) {
+    moving_[i].from = seen_from(static_cast<std::uint16_t>(shared_->first_moving + i), at_W);
+  }
   for (std::size_t i = 0; i < pair_count_; ++i) {
     Pair& pair = pairs_[i];
     if (pair.kind != Kind::point_face && pair.kind != Kind::face_point && pair.kind != Kind::edges) continue;
+    const View& at = i < still_count_ ? at_W : moving(pair.entry).from;
     const RigidObject& object = shared_->entries[pair.entry].object;
     const bool is_mesh = std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
     const double own_radius = shared_->parts[pair.part].solid.radius;
@@ -99,7 +103,7 @@ bool RigidWorld::crossed(const Pair& pair, const Vec3& p) const noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
   const auto& mesh = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&shared_->entries[pair.entry].object.shape);
   const TriangleMesh::Face& face = face_of(mesh, pair.other);
-  const Vec3 was = view(from_) * own.points[pair.own];
+  const Vec3 was = (moves(pair.entry) ? moving(pair.entry).from : view(from_)) * own.points[pair.own];
   const double before = TriangleMesh::height(face, was), after = TriangleMesh::height(face, p);
   if (pair.pressed || before * after >= 0.0) return true;
   const Vec3 there = was + before / (before - after) * (p - was);
@@ -211,8 +215,14 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
 void RigidWorld::find(const ToolPose& pose) noexcept {
   found_count_ = 0;
   looks_ -= static_cast<int>(pair_count_);
-  const View at = view(pose);
-  for (std::size_t i = 0; i < pair_count_; ++i) {
+  const View at_W = view(pose);
+  for (std::size_t i = 0; i < moving_.size(); ++i) {
+    moving_[i].tool = seen_from(static_cast<std::uint16_t>(shared_->first_moving + i), at_W);
+  }
+  for (std::size_t i = first_pair(); i < pair_count_; ++i) {
+    const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
+    if (on != nullptr && !on->close) continue;
+    const View& at = on == nullptr ? at_W : on->tool;
     if (pairs_[i].kind == Kind::rim_field) remember_lowest(pairs_[i], at);
     evaluate(pairs_[i], at, [&](const Touch& t, int which) {
       if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far
@@ -222,12 +232,16 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
       }
       Found& found = found_[found_count_++];
       found.touch = t;
+      if (on != nullptr) {
+        found.touch.point = on->mover.at() * t.point;
+        found.touch.normal = on->mover.at().R * t.normal;
+      }
       found.pair = static_cast<std::uint16_t>(i);
       found.which = static_cast<std::uint8_t>(which);
       found.working = false;
     });
   }
-  drop_deeper(at);
+  drop_deeper(at_W);
 }
 
 // Two sharp edges that cross far behind each other hold nothing where another feature of the two solids keeps them
@@ -239,16 +253,18 @@ bool RigidWorld::beside(const Found& deep, const View& at) const noexcept {
   const Solid* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
   const Solid& own = shared_->parts[pair.part].solid;
   if (other == nullptr || own.radius + other->radius > 0.0) return false;
+  const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
   const double half = 0.5 * deep.touch.gap;
   for (std::size_t j = 0; j < found_count_; ++j) {
     const Pair& by = pairs_[found_[j].pair];
     const Vec3& n = found_[j].touch.normal;
     if (by.entry != pair.entry || by.part != pair.part || found_[j].touch.gap < half) continue;
     if (n.dot(deep.touch.normal) > 0.5) continue;
-    const Vec3 n_T = at.R.transpose() * n;
+    const Vec3 n_T = at.R.transpose() * n, n_O = on == nullptr ? n : Vec3(on->R.transpose() * n);
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (const Vec3& p : own.points) low = std::min(low, n_T.dot(p));
-    for (const Vec3& p : other->points) high = std::max(high, n.dot(p));
+    for (const Vec3& p : other->points) high = std::max(high, n_O.dot(p));
+    if (on != nullptr) high += n.dot(on->x);
     if (low + n.dot(at.x) - high > half) return true;
   }
   return false;

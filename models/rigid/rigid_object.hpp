@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <variant>
 #include <vector>
 
+#include "models/geometry/scripted_motion.hpp"
 #include "models/mesh/mesh.hpp"
 #include "models/rigid_shapes/touch.hpp"
 
@@ -53,12 +55,19 @@ class TriangleFeatures {
   std::vector<std::uint32_t> owned_edges_, first_edge_, owned_vertices_, first_vertex_;
 };
 
+// By a script, or driven from outside; relative to where the object was described.
+struct RigidMotion {
+  ScriptedMotion script;
+  bool driven = false;  // the script doesn't count
+};
+
 struct RigidObject {
-  // In W. A hollow one may need several: a box from inside is six sides.
+  // In W, where it was described. A hollow one may need several: a box from inside is six sides.
   std::variant<FlatSide, HollowSphere, HollowTube, Solid, std::shared_ptr<const TriangleFeatures>> shape;
   double friction = 0.0;
   std::int32_t object = 0;  // what contacts report
   bool inside_out = false;  // of a closed mesh: the tool is inside of it. Other shapes say that by themselves
+  std::optional<RigidMotion> motion{};
 };
 
 // Calls with the object's shape where that is one that a point alone is held by: flat or hollow. (std::visit may

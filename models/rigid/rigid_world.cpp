@@ -16,7 +16,7 @@ namespace {
 constexpr double kPart = 0.2;
 // A step may take so many poses; a local problem that has no solution, or none that is found, costs a hundred times
 // what one at hand does. What is left then counts as unresolved: the tool goes as far as the parts of the step got.
-constexpr int kBudget = 400, kHard = 40;
+constexpr int kBudget = 400, kHard = 40, kBudgetOfPart = 50;
 // Beside that, so many contacts may be looked at in local problems, and so many more for each part of the step: some
 // 0.2 µs each. Without it local problems that have no solution took up to 13 ms of a cycle.
 constexpr int kWork = 1200, kWorkOfPart = 60;
@@ -113,6 +113,9 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     const Bounds box = bounds_of(point, 0.0);
     shared->parts.push_back({std::move(point), box, {}});
   }
+  const auto first_moving =
+      std::stable_partition(objects.begin(), objects.end(), [](const RigidObject& object) { return !object.motion; });
+  shared->first_moving = static_cast<std::size_t>(first_moving - objects.begin());
   std::size_t corners = 0, own_corners = 0;
   for (RigidObject& object : objects) {
     if (!(object.friction >= 0.0 && std::isfinite(object.friction))) {
@@ -142,6 +145,10 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     }
     corners += std::holds_alternative<Solid>(object.shape) ? std::get_if<Solid>(&object.shape)->points.size() : 0;
     friction_.push_back(object.friction);
+    if (object.motion) {
+      const Vec3 middle = bounds.finite() ? Vec3(0.5 * (bounds.low + bounds.high)) : Vec3(Vec3::Zero());
+      moving_.push_back({object.motion->driven ? RigidMover(middle) : RigidMover(object.motion->script)});
+    }
     shared->entries.push_back({std::move(object), bounds, held});
   }
   for (const Part& part : shared->parts) own_corners += part.solid.points.size();
@@ -179,7 +186,8 @@ void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolP
     out.J.row(k).tail<3>() = lever.cross(axes.col(k));
   }
   // From where the tool's material point was.
-  const Vec3 slip = found.touch.point - q_old * (pose.orientation.conjugate() * lever);
+  const Vec3 slip = goes(pair.entry) ? slip_on(pair.entry, lever)
+                                     : Vec3(found.touch.point - q_old * (pose.orientation.conjugate() * lever));
   out.c << found.touch.gap, axes.col(1).dot(slip), axes.col(2).dot(slip);
   out.mu = without_friction_ ? 0.0 : friction(pair);
   const Vec3* force = found.which == 0 ? (pair.pressed ? &pair.force_W : nullptr) : last_force(found.pair, found.which);
@@ -212,6 +220,7 @@ double RigidWorld::worst_passed(const Twist& xi, const ToolPose& pose) const noe
 bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough,
                               Twist& delta) noexcept {
   const Twist e_coupled = couple(pose, e);
+  see_slip(pose, q_old);
   linear_count_ = 0;
   bool solved = true;
   delta = -e;
@@ -316,7 +325,8 @@ void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
 
 // From a pose on, until nothing moves.
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
-  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach);
+  const double rounding =
+      4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach + extent_m_);
   double last = std::numeric_limits<double>::infinity(), share = 1.0, rest = kRest_m;
   ToolPose resting;
   collected_ = false;
@@ -364,26 +374,40 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
   return collected_;
 }
 
-bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept {
-  const Twist way = difference(p_hat, q_old);
-  const double far = motion(p_hat, q_old);
+// Where a part has no solution, another one may: none may take what the last one needs.
+void RigidWorld::share_out(bool last) noexcept {
+  budget_ = last ? kBudget : kBudgetOfPart;
+  problem_.allow(last ? kWork : 2 * kWorkOfPart);
+}
+
+bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
+  const bool comes = something_comes();
   ToolPose reached = q_old;
-  overflow_ = false;
+  overflow_ = squeezed_ = false;
+  let_go(0.0);
   set_sides(q_old, far / parts);
   for (int k = 1; k <= parts; ++k) {
     if (crowded_) {  // what isn't known may be in the way
       q = reached;
       return false;
     }
-    const ToolPose p = k == parts ? p_hat : moved(q_old, way * (static_cast<double>(k) / parts));
+    const double share = static_cast<double>(k) / parts;
+    let_go(share);
+    const ToolPose p = k == parts ? p_hat : on_the_way(p_hat, q_old, share);
+    if (comes) share_out(k == parts);
     ToolPose next = reached;
     if (!settle(p, q_old, next)) {
-      q = reached;
-      return false;
+      // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
+      const bool on = comes && (overflow_ = false, give_way(reached)) && k < parts;
+      if (!on) {
+        q = reached;
+        return false;
+      }
+      next = reached;
     }
     reached = next;
     if (k < parts) {
-      if (motion(reached, gathered_at_) > 0.5 * gathered_reach_) gather(reached, gathered_reach_);
+      if (came_m(reached) > 0.5 * gathered_reach_) gather(reached, gathered_reach_);
       set_sides(reached, far / parts);
     }
   }
@@ -398,21 +422,26 @@ void RigidWorld::forget() noexcept {
 }
 
 const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {
+  advance(K, p_hat, q);
+  for (Moving& m : moving_) m.mover.arrive();
+  return q_;
+}
+
+void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {
   count_ = 0;
-  unresolved_ = overflow_ = false;
+  unresolved_ = overflow_ = squeezed_ = false;
   if (motion(q, q_) > kFront_m) forget();
-  const double far = motion(p_hat, q);
-  if (clearance_ > 0.0 && motion(q, clear_at_) + far < clearance_) {
+  const double far = moving_.empty() ? motion(p_hat, q) : let_come(p_hat, q);
+  if (clearance_ > 0.0 && came_m(q) + far < clearance_) {
     q_ = p_hat;
-    return q_;
+    return;
   }
-  if (crowded_ || !(motion(q, gathered_at_) + 2.0 * far < gathered_reach_)) gather_for(q, far);
+  if (crowded_ || !(came_m(q) + 2.0 * far < gathered_reach_)) gather_for(q, far);
   clearance_ = -1.0;
   if (pair_count_ == 0) {
-    clear_at_ = gathered_at_;
     clearance_ = gathered_reach_;
     q_ = p_hat;
-    return q_;
+    return;
   }
   K_ = K;
   problem_.set_stiffness(K);
@@ -426,11 +455,13 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
   looks_ = kLooks;
   fewer_ = kFewer;
   allow_for(parts);
-  bool fine = in_parts(goal, q, parts, q_);
+  // (far shrinks with the goal only where nothing moves)
+  const double to_goal = moving_.empty() && !whole ? motion(goal, q) : far;
+  bool fine = in_parts(goal, q, to_goal, parts, q_);
   if (fine && gives_energy(q)) {
-    look_again(goal, q, parts);
-  } else if (!fine && budget_ > 0) {
-    fine = in_smaller_parts(goal, q, parts, q_);
+    look_again(goal, q, to_goal, parts);
+  } else if (!fine && budget_ > 0 && finer(parts) > 1) {
+    fine = in_smaller_parts(goal, q, to_goal, parts, q_);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
@@ -442,14 +473,13 @@ const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const Too
     problem_.allow(kWork);
     without_friction_ = true;
     const ToolPose reached = q_;
-    fine = in_parts(goal, q, parts, q_);
+    fine = in_parts(goal, q, to_goal, parts, q_);
     without_friction_ = false;
     if (!fine) q_ = reached;
   }
   beside_ = beside_m;
   unresolved_ = !lawful || !whole || overflow_ || crowded_;
   report(q);
-  return q_;
 }
 
 // What the local problems of so many parts may cost.
@@ -457,40 +487,60 @@ void RigidWorld::allow_for(int parts) noexcept {
   problem_.allow((shared_->hollow ? kWorkInside : kWork) + kWorkOfPart * parts);
 }
 
-bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept {
-  allow_for(8 * parts);
+// How many smaller parts are made of one. What comes fast takes many parts already.
+int RigidWorld::finer(int parts) const noexcept {
+  return something_comes() ? std::clamp(kMostParts / 2 / parts, 1, 8) : 8;
+}
+
+bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts,
+                                  ToolPose& q) noexcept {
+  parts *= finer(parts);
+  allow_for(parts);
+  let_go(0.0);
   gather(q_old, gathered_reach_);
-  return in_parts(p_hat, q_old, 8 * parts, q);
+  return in_parts(p_hat, q_old, far, parts, q);
 }
 
 // In smaller parts; if they lead nowhere, what was found stays.
-void RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, int parts) noexcept {
+void RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
+  if (finer(parts) == 1) return;
   const ToolPose found = q_;
   const std::array<PoseContact, ContactProblem::most> contacts = contacts_;
+  const std::array<std::uint16_t, ContactProblem::most> of_contact = of_contact_;
   const std::size_t count = count_;
-  if (in_smaller_parts(p_hat, q_old, parts, q_)) return;
+  const bool rides = rides_;
+  if (in_smaller_parts(p_hat, q_old, far, parts, q_)) return;
+  let_go(1.0);
+  squeezed_ = false;
   q_ = found;
   contacts_ = contacts;
+  of_contact_ = of_contact;
   count_ = count;
+  rides_ = rides;
   collected_ = true;
 }
 
 // Whether the contacts' work since q(k−1) is above 0 by more than what is of second order in the step: the way of a
 // point that turns by θ at a lever bends by θ² lever/2, a normal turns by θ while the point goes on by s, and something
 // round falls off by s²/2r. That is so of solutions on another side than the one that the tool came to: of a face, say,
-// which it was below and beside.
+// which it was below and beside. An object that moves does honest work, too: with it only what the tool moves relative
+// to it counts.
 bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
   if (!collected_) collect_contacts();
   if (count_ == 0) return false;
   const View now = view(q_), old = view(q_old);
   double work = 0.0, bends = 0.0;
-  const double turned = rotation_vector(q_.orientation * q_old.orientation.conjugate()).norm();
+  const double turned_W = rotation_vector(q_.orientation * q_old.orientation.conjugate()).norm();
+  see_slip(q_, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     const PoseContact& contact = contacts_[k];
     const double force = contact.force_W.norm();
     if (force == 0.0) continue;
-    const Vec3 way = contact.point_W - old * now.to_T(contact.point_W);
+    const std::uint16_t entry = of_contact_[k];
+    const Vec3 way = goes(entry) ? slip_on(entry, contact.point_W - q_.position)
+                                 : Vec3(contact.point_W - old * now.to_T(contact.point_W));
     const double s = way.norm(), lever = (contact.point_W - q_.position).norm();
+    const double turned = goes(entry) ? moving(entry).turned.norm() : turned_W;
     work += contact.force_W.dot(way);
     bends += force * (turned * (0.5 * turned * lever + s) + 0.5 * bend_[k] * s * s);
   }
@@ -508,6 +558,7 @@ double RigidWorld::bend_per_m(const Pair& pair) const noexcept {
 void RigidWorld::collect_contacts() noexcept {
   count_ = 0;
   collected_ = true;
+  rides_ = false;
   for (std::size_t k = 0; k < linear_count_; ++k) {
     const Found& found = found_[of_linear_[k]];
     const Pair& pair = pairs_[found.pair];
@@ -522,15 +573,19 @@ void RigidWorld::collect_contacts() noexcept {
     contact.force_W = axes_[k] * linear_[k].f;
     contact.gap_m = found.touch.gap;
     contact.friction = friction(pair);
+    of_contact_[count_ - 1] = pair.entry;
     bend_[count_ - 1] = bend_per_m(pair);
+    rides_ = rides_ || goes(pair.entry);
   }
 }
 
 void RigidWorld::report(const ToolPose& q_old) noexcept {
   if (!collected_) collect_contacts();
   if (count_ == 0) return;
+  const double rounding =
+      8.0 * std::numeric_limits<double>::epsilon() * (q_old.position.lpNorm<1>() + shared_->reach + extent_m_);
+  if (rides_) return judge_slips(q_old, rounding);
   // What sticks stays, bit for bit.
-  const double rounding = 8.0 * std::numeric_limits<double>::epsilon() * (q_old.position.lpNorm<1>() + shared_->reach);
   if (motion(q_, q_old) > rounding) return;
   q_ = q_old;
   for (std::size_t k = 0; k < count_; ++k) contacts_[k].slips = false;
@@ -538,19 +593,26 @@ void RigidWorld::report(const ToolPose& q_old) noexcept {
 
 double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
   RigidWorld copy(*this);
+  for (Moving& m : copy.moving_) m.close = true;
+  return copy.least_gap_m(pose);
+}
+
+// Of all objects that are close, wherever they are.
+double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
   constexpr double first_m = 1e-3, furthest_m = 1e6, nearest_m = 1e-9;
   double least = std::numeric_limits<double>::infinity(), empty = 0.0;
+  riding_ = nobody;
   for (double far = first_m; far < furthest_m && far > nearest_m;) {
-    copy.pair_count_ = 0;
-    copy.gather(pose, far);
-    if (copy.crowded_) {  // nearer, or else what was empty last is all that is known
+    pair_count_ = 0;
+    gather(pose, far);
+    if (crowded_) {  // nearer, or else what was empty last is all that is known
       if (empty > 0.0) return std::min(empty, overlap_m(pose));
       far *= 0.25;
       continue;
     }
-    copy.set_sides(pose, 0.0);
-    copy.find(pose);
-    for (std::size_t i = 0; i < copy.found_count_; ++i) least = std::min(least, copy.found_[i].touch.gap);
+    set_sides(pose, 0.0);
+    find(pose);
+    for (std::size_t i = 0; i < found_count_; ++i) least = std::min(least, found_[i].touch.gap);
     if (least < far) break;
     empty = far;
     far *= 4.0;
@@ -562,15 +624,22 @@ double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
 // that says nothing.
 double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
   double deepest = std::numeric_limits<double>::infinity();
-  Pose X = Pose::Identity();
-  X.linear() = pose.orientation.toRotationMatrix();
-  X.translation() = pose.position;
-  for (const Entry& entry : shared_->entries) {
-    const auto* solid = std::get_if<Solid>(&entry.object.shape);
-    const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
+  for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
+    const Entry& e = shared_->entries[i];
+    const auto* solid = std::get_if<Solid>(&e.object.shape);
+    const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
+    const auto entry = static_cast<std::uint16_t>(i);
+    if ((solid == nullptr && mesh == nullptr) || (moves(entry) && !moving(entry).close)) continue;
+    const View at = seen_from(entry, view(pose));
+    const bool beyond = distance2_to_box(at.x, e.bounds) > shared_->reach * shared_->reach;
+    if (beyond && !e.object.inside_out)
+      continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)
+    Pose X = Pose::Identity();
+    X.linear() = at.R;
+    X.translation() = at.x;
     for (const Part& part : shared_->parts) {
       double gap = 0.0;
-      if (mesh != nullptr) gap = overlap_with(part, entry, (*mesh)->mesh(), X);
+      if (mesh != nullptr) gap = overlap_with(part, e, (*mesh)->mesh(), X);
       if (solid != nullptr && !(part.solid.faces.empty() && solid->faces.empty())) {
         gap = separation_of_hulls(part.solid, X, *solid);
         if (gap < 0.0) gap -= part.solid.radius + solid->radius;

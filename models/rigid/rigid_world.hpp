@@ -15,7 +15,10 @@
 //    q(k−1). A solution in which the contacts did work on the tool is on a side to which it didn't come: then the parts
 //    are made smaller.
 //
-// Objects stand still.
+// 4. An object that moves is touched in its own frame (rigid_motion.cpp): there the tool comes from where it was
+//    relative to where the object was. What was at rest on it moves with it, and slip is what a material point of the
+//    tool has moved beyond that. Parts of a step divide both motions. What can't reach the tool within a step isn't
+//    looked at. Where the tool has no room left, it is squeezed.
 //
 // Friction between a part with a friction of its own and an object: √(μ_tool μ_object); otherwise the object's.
 #pragma once
@@ -29,6 +32,7 @@
 #include "models/geometry/pose_algorithm.hpp"
 #include "models/rigid/contact_problem.hpp"
 #include "models/rigid/rigid_features.hpp"
+#include "models/rigid/rigid_mover.hpp"
 
 namespace proxarm::models {
 
@@ -41,14 +45,18 @@ class RigidWorld final : public PoseAlgorithm {
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
-  [[nodiscard]] bool wants_time() const noexcept override { return false; }
+  void set_time(const StepTime& time) noexcept override;
+  [[nodiscard]] bool wants_time() const noexcept override { return !moving_.empty(); }
   void set_friction(std::int32_t object, double friction) noexcept override;
+  void drive(std::int32_t object, const Pose& X) noexcept override;
 
   [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {contacts_.data(), count_}; }
   [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
+  [[nodiscard]] bool squeezed() const noexcept override { return squeezed_; }
   // Where more is near than a step has room for, a lower bound. Between corners that face each other, where no feature
   // holds another one, more than their distance.
   [[nodiscard]] double clearance_m(const ToolPose& pose) const noexcept override;
+  [[nodiscard]] double clearance_at_m(const ToolPose& pose, double time_s) const noexcept override;
   [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<RigidWorld>(*this); }
   void copy_state(const PoseAlgorithm& other) noexcept override { *this = dynamic_cast<const RigidWorld&>(other); }
 
@@ -99,12 +107,13 @@ class RigidWorld final : public PoseAlgorithm {
   };
   struct Shared {  // constant
     std::vector<Part> parts;
-    std::vector<Entry> entries;
-    double reach = 0.0;     // of the tool's points from the reference point
-    double thinness = 0.0;  // the least thickness of the tool's parts
-    bool hollow = false;    // a sphere or a tube
-    bool bends = false;     // something is hollow, or the tool has rims: gaps' curvature counts
-    bool dense = false;     // there is a mesh, or there are many solids
+    std::vector<Entry> entries;    // first those that stand still
+    std::size_t first_moving = 0;  // of the entries
+    double reach = 0.0;            // of the tool's points from the reference point
+    double thinness = 0.0;         // the least thickness of the tool's parts
+    bool hollow = false;           // a sphere or a tube
+    bool bends = false;            // something is hollow, or the tool has rims: gaps' curvature counts
+    bool dense = false;            // there is a mesh, or there are many solids
   };
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 512;
@@ -112,8 +121,38 @@ class RigidWorld final : public PoseAlgorithm {
   static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
 
   class NearFaces;
+  // Of an entry that moves.
+  struct Moving {
+    RigidMover mover;
+    bool close = true;                                // may meet the tool in this step
+    ToolPose gathered{};                              // the tool, seen from the object, when the pairs were gathered
+    View tool{}, from{};                              // seen from the object: now, and where the sides were taken
+    Vec3 slid = Vec3::Zero(), turned = Vec3::Zero();  // of the tool since q(k−1), seen from the object; m, rad
+  };
   [[nodiscard]] double motion(const ToolPose& a, const ToolPose& b) const noexcept;
 
+  [[nodiscard]] bool moves(std::uint16_t entry) const noexcept { return entry >= shared_->first_moving; }
+  [[nodiscard]] bool goes(std::uint16_t entry) const noexcept { return moves(entry) && !moving(entry).mover.rests(); }
+  [[nodiscard]] Moving& moving(std::uint16_t entry) noexcept { return moving_[entry - shared_->first_moving]; }
+  [[nodiscard]] const Moving& moving(std::uint16_t entry) const noexcept {
+    return moving_[entry - shared_->first_moving];
+  }
+  [[nodiscard]] View seen_from(std::uint16_t entry, const View& tool) const noexcept;
+  [[nodiscard]] double room_m(std::uint16_t entry, const ToolPose& pose) const noexcept;
+  [[nodiscard]] double let_come(const ToolPose& p_hat, const ToolPose& q) noexcept;
+  [[nodiscard]] std::size_t alone_with(const ToolPose& q, double near) const noexcept;
+  [[nodiscard]] ToolPose on_the_way(const ToolPose& p_hat, const ToolPose& q_old, double share) const noexcept;
+  [[nodiscard]] std::size_t first_pair() const noexcept { return riding_ == nobody ? 0 : still_count_; }
+  [[nodiscard]] double came_m(const ToolPose& q) const noexcept;
+  void let_go(double share) noexcept;
+  [[nodiscard]] bool something_comes() const noexcept;
+  [[nodiscard]] bool has_room(const ToolPose& pose) noexcept;
+  bool give_way(ToolPose& q) noexcept;
+  [[nodiscard]] double least_gap_m(const ToolPose& pose) noexcept;
+  void see_slip(const ToolPose& pose, const ToolPose& q_old) noexcept;
+  [[nodiscard]] Vec3 slip_on(std::uint16_t entry, const Vec3& lever) const noexcept;
+
+  void advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept;
   void forget() noexcept;
   void gather_for(const ToolPose& q, double far) noexcept;
   void gather(const ToolPose& pose, double reach) noexcept;
@@ -158,25 +197,30 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
   void balance(const Twist& e, Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
-  bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
+  void share_out(bool last) noexcept;
+  bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
   void allow_for(int parts) noexcept;
-  bool in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, int parts, ToolPose& q) noexcept;
-  void look_again(const ToolPose& p_hat, const ToolPose& q_old, int parts) noexcept;
+  [[nodiscard]] int finer(int parts) const noexcept;
+  bool in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
+  void look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept;
   [[nodiscard]] bool gives_energy(const ToolPose& q_old) noexcept;
   [[nodiscard]] double bend_per_m(const Pair& pair) const noexcept;
   void collect_contacts() noexcept;
   void report(const ToolPose& q_old) noexcept;
+  void judge_slips(const ToolPose& q_old, double rounding) noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
   [[nodiscard]] static double overlap_with(const Part& part, const Entry& entry, const TriangleMesh& mesh,
                                            const Pose& X) noexcept;
 
   std::shared_ptr<const Shared> shared_;
   std::vector<double> friction_;  // of each entry, as it is now
+  std::vector<Moving> moving_;    // of each entry that moves
 
   ToolPose q_;
   std::array<Pair, most_pairs> pairs_;
   std::size_t pair_count_ = 0;
-  ToolPose from_;  // where the sides were taken
+  std::size_t still_count_ = 0;  // of them; the others are with entries that move
+  ToolPose from_;                // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
   std::size_t face_room_ = most_faces, near_faces_ = 0;
@@ -184,7 +228,6 @@ class RigidWorld final : public PoseAlgorithm {
   int budget_ = 0;        // poses that this step may still take
   int looks_ = 0;         // pairs that it may still look at
   int fewer_ = 0;         // local problems that it may still try with fewer contacts
-  ToolPose clear_at_;
   double clearance_ = -1.0;
 
   std::array<Found, most_found> found_;
@@ -200,9 +243,14 @@ class RigidWorld final : public PoseAlgorithm {
 
   std::array<PoseContact, ContactProblem::most> contacts_;
   std::array<double, ContactProblem::most> bend_;  // of each contact, 1/m: 1/radius where tool or object is round
+  std::array<std::uint16_t, ContactProblem::most> of_contact_{};  // the entries
   std::size_t count_ = 0;
   bool collected_ = false;  // of a pose before the last one that was tried
-  bool unresolved_ = false, overflow_ = false;
+  bool unresolved_ = false, overflow_ = false, squeezed_ = false;
+  bool rides_ = false;  // the last contacts are with something that moves
+  static constexpr std::size_t nobody = static_cast<std::size_t>(-1);
+  std::size_t riding_ = nobody;    // in moving_: what is near in this step, alone
+  double extent_m_ = 0.0;          // of the coordinates of what moves
   bool without_friction_ = false;  // in the present attempt
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
 };

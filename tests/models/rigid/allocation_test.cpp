@@ -24,6 +24,7 @@ TEST(RigidWorld, StepsAndCopiesWithoutAllocating) {
   objects[2].shape = solid_of(CapsuleTool{0.1, 0.02}, isometry({{-0.05, 0.0, 0.01}, Quaternion::Identity()}));
   objects[3].shape = HollowSphere{Vec3::Zero(), 0.15};
   for (RigidObject& object : objects) object.friction = 0.3;
+  objects[2].motion.emplace().script = {.amplitude_m = {0.02, 0.0, 0.01}, .frequency_Hz = 3.0, .turn_rad_per_s = 2.0};
   RigidWorld g({{{BoxTool{{0.02, 0.03, 0.02}}, Pose::Identity(), {}}}}, std::move(objects));
   const std::unique_ptr<PoseAlgorithm> other = g.clone();
   Random random(17);
@@ -37,6 +38,7 @@ TEST(RigidWorld, StepsAndCopiesWithoutAllocating) {
     Twist way;
     way << random.log_arrow(1e-7, 5e-3), random.log_arrow(1e-7, 5e-2);
     way.z() -= 1e-4;
+    g.set_time({.time_s = 1e-3 * k, .period_s = 1e-3});
     q = g.step(K, moved(q, way), q);
     contacts += g.contacts().size();
     if (k % 100 == 0) other->copy_state(g);
