@@ -38,7 +38,7 @@ SummaryConfig summary_config(const command_line::PreparedSession& session) {
 }
 
 void complete(CycleRecord& record, const command_line::PreparedSession& session, std::int64_t rendered_ns) {
-  if (session.rigid) return add_clearances(record, *session.rigid);
+  if (session.rigid) return add_clearances(record, *session.rigid, rendered_ns);
   add_clearances(record, session.scene, rendered_ns);
   if (!session.impedance()) return;
   if (record.contact_object >= 0 && static_cast<std::size_t>(record.contact_object) < session.scene.objects.size()) {

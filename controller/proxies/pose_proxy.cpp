@@ -70,7 +70,13 @@ void PoseProxy::start(const ToolPose& q, double time_s) noexcept {
   move_.setZero();
   wrench_W_.setZero();
   time_s_ = time_s;
+  tell_time();
   make_K();
+}
+
+// An object that moves comes, to the bit, from where the step before took it.
+void PoseProxy::tell_time() noexcept {
+  if (g_->wants_time()) g_->set_time({time_s_, config_.period_s});
 }
 
 void PoseProxy::resume(const ToolPose& q, const Twist& velocity_W) noexcept {
@@ -148,6 +154,7 @@ void PoseProxy::archive(fieldbus::StateArchive& state) noexcept {
   state(q_k1_.position, q_k1_.orientation, reference_.position, reference_.orientation, move_, wrench_W_, time_s_,
         config_.mass_kg, config_.inertia_kg_m2, config_.damping_Ns_per_m, config_.spring_N_per_m,
         config_.turning_damping_Nms_per_rad, config_.turning_spring_Nm_per_rad);
+  if (state.reading()) tell_time();
   make_K();
 }
 

@@ -82,6 +82,7 @@ class PoseProxy {
 
  private:
   void make_K() noexcept;
+  void tell_time() noexcept;
 
   PoseConfig config_;
   models::PoseAlgorithm* g_;

@@ -202,7 +202,7 @@ PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings
   return config;
 }
 
-// The friction of the scene's objects is then that of the tool's 𝒢.
+// The friction of the scene's objects is then that of the tool's 𝒢, and so are their places.
 std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes::CompiledScene& scene,
                                            const SessionSettings& settings) {
   std::unique_ptr<models::PoseAlgorithm> g = scenes::compile_rigid(*scene.source, scene.source->tool->shape);
@@ -210,6 +210,7 @@ std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes
   for (std::int32_t object = 0; static_cast<std::size_t>(object) < scene.frictions.size(); ++object) {
     scene.friction_setters.emplace_back(object, [&g = *g, object](double mu) { g.set_friction(object, mu); });
   }
+  scene.also_drive = [&g = *g](std::int32_t object, const models::Pose& X) { g.drive(object, X); };
   return std::make_unique<PoseWorld>(std::move(g), scene, pose_config(cell, settings));
 }
 

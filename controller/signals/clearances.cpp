@@ -12,9 +12,10 @@ void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_
   record.tool_clearance_m = scenes::tool_clearance_m(scene, tool_W, proxy_W, scene_time_s, scenes::Driven::left_out);
 }
 
-void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid) {
+void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid, std::int64_t rendered_ns) {
+  const double scene_time_s = static_cast<double>(rendered_ns) / 1e9;
   const auto clearance_m = [&](const Triple& x_W, const std::array<double, 4>& q) {
-    return rigid.clearance_m({vec3(x_W), models::Quaternion(q[3], q[0], q[1], q[2])});
+    return rigid.clearance_at_m({vec3(x_W), models::Quaternion(q[3], q[0], q[1], q[2])}, scene_time_s);
   };
   const bool truth = record.has(RecordFlag::truth);
   record.proxy_clearance_m = clearance_m(record.proxy_W_m, record.proxy_q_W);

@@ -15,6 +15,6 @@ void add_clearances(CycleRecord& record, const scenes::Scene& scene, std::int64_
 
 // The same of a rigid tool, by the poses of proxy and tool. Without the simulation's truth the tool is taken to have
 // the proxy's orientation: the record has no other.
-void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid);
+void add_clearances(CycleRecord& record, const models::PoseAlgorithm& rigid, std::int64_t rendered_ns);
 
 }  // namespace proxarm::controller

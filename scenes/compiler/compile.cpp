@@ -353,6 +353,7 @@ void CompiledScene::drive(std::size_t object, const models::Pose& X) noexcept {
   for (const auto& [index, part] : driven) {
     if (static_cast<std::size_t>(index) == object) part->drive(X_S);
   }
+  if (also_drive) also_drive(static_cast<std::int32_t>(object), X);
 }
 
 void CompiledScene::set_friction(std::size_t object, double friction) noexcept {

@@ -44,6 +44,8 @@ struct CompiledScene {
   // scene of fewer dimensions, only the part of X along its space counts.
   void drive(std::size_t object, const models::Pose& X) noexcept;
   std::vector<std::pair<std::int32_t, models::MovingObstacle*>> driven;  // parts of any_algorithm
+  // Who else wants to be told: 𝒢 of a rigid tool.
+  std::function<void(std::int32_t object, const models::Pose& X)> also_drive;
 
   // Sets an object's friction from the next step on, if has_friction(). Precondition: finite and not negative.
   void set_friction(std::size_t object, double friction) noexcept;

@@ -88,7 +88,6 @@ Shapes shapes_of(const Scene& scene, const Object& object) {
 std::string why_not_beside(const Object& object, const models::Tool& tool) {
   const std::string name = "\"" + object.name + "\"";
   if (object.layer) return "a rigid tool touches rigid objects only, and " + name + " has a layer";
-  if (object.motion) return "a rigid tool touches objects that stand still only, and " + name + " moves";
   if (!object.friction_regions.empty()) {
     return "a rigid tool feels one friction for all of an object, and " + name + " has regions";
   }
@@ -139,6 +138,9 @@ std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const m
       part.friction = scene.objects[i].friction;
       part.object = static_cast<std::int32_t>(i);
       part.inside_out = is_inside_out(scene.objects[i].shape);
+      if (const std::optional<Motion>& motion = scene.objects[i].motion) {
+        part.motion = models::RigidMotion{script_of(*motion), motion->driven};
+      }
       objects.push_back(std::move(part));
     }
   }

@@ -120,9 +120,15 @@ std::string explain_rigid(const Scene& scene) {
     if (part.friction) out << ", friction √(" << *part.friction << " μ) with an object's μ";
     out << "\n";
   }
-  for (const Object& object : scene.objects) out << "  " << object.name << ", rigid, μ = " << object.friction << "\n";
+  for (const Object& object : scene.objects) {
+    out << "  " << object.name << ", rigid, μ = " << object.friction
+        << (object.motion ? ", moves: touched in its own frame" : "") << "\n";
+  }
   if (scene.objects.empty()) out << "  nothing to touch: the pose goes where the wrench takes it\n";
   out << "skipped\n  pairs of features that are further apart than the steps to come reach\n";
+  const bool moves =
+      std::any_of(scene.objects.begin(), scene.objects.end(), [](const Object& object) { return object.motion; });
+  out << "  motion: " << (moves ? "of objects that can't reach the tool within a step" : "nothing moves") << "\n";
   tell_costs(scene, *g, out);
   return out.str();
 }

@@ -74,6 +74,39 @@ class RigidTool(ProgramTest):
             self.assertGreater(z, -1e-9)
             self.assertLessEqual(math.hypot(x, y), 0.4 * z * (1 + 1e-9) + 1e-9)
 
+    def test_a_box_rides_on_a_belt(self):
+        """It comes from above onto a plate that goes to and fro under it, and never into it."""
+        summary, rows = self.session("box_on_belt.yaml", "tip.yaml")
+        corners = [(sx * 0.06, sy * 0.04, 0.01 + sz * 0.02) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]
+        lowest = [min(placed(row, corner)[2] for corner in corners) for row in rows]
+        self.assertGreaterEqual(min(lowest), 0.55 - ROUNDING_M)
+        touching = [row for row in rows if row["contact"] != "free" and "unresolved" not in row["flags"]]
+        self.assertGreater(len(touching), 1000)
+        self.assertLessEqual(summary["unresolved_steps"], 8)  # of 8000
+        for row in touching:
+            x, y, z = vector(row, "contact_force_W", "N")
+            if int(row["contacts"]) == 1:
+                self.assertLessEqual(math.hypot(x, y), 0.4 * z * (1 + 1e-9) + 1e-9)
+
+    def test_what_sticks_to_a_belt_moves_as_the_belt_does(self):
+        """A soft hand presses the box down: friction takes it along until the hand pulls harder than that. (The hand of
+        tip.yaml draws it sideways whenever the belt turns round, so there it always slides.)"""
+        soft = self.written("press.yaml", (HANDS / "tip.yaml").read_text().split("waypoints:")[0].replace("500", "50") +
+                            "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0]}\n"
+                            "  - {time_s: 3, offset_m: [0, 0, -0.3]}\n")
+        _, rows = self.session("box_on_belt.yaml", soft)
+        belt = [0.15 * math.sin(math.pi / 2 * 1e-3 * (k + 1)) for k in range(len(rows))]  # after each row's step
+        corners = [(sx * 0.06, sy * 0.04, -0.01) for sx in (-1, 1) for sy in (-1, 1)]
+        flat = [k for k in range(1, len(rows)) if int(rows[k]["contacts"]) in (3, 4)]  # not tipping, nor at the post
+        riding = [k for k in flat if rows[k]["contact"] == "stick"]
+        sliding = [k for k in flat if rows[k]["contact"] == "slip"]
+        self.assertGreater(len(riding), 1000)
+        self.assertGreater(len(sliding), 1000)
+        for k in riding:
+            for corner in corners:
+                was, now = placed(rows[k - 1], corner), placed(rows[k], corner)
+                self.assertLessEqual(math.dist((was[0], was[1] + belt[k] - belt[k - 1], was[2]), now), ROUNDING_M)
+
     def test_the_torque_of_an_edge_is_felt(self):
         """While it leans on an edge at rest, the hand's torque is the contact's: to less than the sensor's noise."""
         still = self.written("lean.yaml", (HANDS / "tip.yaml").read_text().split("waypoints:")[0] + "waypoints:\n"

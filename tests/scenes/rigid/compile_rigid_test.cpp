@@ -45,6 +45,41 @@ TEST(CompileRigid, ABoxRestsOnAPlaneOfTheScene) {
   EXPECT_NEAR(g->clearance_m(q), 0.0, 1e-16);
 }
 
+TEST(CompileRigid, AnObjectMovesAsTheSceneSays) {
+  Scene scene = scene_of(BoxShape{Pose::Identity(), Vec3::Constant(0.2), true});
+  scene.objects[0].motion.emplace();
+  scene.objects[0].motion->velocity_m_per_s = Vec3(0.0, 0.0, 0.1);
+  const auto g = compile_rigid(scene, box(0.02));
+  EXPECT_TRUE(g->wants_time());
+  models::ToolPose q;
+  q.position.z() = -0.09;  // on the bottom of the hollow box, which lifts it
+  for (int k = 1; k <= 100; ++k) {
+    g->set_time({.time_s = 1e-3 * k, .period_s = 1e-3});
+    q = g->step(1e6 * models::Mat6::Identity(), q, q);
+  }
+  EXPECT_NEAR(q.position.z(), -0.08, 1e-12);
+  EXPECT_NEAR(g->clearance_at_m(q, 0.0), 0.01, 1e-12);
+  EXPECT_FALSE(compile_rigid(scene_of(PlaneShape{}), box(0.02))->wants_time());
+}
+
+TEST(CompileRigid, ADrivenObjectWaitsUntilItIsDriven) {
+  Scene scene = scene_of(BoxShape{Pose::Identity(), Vec3::Constant(0.2), false});
+  scene.objects[0].motion.emplace();
+  scene.objects[0].motion->driven = true;
+  scene.objects[0].motion->velocity_m_per_s = Vec3(0.0, 0.0, 0.1);  // doesn't count
+  const auto g = compile_rigid(scene, box(0.02));
+  models::ToolPose q;
+  q.position.z() = 0.11;
+  g->set_time({.time_s = 1e-3, .period_s = 1e-3});
+  q = g->step(1e6 * models::Mat6::Identity(), q, q);
+  EXPECT_EQ(q.position.z(), 0.11);
+  Pose X = Pose::Identity();
+  X.translation().z() = 1e-3;
+  g->drive(0, X);
+  q = g->step(1e6 * models::Mat6::Identity(), q, q);
+  EXPECT_NEAR(q.position.z(), 0.111, 1e-12);
+}
+
 // Along z, in steps of 2 mm, as far as it goes. The step that ends in touching without a force may be flagged: whether
 // a force of rounding acts there isn't decided. None else.
 double end_of_way(const Shape& shape, const Tool& tool, double from, double step) {
@@ -147,11 +182,6 @@ TEST(CompileRigid, RefusesAnObjectWithTheReason) {
   Scene scene = scene_of(PlaneShape{});
   scene.objects[0].layer = ElasticLayer{0.001, 500.0};
   expect_refused(scene, box(0.01), "layer", 7);
-  scene = scene_of(PlaneShape{});
-  scene.objects[0].motion.emplace();
-  expect_refused(scene, box(0.01), "moves", 7);
-  scene.objects[0].motion->driven = true;
-  expect_refused(scene, box(0.01), "moves", 7);
   scene = scene_of(PlaneShape{});
   scene.objects[0].friction_regions.emplace_back();
   expect_refused(scene, sphere(0.01), "regions", 7);
