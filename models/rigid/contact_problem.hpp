@@ -13,7 +13,8 @@
 // Semismooth Newton on y, with f as multipliers, solves a 6 × 6 system each time and converges in two to five; r is
 // large, so the multipliers settle in two. Where Newton cycles, projected Gauss-Seidel over the contacts (Jean and
 // Moreau's nonsmooth contact dynamics) leads it to the neighbourhood of a solution, and a line search keeps it there;
-// up to four contacts, all combinations of free, stick and slip are tried as a last resort. What is returned has passed
+// up to four contacts, all combinations of free, stick and slip are tried as a last resort. Without friction there is a
+// solution wherever gaps can be kept, and it is found (frictionless.cpp). What is returned has passed
 // the law's own test.
 #pragma once
 
@@ -94,7 +95,7 @@ class ContactProblem {
   static void go_to(const Iterate& a, Rows rows, Twist& y) noexcept;
   // a + share (b − a)
   static void go_to(const Iterate& a, const Iterate& b, double share, Rows rows, Twist& y) noexcept;
-  static bool without_friction(Rows rows, Twist& y) noexcept;
+  static bool without_friction(Rows rows, Twist& y) noexcept;  // false: nothing keeps all gaps
   bool enumerate(Rows rows, Twist& y, double size, int* different) noexcept;
   double make_rows(const Twist& e, std::span<const LinearContact> contacts) noexcept;
 

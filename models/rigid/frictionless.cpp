@@ -4,6 +4,7 @@
 // 1983) holds the half-spaces that are missed, one after the other, and lets go those whose force would become
 // negative; it ends after finitely many steps wherever there is a solution, however nearly the contacts depend on each
 // other.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -16,7 +17,9 @@ namespace {
 // Half-spaces that are missed by less are held: a tenth of what a mesh's faces stand out by.
 constexpr double kHeld_m = 1e-14;
 // A normal of which less than this share is new depends on those that hold already: what is left of it is rounding.
-constexpr double kNew = 1e-7;
+constexpr double kNew = 1e-6;
+// Such a one may be missed by a tenth of what a gap may be short of.
+constexpr double kMissed_m = 1e-13;
 constexpr int kMostChanges = 96;  // four for each contact
 
 class Holding {
@@ -51,15 +54,40 @@ class Holding {
         z -= part * Q_[j];
       }
     }
-    for (std::size_t k = count_; k-- > 0;) {
-      double sum = along[k];
-      for (std::size_t j = k + 1; j < count_; ++j) sum -= R_(static_cast<int>(k), static_cast<int>(j)) * change[j];
-      change[k] = sum / R_(static_cast<int>(k), static_cast<int>(k));
-    }
+    change = weights(along);
     return z;
+  }
+  // The point nearest to 0 at which all that hold touch: Nᵀy = −b.
+  [[nodiscard]] Twist place(const std::array<double, 6>& b) const noexcept {
+    Twist y = Twist::Zero();
+    std::array<double, 6> x{};
+    for (std::size_t k = 0; k < count_; ++k) {
+      double sum = -b[k];
+      for (std::size_t j = 0; j < k; ++j) sum -= R_(static_cast<int>(j), static_cast<int>(k)) * x[j];
+      x[k] = sum / R_(static_cast<int>(k), static_cast<int>(k));
+      y += x[k] * Q_[k];
+    }
+    return y;
+  }
+  // The forces of those that hold, whose sum is y.
+  [[nodiscard]] std::array<double, 6> forces(const Twist& y) const noexcept {
+    std::array<double, 6> along{};
+    for (std::size_t j = 0; j < count_; ++j) along[j] = Q_[j].dot(y);
+    return weights(along);
   }
 
  private:
+  // R x = a.
+  [[nodiscard]] std::array<double, 6> weights(const std::array<double, 6>& a) const noexcept {
+    std::array<double, 6> x{};
+    for (std::size_t k = count_; k-- > 0;) {
+      double sum = a[k];
+      for (std::size_t j = k + 1; j < count_; ++j) sum -= R_(static_cast<int>(k), static_cast<int>(j)) * x[j];
+      x[k] = sum / R_(static_cast<int>(k), static_cast<int>(k));
+    }
+    return x;
+  }
+
   std::array<Twist, 6> Q_;
   Mat6 R_ = Mat6::Zero();
   std::size_t count_ = 0;
@@ -71,6 +99,7 @@ bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
   std::array<Twist, most> normals;
   std::array<std::size_t, 6> held{};
   std::array<double, 6> force{};
+  std::array<bool, most> depends{};
   std::size_t count = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) normals[i] = rows[i].H.row(0).transpose();
   y.setZero();
@@ -80,7 +109,7 @@ bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
     double missed = -kHeld_m;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double gap = normals[i].dot(y) + rows[i].b[0];
-      if (!(gap < missed)) continue;
+      if (!(gap < missed) || (depends[i] && gap > -kMissed_m)) continue;
       missed = gap;
       worst = i;
     }
@@ -89,9 +118,16 @@ bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
         row.f.setZero();
         row.state = ContactState::open;
       }
+      holding.set({normals.data(), rows.size()}, {held.data(), count});
+      // What the changes have rounded is taken off.
+      std::array<double, 6> b{};
+      for (std::size_t j = 0; j < count; ++j) b[j] = rows[held[j]].b[0];
+      y = holding.place(b);
+      force = holding.forces(y);
       for (std::size_t j = 0; j < count; ++j) {
-        rows[held[j]].f[0] = force[j];
-        rows[held[j]].state = force[j] > 0.0 ? ContactState::slip : ContactState::open;
+        Row& row = rows[held[j]];
+        row.f[0] = std::max(force[j], 0.0);
+        row.state = row.f[0] > 0.0 ? ContactState::slip : ContactState::open;
       }
       return y.allFinite();
     }
@@ -110,7 +146,11 @@ bool ContactProblem::without_friction(Rows rows, Twist& y) noexcept {
         growth = force[j] / change[j];
         let_go = j;
       }
-      if (!std::isfinite(growth)) return false;  // nothing is in all half-spaces
+      if (!std::isfinite(growth)) {
+        if (!(missed > -kMissed_m)) return false;  // nothing is in all half-spaces
+        depends[worst] = true;
+        break;
+      }
       for (std::size_t j = 0; j < count; ++j) force[j] -= growth * change[j];
       own += growth;
       if (is_new) y += growth * z;
