@@ -2,7 +2,6 @@
 // All have the same mass (4 kg) and moment of inertia (0.05 kg m²), no gravity, and steps of 1 ms.
 #pragma once
 
-#include <btBulletDynamicsCommon.h>
 #include <mujoco/mujoco.h>
 
 #include <cstdio>
@@ -13,6 +12,10 @@
 
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/rigid/held_tool.hpp"
+
+#if __has_include(<btBulletDynamicsCommon.h>)  // only the program that this is for has it among its folders
+#include <btBulletDynamicsCommon.h>
+#endif
 
 namespace proxarm::bench {
 
@@ -141,6 +144,7 @@ struct BulletTuning {
   double breaking_m;  // contacts further apart than this are forgotten
 };
 
+#if __has_include(<btBulletDynamicsCommon.h>)
 class Bullet final : public RigidEngine {
  public:
   Bullet(const RigidScene& scene, const BulletTuning& tuning)
@@ -206,5 +210,6 @@ class Bullet final : public RigidEngine {
   std::vector<std::unique_ptr<btStaticPlaneShape>> sides_;
   std::vector<std::unique_ptr<btRigidBody>> walls_;
 };
+#endif
 
 }  // namespace proxarm::bench
