@@ -253,7 +253,8 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   const Rows rows(rows_.data(), contacts.size());
   Twist y = L_.transpose() * e;
   const Twist start = y;
-  bool solved = rows.size() == 1 && may_look_at(rows) && one_contact(rows[0], y, size, std::max(rough, kTolerance));
+  bool solved = closed_form_ && rows.size() == 1 && may_look_at(rows) &&
+                one_contact(rows[0], y, size, std::max(rough, kTolerance));
   if (!solved) {
     y = start;
     solved = newton(rows, y, size, 25);

@@ -52,6 +52,9 @@ class ContactProblem {
   // from where this one leads; 0: nothing but rounding.
   bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta, double rough = 0.0) noexcept;
 
+  // Whether a single contact is solved in closed form (one_contact.cpp).
+  void use_closed_form(bool use) noexcept { closed_form_ = use; }
+
   // How much solve() may still do, all calls together: contacts that a step of Newton's or a sweep of Gauss and
   // Seidel's looks at. Without a call it may do all that it knows.
   void allow(int work) noexcept { work_ = work; }
@@ -106,6 +109,7 @@ class ContactProblem {
 
   int work_ = std::numeric_limits<int>::max();
   double rough_ = 0.0;
+  bool closed_form_ = true;
   Mat6 K_ = Mat6::Zero();
   Mat6 L_ = Mat6::Identity(), L_inverse_ = Mat6::Identity();
   std::array<Row, most> rows_;

