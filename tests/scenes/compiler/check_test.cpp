@@ -25,7 +25,12 @@ const std::filesystem::path scenes_folder = source_file("scenes");
 TEST(Check, PassesEveryShippedScene) {
   for (const auto& entry : std::filesystem::directory_iterator(scenes_folder)) {
     if (entry.path().extension() != ".yaml") continue;
-    for (const auto& report : check_scene(scenes::load_scene(entry.path()), {.states = scaled(20'000, 1000)})) {
+    const scenes::Scene scene = scenes::load_scene(entry.path());
+    for (const auto& report : check_scene(scene, {.states = scaled(20'000, 1000)})) {
+      EXPECT_NE(report.verdict(), CheckVerdict::wrong) << entry.path() << "\n" << report.text();
+      // A tool's things may be as small as a point's pushes are deep, with a solution on either side; a session with
+      // that tool renders another 𝒢.
+      if (scene.tool) continue;
       EXPECT_EQ(report.verdict(), CheckVerdict::fine) << entry.path() << "\n" << report.text();
     }
   }
