@@ -127,14 +127,20 @@ Vec3 RigidWorld::slip_on(std::uint16_t entry, const Vec3& lever) const noexcept 
   return m.slid + s * w - c * m.turned.cross(w);
 }
 
+// Of the tool's material point that is at `point` at a pose: against the object, wherever that went.
+Vec3 RigidWorld::slip_since(const ToolPose& q_old, std::uint16_t entry, const Vec3& point,
+                            const ToolPose& pose) const noexcept {
+  const Vec3 lever = point - pose.position;
+  if (goes(entry)) return slip_on(entry, lever);
+  return point - q_old * (pose.orientation.conjugate() * lever);
+}
+
 // Where more contacts hold than needed, one may have its force on the cone without slipping.
 void RigidWorld::judge_slips(const ToolPose& q_old, double rounding) noexcept {
   see_slip(q_, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     PoseContact& contact = contacts_[k];
-    const Vec3 lever = contact.point_W - q_.position;
-    const Vec3 slip = goes(of_contact_[k]) ? slip_on(of_contact_[k], lever)
-                                           : Vec3(contact.point_W - q_old * (q_.orientation.conjugate() * lever));
+    const Vec3 slip = slip_since(q_old, of_contact_[k], contact.point_W, q_);
     contact.slips = contact.slips && (slip - contact.normal_W * contact.normal_W.dot(slip)).norm() > rounding;
   }
 }

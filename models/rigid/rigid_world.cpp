@@ -189,8 +189,7 @@ void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolP
     out.J.row(k).tail<3>() = lever.cross(axes.col(k));
   }
   // From where the tool's material point was.
-  const Vec3 slip = goes(pair.entry) ? slip_on(pair.entry, lever)
-                                     : Vec3(found.touch.point - q_old * (pose.orientation.conjugate() * lever));
+  const Vec3 slip = slip_since(q_old, pair.entry, found.touch.point, pose);
   out.c << found.touch.gap, axes.col(1).dot(slip), axes.col(2).dot(slip);
   out.mu = without_friction_ ? 0.0 : friction(pair);
   const Vec3* force = found.which == 0 ? (pair.pressed ? &pair.force_W : nullptr) : last_force(found.pair, found.which);
@@ -627,13 +626,14 @@ double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
 // that says nothing.
 double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
   double deepest = std::numeric_limits<double>::infinity();
+  const View tool = view(pose);
   for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
     const Entry& e = shared_->entries[i];
     const auto* solid = std::get_if<Solid>(&e.object.shape);
     const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
     const auto entry = static_cast<std::uint16_t>(i);
     if ((solid == nullptr && mesh == nullptr) || (moves(entry) && !moving(entry).close)) continue;
-    const View at = seen_from(entry, view(pose));
+    const View at = seen_from(entry, tool);
     const bool beyond = distance2_to_box(at.x, e.bounds) > shared_->reach * shared_->reach;
     if (beyond && !e.object.inside_out)
       continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)

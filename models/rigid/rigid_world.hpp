@@ -151,6 +151,8 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double least_gap_m(const ToolPose& pose) noexcept;
   void see_slip(const ToolPose& pose, const ToolPose& q_old) noexcept;
   [[nodiscard]] Vec3 slip_on(std::uint16_t entry, const Vec3& lever) const noexcept;
+  [[nodiscard]] Vec3 slip_since(const ToolPose& q_old, std::uint16_t entry, const Vec3& point,
+                                const ToolPose& pose) const noexcept;
 
   void advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept;
   void forget() noexcept;
