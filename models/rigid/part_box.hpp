@@ -6,19 +6,10 @@
 #include <cmath>
 #include <cstdint>
 
+#include "models/rigid/near.hpp"
 #include "models/rigid/rigid_features.hpp"
 
 namespace proxarm::models {
-
-inline double distance2_to_segment(const Vec3& p, const EdgeLine& edge) noexcept {
-  const Vec3 along = edge.to - edge.from;
-  const double s = std::clamp(along.dot(p - edge.from) / along.squaredNorm(), 0.0, 1.0);
-  return (p - edge.from - s * along).squaredNorm();
-}
-
-inline double distance2_to_box(const Vec3& p, const Bounds& box) noexcept {
-  return (box.low - p).cwiseMax(p - box.high).cwiseMax(0.0).squaredNorm();
-}
 
 // The box of a part's points, which turns with the tool, the ball around them, and so much around both.
 class PartBox {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "models/rigid/near.hpp"
 #include "models/rigid/part_box.hpp"
 #include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
@@ -13,62 +14,6 @@ namespace {
 constexpr std::size_t kFewPairs = 192;
 // And more triangles than this: one costs some 100 ns whenever pairs are gathered.
 constexpr std::size_t kFewFaces = 256;
-
-double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept {
-  const Vec3 d1 = a.to - a.from, d2 = b.to - b.from, r = a.from - b.from;
-  const double A = d1.squaredNorm(), E = d2.squaredNorm(), f = d2.dot(r), c = d1.dot(r), B = d1.dot(d2);
-  const double denominator = A * E - B * B;
-  double s = denominator > 1e-14 * A * E ? std::clamp((B * f - c * E) / denominator, 0.0, 1.0) : 0.0;
-  double t = (B * s + f) / E;
-  if (t < 0.0) {
-    t = 0.0;
-    s = std::clamp(-c / A, 0.0, 1.0);
-  } else if (t > 1.0) {
-    t = 1.0;
-    s = std::clamp((B - c) / A, 0.0, 1.0);
-  }
-  return (r + s * d1 - t * d2).squaredNorm();
-}
-
-// Whether a unit direction misses the cone between the normals beside a sharp edge by more than `slack` (rad).
-bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) noexcept {
-  const Vec3 w = left.cross(right);
-  const double size = w.norm();
-  if (size < 1e-6) return false;  // two faces in one plane, or back to back: nothing is said
-  return left.cross(n).dot(w) < -slack * size || n.cross(right).dot(w) < -slack * size || n.dot(left + right) < -slack;
-}
-
-// Whether two sharp edges can't hold each other at any pose that is turned by up to `turn` (rad) from this one: their
-// common normal is outside of the faces' normals beside one of them (touch_edges_sharp() asks for that). It turns by
-// as much over the sine of the angle between the edges; twice that, for the normals it is compared with turn too. The
-// 0.02 rad are those that touch_edges_sharp() allows.
-bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept {
-  Vec3 n = (own.to - own.from).normalized().cross((other.to - other.from).normalized());
-  const double sine = n.norm();
-  const double slack = 0.02 + 2.0 * turn * (1.0 + 1.0 / sine);
-  if (!(slack < 0.3)) return false;
-  n /= sine;
-  const auto held = [&](const Vec3& normal) {
-    return !(!other.open && misses(normal, other.left, other.right, slack)) &&
-           !(!own.open && misses(-normal, own.left, own.right, slack));
-  };
-  return !held(n) && !held(-n);
-}
-
-// Whether a point may be so near to a triangle: by its height, and by how far its foot lies beyond the triangle's
-// sides.
-bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept {
-  const TriangleMesh::Face& face = mesh.face(index);
-  const double height = TriangleMesh::height(face, p);
-  if (!(std::abs(height) <= near)) return false;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3& corner = mesh.corner(index, k);
-    const Vec3 outwards = (mesh.corner(index, (k + 1) % 3) - corner).cross(face.normal);
-    const double beyond = outwards.dot(p - corner);
-    if (beyond > 0.0 && beyond * beyond > (near * near - height * height) * outwards.squaredNorm()) return false;
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -117,9 +62,10 @@ void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at
 class RigidWorld::NearFaces {
  public:
   // Of more triangles than `room` it takes none.
-  NearFaces(const Part& part, const TriangleFeatures& mesh, const View& at, double near, std::size_t room) noexcept
-      : solid_(&part.solid), near_(near) {
-    const PartBox around(part.solid, part.box, at, near);
+  NearFaces(const Solid& solid, const Bounds& box_T, const TriangleFeatures& mesh, const View& at, double near,
+            std::size_t room) noexcept
+      : solid_(&solid), near_(near) {
+    const PartBox around(solid, box_T, at, near);
     around.each_face(mesh.mesh(), [&](std::uint32_t face, const Bounds& box) {
       if (count_ == room) return all_ = false;
       faces_[count_++] = face;
@@ -245,17 +191,17 @@ void RigidWorld::edge_with(const Solid& own, std::uint32_t e, const EdgeLine& li
 }
 
 template <typename Add>
-std::optional<std::size_t> RigidWorld::pairs_with(const Part& part, const TriangleFeatures& other, double side,
-                                                  const View& at, double reach, Add add) const noexcept {
-  const Solid& own = part.solid;
+void RigidWorld::pairs_with(const Solid& own, const Bounds& box, const TriangleFeatures& other, double side,
+                            const View& at, double reach, Add add) noexcept {
   const double near = reach + own.radius, turn = reach / shared_->reach;
-  NearFaces close(part, other, at, near, face_room_);
-  if (!close.all()) return {};
-  if (close.faces().empty()) return 0;
+  NearFaces close(own, box, other, at, near, face_room_);
+  crowded_ = crowded_ || !close.all();
+  if (!close.all() || close.faces().empty()) return;
+  near_faces_ += close.faces().size();
   points_with(own, other, close, at, near, add);
-  if (own.edges.empty()) return close.faces().size();
+  if (own.edges.empty()) return;
   for (const std::uint32_t face : close.faces()) {
-    if (crowded_) return close.faces().size();
+    if (crowded_) return;
     for (const std::uint32_t v : other.vertices_of(face)) {
       vertex_with(own, v, at.to_T(other.vertex(v)), close, near, add);
     }
@@ -267,7 +213,64 @@ std::optional<std::size_t> RigidWorld::pairs_with(const Part& part, const Triang
       edge_with(own, e, edge_in_T(edge.line, at, edge.ridge ? 1.0 : -1.0), close, near, turn, add);
     }
   }
-  return close.faces().size();
+}
+
+void RigidWorld::add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own,
+                          std::uint32_t other) noexcept {
+  if (pair_count_ == most_pairs) {
+    crowded_ = true;
+    return;
+  }
+  Pair& pair = pairs_[pair_count_++];
+  pair = {};
+  pair.kind = kind;
+  pair.part = part;
+  pair.entry = entry;
+  pair.own = own;
+  pair.other = other;
+}
+
+// Of a pair whose features have changed places.
+RigidWorld::Kind RigidWorld::other_way_round(Kind kind) noexcept {
+  switch (kind) {
+    case Kind::point_face:
+      return Kind::face_point;
+    case Kind::face_point:
+      return Kind::point_face;
+    case Kind::point_edge:
+      return Kind::edge_point;
+    case Kind::edge_point:
+      return Kind::point_edge;
+    default:
+      return kind;
+  }
+}
+
+void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+  const Entry& e = shared_->entries[entry];
+  const Part& own = shared_->parts[part];
+  const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j) { add_pair(kind, part, entry, i, j); };
+  const Solid* solid = std::get_if<Solid>(&e.object.shape);
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
+  if (mesh != nullptr) {
+    if (own.mesh) return gather_meshes(part, entry, at, reach);
+    return pairs_with(own.solid, own.box, **mesh, e.held, at, reach, add);
+  }
+  if (solid != nullptr) {
+    if (!own.mesh) return pairs_with(own.solid, *solid, at, reach, add);
+    // Seen from the tool it is a solid near a mesh.
+    return pairs_with(*solid, e.box, *own.mesh, 1.0, {at.R.transpose(), at.to_T(Vec3::Zero())}, reach,
+                      [&](Kind kind, std::uint32_t i, std::uint32_t j) { add(other_way_round(kind), j, i); });
+  }
+  with_flat_or_hollow(e.object, [&](const auto& shape) {
+    for (std::uint32_t i = 0; i < own.solid.points.size(); ++i) {
+      if (touch(shape, at * own.solid.points[i], own.solid.radius).gap <= reach) add(Kind::point_field, i, 0);
+    }
+    for (std::uint32_t i = 0; i < own.solid.rims.size(); ++i) {
+      const Solid::Rim& rim = own.solid.rims[i];
+      if (touch(shape, at * rim.centre, rim.radius).gap <= reach) add(Kind::rim_field, i, 0);
+    }
+  });
 }
 
 void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept {
@@ -275,41 +278,13 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
   const View at = seen_from(entry, view(pose));
   const double around = shared_->reach + reach;
   if (distance2_to_box(at.x, e.bounds) > around * around) return;
-  for (std::size_t part = 0; part < shared_->parts.size() && !crowded_; ++part) {
-    const Solid& own = shared_->parts[part].solid;
-    if (const Bounds& box = shared_->parts[part].box; box.finite()) {
-      const double near = 0.5 * (box.high - box.low).norm() + own.radius + reach;
-      if (distance2_to_box(at * Vec3(0.5 * (box.low + box.high)), e.bounds) > near * near) continue;
+  for (std::size_t i = 0; i < shared_->parts.size() && !crowded_; ++i) {
+    const Part& part = shared_->parts[i];
+    if (part.box.finite()) {
+      const double near = 0.5 * (part.box.high - part.box.low).norm() + part.solid.radius + reach;
+      if (distance2_to_box(at * Vec3(0.5 * (part.box.low + part.box.high)), e.bounds) > near * near) continue;
     }
-    const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j) {
-      if (pair_count_ == most_pairs) {
-        crowded_ = true;
-        return;
-      }
-      Pair& pair = pairs_[pair_count_++];
-      pair = {};
-      pair.kind = kind;
-      pair.part = static_cast<std::uint16_t>(part);
-      pair.entry = entry;
-      pair.own = i;
-      pair.other = j;
-    };
-    if (const Solid* solid = std::get_if<Solid>(&e.object.shape)) {
-      pairs_with(own, *solid, at, reach, add);
-    } else if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape)) {
-      const std::optional<std::size_t> looked = pairs_with(shared_->parts[part], **mesh, e.held, at, reach, add);
-      near_faces_ += looked.value_or(0);
-      if (!looked) crowded_ = true;
-    } else {
-      with_flat_or_hollow(e.object, [&](const auto& shape) {
-        for (std::uint32_t i = 0; i < own.points.size(); ++i) {
-          if (touch(shape, at * own.points[i], own.radius).gap <= reach) add(Kind::point_field, i, 0);
-        }
-        for (std::uint32_t i = 0; i < own.rims.size(); ++i) {
-          if (touch(shape, at * own.rims[i].centre, own.rims[i].radius).gap <= reach) add(Kind::rim_field, i, 0);
-        }
-      });
-    }
+    gather_part(static_cast<std::uint16_t>(i), entry, at, reach);
   }
 }
 

@@ -65,12 +65,28 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
     }
     const double height = signed_start(pair, at);
     const bool near = pair.pressed && std::abs(height) < kFront_m;
-    if (!is_mesh) {
+    if (pair.kind == Kind::face_point && shared_->parts[pair.part].mesh) {
+      if (!near) pair.side = static_cast<float>(side_of_tools_face(pair, at, height, far));
+    } else if (!is_mesh) {
       pair.side = height >= -2.0 * far - kFront_m ? 1.0F : 0.0F;
     } else if (!near) {
       pair.side = static_cast<float>(side_of_mesh(pair, at, height, far));
     }
   }
+}
+
+// An object's point under a face of a tool that is a mesh: in front of it, or behind without having come through, as
+// beside an edge, where its foot isn't on the face. Under the face it is behind the tool's far side.
+double RigidWorld::side_of_tools_face(const Pair& pair, const View& at, double height, double far) const noexcept {
+  if (height >= -kFront_m) return 1.0;
+  if (height < -2.0 * far - kFront_m) return 0.0;
+  const Solid& own = shared_->parts[pair.part].solid;
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  const Vec3 y =
+      at.to_T(mesh != nullptr ? (*mesh)->vertex(pair.other) : std::get_if<Solid>(&object.shape)->points[pair.other]);
+  const Solid::Face& face = own.faces[pair.own];
+  return touch_face(y, 0.0, face.normal, face.offset, own.points, own.corners(face), 1.0).has_value() ? 0.0 : 1.0;
 }
 
 // A closed mesh holds the tool on its side, an open one on that on which the feature is. A feature may have been behind
@@ -252,7 +268,7 @@ bool RigidWorld::beside(const Found& deep, const View& at) const noexcept {
   const Pair& pair = pairs_[deep.pair];
   const Solid* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
   const Solid& own = shared_->parts[pair.part].solid;
-  if (other == nullptr || own.radius + other->radius > 0.0) return false;
+  if (other == nullptr || shared_->parts[pair.part].mesh || own.radius + other->radius > 0.0) return false;
   const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
   const double half = 0.5 * deep.touch.gap;
   for (std::size_t j = 0; j < found_count_; ++j) {
@@ -277,8 +293,9 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
     if (a.kind != b.kind || a.part != b.part || a.entry != b.entry) return false;
     return a.kind == Kind::point_face ? a.own == b.own : a.kind == Kind::face_point && a.other == b.other;
   };
-  const auto behind = [&](const Found& deep, const Found& other) {
-    // The foot of the deeper one on its face, seen from the other face.
+  // The foot of the deeper one on its face, seen from the other face.
+  const auto behind = [&](const Found& deep, const Found& other, bool of_tool) {
+    if (of_tool) return other.touch.normal.dot(other.touch.point - deep.touch.point) < kGap_m;
     const Vec3 foot = deep.touch.point - deep.touch.gap * deep.touch.normal;
     return other.touch.normal.dot(foot - (other.touch.point - other.touch.gap * other.touch.normal)) < kGap_m;
   };
@@ -297,8 +314,10 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
       // An open mesh's face may hold the point from behind: only one that it has come through counts here.
       if (is_mesh && pair.kind == Kind::point_face) {
         if (shared_->entries[pair.entry].held == 0.0 && !(found_[j].touch.gap < 0.0)) continue;
-        if (!behind(found_[i], found_[j])) continue;
+        if (!behind(found_[i], found_[j], false)) continue;
       }
+      if (pair.kind == Kind::face_point && shared_->parts[pair.part].mesh && !behind(found_[i], found_[j], true))
+        continue;
       found_[i] = found_[--found_count_];
       --i;
       break;

@@ -56,6 +56,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
     if (sharp) {
       edges_by_face.emplace_back(first.face, static_cast<std::uint32_t>(edges_.size()));
       edges_.push_back(edge);
+      ends_.push_back({first.low, first.high});
       for (const std::uint32_t v : {first.low, first.high}) {
         if (owner[v] == none) owner[v] = first.face;
       }

@@ -1,6 +1,7 @@
 // What a rigid tool can touch, as RigidWorld is built from it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -30,7 +31,9 @@ class TriangleFeatures {
   [[nodiscard]] const TriangleMesh& mesh() const noexcept { return *mesh_; }
   // Of a closed mesh: 1 if its faces' fronts are outside, −1 if inside. Of an open one: 0.
   [[nodiscard]] double outwards() const noexcept { return outwards_; }
+  [[nodiscard]] std::size_t edges() const noexcept { return edges_.size(); }
   [[nodiscard]] const Edge& edge(std::uint32_t i) const noexcept { return edges_[i]; }
+  [[nodiscard]] const std::array<std::uint32_t, 2>& ends(std::uint32_t edge) const noexcept { return ends_[edge]; }
   [[nodiscard]] const Vec3& vertex(std::uint32_t i) const noexcept { return mesh_->vertex(i); }
   // The edges and vertices that a face owns; each belongs to one face.
   [[nodiscard]] std::span<const std::uint32_t> edges_of(std::uint32_t face) const noexcept {
@@ -52,6 +55,7 @@ class TriangleFeatures {
   std::shared_ptr<const TriangleMesh> mesh_;
   double outwards_ = 0.0;
   std::vector<Edge> edges_;
+  std::vector<std::array<std::uint32_t, 2>> ends_;  // of each edge, its vertices
   std::vector<std::uint32_t> owned_edges_, first_edge_, owned_vertices_, first_vertex_;
 };
 

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <type_traits>
 
-#include "models/rigid/part_box.hpp"
+#include "models/rigid/mesh_overlap.hpp"
+#include "models/rigid/mesh_part.hpp"
+#include "models/rigid/near.hpp"
 #include "models/rigid_shapes/overlap.hpp"
 
 namespace proxarm::models {
@@ -20,6 +23,11 @@ constexpr int kBudget = 400, kHard = 40, kBudgetOfPart = 50;
 // Beside that, so many contacts may be looked at in local problems, and so many more for each part of the step: some
 // 0.2 µs each. Without it local problems that have no solution took up to 13 ms of a cycle.
 constexpr int kWork = 1200, kWorkOfPart = 60;
+// Twice that in a step of several parts, and once more for the last of them, whose forces are asked for.
+constexpr int kWorkOfFar = 2400;
+// A part that finds no forces may be left out where the next one finds some, but not two in a row: sides reach as far
+// as two parts do.
+constexpr int kMostLeftOut = 1;
 // What bears less than this share of the greatest force may be left out where nothing else helps, so often in a step.
 constexpr double kIdle = 1e-3;
 constexpr int kFewer = 6;
@@ -82,6 +90,18 @@ Bounds bounds_of(const Solid& solid, double around) {
   return bounds;
 }
 
+MeshPart part_of(const ToolPart& part) {
+  if (const auto* mesh = std::get_if<MeshTool>(&part.shape)) return mesh_part(*mesh, part.X_TP);
+  MeshPart out;
+  std::visit(
+      [&](const auto& shape) {
+        if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, MeshTool>) out.solid = solid_of(shape, part.X_TP);
+      },
+      part.shape);
+  out.thickness_m = thickness(out.solid);
+  return out;
+}
+
 Bounds bounds_of(const RigidObject& object) {
   if (const Solid* solid = std::get_if<Solid>(&object.shape)) return bounds_of(*solid, solid->radius);
   if (const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape)) {
@@ -96,16 +116,17 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   auto shared = std::make_shared<Shared>();
   shared->thinness = std::numeric_limits<double>::infinity();
   for (const ToolPart& part : tool.parts) {
-    Solid solid = std::visit([&part](const auto& shape) { return solid_of(shape, part.X_TP); }, part.shape);
+    auto [mesh, solid, thick] = part_of(part);
     if (part.friction && !(*part.friction >= 0.0 && std::isfinite(*part.friction))) {
       throw std::invalid_argument("a friction must be finite and not negative");
     }
-    if (solid.edges.size() > most_edges) throw std::invalid_argument("a hull of more than 2000 points");
-    shared->thinness = std::min(shared->thinness, thickness(solid));
+    if (!mesh && solid.edges.size() > most_edges) throw std::invalid_argument("a hull of more than 2000 points");
+    shared->thinness = std::min(shared->thinness, thick);
+    shared->dense = shared->dense || mesh;
     shared->reach = std::max(shared->reach, solid.reach);
     shared->bends = shared->bends || !solid.rims.empty();
     const Bounds box = bounds_of(solid, 0.0);
-    shared->parts.push_back({std::move(solid), box, part.friction});
+    shared->parts.push_back({std::move(solid), box, part.friction, std::move(mesh)});
   }
   if (tool.parts.empty()) {
     Solid point;
@@ -149,7 +170,9 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
       const Vec3 middle = bounds.finite() ? Vec3(0.5 * (bounds.low + bounds.high)) : Vec3(Vec3::Zero());
       moving_.push_back({object.motion->driven ? RigidMover(middle) : RigidMover(object.motion->script)});
     }
-    shared->entries.push_back({std::move(object), bounds, held});
+    const Solid* solid = std::get_if<Solid>(&object.shape);
+    const Bounds box = solid != nullptr ? bounds_of(*solid, 0.0) : bounds;
+    shared->entries.push_back({std::move(object), bounds, box, held});
   }
   for (const Part& part : shared->parts) own_corners += part.solid.points.size();
   shared->dense = shared->dense || corners * own_corners > kManyCorners;
@@ -275,7 +298,7 @@ bool RigidWorld::solve_fewer(const ToolPose& pose, const Twist& e, double rough,
     ++bearing;
   }
   if (bearing == 0 || bearing == linear_count_ || --fewer_ < 0) return false;
-  problem_.allow(kWork / 2);
+  problem_.allow(kWork);
   if (!problem_.solve(e, {linear_.data(), bearing}, delta, rough)) return false;
   for (std::size_t k = bearing; k < linear_count_; ++k) {
     linear_[k].f.setZero();
@@ -379,11 +402,12 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
 // Where a part has no solution, another one may: none may take what the last one needs.
 void RigidWorld::share_out(bool last) noexcept {
   budget_ = last ? kBudget : kBudgetOfPart;
-  problem_.allow(last ? kWork : 2 * kWorkOfPart);
+  problem_.allow(last ? kWorkOfFar : 2 * kWorkOfPart);
 }
 
 bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
   const bool comes = something_comes();
+  int left_out = 0;  // the parts just before this one
   ToolPose reached = q_old;
   overflow_ = squeezed_ = false;
   let_go(0.0);
@@ -396,18 +420,20 @@ bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double f
     const double share = static_cast<double>(k) / parts;
     let_go(share);
     const ToolPose p = k == parts ? p_hat : on_the_way(p_hat, q_old, share);
-    if (comes) share_out(k == parts);
+    if (comes || (k == parts && parts > 1)) share_out(k == parts);
     ToolPose next = reached;
-    if (!settle(p, q_old, next)) {
+    if (settle(p, q_old, next)) {
+      left_out = 0;
+      reached = next;
+    } else {
       // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
-      const bool on = comes && (overflow_ = false, give_way(reached)) && k < parts;
+      const bool may = comes || (k < parts && left_out++ < kMostLeftOut);
+      const bool on = may && (overflow_ = false, give_way(reached)) && k < parts;
       if (!on) {
         q = reached;
         return false;
       }
-      next = reached;
     }
-    reached = next;
     if (k < parts) {
       if (came_m(reached) > 0.5 * gathered_reach_) gather(reached, gathered_reach_);
       set_sides(reached, far / parts);
@@ -475,7 +501,8 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     problem_.allow(kWork);
     without_friction_ = true;
     const ToolPose reached = q_;
-    fine = in_parts(goal, q, to_goal, parts, q_);
+    // The iteration may have gone by far in a part: in the dent of a mesh past a face that holds only over itself.
+    fine = in_parts(goal, q, to_goal, parts, q_) && !(shared_->dense && overlap_m(q_) < -kGap_m);
     without_friction_ = false;
     if (!fine) q_ = reached;
   }
@@ -486,7 +513,7 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
 
 // What the local problems of so many parts may cost.
 void RigidWorld::allow_for(int parts) noexcept {
-  problem_.allow((shared_->hollow ? kWorkInside : kWork) + kWorkOfPart * parts);
+  problem_.allow((shared_->hollow ? kWorkInside : parts > 1 ? kWorkOfFar : kWork) + kWorkOfPart * parts);
 }
 
 // How many smaller parts are made of one. What comes fast takes many parts already.
@@ -637,43 +664,35 @@ double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
     const bool beyond = distance2_to_box(at.x, e.bounds) > shared_->reach * shared_->reach;
     if (beyond && !e.object.inside_out)
       continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)
-    Pose X = Pose::Identity();
-    X.linear() = at.R;
-    X.translation() = at.x;
     for (const Part& part : shared_->parts) {
-      double gap = 0.0;
-      if (mesh != nullptr) gap = overlap_with(part, e, (*mesh)->mesh(), X);
-      if (solid != nullptr && !(part.solid.faces.empty() && solid->faces.empty())) {
-        gap = separation_of_hulls(part.solid, X, *solid);
-        if (gap < 0.0) gap -= part.solid.radius + solid->radius;
-      }
+      const double gap = overlap_m(part, e, at);
       if (gap < 0.0) deepest = std::min(deepest, gap);
     }
   }
   return deepest;
 }
 
-// The deepest that a part of the tool stands in any triangle of a mesh, or how far it is from the surface on the wrong
-// side of it; 0 if neither.
-double RigidWorld::overlap_with(const Part& part, const Entry& entry, const TriangleMesh& mesh,
-                                const Pose& X) noexcept {
-  const Solid& own = part.solid;
-  if (own.points.empty()) return 0.0;
-  const View at{X.linear(), X.translation()};
-  double deepest = 0.0;
-  PartBox(own, part.box, at, own.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
-    const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
-    const double gap = own.faces.empty()
-                           ? distance_of_segment(at * own.points.front(), at * own.points.back(), triangle) - own.radius
-                           : separation_from_triangle(own, X, triangle);
-    deepest = std::min(deepest, gap);
-    return true;
-  });
-  if (deepest < 0.0 || entry.held == 0.0) return deepest;
-  const Vec3 inside = at * own.points.front();
-  if (mesh.encloses(inside) == entry.object.inside_out) return 0.0;
-  std::uint32_t near = 0;
-  return -mesh.distance(inside, std::numeric_limits<double>::infinity(), near);
+// How deep a part of the tool stands in an object, or how far it is from a mesh's surface on the wrong side of it; 0 or
+// more if neither.
+double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& at) noexcept {
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
+  if (part.solid.points.empty()) return 0.0;
+  if (mesh != nullptr) {
+    std::optional<bool> inside;
+    if (entry.held != 0.0) inside = entry.object.inside_out;
+    if (part.mesh) return overlap_of_meshes(part.mesh->mesh(), (*mesh)->mesh(), at, inside);
+    return overlap_with_mesh(part.solid, part.box, (*mesh)->mesh(), at, inside);
+  }
+  const Solid& solid = *std::get_if<Solid>(&entry.object.shape);
+  if (part.mesh) {
+    return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), {at.R.transpose(), at.to_T(Vec3::Zero())}, false);
+  }
+  if (part.solid.faces.empty() && solid.faces.empty()) return 0.0;
+  Pose X = Pose::Identity();
+  X.linear() = at.R;
+  X.translation() = at.x;
+  const double gap = separation_of_hulls(part.solid, X, solid);
+  return gap < 0.0 ? gap - (part.solid.radius + solid.radius) : gap;
 }
 
 }  // namespace proxarm::models

@@ -38,10 +38,10 @@ namespace proxarm::models {
 
 class RigidWorld final : public PoseAlgorithm {
  public:
-  // Throws std::invalid_argument for a tool's shape without a size, points that span no solid, a friction below 0, a
-  // cylinder as an object, and one as a tool beside solids, meshes or a tube with round ends. A tool without parts is a
-  // point: a sphere of no radius. An open mesh, which compile_rigid() refuses, is held from both sides, but what is
-  // sharp may pass its border by micrometres.
+  // Throws std::invalid_argument for a tool's shape without a size, points that span no solid, a mesh that is open, a
+  // friction below 0, a cylinder as an object, and one as a tool beside solids, meshes or a tube with round ends. A
+  // tool without parts is a point: a sphere of no radius. An open mesh, which compile_rigid() refuses, is held from
+  // both sides, but what is sharp may pass its border by micrometres.
   RigidWorld(const Tool& tool, std::vector<RigidObject> objects);
 
   const ToolPose& step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept override;
@@ -94,10 +94,12 @@ class RigidWorld final : public PoseAlgorithm {
     Solid solid;
     Bounds box;  // of its points, in T
     std::optional<double> friction;
+    std::shared_ptr<const TriangleFeatures> mesh{};  // of a mesh, whose features are the solid's as well
   };
   struct Entry {
     RigidObject object;
     Bounds bounds;
+    Bounds box{};       // of a solid's points
     double held = 0.0;  // of a closed mesh: 1 or −1, the side of its faces on which the tool is
   };
   struct Pressed {  // a place of a pair that pressed in the last solution, and how hard
@@ -159,6 +161,10 @@ class RigidWorld final : public PoseAlgorithm {
   void gather_for(const ToolPose& q, double far) noexcept;
   void gather(const ToolPose& pose, double reach) noexcept;
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
+  void gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other) noexcept;
+  [[nodiscard]] static Kind other_way_round(Kind kind) noexcept;
   template <typename Add>
   void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
   template <typename Add>
@@ -170,11 +176,12 @@ class RigidWorld final : public PoseAlgorithm {
   template <typename Add>
   void edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, double near, double turn,
                  Add add) const noexcept;
-  // The number of triangles that were near; none if that was more than it looks at.
+  // Of a solid with the box of its points, and a mesh. Where more triangles are near than are looked at, it takes none.
   template <typename Add>
-  std::optional<std::size_t> pairs_with(const Part& part, const TriangleFeatures& other, double side, const View& at,
-                                        double reach, Add add) const noexcept;
+  void pairs_with(const Solid& own, const Bounds& box, const TriangleFeatures& other, double side, const View& at,
+                  double reach, Add add) noexcept;
   void set_sides(const ToolPose& from, double far) noexcept;
+  [[nodiscard]] double side_of_tools_face(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] double side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
@@ -211,8 +218,7 @@ class RigidWorld final : public PoseAlgorithm {
   void report(const ToolPose& q_old) noexcept;
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
-  [[nodiscard]] static double overlap_with(const Part& part, const Entry& entry, const TriangleMesh& mesh,
-                                           const Pose& X) noexcept;
+  [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at) noexcept;
 
   std::shared_ptr<const Shared> shared_;
   std::vector<double> friction_;  // of each entry, as it is now

@@ -8,6 +8,11 @@
 namespace proxarm::models {
 namespace {
 
+std::array<Vec3, 3> sides_of(const std::array<Vec3, 3>& triangle) noexcept {
+  return {(triangle[1] - triangle[0]).normalized(), (triangle[2] - triangle[1]).normalized(),
+          (triangle[0] - triangle[2]).normalized()};
+}
+
 // The points of another body beyond those of `a`, along n.
 double gap_along(const Vec3& n, const Solid& a, const Pose& X, std::span<const Vec3> b) noexcept {
   const Vec3 n_a = X.linear().transpose() * n;
@@ -78,6 +83,24 @@ double separation_from_triangle(const Solid& a, const Pose& X, const std::array<
   for (const Solid::Edge& own : a.edges) {
     const Vec3 along = X.linear() * (a.points[own.to] - a.points[own.from]).normalized();
     for (std::size_t k = 0; k < 3; ++k) across(along, (triangle[(k + 1) % 3] - triangle[k]).normalized(), try_along);
+  }
+  return largest;
+}
+
+double separation_of_triangles(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b) noexcept {
+  double largest = -std::numeric_limits<double>::infinity();
+  const auto try_along = [&](const Vec3& n) {
+    const Vec3 on_a(n.dot(a[0]), n.dot(a[1]), n.dot(a[2])), on_b(n.dot(b[0]), n.dot(b[1]), n.dot(b[2]));
+    largest = std::max({largest, on_b.minCoeff() - on_a.maxCoeff(), on_a.minCoeff() - on_b.maxCoeff()});
+  };
+  for (const auto* triangle : {&a, &b}) {
+    const std::array<Vec3, 3> sides = sides_of(*triangle);
+    const Vec3 normal = sides[0].cross(sides[1]).normalized();
+    try_along(normal);
+    for (const Vec3& side : sides) try_along(side.cross(normal));
+  }
+  for (const Vec3& own : sides_of(a)) {
+    for (const Vec3& other : sides_of(b)) across(own, other, try_along);
   }
   return largest;
 }

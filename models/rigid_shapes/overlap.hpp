@@ -17,6 +17,9 @@ double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b) noexce
 // is the way out of a surface that the solid went in by less than the triangles' size.
 double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle) noexcept;
 
+// The same of two triangles.
+double separation_of_triangles(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b) noexcept;
+
 // The distance of a segment from a triangle; 0 where they meet.
 double distance_of_segment(const Vec3& from, const Vec3& to, const std::array<Vec3, 3>& triangle) noexcept;
 

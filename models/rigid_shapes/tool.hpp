@@ -2,6 +2,8 @@
 // frame, whose origin is the reference point.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <variant>
@@ -31,9 +33,14 @@ struct CylinderTool {
 struct ConvexTool {
   std::vector<Vec3> points_m;
 };
+// A closed surface of triangles, dents and holes included.
+struct MeshTool {
+  std::vector<Vec3> points_m;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
 
 struct ToolPart {
-  std::variant<SphereTool, CapsuleTool, BoxTool, CylinderTool, ConvexTool> shape;
+  std::variant<SphereTool, CapsuleTool, BoxTool, CylinderTool, ConvexTool, MeshTool> shape;
   Pose X_TP = Pose::Identity();  // of the shape in the tool's frame
   // Friction of a contact is √(μ_tool μ_object); without a value here it is the object's.
   std::optional<double> friction;

@@ -21,7 +21,7 @@ using models::Vec3;
 // A tool of more than ten metres is a mistake of the unit, and so is one below a micrometre.
 constexpr description::Range size_range = between(1e-6, 10.0);
 constexpr description::Range friction_range = between(0.0, 100.0);
-constexpr std::size_t most_parts = 64, most_vertices = 2000;
+constexpr std::size_t most_parts = 64, most_vertices = 2000, most_triangles = 20000;
 
 Vec3 vector_of(const std::array<double, 3>& a) { return {a[0], a[1], a[2]}; }
 
@@ -81,10 +81,28 @@ models::ConvexTool read_convex(const YamlNode& node, RigidTool& tool) {
   if (dent > roundness * size_m && !hull) {
     throw node.error_at("file", "a convex mesh",
                         file.string() + ", which has dents of up to " + description::number_text(1e3 * dent) + " mm",
-                        "`hull: true` takes its convex hull; or put it together from convex parts");
+                        "`hull: true` takes its convex hull, and `mesh:` instead of `convex:` takes it as it is");
   }
   tool.meshes.push_back(file);
   return convex;
+}
+
+models::MeshTool read_mesh(const YamlNode& node, RigidTool& tool) {
+  const std::filesystem::path file = node.existing_file("file");
+  MeshPlacement placement;
+  placement.scale = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
+  placement.close_holes_m = node.number_or("close_holes_m", 0.0, between(0.0, 1e3));
+  const auto mesh = load_mesh(file, placement).mesh;
+  if (!mesh->closed()) {
+    throw node.error_at("file", "a closed mesh, which has an inside", file.string() + ", which is open",
+                        "close_holes_m may close it");
+  }
+  if (mesh->size() > most_triangles) {
+    throw node.error_at("file", "at most " + std::to_string(most_triangles) + " triangles",
+                        std::to_string(mesh->size()) + " triangles in " + file.string(), "simplify the mesh");
+  }
+  tool.meshes.push_back(file);
+  return {mesh->structure().vertices, mesh->structure().triangles};
 }
 
 models::ToolPart read_part(const std::string& kind, const YamlNode& node, RigidTool& tool) {
@@ -95,15 +113,15 @@ models::ToolPart read_part(const std::string& kind, const YamlNode& node, RigidT
   if (kind == "cylinder") part.shape = models::CylinderTool{length("length_m"), length("radius_m")};
   if (kind == "box") part.shape = models::BoxTool{vector_of(node.vec3("size_m", size_range))};
   if (kind == "convex") part.shape = read_convex(node, tool);
+  if (kind == "mesh") part.shape = read_mesh(node, tool);
   part.X_TP = pose_of(node);
   if (node.has("friction")) part.friction = node.number("friction", friction_range);
   return part;
 }
 
-const std::vector<std::string> kinds{"sphere", "capsule", "box", "cylinder", "convex"};
-
 // Of one shape, or of several under `parts`.
 void read_parts(const YamlNode& node, RigidTool& tool) {
+  const std::vector<std::string>& kinds = tool_kinds();
   std::vector<std::string> keys = kinds;
   keys.emplace_back("parts");
   const std::string key =
@@ -119,6 +137,11 @@ void read_parts(const YamlNode& node, RigidTool& tool) {
 }
 
 }  // namespace
+
+const std::vector<std::string>& tool_kinds() {
+  static const std::vector<std::string> kinds{"sphere", "capsule", "box", "cylinder", "convex", "mesh"};
+  return kinds;
+}
 
 RigidTool read_tool(const YamlNode& node) {
   RigidTool tool;

@@ -19,11 +19,14 @@ struct RigidTool {
   int line = 0;
   std::string name;
   models::Tool shape;                         // one part or more
-  std::vector<std::filesystem::path> meshes;  // whose vertices span a hull
+  std::vector<std::filesystem::path> meshes;  // that it is made of, or whose vertices span a hull
 };
 
 // Of a file of its own, or of a scene's key `tool`. Throw description::SetupError with file, line and key.
 RigidTool load_tool(const std::filesystem::path& file);
 RigidTool read_tool(const description::YamlNode& node);
+
+// The keys of a tool's shapes; several shapes stand under `parts`.
+const std::vector<std::string>& tool_kinds();
 
 }  // namespace proxarm::scenes

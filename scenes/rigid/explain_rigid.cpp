@@ -105,6 +105,9 @@ struct NameOf {
   std::string operator()(const models::ConvexTool& shape) const {
     return "hull of " + std::to_string(shape.points_m.size()) + " points";
   }
+  std::string operator()(const models::MeshTool& shape) const {
+    return "mesh of " + std::to_string(shape.triangles.size()) + " triangles";
+  }
 };
 
 }  // namespace

@@ -226,6 +226,27 @@ class RigidTool(ProgramTest):
         hull = self.written("hull.yaml", "convex: {file: dented.obj, scale_m: 0.001, hull: true}\n")
         self.summary("--scene", SCENES / "wall.yaml", "--tool", hull, "--duration", "1s")
 
+    def test_a_tool_that_is_a_mesh(self):
+        """The same cube with its dent, as it is: pressed onto a table, it rests on its rim."""
+        corners = [(x, y, z) for x in (-10, 10) for y in (-10, 10) for z in (0, 20)] + [(0, 0, 5)]
+        faces = [(0, 8, 4), (4, 8, 6), (6, 8, 2), (2, 8, 0), (1, 5, 7), (1, 7, 3), (0, 5, 1), (0, 4, 5), (2, 3, 7),
+                 (2, 7, 6), (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5)]
+        text = "".join("v %g %g %g\n" % c for c in corners)
+        text += "".join("f %d %d %d\n" % tuple(i + 1 for i in f) for f in faces)
+        self.written("dented.obj", text)
+        self.written("open.obj", text.rsplit("f", 1)[0])
+        tool = self.written("tool.yaml", "mesh: {file: dented.obj, scale_m: 0.001, rpy_rad: [0, 0, 0]}\n")
+        alone = self.written("scene.yaml", "dimensions: 3\ntool:\n  mesh: {file: dented.obj, scale_m: 0.001}\n")
+        self.assertIn("mesh of 14 triangles", self.call("explain", alone).out)
+        found = self.summary("--scene", SCENES / "wall.yaml", "--tool", tool, "--inertia", "0.05", "--duration", "2s")
+        self.assertGreater(found["contact_time_s"], 0.1)
+        self.assertEqual(found["unresolved_steps"], 0)
+        broken = self.written("open.yaml", "mesh: {file: open.obj, scale_m: 0.001}\n")
+        told = self.refuse("--scene", SCENES / "wall.yaml", "--tool", broken)
+        self.assertIn("open.yaml", told)
+        self.assertIn("which is open", told)
+        self.assertIn("close_holes_m", told)
+
     def test_check_and_explain_know_tools(self):
         outcome = self.call("check", SCENES / "tools/rod.yaml", SCENES / "box_on_table.yaml")
         self.assertEqual(outcome.status, 0, outcome.err)

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "models/files/yaml_file.hpp"
+#include "scenes/format/tool_file.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -22,7 +23,8 @@ FileKind kind_of_yaml(const description::YamlNode& root) {
   for (const char* key : {"objects", "media", "coulomb_field", "guide", "space", "dimensions"}) {
     if (root.has(key)) return FileKind::scene;
   }
-  for (const char* key : {"parts", "sphere", "capsule", "box", "cylinder", "convex"}) {
+  if (root.has("parts")) return FileKind::tool;
+  for (const std::string& key : scenes::tool_kinds()) {
     if (root.has(key)) return FileKind::tool;
   }
   return FileKind::unknown;

@@ -195,6 +195,14 @@ void add_hull(JsonText& json, const models::ConvexTool& hull) {
   json.end();
 }
 
+void add_mesh(JsonText& json, const models::MeshTool& mesh) {
+  json.add("kind", "hull").name("points").begin_list();
+  for (const Vec3& point : mesh.points_m) put(json, point);
+  json.end().name("triangles").begin_list();
+  for (const auto& [a, b, c] : mesh.triangles) json.begin_list().value(a).value(b).value(c).end();
+  json.end();
+}
+
 // A part of a rigid tool, in its link's frame.
 void put(JsonText& json, const models::ToolPart& part, const Pose& X_LT) {
   json.begin_object();
@@ -209,6 +217,8 @@ void put(JsonText& json, const models::ToolPart& part, const Pose& X_LT) {
     json.add("kind", "cylinder").add("radius", cylinder->radius_m).add("length", cylinder->length_m);
   } else if (const auto* hull = std::get_if<models::ConvexTool>(&part.shape)) {
     add_hull(json, *hull);
+  } else if (const auto* mesh = std::get_if<models::MeshTool>(&part.shape)) {
+    add_mesh(json, *mesh);
   }
   json.end();
 }

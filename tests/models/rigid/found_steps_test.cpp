@@ -10,7 +10,7 @@ namespace {
 
 RigidObject object_of(const Body& body, double friction) {
   RigidObject object;
-  object.shape = std::visit([&](const auto& shape) { return solid_of(shape, body.X); }, shape_of(body));
+  object.shape = solid_of_body(body);
   object.friction = friction;
   return object;
 }

@@ -19,7 +19,7 @@ Tool one(const Body& body) { return {{{shape_of(body), body.X, {}}}}; }
 
 RigidObject object_of(const Body& body, double mu, std::int32_t number) {
   RigidObject object;
-  object.shape = std::visit([&](const auto& shape) { return solid_of(shape, body.X); }, shape_of(body));
+  object.shape = solid_of_body(body);
   object.friction = mu;
   object.object = number;
   return object;

@@ -31,7 +31,7 @@ Pushed among_solids(std::uint64_t seed, Make make) {
       Body body = random_body(random, 0.02, 0.1);
       body.X = random_pose(random, 0.08);
       RigidObject object;
-      object.shape = std::visit([&](const auto& shape) { return solid_of(shape, body.X); }, shape_of(body));
+      object.shape = solid_of_body(body);
       object.friction = random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.8);
       object.object = i;
       mu.push_back(object.friction);

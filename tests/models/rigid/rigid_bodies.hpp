@@ -3,7 +3,7 @@
 #pragma once
 
 #include "models/base/random.hpp"
-#include "models/rigid_shapes/tool.hpp"
+#include "models/rigid_shapes/solid.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
 
 namespace proxarm::models {
@@ -60,6 +60,12 @@ inline decltype(ToolPart::shape) shape_of(const Body& body) {
   if (!(body.radius > 0.0)) return BoxTool{body.size};
   if (body.size.z() > 0.0) return CapsuleTool{body.size.z(), body.radius};
   return SphereTool{body.radius};
+}
+
+inline Solid solid_of_body(const Body& body) {
+  if (!(body.radius > 0.0)) return solid_of(BoxTool{body.size}, body.X);
+  if (body.size.z() > 0.0) return solid_of(CapsuleTool{body.size.z(), body.radius}, body.X);
+  return solid_of(SphereTool{body.radius}, body.X);
 }
 
 inline Body random_body(Random& random, double least, double most) {

@@ -36,7 +36,7 @@ struct Hunted {
   }
   void add(const Body& body, double friction) {
     RigidObject object;
-    object.shape = std::visit([&](const auto& shape) { return solid_of(shape, body.X); }, shape_of(body));
+    object.shape = solid_of_body(body);
     object.friction = friction;
     object.object = static_cast<std::int32_t>(mu.size());
     mu.push_back(friction);

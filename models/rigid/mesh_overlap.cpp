@@ -1,0 +1,56 @@
+#include "models/rigid/mesh_overlap.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "models/rigid/mesh_pairs.hpp"
+#include "models/rigid/part_box.hpp"
+#include "models/rigid_shapes/overlap.hpp"
+
+namespace proxarm::models {
+namespace {
+
+double to_wrong_side_m(const TriangleMesh& mesh, const Vec3& x, std::optional<bool> should_be_inside) noexcept {
+  if (!should_be_inside || mesh.encloses(x) == *should_be_inside) return 0.0;
+  std::uint32_t near = 0;
+  return -mesh.distance(x, std::numeric_limits<double>::infinity(), near);
+}
+
+}  // namespace
+
+double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMesh& mesh, const View& at,
+                         std::optional<bool> should_be_inside) noexcept {
+  Pose X = Pose::Identity();
+  X.linear() = at.R;
+  X.translation() = at.x;
+  double deepest = 0.0;
+  PartBox(solid, box, at, solid.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
+    const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
+    const double gap =
+        solid.faces.empty()
+            ? distance_of_segment(at * solid.points.front(), at * solid.points.back(), triangle) - solid.radius
+            : separation_from_triangle(solid, X, triangle);
+    deepest = std::min(deepest, gap);
+    return true;
+  });
+  return deepest < 0.0 ? deepest : to_wrong_side_m(mesh, at * solid.points.front(), should_be_inside);
+}
+
+double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,
+                         std::optional<bool> should_be_inside) noexcept {
+  double deepest = 0.0;
+  MeshPairs(own, other, at, 0.0).each([&](std::uint32_t face, std::uint32_t other_face) {
+    const std::array<Vec3, 3> a = {at * own.corner(face, 0), at * own.corner(face, 1), at * own.corner(face, 2)};
+    const std::array<Vec3, 3> b = {other.corner(other_face, 0), other.corner(other_face, 1),
+                                   other.corner(other_face, 2)};
+    deepest = std::min(deepest, separation_of_triangles(a, b));
+    return true;
+  });
+  if (deepest < 0.0) return deepest;
+  // One may be all inside of the other.
+  const double other_in_own = to_wrong_side_m(own, at.to_T(other.vertex(0)), false);
+  return std::min(other_in_own, to_wrong_side_m(other, at * own.vertex(0), should_be_inside));
+}
+
+}  // namespace proxarm::models

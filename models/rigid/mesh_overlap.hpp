@@ -1,0 +1,19 @@
+// Whether what should be apart stands in a mesh, for setting up.
+#pragma once
+
+#include <optional>
+
+#include "models/rigid/rigid_features.hpp"
+
+namespace proxarm::models {
+
+// The deepest that a solid (with the box of its points; `at` leads from its frame to the mesh's) stands in any triangle
+// of a mesh, or how far its first point is from the surface if it isn't inside or outside as it should be. Negative; 0
+// if neither. An open mesh has no inside.
+double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMesh& mesh, const View& at,
+                         std::optional<bool> should_be_inside) noexcept;
+// Of two meshes the same; the own one is a closed body.
+double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,
+                         std::optional<bool> should_be_inside) noexcept;
+
+}  // namespace proxarm::models

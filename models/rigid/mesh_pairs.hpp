@@ -1,0 +1,106 @@
+// Which triangles of two meshes come near each other.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "models/rigid/rigid_features.hpp"
+
+namespace proxarm::models {
+
+// Goes down both trees at once. `at` leads from the frame of the first mesh to that of the second.
+class MeshPairs {
+ public:
+  MeshPairs(const TriangleMesh& own, const TriangleMesh& other, const View& at, double near) noexcept
+      : own_(&own), other_(&other), at_(at), near_(near), spread_(at.R.cwiseAbs()) {}
+
+  // Calls visit(own face, other face) for each two that come so near, and some that don't, until it returns false.
+  template <typename Visit>
+  void each(Visit visit) const noexcept {
+    // Each of two trees halves its faces at each level, and a node that is divided leaves one of its halves to wait.
+    std::array<NodesOfBoth, 130> stack;
+    std::size_t top = 0;
+    push_near(stack, top, whole(*own_), whole(*other_));
+    while (top > 0) {
+      const NodesOfBoth next = stack[--top];
+      if (next.own.count > 0 && next.other.count > 0) {
+        if (!look_at(next.own, next.other, visit)) return;
+        continue;
+      }
+      const bool divide_own = next.other.count > 0 || (next.own.count == 0 && next.own.size() > next.other.size());
+      for (std::size_t k = 0; k < 2; ++k) {
+        if (divide_own) {
+          push_near(stack, top, half(*own_, next.own, k), next.other);
+        } else {
+          push_near(stack, top, next.own, half(*other_, next.other, k));
+        }
+      }
+    }
+  }
+
+ private:
+  struct Node {
+    Vec3 low, high;
+    std::uint32_t first = 0, count = 0;  // as of TriangleMesh::NodePair
+    [[nodiscard]] double size() const noexcept { return (high - low).squaredNorm(); }
+  };
+  struct NodesOfBoth {
+    Node own, other;
+  };
+
+  static Node node(const TriangleMesh::NodePair& pair, std::size_t k) noexcept {
+    return {{pair.low(k, 0), pair.low(k, 1), pair.low(k, 2)},
+            {pair.high(k, 0), pair.high(k, 1), pair.high(k, 2)},
+            pair.first[k],
+            pair.count[k]};
+  }
+  // The root is alone in its pair.
+  static Node whole(const TriangleMesh& mesh) noexcept { return node(mesh.structure().nodes.front(), 0); }
+  static Node half(const TriangleMesh& mesh, const Node& of, std::size_t k) noexcept {
+    return node(mesh.structure().nodes[of.first], k);
+  }
+
+  template <typename Stack>
+  void push_near(Stack& stack, std::size_t& top, const Node& own, const Node& other) const noexcept {
+    // The boxes, by the six axes of both.
+    const Vec3 half_own = 0.5 * (own.high - own.low), half_other = 0.5 * (other.high - other.low);
+    const Vec3 way = 0.5 * (other.low + other.high) - at_ * Vec3(0.5 * (own.low + own.high));
+    const Vec3 room = half_other + Vec3::Constant(near_);
+    if ((way.cwiseAbs() - spread_ * half_own - room).maxCoeff() > 0.0) return;
+    if (((at_.R.transpose() * way).cwiseAbs() - half_own - spread_.transpose() * room).maxCoeff() > 0.0) return;
+    stack[top++] = {own, other};
+  }
+
+  template <typename Visit>
+  bool look_at(const Node& own, const Node& other, Visit& visit) const noexcept {
+    for (std::uint32_t i = own.first; i < own.first + own.count; ++i) {
+      const std::array<Vec3, 3> a = {at_ * own_->corner(i, 0), at_ * own_->corner(i, 1), at_ * own_->corner(i, 2)};
+      const Vec3 low = a[0].cwiseMin(a[1]).cwiseMin(a[2]), high = a[0].cwiseMax(a[1]).cwiseMax(a[2]);
+      const Vec3 normal = at_.R * own_->face(i).normal;
+      for (std::uint32_t j = other.first; j < other.first + other.count; ++j) {
+        const std::array<Vec3, 3> b = {other_->corner(j, 0), other_->corner(j, 1), other_->corner(j, 2)};
+        const Vec3 b_low = b[0].cwiseMin(b[1]).cwiseMin(b[2]), b_high = b[0].cwiseMax(b[1]).cwiseMax(b[2]);
+        if (((low - b_high).array() > near_).any() || ((b_low - high).array() > near_).any()) continue;
+        if (on_one_side(other_->face(j).normal, b[0], a) || on_one_side(normal, a[0], b)) continue;
+        if (!visit(i, j)) return false;
+      }
+    }
+    return true;
+  }
+
+  // Whether a triangle is further from a plane than it may be.
+  [[nodiscard]] bool on_one_side(const Vec3& normal, const Vec3& through,
+                                 const std::array<Vec3, 3>& triangle) const noexcept {
+    const Vec3 heights(normal.dot(triangle[0] - through), normal.dot(triangle[1] - through),
+                       normal.dot(triangle[2] - through));
+    return heights.minCoeff() > near_ || heights.maxCoeff() < -near_;
+  }
+
+  const TriangleMesh *own_, *other_;
+  View at_;
+  double near_;
+  Mat3 spread_;
+};
+
+}  // namespace proxarm::models

@@ -1,0 +1,63 @@
+#include "models/rigid/near.hpp"
+
+#include <cmath>
+
+namespace proxarm::models {
+namespace {
+
+// Whether a unit direction misses the cone between the normals beside a sharp edge by more than `slack` (rad).
+bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) noexcept {
+  const Vec3 w = left.cross(right);
+  const double size = w.norm();
+  if (size < 1e-6) return false;  // two faces in one plane, or back to back: nothing is said
+  return left.cross(n).dot(w) < -slack * size || n.cross(right).dot(w) < -slack * size || n.dot(left + right) < -slack;
+}
+
+}  // namespace
+
+double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept {
+  const Vec3 d1 = a.to - a.from, d2 = b.to - b.from, r = a.from - b.from;
+  const double A = d1.squaredNorm(), E = d2.squaredNorm(), f = d2.dot(r), c = d1.dot(r), B = d1.dot(d2);
+  const double denominator = A * E - B * B;
+  double s = denominator > 1e-14 * A * E ? std::clamp((B * f - c * E) / denominator, 0.0, 1.0) : 0.0;
+  double t = (B * s + f) / E;
+  if (t < 0.0) {
+    t = 0.0;
+    s = std::clamp(-c / A, 0.0, 1.0);
+  } else if (t > 1.0) {
+    t = 1.0;
+    s = std::clamp((B - c) / A, 0.0, 1.0);
+  }
+  return (r + s * d1 - t * d2).squaredNorm();
+}
+
+// Their common normal is outside of the faces' normals beside one of them (touch_edges_sharp() asks for that). It turns
+// by as much over the sine of the angle between the edges; twice that, for the normals it is compared with turn too.
+// The 0.02 rad are those that touch_edges_sharp() allows.
+bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept {
+  Vec3 n = (own.to - own.from).normalized().cross((other.to - other.from).normalized());
+  const double sine = n.norm();
+  const double slack = 0.02 + 2.0 * turn * (1.0 + 1.0 / sine);
+  if (!(slack < 0.3)) return false;
+  n /= sine;
+  const auto held = [&](const Vec3& normal) {
+    return !(!other.open && misses(normal, other.left, other.right, slack)) &&
+           !(!own.open && misses(-normal, own.left, own.right, slack));
+  };
+  return !held(n) && !held(-n);
+}
+
+bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept {
+  const TriangleMesh::Face& face = mesh.face(index);
+  const double height = TriangleMesh::height(face, p);
+  if (!(std::abs(height) <= near)) return false;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& corner = mesh.corner(index, k);
+    const Vec3 outwards = (mesh.corner(index, (k + 1) % 3) - corner).cross(face.normal);
+    const double beyond = outwards.dot(p - corner);
+    if (beyond > 0.0 && beyond * beyond > (near * near - height * height) * outwards.squaredNorm()) return false;
+  }
+  return true;
+}
+
+}  // namespace proxarm::models

@@ -1,0 +1,76 @@
+// Which pairs of features of a mesh that is a part of the tool and of one that is an object may meet.
+#include "models/rigid/mesh_pairs.hpp"
+#include "models/rigid/near.hpp"
+#include "models/rigid/rigid_features.hpp"
+#include "models/rigid/rigid_world.hpp"
+
+namespace proxarm::models {
+namespace {
+
+// The vertices and the edges that the faces of a pair own, against the other face and against each other: since each
+// belongs to one face, no pair comes twice.
+class OfFaces {
+ public:
+  OfFaces(const TriangleFeatures& own, const TriangleFeatures& other, double held, const View& at, double near,
+          double turn) noexcept
+      : own_(&own), other_(&other), held_(held), at_(at), near_(near), turn_(turn) {}
+
+  template <typename Add>
+  void points_of_tool(std::uint32_t face, std::uint32_t other_face, Add add) const noexcept {
+    for (const std::uint32_t v : own_->vertices_of(face)) {
+      if (comes_near(other_->mesh(), other_face, at_ * own_->vertex(v), near_)) add(v, other_face);
+    }
+  }
+  template <typename Add>
+  void points_of_object(std::uint32_t face, std::uint32_t other_face, Add add) const noexcept {
+    for (const std::uint32_t v : other_->vertices_of(other_face)) {
+      if (comes_near(own_->mesh(), face, at_.to_T(other_->vertex(v)), near_)) add(face, v);
+    }
+  }
+  // A valley is touched by nothing sharp.
+  template <typename Add>
+  void edges(std::uint32_t face, std::uint32_t other_face, Add add) const noexcept {
+    for (const std::uint32_t i : own_->edges_of(face)) {
+      if (!own_->edge(i).ridge) continue;
+      const EdgeLine edge = moved_edge(own_->edge(i).line, at_);
+      for (const std::uint32_t j : other_->edges_of(other_face)) {
+        if (other_->edge(j).ridge != (held_ > 0.0)) continue;
+        EdgeLine line = other_->edge(j).line;
+        if (distance2_of_segments(edge, line) > near_ * near_) continue;
+        line.left *= held_;
+        line.right *= held_;
+        if (!never_hold(edge, line, turn_)) add(i, j);
+      }
+    }
+  }
+
+ private:
+  const TriangleFeatures *own_, *other_;
+  double held_;
+  View at_;
+  double near_, turn_;
+};
+
+}  // namespace
+
+void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
+  const Entry& e = shared_->entries[entry];
+  const TriangleFeatures& own = *shared_->parts[part].mesh;
+  const TriangleFeatures& other = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
+  const OfFaces of(own, other, e.held, at, reach, reach / shared_->reach);
+  const auto add = [&](Kind kind) {
+    return [this, kind, part, entry](std::uint32_t i, std::uint32_t j) { add_pair(kind, part, entry, i, j); };
+  };
+  std::size_t looked_at = 0;
+  MeshPairs(own.mesh(), other.mesh(), at, reach).each([&](std::uint32_t face, std::uint32_t other_face) {
+    crowded_ = crowded_ || looked_at++ == face_room_;
+    if (crowded_) return false;
+    of.points_of_tool(face, other_face, add(Kind::point_face));
+    of.points_of_object(face, other_face, add(Kind::face_point));
+    of.edges(face, other_face, add(Kind::edges));
+    return true;
+  });
+  near_faces_ += looked_at;
+}
+
+}  // namespace proxarm::models
