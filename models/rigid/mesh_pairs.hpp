@@ -21,7 +21,9 @@ class MeshPairs {
     // Each of two trees halves its faces at each level, and a node that is divided leaves one of its halves to wait.
     std::array<NodesOfBoth, 130> stack;
     std::size_t top = 0;
-    push_near(stack, top, whole(*own_), whole(*other_));
+    // The root is alone in its pair.
+    push_near(stack, top, own_node(own_->structure().nodes.front(), 0),
+              other_node(other_->structure().nodes.front(), 0));
     while (top > 0) {
       const NodesOfBoth next = stack[--top];
       if (next.own.count > 0 && next.other.count > 0) {
@@ -31,45 +33,54 @@ class MeshPairs {
       const bool divide_own = next.other.count > 0 || (next.own.count == 0 && next.own.size() > next.other.size());
       for (std::size_t k = 0; k < 2; ++k) {
         if (divide_own) {
-          push_near(stack, top, half(*own_, next.own, k), next.other);
+          push_near(stack, top, own_node(own_->structure().nodes[next.own.first], k), next.other);
         } else {
-          push_near(stack, top, next.own, half(*other_, next.other, k));
+          push_near(stack, top, next.own, other_node(other_->structure().nodes[next.other.first], k));
         }
       }
     }
   }
 
  private:
+  // A node of a tree: its box by middle and half, in its mesh's frame, and in the other one a box around that.
   struct Node {
-    Vec3 low, high;
+    Vec3 middle, half, half_there;
     std::uint32_t first = 0, count = 0;  // as of TriangleMesh::NodePair
-    [[nodiscard]] double size() const noexcept { return (high - low).squaredNorm(); }
+    [[nodiscard]] double size() const noexcept { return half.squaredNorm(); }
   };
   struct NodesOfBoth {
-    Node own, other;
+    Node own, other;  // the own one's middle is in the other frame
   };
 
-  static Node node(const TriangleMesh::NodePair& pair, std::size_t k) noexcept {
-    return {{pair.low(k, 0), pair.low(k, 1), pair.low(k, 2)},
-            {pair.high(k, 0), pair.high(k, 1), pair.high(k, 2)},
-            pair.first[k],
-            pair.count[k]};
+  [[nodiscard]] Node own_node(const TriangleMesh::NodePair& pair, std::size_t k) const noexcept {
+    Node node = box_of(pair, k);
+    node.half_there.noalias() = spread_ * node.half;
+    node.middle = at_ * node.middle;
+    return node;
   }
-  // The root is alone in its pair.
-  static Node whole(const TriangleMesh& mesh) noexcept { return node(mesh.structure().nodes.front(), 0); }
-  static Node half(const TriangleMesh& mesh, const Node& of, std::size_t k) noexcept {
-    return node(mesh.structure().nodes[of.first], k);
+  // With as much room around it as may lie between.
+  [[nodiscard]] Node other_node(const TriangleMesh::NodePair& pair, std::size_t k) const noexcept {
+    Node node = box_of(pair, k);
+    node.half.array() += near_;
+    node.half_there.noalias() = spread_.transpose() * node.half;
+    return node;
+  }
+  static Node box_of(const TriangleMesh::NodePair& pair, std::size_t k) noexcept {
+    const Vec3 low(pair.low(k, 0), pair.low(k, 1), pair.low(k, 2));
+    const Vec3 high(pair.high(k, 0), pair.high(k, 1), pair.high(k, 2));
+    return {0.5 * (low + high), 0.5 * (high - low), {}, pair.first[k], pair.count[k]};
   }
 
+  // The boxes, by the six axes of both.
+  [[nodiscard]] bool reaches(const Node& own, const Node& other) const noexcept {
+    const Vec3 way = other.middle - own.middle;
+    if (((way.cwiseAbs() - own.half_there - other.half).array() > 0.0).any()) return false;
+    const Vec3 way_there = at_.R.transpose() * way;
+    return ((way_there.cwiseAbs() - own.half - other.half_there).array() <= 0.0).all();
+  }
   template <typename Stack>
   void push_near(Stack& stack, std::size_t& top, const Node& own, const Node& other) const noexcept {
-    // The boxes, by the six axes of both.
-    const Vec3 half_own = 0.5 * (own.high - own.low), half_other = 0.5 * (other.high - other.low);
-    const Vec3 way = 0.5 * (other.low + other.high) - at_ * Vec3(0.5 * (own.low + own.high));
-    const Vec3 room = half_other + Vec3::Constant(near_);
-    if ((way.cwiseAbs() - spread_ * half_own - room).maxCoeff() > 0.0) return;
-    if (((at_.R.transpose() * way).cwiseAbs() - half_own - spread_.transpose() * room).maxCoeff() > 0.0) return;
-    stack[top++] = {own, other};
+    if (reaches(own, other)) stack[top++] = {own, other};
   }
 
   template <typename Visit>
@@ -77,6 +88,8 @@ class MeshPairs {
     for (std::uint32_t i = own.first; i < own.first + own.count; ++i) {
       const std::array<Vec3, 3> a = {at_ * own_->corner(i, 0), at_ * own_->corner(i, 1), at_ * own_->corner(i, 2)};
       const Vec3 low = a[0].cwiseMin(a[1]).cwiseMin(a[2]), high = a[0].cwiseMax(a[1]).cwiseMax(a[2]);
+      const Vec3 way = other.middle - 0.5 * (low + high);  // (the other box has the room around it)
+      if (((way.cwiseAbs() - other.half - 0.5 * (high - low)).array() > 0.0).any()) continue;
       const Vec3 normal = at_.R * own_->face(i).normal;
       for (std::uint32_t j = other.first; j < other.first + other.count; ++j) {
         const std::array<Vec3, 3> b = {other_->corner(j, 0), other_->corner(j, 1), other_->corner(j, 2)};

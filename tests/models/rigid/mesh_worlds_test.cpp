@@ -165,7 +165,7 @@ double boxes_from_mesh(const std::vector<Polyhedron>& boxes, const std::vector<P
     for (const Polyhedron& triangle : triangles) {
       const double size = std::max((triangle.corners[1] - triangle.corners[0]).norm(),
                                    (triangle.corners[2] - triangle.corners[0]).norm());
-      if ((triangle.corners[0] - middle).norm() < reach + size + 0.01) {
+      if ((triangle.corners[0] - middle).norm() < reach + size + 1e-3) {
         least = std::min(least, separation(box, triangle));
       }
     }
