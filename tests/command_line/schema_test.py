@@ -39,7 +39,8 @@ UNKNOWABLE = {
         r"bytes that hold|a poll of|no rate for|off: drives|stop_1 or stop_0|none: drives|the key `dbc`|one (of|that)|a last point|a drive on CAN|"
         r"32 for a float|a number that ends|up to 256 bytes)|unknown key|format:",
     "the arm, and what runs": r"^bus |expected (a joint of|a link of|a range within the URDF's|a mass|a timestep|a start|a start pose)",
-    "geometry": r"expected (a direction|axes of nonzero|a physical inertia|an invertible matrix|a closed mesh|less than half of how thick|a number other than 0|a shape, in W)",
+    "geometry": r"expected (a direction|axes of nonzero|a physical inertia|an invertible matrix|a closed mesh|less than half of how thick|a number other than 0|a shape, in W)|"
+                r"leads out of the proxy's (plane|space)",
 }
 
 
