@@ -8,6 +8,7 @@
 #include "tests/models/mesh/mesh_shapes.hpp"
 #include "tests/models/rigid/held_tool.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid/rigid_meshes.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -154,62 +155,6 @@ TEST(RigidWorldsOfMeshes, AToolThatStandsInAMeshIsNoticed) {
   EXPECT_LT(clearance_of_box({0.0, 0.0, top + 0.02}, true), 0.0) << "outside of what it should be in";
 }
 
-// A ball of 8 n² triangles with bumps of some per cent, as a scan has them.
-std::shared_ptr<const TriangleMesh> rough_ball(Random& random, double radius, int n) {
-  TriangleSoup soup;
-  const Vec3 first = 9.0 * random.direction(), second = 17.0 * random.direction();
-  // A face of an octahedron after the other, in n² triangles; what they share is welded.
-  for (int octant = 0; octant < 8; ++octant) {
-    const Vec3 sign((octant & 1) != 0 ? -1.0 : 1.0, (octant & 2) != 0 ? -1.0 : 1.0, (octant & 4) != 0 ? -1.0 : 1.0);
-    const auto at = [&](int i, int j) {
-      const Vec3 u = sign.cwiseProduct(Vec3(i, j, n - i - j)).normalized();
-      soup.vertices.emplace_back(radius * (1.0 + 0.03 * std::sin(first.dot(u)) + 0.02 * std::sin(second.dot(u))) * u);
-      return static_cast<std::uint32_t>(soup.vertices.size() - 1);
-    };
-    const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-      if (sign.prod() > 0.0) {
-        soup.triangles.push_back({a, b, c});
-      } else {
-        soup.triangles.push_back({a, c, b});
-      }
-    };
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; i + j < n; ++j) {
-        add(at(i, j), at(i + 1, j), at(i, j + 1));
-        if (i + j < n - 1) add(at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-      }
-    }
-  }
-  return std::make_shared<const TriangleMesh>(std::move(soup));
-}
-
-Polyhedron polyhedron_of(const TriangleMesh& mesh, std::uint32_t face) {
-  Polyhedron out;
-  out.corners = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
-  for (std::size_t k = 0; k < 3; ++k) out.edges.push_back((out.corners[(k + 1) % 3] - out.corners[k]).normalized());
-  out.normals.push_back(out.edges[0].cross(out.edges[1]).normalized());
-  for (std::size_t k = 0; k < 3; ++k) out.normals.push_back(out.normals[0].cross(out.edges[k]));
-  return out;
-}
-
-// The separation of boxes from a mesh's triangles, of those that may be near.
-double boxes_from_mesh(const std::vector<Polyhedron>& boxes, const std::vector<Polyhedron>& triangles) {
-  double least = 1.0;
-  for (const Polyhedron& box : boxes) {
-    Vec3 middle = Vec3::Zero();
-    for (const Vec3& x : box.corners) middle += x / 8.0;
-    const double reach = (box.corners[0] - middle).norm();
-    for (const Polyhedron& triangle : triangles) {
-      const double size = std::max((triangle.corners[1] - triangle.corners[0]).norm(),
-                                   (triangle.corners[2] - triangle.corners[0]).norm());
-      if ((triangle.corners[0] - middle).norm() < reach + size + 0.01) {
-        least = std::min(least, separation(box, triangle));
-      }
-    }
-  }
-  return least;
-}
-
 // Boxes of the given sizes in a row along z, sent to a mesh.
 Pushed boxes_about(const std::function<std::shared_ptr<const TriangleMesh>(Random&)>& make,
                    const std::vector<Vec3>& sizes, double furthest) {
@@ -238,7 +183,7 @@ Pushed boxes_about(const std::function<std::shared_ptr<const TriangleMesh>(Rando
         X.translation() = pose.position;
         boxes.push_back(polyhedron_of_box(sizes[i], X * tool.parts[i].X_TP));
       }
-      return boxes_from_mesh(boxes, triangles);
+      return polyhedra_from_mesh(boxes, triangles);
     };
     RigidWorld g(tool, {object});
     Mat6 K = Mat6::Zero();
