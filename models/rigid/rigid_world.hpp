@@ -197,6 +197,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, Twist& delta) noexcept;
   bool solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
+  [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
   void balance(const Twist& e, Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;
