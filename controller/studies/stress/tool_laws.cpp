@@ -186,7 +186,11 @@ double ToolLaws::rounding_m(const ToolPose& pose) {
 }
 
 std::string ToolLaws::missed(const ToolCall& call) const {
-  if (call.contacts.empty()) return call.r == call.p ? "" : "a wrench of nothing";
+  if (call.contacts.empty()) {
+    const Twist off = models::difference(call.r, call.p);
+    return off.head<3>().norm() + lever_m * off.tail<3>().norm() <= 8.0 * rounding_m(call.r) ? ""
+                                                                                             : "a wrench of nothing";
+  }
   Twist sum = Twist::Zero();
   double size = 1e-300;
   for (const PoseContact& contact : call.contacts) {
@@ -200,13 +204,18 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     const Vec3 &f = contact.force_W, &n = contact.normal_W;
     const double f_n = n.dot(f);
     const Vec3 f_t = f - f_n * n;
-    if (!(f_n >= 0.0)) return "a pull";
+    if (!(f_n >= -1e-12 * size)) return "a pull";
     // A point on a hollow's wall is known to less, since its normal turns with it.
     if (std::abs(contact.gap_m) > (hollow_ ? 1e-10 : 1e-12) && f_n > 1e-9 * size) return "a force over a gap";
     const double limit = friction(contact) * f_n;
-    // In hollow objects forces are as a local problem has them, solved to 1e-10 of the press where contacts hold each
-    // other; elsewhere what is out of the cone by that is taken off.
-    if (!(f_t.norm() <= limit + (hollow_ ? 1e-10 : 1e-11) * size)) return "out of the cone";
+    // In hollow objects forces are as a local problem has them where contacts hold each other: to 1e-10 of the press,
+    // √(eᵀK e), which is a force by the contact's yield. Elsewhere what is out of the cone by that is taken off.
+    double beyond = 1e-11 * size;
+    if (hollow_) {
+      const Twist e = models::difference(call.r, call.p);
+      beyond += 1e-10 * std::sqrt(e.dot(call.K * e) / yields(call, contact, n));
+    }
+    if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
     // A slip far below what friction would move the contact by is next to sticking: its direction counts as much less.
     const Vec3 slip = slip_of(contact, call.q, call.r);
     const double s = slip.norm();
