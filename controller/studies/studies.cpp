@@ -16,6 +16,7 @@ StudyList all_studies(const ArmRun& arm, const CycleRun& cycles) {
   list.push_back(std::make_unique<Stress>(Stress::Worlds::meshes));
   list.push_back(std::make_unique<Stress>(Stress::Worlds::layers));
   list.push_back(std::make_unique<Stress>(Stress::Worlds::order_2));
+  list.push_back(std::make_unique<Stress>(Stress::Worlds::tools));
   list.push_back(std::make_unique<ErrorStudy>());
   list.push_back(std::make_unique<StabilityMap>());
   list.push_back(std::make_unique<Fidelity>(arm));

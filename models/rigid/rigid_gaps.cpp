@@ -13,6 +13,9 @@ namespace {
 // left of the iteration is as small; this is a thousand times that, and a tenth of what a gap may be short of.
 constexpr double kLift_m = 1e-13;
 
+// A sine. Steps that are long beside a tool turn it by tenths of a radian on their way to where it ends.
+constexpr double kLeans = 0.2;
+
 }  // namespace
 
 // Of a pair at q(k−1): the height of the tool's feature over the object's, or of the object's point over the tool's
@@ -286,6 +289,27 @@ bool RigidWorld::beside(const Found& deep, const View& at) const noexcept {
   return false;
 }
 
+// Whether a solid would stand in a face on which a corner of it lies: parts of it are behind that face by far, seen
+// from the corner. Such a face holds the corner of no lawful pose near this one.
+bool RigidWorld::leans_into(const Found& corner, const View& at) const noexcept {
+  const Pair& pair = pairs_[corner.pair];
+  const auto* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
+  if (other == nullptr) return false;
+  const bool own_corner = pair.kind == Kind::point_face;
+  if (own_corner && shared_->parts[pair.part].mesh) return false;  // it isn't convex
+  const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
+  // Out of the face, in the frame of the solid whose corner it is.
+  const Vec3 n_O = on == nullptr ? corner.touch.normal : Vec3(on->R.transpose() * corner.touch.normal);
+  const Vec3 n = own_corner ? Vec3(at.R.transpose() * corner.touch.normal) : Vec3(-n_O);
+  const Solid& solid = own_corner ? shared_->parts[pair.part].solid : *other;
+  const Vec3& tip = solid.points[own_corner ? pair.own : pair.other];
+  for (const Vec3& p : solid.points) {
+    const Vec3 d = p - tip;
+    if (n.dot(d) < -kLeans * d.norm()) return true;
+  }
+  return false;
+}
+
 // A point inside of a convex solid, or under a ridge of a mesh, is behind several faces: only the one that it is least
 // deep under holds it. The same for an object's point in a part of the tool.
 void RigidWorld::drop_deeper(const View& at) noexcept {
@@ -299,6 +323,20 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
     const Vec3 foot = deep.touch.point - deep.touch.gap * deep.touch.normal;
     return other.touch.normal.dot(foot - (other.touch.point - other.touch.gap * other.touch.normal)) < kGap_m;
   };
+  // A corner that a step takes over an edge is behind the faces on both sides of it, and may be less deep under the one
+  // that it can't lie on.
+  for (std::size_t i = 0; i < found_count_; ++i) {
+    const Kind kind = pairs_[found_[i].pair].kind;
+    if (!(found_[i].touch.gap < -kGap_m) || (kind != Kind::point_face && kind != Kind::face_point)) continue;
+    for (std::size_t j = 0; j < found_count_; ++j) {
+      if (j == i || found_[j].touch.gap < found_[i].touch.gap) continue;
+      if (!same_point(pairs_[found_[i].pair], pairs_[found_[j].pair])) continue;
+      if (!leans_into(found_[j], at) || leans_into(found_[i], at)) continue;
+      found_[j] = found_[--found_count_];
+      if (i == found_count_) i = j;
+      --j;
+    }
+  }
   for (std::size_t i = 0; i < found_count_; ++i) {
     if (!(found_[i].touch.gap < -kGap_m)) continue;
     const Pair& pair = pairs_[found_[i].pair];

@@ -38,6 +38,9 @@ constexpr double kRoughShare = 1e-5;
 constexpr double kNear_m = 1e-9;
 // And the last step turns normals by no more than 1e-10 of a clearance of ten micrometres.
 constexpr double kStill_m = 1e-15;
+// By how much normals may still turn in the last step, whose forces are those of normals before it: of 10 N that is a
+// tenth of a nanonewton across.
+constexpr double kTurned = 1e-11;
 // A tool that rests among more contacts than hold it may have a solution at one pose and, for rounding, none at the
 // next, or steps that don't get smaller than rounding of its forces makes them. After a step below this the first one
 // is taken: normals are right to 1e-8 then.
@@ -330,6 +333,23 @@ bool RigidWorld::stays_balanced(const Twist& delta, const Twist& e) const noexce
   return (K_ * bent).squaredNorm() <= kBalance * kBalance * (K_ * (e + delta)).squaredNorm();
 }
 
+// By how much a twist turns the normals of what presses at most, rad: those of the tool's faces and of edges as the
+// tool turns, and of what is round as it goes on. (Of hollow objects settle() asks for more.)
+double RigidWorld::normals_turn_by(const Twist& delta) const noexcept {
+  double bend = 0.0;
+  bool turns = false;
+  for (std::size_t k = 0; k < linear_count_; ++k) {
+    if (linear_[k].state == ContactState::open) continue;
+    const Pair& pair = pairs_[found_[of_linear_[k]].pair];
+    if (pair.kind == Kind::point_face || pair.kind == Kind::point_field || pair.kind == Kind::rim_field) continue;
+    turns = true;
+    bend = std::max(bend, bend_per_m(pair));
+  }
+  if (!turns) return 0.0;
+  const double turned = delta.tail<3>().norm();
+  return turned + bend * (delta.head<3>().norm() + shared_->reach * turned);
+}
+
 // The local problem is solved to 1e-10 of the free motion's press where contacts hold each other. What forces are then
 // out of their cones by is taken off, and the tool moves by what wrenches lack to balance: 1e-9 N is 1e-16 m on a
 // coupling of 10 N/µm. Where gaps bend, the coupling isn't K, and the law is met more closely.
@@ -382,8 +402,8 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
     // those of normals before it.
     const bool whole = share == 1.0 && !roughly && beside_ <= beside_m && (!shared_->bends || size <= kStill_m);
-    const bool small =
-        std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding && stays_balanced(delta, e);
+    const bool small = std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding &&
+                       stays_balanced(delta, e) && normals_turn_by(delta) <= kTurned;
     if (whole && (size <= rounding || small)) {
       collected_ = false;
       return solved;

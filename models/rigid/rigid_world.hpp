@@ -192,6 +192,7 @@ class RigidWorld final : public PoseAlgorithm {
   void find(const ToolPose& pose) noexcept;
   void drop_deeper(const View& at) noexcept;
   [[nodiscard]] bool beside(const Found& deep, const View& at) const noexcept;
+  [[nodiscard]] bool leans_into(const Found& corner, const View& at) const noexcept;
   [[nodiscard]] double friction(const Pair& pair) const noexcept;
   void linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
                  Mat3& frame) const noexcept;
@@ -204,6 +205,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, Twist& delta) noexcept;
   bool solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
+  [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
   void balance(const Twist& e, Twist& delta) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;

@@ -16,6 +16,7 @@
 //   not judged      work with several contacts of which one is convex, with objects that move (they do work), with
 //                   layers (they give back what they took), and steps of order 2 that ask 𝒢 from another point than
 //                   where the proxy was
+// Rigid tools are judged by the same names, with runs and laws of their own (tool_run.hpp).
 #pragma once
 
 #include <array>
@@ -30,8 +31,8 @@ namespace proxarm::studies {
 class Stress final : public Study {
  public:
   using Worlds = StressWorlds;
-  static constexpr std::array<std::string_view, 4> worlds_names{"stress", "stress_meshes", "stress_layers",
-                                                                "stress_order2"};
+  static constexpr std::array<std::string_view, 5> worlds_names{"stress", "stress_meshes", "stress_layers",
+                                                                "stress_order2", "stress_tools"};
   explicit Stress(Worlds worlds = Worlds::all) : worlds_(worlds) {}
 
   std::string name() const override { return std::string(worlds_names[static_cast<std::size_t>(worlds_)]); }

@@ -9,6 +9,7 @@
 #include "controller/proxies/admittance_proxy.hpp"
 #include "controller/studies/stress/random_scene.hpp"
 #include "controller/studies/stress/stress_laws.hpp"
+#include "controller/studies/stress/tool_run.hpp"
 #include "models/mesh/mesh_obstacle.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/compiler/obstacles.hpp"
@@ -303,6 +304,7 @@ void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, c
 }  // namespace
 
 Tally run_seed(std::uint64_t seed, StressWorlds worlds, std::string* report) {
+  if (worlds == StressWorlds::tools) return run_tool_seed(seed, report);
   Random random(seed);
   const RandomScene made = worlds == StressWorlds::meshes   ? random_mesh_scene(random)
                            : worlds == StressWorlds::layers ? random_layer_scene(random)

@@ -62,5 +62,36 @@ TEST(FoundSteps, AKeyBesideAWallIsNotPushedOutOverTheWallsEnd) {
   EXPECT_GE(apart(at(key, isometry(r)), wall), -1e-16);
 }
 
+// A box's corner comes over an edge of a convex tool in a step of 5 mm and 0.1 rad: behind the faces on both sides of
+// the edge, and less deep under that on the far side, which it can't lie on, since the box would stand in it. The step
+// held it there, 0.7 mm inside, by 0.5 MN. (`proxarm study stress_tools --replay 4579234351648196`, step 12.)
+TEST(FoundSteps, ACornerThatComesOverAnEdgeIsHeldByTheFaceThatItCanLieOn) {
+  const ConvexTool hull{{{0.0096791710080283561, 0.020118781849457749, -0.0036371195572940588},
+                         {-0.013964046287039037, -0.0045116497110002582, -0.013301154163211292},
+                         {0.0083272950227783419, -0.00061814410882549402, 0.012825724061062378},
+                         {0.0079770395060788351, -0.0062388779538671609, 0.0043202286151497356},
+                         {0.0015562341327226778, -0.0028737202192407022, -0.011526893700015372},
+                         {-0.0035923099925627418, 0.019063397522454378, -0.0051691880353451781},
+                         {0.026325957410254151, 0.0037620150066072183, -0.0081994778673238154},
+                         {0.0013190098404186593, -0.0062852171164358896, 0.029018937578444485}}};
+  Body box;
+  box.size = {0.0332733677046212, 0.044315413901664893, 0.065771980866915589};
+  box.X = isometry({{0.062068877042153706, 0.025615821520319673, 0.037171351144421133},
+                    Quaternion(0.99949106530731491, 0.030692380162964387, 0.0051287594709040468, -0.0070202561969290814)
+                        .normalized()});
+  const ToolPose q{{0.047882973936083074, -0.0071344931852686975, 0.067608033610099691},
+                   {0.35917408246520627, 0.83300382676513784, -0.14887512397293226, -0.39361758159660204}};
+  const ToolPose p{{0.043735395107649441, -0.0086453984516657711, 0.06427078665230021},
+                   {0.31778084211172136, 0.85596436678895438, -0.17955515683153503, -0.36619705737424019}};
+  const auto separation_at = [&](const ToolPose& pose) {
+    return separation(at(polyhedron_of_hull(hull.points_m), pose), polyhedron_of_box(box.size, box.X));
+  };
+  ASSERT_GT(separation_at(q), -1e-15);
+  RigidWorld g({{{hull, Pose::Identity(), {}}}}, {object_of(box, 0.69242252595974174)});
+  const ToolPose r = g.step(isotropic(1.16621e8, 1.16621e5), p, q);
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_GE(separation_at(r), -1e-15);
+}
+
 }  // namespace
 }  // namespace proxarm::models

@@ -8,8 +8,8 @@
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
 #include "tests/models/rigid/held_tool.hpp"
-#include "tests/models/rigid/mesh_bodies.hpp"
 #include "tests/models/rigid/rigid_bodies.hpp"
+#include "tests/models/rigid/rigid_meshes.hpp"
 
 namespace proxarm::models {
 namespace {

@@ -7,8 +7,8 @@
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
 #include "tests/models/rigid/held_tool.hpp"
-#include "tests/models/rigid/mesh_bodies.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid/rigid_meshes.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -155,24 +155,6 @@ TEST(RigidWorldsOfMeshes, AToolThatStandsInAMeshIsNoticed) {
   EXPECT_LT(clearance_of_box({0.0, 0.0, top + 0.02}, true), 0.0) << "outside of what it should be in";
 }
 
-// The separation of boxes from a mesh's triangles, of those that may be near.
-double boxes_from_mesh(const std::vector<Polyhedron>& boxes, const std::vector<Polyhedron>& triangles) {
-  double least = 1.0;
-  for (const Polyhedron& box : boxes) {
-    Vec3 middle = Vec3::Zero();
-    for (const Vec3& x : box.corners) middle += x / 8.0;
-    const double reach = (box.corners[0] - middle).norm();
-    for (const Polyhedron& triangle : triangles) {
-      const double size = std::max((triangle.corners[1] - triangle.corners[0]).norm(),
-                                   (triangle.corners[2] - triangle.corners[0]).norm());
-      if ((triangle.corners[0] - middle).norm() < reach + size + 1e-3) {
-        least = std::min(least, separation(box, triangle));
-      }
-    }
-  }
-  return least;
-}
-
 // Boxes of the given sizes in a row along z, sent to a mesh.
 Pushed boxes_about(const std::function<std::shared_ptr<const TriangleMesh>(Random&)>& make,
                    const std::vector<Vec3>& sizes, double furthest) {
@@ -201,7 +183,7 @@ Pushed boxes_about(const std::function<std::shared_ptr<const TriangleMesh>(Rando
         X.translation() = pose.position;
         boxes.push_back(polyhedron_of_box(sizes[i], X * tool.parts[i].X_TP));
       }
-      return boxes_from_mesh(boxes, triangles);
+      return polyhedra_from_mesh(boxes, triangles);
     };
     RigidWorld g(tool, {object});
     Mat6 K = Mat6::Zero();

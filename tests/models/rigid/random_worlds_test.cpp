@@ -76,8 +76,7 @@ TEST(RigidWorlds, ACompoundKeepsTheLaw) {
   }));
 }
 
-// A hull of some points among boxes. The judge takes all planes through three points that leave the others on one side,
-// and all pairs of points as edges: more axes than needed find no more than the separation.
+// A hull of some points among boxes.
 TEST(RigidWorlds, AHullAmongBoxesKeepsTheLaw) {
   Pushed out;
   for (std::uint64_t world = 0; world < 40; ++world) {
@@ -85,20 +84,7 @@ TEST(RigidWorlds, AHullAmongBoxesKeepsTheLaw) {
     ConvexTool hull;
     const int count = 4 + random.below(5);
     for (int i = 0; i < count; ++i) hull.points_m.push_back(random.uniform(0.01, 0.03) * random.direction());
-    Polyhedron body;
-    body.corners = hull.points_m;
-    for (const Vec3& a : hull.points_m) {
-      for (const Vec3& b : hull.points_m) {
-        if (&a >= &b) continue;
-        body.edges.push_back((b - a).normalized());
-        for (const Vec3& c : hull.points_m) {
-          const Vec3 n = (b - a).cross(c - a).normalized();
-          const bool over = std::any_of(body.corners.begin(), body.corners.end(),
-                                        [&](const Vec3& x) { return n.dot(x - a) > 1e-12; });
-          if (&b != &c && &a != &c && !over) body.normals.push_back(n);
-        }
-      }
-    }
+    const Polyhedron body = polyhedron_of_hull(hull.points_m);
     std::vector<RigidObject> objects;
     std::vector<Polyhedron> others;
     for (int i = 0; i < 5; ++i) {
@@ -112,10 +98,7 @@ TEST(RigidWorlds, AHullAmongBoxesKeepsTheLaw) {
     }
     RigidWorld g({{{hull, Pose::Identity(), {}}}}, std::move(objects));
     const auto least = [&](const ToolPose& pose) {
-      Polyhedron moved_body = body;
-      for (Vec3& x : moved_body.corners) x = pose * x;
-      for (Vec3& n : moved_body.normals) n = pose.orientation * n;
-      for (Vec3& e : moved_body.edges) e = pose.orientation * e;
+      const Polyhedron moved_body = at(body, pose);
       double gap = 1.0;
       for (const Polyhedron& other : others) gap = std::min(gap, separation(moved_body, other));
       return gap;

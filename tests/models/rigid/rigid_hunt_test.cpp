@@ -50,7 +50,8 @@ struct Figures {
   std::int64_t steps = 0, touching = 0, slipping = 0, unresolved = 0, noisy = 0;
   double deepest_m = 0.0;
   double imbalance_N = 0.0, cone_N = 0.0, against_slip_N = 0.0, pull_N = 0.0, apart_N = 0.0;
-  std::int64_t rises = 0;  // steps in which contacts gave more energy than rounding and curvature can
+  std::int64_t over_corners = 0;  // steps of which it had to be asked what they met first
+  std::int64_t rises = 0;         // in which contacts gave more energy than rounding and curvature can
   double created_J = 0.0;
 };
 
@@ -102,7 +103,8 @@ void judge(std::span<const PoseContact> contacts, const std::vector<double>& mu,
 // normal of a face or an edge turns with the tool by θ while the point goes on by s, and something round falls off by
 // s²/2r. And where a sharp edge or corner leaves one feature of an object for another, the normal turns by α at once:
 // it has a share of sin α in the way s. But to slide from a plane on to another one by at most s, p̂ must not be deeper
-// below that than s cot α: a force that presses deeper is none of a path over the edge.
+// below that than s cot α: a force that presses deeper is none of a path over the edge. `earlier` is what touched
+// before the step, or first on its way.
 double curvature_J(const Hunted& world, std::span<const PoseContact> contacts, const std::vector<PoseContact>& earlier,
                    const ToolPose& before, const ToolPose& q) {
   const double turned = difference(q, before).tail<3>().norm();
@@ -122,6 +124,16 @@ double curvature_J(const Hunted& world, std::span<const PoseContact> contacts, c
       sum += force * s * sine;
   }
   return sum;
+}
+
+// What a step's way meets first: a tool may come to a corner and slide over it within a millisecond. Of a world that
+// knows nothing of the steps before, led to eighths of the way.
+std::vector<PoseContact> first_met(const Hunted& world, const ToolPose& before, const ToolPose& p_hat) {
+  RigidWorld g(world.tool, world.objects);
+  for (int k = 1; k < 8 && g.contacts().empty(); ++k) {
+    g.step(world.held.K, moved(before, 0.125 * k * difference(p_hat, before)), before);
+  }
+  return {g.contacts().begin(), g.contacts().end()};
 }
 
 // A hand of 300 N/m about places that it changes four times a second, and of torques to turn with; at most 10 N.
@@ -159,7 +171,7 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
     const Twist w = hand.wrench(random, held, middle, k);
     const ToolPose before = held.q, p = held.freely(w);
     const double energy = held.energy_J();
-    const std::vector<PoseContact> earlier(g.contacts().begin(), g.contacts().end());
+    std::vector<PoseContact> earlier(g.contacts().begin(), g.contacts().end());
     held.arrive(g.step(held.K, p, held.q));
     ++out.steps;
     const double apart = world.apart(held.q);
@@ -167,9 +179,18 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
     EXPECT_GE(apart, -1e-12) << "seed " << seed << ", step " << k;
     if (apart < -1e-12) return;
     const Twist way = difference(held.q, before);
-    const double created =
-        held.energy_J() - energy - w.dot(way) - curvature_J(world, g.contacts(), earlier, before, held.q);
-    if (created > 1e-12) {  // J; rounding of a joule is ten thousand times less
+    const auto created_J = [&] {
+      return held.energy_J() - energy - w.dot(way) - curvature_J(world, g.contacts(), earlier, before, held.q);
+    };
+    constexpr double rounding_J = 1e-12;  // of a joule it is ten thousand times less
+    double created = created_J();
+    if (created > rounding_J) {
+      const std::vector<PoseContact> met = first_met(world, before, p);
+      earlier.insert(earlier.end(), met.begin(), met.end());
+      created = created_J();
+      ++out.over_corners;
+    }
+    if (created > rounding_J) {
       ++out.rises;
       raise(out.created_J, created);
       std::cout << "  energy created: seed " << seed << ", step " << k << ": " << created << " J\n";
@@ -183,8 +204,8 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
   }
 }
 
-// `most_unresolved` is a share of all steps; `most_rises` is so many steps of a million.
-void hunt(const char* name, std::uint64_t first_seed, double most_unresolved, std::int64_t most_rises,
+// `most_unresolved` is a share of all steps.
+void hunt(const char* name, std::uint64_t first_seed, double most_unresolved,
           const std::function<Hunted(Random&)>& make) {
   const std::int64_t each = 2000, worlds = std::max<std::int64_t>(1, tests::scaled(75'000) / each);
   const char* alone = std::getenv("PROXARM_RIGID_SEED");
@@ -202,7 +223,7 @@ void hunt(const char* name, std::uint64_t first_seed, double most_unresolved, st
             << " m; at 10 N: imbalance " << out.imbalance_N << " N (" << out.noisy
             << " steps beyond 1e-10), out of the cone " << out.cone_N << ", against slip " << out.against_slip_N
             << ", pull " << out.pull_N << ", with a gap " << out.apart_N << "; energy created in " << out.rises
-            << " steps, at most " << out.created_J << " J\n";
+            << " steps, at most " << out.created_J << " J (" << out.over_corners << " asked what they met first)\n";
   if (alone != nullptr) return;
   // The last step of the iteration still turns levers: seldom, of contacts that press each other, by more than 1e-10 N.
   EXPECT_LE(out.imbalance_N, 1e-9);
@@ -213,11 +234,11 @@ void hunt(const char* name, std::uint64_t first_seed, double most_unresolved, st
   EXPECT_LE(out.apart_N, 1e-8);
   EXPECT_GT(out.touching, out.steps / 10) << "or else this looks at nothing";
   EXPECT_LE(static_cast<double>(out.unresolved), 1.0 + most_unresolved * static_cast<double>(out.steps));
-  EXPECT_LE(out.rises, most_rises * out.steps / 1'000'000);
+  EXPECT_EQ(out.rises, 0);
 }
 
 TEST(RigidHunt, AKeyInItsSlot) {
-  hunt("key", 1'000'000, 0.03, 0, [](Random& random) {
+  hunt("key", 1'000'000, 0.03, [](Random& random) {
     Hunted world;
     const Vec3 size(random.uniform(0.005, 0.04), random.uniform(0.004, 0.02), random.uniform(0.005, 0.04));
     const double half = 0.5 * size.y() + 0.5 * random.uniform(9e-6, 15e-6), mu = random.uniform(0.0, 0.6);
@@ -250,7 +271,7 @@ TEST(RigidHunt, AKeyInItsSlot) {
 
 // A tool of a tenth of a millimetre in a cell of sheets that are as thin, from which there is no way out.
 TEST(RigidHunt, ThinToolsAmongThinSheets) {
-  hunt("thin", 2'000'000, 0.005, 0, [](Random& random) {
+  hunt("thin", 2'000'000, 0.005, [](Random& random) {
     Hunted world;
     const double thin = 1e-4, half = random.uniform(0.001, 0.01);
     Body tool;
@@ -316,9 +337,8 @@ Hunted among_ten(Random& random, const Body& tool) {
   return world;
 }
 
-// One step in 2.5 million (seed 3000443, step 1230) gives 1 mJ more than what is accounted for.
 TEST(RigidHunt, ABoxAmongTenObjects) {
-  hunt("box", 3'000'000, 0.01, 1, [](Random& random) {
+  hunt("box", 3'000'000, 0.01, [](Random& random) {
     Body tool;
     tool.size = random_size(random, 0.01, 0.05);
     return among_ten(random, tool);
@@ -326,7 +346,7 @@ TEST(RigidHunt, ABoxAmongTenObjects) {
 }
 
 TEST(RigidHunt, ACapsuleOverEdges) {
-  hunt("capsule", 4'000'000, 0.001, 0, [](Random& random) {
+  hunt("capsule", 4'000'000, 0.001, [](Random& random) {
     Body tool;
     tool.size.z() = random.uniform(0.01, 0.08);
     tool.radius = random.uniform(0.001, 0.01);

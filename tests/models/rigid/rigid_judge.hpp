@@ -30,6 +30,34 @@ inline Polyhedron polyhedron_of_box(const Vec3& size, const Pose& X) {
   return box;
 }
 
+// The convex hull of some points. All planes through three of them that leave the others on one side, and all pairs as
+// edges: more axes than needed find no more than the separation.
+inline Polyhedron polyhedron_of_hull(const std::vector<Vec3>& points) {
+  Polyhedron hull;
+  hull.corners = points;
+  for (const Vec3& a : points) {
+    for (const Vec3& b : points) {
+      if (&a >= &b) continue;
+      hull.edges.push_back((b - a).normalized());
+      for (const Vec3& c : points) {
+        const Vec3 n = (b - a).cross(c - a).normalized();
+        const bool over =
+            std::any_of(points.begin(), points.end(), [&](const Vec3& x) { return n.dot(x - a) > 1e-12; });
+        if (&b != &c && &a != &c && !over) hull.normals.push_back(n);
+      }
+    }
+  }
+  return hull;
+}
+
+inline Polyhedron at(const Polyhedron& body, const ToolPose& pose) {
+  Polyhedron out = body;
+  for (Vec3& x : out.corners) x = pose * x;
+  for (Vec3& n : out.normals) n = pose.orientation * n;
+  for (Vec3& e : out.edges) e = pose.orientation * e;
+  return out;
+}
+
 // The separating axis theorem: the largest separation over all face normals and products of edges. It is the distance
 // where the nearest features are a face's, and no larger than it otherwise; negative inside.
 inline double separation(const Polyhedron& a, const Polyhedron& b) {
@@ -104,6 +132,19 @@ inline LawFigures judge_law(std::span<const PoseContact> contacts, const Mat6& K
   const double rounding = 0.5 * std::numeric_limits<double>::epsilon() * (K.topLeftCorner<3, 3>() * q.position).norm();
   out.imbalance = std::max((sum - w).norm() - rounding, 0.0) / std::max(w.norm(), 1e-300);
   return out;
+}
+
+// Of the wrench, over the largest force: in a wedge the forces hold each other and are far larger than their sum.
+inline double imbalance(std::span<const PoseContact> contacts, const Mat6& K, const ToolPose& p_hat,
+                        const ToolPose& q) {
+  Twist off = -(K * difference(q, p_hat));
+  double size = off.norm();
+  for (const PoseContact& contact : contacts) {
+    off.head<3>() += contact.force_W;
+    off.tail<3>() += (contact.point_W - q.position).cross(contact.force_W);
+    size = std::max(size, contact.force_W.norm());
+  }
+  return off.norm() / size;
 }
 
 // What steps in a world came to.

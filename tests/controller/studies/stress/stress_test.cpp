@@ -32,6 +32,8 @@ TEST(Stress, HoldsAmongLayers) { expect_no_violation(2, 400, Stress::Worlds::lay
 
 TEST(Stress, HoldsAtOrder2) { expect_no_violation(3, 2'000, Stress::Worlds::order_2); }
 
+TEST(Stress, HoldsWithRigidTools) { expect_no_violation(4, 200, Stress::Worlds::tools); }
+
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
   const Options options{.seed = 5};
@@ -40,6 +42,8 @@ TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   EXPECT_FALSE(Stress::replay(job_seed(1, 0), one));
   EXPECT_FALSE(Stress::replay(job_seed(1, 0), two));
   EXPECT_EQ(one, two);
+  const Stress tools(Stress::Worlds::tools);
+  EXPECT_EQ(tools.run(3, options), tools.run(3, options));
 }
 
 }  // namespace

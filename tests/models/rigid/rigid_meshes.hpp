@@ -1,7 +1,11 @@
-// Meshes as objects and as tools, and their triangles as a judge sees them.
+// Meshes of bodies for rigid tools, and how far convex bodies are from them by the separation from each triangle.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "models/base/random.hpp"
 #include "models/mesh/mesh.hpp"
@@ -46,6 +50,25 @@ inline Polyhedron polyhedron_of(const TriangleMesh& mesh, std::uint32_t face) {
   out.normals.push_back(out.edges[0].cross(out.edges[1]).normalized());
   for (std::size_t k = 0; k < 3; ++k) out.normals.push_back(out.normals[0].cross(out.edges[k]));
   return out;
+}
+
+// The separation of convex bodies from a mesh's triangles, of those that may be near.
+inline double polyhedra_from_mesh(const std::vector<Polyhedron>& bodies, const std::vector<Polyhedron>& triangles) {
+  double least = 1.0;
+  for (const Polyhedron& body : bodies) {
+    Vec3 middle = Vec3::Zero();
+    for (const Vec3& x : body.corners) middle += x / static_cast<double>(body.corners.size());
+    double reach = 0.0;
+    for (const Vec3& x : body.corners) reach = std::max(reach, (x - middle).norm());
+    for (const Polyhedron& triangle : triangles) {
+      const double size = std::max((triangle.corners[1] - triangle.corners[0]).norm(),
+                                   (triangle.corners[2] - triangle.corners[0]).norm());
+      if ((triangle.corners[0] - middle).norm() < reach + size + 1e-3) {
+        least = std::min(least, separation(body, triangle));
+      }
+    }
+  }
+  return least;
 }
 
 inline MeshTool tool_of(const TriangleMesh& mesh) { return {mesh.structure().vertices, mesh.structure().triangles}; }

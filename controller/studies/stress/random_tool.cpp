@@ -1,0 +1,106 @@
+#include "controller/studies/stress/random_tool.hpp"
+
+#include <array>
+
+namespace proxarm::studies {
+namespace {
+
+using models::Pose;
+using models::ToolPart;
+using models::Vec3;
+
+double some_friction(Random& random) { return random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.8); }
+
+Pose some_pose(Random& random, double half_m) {
+  Pose pose = Pose::Identity();
+  const double angle = random.uniform(-3.0, 3.0);
+  pose.linear() = Eigen::AngleAxisd(angle, random.direction()).toRotationMatrix();
+  pose.translation() = random.in_box(half_m);
+  return pose;
+}
+
+Vec3 some_size(Random& random, double low, double high) {
+  Vec3 size;
+  for (double& x : size) x = random.uniform(low, high);
+  return size;
+}
+
+ToolPart some_part(Random& random) {
+  ToolPart part;
+  const int kind = random.below(3);
+  const double radius = random.uniform(0.003, 0.015), length = random.uniform(0.01, 0.03);
+  if (kind == 0) part.shape = models::SphereTool{radius};
+  if (kind == 1) part.shape = models::CapsuleTool{length, radius};
+  if (kind == 2) part.shape = models::BoxTool{some_size(random, 0.005, 0.03)};
+  if (random.chance(0.2)) part.friction = some_friction(random);
+  return part;
+}
+
+ToolPart some_hull(Random& random) {
+  models::ConvexTool hull;
+  const int count = 4 + random.below(5);
+  for (int i = 0; i < count; ++i) hull.points_m.push_back(random.uniform(0.01, 0.03) * random.direction());
+  return {hull, Pose::Identity(), {}};
+}
+
+scenes::Shape some_solid(Random& random, bool box) {
+  const Pose pose = some_pose(random, 0.08);
+  const int kind = random.below(3);
+  if (box || kind == 0) return scenes::BoxShape{pose, some_size(random, 0.02, 0.1), false};
+  const double radius = random.uniform(0.005, 0.05);
+  const Vec3 half = random.uniform(0.01, 0.05) * pose.linear().col(2);
+  if (kind == 1) return scenes::SphereShape{pose.translation(), radius, false};
+  return scenes::CapsuleShape{pose.translation() - half, pose.translation() + half, radius, false};
+}
+
+scenes::Shape some_hollow(Random& random) {
+  const Pose pose = some_pose(random, 0.01);
+  const double radius = random.uniform(0.06, 0.12);
+  const Vec3 middle = pose.translation(), half = random.uniform(0.06, 0.1) * pose.linear().col(2);
+  switch (random.below(4)) {
+    case 0:
+      return scenes::BoxShape{pose, some_size(random, 0.12, 0.25), true};
+    case 1:
+      return scenes::SphereShape{middle, radius, true};
+    case 2:
+      return scenes::CapsuleShape{middle - half, middle + half, radius, true};
+    default:
+      return scenes::CylinderShape{middle - half, middle + half, radius, true};
+  }
+}
+
+void add(Random& random, scenes::Scene& scene, scenes::Shape shape) {
+  scenes::Object object;
+  object.shape = std::move(shape);
+  object.friction = some_friction(random);
+  object.name = "object " + std::to_string(scene.objects.size());
+  scene.objects.push_back(std::move(object));
+}
+
+}  // namespace
+
+RandomToolScene random_tool_scene(Random& random) {
+  RandomToolScene made;
+  constexpr std::array<const char*, 4> kinds{"planes", "solids", "boxes", "hollow"};
+  const int which = random.below(4);
+  made.kind = kinds[static_cast<std::size_t>(which)];
+  const bool convex = which == 2 || (which != 1 && random.chance(0.2));
+  made.tool.parts.push_back(convex ? some_hull(random) : some_part(random));
+  if (!convex && random.chance(0.3)) {
+    made.tool.parts.push_back(some_part(random));
+    for (ToolPart& part : made.tool.parts) part.X_TP = some_pose(random, 0.02);
+  }
+  if (which == 0) {
+    for (int i = 1 + random.below(4); i > 0; --i) {
+      const Vec3 normal = (random.in_box(1.0) + Vec3::UnitZ()).normalized();
+      add(random, made.scene, scenes::PlaneShape{-random.uniform(0.0, 0.03) * normal, normal});
+    }
+  } else if (which == 3) {
+    add(random, made.scene, some_hollow(random));
+  } else {
+    for (int i = 2 + random.below(5); i > 0; --i) add(random, made.scene, some_solid(random, which == 2));
+  }
+  return made;
+}
+
+}  // namespace proxarm::studies

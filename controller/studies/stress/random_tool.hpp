@@ -1,0 +1,25 @@
+// A rigid tool and a world for it, drawn at random.
+#pragma once
+
+#include <string>
+
+#include "models/base/random.hpp"
+#include "models/rigid_shapes/tool.hpp"
+#include "scenes/format/scene.hpp"
+
+namespace proxarm::studies {
+
+using models::Random;
+
+struct RandomToolScene {
+  scenes::Scene scene;
+  models::Tool tool;
+  std::string kind;  // of the world: planes, solids, boxes, hollow
+};
+
+// One to four planes, or two to six solids (boxes, spheres and capsules; boxes alone for a convex tool), or one hollow
+// box, sphere, capsule or cylinder, with a tool that fits in. Tools of 3 to 60 mm: sphere, capsule, box, convex, or two
+// of them. Nothing moves.
+RandomToolScene random_tool_scene(Random& random);
+
+}  // namespace proxarm::studies

@@ -1,0 +1,258 @@
+#include "controller/studies/stress/tool_laws.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <variant>
+
+#include "scenes/compiler/obstacles.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using models::PoseContact;
+using models::ToolPose;
+using models::Twist;
+using models::Vec3;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+// The least of a convex function along a segment, by thirds.
+template <typename Function>
+double least_along(const Vec3& a, const Vec3& b, Function f) {
+  if (a == b) return f(a);
+  double low = 0.0, high = 1.0;
+  for (int k = 0; k < 80; ++k) {
+    const double x = low + (high - low) / 3.0, y = high - (high - low) / 3.0;
+    (f(a + x * (b - a)) < f(a + y * (b - a)) ? high : low) = f(a + x * (b - a)) < f(a + y * (b - a)) ? y : x;
+  }
+  return std::min({f(a + low * (b - a)), f(a), f(b)});
+}
+
+std::vector<Vec3> corners_of_box(const models::Pose& X, const Vec3& size) {
+  std::vector<Vec3> out;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 sign((i & 1) != 0 ? 0.5 : -0.5, (i & 2) != 0 ? 0.5 : -0.5, (i & 4) != 0 ? 0.5 : -0.5);
+    out.emplace_back(X * Vec3(sign.cwiseProduct(size)));
+  }
+  return out;
+}
+
+double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
+  double lowest = infinity;
+  highest = -infinity;
+  for (const Vec3& x : points) {
+    lowest = std::min(lowest, n.dot(x));
+    highest = std::max(highest, n.dot(x));
+  }
+  return lowest;
+}
+
+// What of a tool's material point's way since q isn't along the normal.
+Vec3 slip_of(const PoseContact& contact, const ToolPose& q, const ToolPose& r) {
+  const Vec3 way = contact.point_W - q * (r.orientation.conjugate() * (contact.point_W - r.position));
+  return way - contact.normal_W * contact.normal_W.dot(way);
+}
+
+// By how much K yields at a contact to a newton along a direction, m.
+double yields(const ToolCall& call, const PoseContact& contact, const Vec3& along) {
+  Twist wrench;
+  wrench << along, (contact.point_W - call.r.position).cross(along);
+  return wrench.dot(call.K.ldlt().solve(wrench));
+}
+
+bool is_hollow(const scenes::Shape& shape) {
+  return std::visit(
+      [](const auto& s) {
+        if constexpr (requires { s.inside_out; }) return s.inside_out;
+        return false;
+      },
+      shape);
+}
+
+}  // namespace
+
+ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene_(scene) {
+  for (const models::ToolPart& part : tool.parts) {
+    Core& core = cores_.emplace_back();
+    core.X_TP = part.X_TP;
+    core.friction = part.friction;
+    if (const auto* sphere = std::get_if<models::SphereTool>(&part.shape)) {
+      core.corners_T = {Vec3::Zero()};
+      core.radius_m = sphere->radius_m;
+    } else if (const auto* capsule = std::get_if<models::CapsuleTool>(&part.shape)) {
+      const Vec3 half(0.0, 0.0, 0.5 * capsule->length_m);
+      core.corners_T = {-half, half};
+      core.radius_m = capsule->radius_m;
+    } else if (const auto* box = std::get_if<models::BoxTool>(&part.shape)) {
+      core.corners_T = corners_of_box(models::Pose::Identity(), box->size_m);
+      core.half_m = 0.5 * box->size_m;
+      for (int k = 0; k < 3; ++k) core.normals_T.emplace_back(Vec3::Unit(k));
+      core.edges_T = core.normals_T;
+    } else if (const auto* hull = std::get_if<models::ConvexTool>(&part.shape)) {
+      // All planes through three points that leave the others on one side, and all pairs as edges.
+      core.corners_T = hull->points_m;
+      for (std::size_t i = 0; i < hull->points_m.size(); ++i) {
+        for (std::size_t j = i + 1; j < hull->points_m.size(); ++j) {
+          const Vec3 &a = hull->points_m[i], &b = hull->points_m[j];
+          core.edges_T.emplace_back((b - a).normalized());
+          for (const Vec3& c : hull->points_m) {
+            const Vec3 n = (b - a).cross(c - a);
+            if (n.norm() < 1e-12) continue;
+            double high = 0.0;
+            along(core.corners_T, n.normalized(), high);
+            if (high <= n.normalized().dot(a) + 1e-12) core.normals_T.emplace_back(n.normalized());
+          }
+        }
+      }
+    }
+    for (Vec3& x : core.corners_T) x = core.X_TP * x;
+    for (Vec3& n : core.normals_T) n = core.X_TP.linear() * n;
+    for (Vec3& e : core.edges_T) e = core.X_TP.linear() * e;
+    for (const Vec3& x : core.corners_T) core.middle_T += x / static_cast<double>(core.corners_T.size());
+    for (const Vec3& x : core.corners_T) core.reach_m = std::max(core.reach_m, (x - core.middle_T).norm());
+  }
+  for (const scenes::Object& object : scene.objects) {
+    hollow_ = hollow_ || is_hollow(object.shape);
+    double radius = infinity;
+    if (const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape)) radius = sphere->radius_m;
+    if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) radius = capsule->radius_m;
+    bend_per_m_.push_back(is_hollow(object.shape) ? 0.0 : 1.0 / radius);
+  }
+}
+
+double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::Object& object) const {
+  const auto distance = [&](const Vec3& x) { return scenes::distance_to(object, x); };
+  const double least = distance(pose * core.middle_T) - core.reach_m - core.radius_m;
+  if (least > 0.0) return least;
+  if (std::holds_alternative<scenes::PlaneShape>(object.shape) || is_hollow(object.shape)) {
+    double gap = infinity;
+    for (const Vec3& x : core.corners_T) gap = std::min(gap, distance(pose * x));
+    return gap - core.radius_m;
+  }
+  if (core.normals_T.empty()) {
+    return least_along(pose * core.corners_T.front(), pose * core.corners_T.back(), distance) - core.radius_m;
+  }
+  const auto to_box = [&](const Vec3& x) {
+    const Vec3 y = pose.orientation.conjugate() * (x - pose.position);
+    const Vec3 d = (core.X_TP.inverse() * y).cwiseAbs() - core.half_m;
+    return d.cwiseMax(0.0).norm() + std::min(0.0, d.maxCoeff());
+  };
+  if (const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape)) {
+    return to_box(sphere->centre_m) - sphere->radius_m;
+  }
+  if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) {
+    return least_along(capsule->from_m, capsule->to_m, to_box) - capsule->radius_m;
+  }
+  // Of two convex polyhedra the separation by all of their axes.
+  const auto& box = std::get<scenes::BoxShape>(object.shape);
+  std::vector<Vec3> corners, axes;
+  for (const Vec3& x : core.corners_T) corners.emplace_back(pose * x);
+  for (const Vec3& n : core.normals_T) axes.emplace_back(pose.orientation * n);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3 edge = box.pose_W.linear().col(k);
+    axes.push_back(edge);
+    for (const Vec3& e : core.edges_T) {
+      const Vec3 across = (pose.orientation * e).cross(edge);
+      if (across.norm() > 1e-7) axes.emplace_back(across.normalized());
+    }
+  }
+  const std::vector<Vec3> others = corners_of_box(box.pose_W, box.size_m);
+  double gap = -infinity;
+  for (const Vec3& n : axes) {
+    double high = 0.0, other_high = 0.0;
+    const double low = along(corners, n, high), other_low = along(others, n, other_high);
+    gap = std::max({gap, low - other_high, other_low - high});
+  }
+  return gap;
+}
+
+double ToolLaws::depth_m(const ToolPose& pose) const {
+  double gap = infinity;
+  for (const Core& core : cores_) {
+    for (const scenes::Object& object : scene_.objects) gap = std::min(gap, apart_m(core, pose, object));
+  }
+  return -gap;
+}
+
+double ToolLaws::friction(const PoseContact& contact) const {
+  const double mu = scene_.objects[static_cast<std::size_t>(contact.object)].friction;
+  const std::optional<double>& own = cores_[static_cast<std::size_t>(contact.part)].friction;
+  return own ? std::sqrt(*own * mu) : mu;
+}
+
+double ToolLaws::rounding_m(const ToolPose& pose) {
+  return std::numeric_limits<double>::epsilon() * (pose.position.lpNorm<1>() + lever_m);
+}
+
+std::string ToolLaws::missed(const ToolCall& call) const {
+  if (call.contacts.empty()) {
+    const Twist off = models::difference(call.r, call.p);
+    return off.head<3>().norm() + lever_m * off.tail<3>().norm() <= 8.0 * rounding_m(call.r) ? ""
+                                                                                             : "a wrench of nothing";
+  }
+  Twist sum = Twist::Zero();
+  double size = 1e-300;
+  for (const PoseContact& contact : call.contacts) {
+    sum.head<3>() += contact.force_W;
+    sum.tail<3>() += (contact.point_W - call.r.position).cross(contact.force_W);
+    size = std::max(size, contact.force_W.norm());
+  }
+  // Where contacts hold each other, a local problem is solved to 1e-10 of a step.
+  if (!((sum - call.wrench()).norm() <= 1e-9 * size + 16.0 * call.stiffest * rounding_m(call.r))) return "balance";
+  for (const PoseContact& contact : call.contacts) {
+    const Vec3 &f = contact.force_W, &n = contact.normal_W;
+    const double f_n = n.dot(f);
+    const Vec3 f_t = f - f_n * n;
+    if (!(f_n >= -1e-12 * size)) return "a pull";
+    // A point on a hollow's wall is known to less, since its normal turns with it.
+    if (std::abs(contact.gap_m) > (hollow_ ? 1e-10 : 1e-12) && f_n > 1e-9 * size) return "a force over a gap";
+    const double limit = friction(contact) * f_n;
+    // In hollow objects forces are as a local problem has them where contacts hold each other: to 1e-10 of the press,
+    // √(eᵀK e), which is a force by the contact's yield. Elsewhere what is out of the cone by that is taken off.
+    double beyond = 1e-11 * size;
+    if (hollow_) {
+      const Twist e = models::difference(call.r, call.p);
+      beyond += 1e-10 * std::sqrt(e.dot(call.K * e) / yields(call, contact, n));
+    }
+    if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
+    // A slip far below what friction would move the contact by is next to sticking: its direction counts as much less.
+    const Vec3 slip = slip_of(contact, call.q, call.r);
+    const double s = slip.norm();
+    if (!(s > 0.0)) continue;
+    const double least = std::max(limit * yields(call, contact, slip / s), 1e-9);
+    if (!((f_t + limit / s * slip).norm() * std::min(1.0, s / least) <= 1e-8 * size)) return "not against the slip";
+  }
+  return {};
+}
+
+double ToolLaws::curvature_J(const ToolCall& call) const {
+  const double turned = models::difference(call.r, call.q).tail<3>().norm();
+  double sum = 0.0;
+  for (const PoseContact& contact : call.contacts) {
+    const Vec3 lever = contact.point_W - call.r.position;
+    const double s = (contact.point_W - call.q * (call.r.orientation.conjugate() * lever)).norm();
+    const double radius = cores_[static_cast<std::size_t>(contact.part)].radius_m;
+    const double bend = bend_per_m_[static_cast<std::size_t>(contact.object)] + (radius > 0.0 ? 1.0 / radius : 0.0);
+    sum += contact.force_W.norm() * (turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s);
+  }
+  return sum;
+}
+
+double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier) const {
+  double sum = 0.0;
+  for (const PoseContact& contact : call.contacts) {
+    double cosine = -1.0;
+    for (const PoseContact& was : earlier) {
+      if (was.object == contact.object) cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
+    }
+    if (!(cosine > 0.0)) continue;
+    const Vec3 lever = contact.point_W - call.r.position;
+    const double s = (contact.point_W - call.q * (call.r.orientation.conjugate() * lever)).norm();
+    const double sine = std::sqrt(1.0 - cosine * cosine), force = contact.force_W.norm();
+    if (sine / cosine * yields(call, contact, contact.normal_W) * force <= s) sum += force * s * sine;
+  }
+  return sum;
+}
+
+}  // namespace proxarm::studies

@@ -1,0 +1,70 @@
+// What is known of a rigid tool among objects that stand still, whatever its 𝒢: the judge's own copy of the laws
+// (models/geometry/pose_algorithm.hpp) and of distances, for the stress study.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "models/geometry/pose_algorithm.hpp"
+#include "models/rigid_shapes/tool.hpp"
+#include "scenes/format/scene.hpp"
+
+namespace proxarm::studies {
+
+// One call of 𝒢.
+struct ToolCall {
+  models::Mat6 K;
+  double stiffest = 0.0;  // K's largest eigenvalue, rotations at `lever`; N/m
+  models::ToolPose p, q, r;
+  std::vector<models::PoseContact> contacts;
+  bool unresolved = false;
+
+  [[nodiscard]] models::Twist wrench() const { return K * models::difference(r, p); }
+};
+
+class ToolLaws {
+ public:
+  static constexpr double lever_m = 0.03;  // by which rotations are taken as lengths
+
+  // Precondition: the scene outlives the laws.
+  ToolLaws(const scenes::Scene& scene, const models::Tool& tool);
+
+  // How deep the tool is inside of anything, metres; below 0 it is so far outside, or farther.
+  [[nodiscard]] double depth_m(const models::ToolPose& pose) const;
+
+  // What of the law the call misses; empty if nothing.
+  [[nodiscard]] std::string missed(const ToolCall& call) const;
+
+  // What contacts may add to the tool's energy, being of second order in the step: the way of a point that turns by θ
+  // at a lever bends by θ² lever/2, normals turn by θ while the point goes on by s, and something round falls off by
+  // s²/2r.
+  [[nodiscard]] double curvature_J(const ToolCall& call) const;
+  // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once: sin α
+  // of the way, if p̂ isn't deeper below than a path over the edge can come. `earlier`: what touched before.
+  [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier) const;
+
+  // Rounding of a pose, as a length.
+  [[nodiscard]] static double rounding_m(const models::ToolPose& pose);
+
+ private:
+  // All points within a radius of the hull of some: one for a sphere, two for a capsule.
+  struct Core {
+    std::vector<models::Vec3> corners_T, normals_T, edges_T;
+    models::Vec3 middle_T = models::Vec3::Zero();
+    models::Pose X_TP = models::Pose::Identity();
+    models::Vec3 half_m = models::Vec3::Zero();  // of a box
+    double radius_m = 0.0, reach_m = 0.0;
+    std::optional<double> friction;
+  };
+
+  [[nodiscard]] double friction(const models::PoseContact& contact) const;
+  [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
+
+  const scenes::Scene& scene_;
+  bool hollow_ = false;
+  std::vector<Core> cores_;
+  std::vector<double> bend_per_m_;  // of each object; 1/radius where it is round
+};
+
+}  // namespace proxarm::studies

@@ -1,0 +1,296 @@
+#include "controller/studies/stress/tool_run.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "controller/proxies/pose_proxy.hpp"
+#include "controller/studies/stress/random_tool.hpp"
+#include "controller/studies/stress/tool_laws.hpp"
+#include "scenes/compiler/obstacles.hpp"
+#include "scenes/rigid/compile_rigid.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using controller::PoseProxy;
+using models::Mat6;
+using models::PoseAlgorithm;
+using models::PoseContact;
+using models::ToolPose;
+using models::Twist;
+using models::Vec3;
+
+constexpr int steps_per_run = 1000;
+constexpr double most_m = 0.05, most_rad = 0.3, furthest_m = 2.0;  // of a step; from the origin
+constexpr double lever = ToolLaws::lever_m;
+
+Twist levers() {
+  Twist out;
+  out << Vec3::Ones(), Vec3::Constant(lever);
+  return out;
+}
+
+// Eigenvectors in all directions, eigenvalues (N/m) of 1 to `condition`.
+Mat6 random_stiffness(Random& random, double condition) {
+  Mat6 A;
+  for (int i = 0; i < 36; ++i) A.data()[i] = random.uniform(-1.0, 1.0);
+  const Mat6 axes = Eigen::HouseholderQR<Mat6>(A).householderQ();
+  Twist values;
+  values << 1.0, condition, 0.0, 0.0, 0.0, 0.0;
+  for (int i = 2; i < 6; ++i) values[i] = random.log_uniform(1.0, condition);
+  const Mat6 half = levers().asDiagonal() * axes * values.cwiseSqrt().asDiagonal();
+  return half * half.transpose();
+}
+
+// What a hand or a machine might do, about a place to which it comes back.
+class Pull {
+ public:
+  Pull(Random& random, const Vec3& towards)
+      : random_(random),
+        size_N_(random.log_uniform(1e-2, 1e3)),
+        kind_(random.below(5)),
+        noise_(random.chance(0.5) ? random.log_uniform(1e-6, 1.0) : 0.0),
+        turn_(random.log_uniform(1e-3, 1.0)),
+        centring_(random.log_uniform(3e-3, 0.3)),
+        arm_m_(random.log_uniform(1e-4, 0.05)),
+        force_(random.direction()),
+        torque_(random.direction()),
+        towards_(towards) {}
+
+  [[nodiscard]] double size_N() const noexcept { return size_N_; }
+
+  models::Wrench operator()(int step, const PoseProxy& proxy) {
+    const auto& config = proxy.config();
+    const Vec3 &q = proxy.q().position, v = proxy.move().head<3>() / config.period_s,
+               omega = proxy.move().tail<3>() / config.period_s;
+    if (kind_ == 1 && random_.chance(0.03)) {
+      force_ = random_.direction();
+      torque_ = random_.direction();
+    }
+    if (kind_ == 3) {
+      force_ = (force_ + 0.1 * random_.in_box(1.0)).normalized();
+      torque_ = (torque_ + 0.1 * random_.in_box(1.0)).normalized();
+    }
+    if (kind_ == 4) force_ = (towards_ - q) / (1e-3 + (towards_ - q).norm());
+    const double share = kind_ == 2 ? std::sin(turn_ * step) : 1.0;
+    models::Wrench h{size_N_ * share * force_, size_N_ * arm_m_ * share * torque_};
+    if (noise_ > 0.0) {
+      h.force += size_N_ * noise_ * random_.in_box(1.0);
+      h.torque += size_N_ * arm_m_ * noise_ * random_.in_box(1.0);
+    }
+    // A spring and a damper, of a frequency that the timestep carries.
+    const double rate = centring_ / config.period_s;
+    h.force -= config.mass_kg * rate * (rate * q + v);
+    h.torque -= config.inertia_kg_m2 * rate * omega;
+    return h;
+  }
+
+ private:
+  Random& random_;
+  double size_N_;
+  int kind_;
+  double noise_, turn_, centring_, arm_m_;
+  Vec3 force_, torque_, towards_;
+};
+
+class Judge {
+ public:
+  Judge(const ToolLaws& laws, PoseAlgorithm& g, Random& random, Tally& tally, std::string* report)
+      : laws_(laws), g_(g), fresh_(g.clone()), random_(random), tally_(tally), report_(report) {}
+
+  // `rise_J`: of the tool's energy beyond the hand's work.
+  void step(std::int64_t k, bool fault, const ToolCall& call, double rise_J) {
+    step_ = k;
+    ++tally_.steps;
+    if (fault) return note(finite, call, "", 0.0);
+    tally_.contact += call.contacts.empty() ? 0 : 1;
+    tally_.slipping += std::any_of(call.contacts.begin(), call.contacts.end(), [](const auto& c) { return c.slips; });
+    // A step that finds no forces keeps its gaps nevertheless.
+    const double depth = laws_.depth_m(call.r);
+    tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.position.norm()));
+    if (!(depth <= 1e-12)) note(inside, call, "", depth);
+    if (call.unresolved) {
+      ++tally_.unresolved;
+    } else {
+      judge_energy(call, rise_J);
+    }
+    before_ = call.contacts;
+    depth_before_m_ = depth;
+    if (call.unresolved) return;
+    if (const std::string missed = laws_.missed(call); !missed.empty()) note(law, call, missed, call.wrench().norm());
+    if (!call.contacts.empty() && random_.chance(0.2)) judge_stiffness(call);
+  }
+
+ private:
+  void note(Invariant which, const ToolCall& call, const std::string& what, double value) {
+    ++tally_.violations[which];
+    if (tally_.first_step < 0) {
+      tally_.first = invariant_names[which];
+      tally_.first_step = step_;
+    }
+    if (report_ == nullptr || report_->size() > 20'000) return;
+    std::ostringstream out;
+    out.precision(17);
+    const auto pose = [&out](const char* name, const ToolPose& x) {
+      out << ", " << name << " = [" << x.position.transpose() << "], wxyz [" << x.orientation.w() << " "
+          << x.orientation.vec().transpose() << "]";
+    };
+    out << "step " << step_ << ": " << invariant_names[which] << " " << what << " (" << value << ")";
+    pose("p", call.p);
+    pose("q", call.q);
+    pose("r", call.r);
+    out << (call.unresolved ? ", unresolved" : "") << ", contacts:";
+    for (const PoseContact& contact : call.contacts) {
+      out << " object " << contact.object << "." << contact.feature << (contact.slips ? " slips" : " sticks")
+          << " n = [" << contact.normal_W.transpose() << "] f = [" << contact.force_W.transpose()
+          << "] mu = " << contact.friction << " gap = " << contact.gap_m;
+    }
+    *report_ += out.str() + "\n";
+  }
+
+  void judge_energy(const ToolCall& call, double rise_J) {
+    if (call.contacts.empty()) return;
+    // What a gap was short of by rounding (1e-12 m at most, else it counts as `inside`), the contacts' forces push
+    // back; and where contacts hold each other, by thousands of newtons, a local problem is solved to 1e-10 of the
+    // step.
+    double forces_N = 0.0;
+    for (const PoseContact& contact : call.contacts) forces_N += contact.force_W.norm();
+    const double step_m = levers().cwiseProduct(models::difference(call.p, call.q)).norm();
+    const double short_m = std::max(depth_before_m_, 0.0) + 8.0 * ToolLaws::rounding_m(call.r) + 1e-10 * step_m;
+    const double rounding_J = forces_N * short_m + 1e-12;
+    const double rest_J = rise_J - laws_.curvature_J(call) - rounding_J;
+    if (!(rest_J > 0.0)) return;
+    std::vector<PoseContact> earlier = before_;
+    if (!(rest_J <= laws_.edges_J(call, earlier))) {
+      const std::vector<PoseContact> met = first_met(call);
+      earlier.insert(earlier.end(), met.begin(), met.end());
+    }
+    if (rest_J <= laws_.edges_J(call, earlier)) {
+      ++tally_.edge;
+    } else {
+      note(work, call, "J", rest_J);
+    }
+  }
+
+  // What the way from q to p̂ meets first, in eighths: a tool may come to a corner and slide over it in one step.
+  std::vector<PoseContact> first_met(const ToolCall& call) {
+    const std::unique_ptr<PoseAlgorithm> g = fresh_->clone();
+    for (int k = 1; k < 8 && g->contacts().empty(); ++k) {
+      g->step(call.K, models::moved(call.q, 0.125 * k * models::difference(call.p, call.q)), call.q);
+    }
+    return {g->contacts().begin(), g->contacts().end()};
+  }
+
+  // As tests/models/rigid/stiffness_independence_test.cpp, which says where what is allowed comes from.
+  void judge_stiffness(const ToolCall& call) {
+    Twist w = Twist::Zero();
+    double least_slip_m = 1e9;
+    for (const PoseContact& contact : call.contacts) {
+      const Vec3 at = contact.point_W - call.r.position;
+      w.head<3>() += contact.force_W;
+      w.tail<3>() += at.cross(contact.force_W);
+      if (contact.force_W.isZero(0.0) || !contact.slips || contact.friction == 0.0) continue;
+      const Vec3 way = contact.point_W - call.q * (call.r.orientation.conjugate() * at);
+      least_slip_m = std::min(least_slip_m, (way - contact.normal_W * contact.normal_W.dot(way)).norm());
+    }
+    if (w.isZero(0.0)) return;
+    const double condition = random_.log_uniform(1.0, 1e4), depth_m = random_.log_uniform(1e-7, 1e-3);
+    ToolCall other;
+    other.K = random_stiffness(random_, condition);
+    const double least = levers().cwiseProduct(Twist(other.K.ldlt().solve(w))).norm() / depth_m;
+    other.K *= least;
+    other.stiffest = condition * least;
+    other.p = models::moved(call.r, -other.K.ldlt().solve(w));
+    other.q = call.q;
+    other.r = g_.step(other.K, other.p, call.q);
+    other.contacts.assign(g_.contacts().begin(), g_.contacts().end());
+    const double off = levers().cwiseProduct(models::difference(other.r, call.r)).norm();
+    const double allowed =
+        64.0 * ToolLaws::rounding_m(call.r) *
+            (std::sqrt(condition) + call.stiffest / least + w.cwiseQuotient(levers()).norm() / least / least_slip_m) +
+        1e-12 * std::sqrt(condition) * depth_m;
+    if (g_.unresolved()) {
+      ++tally_.unresolved;
+    } else if (!(off <= std::min(allowed, 1e-10))) {
+      // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
+      if (laws_.missed(other).empty() && laws_.depth_m(other.r) <= 1e-12) {
+        ++tally_.several;
+      } else {
+        note(stiffness, other, laws_.missed(other), off);
+      }
+    }
+  }
+
+  const ToolLaws& laws_;
+  PoseAlgorithm& g_;
+  std::unique_ptr<PoseAlgorithm> fresh_;  // that knows of no step
+  Random& random_;
+  Tally& tally_;
+  std::string* report_;
+  std::vector<PoseContact> before_;  // of the step before
+  double depth_before_m_ = 0.0;
+  std::int64_t step_ = 0;
+};
+
+// A pose a millimetre outside of everything; false where chance found none.
+bool find_start(Random& random, const ToolLaws& laws, ToolPose& q) {
+  for (int k = 0; k < 300; ++k) {
+    q.position = random.in_box(0.15);
+    q.orientation = models::rotation_by(random.arrow(0.0, 3.0));
+    if (laws.depth_m(q) < -1e-3) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Tally run_tool_seed(std::uint64_t seed, std::string* report) {
+  Random random(seed);
+  const RandomToolScene made = random_tool_scene(random);
+  Tally tally;
+  tally.kind = made.kind;
+  tally.objects = made.scene.objects.size();
+  const std::unique_ptr<PoseAlgorithm> g = scenes::compile_rigid(made.scene, made.tool);
+  const ToolLaws laws(made.scene, made.tool);
+  controller::PoseConfig config;
+  config.mass_kg = tally.mass_kg = random.log_uniform(0.1, 100.0);
+  config.inertia_kg_m2 = config.mass_kg * random.log_uniform(1e-4, 1e-2);
+  config.period_s = tally.period_s = random.log_uniform(1e-4, 5e-3);
+  const auto& near = made.scene.objects[static_cast<std::size_t>(random.below(static_cast<int>(tally.objects)))];
+  Pull pull(random, scenes::middle_of(near.shape));
+  tally.force_N = pull.size_N();
+  ToolPose q;
+  if (!find_start(random, laws, q)) return tally;
+  PoseProxy proxy(config, *g);
+  proxy.start(q, 0.0);
+  Judge judge(laws, *g, random, tally, report);
+  const Twist mass = (Twist() << Vec3::Constant(config.mass_kg), Vec3::Constant(config.inertia_kg_m2)).finished();
+  const auto energy_J = [&] {
+    const Twist v = proxy.move() / config.period_s;
+    return 0.5 * v.dot(mass.cwiseProduct(v));
+  };
+  for (int k = 0; k < steps_per_run; ++k) {
+    ToolCall call;
+    call.q = proxy.q();
+    const double before_J = energy_J();
+    const models::Wrench h = pull(k, proxy);
+    call.p = proxy.predict(h);
+    // Flung away or spun, it is where a session's limits have ended it.
+    const Twist way = models::difference(call.p, call.q);
+    if (way.head<3>().norm() > most_m || way.tail<3>().norm() > most_rad || call.q.position.norm() > furthest_m) break;
+    call.K = proxy.K();
+    call.stiffest = std::max(call.K(0, 0), call.K(3, 3) / (lever * lever));
+    const bool fault = proxy.step(call.p) != controller::ProxyFault::none;
+    call.r = proxy.q();
+    call.contacts.assign(g->contacts().begin(), g->contacts().end());
+    call.unresolved = g->unresolved();
+    const double hand_J = h.force.dot(proxy.move().head<3>()) + h.torque.dot(proxy.move().tail<3>());
+    judge.step(k, fault, call, energy_J() - before_J - hand_J);
+    if (fault) break;
+  }
+  return tally;
+}
+
+}  // namespace proxarm::studies
