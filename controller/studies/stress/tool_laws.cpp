@@ -15,7 +15,7 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
 // The least of a convex function along a segment, by thirds.
 template <typename Function>
@@ -39,8 +39,8 @@ std::vector<Vec3> corners_of_box(const models::Pose& X, const Vec3& size) {
 }
 
 double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
-  double lowest = infinity;
-  highest = -infinity;
+  double lowest = beyond_all_m;
+  highest = -beyond_all_m;
   for (const Vec3& x : points) {
     lowest = std::min(lowest, n.dot(x));
     highest = std::max(highest, n.dot(x));
@@ -114,7 +114,7 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
   }
   for (const scenes::Object& object : scene.objects) {
     hollow_ = hollow_ || is_hollow(object.shape);
-    double radius = infinity;
+    double radius = beyond_all_m;
     if (const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape)) radius = sphere->radius_m;
     if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) radius = capsule->radius_m;
     bend_per_m_.push_back(is_hollow(object.shape) ? 0.0 : 1.0 / radius);
@@ -126,7 +126,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   const double least = distance(pose * core.middle_T) - core.reach_m - core.radius_m;
   if (least > 0.0) return least;
   if (std::holds_alternative<scenes::PlaneShape>(object.shape) || is_hollow(object.shape)) {
-    double gap = infinity;
+    double gap = beyond_all_m;
     for (const Vec3& x : core.corners_T) gap = std::min(gap, distance(pose * x));
     return gap - core.radius_m;
   }
@@ -158,7 +158,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
     }
   }
   const std::vector<Vec3> others = corners_of_box(box.pose_W, box.size_m);
-  double gap = -infinity;
+  double gap = -beyond_all_m;
   for (const Vec3& n : axes) {
     double high = 0.0, other_high = 0.0;
     const double low = along(corners, n, high), other_low = along(others, n, other_high);
@@ -168,7 +168,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
 }
 
 double ToolLaws::depth_m(const ToolPose& pose) const {
-  double gap = infinity;
+  double gap = beyond_all_m;
   for (const Core& core : cores_) {
     for (const scenes::Object& object : scene_.objects) gap = std::min(gap, apart_m(core, pose, object));
   }
