@@ -10,6 +10,7 @@
 #include "tests/models/rigid/held_tool.hpp"
 #include "tests/models/rigid/rigid_bodies.hpp"
 #include "tests/models/rigid/rigid_meshes.hpp"
+#include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -127,7 +128,8 @@ struct World {
 
 Pushed sent_about(const Made& make, const std::function<World(Random&)>& make_world, int worlds, std::uint64_t seed) {
   Pushed out;
-  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(worlds); ++i) {
+  const auto count = static_cast<std::uint64_t>(tests::scaled(worlds, 8));
+  for (std::uint64_t i = 0; i < count; ++i) {
     Random random(seed + i);
     const auto mesh = make(random);
     const World world = make_world(random);

@@ -9,6 +9,7 @@
 #include "tests/models/rigid/held_tool.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
 #include "tests/models/rigid/rigid_meshes.hpp"
+#include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -155,11 +156,11 @@ TEST(RigidWorldsOfMeshes, AToolThatStandsInAMeshIsNoticed) {
   EXPECT_LT(clearance_of_box({0.0, 0.0, top + 0.02}, true), 0.0) << "outside of what it should be in";
 }
 
-// Boxes of the given sizes in a row along z, sent to a mesh.
+// Boxes of the given sizes in a row along z, sent to a mesh; to 30 meshes, or PROXARM_TEST_SCALE times as many.
 Pushed boxes_about(const std::function<std::shared_ptr<const TriangleMesh>(Random&)>& make,
                    const std::vector<Vec3>& sizes, double furthest) {
   Pushed out;
-  for (std::uint64_t world = 0; world < 30; ++world) {
+  for (std::uint64_t world = 0; world < static_cast<std::uint64_t>(tests::scaled(30, 12)); ++world) {
     Random random(900 + world);
     const auto mesh = make(random);
     RigidObject object;
