@@ -245,7 +245,7 @@ void compare_in(const Place& place, std::uint64_t seed, Independence& out) {
 // PROXARM_RIGID_SEED=seed looks at that world alone.
 void expect_independent(const char* name, std::uint64_t first_seed, const std::function<Place(Random&)>& make) {
   const char* alone = std::getenv("PROXARM_RIGID_SEED");
-  const std::int64_t worlds = alone != nullptr ? 1 : tests::scaled(20);
+  const std::int64_t worlds = alone != nullptr ? 1 : tests::scaled(20, 20);
   Independence out;
   for (std::int64_t i = 0; i < worlds; ++i) {
     const std::uint64_t seed =
