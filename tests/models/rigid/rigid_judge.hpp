@@ -196,8 +196,8 @@ void push_about(PoseAlgorithm& g, Random& random, ToolPose q, const Mat6& K, con
 inline void expect_law(const Pushed& out) {
   EXPECT_GE(out.deepest, -1e-12);
   EXPECT_GT(out.touching, 300) << "or else this looks at nothing";
-  // At most one of 1,000 steps. Where a push jams, it does for all of its twenty steps, so of few steps jams are counted,
-  // to three standard deviations of such a count.
+  // At most one of 1,000 steps. Where a push jams, it does for all of its twenty steps, so of few steps jams are
+  // counted, to three standard deviations of such a count.
   const double share = 1e-3 * out.judged;
   EXPECT_LE(out.jams, share + 3.0 * std::sqrt(share));
   EXPECT_LE(out.unresolved, (out.judged < 100'000 ? 5.0 : 1.0) * share);
