@@ -40,7 +40,8 @@ std::shared_ptr<const TriangleMesh> star(double radius, double thick) {
 std::shared_ptr<const TriangleMesh> torus(double radius, double thick, std::uint32_t n) {
   TriangleSoup soup;
   for (std::uint32_t i = 0; i < n * n; ++i) {
-    const double a = 2.0 * std::numbers::pi * (i / n) / n, b = 2.0 * std::numbers::pi * (i % n) / n;
+    const std::uint32_t ring = i / n, place = i % n;
+    const double a = 2.0 * std::numbers::pi * ring / n, b = 2.0 * std::numbers::pi * place / n;
     const double r = radius + 0.5 * thick * std::cos(b);
     soup.vertices.emplace_back(r * std::cos(a), r * std::sin(a), 0.5 * thick * std::sin(b));
   }
