@@ -253,5 +253,18 @@ BENCHMARK(convex_on_mesh)->Unit(benchmark::kMicrosecond);
 void mesh_on_mesh(benchmark::State& state) { on_mesh(state, dented_pebble(), 0.23, "wanted: p99 300"); }
 BENCHMARK(mesh_on_mesh)->Unit(benchmark::kMicrosecond);
 
+void mesh_on_box(benchmark::State& state) {
+  Body box;
+  box.size = Vec3(0.3, 0.3, 0.1);
+  const RigidWorld world({{{dented_pebble(), Pose::Identity(), {}}}}, {object_of(box, 0.3)});
+  ToolPose q;
+  q.position = 0.08 * Vec3::UnitZ();
+  const RoamingHand hand{.next_place = [](Random& random, const ToolPose&) {
+    return Vec3(random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05), random.uniform(0.03, 0.09));
+  }};
+  bench(state, {record(world, realistic(q), hand, 1, 5'000)}, kAny, "");
+}
+BENCHMARK(mesh_on_box)->Unit(benchmark::kMicrosecond);
+
 }  // namespace
 }  // namespace proxarm::bench
