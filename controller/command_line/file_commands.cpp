@@ -61,6 +61,12 @@ const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOpti
   return check_laws(scene, options);
 }
 
+void check_tool(const fs::path& file) {
+  scenes::Scene nothing;
+  nothing.tool = std::make_shared<const scenes::RigidTool>(scenes::load_tool(file));
+  scenes::compile_rigid(nothing, nothing.tool->shape);
+}
+
 // Throws SetupError for what the simulated arm can't be, such as gears that are too stiff for its step.
 void require_simulable(const PreparedSession& session) {
   fieldbus::SimulatedCanNetwork network(sim::simulated_buses(session.cell));
@@ -128,7 +134,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       tell_sources(file);
       return "sensor";
     case FileKind::tool:
-      scenes::load_tool(file);
+      check_tool(file);
       return "tool";
     case FileKind::hand:
       description::load_hand(file);

@@ -13,7 +13,7 @@ std::shared_ptr<const TriangleFeatures> features_of(TriangleSoup soup) {
   try {
     return std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(std::move(soup)));
   } catch (const std::invalid_argument& problem) {
-    throw std::invalid_argument(std::string("a mesh as a tool has ") + problem.what());
+    throw std::invalid_argument(std::string("a mesh as a tool can't have ") + problem.what());
   }
 }
 

@@ -149,7 +149,11 @@ std::unique_ptr<models::PoseAlgorithm> compile_rigid(const Scene& scene, const m
     if (scene.objects.empty()) return std::make_unique<models::FreePose>();
     return world;
   } catch (const std::invalid_argument& problem) {
-    throw description::SetupError({.key = "tool", .message = problem.what()});
+    const bool named = scene.tool != nullptr;
+    throw description::SetupError({.file = named ? scene.tool->file.string() : std::string(),
+                                   .line = named ? scene.tool->line : 0,
+                                   .key = "tool",
+                                   .message = problem.what()});
   }
 }
 

@@ -249,6 +249,13 @@ class RigidTool(ProgramTest):
         self.assertIn("open.yaml", told)
         self.assertIn("which is open", told)
         self.assertIn("close_holes_m", told)
+        # A cube beside the first one, inside out.
+        turned = text + "".join("v %g %g %g\n" % (x + 50, y, z) for x, y, z in corners)
+        self.written("turned.obj", turned + "".join("f %d %d %d\n" % tuple(i + 10 for i in f[::-1]) for f in faces))
+        unclear = self.call("check", self.written("turned.yaml", "mesh: {file: turned.obj, scale_m: 0.001}\n"))
+        self.assertNotEqual(unclear.status, 0)
+        self.assertIn("turned.yaml:1: tool: a mesh as a tool can't have faces of which some have their fronts outside",
+                      unclear.out + unclear.err)
 
     def test_check_and_explain_know_tools(self):
         outcome = self.call("check", SCENES / "tools/rod.yaml", SCENES / "box_on_table.yaml")
