@@ -108,7 +108,8 @@ double TriangleFeatures::front_side() const {
     // Before the face, nearer than another one is: a millionth of its size, and far above rounding.
     const Vec3 before = middle + std::max(1e-6 * std::sqrt(area(f)), 16.0 * mesh_->lift_m()) * mesh_->face(f).normal;
     const double here = mesh_->encloses(before) ? -1.0 : 1.0;
-    if (side != 0.0 && here != side) throw std::invalid_argument("faces of which some have their fronts outside, others inside");
+    if (side != 0.0 && here != side)
+      throw std::invalid_argument("faces of which some have their fronts outside, others inside");
     side = here;
   }
   return side;
