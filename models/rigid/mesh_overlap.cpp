@@ -21,9 +21,7 @@ double to_wrong_side_m(const TriangleMesh& mesh, const Vec3& x, std::optional<bo
 
 double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMesh& mesh, const View& at,
                          std::optional<bool> should_be_inside) noexcept {
-  Pose X = Pose::Identity();
-  X.linear() = at.R;
-  X.translation() = at.x;
+  const Pose X = isometry(at);
   double deepest = 0.0;
   PartBox(solid, box, at, solid.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
     const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};

@@ -259,7 +259,7 @@ void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View
   if (solid != nullptr) {
     if (!own.mesh) return pairs_with(own.solid, *solid, at, reach, add);
     // Seen from the tool it is a solid near a mesh.
-    return pairs_with(*solid, e.box, *own.mesh, 1.0, {at.R.transpose(), at.to_T(Vec3::Zero())}, reach,
+    return pairs_with(*solid, e.box, *own.mesh, 1.0, inverse(at), reach,
                       [&](Kind kind, std::uint32_t i, std::uint32_t j) { add(other_way_round(kind), j, i); });
   }
   with_flat_or_hollow(e.object, [&](const auto& shape) {

@@ -22,6 +22,13 @@ struct View {
   [[nodiscard]] Vec3 to_T(const Vec3& p) const noexcept { return R.transpose() * (p - x); }
 };
 
+inline View inverse(const View& at) noexcept { return {at.R.transpose(), at.to_T(Vec3::Zero())}; }
+inline Pose isometry(const View& at) noexcept {
+  Pose X = Pose::Identity();
+  X.linear() = at.R;
+  X.translation() = at.x;
+  return X;
+}
 inline View view(const ToolPose& pose) noexcept { return {pose.orientation.toRotationMatrix(), pose.position}; }
 inline EdgeLine edge_of(const Solid& solid, std::uint32_t i) noexcept {
   const Solid::Edge& e = solid.edges[i];

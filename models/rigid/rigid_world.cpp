@@ -705,13 +705,10 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
   }
   const Solid& solid = *std::get_if<Solid>(&entry.object.shape);
   if (part.mesh) {
-    return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), {at.R.transpose(), at.to_T(Vec3::Zero())}, false);
+    return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false);
   }
   if (part.solid.faces.empty() && solid.faces.empty()) return 0.0;
-  Pose X = Pose::Identity();
-  X.linear() = at.R;
-  X.translation() = at.x;
-  const double gap = separation_of_hulls(part.solid, X, solid);
+  const double gap = separation_of_hulls(part.solid, isometry(at), solid);
   return gap < 0.0 ? gap - (part.solid.radius + solid.radius) : gap;
 }
 

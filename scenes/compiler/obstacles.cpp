@@ -232,16 +232,19 @@ models::ScriptedMotion script_of(const Motion& motion) {
           .turn_rad_per_s = motion.turn_rad_per_s};
 }
 
-double distance_to(const Object& object, const Vec3& x_W) {
-  if (!object.layer) return std::visit(Distance{x_W}, object.shape);
-  const double thickness = object.layer->thickness_m;
-  const bool inside_out = std::visit(
+bool is_inside_out(const Shape& shape) {
+  return std::visit(
       [](const auto& s) {
         if constexpr (requires { s.inside_out; }) return s.inside_out;
         return false;
       },
-      object.shape);
-  if (inside_out) return std::visit(Distance{x_W}, std::visit(StandBack{thickness}, object.shape));
+      shape);
+}
+
+double distance_to(const Object& object, const Vec3& x_W) {
+  if (!object.layer) return std::visit(Distance{x_W}, object.shape);
+  const double thickness = object.layer->thickness_m;
+  if (is_inside_out(object.shape)) return std::visit(Distance{x_W}, std::visit(StandBack{thickness}, object.shape));
   return std::visit(Distance{x_W}, object.shape) + thickness;
 }
 

@@ -42,6 +42,9 @@ models::ScriptedMotion script_of(const Motion& motion);
 models::Vec3 middle_of(const Shape& shape);
 double size_of(const Shape& shape);
 
+// Whether a tool or a proxy is held inside of a shape.
+bool is_inside_out(const Shape& shape);
+
 // Signed distance from the rigid part of an object that stands where it was described.
 double distance_to(const Object& object, const models::Vec3& x_W);
 

@@ -63,15 +63,6 @@ struct ShapesOf {
   Shapes operator()(const MeshShape& s) const { return {std::make_shared<const models::TriangleFeatures>(s.mesh)}; }
 };
 
-bool is_inside_out(const Shape& shape) {
-  return std::visit(
-      [](const auto& s) {
-        if constexpr (requires { s.inside_out; }) return s.inside_out;
-        return false;
-      },
-      shape);
-}
-
 // Of a mesh whose faces don't make a body it says so, at the object's line.
 Shapes shapes_of(const Scene& scene, const Object& object) {
   try {

@@ -93,13 +93,6 @@ void bench(benchmark::State& state, const std::vector<Run>& runs, std::size_t mo
 
 constexpr std::size_t kAny = 1000;
 
-RigidObject object_of(const Body& body, double friction) {
-  RigidObject object;
-  object.shape = solid_of_body(body);
-  object.friction = friction;
-  return object;
-}
-
 // -- a sphere on a plane ----------------------------------------------------------------------------------------------
 
 void sphere_on_plane(benchmark::State& state) {

@@ -166,11 +166,7 @@ class Judge {
 
  private:
   void note(Invariant which, const Call<N>& call, double value) {
-    ++tally_.violations[which];
-    if (tally_.first_step < 0) {
-      tally_.first = invariant_names[which];
-      tally_.first_step = step_;
-    }
+    tally_.violated(which, step_);
     if (report_ == nullptr || report_->size() > 20'000) return;
     std::ostringstream out;
     out.precision(17);

@@ -27,6 +27,13 @@ struct Tally {
   std::array<std::int64_t, invariant_count> violations{};
   std::string first = "none";
   std::int64_t first_step = -1;
+
+  void violated(Invariant which, std::int64_t step) {
+    ++violations[which];
+    if (first_step >= 0) return;
+    first = invariant_names[which];
+    first_step = step;
+  }
 };
 
 // `report`, if there is one, is given a line for each violation.

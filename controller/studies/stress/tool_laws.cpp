@@ -24,7 +24,11 @@ double least_along(const Vec3& a, const Vec3& b, Function f) {
   double low = 0.0, high = 1.0;
   for (int k = 0; k < 80; ++k) {
     const double x = low + (high - low) / 3.0, y = high - (high - low) / 3.0;
-    (f(a + x * (b - a)) < f(a + y * (b - a)) ? high : low) = f(a + x * (b - a)) < f(a + y * (b - a)) ? y : x;
+    if (f(a + x * (b - a)) < f(a + y * (b - a))) {
+      high = y;
+    } else {
+      low = x;
+    }
   }
   return std::min({f(a + low * (b - a)), f(a), f(b)});
 }
@@ -48,26 +52,11 @@ double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
   return lowest;
 }
 
-// What of a tool's material point's way since q isn't along the normal.
-Vec3 slip_of(const PoseContact& contact, const ToolPose& q, const ToolPose& r) {
-  const Vec3 way = contact.point_W - q * (r.orientation.conjugate() * (contact.point_W - r.position));
-  return way - contact.normal_W * contact.normal_W.dot(way);
-}
-
 // By how much K yields at a contact to a newton along a direction, m.
 double yields(const ToolCall& call, const PoseContact& contact, const Vec3& along) {
   Twist wrench;
   wrench << along, (contact.point_W - call.r.position).cross(along);
   return wrench.dot(call.K.ldlt().solve(wrench));
-}
-
-bool is_hollow(const scenes::Shape& shape) {
-  return std::visit(
-      [](const auto& s) {
-        if constexpr (requires { s.inside_out; }) return s.inside_out;
-        return false;
-      },
-      shape);
 }
 
 }  // namespace
@@ -113,11 +102,11 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
     for (const Vec3& x : core.corners_T) core.reach_m = std::max(core.reach_m, (x - core.middle_T).norm());
   }
   for (const scenes::Object& object : scene.objects) {
-    hollow_ = hollow_ || is_hollow(object.shape);
+    hollow_ = hollow_ || scenes::is_inside_out(object.shape);
     double radius = beyond_all_m;
     if (const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape)) radius = sphere->radius_m;
     if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) radius = capsule->radius_m;
-    bend_per_m_.push_back(is_hollow(object.shape) ? 0.0 : 1.0 / radius);
+    bend_per_m_.push_back(scenes::is_inside_out(object.shape) ? 0.0 : 1.0 / radius);
   }
 }
 
@@ -125,7 +114,7 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   const auto distance = [&](const Vec3& x) { return scenes::distance_to(object, x); };
   const double least = distance(pose * core.middle_T) - core.reach_m - core.radius_m;
   if (least > 0.0) return least;
-  if (std::holds_alternative<scenes::PlaneShape>(object.shape) || is_hollow(object.shape)) {
+  if (std::holds_alternative<scenes::PlaneShape>(object.shape) || scenes::is_inside_out(object.shape)) {
     double gap = beyond_all_m;
     for (const Vec3& x : core.corners_T) gap = std::min(gap, distance(pose * x));
     return gap - core.radius_m;
@@ -217,7 +206,7 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     }
     if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
     // A slip far below what friction would move the contact by is next to sticking: its direction counts as much less.
-    const Vec3 slip = slip_of(contact, call.q, call.r);
+    const Vec3 slip = call.slip_of(contact);
     const double s = slip.norm();
     if (!(s > 0.0)) continue;
     const double least = std::max(limit * yields(call, contact, slip / s), 1e-9);
@@ -231,7 +220,7 @@ double ToolLaws::curvature_J(const ToolCall& call) const {
   double sum = 0.0;
   for (const PoseContact& contact : call.contacts) {
     const Vec3 lever = contact.point_W - call.r.position;
-    const double s = (contact.point_W - call.q * (call.r.orientation.conjugate() * lever)).norm();
+    const double s = call.way_of(contact).norm();
     const double radius = cores_[static_cast<std::size_t>(contact.part)].radius_m;
     const double bend = bend_per_m_[static_cast<std::size_t>(contact.object)] + (radius > 0.0 ? 1.0 / radius : 0.0);
     sum += contact.force_W.norm() * (turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s);
@@ -247,8 +236,7 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
       if (was.object == contact.object) cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
     }
     if (!(cosine > 0.0)) continue;
-    const Vec3 lever = contact.point_W - call.r.position;
-    const double s = (contact.point_W - call.q * (call.r.orientation.conjugate() * lever)).norm();
+    const double s = call.way_of(contact).norm();
     const double sine = std::sqrt(1.0 - cosine * cosine), force = contact.force_W.norm();
     if (sine / cosine * yields(call, contact, contact.normal_W) * force <= s) sum += force * s * sine;
   }

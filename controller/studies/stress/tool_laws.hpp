@@ -21,6 +21,14 @@ struct ToolCall {
   bool unresolved = false;
 
   [[nodiscard]] models::Twist wrench() const { return K * models::difference(r, p); }
+  // Of the tool's material point at a contact since q, and what of it isn't along the normal.
+  [[nodiscard]] models::Vec3 way_of(const models::PoseContact& contact) const {
+    return contact.point_W - q * (r.orientation.conjugate() * (contact.point_W - r.position));
+  }
+  [[nodiscard]] models::Vec3 slip_of(const models::PoseContact& contact) const {
+    const models::Vec3 way = way_of(contact);
+    return way - contact.normal_W * contact.normal_W.dot(way);
+  }
 };
 
 class ToolLaws {

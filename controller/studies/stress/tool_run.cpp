@@ -125,11 +125,7 @@ class Judge {
 
  private:
   void note(Invariant which, const ToolCall& call, const std::string& what, double value) {
-    ++tally_.violations[which];
-    if (tally_.first_step < 0) {
-      tally_.first = invariant_names[which];
-      tally_.first_step = step_;
-    }
+    tally_.violated(which, step_);
     if (report_ == nullptr || report_->size() > 20'000) return;
     std::ostringstream out;
     out.precision(17);
@@ -162,12 +158,14 @@ class Judge {
     const double rounding_J = forces_N * short_m + 1e-12;
     const double rest_J = rise_J - laws_.curvature_J(call) - rounding_J;
     if (!(rest_J > 0.0)) return;
-    std::vector<PoseContact> earlier = before_;
-    if (!(rest_J <= laws_.edges_J(call, earlier))) {
+    bool at_edges = rest_J <= laws_.edges_J(call, before_);
+    if (!at_edges) {
+      std::vector<PoseContact> earlier = before_;
       const std::vector<PoseContact> met = first_met(call);
       earlier.insert(earlier.end(), met.begin(), met.end());
+      at_edges = rest_J <= laws_.edges_J(call, earlier);
     }
-    if (rest_J <= laws_.edges_J(call, earlier)) {
+    if (at_edges) {
       ++tally_.edge;
     } else {
       note(work, call, "J", rest_J);
@@ -192,8 +190,7 @@ class Judge {
       w.head<3>() += contact.force_W;
       w.tail<3>() += at.cross(contact.force_W);
       if (contact.force_W.isZero(0.0) || !contact.slips || contact.friction == 0.0) continue;
-      const Vec3 way = contact.point_W - call.q * (call.r.orientation.conjugate() * at);
-      least_slip_m = std::min(least_slip_m, (way - contact.normal_W * contact.normal_W.dot(way)).norm());
+      least_slip_m = std::min(least_slip_m, call.slip_of(contact).norm());
     }
     if (w.isZero(0.0)) return;
     const double condition = random_.log_uniform(1.0, 1e4), depth_m = random_.log_uniform(1e-7, 1e-3);

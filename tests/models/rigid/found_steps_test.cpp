@@ -8,13 +8,6 @@
 namespace proxarm::models {
 namespace {
 
-RigidObject object_of(const Body& body, double friction) {
-  RigidObject object;
-  object.shape = solid_of_body(body);
-  object.friction = friction;
-  return object;
-}
-
 Mat6 isotropic(double moving, double turning) {
   Vec<6> d;
   d << Vec3::Constant(moving), Vec3::Constant(turning);

@@ -168,11 +168,7 @@ World of_solids(Random& random) {
   for (int i = 0; i < 5; ++i) {
     Body body = random_body(random, 0.02, 0.08);
     body.X = random_pose(random, 0.05);
-    RigidObject object;
-    object.shape = solid_of_body(body);
-    object.friction = 0.4;
-    object.object = i;
-    world.objects.push_back(std::move(object));
+    world.objects.push_back(object_of(body, 0.4, i));
     bodies.push_back(body);
   }
   world.apart = [bodies](const std::vector<Polyhedron>& own) {

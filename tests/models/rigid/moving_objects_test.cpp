@@ -17,14 +17,6 @@ constexpr double T = HeldTool::T, pi = std::numbers::pi;
 
 Tool one(const Body& body) { return {{{shape_of(body), body.X, {}}}}; }
 
-RigidObject object_of(const Body& body, double mu, std::int32_t number) {
-  RigidObject object;
-  object.shape = solid_of_body(body);
-  object.friction = mu;
-  object.object = number;
-  return object;
-}
-
 RigidObject floor_with(double mu, const Vec3& normal = Vec3::UnitZ(), double offset = 0.0, std::int32_t number = 0) {
   RigidObject plane;
   plane.shape = FlatSide{normal, offset};

@@ -30,13 +30,9 @@ Pushed among_solids(std::uint64_t seed, Make make) {
     for (int i = 0; i < 6; ++i) {
       Body body = random_body(random, 0.02, 0.1);
       body.X = random_pose(random, 0.08);
-      RigidObject object;
-      object.shape = solid_of_body(body);
-      object.friction = random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.8);
-      object.object = i;
-      mu.push_back(object.friction);
+      mu.push_back(random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.8));
       bodies.push_back(body);
-      objects.push_back(std::move(object));
+      objects.push_back(object_of(body, mu.back(), i));
     }
     RigidWorld g(tool, std::move(objects));
     const auto least = [&](const ToolPose& pose) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "models/base/random.hpp"
+#include "models/rigid/rigid_object.hpp"
 #include "models/rigid_shapes/solid.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
 
@@ -66,6 +67,14 @@ inline Solid solid_of_body(const Body& body) {
   if (!(body.radius > 0.0)) return solid_of(BoxTool{body.size}, body.X);
   if (body.size.z() > 0.0) return solid_of(CapsuleTool{body.size.z(), body.radius}, body.X);
   return solid_of(SphereTool{body.radius}, body.X);
+}
+
+inline RigidObject object_of(const Body& body, double friction, std::int32_t number = 0) {
+  RigidObject object;
+  object.shape = solid_of_body(body);
+  object.friction = friction;
+  object.object = number;
+  return object;
 }
 
 inline Body random_body(Random& random, double least, double most) {

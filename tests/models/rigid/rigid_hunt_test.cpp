@@ -35,13 +35,9 @@ struct Hunted {
     tool_bend_per_m = body.radius > 0.0 ? 1.0 / body.radius : 0.0;
   }
   void add(const Body& body, double friction) {
-    RigidObject object;
-    object.shape = solid_of_body(body);
-    object.friction = friction;
-    object.object = static_cast<std::int32_t>(mu.size());
+    objects.push_back(object_of(body, friction, static_cast<std::int32_t>(mu.size())));
     mu.push_back(friction);
     bend_per_m.push_back(body.radius > 0.0 ? 1.0 / body.radius : 0.0);
-    objects.push_back(std::move(object));
   }
 };
 
