@@ -6,6 +6,7 @@
 
 #include "models/rigid/mesh_pairs.hpp"
 #include "models/rigid/part_box.hpp"
+#include "models/rigid_shapes/cylinder.hpp"
 #include "models/rigid_shapes/overlap.hpp"
 
 namespace proxarm::models {
@@ -22,17 +23,22 @@ double to_wrong_side_m(const TriangleMesh& mesh, const Vec3& x, std::optional<bo
 double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMesh& mesh, const View& at,
                          std::optional<bool> should_be_inside) noexcept {
   const Pose X = isometry(at);
+  std::optional<Cylinder> cylinder;
+  if (!solid.rims.empty()) cylinder = moved(cylinder_of(solid), at.R, at.x);
   double deepest = 0.0;
   PartBox(solid, box, at, solid.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
     const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
     const double gap =
-        solid.faces.empty()
+        cylinder ? separation_of_cylinder(*cylinder, triangle)
+        : solid.faces.empty()
             ? distance_of_segment(at * solid.points.front(), at * solid.points.back(), triangle) - solid.radius
             : separation_from_triangle(solid, X, triangle);
     deepest = std::min(deepest, gap);
     return true;
   });
-  return deepest < 0.0 ? deepest : to_wrong_side_m(mesh, at * solid.points.front(), should_be_inside);
+  return deepest < 0.0
+             ? deepest
+             : to_wrong_side_m(mesh, at * (cylinder ? solid.rims[0].centre : solid.points.front()), should_be_inside);
 }
 
 double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,

@@ -20,6 +20,9 @@ class PartBox {
     half_T_ = 0.5 * (box.high - box.low) + Vec3::Constant(near);
     double ball = 0.0;
     for (const Vec3& p : solid.points) ball = std::max(ball, (p - middle_T_).squaredNorm());
+    for (const Solid::Rim& rim : solid.rims) {  // a cylinder's are about its middle
+      ball = std::max(ball, (rim.centre - middle_T_).squaredNorm() + rim.radius * rim.radius);
+    }
     ball2_ = (std::sqrt(ball) + near) * (std::sqrt(ball) + near);
     spread_ = at.R.cwiseAbs();
     half_ = spread_ * half_T_;

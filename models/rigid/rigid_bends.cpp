@@ -51,6 +51,7 @@ Round round_at(const HollowTube& hollow, const Vec3& x) noexcept {
 // Adds −force ∇²gap to K. False: nothing bends there.
 bool RigidWorld::add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
   const Pair& pair = pairs_[found.pair];
+  if (pair.kind == Kind::rim_face) return add_bend_of_level_rim(found, pose, force, K);
   const bool is_rim = pair.kind == Kind::rim_field;
   if (!is_rim && pair.kind != Kind::point_field) return false;
   const Solid& own = shared_->parts[pair.part].solid;
@@ -85,6 +86,36 @@ bool RigidWorld::add_bend(const Found& found, const ToolPose& pose, double force
   }
   if (!(round.curvature > 0.0) && bend.isZero(0.0)) return false;
   K += force * bend;
+  return true;
+}
+
+// A rim over a face, of either body: nothing bends but the rim, whose lowest place goes around.
+bool RigidWorld::add_bend_of_level_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
+  const Pair& pair = pairs_[found.pair];
+  if (found.which != 0) return false;
+  const std::optional<Cylinder>& ours = shared_->parts[pair.part].cylinder;
+  const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
+  Vec3 centre, axis;
+  if (ours) {
+    centre = pose * ours->rims[pair.own].centre;
+    axis = pose.orientation * ours->axis;
+  } else {
+    const Cylinder& other = *shared_->entries[pair.entry].cylinder;
+    centre = other.rims[pair.other].centre;
+    axis = other.axis;
+    if (on != nullptr) {
+      centre = *on * centre;
+      axis = on->R * axis;
+    }
+  }
+  // (the tool's point is the face's; where they touch it is the rim's)
+  const Vec3 &n = found.touch.normal, x = ours ? found.touch.point : Vec3(found.touch.point - found.touch.gap * n);
+  const Vec3 arm = x - centre, along = axis.cross(arm);
+  const double h_aa = -std::abs(n.dot(arm));
+  if (!(h_aa < -kLevel_m)) return false;
+  Twist h_qa = Twist::Zero();
+  h_qa.tail<3>() = along.cross(n);
+  K -= force * h_qa * (h_qa / h_aa).transpose();
   return true;
 }
 

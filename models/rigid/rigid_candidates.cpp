@@ -252,6 +252,9 @@ void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View
   const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j) { add_pair(kind, part, entry, i, j); };
   const Solid* solid = std::get_if<Solid>(&e.object.shape);
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
+  if (e.cylinder || (own.cylinder && (mesh != nullptr || solid != nullptr))) {
+    return gather_cylinder(part, entry, at, reach);
+  }
   if (mesh != nullptr) {
     if (own.mesh) return gather_meshes(part, entry, at, reach);
     return pairs_with(own.solid, own.box, **mesh, e.held, at, reach, add);

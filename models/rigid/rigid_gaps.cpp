@@ -51,6 +51,7 @@ double RigidWorld::signed_start(const Pair& pair, const View& at) const noexcept
 
 void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
   from_ = q_old;
+  behind_m_ = 2.0 * far + kFront_m;
   const View at_W = view(q_old);
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     moving_[i].from = seen_from(static_cast<std::uint16_t>(shared_->first_moving + i), at_W);
@@ -137,9 +138,14 @@ Solid::Rim RigidWorld::rim_at(const Solid::Rim& rim, const View& at) noexcept {
 
 // While a rim lies flat, where it was lowest before says where it would tip.
 void RigidWorld::remember_lowest(Pair& pair, const View& at) const noexcept {
-  const auto* flat = std::get_if<FlatSide>(&shared_->entries[pair.entry].object.shape);
-  if (flat == nullptr) return;
-  const Vec2 lowest = lowest_of_rim(*flat, rim_at(shared_->parts[pair.part].solid.rims[pair.own], at));
+  Vec2 lowest = Vec2::Zero();
+  if (pair.kind == Kind::rim_face) {
+    Solid::Rim rim;
+    const FlatSide side = side_of(pair, at, rim);
+    lowest = lowest_of_rim(side, rim);
+  } else if (const auto* flat = std::get_if<FlatSide>(&shared_->entries[pair.entry].object.shape)) {
+    lowest = lowest_of_rim(*flat, rim_at(shared_->parts[pair.part].solid.rims[pair.own], at));
+  }
   if (!lowest.isZero(0.0)) pair.level = {lowest.x(), lowest.y()};
 }
 
@@ -228,6 +234,11 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
     case Kind::point_field:
     case Kind::rim_field:
       return;
+    default: {
+      std::array<Touch, 4> touches;
+      const int count = touch_cylinder(pair, at, touches);
+      for (int k = 0; k < count; ++k) each(touches[static_cast<std::size_t>(k)], k);
+    }
   }
 }
 
@@ -242,7 +253,7 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
     const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
     if (on != nullptr && !on->close) continue;
     const View& at = on == nullptr ? at_W : on->tool;
-    if (pairs_[i].kind == Kind::rim_field) remember_lowest(pairs_[i], at);
+    if (pairs_[i].kind == Kind::rim_field || pairs_[i].kind == Kind::rim_face) remember_lowest(pairs_[i], at);
     evaluate(pairs_[i], at, [&](const Touch& t, int which) {
       if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far
       if (found_count_ == most_found) {
@@ -280,10 +291,8 @@ bool RigidWorld::beside(const Found& deep, const View& at) const noexcept {
     if (by.entry != pair.entry || by.part != pair.part || found_[j].touch.gap < half) continue;
     if (n.dot(deep.touch.normal) > 0.5) continue;
     const Vec3 n_T = at.R.transpose() * n, n_O = on == nullptr ? n : Vec3(on->R.transpose() * n);
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Vec3& p : own.points) low = std::min(low, n_T.dot(p));
-    for (const Vec3& p : other->points) high = std::max(high, n_O.dot(p));
-    if (on != nullptr) high += n.dot(on->x);
+    const double low = -extent_along(own, -n_T),
+                 high = extent_along(*other, n_O) + (on != nullptr ? n.dot(on->x) : 0.0);
     if (low + n.dot(at.x) - high > half) return true;
   }
   return false;
@@ -340,7 +349,7 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
   for (std::size_t i = 0; i < found_count_; ++i) {
     if (!(found_[i].touch.gap < -kGap_m)) continue;
     const Pair& pair = pairs_[found_[i].pair];
-    if (pair.kind == Kind::edges && beside(found_[i], at)) {
+    if ((pair.kind == Kind::edges || pair.kind == Kind::rim_edge) && beside(found_[i], at)) {
       found_[i--] = found_[--found_count_];
       continue;
     }

@@ -82,15 +82,33 @@ double thickness(const Solid& solid) {
 
 Bounds bounds_of(const Solid& solid, double around) {
   Bounds bounds;
-  if (solid.points.empty()) return bounds;
-  bounds.low = bounds.high = solid.points.front();
-  for (const Vec3& p : solid.points) {
-    bounds.low = bounds.low.cwiseMin(p);
-    bounds.high = bounds.high.cwiseMax(p);
+  for (int k = 0; k < 3; ++k) {
+    bounds.low[k] = -extent_along(solid, -Vec3::Unit(k)) + solid.radius - around;
+    bounds.high[k] = extent_along(solid, Vec3::Unit(k)) - solid.radius + around;
   }
-  bounds.low.array() -= around;
-  bounds.high.array() += around;
   return bounds;
+}
+
+std::optional<Cylinder> cylinder_in(const Solid& solid) {
+  if (solid.rims.size() != 2) return {};
+  return cylinder_of(solid);
+}
+
+// What no contact is known for.
+void require_contact(bool cylinder, const RigidObject& object) {
+  if (!cylinder) return;
+  const auto* tube = std::get_if<HollowTube>(&object.shape);
+  if (tube != nullptr && !tube->endless) {
+    throw std::invalid_argument("a cylinder as a tool isn't held by the round ends of a tube");
+  }
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  if (mesh != nullptr && !(*mesh)->mesh().closed()) {
+    throw std::invalid_argument("a cylinder as a tool isn't held by an open mesh");
+  }
+  const Solid* solid = std::get_if<Solid>(&object.shape);
+  if (solid != nullptr && !solid->rims.empty()) {
+    throw std::invalid_argument("a cylinder as a tool isn't held by another cylinder");
+  }
 }
 
 MeshPart part_of(const ToolPart& part) {
@@ -129,7 +147,8 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     shared->reach = std::max(shared->reach, solid.reach);
     shared->bends = shared->bends || !solid.rims.empty();
     const Bounds box = bounds_of(solid, 0.0);
-    shared->parts.push_back({std::move(solid), box, part.friction, std::move(mesh)});
+    const std::optional<Cylinder> cylinder = cylinder_in(solid);
+    shared->parts.push_back({std::move(solid), box, part.friction, std::move(mesh), cylinder});
   }
   if (tool.parts.empty()) {
     Solid point;
@@ -145,18 +164,12 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     if (!(object.friction >= 0.0 && std::isfinite(object.friction))) {
       throw std::invalid_argument("a friction must be finite and not negative");
     }
-    const bool has_features = std::holds_alternative<Solid>(object.shape) ||
-                              std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(object.shape);
-    const auto* tube = std::get_if<HollowTube>(&object.shape);
-    const bool holds_no_rim = has_features || (tube != nullptr && !tube->endless);
-    for (const Part& part : shared->parts) {
-      if (holds_no_rim && !part.solid.rims.empty()) {
-        throw std::invalid_argument("a cylinder as a tool touches planes, hollow spheres and endless tubes only");
-      }
-    }
+    for (const Part& part : shared->parts) require_contact(part.cylinder.has_value(), object);
+    std::optional<Cylinder> cylinder;
     if (const Solid* solid = std::get_if<Solid>(&object.shape)) {
-      if (!solid->rims.empty()) throw std::invalid_argument("the outside of a cylinder can't be touched");
       shared->thinness = std::min(shared->thinness, thickness(*solid));
+      cylinder = cylinder_in(*solid);
+      shared->bends = shared->bends || cylinder;
     }
     shared->hollow = shared->hollow || std::holds_alternative<HollowSphere>(object.shape) ||
                      std::holds_alternative<HollowTube>(object.shape);
@@ -175,7 +188,7 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     }
     const Solid* solid = std::get_if<Solid>(&object.shape);
     const Bounds box = solid != nullptr ? bounds_of(*solid, 0.0) : bounds;
-    shared->entries.push_back({std::move(object), bounds, box, held});
+    shared->entries.push_back({std::move(object), bounds, box, held, cylinder});
   }
   for (const Part& part : shared->parts) own_corners += part.solid.points.size();
   shared->dense = shared->dense || corners * own_corners > kManyCorners;
@@ -599,8 +612,12 @@ bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
 double RigidWorld::bend_per_m(const Pair& pair) const noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
   const Solid* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
+  if (const std::optional<Cylinder>& cylinder = shared_->entries[pair.entry].cylinder) {
+    return 1.0 / cylinder->radius + (own.radius > 0.0 ? 1.0 / own.radius : 0.0);
+  }
   double bend = own.radius > 0.0 ? 1.0 / own.radius : 0.0;
   if (other != nullptr && other->radius > 0.0) bend += 1.0 / other->radius;
+  if (pair.kind >= Kind::side_point) bend += 1.0 / shared_->parts[pair.part].cylinder->radius;
   return bend;
 }
 
@@ -696,7 +713,6 @@ double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
 // more if neither.
 double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& at) noexcept {
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
-  if (part.solid.points.empty()) return 0.0;
   if (mesh != nullptr) {
     std::optional<bool> inside;
     if (entry.held != 0.0) inside = entry.object.inside_out;
@@ -706,6 +722,11 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
   const Solid& solid = *std::get_if<Solid>(&entry.object.shape);
   if (part.mesh) {
     return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false);
+  }
+  if (part.cylinder) return separation_of_cylinder(moved(*part.cylinder, at.R, at.x), solid);
+  if (entry.cylinder) {
+    const View to = inverse(at);
+    return separation_of_cylinder(moved(*entry.cylinder, to.R, to.x), part.solid);
   }
   if (part.solid.faces.empty() && solid.faces.empty()) return 0.0;
   const double gap = separation_of_hulls(part.solid, isometry(at), solid);

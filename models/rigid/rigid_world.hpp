@@ -30,9 +30,11 @@
 #include <vector>
 
 #include "models/geometry/pose_algorithm.hpp"
+#include "models/rigid/beside_cylinder.hpp"
 #include "models/rigid/contact_problem.hpp"
 #include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_mover.hpp"
+#include "models/rigid_shapes/cylinder.hpp"
 
 namespace proxarm::models {
 
@@ -72,7 +74,14 @@ class RigidWorld final : public PoseAlgorithm {
     edges,
     point_point,
     point_edge,
-    edge_point
+    edge_point,
+    // Of a cylinder's features and those of the other one, whichever is the tool.
+    side_point,
+    end_point,
+    rim_point,
+    side_edge,
+    rim_edge,
+    rim_face
   };
   struct Pair {
     Kind kind = Kind::point_field;
@@ -95,12 +104,14 @@ class RigidWorld final : public PoseAlgorithm {
     Bounds box;  // of its points, in T
     std::optional<double> friction;
     std::shared_ptr<const TriangleFeatures> mesh{};  // of a mesh, whose features are the solid's as well
+    std::optional<Cylinder> cylinder{};
   };
   struct Entry {
     RigidObject object;
     Bounds bounds;
     Bounds box{};       // of a solid's points
     double held = 0.0;  // of a closed mesh: 1 or −1, the side of its faces on which the tool is
+    std::optional<Cylinder> cylinder{};
   };
   struct Pressed {  // a place of a pair that pressed in the last solution, and how hard
     std::uint16_t pair = 0;
@@ -162,6 +173,7 @@ class RigidWorld final : public PoseAlgorithm {
   void gather(const ToolPose& pose, double reach) noexcept;
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
   void gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  void gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other) noexcept;
   [[nodiscard]] static Kind other_way_round(Kind kind) noexcept;
@@ -187,6 +199,17 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
   void evaluate(const Pair& pair, const View& at, Each each) const noexcept;
+  struct AtCylinder;
+  [[nodiscard]] BesideCylinder beside_cylinder(std::uint16_t part, std::uint16_t entry) const noexcept;
+  [[nodiscard]] int meet(const Pair& pair, const AtCylinder& here, std::array<Meeting, 4>& out) const noexcept;
+  [[nodiscard]] int meet_face(const Pair& pair, const AtCylinder& here, std::array<Meeting, 4>& out) const noexcept;
+  [[nodiscard]] bool counts(const Pair& pair, const AtCylinder& here, const Meeting& meeting) const noexcept;
+  [[nodiscard]] bool was_behind(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept;
+  [[nodiscard]] bool was_behind_edge(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept;
+  [[nodiscard]] View from_of(const Pair& pair) const noexcept;
+  // The places where the two may touch; infinitely far where one doesn't count. Returns their number.
+  [[nodiscard]] int touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept;
+  [[nodiscard]] FlatSide side_of(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
   [[nodiscard]] static Solid::Rim rim_at(const Solid::Rim& rim, const View& at) noexcept;
   void remember_lowest(Pair& pair, const View& at) const noexcept;
   void find(const ToolPose& pose) noexcept;
@@ -198,6 +221,7 @@ class RigidWorld final : public PoseAlgorithm {
                  Mat3& frame) const noexcept;
   [[nodiscard]] const Vec3* last_force(std::uint16_t pair, std::uint8_t which) const noexcept;
   bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
+  bool add_bend_of_level_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   Twist couple(const ToolPose& pose, const Twist& e) noexcept;
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
@@ -262,6 +286,7 @@ class RigidWorld final : public PoseAlgorithm {
   std::size_t riding_ = nobody;    // in moving_: what is near in this step, alone
   double extent_m_ = 0.0;          // of the coordinates of what moves
   bool without_friction_ = false;  // in the present attempt
+  double behind_m_ = kFront_m;     // so far behind a feature of a cylinder may be what it holds in a part of the step
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
 };
 

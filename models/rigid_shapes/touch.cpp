@@ -44,15 +44,14 @@ std::optional<Crossing> cross(const EdgeLine& own, const EdgeLine& other, double
   return Crossing{own.from + s * a, other.from + t * b, n};
 }
 
-// Whether a unit direction across an edge lies between the normals of its faces.
+}  // namespace
+
 bool between(const Vec3& n, const Vec3& left, const Vec3& right) noexcept {
   const Vec3 w = left.cross(right);
   const double size = w.norm();
   if (size < 1e-9) return n.dot(left) > 1.0 - kAskew;
   return left.cross(n).dot(w) >= -kAskew * size && n.cross(right).dot(w) >= -kAskew * size && n.dot(left + right) > 0.0;
 }
-
-}  // namespace
 
 Touch touch(const FlatSide& side, const Vec3& p, double radius) noexcept {
   return {p - radius * side.normal, side.normal, side.normal.dot(p) - side.offset - radius};

@@ -69,6 +69,9 @@ struct EdgeLine {
   bool open = false;  // the border of a sheet: it has a face on one side only, and any direction may hold
 };
 
+// Whether a unit direction across a sharp edge lies between the normals of its faces.
+bool between(const Vec3& n, const Vec3& left, const Vec3& right) noexcept;
+
 // A point p with a radius over a face; none if its foot isn't on the face. `side` is 1 or −1, the side of the face that
 // the point is on.
 std::optional<Touch> touch_face(const Vec3& p, double radius, const Vec3& normal, double offset,

@@ -1,0 +1,121 @@
+// How far a cylinder with flat ends is from another body, by formulas that share nothing with RigidWorld: a plane
+// between the two, the best of all that may be.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "tests/models/rigid/rigid_bodies.hpp"
+
+namespace proxarm::models {
+
+struct Can {
+  Pose X = Pose::Identity();  // the axis is its z, about the middle
+  double length = 0.0, radius = 0.0;
+};
+
+inline Can at(const Can& can, const Pose& X) { return {X * can.X, can.length, can.radius}; }
+
+// All points within a radius of the hull of some. Edges by their ends.
+struct Rounded {
+  std::vector<Vec3> points, normals;
+  std::vector<std::array<Vec3, 2>> edges;
+  double radius = 0.0;
+};
+
+inline Rounded rounded(const Body& body) {
+  Rounded out;
+  out.radius = body.radius;
+  const Vec3 half = 0.5 * body.size;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 sign(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0);
+    if ((half.array() == 0.0 && sign.array() > 0.0).any()) continue;
+    out.points.push_back(body.X * Vec3(half.cwiseProduct(sign)));
+    for (int k = 0; k < 3; ++k) {
+      if (half[k] == 0.0 || sign[k] > 0.0) continue;
+      Vec3 other = half.cwiseProduct(sign);
+      other[k] = half[k];
+      out.edges.push_back({out.points.back(), body.X * other});
+    }
+  }
+  if (half.minCoeff() > 0.0) {
+    for (int k = 0; k < 3; ++k) {
+      out.normals.push_back(body.X.linear().col(k));
+      out.normals.push_back(-body.X.linear().col(k));
+    }
+  }
+  return out;
+}
+
+inline Rounded rounded(const std::array<Vec3, 3>& triangle) {
+  Rounded out;
+  const Vec3 n = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
+  out.normals = {n, -n};
+  for (std::size_t k = 0; k < 3; ++k) {
+    out.points.push_back(triangle[k]);
+    out.edges.push_back({triangle[k], triangle[(k + 1) % 3]});
+  }
+  return out;
+}
+
+// What a plane along n, out of the cylinder, leaves between the two.
+inline double left_along(const Can& can, const Rounded& body, const Vec3& n) {
+  const Vec3 z = can.X.linear().col(2);
+  const double cosine = z.dot(n);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Vec3& p : body.points) nearest = std::min(nearest, n.dot(p - can.X.translation()));
+  return nearest - body.radius - 0.5 * can.length * std::abs(cosine) - can.radius * (n - cosine * z).norm();
+}
+
+// The largest of those across an edge, found by looking around it: it is smooth but for planes along the axis, so that
+// an angle to 1e-8 is enough.
+inline double left_across(const Can& can, const Rounded& body, const Vec3& d) {
+  const Vec3 u = d.unitOrthogonal(), v = d.cross(u);
+  const auto left = [&](double angle) { return left_along(can, body, std::cos(angle) * u + std::sin(angle) * v); };
+  constexpr int around = 90;
+  const double step = 2.0 * std::numbers::pi / around;
+  double best = -std::numeric_limits<double>::infinity();
+  std::array<double, around> values;
+  for (int i = 0; i < around; ++i) values[static_cast<std::size_t>(i)] = left(i * step);
+  for (int i = 0; i < around; ++i) {
+    const auto value = [&](int k) { return values[static_cast<std::size_t>((k + around) % around)]; };
+    if (value(i) < value(i - 1) || value(i) < value(i + 1)) continue;
+    double low = (i - 1) * step, high = (i + 1) * step;
+    for (int k = 0; k < 60; ++k) {
+      const double x = low + (high - low) / 3.0, y = high - (high - low) / 3.0;
+      (left(x) < left(y) ? low : high) = left(x) < left(y) ? x : y;
+    }
+    best = std::max(best, left(low));
+  }
+  const Vec3 along_axis = can.X.linear().col(2).cross(d);
+  if (along_axis.norm() > 1e-9) {
+    best = std::max(
+        {best, left_along(can, body, along_axis.normalized()), left_along(can, body, -along_axis.normalized())});
+  }
+  return best;
+}
+
+inline double apart(const Can& can, const Rounded& body) {
+  const Vec3 z = can.X.linear().col(2);
+  double best = std::max(left_along(can, body, z), left_along(can, body, -z));
+  for (const Vec3& n : body.normals) best = std::max(best, left_along(can, body, -n));
+  for (const Vec3& p : body.points) {
+    const Vec3 x = can.X.inverse() * p;
+    const Vec3 across(x.x(), x.y(), 0.0), out = across.normalized();
+    const Vec3 near = std::min(across.norm(), can.radius) * out +
+                      Vec3(0.0, 0.0, std::clamp(x.z(), -0.5 * can.length, 0.5 * can.length));
+    if (across.norm() > 0.0) best = std::max(best, left_along(can, body, can.X.linear() * out));
+    if ((x - near).norm() > 0.0) best = std::max(best, left_along(can, body, can.X.linear() * (x - near).normalized()));
+  }
+  if (best > 1e-3) return best;  // far enough: nobody asks by how much
+  for (const auto& [from, to] : body.edges) best = std::max(best, left_across(can, body, (to - from).normalized()));
+  return best;
+}
+
+inline Solid solid_of_can(const Can& can) { return solid_of(CylinderTool{can.length, can.radius}, can.X); }
+
+}  // namespace proxarm::models
