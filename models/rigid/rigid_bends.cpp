@@ -51,7 +51,7 @@ Round round_at(const HollowTube& hollow, const Vec3& x) noexcept {
 // Adds −force ∇²gap to K. False: nothing bends there.
 bool RigidWorld::add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
   const Pair& pair = pairs_[found.pair];
-  if (pair.kind == Kind::rim_face) return add_bend_of_level_rim(found, pose, force, K);
+  if (is_flat_rim(pair.kind) && pair.kind != Kind::rim_field) return add_bend_of_rim(found, pose, force, K);
   const bool is_rim = pair.kind == Kind::rim_field;
   if (!is_rim && pair.kind != Kind::point_field) return false;
   const Solid& own = shared_->parts[pair.part].solid;
@@ -90,15 +90,16 @@ bool RigidWorld::add_bend(const Found& found, const ToolPose& pose, double force
 }
 
 // A rim over a face, of either body: nothing bends but the rim, whose lowest place goes around.
-bool RigidWorld::add_bend_of_level_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
+bool RigidWorld::add_bend_of_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
   const Pair& pair = pairs_[found.pair];
   if (found.which != 0) return false;
-  const std::optional<Cylinder>& ours = shared_->parts[pair.part].cylinder;
+  const std::optional<Cylinder>& own = shared_->parts[pair.part].cylinder;
+  const bool ours = own && pair.kind != Kind::end_rim;
   const Placement* on = moves(pair.entry) ? &moving(pair.entry).mover.at() : nullptr;
   Vec3 centre, axis;
   if (ours) {
-    centre = pose * ours->rims[pair.own].centre;
-    axis = pose.orientation * ours->axis;
+    centre = pose * own->rims[pair.own].centre;
+    axis = pose.orientation * own->axis;
   } else {
     const Cylinder& other = *shared_->entries[pair.entry].cylinder;
     centre = other.rims[pair.other].centre;

@@ -80,6 +80,7 @@ class CylinderPairs {
 void RigidWorld::gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const Part& own = shared_->parts[part];
   const Entry& other = shared_->entries[entry];
+  if (own.cylinder && other.cylinder) return gather_cylinders(part, entry, at, reach);
   const bool ours = own.cylinder.has_value();
   const View to = ours ? at : inverse(at);
   const BesideCylinder body = beside_cylinder(part, entry);
@@ -245,6 +246,7 @@ View RigidWorld::from_of(const Pair& pair) const noexcept {
 }
 
 int RigidWorld::touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept {
+  if (pair.kind >= Kind::sides) return touch_cylinders(pair, at, out);
   const AtCylinder here(*this, pair, at);
   std::array<Meeting, 4> places;
   const int count = meet(pair, here, places);
@@ -255,7 +257,8 @@ int RigidWorld::touch_cylinder(const Pair& pair, const View& at, std::array<Touc
   return count;
 }
 
-FlatSide RigidWorld::side_of(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept {
+FlatSide RigidWorld::side_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept {
+  if (pair.kind != Kind::rim_face) return end_under_rim(pair, at, rim);
   const AtCylinder here(*this, pair, at);
   const BesideCylinder::Face face = here.body.face(here.feature);
   rim = here.cylinder.rims[here.round];

@@ -139,9 +139,9 @@ Solid::Rim RigidWorld::rim_at(const Solid::Rim& rim, const View& at) noexcept {
 // While a rim lies flat, where it was lowest before says where it would tip.
 void RigidWorld::remember_lowest(Pair& pair, const View& at) const noexcept {
   Vec2 lowest = Vec2::Zero();
-  if (pair.kind == Kind::rim_face) {
+  if (pair.kind != Kind::rim_field) {
     Solid::Rim rim;
-    const FlatSide side = side_of(pair, at, rim);
+    const FlatSide side = side_under_rim(pair, at, rim);
     lowest = lowest_of_rim(side, rim);
   } else if (const auto* flat = std::get_if<FlatSide>(&shared_->entries[pair.entry].object.shape)) {
     lowest = lowest_of_rim(*flat, rim_at(shared_->parts[pair.part].solid.rims[pair.own], at));
@@ -253,7 +253,7 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
     const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
     if (on != nullptr && !on->close) continue;
     const View& at = on == nullptr ? at_W : on->tool;
-    if (pairs_[i].kind == Kind::rim_field || pairs_[i].kind == Kind::rim_face) remember_lowest(pairs_[i], at);
+    if (is_flat_rim(pairs_[i].kind)) remember_lowest(pairs_[i], at);
     evaluate(pairs_[i], at, [&](const Touch& t, int which) {
       if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far
       if (found_count_ == most_found) {
@@ -349,7 +349,8 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
   for (std::size_t i = 0; i < found_count_; ++i) {
     if (!(found_[i].touch.gap < -kGap_m)) continue;
     const Pair& pair = pairs_[found_[i].pair];
-    if ((pair.kind == Kind::edges || pair.kind == Kind::rim_edge) && beside(found_[i], at)) {
+    const bool is_sharp = pair.kind == Kind::edges || pair.kind == Kind::rim_edge || pair.kind == Kind::rims;
+    if (is_sharp && beside(found_[i], at)) {
       found_[i--] = found_[--found_count_];
       continue;
     }

@@ -9,6 +9,7 @@
 #include "models/rigid/mesh_part.hpp"
 #include "models/rigid/near.hpp"
 #include "models/rigid_shapes/overlap.hpp"
+#include "models/rigid_shapes/two_cylinders.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -104,10 +105,6 @@ void require_contact(bool cylinder, const RigidObject& object) {
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
   if (mesh != nullptr && !(*mesh)->mesh().closed()) {
     throw std::invalid_argument("a cylinder as a tool isn't held by an open mesh");
-  }
-  const Solid* solid = std::get_if<Solid>(&object.shape);
-  if (solid != nullptr && !solid->rims.empty()) {
-    throw std::invalid_argument("a cylinder as a tool isn't held by another cylinder");
   }
 }
 
@@ -612,12 +609,13 @@ bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
 double RigidWorld::bend_per_m(const Pair& pair) const noexcept {
   const Solid& own = shared_->parts[pair.part].solid;
   const Solid* other = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
-  if (const std::optional<Cylinder>& cylinder = shared_->entries[pair.entry].cylinder) {
-    return 1.0 / cylinder->radius + (own.radius > 0.0 ? 1.0 / own.radius : 0.0);
-  }
   double bend = own.radius > 0.0 ? 1.0 / own.radius : 0.0;
   if (other != nullptr && other->radius > 0.0) bend += 1.0 / other->radius;
-  if (pair.kind >= Kind::side_point) bend += 1.0 / shared_->parts[pair.part].cylinder->radius;
+  if (pair.kind >= Kind::side_point) {
+    for (const auto* cylinder : {&shared_->parts[pair.part].cylinder, &shared_->entries[pair.entry].cylinder}) {
+      if (*cylinder) bend += 1.0 / (*cylinder)->radius;
+    }
+  }
   return bend;
 }
 
@@ -722,6 +720,9 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
   const Solid& solid = *std::get_if<Solid>(&entry.object.shape);
   if (part.mesh) {
     return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false);
+  }
+  if (part.cylinder && entry.cylinder) {
+    return separation_of_cylinders(moved(*part.cylinder, at.R, at.x), *entry.cylinder);
   }
   if (part.cylinder) return separation_of_cylinder(moved(*part.cylinder, at.R, at.x), solid);
   if (entry.cylinder) {

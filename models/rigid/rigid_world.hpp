@@ -81,7 +81,14 @@ class RigidWorld final : public PoseAlgorithm {
     rim_point,
     side_edge,
     rim_edge,
-    rim_face
+    rim_face,
+    // Of two cylinders, the tool's first.
+    sides,
+    rim_side,
+    side_rim,
+    rim_end,
+    end_rim,
+    rims
   };
   struct Pair {
     Kind kind = Kind::point_field;
@@ -176,6 +183,9 @@ class RigidWorld final : public PoseAlgorithm {
   void gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other) noexcept;
+  [[nodiscard]] static bool is_flat_rim(Kind kind) noexcept {  // a rim over something flat
+    return kind == Kind::rim_field || kind == Kind::rim_face || kind == Kind::rim_end || kind == Kind::end_rim;
+  }
   [[nodiscard]] static Kind other_way_round(Kind kind) noexcept;
   template <typename Add>
   void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
@@ -209,7 +219,14 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] View from_of(const Pair& pair) const noexcept;
   // The places where the two may touch; infinitely far where one doesn't count. Returns their number.
   [[nodiscard]] int touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept;
-  [[nodiscard]] FlatSide side_of(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
+  // The rim of a pair, and the side that it lies on.
+  [[nodiscard]] FlatSide side_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
+  [[nodiscard]] FlatSide end_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
+  void gather_cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
+  struct TwoCylinders;
+  [[nodiscard]] int meet(const Pair& pair, const TwoCylinders& here, std::array<Meeting, 4>& out) const noexcept;
+  [[nodiscard]] bool counts(const Pair& pair, const TwoCylinders& here, const Meeting& meeting) const noexcept;
+  [[nodiscard]] int touch_cylinders(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept;
   [[nodiscard]] static Solid::Rim rim_at(const Solid::Rim& rim, const View& at) noexcept;
   void remember_lowest(Pair& pair, const View& at) const noexcept;
   void find(const ToolPose& pose) noexcept;
@@ -221,7 +238,7 @@ class RigidWorld final : public PoseAlgorithm {
                  Mat3& frame) const noexcept;
   [[nodiscard]] const Vec3* last_force(std::uint16_t pair, std::uint8_t which) const noexcept;
   bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
-  bool add_bend_of_level_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
+  bool add_bend_of_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   Twist couple(const ToolPose& pose, const Twist& e) noexcept;
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;

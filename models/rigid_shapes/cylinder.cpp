@@ -18,34 +18,6 @@ constexpr double kAlong = 1e-7;
 
 Vec3 on(const Solid::Rim& rim, const Vec2& z) noexcept { return z.x() * rim.u + z.y() * rim.v; }
 
-// Where a rim comes nearest to a line through y along the unit vector d. The squared distance is, with P across the
-// line and c from y to the rim's middle, |P c|² + 2 r (P c)ᵀz + r² − r² (dᵀz)²: turned negative, half of it over r is
-// circle.hpp's function with the x axis along (d_u, d_v), but for a constant.
-int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::array<Vec2, 2>& out) noexcept {
-  const Vec3 c = rim.centre - y, across = c - d * d.dot(c);
-  const Vec2 along(d.dot(rim.u), d.dot(rim.v));
-  const double sine = along.norm();
-  const Vec2 x_axis = sine > 0.0 ? Vec2(along / sine) : Vec2(Vec2::UnitX()), y_axis(-x_axis.y(), x_axis.x());
-  const Vec2 b(-across.dot(rim.u), -across.dot(rim.v));
-  // There the quadratic term belongs to y; (dᵀz)² = sine² (1 − z_y²).
-  const int count = highest_on_circle({x_axis.dot(b), y_axis.dot(b)}, rim.radius * sine * sine, out);
-  for (int k = 0; k < count; ++k) {
-    Vec2& z = out[static_cast<std::size_t>(k)];
-    z = z.x() * x_axis + z.y() * y_axis;
-  }
-  return count;
-}
-
-// Whether a direction out of a rim lies between its side and its end.
-bool out_of_rim(const Vec3& out, const Vec3& beside, const Vec3& before) noexcept {
-  return out.dot(beside) >= -kAskew && out.dot(before) >= -kAskew && out.dot(beside + before) > 0.0;
-}
-
-double reach_along(const Cylinder& cylinder, const Vec3& n) noexcept {
-  const double cosine = cylinder.axis.dot(n), along = std::max(0.0, cosine * cylinder.length);
-  return n.dot(cylinder.from) + along + cylinder.radius * cylinder.axis.cross(n).norm();
-}
-
 // A plane that leaves the largest gap lies on a face or an end, or else across a point and the side or a rim, or along
 // an edge.
 class PlanesBetween {
@@ -94,6 +66,33 @@ class PlanesBetween {
 };
 
 }  // namespace
+
+// The squared distance is, with P across the
+// line and c from y to the rim's middle, |P c|² + 2 r (P c)ᵀz + r² − r² (dᵀz)²: turned negative, half of it over r is
+// circle.hpp's function with the x axis along (d_u, d_v), but for a constant.
+int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::array<Vec2, 2>& out) noexcept {
+  const Vec3 c = rim.centre - y, across = c - d * d.dot(c);
+  const Vec2 along(d.dot(rim.u), d.dot(rim.v));
+  const double sine = along.norm();
+  const Vec2 x_axis = sine > 0.0 ? Vec2(along / sine) : Vec2(Vec2::UnitX()), y_axis(-x_axis.y(), x_axis.x());
+  const Vec2 b(-across.dot(rim.u), -across.dot(rim.v));
+  // There the quadratic term belongs to y; (dᵀz)² = sine² (1 − z_y²).
+  const int count = highest_on_circle({x_axis.dot(b), y_axis.dot(b)}, rim.radius * sine * sine, out);
+  for (int k = 0; k < count; ++k) {
+    Vec2& z = out[static_cast<std::size_t>(k)];
+    z = z.x() * x_axis + z.y() * y_axis;
+  }
+  return count;
+}
+
+bool out_of_rim(const Vec3& out, const Vec3& beside, const Vec3& before) noexcept {
+  return out.dot(beside) >= -kAskew && out.dot(before) >= -kAskew && out.dot(beside + before) > 0.0;
+}
+
+double reach_along(const Cylinder& cylinder, const Vec3& n) noexcept {
+  const double cosine = cylinder.axis.dot(n), along = std::max(0.0, cosine * cylinder.length);
+  return n.dot(cylinder.from) + along + cylinder.radius * cylinder.axis.cross(n).norm();
+}
 
 Cylinder cylinder_of(const Solid& solid) noexcept {
   Cylinder out;

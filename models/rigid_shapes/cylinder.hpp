@@ -57,7 +57,14 @@ int meet_rim(const Cylinder& cylinder, std::uint32_t end, const EdgeLine& edge, 
 // and whatever is beside it. NaN where the edge lies along the rim.
 double height_of_rim(const Cylinder& cylinder, std::uint32_t end, const EdgeLine& edge, const Vec2& place) noexcept;
 
-// How far the body goes along a unit direction.
+// Where a rim comes nearest to the line through y along the unit vector d, in its u and v, the nearest first; two at
+// most.
+int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::array<Vec2, 2>& out) noexcept;
+// Whether a direction out of a rim lies between those out of the side and out of the end.
+bool out_of_rim(const Vec3& out, const Vec3& beside, const Vec3& before) noexcept;
+
+// How far a body goes along a unit direction.
+double reach_along(const Cylinder& cylinder, const Vec3& n) noexcept;
 double extent_along(const Solid& solid, const Vec3& n) noexcept;
 
 // A plane between a cylinder and a convex solid: the largest gap that one leaves, below 0 where they overlap, and then

@@ -116,6 +116,41 @@ inline double apart(const Can& can, const Rounded& body) {
   return best;
 }
 
+inline double furthest_along(const Can& can, const Vec3& n) {
+  const Vec3 z = can.X.linear().col(2);
+  const double cosine = z.dot(n);
+  return n.dot(can.X.translation()) + 0.5 * can.length * std::abs(cosine) + can.radius * (n - cosine * z).norm();
+}
+
+inline Vec3 nearest_of(const Can& can, const Vec3& p) {
+  const Vec3 x = can.X.inverse() * p;
+  const double across = x.head<2>().norm(), share = across > can.radius ? can.radius / across : 1.0;
+  return can.X * Vec3(share * x.x(), share * x.y(), std::clamp(x.z(), -0.5 * can.length, 0.5 * can.length));
+}
+
+// Of two: a plane that leaves more than nothing shows that they are apart. Tried are those along directions that
+// somebody claims, where they touch, those of the axes, and that between two places that come nearest by turns.
+inline double apart(const Can& a, const Can& b, const std::vector<Vec3>& claimed) {
+  double best = -std::numeric_limits<double>::infinity();
+  const auto try_along = [&](const Vec3& n) {
+    if (!(n.norm() > 1e-12)) return;
+    for (const Vec3& out : {Vec3(n.normalized()), Vec3(-n.normalized())}) {
+      best = std::max(best, -furthest_along(b, -out) - furthest_along(a, out));
+    }
+  };
+  const Vec3 z_a = a.X.linear().col(2), z_b = b.X.linear().col(2);
+  for (const Vec3& n : claimed) try_along(n);
+  for (const Vec3& n : {z_a, z_b, Vec3(z_a.cross(z_b))}) try_along(n);
+  if (best > 0.0) return best;
+  Vec3 x = a.X.translation();
+  for (int k = 0; k < 20000 && !(best > 0.0); ++k) {
+    const Vec3 y = nearest_of(b, x);
+    x = nearest_of(a, y);
+    if (k % 50 == 0) try_along(y - x);
+  }
+  return best;
+}
+
 inline Solid solid_of_can(const Can& can) { return solid_of(CylinderTool{can.length, can.radius}, can.X); }
 
 }  // namespace proxarm::models

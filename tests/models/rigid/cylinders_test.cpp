@@ -47,6 +47,7 @@ struct World {
   std::vector<double> mu;
   std::function<double(const ToolPose&)> apart_m;
   double around_m = 0.15;
+  std::shared_ptr<std::vector<Vec3>> claimed = std::make_shared<std::vector<Vec3>>();  // normals of the last contacts
 
   void add(decltype(RigidObject::shape) shape, Random& random) {
     const auto number = static_cast<std::int32_t>(mu.size());
@@ -67,7 +68,12 @@ Pushed pushed(std::uint64_t seed, const std::function<World(Random&)>& make) {
       q = tool_pose(random_pose(random, world.around_m));
     } while (world.apart_m(q) < 1e-3);
     EXPECT_GT(g.clearance_m(q), 0.0);
-    push_about(g, random, q, random_stiffness(random), world.mu, 200, Vec3::Zero(), false, world.apart_m, out);
+    const auto apart_m = [&](const ToolPose& pose) {
+      world.claimed->clear();
+      for (const PoseContact& contact : g.contacts()) world.claimed->push_back(contact.normal_W);
+      return world.apart_m(pose);
+    };
+    push_about(g, random, q, random_stiffness(random), world.mu, 200, Vec3::Zero(), false, apart_m, out);
   }
   std::cout << "  " << out.judged << " steps, " << out.touching << " touching, " << out.unresolved
             << " unresolved; deepest " << out.deepest << " m, imbalance " << out.law.imbalance << ", against slip "
@@ -116,6 +122,25 @@ World among_cans(Random& random, Make make) {
   return world;
 }
 
+World can_among_cans(Random& random) {
+  World world;
+  const Can tool = random_can(random, 0.01, 0.05);
+  world.give(CylinderTool{tool.length, tool.radius});
+  std::vector<Can> cans;
+  for (int i = 0; i < 6; ++i) {
+    Can can = random_can(random, 0.02, 0.1);
+    can.X = random_pose(random, 0.08);
+    cans.push_back(can);
+    world.add(solid_of_can(can), random);
+  }
+  world.apart_m = [=, claimed = world.claimed](const ToolPose& pose) {
+    double gap = 1.0;
+    for (const Can& can : cans) gap = std::min(gap, apart(can, at(tool, isometry(pose)), *claimed));
+    return gap;
+  };
+  return world;
+}
+
 // By planes between it and each triangle, and so that none is inside of it.
 double can_from_mesh(const Can& can, const std::vector<std::array<Vec3, 3>>& triangles) {
   double least = 1.0;
@@ -147,6 +172,8 @@ TEST(Cylinders, AsObjectsTheyHoldABoxByTheLaw) {
 TEST(Cylinders, AsObjectsTheyHoldSpheresAndCapsulesByTheLaw) {
   expect_law(pushed(60000, [](Random& random) { return among_cans(random, random_round); }));
 }
+
+TEST(Cylinders, AsAToolAmongCylindersOneKeepsTheLaw) { expect_law(pushed(120000, can_among_cans)); }
 
 TEST(Cylinders, AsAToolOnARoughBallOneKeepsTheLaw) {
   expect_law(pushed(80000, [](Random& random) {

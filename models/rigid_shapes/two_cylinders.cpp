@@ -1,0 +1,236 @@
+#include "models/rigid_shapes/two_cylinders.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace proxarm::models {
+namespace {
+
+// As in cylinder.cpp.
+constexpr double kAlong = 1e-7;
+
+EdgeLine axis_of(const Cylinder& cylinder) noexcept {
+  EdgeLine axis;
+  axis.from = cylinder.from;
+  axis.to = cylinder.from + cylinder.length * cylinder.axis;
+  return axis;
+}
+
+// A place on a circle, and the way along it per radian.
+struct OnRim {
+  Vec3 arm = Vec3::Zero();  // unit
+  Vec3 x = Vec3::Zero(), along = Vec3::Zero();
+};
+
+OnRim on_rim(const Solid::Rim& rim, double angle) noexcept {
+  const double c = std::cos(angle), s = std::sin(angle);
+  const Vec3 arm = c * rim.u + s * rim.v;
+  return {arm, rim.centre + rim.radius * arm, rim.radius * (c * rim.v - s * rim.u)};
+}
+
+double nearest_angle(const Solid::Rim& rim, const Vec3& p) noexcept {
+  return std::atan2(rim.v.dot(p - rim.centre), rim.u.dot(p - rim.centre));
+}
+
+double distance2_to_rim(const Solid::Rim& rim, const Vec3& p) noexcept {
+  const Vec3 d = p - rim.centre;
+  const double x = rim.u.dot(d), y = rim.v.dot(d), height2 = std::max(0.0, d.squaredNorm() - x * x - y * y);
+  const double beside = std::hypot(x, y) - rim.radius;
+  return height2 + beside * beside;
+}
+
+// How far a point is beyond a rim, in its plane.
+double beyond_rim(const Solid::Rim& rim, const Vec3& p) noexcept {
+  const Vec3 d = p - rim.centre;
+  return std::hypot(rim.u.dot(d), rim.v.dot(d)) - rim.radius;
+}
+
+// Of two circles the places where their distance is least around, by Newton's method from a look around the second one.
+class NearRims {
+ public:
+  NearRims(const Solid::Rim& a, const Solid::Rim& b) noexcept : a_(&a), b_(&b) {
+    std::array<double, around> d2, beyond;
+    for (std::size_t i = 0; i < around; ++i) {
+      const Vec3 x = on_rim(b, step * static_cast<double>(i)).x;
+      d2[i] = distance2_to_rim(a, x);
+      beyond[i] = beyond_rim(a, x);
+    }
+    for (std::size_t i = 0; i < around; ++i) {
+      const std::size_t last = (i + around - 1) % around, next = (i + 1) % around;
+      const double angle = step * static_cast<double>(i);
+      if (d2[i] <= d2[last] && d2[i] <= d2[next]) settle(angle);
+      // Where circles in about one plane cross twice between two looks.
+      if (beyond[i] > 0.0 && beyond[i] <= beyond[last] && beyond[i] <= beyond[next]) settle_dip(angle);
+    }
+  }
+
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+  [[nodiscard]] OnRim on_a(std::size_t k) const noexcept { return on_rim(*a_, angles_[k][0]); }
+  [[nodiscard]] OnRim on_b(std::size_t k) const noexcept { return on_rim(*b_, angles_[k][1]); }
+
+ private:
+  static constexpr std::size_t around = 32;
+  static constexpr double step = 2.0 * std::numbers::pi / static_cast<double>(around);
+
+  void settle_dip(double angle) noexcept {
+    double low = angle - step, high = angle + step;
+    const auto beyond = [&](double at) { return beyond_rim(*a_, on_rim(*b_, at).x); };
+    for (int k = 0; k < 40; ++k) {
+      const double x = low + (high - low) / 3.0, y = high - (high - low) / 3.0;
+      (beyond(x) < beyond(y) ? high : low) = beyond(x) < beyond(y) ? y : x;
+    }
+    const double lowest = 0.5 * (low + high);
+    if (!(beyond(lowest) < 0.0)) return;
+    for (const double side : {-step, step}) {
+      double inside = lowest, outside = angle + side;
+      for (int k = 0; k < 40; ++k) {
+        const double middle = 0.5 * (inside + outside);
+        (beyond(middle) < 0.0 ? inside : outside) = middle;
+      }
+      settle(outside);
+    }
+  }
+
+  void settle(double beta) noexcept {
+    double alpha = nearest_angle(*a_, on_rim(*b_, beta).x);
+    for (int k = 0; k < 30; ++k) {
+      const OnRim p = on_rim(*a_, alpha), q = on_rim(*b_, beta);
+      const Vec3 d = p.x - q.x;
+      const Vec2 slope(d.dot(p.along), -d.dot(q.along));
+      Eigen::Matrix2d bend;
+      bend(0, 0) = p.along.squaredNorm() - a_->radius * d.dot(p.arm);
+      bend(1, 1) = q.along.squaredNorm() + b_->radius * d.dot(q.arm);
+      bend(0, 1) = bend(1, 0) = -p.along.dot(q.along);
+      // Where it bends the other way, downhill.
+      const double least = 0.5 * (bend.trace() - std::hypot(bend(0, 0) - bend(1, 1), 2.0 * bend(0, 1)));
+      if (const double wanted = 1e-12 * bend.trace(); least < wanted) {
+        bend += (std::abs(least) + 0.1 * a_->radius * b_->radius) * Eigen::Matrix2d::Identity();
+      }
+      const Vec2 turn = bend.ldlt().solve(slope);
+      const double size = turn.lpNorm<Eigen::Infinity>(), share = std::min(1.0, 0.3 / size);
+      alpha -= share * turn[0];
+      beta -= share * turn[1];
+      if (size < 1e-15) break;
+    }
+    add(alpha, beta);
+  }
+
+  void add(double alpha, double beta) noexcept {
+    if (!std::isfinite(alpha + beta) || count_ == angles_.size()) return;
+    for (std::size_t k = 0; k < count_; ++k) {
+      if (std::abs(std::remainder(angles_[k][1] - beta, 2.0 * std::numbers::pi)) < 1e-7) return;
+    }
+    angles_[count_++] = {alpha, beta};
+  }
+
+  const Solid::Rim *a_, *b_;
+  std::array<std::array<double, 2>, 4> angles_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace
+
+std::optional<Meeting> meet_sides(const Cylinder& a, const Cylinder& b, double beside) noexcept {
+  return meet_side(a, axis_of(b), b.radius, beside);
+}
+
+int meet_rim_and_side(const Cylinder& a, const Cylinder& b, std::uint32_t rim, double beside,
+                      std::array<Meeting, 4>& out) noexcept {
+  std::array<Vec2, 2> places;
+  const int count = nearest_to_line(b.rims[rim], a.from, a.axis, places);
+  int found = 0;
+  for (int k = 0; k < count; ++k) {
+    const Vec2& z = places[static_cast<std::size_t>(k)];
+    const Solid::Rim& circle = b.rims[rim];
+    const Vec3 x = circle.centre + circle.radius * (z.x() * circle.u + z.y() * circle.v);
+    const std::optional<Meeting> meeting = meet_side(a, x, 0.0, beside);
+    if (meeting) out[static_cast<std::size_t>(found++)] = *meeting;
+  }
+  return found;
+}
+
+int meet_rim_and_end(const Cylinder& a, std::uint32_t end, const Cylinder& b, std::uint32_t rim, const Vec2& level,
+                     double beside, std::array<Meeting, 4>& out) noexcept {
+  const Vec3 n = a.out_of_end(end);
+  std::array<Vec3, 4> places;
+  const int count = nearest_of_rim(FlatSide{n, n.dot(a.rims[end].centre)}, b.rims[rim], level, places);
+  int found = 0;
+  for (int k = 0; k < count; ++k) {
+    const std::optional<Meeting> meeting = meet_end(a, end, places[static_cast<std::size_t>(k)], 0.0, beside);
+    if (meeting) out[static_cast<std::size_t>(found++)] = *meeting;
+  }
+  return found;
+}
+
+int meet_rims(const Cylinder& a, std::uint32_t rim_a, const Cylinder& b, std::uint32_t rim_b,
+              std::array<Meeting, 4>& out) noexcept {
+  const NearRims near(a.rims[rim_a], b.rims[rim_b]);
+  int found = 0;
+  for (std::size_t k = 0; k < near.count(); ++k) {
+    const OnRim p = near.on_a(k), q = near.on_b(k);
+    Vec3 n = p.along.cross(q.along) / (a.radius * b.radius);
+    const double sine = n.norm();
+    if (!(sine > kAlong)) continue;
+    const Vec3 before_a = a.out_of_end(rim_a), before_b = b.out_of_end(rim_b);
+    n *= (n.dot(p.arm + before_a) < 0.0 ? -1.0 : 1.0) / sine;
+    if (!out_of_rim(n, p.arm, before_a) || !out_of_rim(-n, q.arm, before_b)) continue;
+    out[static_cast<std::size_t>(found++)] = {p.x, q.x, n, n.dot(q.x - p.x)};
+  }
+  return found;
+}
+
+double height_of_rims(const Cylinder& a, std::uint32_t rim_a, const Cylinder& b, std::uint32_t rim_b,
+                      const Vec2& place) noexcept {
+  const NearRims near(a.rims[rim_a], b.rims[rim_b]);
+  const Vec3 wanted = place.x() * a.rims[rim_a].u + place.y() * a.rims[rim_a].v;
+  double closest = -std::numeric_limits<double>::infinity(), height = std::numeric_limits<double>::quiet_NaN();
+  for (std::size_t k = 0; k < near.count(); ++k) {
+    const OnRim p = near.on_a(k), q = near.on_b(k);
+    const Vec3 n = p.along.cross(q.along).normalized();
+    if (!(p.arm.dot(wanted) > closest)) continue;
+    closest = p.arm.dot(wanted);
+    height = (n.dot(p.arm + a.out_of_end(rim_a)) < 0.0 ? -1.0 : 1.0) * n.dot(q.x - p.x);
+  }
+  return height;
+}
+
+double separation_of_cylinders(const Cylinder& a, const Cylinder& b) noexcept {
+  double largest = -std::numeric_limits<double>::infinity();
+  const auto try_along = [&](const Vec3& n) {
+    const double size = n.norm();
+    if (!(size > kAlong)) return;
+    const Vec3 out = n / size;
+    largest =
+        std::max({largest, -reach_along(b, -out) - reach_along(a, out), -reach_along(a, -out) - reach_along(b, out)});
+  };
+  try_along(a.axis);
+  try_along(b.axis);
+  try_along(a.axis.cross(b.axis));
+  for (const auto* pair : {&a, &b}) {
+    const Cylinder &one = *pair, &other = pair == &a ? b : a;
+    for (const Solid::Rim& rim : other.rims) {
+      std::array<Vec2, 2> places;
+      const int count = nearest_to_line(rim, one.from, one.axis, places);
+      for (int k = 0; k < count; ++k) {
+        const Vec2& z = places[static_cast<std::size_t>(k)];
+        const Vec3 way = rim.centre + rim.radius * (z.x() * rim.u + z.y() * rim.v) - one.from;
+        try_along((way - one.axis * one.axis.dot(way)).normalized());
+      }
+    }
+  }
+  for (const Solid::Rim& rim_a : a.rims) {
+    for (const Solid::Rim& rim_b : b.rims) {
+      const NearRims near(rim_a, rim_b);
+      for (std::size_t k = 0; k < near.count(); ++k) {
+        const OnRim p = near.on_a(k), q = near.on_b(k);
+        try_along(p.along.normalized().cross(q.along.normalized()));
+        if ((q.x - p.x).norm() > 0.0) try_along((q.x - p.x).normalized());
+      }
+    }
+  }
+  return largest;
+}
+
+}  // namespace proxarm::models
