@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -50,13 +51,16 @@ class BesideCylinder {
   [[nodiscard]] bool sticks_out(std::uint32_t edge) const noexcept {
     return mesh_ == nullptr || mesh_->edge(edge).ridge == (held_ > 0.0);
   }
-  // Of a solid: how high a point is over its faces but one, at most.
-  [[nodiscard]] double highest_over_others(const Vec3& x, std::uint32_t face) const noexcept {
+  // Of a solid: how high the lowest place of a rim is over its faces but one, at most.
+  [[nodiscard]] double highest_over_others(const Solid::Rim& rim, std::uint32_t face) const noexcept {
     double most = -std::numeric_limits<double>::infinity();
     for (std::uint32_t i = 0; i < solid_->faces.size(); ++i) {
-      if (i != face) most = std::max(most, solid_->faces[i].normal.dot(x) - solid_->faces[i].offset);
+      if (i != face) most = std::max(most, height_of_lowest(rim, solid_->faces[i].normal, solid_->faces[i].offset));
     }
     return most;
+  }
+  static double height_of_lowest(const Solid::Rim& rim, const Vec3& normal, double offset) noexcept {
+    return normal.dot(rim.centre) - rim.radius * std::hypot(normal.dot(rim.u), normal.dot(rim.v)) - offset;
   }
 
  private:

@@ -54,8 +54,7 @@ class CylinderPairs {
     for (const std::uint32_t corner : face.ring) half2 = std::max(half2, (face.points[corner] - middle).squaredNorm());
     for (const std::uint32_t end : {0U, 1U}) {
       const Solid::Rim& rim = cylinder_->rims[end];
-      const double down = rim.radius * std::hypot(face.normal.dot(rim.u), face.normal.dot(rim.v));
-      if (std::abs(face.normal.dot(rim.centre) - down - face.offset) > near_) continue;
+      if (std::abs(BesideCylinder::height_of_lowest(rim, face.normal, face.offset)) > near_) continue;
       if (comes_near_rim(end, middle, std::sqrt(half2))) add_(Kind::rim_face, end, i);
     }
   }
@@ -215,7 +214,7 @@ bool RigidWorld::counts(const Pair& pair, const AtCylinder& here, const Meeting&
     }
     case Kind::rim_face:
       if (here.body.mesh() != nullptr) return !was_behind(pair, here, meeting.on_cylinder);
-      return here.body.highest_over_others(meeting.on_cylinder, here.feature) <= meeting.gap;
+      return here.body.highest_over_others(cylinder.rims[here.round], here.feature) <= meeting.gap;
     case Kind::rim_edge:
       return !was_behind_edge(pair, here, meeting.on_cylinder);
     default:

@@ -132,11 +132,16 @@ inline Vec3 nearest_of(const Can& can, const Vec3& p) {
 // somebody claims, where they touch, those of the axes, and that between two places that come nearest by turns.
 inline double apart(const Can& a, const Can& b, const std::vector<Vec3>& claimed) {
   double best = -std::numeric_limits<double>::infinity();
+  Vec3 best_along = Vec3::UnitZ();
   const auto try_along = [&](const Vec3& n) {
-    if (!(n.norm() > 1e-12)) return;
+    const double before = best;
+    if (!(n.norm() > 1e-12)) return false;
     for (const Vec3& out : {Vec3(n.normalized()), Vec3(-n.normalized())}) {
-      best = std::max(best, -furthest_along(b, -out) - furthest_along(a, out));
+      const double left = -furthest_along(b, -out) - furthest_along(a, out);
+      if (left > best) best_along = out;
+      best = std::max(best, left);
     }
+    return best > before;
   };
   const Vec3 z_a = a.X.linear().col(2), z_b = b.X.linear().col(2);
   for (const Vec3& n : claimed) try_along(n);
@@ -147,6 +152,13 @@ inline double apart(const Can& a, const Can& b, const std::vector<Vec3>& claimed
     const Vec3 y = nearest_of(b, x);
     x = nearest_of(a, y);
     if (k % 50 == 0) try_along(y - x);
+  }
+  // Where they touch but nobody says along what, around the best one.
+  Random random(1);
+  for (double step = 1e-2; step > 1e-12 && best < -1e-13; step *= 0.8) {
+    for (int k = 0; k < 60; ++k) {
+      if (try_along(best_along + step * random.direction())) k = 0;
+    }
   }
   return best;
 }

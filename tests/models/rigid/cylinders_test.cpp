@@ -74,6 +74,8 @@ Pushed pushed(std::uint64_t seed, const std::function<World(Random&)>& make) {
       return world.apart_m(pose);
     };
     push_about(g, random, q, random_stiffness(random), world.mu, 200, Vec3::Zero(), false, apart_m, out);
+    EXPECT_GE(out.deepest, -1e-12) << "seed " << seed + i;
+    if (testing::Test::HasFailure()) break;
   }
   std::cout << "  " << out.judged << " steps, " << out.touching << " touching, " << out.unresolved
             << " unresolved; deepest " << out.deepest << " m, imbalance " << out.law.imbalance << ", against slip "
