@@ -19,6 +19,12 @@ class BesideCylinder {
     double offset = 0.0;
     std::span<const Vec3> points;
     std::span<const std::uint32_t> ring;
+    double side = 1.0;  // −1: the ring runs clockwise, seen from where the normal points
+
+    // Whether the point's foot lies on it.
+    [[nodiscard]] bool over(const Vec3& p, double beside = beside_m) const noexcept {
+      return touch_face(p, 0.0, side * normal, 0.0, points, ring, 1.0, beside).has_value();
+    }
   };
 
   explicit BesideCylinder(const Solid& solid) noexcept : solid_(&solid), radius_(solid.radius) {}
@@ -45,7 +51,7 @@ class BesideCylinder {
     }
     const Vec3 normal = held_ * face_of(*mesh_, i).normal;
     return {normal, normal.dot(face_of(*mesh_, i).corner), mesh_->mesh().structure().vertices,
-            mesh_->mesh().triangle(i)};
+            mesh_->mesh().triangle(i), held_};
   }
   // A mesh's valley is touched by nothing sharp.
   [[nodiscard]] bool sticks_out(std::uint32_t edge) const noexcept {

@@ -193,13 +193,7 @@ int RigidWorld::meet_face(const Pair& pair, const AtCylinder& here, std::array<M
 // Whether a meeting counts: its foot is on the face, and what meets there isn't less deep under another surface, which
 // holds it then. A corner that lies on an end is behind the side as well.
 bool RigidWorld::counts(const Pair& pair, const AtCylinder& here, const Meeting& meeting) const noexcept {
-  if (pair.kind == Kind::rim_face) {
-    const BesideCylinder::Face face = here.body.face(here.feature);
-    const bool over =
-        touch_face(meeting.on_cylinder, 0.0, face.normal, face.offset, face.points, face.ring, 1.0, beside_)
-            .has_value();
-    if (!over) return false;
-  }
+  if (pair.kind == Kind::rim_face && !here.body.face(here.feature).over(meeting.on_cylinder, beside_)) return false;
   if (!(meeting.gap < -kGap_m)) return true;
   if (here.body.radius() > 0.0) return true;  // of a centre outside of the cylinder one feature is nearest
   const Cylinder& cylinder = here.cylinder;
@@ -229,7 +223,7 @@ bool RigidWorld::was_behind(const Pair& pair, const AtCylinder& here, const Vec3
   const BesideCylinder::Face face = here.body.face(here.feature);
   const double height = face.normal.dot(was) - face.offset;
   if (height >= -kFront_m) return false;
-  return height < -behind_m_ || touch_face(was, 0.0, face.normal, face.offset, face.points, face.ring, 1.0).has_value();
+  return height < -behind_m_ || face.over(was);
 }
 
 // An edge far behind the rim, as one on the body's other side.

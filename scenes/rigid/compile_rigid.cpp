@@ -57,6 +57,10 @@ struct ShapesOf {
   }
   // From inside: the tube as if it had no end, and both ends.
   Shapes operator()(const CylinderShape& s) const {
+    if (!s.inside_out) {
+      const Vec3 along = s.to_m - s.from_m;
+      return {models::solid_of(models::CylinderTool{along.norm(), s.radius_m}, at(0.5 * (s.from_m + s.to_m), along))};
+    }
     const Vec3 axis = (s.to_m - s.from_m).normalized();
     return {models::HollowTube{s.from_m, s.to_m, s.radius_m, true}, side(axis, s.from_m), side(-axis, s.to_m)};
   }
@@ -85,15 +89,7 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
   if (const auto* mesh = std::get_if<MeshShape>(&object.shape); mesh != nullptr && !mesh->mesh->closed()) {
     return "a rigid tool is held by closed meshes only, and " + name + " is open (close_holes_m may close it)";
   }
-  const bool inside_out = is_inside_out(object.shape);
-  if (std::holds_alternative<CylinderShape>(object.shape) && !inside_out) {
-    return "contact of a rigid tool with the outside of a cylinder isn't built: take a capsule or a box for " + name;
-  }
-  if (!has_cylinder(tool.parts) || std::holds_alternative<PlaneShape>(object.shape)) return {};
-  if (!inside_out || std::holds_alternative<MeshShape>(object.shape)) {
-    return "a cylinder as a tool is held by planes and inside of objects: take a convex tool or a capsule beside " +
-           name;
-  }
+  if (!has_cylinder(tool.parts) || !is_inside_out(object.shape)) return {};
   if (std::holds_alternative<CapsuleShape>(object.shape)) {
     return "a cylinder as a tool isn't held by the round ends of a hollow capsule: take a cylinder for " + name;
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <numbers>
 
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
@@ -217,6 +218,155 @@ TEST(Cylinders, AsObjectsTheyHoldARoughBallByTheLaw) {
     };
     return world;
   }));
+}
+
+// -- closed forms -----------------------------------------------------------------------------------------------------
+
+Mat6 stiffness() {
+  Mat6 K = Mat6::Zero();
+  K.diagonal() << Vec3::Constant(4e6), Vec3::Constant(4e3);
+  return K;
+}
+
+RigidWorld world_of(const Can& tool, const RigidObject& object) {
+  return RigidWorld({{{CylinderTool{tool.length, tool.radius}, tool.X, {}}}}, {object});
+}
+
+ToolPose settled(RigidWorld& g, ToolPose q, const Vec3& push, int steps = 50) {
+  for (int k = 0; k < steps; ++k) {
+    ToolPose p = q;
+    p.position += push;
+    q = g.step(stiffness(), p, q);
+    EXPECT_FALSE(g.unresolved());
+  }
+  return q;
+}
+
+ToolPose standing_at(const Vec3& place) {
+  ToolPose q;
+  q.position = place;
+  return q;
+}
+
+// Where its end stands on a smaller one, a box's top or a larger one, the middle is half of both lengths above.
+TEST(Cylinders, StandOnEndsAndTopsToAFemtometre) {
+  const Can tool{Pose::Identity(), 0.08, 0.03};
+  for (const double radius : {0.01, 0.03, 0.06}) {
+    RigidObject post{solid_of_can({Pose::Identity(), 0.1, radius}), 0.3};
+    for (const double aside : {0.0, 0.005, 0.5 * radius}) {
+      RigidWorld g = world_of(tool, post);
+      const ToolPose q = settled(g, standing_at({aside, 0.0, 0.0905}), {0.0, 0.0, -1e-5}, 100);
+      EXPECT_NEAR(q.position.z(), 0.09, 1e-15) << radius << ", " << aside;
+      EXPECT_LT(rotation_vector(q.orientation).norm(), 1e-12) << radius << ", " << aside;
+      EXPECT_GE(g.contacts().size(), 1U);
+    }
+  }
+  RigidObject box{solid_of(BoxTool{{0.1, 0.1, 0.1}}, Pose::Identity()), 0.3};
+  RigidWorld g = world_of(tool, box);
+  EXPECT_NEAR(settled(g, standing_at({0.01, 0.0, 0.0905}), {0.0, 0.0, -1e-5}, 100).position.z(), 0.09, 1e-15);
+}
+
+// Two that lie across each other are as far apart as both radii, and the force is where the axes cross.
+TEST(Cylinders, LyingAcrossEachOtherTouchWhereTheirAxesCross) {
+  Can tool{Pose::Identity(), 0.2, 0.01}, beam{Pose::Identity(), 0.3, 0.025};
+  tool.X.linear() = Eigen::AngleAxisd(0.5 * std::numbers::pi, Vec3::UnitX()).toRotationMatrix();  // along −y
+  beam.X.linear() = Eigen::AngleAxisd(0.5 * std::numbers::pi, Vec3::UnitY()).toRotationMatrix();  // along x
+  RigidWorld g = world_of(tool, {solid_of_can(beam), 0.0});
+  const ToolPose q = settled(g, standing_at({0.02, 0.0, 0.0351}), {0.0, 0.0, -1e-5});
+  EXPECT_NEAR(q.position.z(), 0.035, 1e-15);
+  ASSERT_EQ(g.contacts().size(), 1U);
+  EXPECT_LT((g.contacts()[0].point_W - Vec3(0.02, 0.0, 0.025)).norm(), 1e-14);
+  EXPECT_NEAR(g.contacts()[0].force_W.z(), 40.0, 1e-9);
+}
+
+// On a table's border, pushed down beyond it: a cylinder of radius r that stands with its middle d inside of the border
+// tips where the push is further out than that. Its end bears on the border's line, which crosses its rim.
+TEST(Cylinders, TipOverABordersLineWhereThePushIsBeyondIt) {
+  const Can tool{Pose::Identity(), 0.08, 0.03};
+  RigidObject table{solid_of(BoxTool{{0.4, 0.4, 0.1}}, Pose::Identity()), 0.5};
+  const double inside = 0.012;
+  for (const double beyond : {-1e-9, 1e-9}) {
+    RigidWorld g = world_of(tool, table);
+    ToolPose q = standing_at({0.2 - inside, 0.0, 0.09});
+    for (int k = 0; k < 5; ++k) {
+      ToolPose p = q;
+      p.position.z() -= 1e-5;  // 40 N at a lever
+      p.orientation = (rotation_by(Vec3(0.0, 40.0 * (inside + beyond) / 4e3, 0.0)) * p.orientation).normalized();
+      q = g.step(stiffness(), p, q);
+      EXPECT_FALSE(g.unresolved());
+    }
+    const double turned = rotation_vector(q.orientation).y();
+    if (beyond < 0.0) EXPECT_LT(std::abs(turned), 1e-14);
+    if (beyond > 0.0) EXPECT_GT(turned, 1e-12);
+  }
+}
+
+// A post that moves sideways into a box at rest pushes it along; nothing overlaps.
+TEST(Cylinders, ThatMovePushABoxInTheirWay) {
+  Body box;
+  box.size = Vec3(0.03, 0.04, 0.05);
+  for (const double turn : {0.0, 3.0}) {
+    const Can post{Pose::Identity(), 0.1, 0.02};
+    RigidObject object{solid_of_can(post), 0.2};
+    object.motion = RigidMotion{};
+    object.motion->script.velocity_m_per_s = Vec3(0.2, 0.0, 0.0);
+    object.motion->script.axis = Vec3(0.3, 1.0, 0.2).normalized();
+    object.motion->script.turn_rad_per_s = turn;
+    RigidWorld g({{{BoxTool{box.size}, Pose::Identity(), {}}}}, {object});
+    ToolPose q = standing_at({0.06, 0.004, 0.01});
+    int touching = 0;
+    for (int k = 1; k <= 400; ++k) {
+      g.set_time({1e-3 * k, 1e-3});
+      q = g.step(stiffness(), q, q);
+      const double gap = apart(at(post, object.motion->script.at(1e-3 * k)), rounded(at(box, isometry(q))));
+      EXPECT_GE(gap, -1e-12) << k;
+      EXPECT_FALSE(g.unresolved()) << k;
+      touching += g.contacts().empty() ? 0 : 1;
+    }
+    EXPECT_GT(touching, 100);
+  }
+}
+
+// What is inside at the start is told, by how deep.
+TEST(Cylinders, TellHowDeepAToolStartsInThem) {
+  RigidObject post{solid_of_can({Pose::Identity(), 0.1, 0.02}), 0.2};
+  RigidWorld ball({{{SphereTool{0.005}, Pose::Identity(), {}}}}, {post});
+  EXPECT_NEAR(ball.clearance_m(standing_at({0.024, 0.0, 0.0})), -0.001, 1e-15);
+  EXPECT_NEAR(ball.clearance_m(standing_at({0.0, 0.0, 0.0545})), -0.0005, 1e-15);
+  EXPECT_NEAR(ball.clearance_m(standing_at({0.023, 0.0, 0.054})), 0.0, 1e-15);
+  RigidWorld can = world_of({Pose::Identity(), 0.04, 0.01}, post);
+  EXPECT_NEAR(can.clearance_m(standing_at({0.0, 0.0, 0.069})), -0.001, 1e-15);
+  EXPECT_NEAR(can.clearance_m(standing_at({0.0295, 0.0, 0.0})), -0.0005, 1e-15);
+  EXPECT_NEAR(can.clearance_m(standing_at({0.0, 0.0, 0.071})), 0.001, 1e-15);
+}
+
+TEST(Cylinders, InsideOfABodysMeshOneKeepsToItsWalls) {
+  TriangleSoup soup;
+  soup.vertices = polyhedron_of_box({0.1, 0.08, 0.06}, Pose::Identity()).corners;
+  for (const std::array<std::uint32_t, 4>& quad : std::vector<std::array<std::uint32_t, 4>>{
+           {0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+    soup.triangles.push_back({quad[0], quad[1], quad[2]});
+    soup.triangles.push_back({quad[0], quad[2], quad[3]});
+  }
+  RigidObject room{std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(soup)), 0.3};
+  room.inside_out = true;
+  const Can tool{Pose::Identity(), 0.03, 0.01};
+  RigidWorld g = world_of(tool, room);
+  const auto apart_m = [&](const ToolPose& pose) {
+    const Can can = at(tool, isometry(pose));
+    double least = 1.0;
+    for (int k = 0; k < 3; ++k) {
+      const double half = std::array{0.05, 0.04, 0.03}[static_cast<std::size_t>(k)];
+      least = std::min({least, half - furthest_along(can, Vec3::Unit(k)), half - furthest_along(can, -Vec3::Unit(k))});
+    }
+    return least;
+  };
+  Pushed out;
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    Random random(seed);
+    push_about(g, random, ToolPose{}, stiffness(), {0.3}, 300, Vec3::Zero(), true, apart_m, out);
+  }
+  expect_law(out);
 }
 
 }  // namespace
