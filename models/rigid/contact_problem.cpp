@@ -188,7 +188,7 @@ bool ContactProblem::damped_newton(Rows rows, Twist& y, double size, int most_it
 }
 
 bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double tolerance) const noexcept {
-  if (rough_ > 0.0) return violation(rows, y) <= rough_ * size;
+  if (rough_ > 0.0) return violation(rows, y) <= std::max(rough_, tolerance) * size;
   if (violation(rows, y) > kRough * size) return false;
   balance(rows, y);
   return violation(rows, y) <= tolerance * size;
@@ -285,6 +285,21 @@ bool ContactProblem::solve(const Twist& e, std::span<LinearContact> contacts, Tw
   }
   delta = L_inverse_.transpose() * y - e;
   return solved;
+}
+
+bool ContactProblem::holds(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept {
+  const double size = make_rows(e, contacts);
+  const Rows rows(rows_.data(), contacts.size());
+  Twist y = Twist::Zero();
+  for (const Row& row : rows) y += row.H.transpose() * row.f;
+  delta = L_inverse_.transpose() * y - e;
+  if (!may_look_at(rows) || !(violation(rows, y) <= kTolerance * size)) return false;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Row& row = rows[i];
+    const bool bears = row.f[0] > 0.0;
+    contacts[i].state = bears ? project(row.f - (row.H * y + row.b) / row.w, row.mu).state : ContactState::open;
+  }
+  return true;
 }
 
 // Newton with the states held that `reached` tells, but for one contact's: where contacts nearly wedge the tool, Gauss

@@ -52,6 +52,11 @@ class ContactProblem {
   // from where this one leads; 0: nothing but rounding.
   bool solve(const Twist& e, std::span<LinearContact> contacts, Twist& delta, double rough = 0.0) noexcept;
 
+  // Whether the forces that are given keep the law, to rounding, and where they bring the tool. Where contacts hold
+  // each other, forces are many that do, and solve() leads from ones that do to others: it asks for gaps that rounding
+  // has made contradict each other.
+  bool holds(const Twist& e, std::span<LinearContact> contacts, Twist& delta) noexcept;
+
   // Whether a single contact is solved in closed form (one_contact.cpp).
   void use_closed_form(bool use) noexcept { closed_form_ = use; }
 

@@ -49,6 +49,9 @@ constexpr double kRest_m = 1e-13;
 // From the fourth pose on only a share of a step is taken, halved as long as steps don't become smaller: from far it
 // may swing to and fro.
 constexpr double kLeastShare = 0.125;
+// But not of steps that rounding makes, where contacts hold each other: 1e-17 m of their gaps are 1e7 times that in the
+// local problem's forces, and friction turns some of it into a way (contact_problem.cpp, kStiff).
+constexpr double kNoise_m = 1e-11;
 // From this pose on features count as far beside their ends as the last step went: two neighbours, of which either one
 // leads to where only the other is found, then hold together. As steps become smaller so does this, and what is found
 // in the end is theirs.
@@ -195,8 +198,9 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   shared_ = std::move(shared);
 }
 
-double RigidWorld::motion(const ToolPose& a, const ToolPose& b) const noexcept {
-  const Twist xi = difference(a, b);
+double RigidWorld::motion(const ToolPose& a, const ToolPose& b) const noexcept { return size_m(difference(a, b)); }
+
+double RigidWorld::size_m(const Twist& xi) const noexcept {
   return xi.head<3>().norm() + shared_->reach * xi.tail<3>().norm();
 }
 
@@ -254,12 +258,13 @@ double RigidWorld::worst_passed(const Twist& xi, const ToolPose& pose) const noe
 }
 
 // Solves the local problem at a pose that is by e off p̂. Contacts that neither pressed last time nor are passed on the
-// way to p̂ join when a solution passes them.
-bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough,
+// way to p̂ join when a solution passes them. `still_m`: rounding, where the last solution may hold already; or 0.
+bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
                               Twist& delta) noexcept {
   const Twist e_coupled = couple(pose, e);
   see_slip(pose, q_old);
   linear_count_ = 0;
+  held_ = false;
   bool solved = true;
   delta = -e;
   for (int round = 0; round < (shared_->dense ? 16 : 8); ++round) {
@@ -280,6 +285,8 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
       ++linear_count_;
     }
     if (!grew) break;
+    held_ = round == 0 && still_m > 0.0 && still_holds(pose, e_coupled, still_m, delta);
+    if (held_) continue;
     solved = problem_.solve(e_coupled, {linear_.data(), linear_count_}, delta, rough);
     if (solved) continue;
     budget_ -= kHard;
@@ -294,6 +301,20 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
     touch.point += delta.head<3>() + delta.tail<3>().cross(lever);
   }
   return solved;
+}
+
+// Whether the forces of the last solution hold the tool here, to within rounding. Where more contacts hold it than are
+// needed, forces are many that do, and friction makes a pose of each: a local problem that is solved anew comes to
+// others each time, as rounding of the gaps has it, and nothing ever comes to rest.
+bool RigidWorld::still_holds(const ToolPose& pose, const Twist& e, double still_m, Twist& delta) noexcept {
+  const Twist before = delta;
+  bool still = problem_.holds(e, {linear_.data(), linear_count_}, delta) && size_m(delta) <= kStill_m;
+  for (std::size_t k = 0; still && k < linear_count_; ++k) {
+    const double gap = approach(found_[of_linear_[k]], pose, delta);
+    still = gap >= -still_m && (linear_[k].state == ContactState::open || gap <= still_m);
+  }
+  if (!still) delta = before;
+  return still;
 }
 
 // Where an edge of the tool lies on a vertex of a mesh, all edges there hold it at one place, most of them with next to
@@ -378,6 +399,13 @@ void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
   if (lack.squaredNorm() > kBalance * kBalance * wrench.squaredNorm()) delta += problem_.yield_to(lack);
 }
 
+// The share of a step that is taken, from that of the step before and the sizes of both.
+double RigidWorld::damped(double share, double size, double last) noexcept {
+  if (size <= kNoise_m) return 1.0;
+  const bool shrinks = size < (1.0 - 0.4 * share) * last;
+  return shrinks ? std::min(2.0 * share, 1.0) : std::max(0.5 * share, kLeastShare);
+}
+
 // From a pose on, until nothing moves.
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
   const double rounding =
@@ -393,9 +421,10 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
     const Twist e = difference(q, p_hat);
-    const bool solved = solve_linear(q, e, q_old, rough, delta);
+    const double still_m = shared_->bends && !roughly && last < kNear_m ? rounding : 0.0;
+    const bool solved = solve_linear(q, e, q_old, rough, still_m, delta);
     if (!delta.allFinite() || (!solved && collected_) || overflow_) break;
-    const double size = delta.head<3>().norm() + shared_->reach * delta.tail<3>().norm();
+    const double size = size_m(delta);
     if (linear_count_ == 0) {
       const bool there = q == p_hat;
       q = p_hat;
@@ -404,17 +433,14 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
       continue;
     }
     if (solved) balance(e, delta);
-    if (shared_->bends && k >= 3) {
-      const bool shrinks = size < (1.0 - 0.4 * share) * last;
-      share = shrinks ? std::min(2.0 * share, 1.0) : std::max(0.5 * share, kLeastShare);
-    }
+    if (shared_->bends && k >= 3) share = damped(share, size, last);
     q = moved(q, share * delta);
     // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
     // those of normals before it.
     const bool whole = share == 1.0 && !roughly && beside_ <= beside_m && (!shared_->bends || size <= kStill_m);
     const bool small = std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding &&
                        stays_balanced(delta, e) && normals_turn_by(delta) <= kTurned;
-    if (whole && (size <= rounding || small)) {
+    if (whole && (held_ || size <= rounding || small)) {
       collected_ = false;
       return solved;
     }

@@ -150,6 +150,7 @@ class RigidWorld final : public PoseAlgorithm {
     Vec3 slid = Vec3::Zero(), turned = Vec3::Zero();  // of the tool since q(k−1), seen from the object; m, rad
   };
   [[nodiscard]] double motion(const ToolPose& a, const ToolPose& b) const noexcept;
+  [[nodiscard]] double size_m(const Twist& xi) const noexcept;  // of a motion
 
   [[nodiscard]] bool moves(std::uint16_t entry) const noexcept { return entry >= shared_->first_moving; }
   [[nodiscard]] bool goes(std::uint16_t entry) const noexcept { return moves(entry) && !moving(entry).mover.rests(); }
@@ -243,11 +244,14 @@ class RigidWorld final : public PoseAlgorithm {
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
   [[nodiscard]] double worst_passed(const Twist& xi, const ToolPose& pose) const noexcept;
-  bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, Twist& delta) noexcept;
+  bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
+                    Twist& delta) noexcept;
+  bool still_holds(const ToolPose& pose, const Twist& e, double still_m, Twist& delta) noexcept;
   bool solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
   [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
   void balance(const Twist& e, Twist& delta) noexcept;
+  [[nodiscard]] static double damped(double share, double size, double last) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
@@ -304,6 +308,7 @@ class RigidWorld final : public PoseAlgorithm {
   double extent_m_ = 0.0;          // of the coordinates of what moves
   bool without_friction_ = false;  // in the present attempt
   double behind_m_ = kFront_m;     // so far behind a feature of a cylinder may be what it holds in a part of the step
+  bool held_ = false;              // the last local problem by the forces of the one before
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
 };
 

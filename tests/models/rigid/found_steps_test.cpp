@@ -86,5 +86,40 @@ TEST(FoundSteps, ACornerThatComesOverAnEdgeIsHeldByTheFaceThatItCanLieOn) {
   EXPECT_GE(separation_at(r), -1e-15);
 }
 
+// A box slides where a hollow cylinder's wall and its end meet, on six corners, which share the load as they like. Each
+// pose of the iteration had other forces, as rounding of the gaps had it (1e-17 m are 0.1 N here), and each another
+// pose 1e-12 m off. One of small steps was taken for the end, of which the tool had gone a quarter: the wrench missed
+// 2e-6 of itself. (`proxarm study stress_tools --replay 868763618029523`, step 876.)
+TEST(FoundSteps, ABoxOnMoreCornersThanHoldItInACylinderComesToRest) {
+  const Vec3 size(0.0082470854365390284, 0.029982516566376557, 0.017957228221322518);
+  const Vec3 from(0.034889238700110022, 0.012546572614379753, -0.070383059731256276),
+      to(-0.023535695916733775, -0.027017843222381717, 0.086173774536746628);
+  const Vec3 axis = (to - from).normalized();
+  const double mu = 0.092649974576272873;
+  std::vector<RigidObject> objects;
+  objects.push_back({HollowTube{from, to, 0.062360739638365428, true}, mu});
+  objects.push_back({FlatSide{axis, axis.dot(from)}, mu});
+  objects.push_back({FlatSide{-axis, -axis.dot(to)}, mu});
+  RigidWorld g({{{BoxTool{size}, Pose::Identity(), {}}}}, objects);
+  Mat6 half;
+  half << 15918309468.433834, 0, 0, 0, 0, 0,                                                                  //
+      5749471747.9162941, 3490856929.8077869, 0, 0, 0, 0,                                                     //
+      6767149274.9494333, 1367691345.6673477, 5450695044.143836, 0, 0, 0,                                     //
+      -25952228.778707784, 27823930.406969514, 27650269.634602666, 6684359.3867461402, 0, 0,                  //
+      223995741.11504057, 125837735.48093171, 48405529.979292959, 235617.31525120576, 5125785.2994161397, 0,  //
+      282677465.61379719, 113642344.55664343, 130233164.61646754, -305431.02266786358, 4615207.5691925539,
+      6261569.8862014487;
+  const Mat6 K = half.selfadjointView<Eigen::Lower>();
+  const ToolPose q{{0.01922982671446203, 0.012912291787014616, 0.095780754978253183},
+                   {-0.6119863312310061, -0.68015531944535901, -0.10136324128005787, -0.3906238153694625}};
+  const ToolPose p{{0.017387007444617634, 0.014819642482122704, 0.095575136769780966},
+                   {-0.60960461911827624, -0.67138209199993915, -0.11482481895555877, -0.40551640637990222}};
+  const ToolPose r = g.step(K, p, q);
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_EQ(g.contacts().size(), 6U);
+  // K is 3e10 N/m along its stiffest axis, coordinates are known to 1.4e-17 m, and the largest force is 10 N.
+  EXPECT_LE(imbalance(g.contacts(), K, p, r), 1e-7);
+}
+
 }  // namespace
 }  // namespace proxarm::models

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "controller/studies/stress/tool_run.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::studies {
@@ -33,6 +34,15 @@ TEST(Stress, HoldsAmongLayers) { expect_no_violation(2, 400, Stress::Worlds::lay
 TEST(Stress, HoldsAtOrder2) { expect_no_violation(3, 2'000, Stress::Worlds::order_2); }
 
 TEST(Stress, HoldsWithRigidTools) { expect_no_violation(4, 200, Stress::Worlds::tools); }
+
+// Step 159: a corner of the tool comes down on a box's face at 96 % of the way, 12 µm from an edge, and p̂ is over that
+// edge. The judge looked at seven eighths of the way for what was met, where nothing is yet, and took the turn of the
+// normal for 0.13 mJ out of nowhere.
+TEST(Stress, AToolThatComesOverAnEdgeAtTheVeryEndOfAStepIsCountedAsAtAnEdge) {
+  const Tally run = run_tool_seed(7563174384567051, nullptr);
+  EXPECT_EQ(run.first, "none") << "step " << run.first_step;
+  EXPECT_EQ(run.edge, 1);
+}
 
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
