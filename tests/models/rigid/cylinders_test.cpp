@@ -296,8 +296,8 @@ TEST(Cylinders, TipOverABordersLineWhereThePushIsBeyondIt) {
       EXPECT_FALSE(g.unresolved());
     }
     const double turned = rotation_vector(q.orientation).y();
-    if (beyond < 0.0) EXPECT_LT(std::abs(turned), 1e-14);
-    if (beyond > 0.0) EXPECT_GT(turned, 1e-12);
+    EXPECT_EQ(turned > 1e-12, beyond > 0.0) << turned;
+    EXPECT_TRUE(std::abs(turned) < 1e-14 || beyond > 0.0) << turned;
   }
 }
 
