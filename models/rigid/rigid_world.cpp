@@ -541,11 +541,25 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   allow_for(parts);
   // (far shrinks with the goal only where nothing moves)
   const double to_goal = moving_.empty() && !whole ? motion(goal, q) : far;
-  bool fine = in_parts(goal, q, to_goal, parts, q_);
+  // Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
+  // none of them: nothing then holds it, and it would go in. What rests on the same features as before is beside none
+  // such.
+  const std::array<Pressed, ContactProblem::most> before = pressed_;
+  const std::size_t count_before = pressed_count_;
+  const auto went_in = [&] {
+    if (!shared_->dense || something_comes()) return false;
+    const bool same = parts == 1 && count_before > 0 && count_before == pressed_count_ &&
+                      std::equal(before.begin(), before.begin() + static_cast<std::ptrdiff_t>(count_before),
+                                 pressed_.begin(), [](const Pressed& a, const Pressed& b) { return a.pair == b.pair; });
+    if (same || !(overlap_m(q_) < -kGap_m)) return false;
+    q_ = q;
+    return true;
+  };
+  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in();
   if (fine && gives_energy(q)) {
     look_again(goal, q, to_goal, parts);
   } else if (!fine && budget_ > 0 && finer(parts) > 1) {
-    fine = in_smaller_parts(goal, q, to_goal, parts, q_);
+    fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in();
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept

@@ -1,6 +1,9 @@
 #include "controller/studies/stress/random_tool.hpp"
 
 #include <array>
+#include <cmath>
+
+#include "controller/studies/stress/globe_mesh.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -69,6 +72,28 @@ scenes::Shape some_hollow(Random& random) {
   }
 }
 
+// With bumps of some per cent, or with dents.
+scenes::MeshShape some_star(Random& random, const Vec3& middle, double radius, int finest) {
+  const bool rough = random.chance(0.5);
+  const double high = rough ? 0.04 : random.uniform(0.1, 0.4);
+  const Vec3 first = (rough ? 9.0 : 4.0) * random.direction(), second = 7.0 * random.direction();
+  const auto rings = static_cast<std::uint32_t>(3 + random.below(finest));
+  const auto sectors = static_cast<std::uint32_t>(4 + random.below(finest + 2));
+  const models::Mat3 R = some_pose(random, 0.0).linear();
+  return globe_mesh(rings, sectors, [&](const Vec3& x) {
+    const double bump = high * (std::sin(first.dot(x)) + 0.5 * std::sin(second.dot(x)));
+    return Vec3(middle + radius * (1.0 + bump) * (R * x));
+  });
+}
+
+ToolPart some_mesh_tool(Random& random) {
+  const scenes::MeshShape star = some_star(random, Vec3::Zero(), random.uniform(0.008, 0.025), 5);
+  ToolPart part;
+  part.shape = models::MeshTool{star.mesh->structure().vertices, star.mesh->structure().triangles};
+  if (random.chance(0.2)) part.friction = some_friction(random);
+  return part;
+}
+
 void add(Random& random, scenes::Scene& scene, scenes::Shape shape) {
   scenes::Object object;
   object.shape = std::move(shape);
@@ -99,6 +124,29 @@ RandomToolScene random_tool_scene(Random& random) {
     add(random, made.scene, some_hollow(random));
   } else {
     for (int i = 2 + random.below(5); i > 0; --i) add(random, made.scene, some_solid(random, which == 2));
+  }
+  return made;
+}
+
+RandomToolScene random_mesh_tool_scene(Random& random) {
+  RandomToolScene made;
+  made.kind = "meshes";
+  const int which = random.below(3);
+  const bool tool = which > 0, object = which != 1;
+  made.tool.parts.push_back(tool ? some_mesh_tool(random) : random.chance(0.3) ? some_hull(random) : some_part(random));
+  // No hull beside what is round: none of the judge's distances is for that.
+  const bool sharp = std::holds_alternative<models::ConvexTool>(made.tool.parts.front().shape);
+  if (object) {
+    const Vec3 middle = random.in_box(0.03);
+    add(random, made.scene, some_star(random, middle, random.uniform(0.03, 0.07), 9));
+  }
+  for (int i = object ? random.below(3) : 1 + random.below(3); i > 0; --i) {
+    if (random.chance(0.3)) {
+      const Vec3 normal = random.direction();
+      add(random, made.scene, scenes::PlaneShape{-random.uniform(0.03, 0.08) * normal, normal});
+    } else {
+      add(random, made.scene, some_solid(random, sharp));
+    }
   }
   return made;
 }

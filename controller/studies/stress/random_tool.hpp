@@ -14,12 +14,16 @@ using models::Random;
 struct RandomToolScene {
   scenes::Scene scene;
   models::Tool tool;
-  std::string kind;  // of the world: planes, solids, boxes, hollow
+  std::string kind;  // of the world: planes, solids, boxes, hollow, meshes
 };
 
 // One to four planes, or two to six solids (boxes, spheres and capsules; boxes alone for a convex tool), or one hollow
 // box, sphere, capsule or cylinder, with a tool that fits in. Tools of 3 to 60 mm: sphere, capsule, box, convex, or two
 // of them. Nothing moves.
 RandomToolScene random_tool_scene(Random& random);
+
+// The same with closed meshes of 20 to 350 triangles, rough balls and stars with dents: as an object, as the tool, or
+// both, beside up to two solids or planes.
+RandomToolScene random_mesh_tool_scene(Random& random);
 
 }  // namespace proxarm::studies

@@ -52,6 +52,18 @@ double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
   return lowest;
 }
 
+// The nearest point of a triangle, by the regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
+double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
+  const Vec3 ab = b - a, ac = c - a, bc = c - b;
+  const auto to_edge = [&](const Vec3& from, const Vec3& d) {
+    return (p - from - std::clamp(d.dot(p - from) / d.squaredNorm(), 0.0, 1.0) * d).norm();
+  };
+  const Vec3 n = ab.cross(ac);
+  const bool over = n.dot(ab.cross(p - a)) >= 0.0 && n.dot(bc.cross(p - b)) >= 0.0 && n.dot(ac.cross(p - a)) <= 0.0;
+  if (over) return std::abs(n.normalized().dot(p - a));
+  return std::min({to_edge(a, ab), to_edge(a, ac), to_edge(b, bc)});
+}
+
 // By how much K yields at a contact to a newton along a direction, m.
 double yields(const ToolCall& call, const PoseContact& contact, const Vec3& along) {
   Twist wrench;
@@ -95,9 +107,17 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
         }
       }
     }
+    if (const auto* mesh = std::get_if<models::MeshTool>(&part.shape)) {
+      core.corners_T = mesh->points_m;
+      std::vector<Vec3> points;
+      for (const Vec3& x : mesh->points_m) points.emplace_back(part.X_TP * x);
+      core.mesh_T = std::make_shared<const models::TriangleMesh>(models::TriangleSoup{points, mesh->triangles});
+      for (std::uint32_t f = 0; f < core.mesh_T->size(); ++f) core.pieces_T.push_back(triangle_of(*core.mesh_T, f));
+    }
     for (Vec3& x : core.corners_T) x = core.X_TP * x;
     for (Vec3& n : core.normals_T) n = core.X_TP.linear() * n;
     for (Vec3& e : core.edges_T) e = core.X_TP.linear() * e;
+    if (!core.normals_T.empty()) core.pieces_T.push_back(piece_of(core.corners_T, core.normals_T, core.edges_T));
     for (const Vec3& x : core.corners_T) core.middle_T += x / static_cast<double>(core.corners_T.size());
     for (const Vec3& x : core.corners_T) core.reach_m = std::max(core.reach_m, (x - core.middle_T).norm());
   }
@@ -107,7 +127,101 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
     if (const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape)) radius = sphere->radius_m;
     if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) radius = capsule->radius_m;
     bend_per_m_.push_back(scenes::is_inside_out(object.shape) ? 0.0 : 1.0 / radius);
+    std::vector<Piece>& pieces = pieces_.emplace_back();
+    if (const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape)) {
+      for (std::uint32_t f = 0; f < mesh->mesh->size(); ++f) pieces.push_back(triangle_of(*mesh->mesh, f));
+    } else if (const auto* box = std::get_if<scenes::BoxShape>(&object.shape)) {
+      std::vector<Vec3> axes;
+      for (int k = 0; k < 3; ++k) axes.emplace_back(box->pose_W.linear().col(k));
+      pieces.push_back(piece_of(corners_of_box(box->pose_W, box->size_m), axes, axes));
+    }
   }
+}
+
+ToolLaws::Piece ToolLaws::piece_of(std::vector<Vec3> corners, std::vector<Vec3> normals, std::vector<Vec3> edges) {
+  Piece out{std::move(corners), std::move(normals), std::move(edges)};
+  for (const Vec3& x : out.corners) out.middle += x / static_cast<double>(out.corners.size());
+  for (const Vec3& x : out.corners) out.reach_m = std::max(out.reach_m, (x - out.middle).norm());
+  return out;
+}
+
+ToolLaws::Piece ToolLaws::triangle_of(const models::TriangleMesh& mesh, std::uint32_t face) {
+  const std::vector<Vec3> corners = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
+  std::vector<Vec3> edges, normals;
+  for (std::size_t k = 0; k < 3; ++k) edges.emplace_back((corners[(k + 1) % 3] - corners[k]).normalized());
+  normals.emplace_back(edges[0].cross(edges[1]).normalized());
+  for (const Vec3& edge : edges) normals.emplace_back(normals.front().cross(edge));
+  return piece_of(corners, normals, edges);
+}
+
+ToolLaws::Piece ToolLaws::moved(const Piece& piece, const ToolPose& pose) {
+  Piece out = piece;
+  for (Vec3& x : out.corners) x = pose * x;
+  for (Vec3& n : out.normals) n = pose.orientation * n;
+  for (Vec3& e : out.edges) e = pose.orientation * e;
+  out.middle = pose * piece.middle;
+  return out;
+}
+
+// The separation by all axes; of pieces that are clear of each other no more than that of the balls around them.
+double ToolLaws::between_m(const Piece& a, const Piece& b) {
+  double gap = (a.middle - b.middle).norm() - a.reach_m - b.reach_m;
+  if (gap > 1e-3) return gap;
+  gap = -beyond_all_m;
+  const auto by = [&](const Vec3& n) {
+    double a_high = 0.0, b_high = 0.0;
+    const double a_low = along(a.corners, n, a_high), b_low = along(b.corners, n, b_high);
+    gap = std::max({gap, a_low - b_high, b_low - a_high});
+  };
+  for (const Vec3& n : a.normals) by(n);
+  for (const Vec3& n : b.normals) by(n);
+  for (const Vec3& e : a.edges) {
+    for (const Vec3& f : b.edges) {
+      const Vec3 across = e.cross(f);
+      if (across.norm() > 1e-7) by(across.normalized());
+    }
+  }
+  return gap;
+}
+
+double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to) {
+  const Vec3 &a = triangle.corners[0], &b = triangle.corners[1], &c = triangle.corners[2];
+  const double clear = (0.5 * (from + to) - triangle.middle).norm() - triangle.reach_m - 0.5 * (to - from).norm();
+  if (clear > 0.1) return clear;
+  return least_along(from, to, [&](const Vec3& x) { return to_triangle(a, b, c, x); });
+}
+
+// Of a mesh, as tool or as object, that is met by something with a volume; planes are met by corners.
+double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_t index) const {
+  const scenes::Object& object = scene_.objects[index];
+  const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape);
+  const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape);
+  const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape);
+  double gap = beyond_all_m;
+  // One all inside of the other: as deep as it is small.
+  if (mesh != nullptr && mesh->mesh->encloses(pose * core.corners_T.front())) return -core.reach_m - core.radius_m;
+  if (core.mesh_T) {
+    const Vec3 x = sphere != nullptr    ? sphere->centre_m
+                   : capsule != nullptr ? capsule->from_m
+                                        : pieces_[index].front().corners.front();
+    if (core.mesh_T->encloses(pose.orientation.conjugate() * (x - pose.position))) return -core.reach_m;
+  }
+  std::vector<Piece> own;
+  for (const Piece& piece : core.pieces_T) own.push_back(moved(piece, pose));
+  for (const Piece& other : pieces_[index]) {
+    for (const Piece& piece : own) gap = std::min(gap, between_m(piece, other));
+    if (own.empty()) {
+      gap = std::min(
+          gap, from_segment_m(other, pose * core.corners_T.front(), pose * core.corners_T.back()) - core.radius_m);
+    }
+  }
+  for (const Piece& piece : own) {
+    if (sphere != nullptr)
+      gap = std::min(gap, from_segment_m(piece, sphere->centre_m, sphere->centre_m) - sphere->radius_m);
+    if (capsule != nullptr)
+      gap = std::min(gap, from_segment_m(piece, capsule->from_m, capsule->to_m) - capsule->radius_m);
+  }
+  return gap;
 }
 
 double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::Object& object) const {
@@ -159,7 +273,12 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
 double ToolLaws::depth_m(const ToolPose& pose) const {
   double gap = beyond_all_m;
   for (const Core& core : cores_) {
-    for (const scenes::Object& object : scene_.objects) gap = std::min(gap, apart_m(core, pose, object));
+    for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+      const scenes::Object& object = scene_.objects[i];
+      const bool mesh = std::holds_alternative<scenes::MeshShape>(object.shape) ||
+                        (core.mesh_T && !std::holds_alternative<scenes::PlaneShape>(object.shape));
+      gap = std::min(gap, mesh ? apart_from_m(core, pose, i) : apart_m(core, pose, object));
+    }
   }
   return -gap;
 }

@@ -2,11 +2,13 @@
 // (models/geometry/pose_algorithm.hpp) and of distances, for the stress study.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "models/geometry/pose_algorithm.hpp"
+#include "models/mesh/mesh.hpp"
 #include "models/rigid_shapes/tool.hpp"
 #include "scenes/format/scene.hpp"
 
@@ -56,8 +58,23 @@ class ToolLaws {
   [[nodiscard]] static double rounding_m(const models::ToolPose& pose);
 
  private:
+  // A convex piece: its corners, and all directions that may separate it from another.
+  struct Piece {
+    std::vector<models::Vec3> corners, normals, edges;
+    models::Vec3 middle = models::Vec3::Zero();
+    double reach_m = 0.0;
+  };
+  static Piece piece_of(std::vector<models::Vec3> corners, std::vector<models::Vec3> normals,
+                        std::vector<models::Vec3> edges);
+  static Piece triangle_of(const models::TriangleMesh& mesh, std::uint32_t face);
+  static Piece moved(const Piece& piece, const models::ToolPose& pose);
+  static double between_m(const Piece& a, const Piece& b);
+  static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to);
+
   // All points within a radius of the hull of some: one for a sphere, two for a capsule.
   struct Core {
+    std::vector<Piece> pieces_T;                           // of a sharp one; a mesh's triangles
+    std::shared_ptr<const models::TriangleMesh> mesh_T{};  // of a mesh
     std::vector<models::Vec3> corners_T, normals_T, edges_T;
     models::Vec3 middle_T = models::Vec3::Zero();
     models::Pose X_TP = models::Pose::Identity();
@@ -68,11 +85,13 @@ class ToolLaws {
 
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
   [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
+  [[nodiscard]] double apart_from_m(const Core& core, const models::ToolPose& pose, std::size_t object) const;
 
   const scenes::Scene& scene_;
   bool hollow_ = false;
   std::vector<Core> cores_;
-  std::vector<double> bend_per_m_;  // of each object; 1/radius where it is round
+  std::vector<std::vector<Piece>> pieces_;  // of each object: a mesh's triangles, a box; of others none
+  std::vector<double> bend_per_m_;          // of each object; 1/radius where it is round
 };
 
 }  // namespace proxarm::studies

@@ -44,6 +44,14 @@ TEST(Stress, AToolThatComesOverAnEdgeAtTheVeryEndOfAStepIsCountedAsAtAnEdge) {
   EXPECT_EQ(run.edge, 1);
 }
 
+// Step 43: a corner of a convex tool slides along a mesh's valley and over its end. It was behind six faces there, with
+// its foot on none of them, and nothing held it: it went 85 µm in, and 12 mm in the steps after.
+TEST(Stress, ACornerThatComesOverTheEndOfAMeshsValleyStaysOutside) {
+  const Tally run = run_tool_seed(2213866497049629, nullptr);
+  EXPECT_EQ(run.kind, "meshes");
+  EXPECT_EQ(run.first, "none") << "step " << run.first_step;
+}
+
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
   const Options options{.seed = 5};
