@@ -291,7 +291,10 @@ bool ContactProblem::holds(const Twist& e, std::span<LinearContact> contacts, Tw
   const double size = make_rows(e, contacts);
   const Rows rows(rows_.data(), contacts.size());
   Twist y = Twist::Zero();
-  for (const Row& row : rows) y += row.H.transpose() * row.f;
+  for (const Row& row : rows) {
+    if (row.f[0] < 0.0) return false;  // its normal has turned on: nothing pulls
+    y += row.H.transpose() * row.f;
+  }
   delta = L_inverse_.transpose() * y - e;
   if (!may_look_at(rows) || !(violation(rows, y) <= kTolerance * size)) return false;
   for (std::size_t i = 0; i < rows.size(); ++i) {

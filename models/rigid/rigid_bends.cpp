@@ -51,6 +51,7 @@ Round round_at(const HollowTube& hollow, const Vec3& x) noexcept {
 // Adds −force ∇²gap to K. False: nothing bends there.
 bool RigidWorld::add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
   const Pair& pair = pairs_[found.pair];
+  if (pair.kind == Kind::sides || pair.kind == Kind::side_edge) return add_bend_of_sides(found, pose, force, K);
   if (is_flat_rim(pair.kind) && pair.kind != Kind::rim_field) return add_bend_of_rim(found, pose, force, K);
   const bool is_rim = pair.kind == Kind::rim_field;
   if (!is_rim && pair.kind != Kind::point_field) return false;
@@ -117,6 +118,44 @@ bool RigidWorld::add_bend_of_rim(const Found& found, const ToolPose& pose, doubl
   Twist h_qa = Twist::Zero();
   h_qa.tail<3>() = along.cross(n);
   K -= force * h_qa * (h_qa / h_aa).transpose();
+  return true;
+}
+
+// Two sides, or a side and an edge, touch where the axes come nearest, D apart, at s and t along them: D's second
+// derivatives over the pose and over these, u and v the axes, P across the normal,
+//
+//   D_qq = GᵀPG/D,  D_qs = [0; u × n] + GᵀPu/D,  D_qt = −GᵀPv/D,  D_ss = D_tt = 1/D,  D_st = −uᵀv/D
+//
+// Nearly parallel, the place goes far with next to no turn.
+bool RigidWorld::add_bend_of_sides(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept {
+  const Pair& pair = pairs_[found.pair];
+  const std::optional<Cylinder>&own = shared_->parts[pair.part].cylinder,
+        &other = shared_->entries[pair.entry].cylinder;
+  const double own_radius = own ? own->radius : shared_->parts[pair.part].solid.radius;
+  const auto along_edge = [&] {
+    const EdgeLine edge = beside_cylinder(pair.part, pair.entry).edge(own ? pair.other : pair.own);
+    return Vec3((edge.to - edge.from).normalized());
+  };
+  const Vec3 u = pose.orientation * (own ? own->axis : along_edge()), v_O = other ? other->axis : along_edge();
+  const Vec3 v = moves(pair.entry) ? Vec3(moving(pair.entry).mover.at().R * v_O) : v_O;
+  double D = found.touch.gap + own_radius;
+  if (other) D += other->radius;
+  if (const auto* solid = std::get_if<Solid>(&shared_->entries[pair.entry].object.shape)) D += solid->radius;
+  const double sine2 = u.cross(v).squaredNorm();
+  if (!(sine2 > 1e-14 && D > 0.0)) return false;
+  const Vec3& n = found.touch.normal;
+  const Vec3 lever = found.touch.point - pose.position + own_radius * n;
+  const Mat3 P = Mat3::Identity() - n * n.transpose();
+  Eigen::Matrix<double, 3, 6> G;
+  G.leftCols<3>().setIdentity();
+  G.rightCols<3>() << 0.0, lever.z(), -lever.y(), -lever.z(), 0.0, lever.x(), lever.y(), -lever.x(), 0.0;
+  Eigen::Matrix<double, 6, 2> along;
+  along.col(0) = G.transpose() * (P * u) / D;
+  along.col(0).tail<3>() += u.cross(n);
+  along.col(1) = -(G.transpose() * (P * v)) / D;
+  Eigen::Matrix2d inverse;  // of D_ss, D_st, D_tt
+  inverse << 1.0, u.dot(v), u.dot(v), 1.0;
+  K += force * (D / sine2 * along * inverse * along.transpose() - G.transpose() * P * G / D);
   return true;
 }
 

@@ -240,6 +240,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] const Vec3* last_force(std::uint16_t pair, std::uint8_t which) const noexcept;
   bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   bool add_bend_of_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
+  bool add_bend_of_sides(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   Twist couple(const ToolPose& pose, const Twist& e) noexcept;
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;

@@ -13,6 +13,9 @@ constexpr double kAskew = 0.02;
 // Where a round body lies on an end, or along the side, it rocks between two places of a rim: so far over, in radians,
 // both are held. Either keeps to its law anywhere: no place of a rim may come into the body.
 constexpr double kNearlyLevel = 0.05;
+// A quarter of what a gap may be short of: where something straight lies along the side to within this, the place at
+// which it comes nearest is anywhere.
+constexpr double kSag_m = 2.5e-13;
 // Below this sine an edge lies along the rim: what is beside it decides.
 constexpr double kAlong = 1e-7;
 
@@ -131,7 +134,9 @@ std::optional<Meeting> meet_side(const Cylinder& cylinder, const EdgeLine& edge,
                                  double beside) noexcept {
   const Vec3 d = edge.to - edge.from, n = cylinder.axis.cross(d), w = edge.from - cylinder.from;
   const double nn = n.squaredNorm(), length = d.norm();
-  if (nn <= 1e-14 * length * length) return {};  // parallel: its ends and the rims decide
+  // Parallel: its ends and the rims decide, between which the side is no nearer than this.
+  const double sine2 = nn / (length * length), shorter = std::min(length, cylinder.length);
+  if (sine2 <= 1e-14 || sine2 * shorter * shorter <= 8.0 * kSag_m * (cylinder.radius + radius)) return {};
   const double along = w.cross(d).dot(n) / nn, s = w.cross(cylinder.axis).dot(n) / nn;
   if (along < -beside || along > cylinder.length + beside) return {};
   if (s < -beside / length || s > 1.0 + beside / length) return {};
