@@ -13,6 +13,9 @@ namespace {
 // left of the iteration is as small; this is a thousand times that, and a tenth of what a gap may be short of.
 constexpr double kLift_m = 1e-13;
 
+// What a pair of a cylinder's features costs more than others, in their 15 ns.
+constexpr int kOfCylinder = 15, kRims = 200;
+
 // A sine. Steps that are long beside a tool turn it by tenths of a radian on their way to where it ends.
 constexpr double kLeans = 0.2;
 
@@ -253,6 +256,7 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
     const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
     if (on != nullptr && !on->close) continue;
     const View& at = on == nullptr ? at_W : on->tool;
+    if (pairs_[i].kind >= Kind::side_point) looks_ -= pairs_[i].kind == Kind::rims ? kRims : kOfCylinder;
     if (is_flat_rim(pairs_[i].kind)) remember_lowest(pairs_[i], at);
     evaluate(pairs_[i], at, [&](const Touch& t, int which) {
       if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far
