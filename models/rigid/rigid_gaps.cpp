@@ -14,7 +14,7 @@ namespace {
 constexpr double kLift_m = 1e-13;
 
 // What a pair of a cylinder's features costs more than others, in their 15 ns.
-constexpr int kOfCylinder = 15, kRims = 200;
+constexpr int kOfCylinder = 30, kRims = 600;
 
 // A sine. Steps that are long beside a tool turn it by tenths of a radian on their way to where it ends.
 constexpr double kLeans = 0.2;
