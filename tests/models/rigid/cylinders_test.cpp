@@ -60,7 +60,7 @@ struct World {
 
 Pushed pushed(std::uint64_t seed, const std::function<World(Random&)>& make) {
   Pushed out;
-  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(tests::scaled(40)); ++i) {
+  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(tests::scaled(40, 40)); ++i) {
     Random random(seed + i);
     World world = make(random);
     RigidWorld g(world.tool, world.objects);
