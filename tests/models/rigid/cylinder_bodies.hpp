@@ -155,8 +155,8 @@ inline double apart(const Can& a, const Can& b, const std::vector<Vec3>& claimed
   }
   // Where they touch but nobody says along what, around the best one.
   Random random(1);
-  for (double step = 1e-2; step > 1e-12 && best < -1e-13; step *= 0.8) {
-    for (int k = 0; k < 60; ++k) {
+  for (double step = 1e-2; step > 1e-14 && best < -1e-13; step *= 0.8) {
+    for (int k = 0; k < 400; ++k) {
       if (try_along(best_along + step * random.direction())) k = 0;
     }
   }
