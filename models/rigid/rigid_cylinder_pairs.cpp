@@ -31,11 +31,7 @@ struct RigidWorld::TwoCylinders {
 void RigidWorld::gather_cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const TwoCylinders here(*this, part, entry, at);
   const auto add = [&](Kind kind, std::uint32_t own, std::uint32_t other) { add_pair(kind, part, entry, own, other); };
-  EdgeLine own, other;
-  own.from = here.own.from;
-  own.to = here.own.from + here.own.length * here.own.axis;
-  other.from = here.other.from;
-  other.to = here.other.from + here.other.length * here.other.axis;
+  const EdgeLine own = axis_of(here.own), other = axis_of(here.other);
   const double most = reach + here.own.radius + here.other.radius;
   if (distance2_of_segments(own, other) > most * most) return;
   add(Kind::sides, 0, 0);

@@ -34,11 +34,8 @@ class CylinderPairs {
   }
   void edge(std::uint32_t i) const noexcept {
     const EdgeLine edge = body_->edge(i);
-    EdgeLine axis;
-    axis.from = cylinder_->from;
-    axis.to = cylinder_->from + cylinder_->length * cylinder_->axis;
     const double most = near_ + cylinder_->radius;
-    if (distance2_of_segments(edge, axis) > most * most) return;
+    if (distance2_of_segments(edge, axis_of(*cylinder_)) > most * most) return;
     add_(Kind::side_edge, 0U, i);
     const Vec3 middle = 0.5 * (edge.from + edge.to);
     const double half = 0.5 * (edge.to - edge.from).norm();

@@ -16,8 +16,6 @@ constexpr double kNearlyLevel = 0.05;
 // A quarter of what a gap may be short of: where something straight lies along the side to within this, the place at
 // which it comes nearest is anywhere.
 constexpr double kSag_m = 2.5e-13;
-// Below this sine an edge lies along the rim: what is beside it decides.
-constexpr double kAlong = 1e-7;
 
 Vec3 on(const Solid::Rim& rim, const Vec2& z) noexcept { return z.x() * rim.u + z.y() * rim.v; }
 
@@ -70,9 +68,9 @@ class PlanesBetween {
 
 }  // namespace
 
-// The squared distance is, with P across the
-// line and c from y to the rim's middle, |P c|² + 2 r (P c)ᵀz + r² − r² (dᵀz)²: turned negative, half of it over r is
-// circle.hpp's function with the x axis along (d_u, d_v), but for a constant.
+// The squared distance is, with P across the line and c from y to the rim's middle, |P c|² + 2 r (P c)ᵀz + r² − r²
+// (dᵀz)²: turned negative, half of it over r is circle.hpp's function with the x axis along (d_u, d_v), but for a
+// constant.
 int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::array<Vec2, 2>& out) noexcept {
   const Vec3 c = rim.centre - y, across = c - d * d.dot(c);
   const Vec2 along(d.dot(rim.u), d.dot(rim.v));
@@ -116,6 +114,13 @@ Cylinder moved(const Cylinder& cylinder, const Mat3& R, const Vec3& x) noexcept 
     out.rims[k] = {R * rim.centre + x, R * rim.u, R * rim.v, rim.radius};
   }
   return out;
+}
+
+EdgeLine axis_of(const Cylinder& cylinder) noexcept {
+  EdgeLine axis;
+  axis.from = cylinder.from;
+  axis.to = cylinder.from + cylinder.length * cylinder.axis;
+  return axis;
 }
 
 std::optional<Meeting> meet_side(const Cylinder& cylinder, const Vec3& p, double radius, double beside) noexcept {

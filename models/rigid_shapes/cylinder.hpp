@@ -31,9 +31,13 @@ struct Cylinder {
   [[nodiscard]] Vec3 out_of_end(std::uint32_t end) const noexcept { return end == 0 ? Vec3(-axis) : axis; }
 };
 
+// Below this sine an edge lies along a rim: what is beside it decides.
+inline constexpr double kAlong = 1e-7;
+
 // Precondition: the solid has two rims.
 Cylinder cylinder_of(const Solid& solid) noexcept;
 Cylinder moved(const Cylinder& cylinder, const Mat3& R, const Vec3& x) noexcept;
+EdgeLine axis_of(const Cylinder& cylinder) noexcept;
 
 // A place where the two come near.
 struct Meeting {

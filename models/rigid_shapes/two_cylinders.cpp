@@ -8,16 +8,6 @@
 namespace proxarm::models {
 namespace {
 
-// As in cylinder.cpp.
-constexpr double kAlong = 1e-7;
-
-EdgeLine axis_of(const Cylinder& cylinder) noexcept {
-  EdgeLine axis;
-  axis.from = cylinder.from;
-  axis.to = cylinder.from + cylinder.length * cylinder.axis;
-  return axis;
-}
-
 // A place on a circle, and the way along it per radian.
 struct OnRim {
   Vec3 arm = Vec3::Zero();  // unit

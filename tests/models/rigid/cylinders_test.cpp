@@ -13,13 +13,6 @@
 namespace proxarm::models {
 namespace {
 
-Mat6 random_stiffness(Random& random) {
-  const double M = random.log_uniform(0.5, 20.0), J = M * random.log_uniform(1e-4, 1e-2);
-  Mat6 K = Mat6::Zero();
-  K.diagonal() << Vec3::Constant(1e6 * M), Vec3::Constant(1e6 * J);
-  return K;
-}
-
 Can random_can(Random& random, double least, double most) {
   Can can;
   can.length = random.uniform(least, most);
@@ -57,6 +50,17 @@ struct World {
   }
   void give(decltype(ToolPart::shape) shape) { tool = {{{std::move(shape), Pose::Identity(), {}}}}; }
 };
+
+std::vector<Can> add_cans(World& world, Random& random, int count) {
+  std::vector<Can> cans;
+  for (int i = 0; i < count; ++i) {
+    Can can = random_can(random, 0.02, 0.1);
+    can.X = random_pose(random, 0.08);
+    cans.push_back(can);
+    world.add(solid_of_can(can), random);
+  }
+  return cans;
+}
 
 Pushed pushed(std::uint64_t seed, const std::function<World(Random&)>& make) {
   Pushed out;
@@ -109,13 +113,7 @@ World among_cans(Random& random, Make make) {
   World world;
   const Body tool = make(random, 0.01, 0.05);
   world.give(shape_of(tool));
-  std::vector<Can> cans;
-  for (int i = 0; i < 6; ++i) {
-    Can can = random_can(random, 0.02, 0.1);
-    can.X = random_pose(random, 0.08);
-    cans.push_back(can);
-    world.add(solid_of_can(can), random);
-  }
+  const std::vector<Can> cans = add_cans(world, random, 6);
   world.apart_m = [=](const ToolPose& pose) {
     const Rounded body = rounded(at(tool, isometry(pose)));
     double gap = 1.0;
@@ -129,13 +127,7 @@ World can_among_cans(Random& random) {
   World world;
   const Can tool = random_can(random, 0.01, 0.05);
   world.give(CylinderTool{tool.length, tool.radius});
-  std::vector<Can> cans;
-  for (int i = 0; i < 6; ++i) {
-    Can can = random_can(random, 0.02, 0.1);
-    can.X = random_pose(random, 0.08);
-    cans.push_back(can);
-    world.add(solid_of_can(can), random);
-  }
+  const std::vector<Can> cans = add_cans(world, random, 6);
   world.apart_m = [=, claimed = world.claimed](const ToolPose& pose) {
     double gap = 1.0;
     for (const Can& can : cans) gap = std::min(gap, apart(can, at(tool, isometry(pose)), *claimed));
@@ -199,13 +191,7 @@ TEST(Cylinders, AsObjectsTheyHoldARoughBallByTheLaw) {
     World world;
     const auto ball = rough_ball(random, random.uniform(0.005, 0.03), 2 + random.below(3));
     world.give(tool_of(*ball));
-    std::vector<Can> cans;
-    for (int i = 0; i < 4; ++i) {
-      Can can = random_can(random, 0.02, 0.1);
-      can.X = random_pose(random, 0.08);
-      cans.push_back(can);
-      world.add(solid_of_can(can), random);
-    }
+    const std::vector<Can> cans = add_cans(world, random, 4);
     const auto triangles = triangles_of(*ball);
     world.apart_m = [=](const ToolPose& pose) {
       double gap = 1.0;

@@ -8,13 +8,6 @@
 namespace proxarm::models {
 namespace {
 
-Mat6 random_stiffness(Random& random) {
-  const double M = random.log_uniform(0.5, 20.0), J = M * random.log_uniform(1e-4, 1e-2);
-  Mat6 K = Mat6::Zero();
-  K.diagonal() << Vec3::Constant(1e6 * M), Vec3::Constant(1e6 * J);
-  return K;
-}
-
 // Tools as `make` draws them, among six solids.
 template <typename Make>
 Pushed among_solids(std::uint64_t seed, Make make) {

@@ -17,6 +17,14 @@ inline Pose random_pose(Random& random, double half) {
   return X;
 }
 
+// Of a mass and a moment of inertia at 1 kHz.
+inline Mat6 random_stiffness(Random& random) {
+  const double M = random.log_uniform(0.5, 20.0), J = M * random.log_uniform(1e-4, 1e-2);
+  Mat6 K = Mat6::Zero();
+  K.diagonal() << Vec3::Constant(1e6 * M), Vec3::Constant(1e6 * J);
+  return K;
+}
+
 inline Vec3 random_size(Random& random, double least, double most) {
   Vec3 size;
   for (double& x : size) x = random.uniform(least, most);
