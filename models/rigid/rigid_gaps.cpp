@@ -72,8 +72,10 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
     }
     const double height = signed_start(pair, at);
     const bool near = pair.pressed && std::abs(height) < kFront_m;
-    if (pair.kind == Kind::face_point && shared_->parts[pair.part].mesh) {
+    if (pair.kind == Kind::face_point) {
       if (!near) pair.side = static_cast<float>(side_of_tools_face(pair, at, height, far));
+    } else if (!is_mesh && pair.kind == Kind::point_face) {
+      if (!near) pair.side = static_cast<float>(side_of_solids_face(pair, at, height, far));
     } else if (!is_mesh) {
       pair.side = height >= -2.0 * far - kFront_m ? 1.0F : 0.0F;
     } else if (!near) {
@@ -82,8 +84,9 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
   }
 }
 
-// An object's point under a face of a tool that is a mesh: in front of it, or behind without having come through, as
-// beside an edge, where its foot isn't on the face. Under the face it is behind the tool's far side.
+// A point under a face of a closed body that it has not come through: in front of it, or behind, as beside an edge,
+// where its foot isn't on the face. Under the face it is behind the body's far side, which next to an edge is near,
+// however thick the body is.
 double RigidWorld::side_of_tools_face(const Pair& pair, const View& at, double height, double far) const noexcept {
   if (height >= -kFront_m) return 1.0;
   if (height < -2.0 * far - kFront_m) return 0.0;
@@ -94,6 +97,16 @@ double RigidWorld::side_of_tools_face(const Pair& pair, const View& at, double h
       at.to_T(mesh != nullptr ? (*mesh)->vertex(pair.other) : std::get_if<Solid>(&object.shape)->points[pair.other]);
   const Solid::Face& face = own.faces[pair.own];
   return touch_face(y, 0.0, face.normal, face.offset, own.points, own.corners(face), 1.0).has_value() ? 0.0 : 1.0;
+}
+
+// The same for the tool's point under a face of a solid.
+double RigidWorld::side_of_solids_face(const Pair& pair, const View& at, double height, double far) const noexcept {
+  if (height >= -kFront_m) return 1.0;
+  if (height < -2.0 * far - kFront_m) return 0.0;
+  const Solid& solid = *std::get_if<Solid>(&shared_->entries[pair.entry].object.shape);
+  const Solid::Face& face = solid.faces[pair.other];
+  const Vec3 p = at * shared_->parts[pair.part].solid.points[pair.own];
+  return touch_face(p, 0.0, face.normal, face.offset, solid.points, solid.corners(face), 1.0).has_value() ? 0.0 : 1.0;
 }
 
 // A closed mesh holds the tool on its side, an open one on that on which the feature is. A feature may have been behind

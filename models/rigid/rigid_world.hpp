@@ -205,6 +205,7 @@ class RigidWorld final : public PoseAlgorithm {
                   double reach, Add add) noexcept;
   void set_sides(const ToolPose& from, double far) noexcept;
   [[nodiscard]] double side_of_tools_face(const Pair& pair, const View& at, double height, double far) const noexcept;
+  [[nodiscard]] double side_of_solids_face(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] double side_of_mesh(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;

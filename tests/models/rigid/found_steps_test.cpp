@@ -121,5 +121,41 @@ TEST(FoundSteps, ABoxOnMoreCornersThanHoldItInACylinderComesToRest) {
   EXPECT_LE(imbalance(g.contacts(), K, p, r), 1e-7);
 }
 
+// A convex tool of 37 mm slides along a box's edge, 11 mm in one step of four parts, towards a place where it is thin:
+// the box's corner is outside of it there, 5.6 mm below its far face. That face held the corner, since a part of the
+// step could have brought it as far behind, had it come from in front: the tool was pushed 2 mm on, the way it went, by
+// 84 kN, and had 1.1 kJ more. (`proxarm study stress_tools --replay 7570964767822425`, step 7; five or more of 60,000 runs
+// had such a step.)
+TEST(FoundSteps, ACornerBelowAToolsFarSideIsNotPulledThroughIt) {
+  const ConvexTool hull{{{-0.016618958655176933, -0.01720363833885509, -0.0054664141006381881},
+                         {-0.010156526926390529, 0.0027308466506723882, -0.017302400925221947},
+                         {0.014211038343136324, -0.0070005611582194234, 0.0070421085705579985},
+                         {0.0024567669101428855, -0.013409851691517821, 0.0042109374240395531},
+                         {-0.010424030659774427, -0.00066042020516116735, 0.019465047230856982},
+                         {-0.021079894266579424, -0.0027236832644757323, 0.0095769847481990984}}};
+  Body box;
+  box.size = {0.03598633633587113, 0.077481698431478924, 0.086221632106815382};
+  box.X = isometry(
+      {{-0.01990646711998309, 0.048182477362612122, 0.021600369208310363},
+       Quaternion(0.89913790496758894, 0.088570120774672412, 0.25479836699146374, 0.34465077068670291).normalized()});
+  const ToolPose q{{-0.046261715223542131, 0.014973749906379622, -0.015845229122064076},
+                   {0.7133703575789615, 0.11881529528886114, -0.64988639708604945, 0.2337377363961563}};
+  const ToolPose p{{-0.039036588171200953, 0.0053719780815370752, -0.016741505705601473},
+                   {0.71220785792195707, 0.11859416479667018, -0.65282682513759782, 0.22915612051865886}};
+  const auto separation_at = [&](const ToolPose& pose) {
+    return separation(at(polyhedron_of_hull(hull.points_m), pose), polyhedron_of_box(box.size, box.X));
+  };
+  ASSERT_GT(separation_at(q), -1e-15);
+  RigidWorld g({{{hull, Pose::Identity(), {}}}}, {object_of(box, 0.0)});
+  const ToolPose r = g.step(isotropic(42861679.711751454, 60749.859729354881), p, q);
+  EXPECT_FALSE(g.unresolved());
+  EXPECT_GE(separation_at(r), -1e-15);
+  ASSERT_EQ(g.contacts().size(), 1U);
+  // It goes along the edge, and turns by 0.02 rad at a lever of 20 mm on the way.
+  const PoseContact& contact = g.contacts().front();
+  const Vec3 way = contact.point_W - q * (r.orientation.conjugate() * Vec3(contact.point_W - r.position));
+  EXPECT_LE(std::abs(contact.force_W.dot(way)), 1e-4 * contact.force_W.norm() * way.norm());
+}
+
 }  // namespace
 }  // namespace proxarm::models
