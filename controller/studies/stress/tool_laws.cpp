@@ -325,11 +325,17 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     }
     if (!(f_t.norm() <= limit + beyond)) return "out of the cone";
     // A slip far below what friction would move the contact by is next to sticking: its direction counts as much less.
+    // And it is the difference of two places, known to ε = 8 roundings (both poses', and those of what rotates by them;
+    // up to 5 have been seen). A friction against s₀ = s − e, ‖e‖ ≤ ε, is off s by
+    //   μ f_n ‖s/‖s‖ − s₀/‖s₀‖‖ ≤ 2 μ f_n ε/‖s‖
+    // and so is any that sticks, where s₀ = 0 and ‖s‖ ≤ ε.
     const Vec3 slip = call.slip_of(contact);
     const double s = slip.norm();
     if (!(s > 0.0)) continue;
     const double least = std::max(limit * yields(call, contact, slip / s), 1e-9);
-    if (!((f_t + limit / s * slip).norm() * std::min(1.0, s / least) <= 1e-8 * size)) return "not against the slip";
+    const double off = (f_t + limit / s * slip).norm();
+    const double allowed = 1e-8 * size * std::max(s, least) + 2.0 * limit * 8.0 * rounding_m(call.r);
+    if (!(off * s <= allowed)) return "not against the slip";
   }
   return {};
 }
