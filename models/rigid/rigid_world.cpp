@@ -428,7 +428,10 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     if (linear_count_ == 0) {
       const bool there = q == p_hat;
       q = p_hat;
-      if (there) return true;
+      if (there) {
+        collected_ = false;  // what a pose before this one touched, it doesn't
+        return true;
+      }
       last = std::numeric_limits<double>::infinity();  // that wasn't a step of the iteration
       continue;
     }

@@ -124,8 +124,8 @@ TEST(FoundSteps, ABoxOnMoreCornersThanHoldItInACylinderComesToRest) {
 // A convex tool of 37 mm slides along a box's edge, 11 mm in one step of four parts, towards a place where it is thin:
 // the box's corner is outside of it there, 5.6 mm below its far face. That face held the corner, since a part of the
 // step could have brought it as far behind, had it come from in front: the tool was pushed 2 mm on, the way it went, by
-// 84 kN, and had 1.1 kJ more. (`proxarm study stress_tools --replay 7570964767822425`, step 7; five or more of 60,000 runs
-// had such a step.)
+// 84 kN, and had 1.1 kJ more. (`proxarm study stress_tools --replay 7570964767822425`, step 7; five or more of its
+// 60,000 runs had such a step.)
 TEST(FoundSteps, ACornerBelowAToolsFarSideIsNotPulledThroughIt) {
   const ConvexTool hull{{{-0.016618958655176933, -0.01720363833885509, -0.0054664141006381881},
                          {-0.010156526926390529, 0.0027308466506723882, -0.017302400925221947},
