@@ -198,13 +198,22 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
   const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape);
   const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape);
   double gap = beyond_all_m;
-  // One all inside of the other: as deep as it is small.
-  if (mesh != nullptr && mesh->mesh->encloses(pose * core.corners_T.front())) return -core.reach_m - core.radius_m;
+  // One all inside of the other: as deep as it is small. With all of its corners: one that touches from outside is on
+  // either side by rounding. (Replay 5924495204300528, step 31, a box with its first corner on the tool.)
+  const auto all_in = [](const models::TriangleMesh& around, const std::vector<Vec3>& points, const auto& place) {
+    return std::all_of(points.begin(), points.end(), [&](const Vec3& x) { return around.encloses(place(x)); });
+  };
+  if (mesh != nullptr && all_in(*mesh->mesh, core.corners_T, [&](const Vec3& x) { return pose * x; })) {
+    return -core.reach_m - core.radius_m;
+  }
   if (core.mesh_T) {
-    const Vec3 x = sphere != nullptr    ? sphere->centre_m
-                   : capsule != nullptr ? capsule->from_m
-                                        : pieces_[index].front().corners.front();
-    if (core.mesh_T->encloses(pose.orientation.conjugate() * (x - pose.position))) return -core.reach_m;
+    const auto in_T = [&](const Vec3& x) { return Vec3(pose.orientation.conjugate() * (x - pose.position)); };
+    const auto is_in = [&](const Piece& piece) { return all_in(*core.mesh_T, piece.corners, in_T); };
+    const std::vector<Piece>& pieces = pieces_[index];
+    const bool inside = sphere != nullptr    ? core.mesh_T->encloses(in_T(sphere->centre_m))
+                        : capsule != nullptr ? core.mesh_T->encloses(in_T(capsule->from_m))
+                                             : std::all_of(pieces.begin(), pieces.end(), is_in);
+    if (inside) return -core.reach_m;
   }
   std::vector<Piece> own;
   for (const Piece& piece : core.pieces_T) own.push_back(moved(piece, pose));
