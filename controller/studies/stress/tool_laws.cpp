@@ -365,12 +365,20 @@ double ToolLaws::curvature_J(const ToolCall& call) const {
 double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier) const {
   double sum = 0.0;
   for (const PoseContact& contact : call.contacts) {
+    const double s = call.way_of(contact).norm();
+    // A normal turns where it is: of what touched the object before, what was as near as a place may have come, if
+    // there is such. (Replay 2305703389568219, step 172: one edge of the tool leaves a face of a mesh for the next
+    // face's edge, and others lie on that face already, elsewhere.)
+    const auto came = [&](const PoseContact& was) {
+      return was.object == contact.object && (was.point_W - contact.point_W).norm() <= 2.0 * s;
+    };
+    const bool near = std::any_of(earlier.begin(), earlier.end(), came);
     double cosine = -1.0;
     for (const PoseContact& was : earlier) {
-      if (was.object == contact.object) cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
+      if (near ? !came(was) : was.object != contact.object) continue;
+      cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
     }
     if (!(cosine > 0.0)) continue;
-    const double s = call.way_of(contact).norm();
     const double sine = std::sqrt(1.0 - cosine * cosine), force = contact.force_W.norm();
     if (sine / cosine * yields(call, contact, contact.normal_W) * force <= s) sum += force * s * sine;
   }
