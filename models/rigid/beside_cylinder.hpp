@@ -7,8 +7,8 @@
 #include <limits>
 #include <span>
 
-#include "models/rigid/rigid_features.hpp"
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid_features/rigid_features.hpp"
+#include "models/rigid_features/rigid_object.hpp"
 
 namespace proxarm::models {
 

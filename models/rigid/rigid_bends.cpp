@@ -18,8 +18,8 @@
 // iteration by a millionth and don't move its end.
 #include <cmath>
 
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 namespace {

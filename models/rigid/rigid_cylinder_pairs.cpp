@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/rigid/near.hpp"
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/near.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 #include "models/rigid_shapes/two_cylinders.hpp"
 
 namespace proxarm::models {

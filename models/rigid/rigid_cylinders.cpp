@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "models/rigid/beside_cylinder.hpp"
-#include "models/rigid/near.hpp"
-#include "models/rigid/part_box.hpp"
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/near.hpp"
+#include "models/rigid_features/part_box.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 namespace {

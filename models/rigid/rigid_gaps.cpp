@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 namespace {

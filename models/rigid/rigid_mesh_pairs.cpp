@@ -1,8 +1,8 @@
 // Which pairs of features of a mesh that is a part of the tool and of one that is an object may meet.
-#include "models/rigid/mesh_pairs.hpp"
-#include "models/rigid/near.hpp"
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/mesh_pairs.hpp"
+#include "models/rigid_features/near.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 namespace {

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/rigid/part_box.hpp"
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/part_box.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 

@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "models/rigid/mesh_overlap.hpp"
-#include "models/rigid/mesh_part.hpp"
-#include "models/rigid/near.hpp"
+#include "models/rigid_features/mesh_overlap.hpp"
+#include "models/rigid_features/mesh_part.hpp"
+#include "models/rigid_features/near.hpp"
 #include "models/rigid_shapes/overlap.hpp"
 #include "models/rigid_shapes/two_cylinders.hpp"
 

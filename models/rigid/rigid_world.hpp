@@ -30,10 +30,10 @@
 #include <vector>
 
 #include "models/geometry/pose_algorithm.hpp"
+#include "models/local_problem/contact_problem.hpp"
 #include "models/rigid/beside_cylinder.hpp"
-#include "models/rigid/contact_problem.hpp"
-#include "models/rigid/rigid_features.hpp"
 #include "models/rigid/rigid_mover.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 #include "models/rigid_shapes/cylinder.hpp"
 
 namespace proxarm::models {

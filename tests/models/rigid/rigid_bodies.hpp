@@ -3,7 +3,7 @@
 #pragma once
 
 #include "models/base/random.hpp"
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid_features/rigid_object.hpp"
 #include "models/rigid_shapes/solid.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "models/base/random.hpp"
 #include "models/geometry/tool_pose.hpp"
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid_features/rigid_object.hpp"
 #include "models/rigid_shapes/tool.hpp"
 #include "tests/models/rigid/rigid_judge.hpp"
 

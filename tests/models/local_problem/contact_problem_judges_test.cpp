@@ -5,9 +5,9 @@
 
 #include <iostream>
 
-#include "tests/models/rigid/brute_force.hpp"
-#include "tests/models/rigid/local_problem.hpp"
-#include "tests/models/rigid/siconos_judge.hpp"
+#include "tests/models/local_problem/brute_force.hpp"
+#include "tests/models/local_problem/local_problem.hpp"
+#include "tests/models/local_problem/siconos_judge.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <limits>
 
-#include "models/rigid/contact_problem.hpp"
+#include "models/local_problem/contact_problem.hpp"
 
 namespace proxarm::models {
 namespace {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "models/rigid/near.hpp"
-#include "models/rigid/rigid_features.hpp"
+#include "models/rigid_features/near.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 

@@ -1,4 +1,4 @@
-#include "models/rigid/mesh_part.hpp"
+#include "models/rigid_features/mesh_part.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "models/base/random.hpp"
-#include "models/rigid/contact_problem.hpp"
+#include "models/local_problem/contact_problem.hpp"
 
 namespace proxarm::models {
 

@@ -1,11 +1,11 @@
-#include "models/rigid/mesh_overlap.hpp"
+#include "models/rigid_features/mesh_overlap.hpp"
 
 #include <algorithm>
 #include <array>
 #include <limits>
 
-#include "models/rigid/mesh_pairs.hpp"
-#include "models/rigid/part_box.hpp"
+#include "models/rigid_features/mesh_pairs.hpp"
+#include "models/rigid_features/part_box.hpp"
 #include "models/rigid_shapes/cylinder.hpp"
 #include "models/rigid_shapes/overlap.hpp"
 

@@ -1,4 +1,4 @@
-#include "models/rigid/contact_problem.hpp"
+#include "models/local_problem/contact_problem.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

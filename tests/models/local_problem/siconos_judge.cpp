@@ -1,4 +1,4 @@
-#include "tests/models/rigid/siconos_judge.hpp"
+#include "tests/models/local_problem/siconos_judge.hpp"
 
 #include <Eigen/Cholesky>
 #include <cstdlib>

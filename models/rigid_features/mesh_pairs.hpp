@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "models/rigid/rigid_features.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 

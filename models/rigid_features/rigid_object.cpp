@@ -1,4 +1,4 @@
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid_features/rigid_object.hpp"
 
 #include <algorithm>
 #include <cmath>

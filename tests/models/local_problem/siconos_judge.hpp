@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "models/rigid/contact_problem.hpp"
+#include "models/local_problem/contact_problem.hpp"
 
 namespace proxarm::models {
 

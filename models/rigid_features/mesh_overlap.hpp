@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "models/rigid/rigid_features.hpp"
+#include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
 

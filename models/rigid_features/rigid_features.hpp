@@ -2,7 +2,7 @@
 #pragma once
 
 #include "models/geometry/tool_pose.hpp"
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid_features/rigid_object.hpp"
 
 namespace proxarm::models {
 

@@ -7,7 +7,7 @@
 // the guess.
 #include <cmath>
 
-#include "models/rigid/contact_problem.hpp"
+#include "models/local_problem/contact_problem.hpp"
 
 namespace proxarm::models {
 namespace {

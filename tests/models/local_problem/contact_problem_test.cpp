@@ -1,10 +1,10 @@
-#include "models/rigid/contact_problem.hpp"
+#include "models/local_problem/contact_problem.hpp"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 
-#include "tests/models/rigid/local_problem.hpp"
+#include "tests/models/local_problem/local_problem.hpp"
 
 namespace proxarm::models {
 namespace {

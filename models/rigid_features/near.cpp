@@ -1,4 +1,4 @@
-#include "models/rigid/near.hpp"
+#include "models/rigid_features/near.hpp"
 
 #include <cmath>
 

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "models/rigid/rigid_object.hpp"
+#include "models/rigid_features/rigid_object.hpp"
 #include "models/rigid_shapes/tool.hpp"
 
 namespace proxarm::models {
