@@ -349,6 +349,7 @@ void SummaryBuilder::State::turn(const CycleRecord& now) {
 
 void SummaryBuilder::State::slide(const CycleRecord& now, const Vec3& resistance) {
   if (now.contact != ContactPhase::slip || !(now.friction > 0.0) || now.contact_count > 1) return;
+  if (limited(now)) return;  // what a limit takes is no friction
   const Vec3 n = vec3(now.normal_W);
   const Vec3 f = vec3(now.contact_force_W_N);
   const Vec3 along = n.dot(f) * n - f;

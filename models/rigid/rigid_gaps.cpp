@@ -286,6 +286,7 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
       found.pair = static_cast<std::uint16_t>(i);
       found.which = static_cast<std::uint8_t>(which);
       found.working = false;
+      if (is_along_side(pairs_[i].kind)) stay_along_side(found, pose);
     });
   }
   drop_deeper(at_W);

@@ -29,7 +29,8 @@ constexpr int kWorkOfFar = 2400;
 // A part that finds no forces may be left out where the next one finds some, but not two in a row: sides reach as far
 // as two parts do.
 constexpr int kMostLeftOut = 1;
-// What bears less than this share of the greatest force may be left out where nothing else helps, so often in a step.
+// What bears less than this share of the greatest force, and what bends, may be left out where nothing else helps, so
+// often in a step.
 constexpr double kIdle = 1e-3;
 constexpr int kFewer = 6;
 constexpr int kWorkInside = 600;  // of hollow objects, where a look costs 0.5 µs and most steps take thirty
@@ -232,7 +233,8 @@ void RigidWorld::linearise(const Found& found, const ToolPose& pose, const ToolP
   const Vec3 slip = slip_since(q_old, pair.entry, found.touch.point, pose);
   out.c << found.touch.gap, axes.col(1).dot(slip), axes.col(2).dot(slip);
   out.mu = without_friction_ ? 0.0 : friction(pair);
-  const Vec3* force = found.which == 0 ? (pair.pressed ? &pair.force_W : nullptr) : last_force(found.pair, found.which);
+  const Pressed* last = found.which == 0 ? nullptr : last_pressed(found.pair, found.which);
+  const Vec3* force = last != nullptr ? &last->force_W : found.which == 0 && pair.pressed ? &pair.force_W : nullptr;
   out.f = force != nullptr ? Vec3(axes.transpose() * *force) : Vec3(Vec3::Zero());
 }
 
@@ -257,49 +259,60 @@ double RigidWorld::worst_passed(const Twist& xi, const ToolPose& pose) const noe
   return least.back();
 }
 
+// Those that δ passes, and of the first ones what pressed last time. False: there are none that aren't in yet.
+bool RigidWorld::join(const ToolPose& pose, const ToolPose& q_old, const Twist& delta, bool first,
+                      double still_m) noexcept {
+  bool grew = false;
+  const double worst = shared_->dense ? worst_passed(delta, pose) : -1e-16;
+  for (std::size_t i = 0; i < found_count_; ++i) {
+    Found& found = found_[i];
+    if (found.working) continue;
+    const bool pressed = pairs_[found.pair].pressed;
+    if (!(approach(found, pose, delta) < worst) && !(first && pressed)) continue;
+    if (linear_count_ == ContactProblem::most) {
+      overflow_ = true;
+      break;
+    }
+    found.working = grew = true;
+    of_linear_[linear_count_] = static_cast<std::uint16_t>(i);
+    LinearContact& linear = linear_[linear_count_];
+    linearise(found, pose, q_old, linear, axes_[linear_count_]);
+    // What pressed is still there; forces that hold each other would follow rounding.
+    if (pressed && std::abs(linear.c[0]) <= still_m) linear.c[0] = 0.0;
+    ++linear_count_;
+  }
+  return grew;
+}
+
 // Solves the local problem at a pose that is by e off p̂. Contacts that neither pressed last time nor are passed on the
 // way to p̂ join when a solution passes them. `still_m`: rounding, where the last solution may hold already; or 0.
 bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
                               Twist& delta) noexcept {
-  const Twist e_coupled = couple(pose, e);
+  Twist e_coupled = couple(pose, e);
   see_slip(pose, q_old);
   linear_count_ = 0;
   held_ = false;
   bool solved = true;
   delta = -e;
   for (int round = 0; round < (shared_->dense ? 16 : 8); ++round) {
-    bool grew = false;
-    const double worst = shared_->dense ? worst_passed(delta, pose) : -1e-16;
-    for (std::size_t i = 0; i < found_count_; ++i) {
-      Found& found = found_[i];
-      if (found.working) continue;
-      const bool wanted = approach(found, pose, delta) < worst || (round == 0 && pairs_[found.pair].pressed);
-      if (!wanted) continue;
-      if (linear_count_ == ContactProblem::most) {
-        overflow_ = true;
-        break;
-      }
-      found.working = grew = true;
-      of_linear_[linear_count_] = static_cast<std::uint16_t>(i);
-      linearise(found, pose, q_old, linear_[linear_count_], axes_[linear_count_]);
-      ++linear_count_;
-    }
-    if (!grew) break;
+    if (!join(pose, q_old, delta, round == 0, still_m)) break;
     held_ = round == 0 && still_m > 0.0 && still_holds(pose, e_coupled, still_m, delta);
     if (held_) continue;
     solved = problem_.solve(e_coupled, {linear_.data(), linear_count_}, delta, rough);
     if (solved) continue;
     budget_ -= kHard;
-    solved = solve_fewer(pose, e_coupled, rough, delta);
+    solved = solve_unbent(e, rough, e_coupled, delta) || solve_fewer(pose, e_coupled, rough, delta);
   }
-  keep_forces();
   // What is reported is where the contact goes with this solution, not where it was linearised.
   for (std::size_t k = 0; k < linear_count_; ++k) {
-    Touch& touch = found_[of_linear_[k]].touch;
-    const Vec3 lever = touch.point - pose.position;
-    touch.gap = approach(found_[of_linear_[k]], pose, delta);
-    touch.point += delta.head<3>() + delta.tail<3>().cross(lever);
+    Found& found = found_[of_linear_[k]];
+    const Vec3 lever = found.touch.point - pose.position;
+    const bool goes_along = is_along_side(pairs_[found.pair].kind) && linear_[k].state != ContactState::open;
+    const Vec3 along = goes_along ? way_along_side(found, pose, delta) : Vec3(Vec3::Zero());
+    found.touch.gap = approach(found, pose, delta);
+    found.touch.point += delta.head<3>() + delta.tail<3>().cross(lever) + along;
   }
+  keep_forces();
   return solved;
 }
 
@@ -308,13 +321,23 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
 // others each time, as rounding of the gaps has it, and nothing ever comes to rest.
 bool RigidWorld::still_holds(const ToolPose& pose, const Twist& e, double still_m, Twist& delta) noexcept {
   const Twist before = delta;
-  bool still = problem_.holds(e, {linear_.data(), linear_count_}, delta) && size_m(delta) <= kStill_m;
+  bool still = problem_.holds(e, {linear_.data(), linear_count_}, delta);
   for (std::size_t k = 0; still && k < linear_count_; ++k) {
     const double gap = approach(found_[of_linear_[k]], pose, delta);
     still = gap >= -still_m && (linear_[k].state == ContactState::open || gap <= still_m);
   }
   if (!still) delta = before;
   return still;
+}
+
+// Where sides lie along each other, what bends has a condition of 1e10, and no forces are found that hold to within
+// rounding. Without the bends the iteration goes on, if more slowly.
+bool RigidWorld::solve_unbent(const Twist& e, double rough, Twist& e_coupled, Twist& delta) noexcept {
+  if (e_coupled == e || --fewer_ < 0) return false;
+  problem_.set_stiffness(K_);
+  problem_.allow(kWork);
+  e_coupled = e;
+  return problem_.solve(e, {linear_.data(), linear_count_}, delta, rough);
 }
 
 // Where an edge of the tool lies on a vertex of a mesh, all edges there hold it at one place, most of them with next to
@@ -352,7 +375,7 @@ void RigidWorld::keep_forces() noexcept {
     pair.pressed = true;
     const Vec3 force = axes_[k] * linear_[k].f;
     if (found.which == 0) pair.force_W = force;
-    pressed_[pressed_count_++] = {found.pair, found.which, force};
+    pressed_[pressed_count_++] = {found.pair, found.which, force, found.touch.point};
   }
 }
 
@@ -406,10 +429,14 @@ double RigidWorld::damped(double share, double size, double last) noexcept {
   return shrinks ? std::min(2.0 * share, 1.0) : std::max(0.5 * share, kLeastShare);
 }
 
+// Of gaps.
+double RigidWorld::rounding_m(const ToolPose& pose) const noexcept {
+  return 4.0 * std::numeric_limits<double>::epsilon() * (pose.position.lpNorm<1>() + shared_->reach + extent_m_);
+}
+
 // From a pose on, until nothing moves.
 bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept {
-  const double rounding =
-      4.0 * std::numeric_limits<double>::epsilon() * (q.position.lpNorm<1>() + shared_->reach + extent_m_);
+  const double rounding = rounding_m(q);
   double last = std::numeric_limits<double>::infinity(), share = 1.0, rest = kRest_m;
   ToolPose resting;
   collected_ = false;
@@ -443,7 +470,7 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     const bool whole = share == 1.0 && !roughly && beside_ <= beside_m && (!shared_->bends || size <= kStill_m);
     const bool small = std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding &&
                        stays_balanced(delta, e) && normals_turn_by(delta) <= kTurned;
-    if (whole && (held_ || size <= rounding || small)) {
+    if (whole && ((held_ && size <= kStill_m) || size <= rounding || small)) {
       collected_ = false;
       return solved;
     }

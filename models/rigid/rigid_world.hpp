@@ -124,6 +124,7 @@ class RigidWorld final : public PoseAlgorithm {
     std::uint16_t pair = 0;
     std::uint8_t which = 0;
     Vec3 force_W = Vec3::Zero();
+    Vec3 place_W = Vec3::Zero();  // of the material point, where it goes with that solution
   };
   struct Shared {  // constant
     std::vector<Part> parts;
@@ -238,17 +239,25 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double friction(const Pair& pair) const noexcept;
   void linearise(const Found& found, const ToolPose& pose, const ToolPose& q_old, LinearContact& out,
                  Mat3& frame) const noexcept;
-  [[nodiscard]] const Vec3* last_force(std::uint16_t pair, std::uint8_t which) const noexcept;
+  [[nodiscard]] const Pressed* last_pressed(std::uint16_t pair, std::uint8_t which) const noexcept;
+  [[nodiscard]] static bool is_along_side(Kind kind) noexcept { return kind == Kind::sides || kind == Kind::side_edge; }
   bool add_bend(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   bool add_bend_of_rim(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
   bool add_bend_of_sides(const Found& found, const ToolPose& pose, double force, Mat6& K) const noexcept;
+  struct NearSides;
+  [[nodiscard]] std::optional<NearSides> near_sides(const Found& found, const ToolPose& pose) const noexcept;
+  [[nodiscard]] Vec3 way_along_side(const Found& found, const ToolPose& pose, const Twist& delta) const noexcept;
+  void stay_along_side(Found& found, const ToolPose& pose) const noexcept;
+  [[nodiscard]] double rounding_m(const ToolPose& pose) const noexcept;
   Twist couple(const ToolPose& pose, const Twist& e) noexcept;
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
   [[nodiscard]] double worst_passed(const Twist& xi, const ToolPose& pose) const noexcept;
+  bool join(const ToolPose& pose, const ToolPose& q_old, const Twist& delta, bool first, double still_m) noexcept;
   bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
                     Twist& delta) noexcept;
   bool still_holds(const ToolPose& pose, const Twist& e, double still_m, Twist& delta) noexcept;
+  bool solve_unbent(const Twist& e, double rough, Twist& e_coupled, Twist& delta) noexcept;
   bool solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
   [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
@@ -284,7 +293,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
   int looks_ = 0;         // pairs that it may still look at
-  int fewer_ = 0;         // local problems that it may still try with fewer contacts
+  int fewer_ = 0;         // local problems that it may still try with less
   double clearance_ = -1.0;
 
   std::array<Found, most_found> found_;

@@ -14,6 +14,21 @@ struct OnRim {
   Vec3 x = Vec3::Zero(), along = Vec3::Zero();
 };
 
+// Looks around a rim; their cosines and sines.
+constexpr std::size_t around = 32;
+constexpr double step = 2.0 * std::numbers::pi / static_cast<double>(around);
+const std::array<Vec2, around>& looks() noexcept {
+  static const std::array<Vec2, around> all = [] {
+    std::array<Vec2, around> out;
+    for (std::size_t i = 0; i < around; ++i) {
+      const double angle = step * static_cast<double>(i);
+      out[i] = {std::cos(angle), std::sin(angle)};
+    }
+    return out;
+  }();
+  return all;
+}
+
 OnRim on_rim(const Solid::Rim& rim, double angle) noexcept {
   const double c = std::cos(angle), s = std::sin(angle);
   const Vec3 arm = c * rim.u + s * rim.v;
@@ -22,13 +37,6 @@ OnRim on_rim(const Solid::Rim& rim, double angle) noexcept {
 
 double nearest_angle(const Solid::Rim& rim, const Vec3& p) noexcept {
   return std::atan2(rim.v.dot(p - rim.centre), rim.u.dot(p - rim.centre));
-}
-
-double distance2_to_rim(const Solid::Rim& rim, const Vec3& p) noexcept {
-  const Vec3 d = p - rim.centre;
-  const double x = rim.u.dot(d), y = rim.v.dot(d), height2 = std::max(0.0, d.squaredNorm() - x * x - y * y);
-  const double beside = std::hypot(x, y) - rim.radius;
-  return height2 + beside * beside;
 }
 
 // How far a point is beyond a rim, in its plane.
@@ -43,9 +51,11 @@ class NearRims {
   NearRims(const Solid::Rim& a, const Solid::Rim& b) noexcept : a_(&a), b_(&b) {
     std::array<double, around> d2, beyond;
     for (std::size_t i = 0; i < around; ++i) {
-      const Vec3 x = on_rim(b, step * static_cast<double>(i)).x;
-      d2[i] = distance2_to_rim(a, x);
-      beyond[i] = beyond_rim(a, x);
+      const Vec2& look = looks()[i];
+      const Vec3 d = b.centre + b.radius * (look.x() * b.u + look.y() * b.v) - a.centre;
+      const double x = a.u.dot(d), y = a.v.dot(d), across2 = x * x + y * y;
+      beyond[i] = std::sqrt(across2) - a.radius;
+      d2[i] = std::max(0.0, d.squaredNorm() - across2) + beyond[i] * beyond[i];
     }
     for (std::size_t i = 0; i < around; ++i) {
       const std::size_t last = (i + around - 1) % around, next = (i + 1) % around;
@@ -61,9 +71,6 @@ class NearRims {
   [[nodiscard]] OnRim on_b(std::size_t k) const noexcept { return on_rim(*b_, angles_[k][1]); }
 
  private:
-  static constexpr std::size_t around = 32;
-  static constexpr double step = 2.0 * std::numbers::pi / static_cast<double>(around);
-
   void settle_dip(double angle) noexcept {
     double low = angle - step, high = angle + step;
     const auto beyond = [&](double at) { return beyond_rim(*a_, on_rim(*b_, at).x); };
