@@ -33,6 +33,11 @@ constexpr int kMostLeftOut = 1;
 // often in a step.
 constexpr double kIdle = 1e-3;
 constexpr int kFewer = 6;
+// Contacts that are passed by less than rounding don't join. Where more than a few are, so many at a time do; and none
+// that is passed by less than a hundredth of what a gap may be short of need be known.
+constexpr double kPassed_m = 1e-16, kPassedAmongMany_m = 1e-14;
+constexpr std::size_t kAtATime = 5, kFewPassed = 12;
+constexpr int kRounds = 16;
 constexpr int kWorkInside = 600;  // of hollow objects, where a look costs 0.5 µs and most steps take thirty
 // Newton's iteration with the gaps' curvature: what comes before a step of this size needn't be exact. A local problem
 // that is solved to this share of the last step leads as near.
@@ -244,36 +249,47 @@ double RigidWorld::approach(const Found& found, const ToolPose& pose, const Twis
   return found.touch.gap + found.touch.normal.dot(xi.head<3>() + xi.tail<3>().cross(lever));
 }
 
-// A face that comes down on a fine mesh passes many of its vertices at once, and few of them will hold it: those that
-// it passes by most join first, four at a time.
+// A face that comes down on a fine mesh passes many of its vertices at once, as a prism of many sides does that stands
+// up on a table, and few of them will hold it: those that it passes by most join first, four at a time. Below how much
+// they are passed; where few are, by anything.
 double RigidWorld::worst_passed(const Twist& xi, const ToolPose& pose) const noexcept {
-  std::array<double, 5> least;
-  least.fill(-1e-16);
+  std::array<double, kAtATime> least;
+  least.fill(-kPassed_m);
+  std::size_t passed = 0;
   for (std::size_t i = 0; i < found_count_; ++i) {
     if (found_[i].working) continue;
     double gap = approach(found_[i], pose, xi);
+    if (!(gap < -kPassed_m)) continue;
+    ++passed;
     for (double& other : least) {
       if (gap < other) std::swap(gap, other);
     }
   }
-  return least.back();
+  if (!shared_->dense && passed <= kFewPassed) return -kPassed_m;
+  // (many may be passed by as much to the bit)
+  return least.front() == least.back() ? std::nextafter(least.back(), 0.0) : least.back();
 }
 
 // Those that δ passes, and of the first ones what pressed last time. False: there are none that aren't in yet.
 bool RigidWorld::join(const ToolPose& pose, const ToolPose& q_old, const Twist& delta, bool first,
                       double still_m) noexcept {
-  bool grew = false;
-  const double worst = shared_->dense ? worst_passed(delta, pose) : -1e-16;
+  const double worst = worst_passed(delta, pose);
+  const bool some = worst < -kPassed_m;  // of those that are passed
+  std::size_t joined = 0;
+  const std::size_t before = linear_count_;
   for (std::size_t i = 0; i < found_count_; ++i) {
     Found& found = found_[i];
     if (found.working) continue;
     const bool pressed = pairs_[found.pair].pressed;
-    if (!(approach(found, pose, delta) < worst) && !(first && pressed)) continue;
+    const double gap = approach(found, pose, delta);
+    const bool passed = gap < worst && (!some || joined + 1 < kAtATime);
+    if (!passed && !(first && pressed)) continue;
     if (linear_count_ == ContactProblem::most) {
-      overflow_ = true;
-      break;
+      overflow_ = overflow_ || gap < -kPassedAmongMany_m;
+      continue;
     }
-    found.working = grew = true;
+    if (passed) ++joined;
+    found.working = true;
     of_linear_[linear_count_] = static_cast<std::uint16_t>(i);
     LinearContact& linear = linear_[linear_count_];
     linearise(found, pose, q_old, linear, axes_[linear_count_]);
@@ -281,7 +297,7 @@ bool RigidWorld::join(const ToolPose& pose, const ToolPose& q_old, const Twist& 
     if (pressed && std::abs(linear.c[0]) <= still_m) linear.c[0] = 0.0;
     ++linear_count_;
   }
-  return grew;
+  return linear_count_ > before;
 }
 
 // Solves the local problem at a pose that is by e off p̂. Contacts that neither pressed last time nor are passed on the
@@ -294,7 +310,7 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
   held_ = false;
   bool solved = true;
   delta = -e;
-  for (int round = 0; round < (shared_->dense ? 16 : 8); ++round) {
+  for (int round = 0; round < kRounds; ++round) {
     if (!join(pose, q_old, delta, round == 0, still_m)) break;
     held_ = round == 0 && still_m > 0.0 && still_holds(pose, e_coupled, still_m, delta);
     if (held_) continue;
