@@ -17,31 +17,42 @@ using models::Vec3;
 constexpr double shortest_slide_s = 0.1;
 constexpr double free_force_N = 1e-3;  // far above rounding (κ times an ulp of q), far below what a hand feels
 
-// Durations up to 1 ms in bins of 10 ns, so that a median over hours needs no more memory than one over seconds.
+// Durations in bins of 10 ns up to 1 ms, and beyond that of a hundredth of themselves up to 10 s, so that a median over
+// hours needs no more memory than one over seconds.
 class Durations {
  public:
   void add(std::int64_t ns) {
-    const std::int64_t bin = std::clamp<std::int64_t>(ns / 10, 0, static_cast<std::int64_t>(bins_.size()) - 1);
-    ++bins_[static_cast<std::size_t>(bin)];
+    ++bins_[bin_of(ns)];
     ++count_;
     max_ns_ = std::max(max_ns_, ns);
   }
 
-  // The duration that a fraction of all don't exceed, in µs; past the last bin the longest.
+  // The duration that a fraction of all don't exceed, in µs, at most the longest.
   [[nodiscard]] double quantile_us(double fraction) const {
     if (count_ == 0) return 0.0;
     const auto rank = static_cast<std::uint64_t>(std::ceil(fraction * static_cast<double>(count_)));
     std::uint64_t seen = 0;
-    for (std::size_t i = 0; i + 1 < bins_.size(); ++i) {
+    for (std::size_t i = 0; i < bins_.size(); ++i) {
       seen += bins_[i];
-      if (seen >= rank) return std::min(0.01 * static_cast<double>(i) + 0.005, max_us());
+      if (seen >= rank) return std::min(i < fine ? 0.01 * static_cast<double>(i) + 0.005 : end_us(i), max_us());
     }
     return max_us();
   }
   [[nodiscard]] double max_us() const { return 1e-3 * static_cast<double>(max_ns_); }
 
  private:
-  std::vector<std::uint32_t> bins_ = std::vector<std::uint32_t>(100'000);
+  static constexpr std::size_t fine = 100'000, coarse = 926;
+  static constexpr double ratio = 1.01;
+
+  static std::size_t bin_of(std::int64_t ns) {
+    const auto bin = static_cast<std::size_t>(std::max<std::int64_t>(ns, 0) / 10);
+    if (bin < fine) return bin;
+    const auto beyond = static_cast<std::size_t>(std::log(1e-6 * static_cast<double>(ns)) / std::log(ratio));
+    return fine + std::min(beyond, coarse - 1);
+  }
+  static double end_us(std::size_t bin) { return 1e3 * std::pow(ratio, static_cast<double>(bin - fine + 1)); }
+
+  std::vector<std::uint32_t> bins_ = std::vector<std::uint32_t>(fine + coarse);
   std::uint64_t count_ = 0;
   std::int64_t max_ns_ = 0;
 };

@@ -114,7 +114,7 @@ struct LimitSummary {
 };
 
 struct ComputeTime {
-  double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns, below 1 ms
+  double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns below 1 ms, to 1 % above
 };
 
 // Of a session in real time (latency.hpp), µs.

@@ -268,6 +268,21 @@ TEST(Summary, CountsDurationsToTenNanoseconds) {
   EXPECT_EQ(slow.finish().compute_us.median, 5000.0);
 }
 
+// Where a cycle in ten takes milliseconds, one of them seconds, p99 is that of the milliseconds, to a hundredth.
+TEST(Summary, QuantilesBeyondAMillisecondAreNotTheLongest) {
+  SummaryBuilder builder({});
+  for (int k = 0; k < 1000; ++k) {
+    const std::int64_t ns = k == 500 ? 3'000'000'000 : k % 10 == 0 ? 5'000'000 + 1000 * k : 20'000;
+    builder.add({.cycle = static_cast<std::uint64_t>(k), .compute_ns = ns});
+  }
+  const Summary s = builder.finish();
+  EXPECT_NEAR(s.compute_us.median, 20.0, 0.01);
+  // The 990th of 1000: the tenth from above, of which the first is the 3 s.
+  EXPECT_GE(s.compute_us.p99, 5910.0);
+  EXPECT_LE(s.compute_us.p99, 5910.0 * 1.01);
+  EXPECT_EQ(s.compute_us.max, 3e6);
+}
+
 TEST(Summary, JsonHasTheKeysThatProgramsReadAndOnlyRepeatableOnesInTheRecord) {
   Summary s = Session{}.run();
   s.wall_time_s = 0.7;
