@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <map>
 #include <numbers>
 #include <stdexcept>
+
+#include "models/rigid_shapes/exact_hull.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -28,7 +32,8 @@ class Hull {
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
-    // Points this near to a face's plane are its corners: a million roundings, far below what is made or measured.
+    // Points this near to a face's plane are its corners: a million roundings. Files of seven digits have points that
+    // are further off it, and nearer than what tells one face from the next (ExactHull).
     flat_ = 1e-10 * (high - low).norm();
     middle_ = Vec3::Zero();
     for (const Vec3& p : points_) middle_ += p / static_cast<double>(points_.size());
@@ -189,6 +194,102 @@ class Hull {
   std::vector<Solid::Edge> edges_;
 };
 
+// A body that is thinner than this share of its size is none: points in one plane, rounded.
+constexpr double kThin = 1e-9;
+// And a face that is narrower than this has no normal of its own: its corners are on a line, rounded.
+constexpr double kNeedle = 1e-12;
+
+// Of points that are nearly in one plane, too far off it to be taken for corners of one face.
+class ExactHull {
+ public:
+  explicit ExactHull(std::vector<Vec3> points) : points_(std::move(points)) {
+    const auto before = [](const Vec3& a, const Vec3& b) {
+      return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+    };
+    for (Vec3& p : points_) p = (p.array().abs() < 1e-60).select(0.0, p);
+    std::sort(points_.begin(), points_.end(), before);
+    points_.erase(std::unique(points_.begin(), points_.end()), points_.end());
+    size_ = (points_.front() - points_.back()).norm();
+  }
+
+  Solid build() {
+    rings_ = faces_of_hull(points_);
+    require(!rings_.empty(), "the points span no solid");
+    for (std::size_t i = 0; i < rings_.size(); ++i) add_face(i);
+    std::sort(needles_.begin(), needles_.end(), std::greater<>());
+    for (const auto& [width, face] : needles_) lean_on_neighbours(face);
+    finish();
+    return std::move(solid_);
+  }
+
+ private:
+  [[nodiscard]] double length(std::uint32_t a, std::uint32_t b) const { return (points_[a] - points_[b]).norm(); }
+
+  void add_face(std::size_t i) {
+    const std::vector<std::uint32_t>& ring = rings_[i];
+    Vec3 area = Vec3::Zero();
+    Vec3 longest = Vec3::Zero();
+    for (std::size_t k = 0; k < ring.size(); ++k) {
+      const std::uint32_t from = ring[k], to = ring[(k + 1) % ring.size()];
+      area += (points_[from] - points_[ring[0]]).cross(points_[to] - points_[ring[0]]);
+      const Vec3 side = points_[to] - points_[from];
+      if (side.squaredNorm() > longest.squaredNorm()) longest = side;
+      left_of_[{from, to}] = i;
+    }
+    const double width = area.norm() / longest.norm();
+    // Rounding of a narrow one's area must turn it about its length only.
+    for (int k = 0; k < 2; ++k) area -= area.dot(longest) / longest.squaredNorm() * longest;
+    normals_.push_back(area.normalized());
+    if (!(width > kNeedle * size_)) needles_.emplace_back(width, i);
+  }
+
+  // Between the normals beyond its two longest edges.
+  void lean_on_neighbours(std::size_t face) {
+    const std::vector<std::uint32_t>& ring = rings_[face];
+    std::vector<std::pair<double, std::size_t>> beyond;
+    for (std::size_t k = 0; k < ring.size(); ++k) {
+      const std::uint32_t from = ring[k], to = ring[(k + 1) % ring.size()];
+      beyond.emplace_back(length(from, to), left_of_.at({to, from}));
+    }
+    std::sort(beyond.begin(), beyond.end(), std::greater<>());
+    normals_[face] = (normals_[beyond[0].second] + normals_[beyond[1].second]).normalized();
+  }
+
+  void finish() {
+    std::vector<std::uint32_t> number(points_.size(), ~0U);
+    for (std::size_t i = 0; i < rings_.size(); ++i) {
+      const Vec3& n = normals_[i];
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (const Vec3& p : points_) low = std::min(low, n.dot(p));
+      for (const std::uint32_t j : rings_[i]) high = std::max(high, n.dot(points_[j]));
+      require(high - low > kThin * size_, "the points span no solid");
+      solid_.faces.push_back(
+          {n, high, static_cast<std::uint32_t>(solid_.ring.size()), static_cast<std::uint32_t>(rings_[i].size())});
+      for (const std::uint32_t j : rings_[i]) {
+        if (number[j] == ~0U) {
+          number[j] = static_cast<std::uint32_t>(solid_.points.size());
+          solid_.points.push_back(points_[j]);
+        }
+        solid_.ring.push_back(number[j]);
+      }
+    }
+    for (const auto& [edge, face] : left_of_) {
+      const auto [from, to] = edge;
+      if (from < to) {
+        solid_.edges.push_back({number[from], number[to], normals_[face], normals_[left_of_.at({to, from})]});
+      }
+    }
+  }
+
+  std::vector<Vec3> points_;
+  double size_ = 0.0;
+  std::vector<std::vector<std::uint32_t>> rings_;
+  std::vector<Vec3> normals_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> left_of_;  // the face to the left of an edge
+  std::vector<std::pair<double, std::size_t>> needles_;                     // width, face
+  Solid solid_;
+};
+
 }  // namespace
 
 Solid solid_of(const SphereTool& shape, const Pose& X) {
@@ -231,7 +332,11 @@ Solid solid_of(const ConvexTool& shape, const Pose& X) {
   require(shape.points_m.size() >= 4, "the points span no solid");
   std::vector<Vec3> points;
   for (const Vec3& p : shape.points_m) points.push_back(X * p);
-  return finished(Hull(std::move(points)).build());
+  try {
+    return finished(Hull(points).build());
+  } catch (const std::invalid_argument&) {
+    return finished(ExactHull(std::move(points)).build());
+  }
 }
 
 }  // namespace proxarm::models
