@@ -205,12 +205,15 @@ Twist RigidWorld::couple(const ToolPose& pose, const Twist& e) noexcept {
   if (!shared_->bends) return e;
   Mat6 K = K_;
   bool bent = false;
+  lies_along_ = false;
   for (std::size_t i = 0; i < found_count_; ++i) {
     const Found& found = found_[i];
     const Pressed* last = last_pressed(found.pair, found.which);
     if (last == nullptr) continue;
     const double f_n = found.touch.normal.dot(last->force_W);
-    if (f_n > 0.0 && add_bend(found, pose, f_n, K)) bent = true;
+    if (!(f_n > 0.0) || !add_bend(found, pose, f_n, K)) continue;
+    bent = true;
+    lies_along_ = lies_along_ || is_along_side(pairs_[found.pair].kind);
   }
   problem_.set_stiffness(K);
   return bent ? problem_.yield_to(K_ * e) : e;

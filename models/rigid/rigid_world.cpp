@@ -294,7 +294,7 @@ bool RigidWorld::join(const ToolPose& pose, const ToolPose& q_old, const Twist& 
     LinearContact& linear = linear_[linear_count_];
     linearise(found, pose, q_old, linear, axes_[linear_count_]);
     // What pressed is still there; forces that hold each other would follow rounding.
-    if (pressed && std::abs(linear.c[0]) <= still_m) linear.c[0] = 0.0;
+    if (pressed && lies_along_ && std::abs(linear.c[0]) <= still_m) linear.c[0] = 0.0;
     ++linear_count_;
   }
   return linear_count_ > before;
@@ -342,6 +342,7 @@ bool RigidWorld::still_holds(const ToolPose& pose, const Twist& e, double still_
     const double gap = approach(found_[of_linear_[k]], pose, delta);
     still = gap >= -still_m && (linear_[k].state == ContactState::open || gap <= still_m);
   }
+  if (!lies_along_) still = still && size_m(delta) <= kStill_m;
   if (!still) delta = before;
   return still;
 }
@@ -349,7 +350,7 @@ bool RigidWorld::still_holds(const ToolPose& pose, const Twist& e, double still_
 // Where sides lie along each other, what bends has a condition of 1e10, and no forces are found that hold to within
 // rounding. Without the bends the iteration goes on, if more slowly.
 bool RigidWorld::solve_unbent(const Twist& e, double rough, Twist& e_coupled, Twist& delta) noexcept {
-  if (e_coupled == e || --fewer_ < 0) return false;
+  if (!lies_along_ || --fewer_ < 0) return false;
   problem_.set_stiffness(K_);
   problem_.allow(kWork);
   e_coupled = e;

@@ -319,6 +319,7 @@ class RigidWorld final : public PoseAlgorithm {
   double extent_m_ = 0.0;          // of the coordinates of what moves
   bool without_friction_ = false;  // in the present attempt
   double behind_m_ = kFront_m;     // so far behind a feature of a cylinder may be what it holds in a part of the step
+  bool lies_along_ = false;        // a side along another, pressing in the last solution
   bool held_ = false;              // the last local problem by the forces of the one before
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
 };
