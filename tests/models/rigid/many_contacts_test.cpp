@@ -25,7 +25,8 @@ Tool nine_legs() {
   Tool tool;
   for (int i = 0; i < 9; ++i) {
     Pose X = Pose::Identity();
-    X.translation() = Vec3(0.03 * (i % 3), 0.03 * (i / 3), 0.025);
+    const int row = i / 3;
+    X.translation() = Vec3(0.03 * (i % 3), 0.03 * row, 0.025);
     tool.parts.push_back({BoxTool{Vec3(0.01, 0.01, 0.05)}, X, {}});
   }
   return tool;

@@ -121,7 +121,8 @@ TEST(RigidWorlds, AHullWhoseSidesAreNearlyFlatKeepsTheLaw) {
     const int sides = 3 + random.below(4);
     std::vector<Vec3> points;
     for (int k = 0; k < 2 * sides; ++k) {
-      const double a = 2.0 * std::numbers::pi * (k / 2) / sides;
+      const int corner = k / 2;
+      const double a = 2.0 * std::numbers::pi * corner / sides;
       const Vec3 p = R * Vec3(0.02 * std::cos(a), 0.02 * std::sin(a), k % 2 == 0 ? half : -half);
       points.push_back(single ? Vec3(p.cast<float>().cast<double>()) : Vec3(p + random.in_box(noise)));
     }
