@@ -102,6 +102,19 @@ void RigidWorld::let_go(double share) noexcept {
   for (Moving& m : moving_) m.mover.go(share);
 }
 
+// Where the tool is then that stays where it is, seen from what it is alone with: parts are short in that frame, while
+// the object may go by far in W.
+ToolPose RigidWorld::let_go_with(const ToolPose& q, double share) noexcept {
+  if (riding_ == nobody) {
+    let_go(share);
+    return q;
+  }
+  const Placement& at = moving_[riding_].mover.at();
+  const ToolPose on = at.back(q);
+  let_go(share);
+  return at * on;
+}
+
 // How the tool has moved since q(k−1), seen from what moves.
 void RigidWorld::see_slip(const ToolPose& pose, const ToolPose& q_old) noexcept {
   for (Moving& m : moving_) {
@@ -145,8 +158,20 @@ void RigidWorld::judge_slips(const ToolPose& q_old, double rounding) noexcept {
   }
 }
 
-// Whether the tool may be at a pose, by the sides on which it was: no gap is below 0.
+// How far the tool has come since the sides were taken, seen from what it may meet.
+double RigidWorld::strode_m(const ToolPose& pose) const noexcept {
+  double most = riding_ == nobody ? motion(pose, from_) : 0.0;
+  for (const Moving& m : moving_) {
+    if (!m.close) continue;
+    most = std::max(most, motion(m.mover.at().back(pose), {m.from.x, Quaternion(m.from.R)}));
+  }
+  return most;
+}
+
+// Whether the tool may be at a pose, by the sides on which it was: no gap is below 0. Sides tell nothing about a pose
+// that is further away than they reach.
 bool RigidWorld::has_room(const ToolPose& pose) noexcept {
+  if (strode_m(pose) > behind_m_) return false;
   find(pose);
   return !overflow_ && std::all_of(found_.begin(), found_.begin() + static_cast<std::ptrdiff_t>(found_count_),
                                    [](const Found& found) { return found.touch.gap >= -kGap_m; });

@@ -69,7 +69,6 @@ constexpr int kLooks = 60000;
 constexpr double kBalance = 3e-12;
 // Rounding of the work of 1000 N over a millimetre is ten thousand times less.
 constexpr double kNothing_J = 1e-12;
-constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
 
 // More pairs of corners than a box has among twenty others: where most of them came near, a step would look at too
 // much.
@@ -510,6 +509,7 @@ void RigidWorld::share_out(bool last) noexcept {
 
 bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
   const bool comes = something_comes();
+  if (comes && parts > 1) return in_strides(p_hat, q_old, far, parts, q);
   int left_out = 0;  // the parts just before this one
   ToolPose reached = q_old;
   overflow_ = squeezed_ = false;
@@ -521,7 +521,7 @@ bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double f
       return false;
     }
     const double share = static_cast<double>(k) / parts;
-    let_go(share);
+    reached = let_go_with(reached, share);
     const ToolPose p = k == parts ? p_hat : on_the_way(p_hat, q_old, share);
     if (comes || (k == parts && parts > 1)) share_out(k == parts);
     ToolPose next = reached;
@@ -579,7 +579,8 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   const double known = shared_->dense ? 0.25 * gathered_reach_ : gathered_reach_;
   const double limit = std::min(kPart * shared_->thinness, known);
   const double wanted = std::max(std::ceil(far / limit), 1.0);
-  const bool whole = wanted <= kMostParts;
+  // Among what moves strides lead over many parts at once.
+  const bool whole = wanted <= (something_comes() ? kMostStrides : kMostParts);
   const int parts = whole ? static_cast<int>(wanted) : kMostParts;
   const ToolPose goal = whole ? p_hat : moved(q, difference(p_hat, q) * (kMostParts / wanted));
   budget_ = kBudget + 8 * parts;
@@ -603,18 +604,20 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     return true;
   };
   bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in();
+  // What has used up what it may look at finds no more in smaller parts, nor without friction.
+  const auto may = [&] { return looks_ > 0 || !something_comes(); };
   if (fine && gives_energy(q)) {
-    look_again(goal, q, to_goal, parts);
-  } else if (!fine && budget_ > 0 && finer(parts) > 1) {
+    if (may()) look_again(goal, q, to_goal, parts);
+  } else if (!fine && budget_ > 0 && finer(parts) > 1 && may()) {
     fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in();
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
   // the law: there a jam is what most often has no solution, and without friction it would slip right through.
   const bool lawful = fine;
-  if (!fine && !shared_->hollow) {
+  if (!fine && !shared_->hollow && may()) {
     budget_ = kBudget;
-    looks_ = kLooks / 2;
+    looks_ = something_comes() ? std::min(looks_, kLooks / 2) : kLooks / 2;
     problem_.allow(kWork);
     without_friction_ = true;
     const ToolPose reached = q_;

@@ -136,6 +136,8 @@ class RigidWorld final : public PoseAlgorithm {
     bool bends = false;            // something is hollow, or the tool has rims: gaps' curvature counts
     bool dense = false;            // there is a mesh, or there are many solids
   };
+  static constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
+  static constexpr int kMostStrides = 1 << 16;  // the same, among objects that move
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 512;
   static constexpr std::size_t most_faces = 2048;  // of a mesh, near a part
@@ -167,6 +169,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] std::size_t first_pair() const noexcept { return riding_ == nobody ? 0 : still_count_; }
   [[nodiscard]] double came_m(const ToolPose& q) const noexcept;
   void let_go(double share) noexcept;
+  ToolPose let_go_with(const ToolPose& q, double share) noexcept;
   [[nodiscard]] bool something_comes() const noexcept;
   [[nodiscard]] bool has_room(const ToolPose& pose) noexcept;
   bool give_way(ToolPose& q) noexcept;
@@ -266,6 +269,12 @@ class RigidWorld final : public PoseAlgorithm {
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
+  bool in_strides(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
+  void wait(ToolPose& q, double share, double each) noexcept;
+  void stand(const ToolPose& pose, double far) noexcept;
+  [[nodiscard]] double strode_m(const ToolPose& pose) const noexcept;
+  [[nodiscard]] double free_m(std::uint16_t part, std::uint16_t entry, const View& at) noexcept;
+  [[nodiscard]] double free_m(const ToolPose& pose, double enough) noexcept;
   void allow_for(int parts) noexcept;
   [[nodiscard]] int finer(int parts) const noexcept;
   bool in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
