@@ -160,7 +160,10 @@ double RigidWorld::free_m(const ToolPose& pose, double enough) noexcept {
 
 // The tool stands here: the pairs are those that are near, the sides those on which it is.
 void RigidWorld::stand(const ToolPose& pose, double far) noexcept {
-  if (came_m(pose) > 0.5 * gathered_reach_) gather(pose, gathered_reach_);
+  if (came_m(pose) > 0.5 * gathered_reach_) {
+    gather(pose, gathered_reach_);
+    looks_ -= kOfPose + 4 * static_cast<int>(near_faces_);
+  }
   set_sides(pose, far);
 }
 
