@@ -167,84 +167,99 @@ void RigidWorld::stand(const ToolPose& pose, double far) noexcept {
   set_sides(pose, far);
 }
 
-bool RigidWorld::in_strides(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
-  const double each = far / parts;
-  const auto share = [&](int k) { return static_cast<double>(k) / parts; };
-  const auto way = [&](int k) { return k == parts ? p_hat : on_the_way(p_hat, q_old, share(k)); };
+// A step's parts from q_old to p̂, and how far the tool has come.
+struct RigidWorld::Strides {
+  const ToolPose &p_hat, &q_old;
+  double each;  // how far p̂ goes in a part
+  int parts;
+  int k = 0, stride = 1;  // parts done, and how many the next stride has
   ToolPose reached = q_old;
+
+  [[nodiscard]] double share(int part) const noexcept { return static_cast<double>(part) / parts; }
+};
+
+// Where p̂ is then.
+ToolPose RigidWorld::way(const Strides& s, int part) const noexcept {
+  return part == s.parts ? s.p_hat : on_the_way(s.p_hat, s.q_old, s.share(part));
+}
+
+// As many parts as there is room for. Whether there were any.
+bool RigidWorld::go_freely(Strides& s) noexcept {
+  // What held the tool may have left it off its way. Beyond what is gathered nothing is near, if that is nothing.
+  const double off = s.k == 0 ? 0.0 : motion(way(s, s.k), s.reached);
+  const int left = s.parts - s.k;
+  const double enough = (off + s.each * left) / kOfRoom;
+  double room = pair_count_ == 0 ? gathered_reach_ - came_m(s.reached) : 0.0;
+  if (room < enough) room = std::max(room, free_m(s.reached, enough));
+  const double free = std::floor(std::min((kOfRoom * room - off) / s.each + 1e-9, static_cast<double>(left)));
+  if (free < (pair_count_ == 0 ? 1.0 : 2.0) && !(free >= 0.0 && static_cast<int>(free) == left)) return false;
+  s.k += static_cast<int>(free);
+  let_go(s.share(s.k));
+  s.reached = way(s, s.k);
+  linear_count_ = found_count_ = 0;
+  keep_forces();
+  collected_ = false;
+  s.stride = 1;
+  return true;
+}
+
+// A stride in which something holds the tool, or may.
+RigidWorld::Strode RigidWorld::go_held(Strides& s) noexcept {
+  const int to = std::min(s.k + s.stride, s.parts);
+  const ToolPose start = let_go_with(s.reached, s.share(to));
+  ToolPose p = way(s, to);
+  const double ahead = motion(p, start), most = 2.0 * s.each * s.stride;
+  const bool last = to == s.parts && ahead <= most;
+  if (ahead > most) p = moved(start, difference(p, start) * (most / ahead));
+  share_out(last);
+  const int before = budget_;
+  ToolPose next = start;
+  const bool solved = settle(p, s.q_old, next);
+  looks_ -= kOfPose * (before - budget_);
+  const double strode = strode_m(next);
+  if (s.stride > 1 && !(solved && strode <= s.each)) {  // too far at once
+    overflow_ = false;
+    s.stride = std::max(s.stride / (kLonger * kLonger), 1);
+    let_go(s.share(s.k));
+    return Strode::again;
+  }
+  s.reached = solved ? next : start;
+  if (solved) {
+    // As many at once as the tool would need to come as far as it may.
+    const double longer = std::min(kOfRoom * s.each / strode, double{kLonger}) * s.stride;
+    s.stride = static_cast<int>(std::clamp(longer, 1.0, static_cast<double>(s.parts)));
+  } else {
+    // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
+    overflow_ = false;
+    if (!give_way(s.reached) || to == s.parts) return Strode::nowhere;
+  }
+  s.k = to;
+  return solved && last ? Strode::to_the_end : Strode::on;
+}
+
+bool RigidWorld::in_strides(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
+  Strides s{p_hat, q_old, far / parts, parts};
   overflow_ = squeezed_ = false;
   let_go(0.0);
-  gather(q_old, kGatheredParts * each);
-  stand(q_old, each);
+  gather(q_old, kGatheredParts * s.each);
+  stand(q_old, s.each);
   found_count_ = 0;
-  int k = 0, stride = 1;
-  for (bool there = false; !there;) {
+  Strode strode = Strode::on;
+  while (strode != Strode::to_the_end && strode != Strode::nowhere) {
     if (crowded_) {  // what isn't known may be in the way
-      q = reached;
-      return false;
-    }
-    if (looks_ < 0) {
-      wait(reached, share(k), each);
-      q = reached;
-      return false;
-    }
-    if (pressed_count_ == 0) {
-      // What held the tool may have left it off its way. Beyond what is gathered nothing is near, if that is nothing.
-      const double off = k == 0 ? 0.0 : motion(way(k), reached), enough = (off + each * (parts - k)) / kOfRoom;
-      double room = pair_count_ == 0 ? gathered_reach_ - came_m(reached) : 0.0;
-      if (room < enough) room = std::max(room, free_m(reached, enough));
-      const double free = std::floor(std::min((kOfRoom * room - off) / each + 1e-9, static_cast<double>(parts - k)));
-      if (free >= (pair_count_ == 0 ? 1.0 : 2.0) || (free >= 0.0 && k + static_cast<int>(free) == parts)) {
-        k += static_cast<int>(free);
-        let_go(share(k));
-        reached = way(k);
-        linear_count_ = found_count_ = 0;
-        keep_forces();
-        collected_ = false;
-        stride = 1;
-        there = k == parts;
-        if (!there) stand(reached, each);
-        continue;
-      }
-    }
-    const int to = std::min(k + stride, parts);
-    const ToolPose start = let_go_with(reached, share(to));
-    ToolPose p = way(to);
-    const double ahead = motion(p, start), most = 2.0 * each * stride;
-    const bool last = to == parts && ahead <= most;
-    if (ahead > most) p = moved(start, difference(p, start) * (most / ahead));
-    share_out(last);
-    const int before = budget_;
-    ToolPose next = start;
-    const bool solved = settle(p, q_old, next);
-    looks_ -= kOfPose * (before - budget_);
-    const double strode = strode_m(next);
-    if (stride > 1 && !(solved && strode <= each)) {
-      overflow_ = false;
-      stride = std::max(stride / (kLonger * kLonger), 1);
-      let_go(share(k));
-      continue;
-    }
-    if (solved) {
-      reached = next;
-      // As many at once as the tool would need to come as far as it may.
-      const double longer = std::min(kOfRoom * each / strode, double{kLonger}) * stride;
-      stride = static_cast<int>(std::clamp(longer, 1.0, static_cast<double>(parts)));
+      strode = Strode::nowhere;
+    } else if (looks_ < 0) {
+      wait(s.reached, s.share(s.k), s.each);
+      strode = Strode::nowhere;
+    } else if (pressed_count_ == 0 && go_freely(s)) {
+      strode = s.k == s.parts ? Strode::to_the_end : Strode::on;
     } else {
-      // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
-      reached = start;
-      const bool on = (overflow_ = false, give_way(reached)) && to < parts;
-      if (!on) {
-        q = reached;
-        return false;
-      }
+      strode = go_held(s);
     }
-    k = to;
-    there = solved && last;
-    if (!there) stand(reached, each);
+    if (strode == Strode::on) stand(s.reached, s.each);
   }
-  q = reached;
-  return true;
+  q = s.reached;
+  return strode == Strode::to_the_end;
 }
 
 // Where no more may be looked at, the tool waits where it is, or is taken along, until all has come to where it is at

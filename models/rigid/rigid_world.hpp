@@ -269,6 +269,11 @@ class RigidWorld final : public PoseAlgorithm {
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
+  struct Strides;
+  enum class Strode { on, again, nowhere, to_the_end };
+  [[nodiscard]] ToolPose way(const Strides& s, int part) const noexcept;
+  bool go_freely(Strides& s) noexcept;
+  Strode go_held(Strides& s) noexcept;
   bool in_strides(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
   void wait(ToolPose& q, double share, double each) noexcept;
   void stand(const ToolPose& pose, double far) noexcept;
