@@ -42,7 +42,10 @@ ToolPart some_part(Random& random) {
 ToolPart some_hull(Random& random) {
   models::ConvexTool hull;
   const int count = 4 + random.below(5);
-  for (int i = 0; i < count; ++i) hull.points_m.push_back(random.uniform(0.01, 0.03) * random.direction());
+  for (int i = 0; i < count; ++i) {
+    const Vec3 out = random.direction();
+    hull.points_m.emplace_back(random.uniform(0.01, 0.03) * out);
+  }
   return {hull, Pose::Identity(), {}};
 }
 

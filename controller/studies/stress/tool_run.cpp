@@ -100,7 +100,8 @@ class Pull {
 // seeds make them.)
 Vec3 home_in(const std::string& kind, std::uint64_t seed) {
   Random random(seed + 1);
-  const Vec3 there = random.direction() * random.uniform(0.0, 0.15);
+  const double away_m = random.uniform(0.0, 0.15);
+  const Vec3 there = away_m * random.direction();
   return kind == "hollow" ? there : Vec3(Vec3::Zero());
 }
 
