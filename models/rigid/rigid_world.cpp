@@ -5,10 +5,8 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "models/rigid_features/mesh_overlap.hpp"
 #include "models/rigid_features/mesh_part.hpp"
 #include "models/rigid_features/near.hpp"
-#include "models/rigid_shapes/overlap.hpp"
 #include "models/rigid_shapes/two_cylinders.hpp"
 
 namespace proxarm::models {
@@ -589,27 +587,14 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   allow_for(parts);
   // (far shrinks with the goal only where nothing moves)
   const double to_goal = moving_.empty() && !whole ? motion(goal, q) : far;
-  // Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
-  // none of them: nothing then holds it, and it would go in. What rests on the same features as before is beside none
-  // such.
-  const std::array<Pressed, ContactProblem::most> before = pressed_;
-  const std::size_t count_before = pressed_count_;
-  const auto went_in = [&] {
-    if (!shared_->dense || something_comes()) return false;
-    const bool same = parts == 1 && count_before > 0 && count_before == pressed_count_ &&
-                      std::equal(before.begin(), before.begin() + static_cast<std::ptrdiff_t>(count_before),
-                                 pressed_.begin(), [](const Pressed& a, const Pressed& b) { return a.pair == b.pair; });
-    if (same || !(overlap_m(q_) < -kGap_m)) return false;
-    q_ = q;
-    return true;
-  };
-  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in();
+  const FeaturesBefore before = features();
+  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(before, parts, q);
   // What has used up what it may look at finds no more in smaller parts, nor without friction.
   const auto may = [&] { return looks_ > 0 || !something_comes(); };
   if (fine && gives_energy(q)) {
     if (may()) look_again(goal, q, to_goal, parts);
   } else if (!fine && budget_ > 0 && finer(parts) > 1 && may()) {
-    fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in();
+    fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in(before, parts, q);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
@@ -622,7 +607,7 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     without_friction_ = true;
     const ToolPose reached = q_;
     // The iteration may have gone by far in a part: in the dent of a mesh past a face that holds only over itself.
-    fine = in_parts(goal, q, to_goal, parts, q_) && !(shared_->dense && overlap_m(q_) < -kGap_m);
+    fine = in_parts(goal, q, to_goal, parts, q_) && !(shared_->dense && stands_in(q_));
     without_friction_ = false;
     if (!fine) q_ = reached;
   }
@@ -743,85 +728,6 @@ void RigidWorld::report(const ToolPose& q_old) noexcept {
   if (motion(q_, q_old) > rounding) return;
   q_ = q_old;
   for (std::size_t k = 0; k < count_; ++k) contacts_[k].slips = false;
-}
-
-double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
-  RigidWorld copy(*this);
-  for (Moving& m : copy.moving_) m.close = true;
-  return copy.least_gap_m(pose);
-}
-
-// Of all objects that are close, wherever they are.
-double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
-  constexpr double first_m = 1e-3, furthest_m = 1e6, nearest_m = 1e-9;
-  double least = std::numeric_limits<double>::infinity(), empty = 0.0;
-  riding_ = nobody;
-  for (double far = first_m; far < furthest_m && far > nearest_m;) {
-    pair_count_ = 0;
-    gather(pose, far);
-    if (crowded_) {  // nearer, or else what was empty last is all that is known
-      if (empty > 0.0) return std::min(empty, overlap_m(pose));
-      far *= 0.25;
-      continue;
-    }
-    set_sides(pose, 0.0);
-    find(pose);
-    for (std::size_t i = 0; i < found_count_; ++i) least = std::min(least, found_[i].touch.gap);
-    if (least < far) break;
-    empty = far;
-    far *= 4.0;
-  }
-  return std::min(least, overlap_m(pose));
-}
-
-// Features have their gaps on the side on which the tool was. Where it is inside of a solid, or stands in a surface,
-// that says nothing.
-double RigidWorld::overlap_m(const ToolPose& pose) const noexcept {
-  double deepest = std::numeric_limits<double>::infinity();
-  const View tool = view(pose);
-  for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
-    const Entry& e = shared_->entries[i];
-    const auto* solid = std::get_if<Solid>(&e.object.shape);
-    const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
-    const auto entry = static_cast<std::uint16_t>(i);
-    if ((solid == nullptr && mesh == nullptr) || (moves(entry) && !moving(entry).close)) continue;
-    const View at = seen_from(entry, tool);
-    const bool beyond = distance2_to_box(at.x, e.bounds) > shared_->reach * shared_->reach;
-    if (beyond && !e.object.inside_out)
-      continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)
-    for (const Part& part : shared_->parts) {
-      const double gap = overlap_m(part, e, at);
-      if (gap < 0.0) deepest = std::min(deepest, gap);
-    }
-  }
-  return deepest;
-}
-
-// How deep a part of the tool stands in an object, or how far it is from a mesh's surface on the wrong side of it; 0 or
-// more if neither.
-double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& at) noexcept {
-  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
-  if (mesh != nullptr) {
-    std::optional<bool> inside;
-    if (entry.held != 0.0) inside = entry.object.inside_out;
-    if (part.mesh) return overlap_of_meshes(part.mesh->mesh(), (*mesh)->mesh(), at, inside);
-    return overlap_with_mesh(part.solid, part.box, (*mesh)->mesh(), at, inside);
-  }
-  const Solid& solid = *std::get_if<Solid>(&entry.object.shape);
-  if (part.mesh) {
-    return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false);
-  }
-  if (part.cylinder && entry.cylinder) {
-    return separation_of_cylinders(moved(*part.cylinder, at.R, at.x), *entry.cylinder);
-  }
-  if (part.cylinder) return separation_of_cylinder(moved(*part.cylinder, at.R, at.x), solid);
-  if (entry.cylinder) {
-    const View to = inverse(at);
-    return separation_of_cylinder(moved(*entry.cylinder, to.R, to.x), part.solid);
-  }
-  if (part.solid.faces.empty() && solid.faces.empty()) return 0.0;
-  const double gap = separation_of_hulls(part.solid, isometry(at), solid);
-  return gap < 0.0 ? gap - (part.solid.radius + solid.radius) : gap;
 }
 
 }  // namespace proxarm::models

@@ -33,6 +33,7 @@
 #include "models/local_problem/contact_problem.hpp"
 #include "models/rigid/beside_cylinder.hpp"
 #include "models/rigid/rigid_mover.hpp"
+#include "models/rigid_features/mesh_overlap.hpp"
 #include "models/rigid_features/rigid_features.hpp"
 #include "models/rigid_shapes/cylinder.hpp"
 
@@ -289,8 +290,16 @@ class RigidWorld final : public PoseAlgorithm {
   void collect_contacts() noexcept;
   void report(const ToolPose& q_old) noexcept;
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
-  [[nodiscard]] double overlap_m(const ToolPose& pose) const noexcept;
-  [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at) noexcept;
+  struct FeaturesBefore {
+    std::array<std::uint16_t, ContactProblem::most> pairs;
+    std::size_t count = 0;
+  };
+  [[nodiscard]] FeaturesBefore features() const noexcept;
+  bool went_in(const FeaturesBefore& before, int parts, const ToolPose& q_old) noexcept;
+  [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
+  [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
+  [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at,
+                                        const Apart& apart) noexcept;
 
   std::shared_ptr<const Shared> shared_;
   std::vector<double> friction_;  // of each entry, as it is now

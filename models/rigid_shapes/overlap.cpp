@@ -13,13 +13,22 @@ std::array<Vec3, 3> sides_of(const std::array<Vec3, 3>& triangle) noexcept {
           (triangle[0] - triangle[2]).normalized()};
 }
 
-// The points of another body beyond those of `a`, along n.
-double gap_along(const Vec3& n, const Solid& a, const Pose& X, std::span<const Vec3> b) noexcept {
-  const Vec3 n_a = X.linear().transpose() * n;
-  double furthest = -std::numeric_limits<double>::infinity(), nearest = std::numeric_limits<double>::infinity();
-  for (const Vec3& p : a.points) furthest = std::max(furthest, n_a.dot(p));
-  for (const Vec3& p : b) nearest = std::min(nearest, n.dot(p));
-  return nearest - (furthest + n.dot(X.translation()));
+// The points of `a` along n.
+double furthest(const Vec3& n, std::span<const Vec3> a) noexcept {
+  double out = -std::numeric_limits<double>::infinity();
+  for (const Vec3& p : a) out = std::max(out, n.dot(p));
+  return out;
+}
+
+// The points of another body beyond those of `a`, along n, if nothing of `a` is further along n than `own`.
+double gap_beyond(double own, const Vec3& n, std::span<const Vec3> b) noexcept { return -furthest(-n, b) - own; }
+
+// Whether a plane with this normal may lie on a convex body along one of its edges: between those of the faces beside
+// it. Elsewhere the edge isn't furthest along n, and the gap that counts is another plane's. Without faces it may.
+bool holds_along(const Solid::Edge& edge, const Vec3& along, const Vec3& n) noexcept {
+  if (edge.left.isZero(0.0)) return true;
+  const double turn = edge.left.cross(edge.right).dot(along);
+  return turn * edge.left.cross(n).dot(along) >= 0.0 && turn * n.cross(edge.right).dot(along) >= 0.0;
 }
 
 // Tries the planes along two unit directions. Parallel ones have no plane of their own. Below a millionth of a radian
@@ -53,36 +62,62 @@ double between_segments(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3&
 
 }  // namespace
 
-double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b) noexcept {
+double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b, double enough) noexcept {
   double largest = -std::numeric_limits<double>::infinity();
-  const auto try_along = [&](const Vec3& n) { largest = std::max(largest, gap_along(n, a, X, b.points)); };
-  for (const Solid::Face& face : a.faces) try_along(X.linear() * face.normal);
-  for (const Solid::Face& face : b.faces) try_along(-face.normal);
-  if (largest > 0.0) return largest;  // apart is all that is asked for
+  const Pose to_a = X.inverse();
+  for (const Solid::Face& face : a.faces) {
+    const Vec3 n = X.linear() * face.normal;
+    largest = std::max(largest, gap_beyond(face.offset + n.dot(X.translation()), n, b.points));
+    if (largest > enough) return largest;
+  }
+  for (const Solid::Face& face : b.faces) {
+    const Vec3 n = to_a.linear() * face.normal;
+    largest = std::max(largest, gap_beyond(face.offset + n.dot(to_a.translation()), n, a.points));
+    if (largest > enough) return largest;
+  }
   for (const Solid::Edge& own : a.edges) {
-    const Vec3 along = X.linear() * (a.points[own.to] - a.points[own.from]).normalized();
+    const Vec3 along_a = (a.points[own.to] - a.points[own.from]).normalized(), along = X.linear() * along_a;
     for (const Solid::Edge& other : b.edges) {
-      across(along, (b.points[other.to] - b.points[other.from]).normalized(), try_along);
+      const Vec3 along_b = (b.points[other.to] - b.points[other.from]).normalized();
+      across(along, along_b, [&](const Vec3& n) {
+        const Vec3 n_a = to_a.linear() * n;
+        if (!holds_along(own, along_a, n_a) || !holds_along(other, along_b, -n)) return;
+        largest = std::max(largest, gap_beyond(furthest(n_a, a.points) + n.dot(X.translation()), n, b.points));
+      });
     }
   }
   return largest;
 }
 
-double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle) noexcept {
+double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle,
+                                double enough) noexcept {
+  const Pose to_a = X.inverse();
+  const std::array<Vec3, 3> b = {to_a * triangle[0], to_a * triangle[1], to_a * triangle[2]};
+  const std::array<Vec3, 3> sides = sides_of(b);
+  const Vec3 normal = sides[0].cross(sides[1]).normalized();
   double largest = -std::numeric_limits<double>::infinity();
-  const auto try_along = [&](const Vec3& n) { largest = std::max(largest, gap_along(n, a, X, triangle)); };
-  const Vec3 normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized();
-  try_along(normal);
-  try_along(-normal);
-  for (const Solid::Face& face : a.faces) try_along(X.linear() * face.normal);
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3 side = (triangle[(k + 1) % 3] - triangle[k]).normalized();
-    try_along(side.cross(normal));
-    if (largest > 0.0) return largest;  // most are apart by now
+  const auto is_enough = [&](const Vec3& n, double own) {
+    largest = std::max(largest, gap_beyond(own, n, b));
+    return largest > enough;
+  };
+  // Of the many that are apart most are by these planes, dearest last.
+  for (const Vec3& n : {normal, Vec3(-normal)}) {
+    if (is_enough(n, furthest(n, a.points))) return largest;
+  }
+  for (const Solid::Face& face : a.faces) {
+    if (is_enough(face.normal, face.offset)) return largest;
+  }
+  for (const Vec3& side : sides) {
+    const Vec3 n = side.cross(normal);
+    if (is_enough(n, furthest(n, a.points))) return largest;
   }
   for (const Solid::Edge& own : a.edges) {
-    const Vec3 along = X.linear() * (a.points[own.to] - a.points[own.from]).normalized();
-    for (std::size_t k = 0; k < 3; ++k) across(along, (triangle[(k + 1) % 3] - triangle[k]).normalized(), try_along);
+    const Vec3 along = (a.points[own.to] - a.points[own.from]).normalized();
+    for (const Vec3& side : sides) {
+      across(along, side, [&](const Vec3& n) {
+        if (holds_along(own, along, n)) is_enough(n, n.dot(a.points[own.from]));
+      });
+    }
   }
   return largest;
 }

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
 #include <functional>
 #include <numbers>
 
@@ -216,6 +218,38 @@ TEST(RigidWorldsOfMeshes, ABladeDoesntPassASheetThatIsAsThin) {
     return std::make_shared<const TriangleMesh>(std::move(soup));
   };
   expect_law(boxes_about(sheet, {{1e-4, 0.02, 0.05}}, 0.06));
+}
+
+// Whether a tool has come into a mesh is asked whenever what holds it changes. That may not cost more than the step: by
+// all planes along two edges each triangle took a hull of 200 corners a millisecond, and a step fifty. The bound is
+// what a cycle has at 1 kHz, ten times what it needs.
+TEST(MeshWorlds, TimingOfAHullOnALargeMesh) {
+  TriangleSoup soup = tests::ball(6, 0.05);
+  for (Vec3& v : soup.vertices) v *= 1.0 + 0.01 * std::sin(800.0 * v.x()) * std::sin(700.0 * v.y());
+  RigidObject object;
+  object.shape = std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(std::move(soup)));
+  object.friction = 0.3;
+  Random random(91);
+  ConvexTool hull;
+  for (int i = 0; i < 200; ++i) hull.points_m.push_back(0.01 * random.direction());
+  RigidWorld g({{{hull, Pose::Identity(), {}}}}, {object});
+  ToolPose q;
+  q.position = 0.065 * Vec3::UnitX();
+  HeldTool held = realistic(q);
+  RoamingHand hand{.next_place = [](Random& r, const ToolPose& now) {
+    return Vec3(r.uniform(0.03, 0.06) * (now.position.normalized() + r.in_box(0.5)).normalized());
+  }};
+  std::vector<double> touching_us;
+  for (int k = 0; k < 2'000; ++k) {
+    const ToolPose p = held.freely(hand.wrench(random, held, k));
+    const auto begun = std::chrono::steady_clock::now();
+    held.arrive(g.step(held.K, p, held.q));
+    const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begun;
+    if (!g.contacts().empty()) touching_us.push_back(took.count());
+  }
+  ASSERT_GT(touching_us.size(), 500u);
+  std::nth_element(touching_us.begin(), touching_us.begin() + touching_us.size() / 2, touching_us.end());
+  EXPECT_LT(touching_us[touching_us.size() / 2], 1000.0);
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
+
 #include "models/base/random.hpp"
 
 namespace proxarm::models {
@@ -63,6 +66,102 @@ TEST(Overlap, NoDirectionLeadsOutOnAShorterWay) {
     EXPECT_NEAR(best, told, 0.2 * std::abs(told) + 1e-3);  // of 20,000 directions one is within some 0.02 rad
   }
   EXPECT_GT(overlapping, 20);
+}
+
+// All planes that two convex bodies can have between them: along the faces of both, and along an edge of each.
+double by_all_planes(const Solid& a, const Pose& X, const Solid& b) {
+  double best = -1e9;
+  for (const Solid::Face& face : a.faces) best = std::max(best, gap_along(X.linear() * face.normal, a, X, b));
+  for (const Solid::Face& face : b.faces) best = std::max(best, gap_along(-face.normal, a, X, b));
+  for (const Solid::Edge& own : a.edges) {
+    for (const Solid::Edge& other : b.edges) {
+      const Vec3 n = (X.linear() * (a.points[own.to] - a.points[own.from]).normalized())
+                         .cross((b.points[other.to] - b.points[other.from]).normalized());
+      if (n.norm() < 1e-6) continue;
+      best = std::max({best, gap_along(n.normalized(), a, X, b), gap_along(-n.normalized(), a, X, b)});
+    }
+  }
+  return best;
+}
+
+Solid random_hull(Random& random, int points) {
+  ConvexTool hull;
+  for (int i = 0; i < points; ++i) hull.points_m.push_back(random.arrow(0.02, 0.03));
+  return solid_of(hull, Pose::Identity());
+}
+
+// A triangle as a solid of two faces; its sides' planes are those of its edges and their neighbours' normals.
+Solid solid_of_triangle(const std::array<Vec3, 3>& corners) {
+  Solid out;
+  out.points = {corners[0], corners[1], corners[2]};
+  const Vec3 n = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    out.edges.push_back({k, (k + 1) % 3, n, -n});
+    out.faces.push_back({n.cross(corners[(k + 1) % 3] - corners[k]).normalized() * -1.0, 0.0, 0, 0});
+  }
+  out.faces.push_back({n, 0.0, 0, 0});
+  out.faces.push_back({-n, 0.0, 0, 0});
+  return out;
+}
+
+// Edges are asked only for planes on which they can lie: that leaves out none that counts. To the rounding of some
+// centimetres.
+TEST(Overlap, OfHullsItIsWhatTheBestOfAllPlanesLeaves) {
+  Random random(6);
+  int overlapping = 0, apart = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Solid a = random_hull(random, 4 + random.below(20)), b = random_hull(random, 4 + random.below(20));
+    const Pose X = random_pose(random, 0.05);
+    const double told = separation_of_hulls(a, X, b), best = by_all_planes(a, X, b);
+    if (best > 1e-15) {
+      EXPECT_GT(told, 0.0);
+      EXPECT_LE(told, best + 1e-15);
+      ++apart;
+    } else {
+      EXPECT_NEAR(told, best, 1e-15);
+      ++overlapping;
+    }
+  }
+  EXPECT_GT(overlapping, 50);
+  EXPECT_GT(apart, 30);
+}
+
+TEST(Overlap, OfAHullAndATriangleItIsWhatTheBestOfAllPlanesLeaves) {
+  Random random(7);
+  int overlapping = 0, apart = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Solid a = random_hull(random, 4 + random.below(40));
+    const Vec3 middle = random.in_box(0.03);
+    const std::array<Vec3, 3> triangle = {middle + random.in_box(0.02), middle + random.in_box(0.02),
+                                          middle + random.in_box(0.02)};
+    const Pose X = random_pose(random, 0.01);
+    const double told = separation_from_triangle(a, X, triangle);
+    const double best = by_all_planes(a, X, solid_of_triangle(triangle));
+    if (best > 1e-15) {
+      EXPECT_GT(told, 0.0);
+      EXPECT_LE(told, best + 1e-15);
+      ++apart;
+    } else {
+      EXPECT_NEAR(told, best, 1e-15);
+      ++overlapping;
+    }
+  }
+  EXPECT_GT(overlapping, 100);
+  EXPECT_GT(apart, 50);
+}
+
+// As deep as 1e-12 m is enough: what touches, by rounding above or below, isn't looked at any further, and what is
+// deeper is told as it is.
+TEST(Overlap, WhatIsEnoughEndsTheSearchAndNothingElseDoes) {
+  const Solid box = solid_of(BoxTool{Vec3(0.02, 0.02, 0.02)}, Pose::Identity());
+  for (const double deep_m : {0.0, 1e-13, 9e-13, 1.1e-12, 1e-9, 1e-4}) {
+    Pose X = Pose::Identity();
+    X.translation().z() = 0.01 - deep_m;
+    const std::array<Vec3, 3> triangle = {Vec3(-0.1, -0.1, 0.0), Vec3(0.1, -0.1, 0.0), Vec3(0.0, 0.1, 0.0)};
+    EXPECT_NEAR(separation_from_triangle(box, X, triangle, -1e-12), -deep_m, 1e-17);
+    X.translation().z() = 0.02 - deep_m;
+    EXPECT_NEAR(separation_of_hulls(box, X, box, -1e-12), -deep_m, 1e-17);
+  }
 }
 
 TEST(Overlap, APointInsideOfABoxIsAsDeepAsItsNearestFace) {

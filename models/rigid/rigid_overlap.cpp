@@ -1,0 +1,131 @@
+// Whether the tool stands in an object: how far it is from there, for figures, and whether a step has led it in.
+#include <algorithm>
+#include <array>
+
+#include "models/rigid/rigid_world.hpp"
+#include "models/rigid_features/mesh_overlap.hpp"
+#include "models/rigid_features/near.hpp"
+#include "models/rigid_shapes/overlap.hpp"
+#include "models/rigid_shapes/two_cylinders.hpp"
+
+namespace proxarm::models {
+namespace {
+
+constexpr std::size_t kMostPlanes = 8;  // more contacts than hold a tool
+
+}  // namespace
+
+double RigidWorld::clearance_m(const ToolPose& pose) const noexcept {
+  RigidWorld copy(*this);
+  for (Moving& m : copy.moving_) m.close = true;
+  return copy.least_gap_m(pose);
+}
+
+// Of all objects that are close, wherever they are.
+double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
+  constexpr double first_m = 1e-3, furthest_m = 1e6, nearest_m = 1e-9;
+  double least = std::numeric_limits<double>::infinity(), empty = 0.0;
+  riding_ = nobody;
+  for (double far = first_m; far < furthest_m && far > nearest_m;) {
+    pair_count_ = 0;
+    gather(pose, far);
+    if (crowded_) {  // nearer, or else what was empty last is all that is known
+      if (empty > 0.0) return std::min(empty, overlap_m(pose));
+      far *= 0.25;
+      continue;
+    }
+    set_sides(pose, 0.0);
+    find(pose);
+    for (std::size_t i = 0; i < found_count_; ++i) least = std::min(least, found_[i].touch.gap);
+    if (least < far) break;
+    empty = far;
+    far *= 4.0;
+  }
+  return std::min(least, overlap_m(pose));
+}
+
+// Features have their gaps on the side on which the tool was. Where it is inside of a solid, or stands in a surface,
+// that says nothing.
+double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noexcept {
+  double deepest = std::numeric_limits<double>::infinity();
+  const View tool = view(pose);
+  for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
+    const Entry& e = shared_->entries[i];
+    const auto* solid = std::get_if<Solid>(&e.object.shape);
+    const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
+    const auto entry = static_cast<std::uint16_t>(i);
+    if ((solid == nullptr && mesh == nullptr) || (moves(entry) && !moving(entry).close)) continue;
+    const View at = seen_from(entry, tool);
+    const bool beyond = distance2_to_box(at.x, e.bounds) > shared_->reach * shared_->reach;
+    if (beyond && !e.object.inside_out)
+      continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)
+    for (const Part& part : shared_->parts) {
+      const double gap = overlap_m(part, e, at, moves(entry) ? Apart{apart.enough} : apart);
+      if (gap < 0.0) deepest = std::min(deepest, gap);
+    }
+  }
+  return deepest;
+}
+
+// How deep a part of the tool stands in an object, or how far it is from a mesh's surface on the wrong side of it; 0 or
+// more if neither.
+double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& at, const Apart& apart) noexcept {
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
+  if (mesh != nullptr) {
+    std::optional<bool> inside;
+    if (entry.held != 0.0) inside = entry.object.inside_out;
+    if (part.mesh) return overlap_of_meshes(part.mesh->mesh(), (*mesh)->mesh(), at, inside);
+    return overlap_with_mesh(part.solid, part.box, (*mesh)->mesh(), at, inside, apart);
+  }
+  const Solid& solid = *std::get_if<Solid>(&entry.object.shape);
+  if (part.mesh) {
+    std::array<Vec3, kMostPlanes> normals;
+    const std::size_t count = std::min(apart.normals.size(), normals.size());
+    for (std::size_t i = 0; i < count; ++i) normals[i] = at.R.transpose() * apart.normals[i];
+    return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false,
+                             {apart.enough, {normals.data(), count}});
+  }
+  if (part.cylinder && entry.cylinder) {
+    return separation_of_cylinders(moved(*part.cylinder, at.R, at.x), *entry.cylinder);
+  }
+  if (part.cylinder) return separation_of_cylinder(moved(*part.cylinder, at.R, at.x), solid);
+  if (entry.cylinder) {
+    const View to = inverse(at);
+    return separation_of_cylinder(moved(*entry.cylinder, to.R, to.x), part.solid);
+  }
+  if (part.solid.faces.empty() && solid.faces.empty()) return 0.0;
+  const double gap = separation_of_hulls(part.solid, isometry(at), solid, apart.enough);
+  return gap < 0.0 ? gap - (part.solid.radius + solid.radius) : gap;
+}
+
+// The features that hold the tool.
+RigidWorld::FeaturesBefore RigidWorld::features() const noexcept {
+  FeaturesBefore out;
+  if (!shared_->dense) return out;
+  for (std::size_t i = 0; i < pressed_count_; ++i) out.pairs[out.count++] = pressed_[i].pair;
+  return out;
+}
+
+// Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
+// none of them: nothing then holds it, and it would go in. What rests on the same features as before is beside none
+// such. A tool that went in goes back to where it was.
+bool RigidWorld::went_in(const FeaturesBefore& before, int parts, const ToolPose& q_old) noexcept {
+  if (!shared_->dense || something_comes()) return false;
+  const bool same =
+      parts == 1 && before.count > 0 && before.count == pressed_count_ &&
+      std::equal(pressed_.begin(), pressed_.begin() + static_cast<std::ptrdiff_t>(pressed_count_), before.pairs.begin(),
+                 [](const Pressed& p, std::uint16_t pair) { return p.pair == pair; });
+  if (same || !stands_in(q_)) return false;
+  q_ = q_old;
+  return true;
+}
+
+// What the tool touches is mostly on the other side of a plane through a contact, and so is what is next to it.
+bool RigidWorld::stands_in(const ToolPose& pose) const noexcept {
+  std::array<Vec3, kMostPlanes> normals;
+  const std::size_t count = std::min(linear_count_, normals.size());
+  for (std::size_t k = 0; k < count; ++k) normals[k] = found_[of_linear_[k]].touch.normal;
+  return overlap_m(pose, {-kGap_m, {normals.data(), count}}) < -kGap_m;
+}
+
+}  // namespace proxarm::models
