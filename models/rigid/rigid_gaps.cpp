@@ -258,6 +258,41 @@ void RigidWorld::evaluate(const Pair& pair, const View& at, Each each) const noe
   }
 }
 
+// A face of a closed mesh goes on beyond its valleys, inside of the body: there a point that is before it is before the
+// valley's other face as well, or in that. A corner in a valley that a pose of the iteration takes behind one face by
+// some nanometres has its foot on the other one beyond the valley by as much; not to be found there, it let the tool go
+// by tenths of a millimetre, to where something else held it. So what pressed in the last solution still counts as far
+// beyond as the last step went. (Next to a valley's end the body may end there, too: what a step ends on has its foot
+// on its face.)
+std::optional<Touch> RigidWorld::over_valley(const Pair& pair, const View& at) const noexcept {
+  const Entry& entry = shared_->entries[pair.entry];
+  const Part& part = shared_->parts[pair.part];
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
+  const bool ours = pair.kind == Kind::face_point;
+  const TriangleFeatures* features = ours ? part.mesh.get() : mesh != nullptr ? mesh->get() : nullptr;
+  if (features == nullptr || pair.side == 0.0F) return {};
+  if (!ours && (pair.kind != Kind::point_face || entry.held == 0.0)) return {};
+  const std::uint32_t index = ours ? pair.own : pair.other;
+  const double side = ours ? 1.0 : static_cast<double>(pair.side);
+  const std::uint8_t valleys = features->valleys_of(index, side);
+  if (valleys == 0) return {};
+  const Solid* solid = std::get_if<Solid>(&entry.object.shape);
+  const double radius = ours ? (solid != nullptr ? solid->radius : 0.0) : part.solid.radius;
+  const Vec3 p = !ours ? at * part.solid.points[pair.own]
+                       : at.to_T(mesh != nullptr ? (*mesh)->vertex(pair.other) : solid->points[pair.other]);
+  const Vec3& n = face_of(*features, index).normal;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Vec3& corner = features->mesh().corner(index, k);
+    const Vec3 inwards = n.cross(features->mesh().corner(index, (k + 1) % 3) - corner);
+    const double off = (valleys >> k & 1U) != 0 ? over_m_ : beside_m;
+    if (inwards.dot(p - corner) < -off * inwards.norm()) return {};
+  }
+  const double gap = side * TriangleMesh::height(face_of(*features, index), p) - radius,
+               lift = mesh != nullptr ? kLift_m : 0.0;
+  if (!ours) return Touch{p - radius * side * n, side * n, gap - lift};
+  return Touch{at * Vec3(p - (gap + radius) * n), -(at.R * n), gap - lift};
+}
+
 void RigidWorld::find(const ToolPose& pose) noexcept {
   found_count_ = 0;
   looks_ -= static_cast<int>(pair_count_);
@@ -271,7 +306,8 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
     const View& at = on == nullptr ? at_W : on->tool;
     if (pairs_[i].kind >= Kind::side_point) looks_ -= pairs_[i].kind == Kind::rims ? kRims : kOfCylinder;
     if (is_flat_rim(pairs_[i].kind)) remember_lowest(pairs_[i], at);
-    evaluate(pairs_[i], at, [&](const Touch& t, int which) {
+    const std::size_t before = found_count_;
+    const auto add = [&](const Touch& t, int which) {
       if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far
       if (found_count_ == most_found) {
         overflow_ = true;
@@ -285,9 +321,15 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
       }
       found.pair = static_cast<std::uint16_t>(i);
       found.which = static_cast<std::uint8_t>(which);
-      found.working = false;
+      found.working = found.over = false;
       if (is_along_side(pairs_[i].kind)) stay_along_side(found, pose);
-    });
+    };
+    evaluate(pairs_[i], at, add);
+    if (found_count_ > before || !pairs_[i].pressed || !(over_m_ > beside_m)) continue;
+    if (const std::optional<Touch> t = over_valley(pairs_[i], at)) {
+      add(*t, 0);
+      if (found_count_ > before) found_[before].over = true;
+    }
   }
   drop_deeper(at_W);
 }
@@ -365,7 +407,7 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
     }
   }
   for (std::size_t i = 0; i < found_count_; ++i) {
-    if (!(found_[i].touch.gap < -kGap_m)) continue;
+    if (!(found_[i].touch.gap < -kGap_m) || found_[i].over) continue;
     const Pair& pair = pairs_[found_[i].pair];
     const bool is_sharp = pair.kind == Kind::edges || pair.kind == Kind::rim_edge || pair.kind == Kind::rims;
     if (is_sharp && beside(found_[i], at)) {

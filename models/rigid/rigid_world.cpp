@@ -393,6 +393,15 @@ void RigidWorld::keep_forces() noexcept {
   }
 }
 
+// Whether all that presses lies on what it is pressed to, to within rounding.
+bool RigidWorld::on_features() const noexcept {
+  if (beside_ > beside_m) return false;
+  for (std::size_t k = 0; k < linear_count_; ++k) {
+    if (linear_[k].state != ContactState::open && found_[of_linear_[k]].over) return false;
+  }
+  return true;
+}
+
 // Whether the wrench is balanced after δ from a pose that is by e off p̂ as the local problem has it. Rotations aren't
 // vectors: log(exp δ exp e) = δ + e + δ × e/2 to second order.
 bool RigidWorld::stays_balanced(const Twist& delta, const Twist& e) const noexcept {
@@ -457,7 +466,9 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
   for (int k = 0; k < 50; ++k) {
     if (--budget_ < 0 || looks_ < 0 || problem_.exhausted()) break;
     beside_ = k < kToAndFro ? beside_m : std::clamp(last, beside_m, kBesideAtMost_m);
+    over_m_ = std::isfinite(last) ? std::clamp(last, beside_m, kBesideAtMost_m) : beside_m;
     find(q);
+    over_m_ = beside_m;
     Twist delta;
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
@@ -481,14 +492,15 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     q = moved(q, share * delta);
     // What is left after this is the last ratio times this. Where gaps bend, this step counts as well: the forces are
     // those of normals before it.
-    const bool whole = share == 1.0 && !roughly && beside_ <= beside_m && (!shared_->bends || size <= kStill_m);
+    const bool on = on_features();
+    const bool whole = share == 1.0 && !roughly && on && (!shared_->bends || size <= kStill_m);
     const bool small = std::isfinite(last) && size < 0.1 * last && size / last * size <= 0.1 * rounding &&
                        stays_balanced(delta, e) && normals_turn_by(delta) <= kTurned;
     if (whole && ((held_ && size <= kStill_m) || size <= rounding || small)) {
       collected_ = false;
       return solved;
     }
-    if (solved && !roughly && beside_ <= beside_m && size < rest) {
+    if (solved && !roughly && on && size < rest) {
       rest = size;
       resting = q;
       collect_contacts();

@@ -106,6 +106,7 @@ class RigidWorld final : public PoseAlgorithm {
     std::uint16_t pair = 0;
     std::uint8_t which = 0;  // of a rim
     bool working = false;
+    bool over = false;  // its foot is beyond a valley
   };
   struct Part {
     Solid solid;
@@ -216,6 +217,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
   void evaluate(const Pair& pair, const View& at, Each each) const noexcept;
+  [[nodiscard]] std::optional<Touch> over_valley(const Pair& pair, const View& at) const noexcept;
   struct AtCylinder;
   [[nodiscard]] BesideCylinder beside_cylinder(std::uint16_t part, std::uint16_t entry) const noexcept;
   [[nodiscard]] int meet(const Pair& pair, const AtCylinder& here, std::array<Meeting, 4>& out) const noexcept;
@@ -263,6 +265,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool still_holds(const ToolPose& pose, const Twist& e, double still_m, Twist& delta) noexcept;
   bool solve_unbent(const Twist& e, double rough, Twist& e_coupled, Twist& delta) noexcept;
   bool solve_fewer(const ToolPose& pose, const Twist& e, double rough, Twist& delta) noexcept;
+  [[nodiscard]] bool on_features() const noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
   [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
   void balance(const Twist& e, Twist& delta) noexcept;
@@ -345,6 +348,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool lies_along_ = false;        // a side along another, pressing in the last solution
   bool held_ = false;              // the last local problem by the forces of the one before
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
+  double over_m_ = beside_m;       // and how far beyond a valley, of what pressed in the last solution
 };
 
 }  // namespace proxarm::models

@@ -20,6 +20,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
   // All half-edges, sorted, so that those of one edge are neighbours.
   struct Half {
     std::uint32_t low, high, face, opposite;
+    std::uint8_t bit;
   };
   std::vector<Half> halves;
   const auto faces = static_cast<std::uint32_t>(mesh_->size());
@@ -28,7 +29,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
     const auto& t = mesh_->triangle(f);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-      halves.push_back({std::min(a, b), std::max(a, b), f, t[(k + 2) % 3]});
+      halves.push_back({std::min(a, b), std::max(a, b), f, t[(k + 2) % 3], static_cast<std::uint8_t>(1U << k)});
     }
   }
   std::sort(halves.begin(), halves.end(), [](const Half& x, const Half& y) {
@@ -39,6 +40,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
   std::uint32_t vertices = 0;
   for (const Half& half : halves) vertices = std::max(vertices, half.high + 1);
   std::vector<std::uint32_t> owner(vertices, none);
+  bends_.assign(faces, {0, 0});
   for (std::size_t i = 0; i < halves.size();) {
     std::size_t end = i + 1;
     while (end < halves.size() && halves[end].low == halves[i].low && halves[end].high == halves[i].high) ++end;
@@ -57,6 +59,7 @@ TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : m
       edges_by_face.emplace_back(first.face, static_cast<std::uint32_t>(edges_.size()));
       edges_.push_back(edge);
       ends_.push_back({first.low, first.high});
+      for (std::size_t k = i; k < end && end - i == 2; ++k) bends_[halves[k].face][edge.ridge ? 1 : 0] |= halves[k].bit;
       for (const std::uint32_t v : {first.low, first.high}) {
         if (owner[v] == none) owner[v] = first.face;
       }

@@ -35,6 +35,11 @@ class TriangleFeatures {
   [[nodiscard]] const Edge& edge(std::uint32_t i) const noexcept { return edges_[i]; }
   [[nodiscard]] const std::array<std::uint32_t, 2>& ends(std::uint32_t edge) const noexcept { return ends_[edge]; }
   [[nodiscard]] const Vec3& vertex(std::uint32_t i) const noexcept { return mesh_->vertex(i); }
+  // Which of a face's edges are valleys, seen from its front (side 1) or from behind (−1): bit k for the one from
+  // corner k to the next.
+  [[nodiscard]] std::uint8_t valleys_of(std::uint32_t face, double side) const noexcept {
+    return bends_[face][side > 0.0 ? 0 : 1];
+  }
   // The edges and vertices that a face owns; each belongs to one face.
   [[nodiscard]] std::span<const std::uint32_t> edges_of(std::uint32_t face) const noexcept {
     return owned(owned_edges_, first_edge_, face);
@@ -56,6 +61,7 @@ class TriangleFeatures {
   double outwards_ = 0.0;
   std::vector<Edge> edges_;
   std::vector<std::array<std::uint32_t, 2>> ends_;  // of each edge, its vertices
+  std::vector<std::array<std::uint8_t, 2>> bends_;  // of each face, its valleys and its ridges
   std::vector<std::uint32_t> owned_edges_, first_edge_, owned_vertices_, first_vertex_;
 };
 
