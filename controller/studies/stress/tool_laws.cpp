@@ -349,33 +349,39 @@ std::string ToolLaws::missed(const ToolCall& call) const {
   return {};
 }
 
-double ToolLaws::curvature_J(const ToolCall& call) const {
+double ToolLaws::curvature_m(const ToolCall& call, const PoseContact& contact) const {
   const double turned = models::difference(call.r, call.q).tail<3>().norm();
+  const Vec3 lever = contact.point_W - call.r.position;
+  const double s = call.way_of(contact).norm();
+  const double radius = cores_[static_cast<std::size_t>(contact.part)].radius_m;
+  const double bend = bend_per_m_[static_cast<std::size_t>(contact.object)] + (radius > 0.0 ? 1.0 / radius : 0.0);
+  return turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s;
+}
+
+double ToolLaws::curvature_J(const ToolCall& call) const {
   double sum = 0.0;
-  for (const PoseContact& contact : call.contacts) {
-    const Vec3 lever = contact.point_W - call.r.position;
-    const double s = call.way_of(contact).norm();
-    const double radius = cores_[static_cast<std::size_t>(contact.part)].radius_m;
-    const double bend = bend_per_m_[static_cast<std::size_t>(contact.object)] + (radius > 0.0 ? 1.0 / radius : 0.0);
-    sum += contact.force_W.norm() * (turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s);
-  }
+  for (const PoseContact& contact : call.contacts) sum += contact.force_W.norm() * curvature_m(call, contact);
   return sum;
 }
 
 double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier) const {
   double sum = 0.0;
   for (const PoseContact& contact : call.contacts) {
-    const double s = call.way_of(contact).norm();
+    const Vec3 way = call.way_of(contact);
+    const double s = way.norm(), bent_m = curvature_m(call, contact) + 1e-12;
+    const auto met = [&](const PoseContact& was) {
+      return was.object == contact.object && was.normal_W.dot(way) <= bent_m;
+    };
     // A normal turns where it is: of what touched the object before, what was as near as a place may have come, if
     // there is such. (Replay 2305703389568219, step 172: one edge of the tool leaves a face of a mesh for the next
     // face's edge, and others lie on that face already, elsewhere.)
     const auto came = [&](const PoseContact& was) {
-      return was.object == contact.object && (was.point_W - contact.point_W).norm() <= 2.0 * s;
+      return met(was) && (was.point_W - contact.point_W).norm() <= 2.0 * s;
     };
     const bool near = std::any_of(earlier.begin(), earlier.end(), came);
     double cosine = -1.0;
     for (const PoseContact& was : earlier) {
-      if (near ? !came(was) : was.object != contact.object) continue;
+      if (near ? !came(was) : !met(was)) continue;
       cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
     }
     if (!(cosine > 0.0)) continue;

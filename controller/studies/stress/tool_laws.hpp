@@ -50,8 +50,11 @@ class ToolLaws {
   // at a lever bends by θ² lever/2, normals turn by θ while the point goes on by s, and something round falls off by
   // s²/2r.
   [[nodiscard]] double curvature_J(const ToolCall& call) const;
-  // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once: sin α
-  // of the way, if p̂ isn't deeper below than a path over the edge can come. `earlier`: what touched before.
+  // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once, from
+  // n₀ to n. Along n₀ the place of contact has come to meet the feature or been held by it, n₀ᵀs ≤ 0 (but for what the
+  // curvature accounts for), so that nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖: sin α of the way, if p̂ isn't
+  // deeper below than a path over the edge can come. `earlier`: what touched before, in the step before or on the way.
+  // What the place came from behind says nothing about it.
   [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier) const;
 
   // Rounding of a pose, as a length.
@@ -84,6 +87,7 @@ class ToolLaws {
   };
 
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
+  [[nodiscard]] double curvature_m(const ToolCall& call, const models::PoseContact& contact) const;
   [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
   [[nodiscard]] double apart_from_m(const Core& core, const models::ToolPose& pose, std::size_t object) const;
 

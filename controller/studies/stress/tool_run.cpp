@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <sstream>
 
 #include "controller/proxies/pose_proxy.hpp"
@@ -169,12 +170,7 @@ class Judge {
     const double rest_J = rise_J - laws_.curvature_J(call) - rounding_J;
     if (!(rest_J > 0.0)) return;
     bool at_edges = rest_J <= laws_.edges_J(call, before_);
-    if (!at_edges) {
-      std::vector<PoseContact> earlier = before_;
-      const std::vector<PoseContact> met = first_met(call);
-      earlier.insert(earlier.end(), met.begin(), met.end());
-      at_edges = rest_J <= laws_.edges_J(call, earlier);
-    }
+    if (!at_edges) at_edges = rest_J <= laws_.edges_J(call, met(call));
     if (at_edges) {
       ++tally_.edge;
     } else {
@@ -182,30 +178,43 @@ class Judge {
     }
   }
 
-  // What the way from q to p̂ meets first: a tool may come to a corner and slide over it in one step. Where no eighth of
-  // the way touches that may still happen, in the last one: of replay 7563174384567051, step 159, a corner of the tool
-  // comes down on a face 96 % of the way, 12 µm from the face's edge, and p̂ is over that edge by 6 µm. There the edges
-  // alone hold it (the corner's foot isn't on the face, and friction doesn't bring it back), with a normal that leads
-  // forward: that is the law's only solution, and it turned the normal by 65° at once. So the place is looked for, to
-  // 1e-3 of an eighth, and what touches next to it is what was met.
-  std::vector<PoseContact> first_met(const ToolCall& call) {
+  // What the way from q to p̂ meets: a tool may come to a corner and slide over it in one step. Of replay
+  // 4460787946124040, step 41, it is pressed to one box, comes to a face of another one after a ninth of the way, is
+  // wedged between both by up to 7 kN, 0.5 mm before p̂, and leaves that face over its edge after three quarters: the
+  // edge, which it slides down, pushes forward, and that is the law's only solution. So each eighth of the way is
+  // looked at.
+  // What is first met between two of them may be left before the second one: of replay 7563174384567051, step 159, a
+  // corner of the tool comes down on a face 96 % of the way, 12 µm from the face's edge, and p̂ is over that edge by
+  // 6 µm. There the edges alone hold it (the corner's foot isn't on the face, and friction doesn't bring it back), with
+  // a normal that leads forward, and that turned the normal by 65° at once. So where an object is met first is looked
+  // for, to 1e-3 of an eighth, and what touches next to it is what was met.
+  std::vector<PoseContact> met(const ToolCall& call) {
     const std::unique_ptr<PoseAlgorithm> g = fresh_->clone();
     const Twist way = models::difference(call.p, call.q);
-    const auto touches = [&](double share) {
+    const auto touched_at = [&](double share) {
       g->step(call.K, models::moved(call.q, share * way), call.q);
-      return !g->contacts().empty();
+      return g->contacts();
     };
-    double free = 0.0, touching = 0.125;
-    while (touching < 1.0 && !touches(touching)) {
-      free = touching;
-      touching += 0.125;
+    const auto touches = [](std::span<const PoseContact> contacts, int object) {
+      return std::any_of(contacts.begin(), contacts.end(), [&](const auto& c) { return c.object == object; });
+    };
+    std::vector<PoseContact> all = before_;
+    for (int k = 1; k <= 8; ++k) {
+      const std::span<const PoseContact> here = touched_at(0.125 * k);
+      const std::vector<PoseContact> now(here.begin(), here.end());
+      for (const PoseContact& contact : now) {
+        if (touches(all, contact.object)) continue;
+        double free = 0.125 * (k - 1), touching = 0.125 * k;
+        for (int i = 0; i < 10; ++i) {
+          const double half = 0.5 * (free + touching);
+          (touches(touched_at(half), contact.object) ? touching : free) = half;
+        }
+        const std::span<const PoseContact> first = touched_at(touching);
+        all.insert(all.end(), first.begin(), first.end());
+      }
+      if (k < 8) all.insert(all.end(), now.begin(), now.end());
     }
-    for (int k = 0; k < 10; ++k) {
-      const double half = 0.5 * (free + touching);
-      (touches(half) ? touching : free) = half;
-    }
-    touches(touching);
-    return {g->contacts().begin(), g->contacts().end()};
+    return all;
   }
 
   // As tests/models/rigid/stiffness_independence_test.cpp, which says where what is allowed comes from.
