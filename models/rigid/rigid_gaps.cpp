@@ -379,6 +379,25 @@ bool RigidWorld::leans_into(const Found& corner, const View& at) const noexcept 
   return false;
 }
 
+// Whether one face of a closed mesh is all before another one's plane, as beside a valley: so is the foot on it then,
+// though on the valley's line rounding may say otherwise. Both hold the point.
+bool RigidWorld::rises_from(const Pair& one, const Pair& other) const noexcept {
+  const Entry& entry = shared_->entries[one.entry];
+  const bool of_tool = one.kind == Kind::face_point;
+  if (!of_tool && entry.held == 0.0) return false;
+  const TriangleFeatures& mesh = of_tool ? *shared_->parts[one.part].mesh
+                                         : **std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
+  const std::uint32_t face = of_tool ? one.own : one.other, base = of_tool ? other.own : other.other;
+  const double side = of_tool ? 1.0 : static_cast<double>(one.side);
+  double low = 0.0, high = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double height = side * TriangleMesh::height(face_of(mesh, base), mesh.mesh().corner(face, k));
+    low = std::min(low, height);
+    high = std::max(high, height);
+  }
+  return low > -kGap_m && high > kGap_m;
+}
+
 // A point inside of a convex solid, or under a ridge of a mesh, is behind several faces: only the one that it is least
 // deep under holds it. The same for an object's point in a part of the tool.
 void RigidWorld::drop_deeper(const View& at) noexcept {
@@ -422,10 +441,11 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
       // An open mesh's face may hold the point from behind: only one that it has come through counts here.
       if (is_mesh && pair.kind == Kind::point_face) {
         if (shared_->entries[pair.entry].held == 0.0 && !(found_[j].touch.gap < 0.0)) continue;
-        if (!behind(found_[i], found_[j], false)) continue;
+        if (!behind(found_[i], found_[j], false) || rises_from(pair, pairs_[found_[j].pair])) continue;
       }
-      if (pair.kind == Kind::face_point && shared_->parts[pair.part].mesh && !behind(found_[i], found_[j], true))
-        continue;
+      if (pair.kind == Kind::face_point && shared_->parts[pair.part].mesh) {
+        if (!behind(found_[i], found_[j], true) || rises_from(pair, pairs_[found_[j].pair])) continue;
+      }
       found_[i] = found_[--found_count_];
       --i;
       break;

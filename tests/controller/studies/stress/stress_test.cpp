@@ -44,6 +44,28 @@ TEST(Stress, AToolThatComesOverAnEdgeAtTheVeryEndOfAStepIsCountedAsAtAnEdge) {
   EXPECT_EQ(run.edge, 1);
 }
 
+// Of the first, step 41: wedged between two boxes, with 7 kN, a corner leaves the face of one of them over its edge.
+// The judge knew only what the way meets first, the other box, and took the edge's push for 0.5 J out of nowhere. Of
+// the others a corner goes over a mesh's ridge, pressed by 1.2 kN and 150 N: what lay on the mesh before the step, next
+// to there, had its place behind it, and said nothing about the ridge.
+TEST(Stress, AToolThatIsPressedOverAnEdgeThatItMeetsWithinTheStepIsCountedAsAtAnEdge) {
+  for (const std::uint64_t seed : {4460787946124040ULL, 6498936351365718ULL, 3134012562812637ULL}) {
+    const Tally run = run_tool_seed(seed, nullptr);
+    EXPECT_EQ(run.first, "none") << seed << " step " << run.first_step;
+    EXPECT_GE(run.edge, 1) << seed;
+  }
+}
+
+// A corner lies in a mesh's valley, a valley of a mesh as a tool on a corner: steps 105 and 85 lost it for a pose of
+// the iteration, and the tool sprang by 0.03 and 0.12 mm.
+TEST(Stress, ACornerInAMeshsValleyStaysInIt) {
+  for (const std::uint64_t seed : {5997991409764174ULL, 8594242761720168ULL}) {
+    const Tally run = run_tool_seed(seed, nullptr);
+    EXPECT_EQ(run.kind, "meshes");
+    EXPECT_EQ(run.first, "none") << seed << " step " << run.first_step;
+  }
+}
+
 // Step 43: a corner of a convex tool slides along a mesh's valley and over its end. It was behind six faces there, with
 // its foot on none of them, and nothing held it: it went 85 µm in, and 12 mm in the steps after.
 TEST(Stress, ACornerThatComesOverTheEndOfAMeshsValleyStaysOutside) {
