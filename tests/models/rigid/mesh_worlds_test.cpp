@@ -252,7 +252,7 @@ TEST(MeshWorlds, TimingOfAHullOnALargeMesh) {
   EXPECT_LT(touching_us[touching_us.size() / 2], 1000.0);
 }
 
-// A block with a sharp groove along y, as wide as it is high or wider; its lowest line is at z = −depth.
+// A block with a groove along y; its lowest line is at z = −depth.
 std::shared_ptr<const TriangleMesh> grooved_block(double depth) {
   constexpr double half = 0.02, bottom = -0.03;
   TriangleSoup soup;
