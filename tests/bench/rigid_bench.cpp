@@ -192,6 +192,26 @@ void peg_hit_about(benchmark::State& state) {
 }
 BENCHMARK(peg_hit_about)->Unit(benchmark::kMicrosecond);
 
+// -- a cylinder at a post ---------------------------------------------------------------------------------------------
+
+// scenes/cylinder_on_post.yaml: sides, ends and rims of two cylinders. By its middle, the tool lies along the post and
+// stands on it; between four places beside it and one on top.
+void cylinder_on_post(benchmark::State& state) {
+  RigidObject post;
+  post.shape = solid_of(CylinderTool{0.35, 0.06}, Pose::Identity());
+  post.friction = 0.3;
+  const RigidWorld world({{{CylinderTool{0.08, 0.03}, Pose::Identity(), {}}}}, {post});
+  ToolPose q;
+  q.position = Vec3(0.1, 0.0, 0.1);
+  const RoamingHand hand{.next_place = [](Random& random, const ToolPose&) {
+    if (random.chance(0.3)) return Vec3(random.in_box(0.03) + Vec3(0.0, 0.0, 0.2));
+    const double angle = random.uniform(-3.0, 3.0);
+    return Vec3(0.085 * std::cos(angle), 0.085 * std::sin(angle), random.uniform(0.05, 0.2));
+  }};
+  bench(state, {record(world, realistic(q), hand, 1, 50'000)}, kAny, "");
+}
+BENCHMARK(cylinder_on_post)->Unit(benchmark::kMicrosecond);
+
 // -- a convex tool on a large mesh ------------------------------------------------------------------------------------
 
 double bumpy(const Vec3& out) {
