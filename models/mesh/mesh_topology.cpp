@@ -287,6 +287,29 @@ TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m) {
   return soup;
 }
 
+NoInside why_no_inside(const TriangleMesh& mesh) {
+  if (mesh.closed()) {
+    if (mesh.size() >= 4) return {};
+    return {"has " + std::to_string(mesh.size()) + " triangles, and the smallest body has 4", ""};
+  }
+  const MeshTopology found = topology_of(mesh);
+  const auto at = [](const MeshDefect& defect) { return ", the first at " + place_text(defect.first_W); };
+  if (!found.holes.empty()) {
+    const MeshHole& largest = found.holes.back();
+    return {"is open, with a hole of " + size_text(largest.size_m) + " at " + place_text(largest.centre),
+            "close_holes_m may close it"};
+  }
+  if (found.non_manifold.count > 0) {
+    return {"has edges of three and more faces: " + std::to_string(found.non_manifold.count) + at(found.non_manifold),
+            "take out what is inside of it"};
+  }
+  if (found.flipped.count > 0) {
+    return {"has faces turned against the others: " + std::to_string(found.flipped.count) + at(found.flipped),
+            "turn them round in the program that made it"};
+  }
+  return {"has no front that all of its faces agree on", "a body has one"};
+}
+
 std::string place_text(const Vec3& at_W) {
   char text[96];
   std::snprintf(text, sizeof text, "x %.4g, y %.4g, z %.4g m", at_W.x(), at_W.y(), at_W.z());

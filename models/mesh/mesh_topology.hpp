@@ -38,6 +38,13 @@ struct MeshTopology {
 };
 MeshTopology topology_of(const TriangleMesh& mesh);
 
+// What keeps a mesh from being a body, with an inside: "is open, with a hole of 12 mm at …" and the like; and what may
+// be done about it. Empty for one that is.
+struct NoInside {
+  std::string what, advice;
+};
+NoInside why_no_inside(const TriangleMesh& mesh);
+
 // Faces that cut through others with which they share no edge, and faces that lie in the same three vertices. Costs
 // about as much as building the mesh: not for each start of a session.
 MeshDefect crossing_faces(const TriangleMesh& mesh);

@@ -9,6 +9,7 @@
 #include "models/base/text.hpp"
 #include "models/files/yaml_file.hpp"
 #include "models/files/yaml_rules.hpp"
+#include "models/mesh/mesh_topology.hpp"
 #include "scenes/mesh_files/mesh_file.hpp"
 
 namespace proxarm::scenes {
@@ -93,9 +94,9 @@ models::MeshTool read_mesh(const YamlNode& node, RigidTool& tool) {
   placement.scale = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
   placement.close_holes_m = node.number_or("close_holes_m", 0.0, between(0.0, 1e3));
   const auto mesh = load_mesh(file, placement).mesh;
-  if (!mesh->closed()) {
-    throw node.error_at("file", "a closed mesh, which has an inside", file.string() + ", which is open",
-                        "close_holes_m may close it");
+  if (const models::NoInside found = models::why_no_inside(*mesh); !found.what.empty()) {
+    throw node.error_at("file", "a closed mesh, which has an inside", file.string() + ", which " + found.what,
+                        found.advice);
   }
   if (mesh->size() > most_triangles) {
     throw node.error_at("file", "at most " + std::to_string(most_triangles) + " triangles",

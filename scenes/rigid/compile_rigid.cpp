@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "models/base/setup_error.hpp"
+#include "models/mesh/mesh_topology.hpp"
 #include "models/rigid/rigid_world.hpp"
 #include "scenes/compiler/obstacles.hpp"
 
@@ -86,8 +87,11 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
   if (!object.friction_regions.empty()) {
     return "a rigid tool feels one friction for all of an object, and " + name + " has regions";
   }
-  if (const auto* mesh = std::get_if<MeshShape>(&object.shape); mesh != nullptr && !mesh->mesh->closed()) {
-    return "a rigid tool is held by closed meshes only, and " + name + " is open (close_holes_m may close it)";
+  if (const auto* mesh = std::get_if<MeshShape>(&object.shape); mesh != nullptr) {
+    const models::NoInside found = models::why_no_inside(*mesh->mesh);
+    const std::string advice = found.advice.empty() ? "" : " (" + found.advice + ")";
+    if (!found.what.empty())
+      return "a rigid tool is held by closed meshes only, and " + name + " " + found.what + advice;
   }
   if (!has_cylinder(tool.parts) || !is_inside_out(object.shape)) return {};
   if (std::holds_alternative<CapsuleShape>(object.shape)) {

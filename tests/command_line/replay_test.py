@@ -64,7 +64,7 @@ class Replay(ProgramTest):
         scene = self.written("mesh.yaml", f"name: box of triangles\nobjects:\n  - mesh: {{file: {mesh.name}, friction: 0.3}}\n")
         for arguments in (("--scene", scene), ("--scene", "scenes/moving_plate.yaml", "--order", "2"),
                           ("--scene", "scenes/line.yaml"), ("--orientation", "free"),
-                          ("--scene", "scenes/box_on_belt.yaml", "--hand", "sim/hands/tip.yaml", "--inertia", "0.05"),
+                          ("--scene", "scenes/box_on_belt.yaml", "--hand", "sim/hands/tip.yaml", "--inertia", "0.1"),
                           ("models/cells/rail.yaml", "--timestep", "4ms")):
             with self.subTest(arguments):
                 outcome = self.call("run", "--json", "--record", "session", "--duration", "3s", *arguments)

@@ -50,8 +50,8 @@ def furthest_of_circle(x, y, u, v, radius):
 
 
 class RigidTool(ProgramTest):
-    def session(self, scene, hand, *options, folder="session"):
-        summary = self.summary("--scene", SCENES / scene, "--hand", HANDS / hand, "--inertia", "0.05", "--duration", "8s",
+    def session(self, scene, hand, *options, folder="session", inertia="0.05"):
+        summary = self.summary("--scene", SCENES / scene, "--hand", HANDS / hand, "--inertia", inertia, "--duration", "8s",
                                "--record", folder, *options)
         with open(self.folder / folder / "signals.csv", newline="") as file:
             rows = [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
@@ -75,13 +75,15 @@ class RigidTool(ProgramTest):
             self.assertLessEqual(math.hypot(x, y), 0.4 * z * (1 + 1e-9) + 1e-9)
 
     def test_a_box_rides_on_a_belt(self):
-        """It comes from above onto a plate that goes to and fro under it, and never into it."""
-        summary, rows = self.session("box_on_belt.yaml", "tip.yaml")
+        """It comes from above onto a plate that goes to and fro under it, and never into it. (With half the inertia it
+        bounces at 15 Hz, and how often it touches is chance.)"""
+        summary, rows = self.session("box_on_belt.yaml", "tip.yaml", inertia="0.1")
+        self.assertFalse(summary["oscillation"]["lasts"])
         corners = [(sx * 0.06, sy * 0.04, 0.01 + sz * 0.02) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]
         lowest = [min(placed(row, corner)[2] for corner in corners) for row in rows]
         self.assertGreaterEqual(min(lowest), 0.55 - ROUNDING_M)
         touching = [row for row in rows if row["contact"] != "free" and "unresolved" not in row["flags"]]
-        self.assertGreater(len(touching), 1000)
+        self.assertGreater(len(touching), 4000)
         self.assertLessEqual(summary["unresolved_steps"], 8)  # of 8000
         for row in touching:
             x, y, z = vector(row, "contact_force_W", "N")
@@ -247,8 +249,19 @@ class RigidTool(ProgramTest):
         broken = self.written("open.yaml", "mesh: {file: open.obj, scale_m: 0.001}\n")
         told = self.refuse("--scene", SCENES / "wall.yaml", "--tool", broken)
         self.assertIn("open.yaml", told)
-        self.assertIn("which is open", told)
+        self.assertIn("which is open, with a hole of ", told)
         self.assertIn("close_holes_m", told)
+        # The last face turned round: every edge still has two faces.
+        last = text.rsplit("f", 1)[1].split()
+        self.written("flipped.obj", text.rsplit("f", 1)[0] + "f " + " ".join(last[::-1]) + "\n")
+        flipped = self.refuse("--scene", SCENES / "wall.yaml", "--tool",
+                              self.written("flipped.yaml", "mesh: {file: flipped.obj, scale_m: 0.001}\n"))
+        self.assertIn("which has faces turned against the others: 1, the first at x ", flipped)
+        # Two faces of the same three corners, back to back: closed, and nothing is inside.
+        self.written("flat.obj", "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\nf 3 2 1\n")
+        flat = self.refuse("--scene", SCENES / "wall.yaml", "--tool",
+                           self.written("flat.yaml", "mesh: {file: flat.obj, scale_m: 0.001}\n"))
+        self.assertIn("has 2 triangles, and the smallest body has 4", flat)
         # A cube beside the first one, inside out.
         turned = text + "".join("v %g %g %g\n" % (x + 50, y, z) for x, y, z in corners)
         self.written("turned.obj", turned + "".join("f %d %d %d\n" % tuple(i + 10 for i in f[::-1]) for f in faces))
