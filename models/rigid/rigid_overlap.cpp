@@ -98,24 +98,11 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
   return gap < 0.0 ? gap - (part.solid.radius + solid.radius) : gap;
 }
 
-// The features that hold the tool.
-RigidWorld::FeaturesBefore RigidWorld::features() const noexcept {
-  FeaturesBefore out;
-  if (!shared_->dense) return out;
-  for (std::size_t i = 0; i < pressed_count_; ++i) out.pairs[out.count++] = pressed_[i].pair;
-  return out;
-}
-
 // Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
-// none of them: nothing then holds it, and it would go in. What rests on the same features as before is beside none
-// such. A tool that went in goes back to where it was.
-bool RigidWorld::went_in(const FeaturesBefore& before, int parts, const ToolPose& q_old) noexcept {
-  if (!shared_->dense || something_comes()) return false;
-  const bool same =
-      parts == 1 && before.count > 0 && before.count == pressed_count_ &&
-      std::equal(pressed_.begin(), pressed_.begin() + static_cast<std::ptrdiff_t>(pressed_count_), before.pairs.begin(),
-                 [](const Pressed& p, std::uint16_t pair) { return p.pair == pair; });
-  if (same || !stands_in(q_)) return false;
+// none of them: nothing then holds it, and it would go in, though all else rests where it did. A tool that went in goes
+// back to where it was.
+bool RigidWorld::went_in(const ToolPose& q_old) noexcept {
+  if (!shared_->dense || something_comes() || !stands_in(q_)) return false;
   q_ = q_old;
   return true;
 }

@@ -599,14 +599,13 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   allow_for(parts);
   // (far shrinks with the goal only where nothing moves)
   const double to_goal = moving_.empty() && !whole ? motion(goal, q) : far;
-  const FeaturesBefore before = features();
-  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(before, parts, q);
+  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(q);
   // What has used up what it may look at finds no more in smaller parts, nor without friction.
   const auto may = [&] { return looks_ > 0 || !something_comes(); };
   if (fine && gives_energy(q)) {
     if (may()) look_again(goal, q, to_goal, parts);
   } else if (!fine && budget_ > 0 && finer(parts) > 1 && may()) {
-    fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in(before, parts, q);
+    fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in(q);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept

@@ -294,12 +294,7 @@ class RigidWorld final : public PoseAlgorithm {
   void collect_contacts() noexcept;
   void report(const ToolPose& q_old) noexcept;
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
-  struct FeaturesBefore {
-    std::array<std::uint16_t, ContactProblem::most> pairs;
-    std::size_t count = 0;
-  };
-  [[nodiscard]] FeaturesBefore features() const noexcept;
-  bool went_in(const FeaturesBefore& before, int parts, const ToolPose& q_old) noexcept;
+  bool went_in(const ToolPose& q_old) noexcept;
   [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
   [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at,
