@@ -220,10 +220,10 @@ TEST(RigidWorldsOfMeshes, ABladeDoesntPassASheetThatIsAsThin) {
   expect_law(boxes_about(sheet, {{1e-4, 0.02, 0.05}}, 0.06));
 }
 
-// Whether a tool has come into a mesh is asked whenever what holds it changes. That may not cost more than the step: by
+// Whether a tool has come into a mesh is asked at each step. That may not cost more than the step: by
 // all planes along two edges each triangle took a hull of 200 corners a millisecond, and a step fifty. The bound is
 // what a cycle has at 1 kHz, ten times what it needs.
-TEST(MeshWorlds, TimingOfAHullOnALargeMesh) {
+TEST(RigidWorldsOfMeshes, TimingOfAHullOnALargeMesh) {
   TriangleSoup soup = tests::ball(6, 0.05);
   for (Vec3& v : soup.vertices) v *= 1.0 + 0.01 * std::sin(800.0 * v.x()) * std::sin(700.0 * v.y());
   RigidObject object;

@@ -104,15 +104,12 @@ Solid solid_of_triangle(const std::array<Vec3, 3>& corners) {
   return out;
 }
 
-// Edges are asked only for planes on which they can lie: that leaves out none that counts. To the rounding of some
-// centimetres.
-TEST(Overlap, OfHullsItIsWhatTheBestOfAllPlanesLeaves) {
-  Random random(6);
+// What overlaps is as deep as the best of all planes says, to the rounding of some centimetres. Of what is apart only
+// that is told, and no more than there is.
+struct Compared {
   int overlapping = 0, apart = 0;
-  for (int i = 0; i < 200; ++i) {
-    const Solid a = random_hull(random, 4 + random.below(20)), b = random_hull(random, 4 + random.below(20));
-    const Pose X = random_pose(random, 0.05);
-    const double told = separation_of_hulls(a, X, b), best = by_all_planes(a, X, b);
+
+  void expect(double told, double best) {
     if (best > 1e-15) {
       EXPECT_GT(told, 0.0);
       EXPECT_LE(told, best + 1e-15);
@@ -122,32 +119,34 @@ TEST(Overlap, OfHullsItIsWhatTheBestOfAllPlanesLeaves) {
       ++overlapping;
     }
   }
-  EXPECT_GT(overlapping, 50);
-  EXPECT_GT(apart, 30);
+};
+
+// Edges are asked only for planes on which they can lie: that leaves out none that counts.
+TEST(Overlap, OfHullsItIsWhatTheBestOfAllPlanesLeaves) {
+  Random random(6);
+  Compared seen;
+  for (int i = 0; i < 200; ++i) {
+    const Solid a = random_hull(random, 4 + random.below(20)), b = random_hull(random, 4 + random.below(20));
+    const Pose X = random_pose(random, 0.05);
+    seen.expect(separation_of_hulls(a, X, b), by_all_planes(a, X, b));
+  }
+  EXPECT_GT(seen.overlapping, 50);
+  EXPECT_GT(seen.apart, 30);
 }
 
 TEST(Overlap, OfAHullAndATriangleItIsWhatTheBestOfAllPlanesLeaves) {
   Random random(7);
-  int overlapping = 0, apart = 0;
+  Compared seen;
   for (int i = 0; i < 400; ++i) {
     const Solid a = random_hull(random, 4 + random.below(40));
     const Vec3 middle = random.in_box(0.03);
     const std::array<Vec3, 3> triangle = {middle + random.in_box(0.02), middle + random.in_box(0.02),
                                           middle + random.in_box(0.02)};
     const Pose X = random_pose(random, 0.01);
-    const double told = separation_from_triangle(a, X, triangle);
-    const double best = by_all_planes(a, X, solid_of_triangle(triangle));
-    if (best > 1e-15) {
-      EXPECT_GT(told, 0.0);
-      EXPECT_LE(told, best + 1e-15);
-      ++apart;
-    } else {
-      EXPECT_NEAR(told, best, 1e-15);
-      ++overlapping;
-    }
+    seen.expect(separation_from_triangle(a, X, triangle), by_all_planes(a, X, solid_of_triangle(triangle)));
   }
-  EXPECT_GT(overlapping, 100);
-  EXPECT_GT(apart, 50);
+  EXPECT_GT(seen.overlapping, 100);
+  EXPECT_GT(seen.apart, 50);
 }
 
 // As deep as 1e-12 m is enough: what touches, by rounding above or below, isn't looked at any further, and what is
