@@ -1,6 +1,7 @@
 // On which side of a feature the tool is, and how far from it.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/rigid_features.hpp"
@@ -293,6 +294,39 @@ std::optional<Touch> RigidWorld::over_valley(const Pair& pair, const View& at) c
   return Touch{at * Vec3(p - (gap + radius) * n), -(at.R * n), gap - lift};
 }
 
+// What pressed in the last solution, beyond its end by no more than the last step went. An edge of the tool that lies
+// on a vertex crosses one edge there or another one, as a pose of the iteration has it by nanometres: the one that it
+// left wasn't found, nothing held the tool there any more, and it went on by half a millimetre, to where something else
+// did.
+template <typename Each>
+void RigidWorld::evaluate_over(const Pair& pair, const View& at, Each each) noexcept {
+  if (const std::optional<Touch> t = over_valley(pair, at)) return each(*t, 0);
+  if (pair.kind != Kind::edges) return;
+  const double beside = std::exchange(beside_, std::max(beside_, over_m_));
+  evaluate(pair, at, each);
+  beside_ = beside;
+}
+
+// Whether a point that comes from behind a face of a convex solid is still before another one of its faces: then it is
+// outside, and what is deep under the face isn't in the solid. Where the solid is thin, as next to a tip, the far side
+// of an edge is near that a point lies under.
+bool RigidWorld::is_beyond_edge(const Pair& pair, double gap, const View& at) const noexcept {
+  const bool of_tool = pair.kind == Kind::face_point;
+  if (!(gap < -kGap_m) || (!of_tool && pair.kind != Kind::point_face)) return false;
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  const Solid* other = std::get_if<Solid>(&object.shape);
+  const Part& part = shared_->parts[pair.part];
+  const Solid* solid = !of_tool ? other : part.mesh ? nullptr : &part.solid;
+  if (solid == nullptr || !(signed_start(pair, from_of(pair)) < -kFront_m)) return false;
+  const Vec3 y = !of_tool ? at * part.solid.points[pair.own]
+                          : at.to_T(mesh != nullptr ? (*mesh)->vertex(pair.other) : other->points[pair.other]);
+  const auto height = [&y](const Solid::Face& face) { return face.normal.dot(y) - face.offset; };
+  if (!(height(solid->faces[of_tool ? pair.own : pair.other]) < -kGap_m)) return false;
+  return std::any_of(solid->faces.begin(), solid->faces.end(),
+                     [&](const Solid::Face& face) { return height(face) > kGap_m; });
+}
+
 void RigidWorld::find(const ToolPose& pose) noexcept {
   found_count_ = 0;
   looks_ -= static_cast<int>(pair_count_);
@@ -325,11 +359,10 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
       if (is_along_side(pairs_[i].kind)) stay_along_side(found, pose);
     };
     evaluate(pairs_[i], at, add);
+    if (found_count_ > before && is_beyond_edge(pairs_[i], found_[before].touch.gap, at)) found_count_ = before;
     if (found_count_ > before || !pairs_[i].pressed || !(over_m_ > beside_m)) continue;
-    if (const std::optional<Touch> t = over_valley(pairs_[i], at)) {
-      add(*t, 0);
-      if (found_count_ > before) found_[before].over = true;
-    }
+    evaluate_over(pairs_[i], at, add);
+    if (found_count_ > before) found_[before].over = true;
   }
   drop_deeper(at_W);
 }

@@ -106,7 +106,7 @@ class RigidWorld final : public PoseAlgorithm {
     std::uint16_t pair = 0;
     std::uint8_t which = 0;  // of a rim
     bool working = false;
-    bool over = false;  // its foot is beyond a valley
+    bool over = false;  // its foot is beyond a valley or an edge's end
   };
   struct Part {
     Solid solid;
@@ -218,6 +218,9 @@ class RigidWorld final : public PoseAlgorithm {
   template <typename Each>
   void evaluate(const Pair& pair, const View& at, Each each) const noexcept;
   [[nodiscard]] std::optional<Touch> over_valley(const Pair& pair, const View& at) const noexcept;
+  template <typename Each>
+  void evaluate_over(const Pair& pair, const View& at, Each each) noexcept;
+  [[nodiscard]] bool is_beyond_edge(const Pair& pair, double gap, const View& at) const noexcept;
   struct AtCylinder;
   [[nodiscard]] BesideCylinder beside_cylinder(std::uint16_t part, std::uint16_t entry) const noexcept;
   [[nodiscard]] int meet(const Pair& pair, const AtCylinder& here, std::array<Meeting, 4>& out) const noexcept;
@@ -344,7 +347,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool lies_along_ = false;        // a side along another, pressing in the last solution
   bool held_ = false;              // the last local problem by the forces of the one before
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
-  double over_m_ = beside_m;       // and how far beyond a valley, of what pressed in the last solution
+  double over_m_ = beside_m;       // and how far beyond a valley or an edge's end, of what pressed in the last solution
 };
 
 }  // namespace proxarm::models

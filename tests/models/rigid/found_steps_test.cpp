@@ -157,5 +157,51 @@ TEST(FoundSteps, ACornerBelowAToolsFarSideIsNotPulledThroughIt) {
   EXPECT_LE(std::abs(contact.force_W.dot(way)), 1e-4 * contact.force_W.norm() * way.norm());
 }
 
+// The tip of a wedge, along x, with a ridge below that falls by 0.4 of the way, comes over a needle's point in one step
+// of a millimetre: 0.5 mm beside the tip before, 0.5 mm under the ridge after, clear of it by so much. The wedge is
+// 0.2 mm high there.
+struct TipOverANeedle {
+  ConvexTool wedge{{Vec3::Zero(), {0.02, 0.01, 0.0}, {0.02, -0.01, 0.0}, {0.02, 0.0, -0.008}}}, needle;
+  Vec3 way{1e-3, 0.0, 0.0};  // of the needle, seen from the wedge
+
+  explicit TipOverANeedle(double clear_m) {
+    const Vec3 point(-0.5e-3, 0.0, -0.2e-3 - clear_m);
+    needle.points_m = {point, point + Vec3(5e-3, 0.0, -0.03), point + Vec3(-5e-3, 5e-3, -0.03),
+                       point + Vec3(-5e-3, -5e-3, -0.03)};
+  }
+  // Of the tool from where it would go.
+  [[nodiscard]] double off_m(bool wedge_is_tool, std::size_t contacts) const {
+    RigidWorld g({{{wedge_is_tool ? wedge : needle, Pose::Identity(), {}}}},
+                 {{solid_of(wedge_is_tool ? needle : wedge, Pose::Identity()), 0.0}});
+    ToolPose p;
+    p.position = wedge_is_tool ? Vec3(-way) : way;
+    const ToolPose r = g.step(isotropic(4e6, 4e3), p, {});
+    EXPECT_FALSE(g.unresolved());
+    EXPECT_EQ(g.contacts().size(), contacts);
+    return difference(r, p).norm();
+  }
+};
+
+// A far side held a point that came under it beside the tip, from behind: the wedge went 0.54 mm elsewhere, and seven
+// contacts held it. (`proxarm study stress_tools --replay 50247846435724`, steps 294 to 297.)
+TEST(FoundSteps, AFarSideHoldsNoPointThatIsStillOutsideOfTheSolid) {
+  for (const double clear_m : {1e-5, 1e-9, 2e-12}) {
+    for (const bool wedge_is_tool : {true, false}) {
+      EXPECT_EQ(TipOverANeedle(clear_m).off_m(wedge_is_tool, 0), 0.0) << clear_m << wedge_is_tool;
+    }
+  }
+}
+
+// Passed by so much from above, the ridge is held at the point, off it along a normal and so by no more than that.
+TEST(FoundSteps, APointThatIsPassedByLittleIsHeldByTheEdgeThatItPassesAndNotByTheFarSide) {
+  for (const double passed_m : {1e-5, 1e-9, 2e-12}) {
+    for (const bool wedge_is_tool : {true, false}) {
+      const double off_m = TipOverANeedle(-passed_m).off_m(wedge_is_tool, 1);
+      EXPECT_GT(off_m, 0.0);
+      EXPECT_LE(off_m, passed_m) << wedge_is_tool;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace proxarm::models

@@ -46,10 +46,10 @@ TEST(Stress, AToolThatComesOverAnEdgeAtTheVeryEndOfAStepIsCountedAsAtAnEdge) {
 
 // Of the first, step 41: wedged between two boxes, with 7 kN, a corner leaves the face of one of them over its edge.
 // The judge knew only what the way meets first, the other box, and took the edge's push for 0.5 J out of nowhere. Of
-// the others a corner goes over a mesh's ridge, pressed by 1.2 kN and 150 N: what lay on the mesh before the step, next
-// to there, had its place behind it, and said nothing about the ridge.
+// the other a corner goes over a mesh's ridge, pressed by 1.2 kN: what lay on the mesh before the step, next to there,
+// had its place behind it, and said nothing about the ridge.
 TEST(Stress, AToolThatIsPressedOverAnEdgeThatItMeetsWithinTheStepIsCountedAsAtAnEdge) {
-  for (const std::uint64_t seed : {4460787946124040ULL, 6498936351365718ULL, 3134012562812637ULL}) {
+  for (const std::uint64_t seed : {4460787946124040ULL, 6498936351365718ULL}) {
     const Tally run = run_tool_seed(seed, nullptr);
     EXPECT_EQ(run.first, "none") << seed << " step " << run.first_step;
     EXPECT_GE(run.edge, 1) << seed;
@@ -80,6 +80,19 @@ TEST(Stress, ACornerGoesIntoNoMeshWhileTheToolRestsWhereItDid) {
   const Tally run = run_tool_seed(4335176883144888, nullptr);
   EXPECT_EQ(run.first, "none") << "step " << run.first_step;
   EXPECT_GT(run.contact, 500);
+}
+
+// Of the first, steps 172 and 294: an edge of the tool that lies on a mesh's vertex lost the mesh's edge that held it
+// there, since a pose of the iteration had it beyond that edge's end by nanometres, and sprang by 0.7 mm; a tip of the
+// tool was held by its far side, above a vertex that it came over, and sprang by 0.3 mm. Of the second, step 29: an
+// edge that met a vertex went on beyond it by 0.3 mm, and gained 42 mJ.
+TEST(Stress, AnEdgeStaysOnAVertexAndATipIsHeldByTheSideItLiesOn) {
+  for (const std::uint64_t seed : {50247846435724ULL, 3134012562812637ULL}) {
+    const Tally run = run_tool_seed(seed, nullptr);
+    EXPECT_EQ(run.kind, "meshes");
+    EXPECT_EQ(run.first, "none") << seed << " step " << run.first_step;
+    EXPECT_EQ(run.edge, 0) << seed;
+  }
 }
 
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
