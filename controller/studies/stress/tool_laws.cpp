@@ -10,6 +10,7 @@
 namespace proxarm::studies {
 namespace {
 
+using models::Mat6;
 using models::PoseContact;
 using models::ToolPose;
 using models::Twist;
@@ -364,8 +365,52 @@ double ToolLaws::curvature_J(const ToolCall& call) const {
   return sum;
 }
 
-double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier) const {
+std::vector<ToolLaws::Holding> ToolLaws::holding(const ToolCall& call, const std::vector<PoseContact>& before) const {
+  std::vector<Holding> out;
+  const double turned = models::difference(call.r, call.q).tail<3>().norm();
+  const auto presses = [](const PoseContact& contact) { return contact.normal_W.dot(contact.force_W) > 0.0; };
+  for (const PoseContact& now : call.contacts) {
+    if (!presses(now) || std::abs(now.normal_W.dot(call.way_of(now))) > curvature_m(call, now) + 1e-12) continue;
+    const auto is_same = [&](const PoseContact& was) {
+      return was.object == now.object && was.feature == now.feature && was.part == now.part && presses(was) &&
+             (was.normal_W - now.normal_W).norm() <= turned + 1e-12;
+    };
+    const auto was = std::find_if(before.begin(), before.end(), is_same);
+    if (was != before.end()) out.push_back({&now, &*was});
+  }
+  return out;
+}
+
+double ToolLaws::least_way_m(const ToolCall& call, const PoseContact& over, const Vec3& n0, const Holders& holders) {
+  const auto at = [&](const PoseContact& contact, const Vec3& along) {
+    Twist out;
+    out << along, (contact.point_W - call.r.position).cross(along);
+    return out;
+  };
+  Mat6 C = call.K.inverse();
+  for (const auto& [contact, force] : holders) {
+    if (contact == &over) continue;
+    const Twist normal = at(*contact, contact->normal_W), pushes = at(*contact, force / contact->normal_W.dot(force));
+    const Twist yielding = C * pushes;
+    const double yield = normal.dot(yielding);
+    if (yield > 1e-6 * normal.dot(call.K.ldlt().solve(normal))) C -= yielding * (normal.transpose() * C) / yield;
+  }
+  const Vec3& n = over.normal_W;
+  const Vec3 t = (n.dot(n0) * n - n0).normalized();
+  const auto G = [&](const Vec3& a, const Vec3& b) { return at(over, a).dot(C * at(over, b)); };
+  const double both = G(n, n0), sine = n.cross(n0).norm();
+  if (!(both > 0.0)) return beyond_all_m;
+  return sine * over.force_W.norm() * (G(n, n) * G(t, t) - G(t, n) * G(n, t)) / both;
+}
+
+double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier,
+                         const std::vector<PoseContact>& before) const {
   double sum = 0.0;
+  Holders now, then;
+  for (const Holding& holder : holding(call, before)) {
+    now.emplace_back(holder.now, holder.now->force_W);
+    then.emplace_back(holder.now, holder.was->force_W);
+  }
   for (const PoseContact& contact : call.contacts) {
     const Vec3 way = call.way_of(contact);
     const double s = way.norm(), bent_m = curvature_m(call, contact) + 1e-12;
@@ -379,14 +424,18 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
       return met(was) && (was.point_W - contact.point_W).norm() <= 2.0 * s;
     };
     const bool near = std::any_of(earlier.begin(), earlier.end(), came);
-    double cosine = -1.0;
+    const auto cosine_of = [&](const PoseContact& was) { return was.normal_W.dot(contact.normal_W); };
+    const PoseContact* from = nullptr;
     for (const PoseContact& was : earlier) {
       if (near ? !came(was) : !met(was)) continue;
-      cosine = std::max(cosine, std::min(1.0, was.normal_W.dot(contact.normal_W)));
+      if (from == nullptr || cosine_of(was) > cosine_of(*from)) from = &was;
     }
-    if (!(cosine > 0.0)) continue;
-    const double sine = std::sqrt(1.0 - cosine * cosine), force = contact.force_W.norm();
-    if (sine / cosine * yields(call, contact, contact.normal_W) * force <= s) sum += force * s * sine;
+    if (from == nullptr || !(cosine_of(*from) > 0.0)) continue;
+    const double sine = contact.normal_W.cross(from->normal_W).norm(), force = contact.force_W.norm();
+    if (!(sine > 1e-9)) continue;
+    const double least_m =
+        std::max(least_way_m(call, contact, from->normal_W, now), least_way_m(call, contact, from->normal_W, then));
+    if (least_m <= s) sum += force * s * sine;
   }
   return sum;
 }

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "models/geometry/pose_algorithm.hpp"
@@ -53,9 +54,21 @@ class ToolLaws {
   // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once, from
   // n₀ to n. Along n₀ the place of contact has come to meet the feature or been held by it, n₀ᵀs ≤ 0 (but for what the
   // curvature accounts for), so that nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖: sin α of the way, if p̂ isn't
-  // deeper below than a path over the edge can come. `earlier`: what touched before, in the step before or on the way.
-  // What the place came from behind says nothing about it.
-  [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier) const;
+  // deeper below than a path over the edge can come.
+  //
+  // How deep that is: where the place is on the edge, a force λ₀n₀ becomes λn at the same p̂. By the compliance G of the
+  // place the tool yields by G(λn − λ₀n₀), and not along n, so that λ₀ nᵀGn₀ = λ nᵀGn; along the new feature's t, with
+  // n₀ = n cos α − t sin α, that is
+  //   λ (tᵀGn − tᵀGn₀ nᵀGn/nᵀGn₀) = λ sin α (nᵀGn tᵀGt − tᵀGn nᵀGt)/nᵀGn₀
+  // and s, to which what came before it adds, is no less. (All directions alike, G = y, it is y λ tan α.) Without other
+  // contacts G is that of C = K⁻¹. What presses on a feature all the time, along g, with a force along φ, takes from C
+  // what would move it: C − Cφ gᵀC/gᵀCφ. Only what pressed there in the step before, and hasn't moved along its normal
+  // since, is taken for such; and since friction may have turned φ meanwhile, both its first and its last must do.
+  //
+  // `earlier`: what touched before, in the step before or on the way; `before`: in the step before. What the place came
+  // from behind says nothing about it.
+  [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier,
+                               const std::vector<models::PoseContact>& before) const;
 
   // Rounding of a pose, as a length.
   [[nodiscard]] static double rounding_m(const models::ToolPose& pose);
@@ -85,6 +98,16 @@ class ToolLaws {
     double radius_m = 0.0, reach_m = 0.0;
     std::optional<double> friction;
   };
+
+  struct Holding {  // what pressed on the same feature in the step before
+    const models::PoseContact *now, *was;
+  };
+  using Holders = std::vector<std::pair<const models::PoseContact*, models::Vec3>>;  // and their forces
+  [[nodiscard]] std::vector<Holding> holding(const ToolCall& call,
+                                             const std::vector<models::PoseContact>& before) const;
+  // How far a contact goes at least where it comes over an edge from n₀; infinite where no path leads over it.
+  [[nodiscard]] static double least_way_m(const ToolCall& call, const models::PoseContact& over, const models::Vec3& n0,
+                                          const Holders& holders);
 
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
   [[nodiscard]] double curvature_m(const ToolCall& call, const models::PoseContact& contact) const;

@@ -169,7 +169,7 @@ class Judge {
     const double rounding_J = forces_N * short_m + 1e-12;
     const double rest_J = rise_J - laws_.curvature_J(call) - rounding_J;
     if (!(rest_J > 0.0)) return;
-    if (rest_J <= laws_.edges_J(call, before_) || rest_J <= laws_.edges_J(call, met(call))) {
+    if (rest_J <= laws_.edges_J(call, before_, before_) || rest_J <= laws_.edges_J(call, met(call), before_)) {
       ++tally_.edge;
     } else {
       note(work, call, "J", rest_J);
