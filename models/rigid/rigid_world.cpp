@@ -579,7 +579,8 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   }
   if (crowded_ || !(came_m(q) + 2.0 * far < gathered_reach_)) gather_for(q, far);
   clearance_ = -1.0;
-  if (pair_count_ == 0) {
+  // (Where much was near, it may know of less than the step's way.)
+  if (pair_count_ == 0 && came_m(q) + far < gathered_reach_) {
     clearance_ = gathered_reach_;
     q_ = p_hat;
     return;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "models/rigid/rigid_world.hpp"
+#include "tests/models/mesh/mesh_shapes.hpp"
 #include "tests/models/rigid/rigid_bodies.hpp"
 
 namespace proxarm::models {
@@ -200,6 +201,25 @@ TEST(FoundSteps, APointThatIsPassedByLittleIsHeldByTheEdgeThatItPassesAndNotByTh
       EXPECT_GT(off_m, 0.0);
       EXPECT_LE(off_m, passed_m) << wedge_is_tool;
     }
+  }
+}
+
+// A step of 30 mm over a mesh of which more triangles are within 30 mm than a step looks at: what is known then is what
+// is nearer, and where that was nothing, the tool went all the way, into the mesh, unflagged. (`proxarm study
+// stress_tools --replay 4563682286983465`, step 2, 1.9 mm.)
+TEST(FoundSteps, AToolFliesNoFartherThanItKnowsWhatIsThere) {
+  const auto globe =
+      std::make_shared<const TriangleFeatures>(std::make_shared<const TriangleMesh>(tests::globe(100, 200, 0.05)));
+  const Vec3 size = Vec3::Constant(0.01);
+  for (const double away_m : {0.003, 0.006, 0.01, 0.02}) {
+    RigidWorld g({{{BoxTool{size}, Pose::Identity(), {}}}}, {{globe, 0.0}});
+    ToolPose q;
+    q.position.z() = 0.05 + 0.5 * size.z() + away_m;
+    ToolPose p = q;
+    p.position.z() -= 0.03;
+    const ToolPose r = g.step(isotropic(4e6, 4e3), p, q);
+    EXPECT_GE(g.clearance_m(r), -1e-12) << away_m;
+    EXPECT_FALSE(g.contacts().empty() && !g.unresolved()) << away_m;
   }
 }
 
