@@ -134,7 +134,7 @@ Run among_ten(std::uint64_t seed, bool is_box) {
     q = tool_pose(random_pose(random, 0.12));
   } while (!std::all_of(bodies.begin(), bodies.end(), is_free));
   const RoamingHand hand{
-      .next_place = [](Random& r, const ToolPose& now) { return 0.5 * now.position + r.in_box(0.06); }};
+      .next_place = [](Random& r, const ToolPose& now) { return Vec3(0.5 * now.position + r.in_box(0.06)); }};
   return record({{{{shape_of(tool), Pose::Identity(), {}}}}, objects}, realistic(q), hand, seed, 5'000);
 }
 
@@ -255,7 +255,7 @@ void on_mesh(benchmark::State& state, const decltype(ToolPart::shape)& shape, do
   q.position = from * Vec3::UnitX();
   const RoamingHand hand{.next_place = [](Random& random, const ToolPose& now) {
     const Vec3 out = (now.position.normalized() + random.in_box(0.2)).normalized();
-    return (bumpy(out) + random.uniform(-0.03, 0.02)) * out;
+    return Vec3((bumpy(out) + random.uniform(-0.03, 0.02)) * out);
   }};
   bench(state, {record(world, realistic(q), hand, 1, 5'000)}, kAny, wanted);
 }
