@@ -18,36 +18,48 @@ double to_wrong_side_m(const TriangleMesh& mesh, const Vec3& x, std::optional<bo
   return -mesh.distance(x, std::numeric_limits<double>::infinity(), near);
 }
 
-// How far a solid reaches along each of some normals, and against it.
-class Reach {
+// Planes that may lie between a solid and triangles: how far the solid reaches along some normals, and against them.
+// What is apart from one triangle is mostly so from those next to it by the same plane.
+class Planes {
  public:
-  Reach(const Solid& solid, const View& at, std::span<const Vec3> normals) noexcept
-      : normals_(solid.rims.empty() ? normals.first(std::min(normals.size(), kMost)) : normals.first(0)) {
-    for (std::size_t i = 0; i < normals_.size(); ++i) {
-      const Vec3 n = at.R.transpose() * normals_[i];
-      double low = std::numeric_limits<double>::infinity(), high = -low;
-      for (const Vec3& p : solid.points) {
-        low = std::min(low, n.dot(p));
-        high = std::max(high, n.dot(p));
-      }
-      low_[i] = low - solid.radius + normals_[i].dot(at.x);
-      high_[i] = high + solid.radius + normals_[i].dot(at.x);
+  Planes(const Solid& solid, const View& at, std::span<const Vec3> normals) noexcept : solid_(&solid), at_(at) {
+    if (solid.rims.empty()) {
+      for (const Vec3& n : normals.first(std::min(normals.size(), kMost))) add(n);
     }
   }
+  // The oldest goes where there is no room.
+  void add(const Vec3& normal) noexcept {
+    Plane& plane = planes_[added_++ % kMost];
+    const Vec3 n = at_.R.transpose() * normal;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const Vec3& p : solid_->points) {
+      low = std::min(low, n.dot(p));
+      high = std::max(high, n.dot(p));
+    }
+    const double there = normal.dot(at_.x);
+    plane = {normal, low - solid_->radius + there, high + solid_->radius + there};
+  }
   // Whether along one of them more than `gap` is between the two.
-  [[nodiscard]] bool leaves(double gap, const std::array<Vec3, 3>& triangle) const noexcept {
-    for (std::size_t i = 0; i < normals_.size(); ++i) {
-      const Vec3& n = normals_[i];
-      const auto [low, high] = std::minmax({n.dot(triangle[0]), n.dot(triangle[1]), n.dot(triangle[2])});
-      if (low - high_[i] > gap || low_[i] - high > gap) return true;
+  [[nodiscard]] bool leave(double gap, const std::array<Vec3, 3>& triangle) const noexcept {
+    for (std::size_t i = 0; i < std::min(added_, kMost); ++i) {
+      const Plane& plane = planes_[i];
+      const auto [low, high] =
+          std::minmax({plane.normal.dot(triangle[0]), plane.normal.dot(triangle[1]), plane.normal.dot(triangle[2])});
+      if (low - plane.high > gap || plane.low - high > gap) return true;
     }
     return false;
   }
 
  private:
-  static constexpr std::size_t kMost = 8;
-  std::span<const Vec3> normals_;
-  std::array<double, kMost> low_{}, high_{};
+  static constexpr std::size_t kMost = 16;
+  struct Plane {
+    Vec3 normal;
+    double low = 0.0, high = 0.0;  // of the solid
+  };
+  const Solid* solid_;
+  View at_;
+  std::array<Plane, kMost> planes_;
+  std::size_t added_ = 0;
 };
 
 }  // namespace
@@ -57,16 +69,21 @@ double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMe
   const Pose X = isometry(at);
   std::optional<Cylinder> cylinder;
   if (!solid.rims.empty()) cylinder = moved(cylinder_of(solid), at.R, at.x);
-  const Reach reach(solid, at, apart.normals);
+  Planes planes(solid, at, apart.normals);
   double deepest = 0.0;
+  const auto gap_to = [&](const std::array<Vec3, 3>& triangle) {
+    if (cylinder) return separation_of_cylinder(*cylinder, triangle);
+    if (solid.faces.empty()) {
+      return distance_of_segment(at * solid.points.front(), at * solid.points.back(), triangle) - solid.radius;
+    }
+    const Separation by = separation_from_triangle(solid, X, triangle, apart.enough);
+    if (by.gap > apart.enough) planes.add(by.normal);
+    return by.gap;
+  };
   PartBox(solid, box, at, solid.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
     const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
-    if (reach.leaves(apart.enough, triangle)) return true;
-    const double gap =
-        cylinder ? separation_of_cylinder(*cylinder, triangle)
-        : solid.faces.empty()
-            ? distance_of_segment(at * solid.points.front(), at * solid.points.back(), triangle) - solid.radius
-            : separation_from_triangle(solid, X, triangle, apart.enough);
+    if (planes.leave(apart.enough, triangle)) return true;
+    const double gap = gap_to(triangle);
     if (gap <= apart.enough) deepest = std::min(deepest, gap);
     return true;
   });

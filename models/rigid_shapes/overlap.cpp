@@ -89,27 +89,29 @@ double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b, double
   return largest;
 }
 
-double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle,
-                                double enough) noexcept {
+Separation separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle,
+                                    double enough) noexcept {
   const Pose to_a = X.inverse();
   const std::array<Vec3, 3> b = {to_a * triangle[0], to_a * triangle[1], to_a * triangle[2]};
   const std::array<Vec3, 3> sides = sides_of(b);
   const Vec3 normal = sides[0].cross(sides[1]).normalized();
-  double largest = -std::numeric_limits<double>::infinity();
+  Separation largest{-std::numeric_limits<double>::infinity(), normal};  // (its normal is the solid's until the end)
   const auto is_enough = [&](const Vec3& n, double own) {
-    largest = std::max(largest, gap_beyond(own, n, b));
-    return largest > enough;
+    const double gap = gap_beyond(own, n, b);
+    if (gap > largest.gap) largest = {gap, n};
+    return gap > enough;
   };
+  const auto told = [&]() -> Separation { return {largest.gap, X.linear() * largest.normal}; };
   // Of the many that are apart most are by these planes, dearest last.
   for (const Vec3& n : {normal, Vec3(-normal)}) {
-    if (is_enough(n, furthest(n, a.points))) return largest;
+    if (is_enough(n, furthest(n, a.points))) return told();
   }
   for (const Solid::Face& face : a.faces) {
-    if (is_enough(face.normal, face.offset)) return largest;
+    if (is_enough(face.normal, face.offset)) return told();
   }
   for (const Vec3& side : sides) {
     const Vec3 n = side.cross(normal);
-    if (is_enough(n, furthest(n, a.points))) return largest;
+    if (is_enough(n, furthest(n, a.points))) return told();
   }
   for (const Solid::Edge& own : a.edges) {
     const Vec3 along = (a.points[own.to] - a.points[own.from]).normalized();
@@ -119,7 +121,7 @@ double separation_from_triangle(const Solid& a, const Pose& X, const std::array<
       });
     }
   }
-  return largest;
+  return told();
 }
 
 double separation_of_triangles(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b) noexcept {

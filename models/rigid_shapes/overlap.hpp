@@ -14,10 +14,15 @@ namespace proxarm::models {
 // one of them has faces.
 double separation_of_hulls(const Solid& a, const Pose& X, const Solid& b, double enough = 0.0) noexcept;
 
+// The plane that leaves the largest gap, by its unit normal away from the first body, in the frame of the second.
+struct Separation {
+  double gap = 0.0;
+  Vec3 normal;
+};
 // The same of a solid with faces, without a radius, and a triangle. It counts from the triangle's nearest side, so it
 // is the way out of a surface that the solid went in by less than the triangles' size.
-double separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle,
-                                double enough = 0.0) noexcept;
+Separation separation_from_triangle(const Solid& a, const Pose& X, const std::array<Vec3, 3>& triangle,
+                                    double enough = 0.0) noexcept;
 
 // The same of two triangles.
 double separation_of_triangles(const std::array<Vec3, 3>& a, const std::array<Vec3, 3>& b) noexcept;

@@ -143,7 +143,10 @@ TEST(Overlap, OfAHullAndATriangleItIsWhatTheBestOfAllPlanesLeaves) {
     const std::array<Vec3, 3> triangle = {middle + random.in_box(0.02), middle + random.in_box(0.02),
                                           middle + random.in_box(0.02)};
     const Pose X = random_pose(random, 0.01);
-    seen.expect(separation_from_triangle(a, X, triangle), by_all_planes(a, X, solid_of_triangle(triangle)));
+    const Solid flat = solid_of_triangle(triangle);
+    const Separation told = separation_from_triangle(a, X, triangle);
+    seen.expect(told.gap, by_all_planes(a, X, flat));
+    EXPECT_NEAR(gap_along(told.normal, a, X, flat), told.gap, 1e-15);
   }
   EXPECT_GT(seen.overlapping, 100);
   EXPECT_GT(seen.apart, 50);
@@ -157,7 +160,7 @@ TEST(Overlap, WhatIsEnoughEndsTheSearchAndNothingElseDoes) {
     Pose X = Pose::Identity();
     X.translation().z() = 0.01 - deep_m;
     const std::array<Vec3, 3> triangle = {Vec3(-0.1, -0.1, 0.0), Vec3(0.1, -0.1, 0.0), Vec3(0.0, 0.1, 0.0)};
-    EXPECT_NEAR(separation_from_triangle(box, X, triangle, -1e-12), -deep_m, 1e-17);
+    EXPECT_NEAR(separation_from_triangle(box, X, triangle, -1e-12).gap, -deep_m, 1e-17);
     X.translation().z() = 0.02 - deep_m;
     EXPECT_NEAR(separation_of_hulls(box, X, box, -1e-12), -deep_m, 1e-17);
   }
