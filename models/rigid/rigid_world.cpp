@@ -159,11 +159,16 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
     const Bounds box = bounds_of(point, 0.0);
     shared->parts.push_back({std::move(point), box, {}});
   }
-  const auto first_moving =
-      std::stable_partition(objects.begin(), objects.end(), [](const RigidObject& object) { return !object.motion; });
-  shared->first_moving = static_cast<std::size_t>(first_moving - objects.begin());
-  std::size_t corners = 0, own_corners = 0;
+  std::vector<RigidObject> still_first;
   for (RigidObject& object : objects) {
+    if (!object.motion) still_first.push_back(std::move(object));
+  }
+  shared->first_moving = still_first.size();
+  for (RigidObject& object : objects) {
+    if (object.motion) still_first.push_back(std::move(object));
+  }
+  std::size_t corners = 0, own_corners = 0;
+  for (RigidObject& object : still_first) {
     if (!(object.friction >= 0.0 && std::isfinite(object.friction))) {
       throw std::invalid_argument("a friction must be finite and not negative");
     }
