@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "models/geometry/geometry.hpp"
-#include "models/rigid_shapes/normal_cone.hpp"
 #include "models/rigid_shapes/tool.hpp"
 
 namespace proxarm::models {
@@ -34,7 +33,6 @@ struct Solid {
   };
 
   std::vector<Vec3> points;
-  NormalCones cones;  // of its points and faces
   std::vector<Edge> edges;
   std::vector<Face> faces;
   std::vector<std::uint32_t> ring;
