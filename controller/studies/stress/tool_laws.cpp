@@ -387,13 +387,14 @@ double ToolLaws::least_way_m(const ToolCall& call, const PoseContact& over, cons
     out << along, (contact.point_W - call.r.position).cross(along);
     return out;
   };
-  Mat6 C = call.K.inverse();
+  const Mat6 free = call.K.inverse();
+  Mat6 C = free;
   for (const auto& [contact, force] : holders) {
     if (contact == &over) continue;
     const Twist normal = at(*contact, contact->normal_W), pushes = at(*contact, force / contact->normal_W.dot(force));
     const Twist yielding = C * pushes;
     const double yield = normal.dot(yielding);
-    if (yield > 1e-6 * normal.dot(call.K.ldlt().solve(normal))) C -= yielding * (normal.transpose() * C) / yield;
+    if (yield > 1e-6 * normal.dot(free * normal)) C -= yielding * (normal.transpose() * C) / yield;
   }
   const Vec3& n = over.normal_W;
   const Vec3 t = (n.dot(n0) * n - n0).normalized();
