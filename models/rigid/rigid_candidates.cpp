@@ -23,11 +23,14 @@ void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at
   const double radii = own.radius + other.radius, near = reach + radii, near2 = near * near;
   const bool round = radii > 0.0;
   const double turn = reach / shared_->reach;
+  const NormalCone::Angle corners_turn = turn_of_corners(turn);
   for (std::uint32_t i = 0; i < own.points.size(); ++i) {
     const Vec3 p = at * own.points[i];
+    const NormalCone cone = own.cones.of_corners[i].seen_by(at.R);
     for (std::uint32_t j = 0; j < other.faces.size(); ++j) {
       const Solid::Face& face = other.faces[j];
-      if (std::abs(face.normal.dot(p) - face.offset) <= near) add(Kind::point_face, i, j);
+      if (!cone.holds(-face.normal, other.cones.around_faces[j] + corners_turn)) continue;
+      if (comes_near(other, face, p, near)) add(Kind::point_face, i, j);
     }
     if (!round) continue;
     for (std::uint32_t j = 0; j < other.points.size(); ++j) {
@@ -38,10 +41,12 @@ void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at
     }
   }
   for (std::uint32_t j = 0; j < other.points.size(); ++j) {
-    const Vec3 y = at.R.transpose() * (other.points[j] - at.x);
+    const Vec3 y = at.to_T(other.points[j]);
+    const NormalCone cone = other.cones.of_corners[j].seen_by(at.R.transpose());
     for (std::uint32_t i = 0; i < own.faces.size(); ++i) {
       const Solid::Face& face = own.faces[i];
-      if (std::abs(face.normal.dot(y) - face.offset) <= near) add(Kind::face_point, i, j);
+      if (!cone.holds(-face.normal, own.cones.around_faces[i] + corners_turn)) continue;
+      if (comes_near(own, face, y, near)) add(Kind::face_point, i, j);
     }
     if (!round) continue;
     for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
@@ -63,8 +68,8 @@ class RigidWorld::NearFaces {
  public:
   // Of more triangles than `room` it takes none.
   NearFaces(const Solid& solid, const Bounds& box_T, const TriangleFeatures& mesh, const View& at, double near,
-            std::size_t room) noexcept
-      : solid_(&solid), near_(near) {
+            double turn, std::size_t room) noexcept
+      : solid_(&solid), near_(near), turn_(turn), corners_turn_(turn_of_corners(turn)) {
     const PartBox around(solid, box_T, at, near);
     around.each_face(mesh.mesh(), [&](std::uint32_t face, const Bounds& box) {
       if (count_ == room) return all_ = false;
@@ -81,19 +86,32 @@ class RigidWorld::NearFaces {
     }
     for (std::uint32_t i = 0; i < solid_->edges.size(); ++i) {
       const Vec3 &from = solid_->points[solid_->edges[i].from], &to = solid_->points[solid_->edges[i].to];
-      if (meets(from.cwiseMin(to), from.cwiseMax(to))) crossing_[crossing_count_++] = static_cast<std::uint16_t>(i);
+      if (!meets(from.cwiseMin(to), from.cwiseMax(to))) continue;
+      around_[crossing_count_] = {0.5 * (from + to), 0.5 * (to - from).norm()};
+      crossing_[crossing_count_++] = static_cast<std::uint16_t>(i);
     }
   }
 
+  [[nodiscard]] double near() const noexcept { return near_; }
+  [[nodiscard]] double turn() const noexcept { return turn_; }  // of poses to come, rad
+  [[nodiscard]] const NormalCone::Angle& corners_turn() const noexcept { return corners_turn_; }
   [[nodiscard]] bool all() const noexcept { return all_; }  // or there is no room for more
   [[nodiscard]] std::span<const std::uint32_t> faces() const noexcept { return {faces_.data(), count_}; }
   // Whether a box of T comes near any of the triangles.
   [[nodiscard]] bool meets(const Vec3& low, const Vec3& high) const noexcept {
     return (low.array() <= region_.high.array() + near_).all() && (high.array() >= region_.low.array() - near_).all();
   }
-  // The tool's faces over which triangles may be as high as −near, and its edges that may come near them.
+  // The tool's faces over which triangles may be as high as −near.
   [[nodiscard]] std::span<const std::uint16_t> rising() const noexcept { return {rising_.data(), rising_count_}; }
-  [[nodiscard]] std::span<const std::uint16_t> crossing() const noexcept { return {crossing_.data(), crossing_count_}; }
+
+  // Calls visit(edge) for the edges whose ball comes near another one.
+  template <typename Visit>
+  void each_crossing(const Vec3& middle, double radius, Visit visit) const noexcept {
+    for (std::size_t i = 0; i < crossing_count_; ++i) {
+      const double most = near_ + radius + around_[i].radius;
+      if ((around_[i].middle - middle).squaredNorm() <= most * most) visit(crossing_[i]);
+    }
+  }
 
   // Whether two points of T, and so all between them, are further than near before one of the tool's faces. What is
   // asked next often is so for the same one.
@@ -125,27 +143,36 @@ class RigidWorld::NearFaces {
     return face.normal.dot(middle) + face.normal.cwiseAbs().dot(half) - face.offset >= -near_;
   }
 
+  struct Ball {
+    Vec3 middle;
+    double radius;
+  };
   const Solid* solid_;
-  double near_;
+  double near_, turn_;
+  NormalCone::Angle corners_turn_;
   Bounds region_;  // in T, of the triangles' part within the tool's box
   std::array<std::uint32_t, most_faces> faces_;
   std::array<std::uint16_t, most_edges> rising_, crossing_;
+  std::array<Ball, most_edges> around_;  // those that cross
   std::size_t count_ = 0, rising_count_ = 0, crossing_count_ = 0, witness_ = 0;
   bool all_ = true;
 };
 
 // The tool's points.
 template <typename Add>
-void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, const NearFaces& close, const View& at,
-                             double near, Add add) const noexcept {
-  const double near2 = near * near;
+void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, double side, const NearFaces& close,
+                             const View& at, Add add) const noexcept {
+  const double near = close.near(), near2 = near * near;
   for (std::uint32_t i = 0; i < own.points.size(); ++i) {
     if (!close.meets(own.points[i], own.points[i])) continue;
     const Vec3 p = at * own.points[i];
+    const NormalCone cone = own.cones.of_corners[i].seen_by(at.R);
     other.mesh().within(p, near, [&](std::uint32_t face) {
       if (crowded_) return false;
       if (!comes_near(other.mesh(), face, p, near)) return true;
-      add(Kind::point_face, i, face);
+      const NormalCone::Angle turn = other.around(face) + close.corners_turn();
+      const bool may_rest = side == 0.0 || cone.holds(-side * face_of(other, face).normal, turn);
+      if (may_rest) add(Kind::point_face, i, face);
       if (!(own.radius > 0.0)) return true;
       for (const std::uint32_t v : other.vertices_of(face)) {
         if ((p - other.vertex(v)).squaredNorm() <= near2) add(Kind::point_point, i, v);
@@ -158,66 +185,68 @@ void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, co
   }
 }
 
-// A vertex of the mesh, at y in T, with the tool's faces and edges.
+// A vertex of the mesh, at y in T and with its cone there, with the tool's faces and edges.
 template <typename Add>
-void RigidWorld::vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, NearFaces& close, double near,
+void RigidWorld::vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, const NormalCone& cone, NearFaces& close,
                              Add add) const noexcept {
+  const double near = close.near();
   if (!close.beyond(y, y) && close.out(y) >= -near) {
     for (const std::uint16_t i : close.rising()) {
-      if (std::abs(own.faces[i].normal.dot(y) - own.faces[i].offset) <= near) add(Kind::face_point, i, v);
+      const Solid::Face& face = own.faces[i];
+      if (!cone.holds(-face.normal, own.cones.around_faces[i] + close.corners_turn())) continue;
+      if (comes_near(own, face, y, near)) add(Kind::face_point, i, v);
     }
   }
   if (!(own.radius > 0.0)) return;
-  for (const std::uint16_t i : close.crossing()) {
+  close.each_crossing(y, 0.0, [&](std::uint16_t i) {
     if (distance2_to_segment(y, edge_of(own, i)) <= near * near) add(Kind::edge_point, i, v);
-  }
+  });
 }
 
 // An edge of the mesh, seen from T, with the tool's edges.
 template <typename Add>
-void RigidWorld::edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, double near,
-                           double turn, Add add) const noexcept {
+void RigidWorld::edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close,
+                           Add add) const noexcept {
   if (close.beyond(line.from, line.to)) return;
   const Vec3 middle = 0.5 * (line.from + line.to);
   const double half = 0.5 * (line.to - line.from).norm();
-  for (const std::uint16_t i : close.crossing()) {
+  close.each_crossing(middle, half, [&](std::uint16_t i) {
     const EdgeLine edge = edge_of(own, i);
-    // The ball around an edge of the mesh is small.
-    const double most = near + half;
-    if (distance2_to_segment(middle, edge) > most * most || distance2_of_segments(edge, line) > near * near) continue;
-    if (!(own.radius > 0.0) && never_hold(edge, line, turn)) continue;
+    if (distance2_of_segments(edge, line) > close.near() * close.near()) return;
+    if (!(own.radius > 0.0) && never_hold(edge, line, close.turn())) return;
     add(Kind::edges, i, e);
-  }
+  });
 }
 
 template <typename Add>
 void RigidWorld::pairs_with(const Solid& own, const Bounds& box, const TriangleFeatures& other, double side,
                             const View& at, double reach, Add add) noexcept {
-  const double near = reach + own.radius, turn = reach / shared_->reach;
-  NearFaces close(own, box, other, at, near, face_room_);
+  NearFaces close(own, box, other, at, reach + own.radius, reach / shared_->reach, face_room_);
   crowded_ = crowded_ || !close.all();
   if (!close.all() || close.faces().empty()) return;
   near_faces_ += close.faces().size();
-  points_with(own, other, close, at, near, add);
+  points_with(own, other, side, close, at, add);
   if (own.edges.empty()) return;
+  // Inside of a body its normals are the others.
+  const Mat3 to_T = (side < 0.0 ? -1.0 : 1.0) * at.R.transpose();
   for (const std::uint32_t face : close.faces()) {
     if (crowded_) return;
     for (const std::uint32_t v : other.vertices_of(face)) {
-      vertex_with(own, v, at.to_T(other.vertex(v)), close, near, add);
+      vertex_with(own, v, at.to_T(other.vertex(v)), other.cone(v).seen_by(to_T), close, add);
     }
     for (const std::uint32_t e : other.edges_of(face)) {
       const TriangleFeatures::Edge& edge = other.edge(e);
       // A valley of a closed mesh is touched by nothing sharp.
       const bool is_valley = side != 0.0 && !edge.line.open && edge.ridge != (side > 0.0);
       if (is_valley && !(own.radius > 0.0)) continue;
-      edge_with(own, e, edge_in_T(edge.line, at, edge.ridge ? 1.0 : -1.0), close, near, turn, add);
+      edge_with(own, e, edge_in_T(edge.line, at, edge.ridge ? 1.0 : -1.0), close, add);
     }
   }
 }
 
 void RigidWorld::add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own,
                           std::uint32_t other) noexcept {
-  if (pair_count_ == most_pairs) {
+  if (pair_count_ == pair_room_) {
     crowded_ = true;
     return;
   }
@@ -297,31 +326,30 @@ void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double 
 void RigidWorld::gather_for(const ToolPose& q, double far) noexcept {
   const double least = 3.0 * far + 1e-6;
   double reach = 3.0 * far + std::max(8.0 * far, 0.01 * shared_->reach) + 1e-6;
-  if (!shared_->dense) return gather(q, reach);
-  if (gathered_reach_ > 0.0) {
+  const bool dense = shared_->dense;
+  if (dense && gathered_reach_ > 0.0) {
     const bool few = pair_count_ < kFewPairs / 4 && near_faces_ < kFewFaces / 4;
     reach = std::clamp((few ? 2.0 : 1.0) * gathered_reach_, least, reach);
   }
-  face_room_ = kFewFaces;
-  gather(q, reach);
-  while ((crowded_ || pair_count_ > kFewPairs) && reach > least) {
-    reach = std::max(least, 0.5 * reach);
-    gather(q, reach);
+  const KeptPairs kept = pressed_pairs();
+  for (; reach > 1.5 * least; reach *= 0.5) {
+    if (look_around(q, reach, dense ? kFewPairs : most_pairs, dense ? kFewFaces : most_faces)) return restore(kept);
   }
-  face_room_ = most_faces;
-  for (int k = 0; k < 10 && crowded_; ++k) {
-    if (k > 0) reach *= 0.5;
-    gather(q, reach);
-  }
+  reach = least;
+  for (int k = 0; k < 10 && !look_around(q, reach); ++k) reach *= 0.5;
+  restore(kept);
 }
 
 void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
-  // The sides and forces of what touched are kept.
-  std::array<Pair, ContactProblem::most> kept;
-  std::size_t kept_count = 0;
-  for (std::size_t i = 0; i < pair_count_ && kept_count < kept.size(); ++i) {
-    if (pairs_[i].pressed) kept[kept_count++] = pairs_[i];
-  }
+  const KeptPairs kept = pressed_pairs();
+  look_around(pose, reach);
+  restore(kept);
+}
+
+// Whether there was room for all pairs and for the triangles they are of; otherwise it ends early.
+bool RigidWorld::look_around(const ToolPose& pose, double reach, std::size_t pairs, std::size_t faces) noexcept {
+  pair_room_ = pairs;
+  face_room_ = faces;
   pair_count_ = pressed_count_ = near_faces_ = 0;
   crowded_ = false;
   for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
@@ -335,8 +363,21 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
   }
   gathered_at_ = pose;
   gathered_reach_ = reach;
-  for (std::size_t k = 0; k < kept_count; ++k) {
-    const Pair& old = kept[k];
+  return !crowded_;
+}
+
+// The sides and forces of what touched are kept when pairs are gathered anew.
+RigidWorld::KeptPairs RigidWorld::pressed_pairs() const noexcept {
+  KeptPairs kept;
+  for (std::size_t i = 0; i < pair_count_ && kept.count < kept.pairs.size(); ++i) {
+    if (pairs_[i].pressed) kept.pairs[kept.count++] = pairs_[i];
+  }
+  return kept;
+}
+
+void RigidWorld::restore(const KeptPairs& kept) noexcept {
+  for (std::size_t k = 0; k < kept.count; ++k) {
+    const Pair& old = kept.pairs[k];
     for (std::size_t i = 0; i < pair_count_; ++i) {
       Pair& pair = pairs_[i];
       if (pair.kind != old.kind || pair.part != old.part || pair.entry != old.entry) continue;

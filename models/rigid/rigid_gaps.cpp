@@ -72,7 +72,8 @@ void RigidWorld::set_sides(const ToolPose& q_old, double far) noexcept {
       if (radii > 0.0) continue;
     }
     const double height = signed_start(pair, at);
-    const bool near = pair.pressed && std::abs(height) < kFront_m;
+    // (What pressed in a part that led nowhere may have lost its side there.)
+    const bool near = pair.pressed && pair.side != 0.0F && std::abs(height) < kFront_m;
     if (pair.kind == Kind::face_point) {
       if (!near) pair.side = static_cast<float>(side_of_tools_face(pair, at, height, far));
     } else if (!is_mesh && pair.kind == Kind::point_face) {

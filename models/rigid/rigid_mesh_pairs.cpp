@@ -13,17 +13,29 @@ class OfFaces {
  public:
   OfFaces(const TriangleFeatures& own, const TriangleFeatures& other, double held, const View& at, double near,
           double turn) noexcept
-      : own_(&own), other_(&other), held_(held), at_(at), near_(near), turn_(turn) {}
+      : own_(&own),
+        other_(&other),
+        held_(held),
+        at_(at),
+        near_(near),
+        turn_(turn),
+        corners_turn_(turn_of_corners(turn)) {}
 
   template <typename Add>
   void points_of_tool(std::uint32_t face, std::uint32_t other_face, Add add) const noexcept {
+    const Vec3 inwards = -held_ * (at_.R.transpose() * face_of(*other_, other_face).normal);
+    const NormalCone::Angle turn = other_->around(other_face) + corners_turn_;
     for (const std::uint32_t v : own_->vertices_of(face)) {
+      if (held_ != 0.0 && !own_->cone(v).holds(inwards, turn)) continue;
       if (comes_near(other_->mesh(), other_face, at_ * own_->vertex(v), near_)) add(v, other_face);
     }
   }
   template <typename Add>
   void points_of_object(std::uint32_t face, std::uint32_t other_face, Add add) const noexcept {
+    const Vec3 inwards = -held_ * (at_.R * face_of(*own_, face).normal);
+    const NormalCone::Angle turn = own_->around(face) + corners_turn_;
     for (const std::uint32_t v : other_->vertices_of(other_face)) {
+      if (!other_->cone(v).holds(inwards, turn)) continue;
       if (comes_near(own_->mesh(), face, at_.to_T(other_->vertex(v)), near_)) add(face, v);
     }
   }
@@ -49,6 +61,7 @@ class OfFaces {
   double held_;
   View at_;
   double near_, turn_;
+  NormalCone::Angle corners_turn_;
 };
 
 }  // namespace

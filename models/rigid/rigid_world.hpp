@@ -100,6 +100,10 @@ class RigidWorld final : public PoseAlgorithm {
     Vec3 force_W = Vec3::Zero();            // of the last solution
     std::array<double, 2> level{1.0, 0.0};  // where a rim that lies flat was lowest, in its u and v
   };
+  struct KeptPairs {
+    std::array<Pair, ContactProblem::most> pairs;
+    std::size_t count = 0;
+  };
   // A pair at a pose.
   struct Found {
     Touch touch;  // in W
@@ -142,7 +146,7 @@ class RigidWorld final : public PoseAlgorithm {
   static constexpr int kMostStrides = 1 << 16;  // the same, among objects that move
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 512;
-  static constexpr std::size_t most_faces = 2048;  // of a mesh, near a part
+  static constexpr std::size_t most_faces = 4096;  // of a mesh, near a part
   static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
 
   class NearFaces;
@@ -185,6 +189,10 @@ class RigidWorld final : public PoseAlgorithm {
   void forget() noexcept;
   void gather_for(const ToolPose& q, double far) noexcept;
   void gather(const ToolPose& pose, double reach) noexcept;
+  bool look_around(const ToolPose& pose, double reach, std::size_t pairs = most_pairs,
+                   std::size_t faces = most_faces) noexcept;
+  [[nodiscard]] KeptPairs pressed_pairs() const noexcept;
+  void restore(const KeptPairs& kept) noexcept;
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
   void gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
@@ -197,14 +205,13 @@ class RigidWorld final : public PoseAlgorithm {
   template <typename Add>
   void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
   template <typename Add>
-  void points_with(const Solid& own, const TriangleFeatures& other, const NearFaces& close, const View& at, double near,
+  void points_with(const Solid& own, const TriangleFeatures& other, double side, const NearFaces& close, const View& at,
                    Add add) const noexcept;
   template <typename Add>
-  void vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, NearFaces& close, double near,
+  void vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, const NormalCone& cone, NearFaces& close,
                    Add add) const noexcept;
   template <typename Add>
-  void edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, double near, double turn,
-                 Add add) const noexcept;
+  void edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, Add add) const noexcept;
   // Of a solid with the box of its points, and a mesh. Where more triangles are near than are looked at, it takes none.
   template <typename Add>
   void pairs_with(const Solid& own, const Bounds& box, const TriangleFeatures& other, double side, const View& at,
@@ -314,7 +321,7 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;                // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
-  std::size_t face_room_ = most_faces, near_faces_ = 0;
+  std::size_t pair_room_ = most_pairs, face_room_ = most_faces, near_faces_ = 0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
   int looks_ = 0;         // pairs that it may still look at

@@ -1,6 +1,7 @@
 #include "models/rigid_features/near.hpp"
 
 #include <cmath>
+#include <span>
 
 namespace proxarm::models {
 namespace {
@@ -11,6 +12,19 @@ bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) no
   const double size = w.norm();
   if (size < 1e-6) return false;  // two faces in one plane, or back to back: nothing is said
   return left.cross(n).dot(w) < -slack * size || n.cross(right).dot(w) < -slack * size || n.dot(left + right) < -slack;
+}
+
+// Corners go round counter-clockwise, seen from where the normal points.
+bool comes_near_polygon(const Vec3& normal, double height, std::span<const Vec3> points,
+                        std::span<const std::uint32_t> corners, const Vec3& p, double near) noexcept {
+  if (!(std::abs(height) <= near)) return false;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const Vec3& corner = points[corners[k]];
+    const Vec3 outwards = (points[corners[k + 1 < corners.size() ? k + 1 : 0]] - corner).cross(normal);
+    const double beyond = outwards.dot(p - corner);
+    if (beyond > 0.0 && beyond * beyond > (near * near - height * height) * outwards.squaredNorm()) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -49,15 +63,12 @@ bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcep
 
 bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept {
   const TriangleMesh::Face& face = mesh.face(index);
-  const double height = TriangleMesh::height(face, p);
-  if (!(std::abs(height) <= near)) return false;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec3& corner = mesh.corner(index, k);
-    const Vec3 outwards = (mesh.corner(index, (k + 1) % 3) - corner).cross(face.normal);
-    const double beyond = outwards.dot(p - corner);
-    if (beyond > 0.0 && beyond * beyond > (near * near - height * height) * outwards.squaredNorm()) return false;
-  }
-  return true;
+  return comes_near_polygon(face.normal, TriangleMesh::height(face, p), mesh.structure().vertices, mesh.triangle(index),
+                            p, near);
+}
+
+bool comes_near(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept {
+  return comes_near_polygon(face.normal, face.normal.dot(p) - face.offset, solid.points, solid.corners(face), p, near);
 }
 
 }  // namespace proxarm::models

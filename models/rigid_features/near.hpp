@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "models/mesh/mesh.hpp"
+#include "models/rigid_shapes/solid.hpp"
 #include "models/rigid_shapes/touch.hpp"
 
 namespace proxarm::models {
@@ -24,8 +25,13 @@ double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept;
 // Whether two sharp edges can't hold each other at any pose that is turned by up to `turn` (rad) from this one.
 bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept;
 
-// Whether a point may be so near to a triangle: by its height, and by how far its foot lies beyond the triangle's
-// sides.
+// By how much a corner and a face may turn until they touch, for the corner's cone of normals. Either may, and normals
+// of narrow faces are known to some 0.02 rad only.
+inline NormalCone::Angle turn_of_corners(double turn) noexcept { return NormalCone::Angle::of(0.02 + 2.0 * turn); }
+
+// Whether a point may be so near to a triangle, or to a face of a solid: by its height, and by how far its foot lies
+// beyond the sides.
 bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept;
+bool comes_near(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept;
 
 }  // namespace proxarm::models

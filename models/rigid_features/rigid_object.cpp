@@ -17,6 +17,14 @@ constexpr double kFlat = 1e-9;
 
 TriangleFeatures::TriangleFeatures(std::shared_ptr<const TriangleMesh> mesh) : mesh_(std::move(mesh)) {
   if (mesh_->closed()) outwards_ = front_side();
+  if (mesh_->closed()) {
+    cones_ = normal_cones(mesh_->structure().vertices.size(), [this](auto visit) {
+      for (std::uint32_t f = 0; f < mesh_->size(); ++f) visit(mesh_->face(f).normal, mesh_->triangle(f));
+    });
+  } else {
+    cones_.of_corners.resize(mesh_->structure().vertices.size());
+    cones_.around_faces.resize(mesh_->size());
+  }
   // All half-edges, sorted, so that those of one edge are neighbours.
   struct Half {
     std::uint32_t low, high, face, opposite;

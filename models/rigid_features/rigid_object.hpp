@@ -10,6 +10,7 @@
 
 #include "models/geometry/scripted_motion.hpp"
 #include "models/mesh/mesh.hpp"
+#include "models/rigid_shapes/normal_cone.hpp"
 #include "models/rigid_shapes/touch.hpp"
 
 namespace proxarm::models {
@@ -35,6 +36,9 @@ class TriangleFeatures {
   [[nodiscard]] const Edge& edge(std::uint32_t i) const noexcept { return edges_[i]; }
   [[nodiscard]] const std::array<std::uint32_t, 2>& ends(std::uint32_t edge) const noexcept { return ends_[edge]; }
   [[nodiscard]] const Vec3& vertex(std::uint32_t i) const noexcept { return mesh_->vertex(i); }
+  // Of a body's vertex, as seen from its faces' fronts.
+  [[nodiscard]] const NormalCone& cone(std::uint32_t vertex) const noexcept { return cones_.of_corners[vertex]; }
+  [[nodiscard]] const NormalCone::Angle& around(std::uint32_t face) const noexcept { return cones_.around_faces[face]; }
   // Which of a face's edges are valleys, seen from its front (side 1) or from behind (−1): bit k for the one from
   // corner k to the next.
   [[nodiscard]] std::uint8_t valleys_of(std::uint32_t face, double side) const noexcept {
@@ -59,6 +63,7 @@ class TriangleFeatures {
 
   std::shared_ptr<const TriangleMesh> mesh_;
   double outwards_ = 0.0;
+  NormalCones cones_;  // of a body; of an open mesh they hold any direction
   std::vector<Edge> edges_;
   std::vector<std::array<std::uint32_t, 2>> ends_;  // of each edge, its vertices
   std::vector<std::array<std::uint8_t, 2>> bends_;  // of each face, its valleys and its ridges

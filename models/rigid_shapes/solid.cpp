@@ -20,6 +20,9 @@ Solid finished(Solid solid) {
   solid.reach = 0.0;
   for (const Vec3& p : solid.points) solid.reach = std::max(solid.reach, p.norm() + solid.radius);
   for (const Solid::Rim& rim : solid.rims) solid.reach = std::max(solid.reach, rim.centre.norm() + rim.radius);
+  solid.cones = normal_cones(solid.points.size(), [&](auto visit) {
+    for (const Solid::Face& face : solid.faces) visit(face.normal, solid.corners(face));
+  });
   return solid;
 }
 

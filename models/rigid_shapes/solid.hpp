@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "models/geometry/geometry.hpp"
+#include "models/rigid_shapes/normal_cone.hpp"
 #include "models/rigid_shapes/tool.hpp"
 
 namespace proxarm::models {
@@ -33,6 +34,7 @@ struct Solid {
   };
 
   std::vector<Vec3> points;
+  NormalCones cones;  // of its points and faces
   std::vector<Edge> edges;
   std::vector<Face> faces;
   std::vector<std::uint32_t> ring;
