@@ -104,12 +104,12 @@ TEST(Stress, AHeldToolThatGoesOverAnEdgeIsCountedAsAtAnEdge) {
   EXPECT_GE(run.edge, 1);
 }
 
-// Step 12: with fewer pairs of features looked at, corners and faces only where the corner is near the face and not
-// just near its plane, the tool went 0.3 mm into a box, unflagged, which 1,759 tests had let pass.
+// Step 12: a part of a step that led nowhere had left a corner behind the face that it pressed on, and from then on it
+// counted as behind it: the tool went 0.3 mm into the box, unflagged.
 TEST(Stress, ACornerThatComesDownOnABoxBetweenOthersStaysOutside) {
   const Tally run = clean_run(7135678590666904);
   EXPECT_EQ(run.kind, "boxes");
-  EXPECT_GT(run.contact, 800);
+  EXPECT_GT(run.contact, 300);
 }
 
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
