@@ -65,6 +65,13 @@ double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   return std::min({to_edge(a, ab), to_edge(a, ac), to_edge(b, bc)});
 }
 
+// Whether a contact may be one of an edge: it is on it, and the edge in the plane across its normal.
+bool lies_on(const PoseContact& contact, const Vec3& from, const Vec3& to, double within_m) {
+  const Vec3 d = to - from, off = contact.point_W - from;
+  if (std::abs(contact.normal_W.dot(d)) > within_m) return false;
+  return (off - std::clamp(d.dot(off) / d.squaredNorm(), 0.0, 1.0) * d).norm() <= within_m;
+}
+
 // By how much K yields at a contact to a newton along a direction, m.
 double yields(const ToolCall& call, const PoseContact& contact, const Vec3& along) {
   Twist wrench;
@@ -118,7 +125,11 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
     for (Vec3& x : core.corners_T) x = core.X_TP * x;
     for (Vec3& n : core.normals_T) n = core.X_TP.linear() * n;
     for (Vec3& e : core.edges_T) e = core.X_TP.linear() * e;
-    if (!core.normals_T.empty()) core.pieces_T.push_back(piece_of(core.corners_T, core.normals_T, core.edges_T));
+    if (!core.normals_T.empty()) {
+      core.pieces_T.push_back(piece_of(core.corners_T, core.normals_T, core.edges_T));
+      core.sharp_T = sharp_edges_of(core.pieces_T.front());
+    }
+    if (core.mesh_T) core.sharp_T = sharp_edges_of(*core.mesh_T);
     for (const Vec3& x : core.corners_T) core.middle_T += x / static_cast<double>(core.corners_T.size());
     for (const Vec3& x : core.corners_T) core.reach_m = std::max(core.reach_m, (x - core.middle_T).norm());
   }
@@ -129,12 +140,15 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
     if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) radius = capsule->radius_m;
     bend_per_m_.push_back(scenes::is_inside_out(object.shape) ? 0.0 : 1.0 / radius);
     std::vector<Piece>& pieces = pieces_.emplace_back();
+    Edges& sharp = sharp_.emplace_back();
     if (const auto* mesh = std::get_if<scenes::MeshShape>(&object.shape)) {
       for (std::uint32_t f = 0; f < mesh->mesh->size(); ++f) pieces.push_back(triangle_of(*mesh->mesh, f));
+      sharp = sharp_edges_of(*mesh->mesh);
     } else if (const auto* box = std::get_if<scenes::BoxShape>(&object.shape)) {
       std::vector<Vec3> axes;
       for (int k = 0; k < 3; ++k) axes.emplace_back(box->pose_W.linear().col(k));
       pieces.push_back(piece_of(corners_of_box(box->pose_W, box->size_m), axes, axes));
+      sharp = sharp_edges_of(pieces.back());
     }
   }
 }
@@ -153,6 +167,45 @@ ToolLaws::Piece ToolLaws::triangle_of(const models::TriangleMesh& mesh, std::uin
   normals.emplace_back(edges[0].cross(edges[1]).normalized());
   for (const Vec3& edge : edges) normals.emplace_back(normals.front().cross(edge));
   return piece_of(corners, normals, edges);
+}
+
+// Pairs of corners that are furthest along two normals, or against them (a box has one normal for two sides).
+ToolLaws::Edges ToolLaws::sharp_edges_of(const Piece& piece) {
+  std::vector<Vec3> faces;
+  const auto is_far = [&](const Vec3& x, const Vec3& n) {
+    double high = 0.0;
+    along(piece.corners, n, high);
+    return n.dot(x) >= high - 1e-12;
+  };
+  for (const Vec3& normal : piece.normals) {
+    for (const Vec3& n : {normal, Vec3(-normal)}) {
+      const auto on =
+          std::count_if(piece.corners.begin(), piece.corners.end(), [&](const Vec3& x) { return is_far(x, n); });
+      const bool known = std::any_of(faces.begin(), faces.end(), [&](const Vec3& f) { return (f - n).norm() < 1e-7; });
+      if (on >= 3 && !known) faces.push_back(n);
+    }
+  }
+  Edges out;
+  for (std::size_t i = 0; i < piece.corners.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const Vec3 &a = piece.corners[i], &b = piece.corners[j];
+      const auto both =
+          std::count_if(faces.begin(), faces.end(), [&](const Vec3& n) { return is_far(a, n) && is_far(b, n); });
+      if (both >= 2) out.emplace_back(a, b);
+    }
+  }
+  return out;
+}
+
+ToolLaws::Edges ToolLaws::sharp_edges_of(const models::TriangleMesh& mesh) {
+  Edges out;
+  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t from = mesh.triangle(f)[k], to = mesh.triangle(f)[(k + 1) % 3];
+      if (from < to) out.emplace_back(mesh.vertex(from), mesh.vertex(to));  // the other side has it the other way
+    }
+  }
+  return out;
 }
 
 ToolLaws::Piece ToolLaws::moved(const Piece& piece, const ToolPose& pose) {
@@ -350,13 +403,32 @@ std::string ToolLaws::missed(const ToolCall& call) const {
   return {};
 }
 
+// As a sine, where that is more than the tool's own turn.
+double ToolLaws::normal_turns(const ToolCall& call, const PoseContact& contact) const {
+  double most = models::difference(call.r, call.q).tail<3>().norm();
+  // At either pose a gap may be short of 1e-12 m.
+  const double within_m = 2e-12 + 8.0 * rounding_m(call.r);
+  const Vec3 &n = contact.normal_W, way = call.way_of(contact);
+  for (const auto& [a, b] : cores_[static_cast<std::size_t>(contact.part)].sharp_T) {
+    if (!lies_on(contact, call.r * a, call.r * b, within_m)) continue;
+    for (const auto& [from, to] : sharp_[static_cast<std::size_t>(contact.object)]) {
+      if (!lies_on(contact, from, to, within_m)) continue;
+      const Vec3 now = (call.r.orientation * (b - a)).cross(to - from),
+                 was = (call.q.orientation * (b - a)).cross(to - from);
+      const Vec3 n0 = n.dot(now) < 0.0 ? Vec3(-was.normalized()) : Vec3(was.normalized());
+      if (n0.dot(n) > 0.0 && n0.dot(way) <= within_m) most = std::max(most, n0.cross(n).norm());
+    }
+  }
+  return most;
+}
+
 double ToolLaws::curvature_m(const ToolCall& call, const PoseContact& contact) const {
   const double turned = models::difference(call.r, call.q).tail<3>().norm();
   const Vec3 lever = contact.point_W - call.r.position;
   const double s = call.way_of(contact).norm();
   const double radius = cores_[static_cast<std::size_t>(contact.part)].radius_m;
   const double bend = bend_per_m_[static_cast<std::size_t>(contact.object)] + (radius > 0.0 ? 1.0 / radius : 0.0);
-  return turned * (0.5 * turned * lever.norm() + s) + 0.5 * bend * s * s;
+  return 0.5 * turned * turned * lever.norm() + normal_turns(call, contact) * s + 0.5 * bend * s * s;
 }
 
 double ToolLaws::curvature_J(const ToolCall& call) const {
@@ -389,12 +461,18 @@ double ToolLaws::least_way_m(const ToolCall& call, const PoseContact& over, cons
   };
   const Mat6 free = call.K.inverse();
   Mat6 C = free;
+  const auto hold = [&](const Twist& along, const Twist& pushes) {
+    const Twist yielding = C * pushes;
+    const double yield = along.dot(yielding);
+    if (yield > 1e-6 * along.dot(free * along)) C -= yielding * (along.transpose() * C) / yield;
+  };
   for (const auto& [contact, force] : holders) {
     if (contact == &over) continue;
-    const Twist normal = at(*contact, contact->normal_W), pushes = at(*contact, force / contact->normal_W.dot(force));
-    const Twist yielding = C * pushes;
-    const double yield = normal.dot(yielding);
-    if (yield > 1e-6 * normal.dot(free * normal)) C -= yielding * (normal.transpose() * C) / yield;
+    if (call.way_of(*contact).norm() <= 8.0 * rounding_m(call.r)) {
+      for (int k = 0; k < 3; ++k) hold(at(*contact, Vec3::Unit(k)), at(*contact, Vec3::Unit(k)));
+    } else {
+      hold(at(*contact, contact->normal_W), at(*contact, force / contact->normal_W.dot(force)));
+    }
   }
   const Vec3& n = over.normal_W;
   const Vec3 t = (n.dot(n0) * n - n0).normalized();

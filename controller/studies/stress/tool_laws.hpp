@@ -50,6 +50,11 @@ class ToolLaws {
   // What contacts may add to the tool's energy, being of second order in the step: the way of a point that turns by θ
   // at a lever bends by θ² lever/2, normals turn by θ while the point goes on by s, and something round falls off by
   // s²/2r.
+  //
+  // Where two sharp edges cross, along a and b, the normal is along a × b, and turns by up to θ over the sine of the
+  // angle between them. How far is known: with n₀ that of the same edges at q, y the place of contact and x that of its
+  // material point at q, s = y − x leads from one edge's line to the other's, and −n₀ᵀs was the edges' gap. So
+  // n₀ᵀs ≤ 0 but for rounding, and nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
   [[nodiscard]] double curvature_J(const ToolCall& call) const;
   // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once, from
   // n₀ to n. Along n₀ the place of contact has come to meet the feature or been held by it, n₀ᵀs ≤ 0 (but for what the
@@ -63,7 +68,9 @@ class ToolLaws {
   // and s, to which what came before it adds, is no less. (All directions alike, G = y, it is y λ tan α.) Without other
   // contacts G is that of C = K⁻¹. What presses on a feature all the time, along g, with a force along φ, takes from C
   // what would move it: C − Cφ gᵀC/gᵀCφ. Only what pressed there in the step before, and hasn't moved along its normal
-  // since, is taken for such; and since friction may have turned φ meanwhile, both its first and its last must do.
+  // since, is taken for such; and since friction may have turned φ meanwhile, both its first and its last must do. What
+  // sticks holds along all directions: there each of three takes what moves the place along it, by the force that is
+  // needed for it. (A way is known to 8 roundings, as missed() has it.)
   //
   // `earlier`: what touched before, in the step before or on the way; `before`: in the step before. What the place came
   // from behind says nothing about it.
@@ -74,6 +81,7 @@ class ToolLaws {
   [[nodiscard]] static double rounding_m(const models::ToolPose& pose);
 
  private:
+  using Edges = std::vector<std::pair<models::Vec3, models::Vec3>>;
   // A convex piece: its corners, and all directions that may separate it from another.
   struct Piece {
     std::vector<models::Vec3> corners, normals, edges;
@@ -83,6 +91,8 @@ class ToolLaws {
   static Piece piece_of(std::vector<models::Vec3> corners, std::vector<models::Vec3> normals,
                         std::vector<models::Vec3> edges);
   static Piece triangle_of(const models::TriangleMesh& mesh, std::uint32_t face);
+  static Edges sharp_edges_of(const Piece& piece);
+  static Edges sharp_edges_of(const models::TriangleMesh& mesh);
   static Piece moved(const Piece& piece, const models::ToolPose& pose);
   static double between_m(const Piece& a, const Piece& b);
   static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to);
@@ -92,6 +102,7 @@ class ToolLaws {
     std::vector<Piece> pieces_T;                           // of a sharp one; a mesh's triangles
     std::shared_ptr<const models::TriangleMesh> mesh_T{};  // of a mesh
     std::vector<models::Vec3> corners_T, normals_T, edges_T;
+    Edges sharp_T;
     models::Vec3 middle_T = models::Vec3::Zero();
     models::Pose X_TP = models::Pose::Identity();
     models::Vec3 half_m = models::Vec3::Zero();  // of a box
@@ -110,6 +121,7 @@ class ToolLaws {
                                           const Holders& holders);
 
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
+  [[nodiscard]] double normal_turns(const ToolCall& call, const models::PoseContact& contact) const;
   [[nodiscard]] double curvature_m(const ToolCall& call, const models::PoseContact& contact) const;
   [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
   [[nodiscard]] double apart_from_m(const Core& core, const models::ToolPose& pose, std::size_t object) const;
@@ -118,6 +130,7 @@ class ToolLaws {
   bool hollow_ = false;
   std::vector<Core> cores_;
   std::vector<std::vector<Piece>> pieces_;  // of each object: a mesh's triangles, a box; of others none
+  std::vector<Edges> sharp_;                // of each object
   std::vector<double> bend_per_m_;          // of each object; 1/radius where it is round
 };
 

@@ -112,6 +112,20 @@ TEST(Stress, ACornerThatComesDownOnABoxBetweenOthersStaysOutside) {
   EXPECT_GT(run.contact, 300);
 }
 
+// Step 810: an edge of the tool slides along a mesh's edge, crossing it at 3°, and tilts by 0.4°: the normal turns by
+// 10°. The judge took the tool's turn for the normal's, and the rest for 2.7 mJ out of nowhere.
+TEST(Stress, ANormalOfEdgesThatNearlyLieAlongEachOtherTurnsByMoreThanTheTool) {
+  const Tally run = clean_run(8287154982278410);
+  EXPECT_EQ(run.kind, "meshes");
+}
+
+// Step 132: the tool sticks to one box while a corner of another one goes over one of its edges. The judge let what
+// sticks hold along its normal only, and took the push of the side beyond, over 60 µm, for 29 µJ out of nowhere.
+TEST(Stress, AToolThatSticksElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) {
+  const Tally run = clean_run(431851761038966);
+  EXPECT_GE(run.edge, 1);
+}
+
 TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   const Stress study;
   const Options options{.seed = 5};

@@ -117,5 +117,87 @@ TEST(ToolLaws, WhatHoldsByFrictionDoesSoWithTheForceItHadAndTheOneItHas) {
   }
 }
 
+// A contact a metre aside that sticks leaves the tool to turn about it: of 1e5 N/m and 1e5 Nm/rad the place then
+// yields by 1/(1e5 + 1e5), half of what it does freely (and less by 2.5e-9, the square of how far it turns). Where it
+// slips, it holds along its normal only.
+TEST(ToolLaws, WhatSticksHoldsAlongAllDirectionsOverAnEdge) {
+  for (const double share : {1.0 - 10.0 * little, 1.0 + 10.0 * little}) {
+    OverAnEdgeHeld here(0.5 * share * free_m);
+    const Vec3 pivot = Vec3::UnitY();
+    here.call.r.orientation = models::rotation_by(2.0 * std::asin(0.25 * share * free_m) * Vec3::UnitZ());
+    here.call.r.position = pivot - here.call.r.orientation * pivot;
+    here.call.contacts[0].point_W = here.call.r.position;
+    here.call.contacts[1].point_W = here.holds.point_W = pivot;
+    EXPECT_EQ(here.is_over({here.holds}), share > 1.0);
+    here.call.q.position.x() -= 1e-14;  // 16 roundings
+    EXPECT_FALSE(here.is_over({here.holds}));
+  }
+}
+
+// Two edges that cross at 0.05 rad, along x = 0 that of the object, and a tool that turns by 0.005 rad about x: the
+// normal turns by 0.1 rad.
+struct CrossingEdges {
+  static constexpr double between = 0.05, turn = 0.005, way_m = 1e-4;
+  scenes::Scene scene;
+  models::Tool tool{{{models::BoxTool{Vec3::Constant(0.01)}, models::Pose::Identity(), {}}}};
+  ToolCall call;
+
+  // `aside`: by how much more the tool came from behind the plane that the edges had at q; m.
+  explicit CrossingEdges(double aside_m, double crossing = between) {
+    scenes::Object box;
+    scenes::BoxShape shape;
+    shape.pose_W = models::Pose::Identity();
+    shape.pose_W.linear() = Eigen::AngleAxisd(0.8, Vec3::UnitY()).toRotationMatrix();
+    shape.size_m = Vec3::Constant(0.1);
+    shape.pose_W.translation() = -(shape.pose_W.linear() * Vec3(-0.05, 0.0, 0.05));
+    box.shape = shape;
+    scene.objects.push_back(box);
+    // The tool's lower left edge along y lies on the origin, turned about z and then about x.
+    const auto turned = [&](double about_x) {
+      return models::Quaternion(models::rotation_by(Vec3(about_x, 0.0, 0.0)) *
+                                models::rotation_by(Vec3(0.0, 0.0, -crossing)) *
+                                models::rotation_by(Vec3(0.0, -0.8, 0.0)));
+    };
+    const Vec3 corner(-0.005, 0.0, -0.005);
+    call.K = 1e6 * models::Mat6::Identity();
+    call.r.orientation = turned(0.0);
+    call.r.position = -(call.r.orientation * corner);
+    call.q.orientation = turned(-turn);
+    const Vec3 own = call.q.orientation * Vec3::UnitY();
+    const Vec3 n0 = own.cross(Vec3::UnitY()).normalized(), n = Vec3::UnitZ();
+    const Vec3 up = n0.z() > 0.0 ? n0 : Vec3(-n0);
+    const Vec3 along = (n - n.dot(up) * up).normalized();
+    call.q.position = -(call.q.orientation * corner) - way_m * along - aside_m * up;
+    PoseContact contact;
+    contact.object = contact.part = 0;
+    contact.normal_W = n;
+    contact.force_W = 10.0 * n;
+    call.contacts.push_back(contact);
+  }
+  [[nodiscard]] double allowed_J() const { return ToolLaws(scene, tool).curvature_J(call); }
+};
+
+TEST(ToolLaws, ANormalOfCrossingEdgesTurnsByMoreThanTheTool) {
+  const double sine = std::sin(std::atan2(std::sin(CrossingEdges::turn), std::tan(CrossingEdges::between)));
+  const double lever_m = 0.005 * std::sqrt(2.0), theta = CrossingEdges::turn, force_N = 10.0;
+  const double bends_m = 0.5 * theta * theta * lever_m;
+  const double by_edges_J = force_N * (bends_m + sine * CrossingEdges::way_m);
+  EXPECT_NEAR(CrossingEdges(0.0).allowed_J(), by_edges_J, 1e-9 * by_edges_J);
+  // The edges came from behind each other: by what rounding and gaps may be short of, or by more.
+  EXPECT_NEAR(CrossingEdges(1.99e-12).allowed_J(), by_edges_J, 1e-6 * by_edges_J);
+  const double by_turn_J = force_N * (bends_m + theta * CrossingEdges::way_m);
+  EXPECT_NEAR(CrossingEdges(2.01e-12).allowed_J(), by_turn_J, 1e-6 * by_turn_J);
+}
+
+// Nor where the contact is on no edge, or its normal is another one.
+TEST(ToolLaws, WhereNoEdgesCrossANormalTurnsByWhatTheToolDoes) {
+  CrossingEdges off(0.0), leaning(0.0);
+  const double by_turn_J = 10.0 * CrossingEdges::way_m * CrossingEdges::turn;  // and a fifth for its lever
+  off.call.contacts[0].point_W = Vec3(0.0, 0.0, 3e-12);
+  EXPECT_LT(off.allowed_J(), 1.3 * by_turn_J);
+  leaning.call.contacts[0].normal_W = Vec3(0.0, 1e-6, 1.0).normalized();
+  EXPECT_LT(leaning.allowed_J(), 1.3 * by_turn_J);
+}
+
 }  // namespace
 }  // namespace proxarm::studies
