@@ -592,7 +592,9 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   }
   K_ = K;
   problem_.set_stiffness(K);
-  const double known = shared_->dense ? 0.25 * gathered_reach_ : gathered_reach_;
+  // (Where all that the step can come near is known, one part may go as far.)
+  const bool all_known = !shared_->dense && came_m(q) + 2.0 * far < gathered_reach_;
+  const double known = all_known ? gathered_reach_ : 0.25 * gathered_reach_;
   const double limit = std::min(kPart * shared_->thinness, known);
   const double wanted = std::max(std::ceil(far / limit), 1.0);
   // Among what moves strides lead over many parts at once.

@@ -20,7 +20,14 @@ struct NormalCone {
     static constexpr double most = 1.0;  // rad
     double cosine = any, sine = 0.0;
     static Angle of(double angle) noexcept { return angle < most ? Angle{std::cos(angle), std::sin(angle)} : Angle{}; }
+    // Of two unit vectors.
+    static Angle between(const Vec3& a, const Vec3& b) noexcept {
+      const double cosine = a.dot(b);
+      return cosine > 0.0 ? Angle{cosine, a.cross(b).norm()} : Angle{};
+    }
     [[nodiscard]] bool is_any() const noexcept { return cosine == any; }
+    // A sum of two, as one that more may be added to.
+    [[nodiscard]] Angle narrow() const noexcept { return cosine > std::cos(most) ? *this : Angle{}; }
     friend Angle operator+(const Angle& a, const Angle& b) noexcept {
       if (a.is_any() || b.is_any()) return {};
       return {a.cosine * b.cosine - a.sine * b.sine, a.sine * b.cosine + a.cosine * b.sine};
@@ -41,12 +48,22 @@ struct NormalCone {
   }
 };
 
-// Of each corner of a body its cone, and of each face how far the normals at its corners turn away from its own: a
-// corner of another body that lies on an edge rests on both faces there, and neither normal alone need be in its cone.
+// Of each corner and edge of a body its cone, and of each face how far the normals at its corners turn away from its
+// own: a corner of another body that lies on an edge rests on both faces there, and neither normal alone need be in its
+// cone.
 struct NormalCones {
   std::vector<NormalCone> of_corners;
   std::vector<NormalCone::Angle> around_faces;
+  std::vector<NormalCone> of_edges{};
 };
+
+// Around the normals beside an edge, and as far beyond them as touch_edges_sharp() allows.
+inline NormalCone cone_of_edge(const Vec3& left, const Vec3& right) noexcept {
+  const Vec3 sum = left + right;
+  if (!(sum.norm() > 0.0)) return {};
+  const Vec3 axis = sum.normalized();
+  return {axis, NormalCone::Angle::of(std::acos(std::clamp(axis.dot(left), -1.0, 1.0)) + 0.02)};
+}
 
 // `each_face` calls with the unit normal and the corners of every face.
 template <typename EachFace>

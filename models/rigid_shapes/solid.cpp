@@ -23,6 +23,7 @@ Solid finished(Solid solid) {
   solid.cones = normal_cones(solid.points.size(), [&](auto visit) {
     for (const Solid::Face& face : solid.faces) visit(face.normal, solid.corners(face));
   });
+  for (const Solid::Edge& edge : solid.edges) solid.cones.of_edges.push_back(cone_of_edge(edge.left, edge.right));
   return solid;
 }
 
