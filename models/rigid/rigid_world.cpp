@@ -607,18 +607,18 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   allow_for(parts);
   // (far shrinks with the goal only where nothing moves)
   const double to_goal = moving_.empty() && !whole ? motion(goal, q) : far;
-  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(q);
+  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(q), looked = true;
   // What has used up what it may look at finds no more in smaller parts, nor without friction.
   const auto may = [&] { return looks_ > 0 || !something_comes(); };
   if (fine && gives_energy(q)) {
-    if (may()) look_again(goal, q, to_goal, parts);
+    if (may()) looked = look_again(goal, q, to_goal, parts);
   } else if (!fine && budget_ > 0 && finer(parts) > 1 && may()) {
     fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in(q);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
   // the law: there a jam is what most often has no solution, and without friction it would slip right through.
-  const bool lawful = fine;
+  const bool lawful = fine && looked;
   if (!fine && !shared_->hollow && may()) {
     budget_ = kBudget;
     looks_ = something_comes() ? std::min(looks_, kLooks / 2) : kLooks / 2;
@@ -654,15 +654,17 @@ bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, 
   return in_parts(p_hat, q_old, far, parts, q);
 }
 
-// In smaller parts; if they lead nowhere, what was found stays.
-void RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
-  if (finer(parts) == 1) return;
+// In smaller parts; if they lead nowhere, what was found stays. False: nothing is left to look at what may be far from
+// lawful, and the tool stays where they led.
+bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
+  if (finer(parts) == 1) return true;
   const ToolPose found = q_;
   const std::array<PoseContact, ContactProblem::most> contacts = contacts_;
   const std::array<std::uint16_t, ContactProblem::most> of_contact = of_contact_;
   const std::size_t count = count_;
   const bool rides = rides_;
-  if (in_smaller_parts(p_hat, q_old, far, parts, q_)) return;
+  if (in_smaller_parts(p_hat, q_old, far, parts, q_)) return true;
+  if (looks_ <= 0) return false;
   let_go(1.0);
   squeezed_ = false;
   q_ = found;
@@ -671,6 +673,7 @@ void RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double
   count_ = count;
   rides_ = rides;
   collected_ = true;
+  return true;
 }
 
 // Whether the contacts' work since q(k−1) is above 0 by more than what is of second order in the step: the way of a
