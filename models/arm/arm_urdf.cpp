@@ -148,12 +148,14 @@ void load_document(tinyxml2::XMLDocument& document, const std::filesystem::path&
   const auto status = std::filesystem::status(file, error);
   if (!std::filesystem::exists(status)) throw mistake(file, 0, "no such file");
   if (std::filesystem::is_directory(status)) throw mistake(file, 0, "is a folder", "name the URDF in it");
-  if (const auto size = std::filesystem::file_size(file, error); !error && size > max_bytes) {
-    throw mistake(file, 0, "is larger than 16 MiB", "is it the right file?");
-  }
+  const auto size = std::filesystem::file_size(file, error);
+  if (!error && size > max_bytes) throw mistake(file, 0, "is larger than 16 MiB", "is it the right file?");
   const tinyxml2::XMLError result = document.LoadFile(file.c_str());
   if (result == tinyxml2::XML_SUCCESS) return;
-  if (result == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) throw mistake(file, 0, "the file is empty");
+  if (result == tinyxml2::XML_ERROR_EMPTY_DOCUMENT) {
+    throw mistake(file, 0,
+                  size == 0 ? "the file is empty" : "no XML in the file: it is blank, or begins with a byte 0");
+  }
   if (result == tinyxml2::XML_ERROR_FILE_COULD_NOT_BE_OPENED || result == tinyxml2::XML_ERROR_FILE_NOT_FOUND ||
       result == tinyxml2::XML_ERROR_FILE_READ_ERROR) {
     throw mistake(file, 0, "can't be read", "look at its permissions");

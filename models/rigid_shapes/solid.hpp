@@ -54,4 +54,7 @@ Solid solid_of(const BoxTool& shape, const Pose& X);
 Solid solid_of(const CylinderTool& shape, const Pose& X);
 Solid solid_of(const ConvexTool& shape, const Pose& X);  // points inside of the hull are left out
 
+// How far a tool's shapes come from its reference point. Throws as solid_of().
+double reach_of(const Tool& tool);
+
 }  // namespace proxarm::models

@@ -57,6 +57,14 @@ class RigidTool(ProgramTest):
             rows = [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
         return summary, rows
 
+    def test_a_tool_longer_than_the_arm_is_wondered_at(self):
+        for length, wondered in ((2.9, False), (5.0, True)):  # from its middle; the arm reaches 1.55 m
+            tool = self.written("tool.yaml", f"box: {{size_m: [{length}, 0.06, 0.06]}}\n")
+            done = self.call("run", "--tool", tool, "--scene", SCENES / "free.yaml", "--duration", "0.2s")
+            self.assertEqual(done.status, 0, done.err)
+            said = "the tool comes 2.5 m from its reference point, and the arm reaches 1.55 m" in done.err
+            self.assertEqual(said, wondered, done.err)
+
     def test_a_box_stands_on_its_table(self):
         summary, rows = self.session("box_on_table.yaml", "tip.yaml")
         corners = [(sx * 0.06, sy * 0.04, 0.01 + sz * 0.02) for sx in (-1, 1) for sy in (-1, 1) for sz in (-1, 1)]

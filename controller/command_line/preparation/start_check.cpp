@@ -13,6 +13,8 @@
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/geometry/eigenvalues.hpp"
+#include "models/mesh/mesh_topology.hpp"
+#include "models/rigid_shapes/solid.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/mesh_files/mesh_report.hpp"
 
@@ -239,6 +241,15 @@ std::vector<std::string> weight_surprises(const PreparedSession& session, const 
                               : "such poses the drive can't hold it")};
 }
 
+// No arm swings a tool that is longer than itself; one in millimetres is a thousand times as long as it should be.
+std::vector<std::string> tool_surprises(const scenes::RigidTool& tool, double reach_m) {
+  const double tool_m = models::reach_of(tool.shape);
+  if (tool_m <= reach_m) return {};
+  return {tool.file.string() + ":" + std::to_string(tool.line) + ": the tool comes " + models::size_text(tool_m) +
+          " from its reference point, and the arm reaches " + models::size_text(reach_m) +
+          ": are its sizes in metres? (of a mesh: scale_m)"};
+}
+
 }  // namespace
 
 void require_usable_start(const PreparedSession& session) {
@@ -270,6 +281,9 @@ std::vector<std::string> surprises(const PreparedSession& session) {
   // No joint's axis is further from the tool than the arm can reach.
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
   std::vector<std::string> lines = weight_surprises(session, arm);
+  if (session.scene.tool) {
+    for (const std::string& line : tool_surprises(*session.scene.tool, reach_m)) lines.push_back(line);
+  }
   for (const scenes::Object& object : session.scene.objects) {
     const auto* const mesh = std::get_if<scenes::MeshShape>(&object.shape);
     if (mesh == nullptr || !mesh->mesh) continue;
