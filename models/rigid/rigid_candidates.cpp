@@ -375,7 +375,7 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
 bool RigidWorld::look_around(const ToolPose& pose, double reach, std::size_t pairs, std::size_t faces) noexcept {
   pair_room_ = pairs;
   face_room_ = faces;
-  pair_count_ = pressed_count_ = near_faces_ = 0;
+  pair_count_ = pressed_count_ = near_faces_ = faces_of_both_count_ = 0;
   crowded_ = false;
   for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
     gather_entry(static_cast<std::uint16_t>(entry), pose, reach);

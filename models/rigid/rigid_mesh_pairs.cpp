@@ -78,6 +78,9 @@ void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const Vi
   MeshPairs(own.mesh(), other.mesh(), at, reach).each([&](std::uint32_t face, std::uint32_t other_face) {
     crowded_ = crowded_ || looked_at++ == face_room_;
     if (crowded_) return false;
+    if (faces_of_both_count_ < faces_of_both_.size()) {
+      faces_of_both_[faces_of_both_count_++] = {part, entry, face, other_face};
+    }
     of.points_of_tool(face, other_face, add(Kind::point_face));
     of.points_of_object(face, other_face, add(Kind::face_point));
     of.edges(face, other_face, add(Kind::edges));

@@ -4,6 +4,7 @@
 
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/mesh_overlap.hpp"
+#include "models/rigid_features/mesh_pairs.hpp"
 #include "models/rigid_features/near.hpp"
 #include "models/rigid_shapes/overlap.hpp"
 #include "models/rigid_shapes/two_cylinders.hpp"
@@ -49,6 +50,7 @@ double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
 double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noexcept {
   double deepest = std::numeric_limits<double>::infinity();
   const View tool = view(pose);
+  const bool near_known = has_near_faces(pose);
   for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
     const Entry& e = shared_->entries[i];
     const auto* solid = std::get_if<Solid>(&e.object.shape);
@@ -59,12 +61,37 @@ double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noe
     const bool beyond = distance2_to_box(at.x, e.bounds) > shared_->reach * shared_->reach;
     if (beyond && !e.object.inside_out)
       continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)
-    for (const Part& part : shared_->parts) {
-      const double gap = overlap_m(part, e, at, moves(entry) ? Apart{apart.enough} : apart);
+    for (std::size_t k = 0; k < shared_->parts.size(); ++k) {
+      const auto part = static_cast<std::uint16_t>(k);
+      const bool known = near_known && mesh != nullptr && shared_->parts[part].mesh && !moves(entry);
+      const double gap = known ? overlap_of_near_faces(part, entry, at)
+                               : overlap_m(shared_->parts[part], e, at, moves(entry) ? Apart{apart.enough} : apart);
       if (gap < 0.0) deepest = std::min(deepest, gap);
     }
   }
   return deepest;
+}
+
+// Whether all triangles of meshes that stand still are known that may meet at this pose: it is no further from where
+// they were gathered than they looked.
+bool RigidWorld::has_near_faces(const ToolPose& pose) const noexcept {
+  const bool all = !crowded_ && !faces_of_both_.empty() && faces_of_both_count_ < faces_of_both_.size();
+  return all && riding_ == nobody && motion(pose, gathered_at_) < gathered_reach_;
+}
+
+double RigidWorld::overlap_of_near_faces(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept {
+  const Entry& e = shared_->entries[entry];
+  const TriangleMesh& own = shared_->parts[part].mesh->mesh();
+  const TriangleMesh& other = (*std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape))->mesh();
+  const MeshPairs pairs(own, other, at, 0.0);
+  double deepest = 0.0;
+  for (std::size_t k = 0; k < faces_of_both_count_; ++k) {
+    const NearFacesOfBoth& faces = faces_of_both_[k];
+    if (faces.part != part || faces.entry != entry || !pairs.come_near(faces.own, faces.other)) continue;
+    deepest = std::min(deepest, overlap_of_faces(own, faces.own, other, faces.other, at));
+  }
+  if (deepest < 0.0) return deepest;
+  return overlap_of_all(own, other, at, e.held != 0.0 ? std::optional<bool>(e.object.inside_out) : std::nullopt);
 }
 
 // How deep a part of the tool stands in an object, or how far it is from a mesh's surface on the wrong side of it; 0 or

@@ -203,6 +203,13 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   // Where gaps bend, most of the iteration is rough, and a peg that goes by the closed form ends more often in a jam
   // that has no solution: in 17 of 8,000 steps where it was none.
   problem_.use_closed_form(!shared->bends);
+  const auto is_mesh = [](const Entry& e) {
+    return std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(e.object.shape);
+  };
+  const bool of_tool = std::any_of(shared->parts.begin(), shared->parts.end(), [](const Part& p) { return p.mesh; });
+  if (of_tool && std::any_of(shared->entries.begin(), shared->entries.end(), is_mesh)) {
+    faces_of_both_.resize(most_faces + 1);  // one more than room, so that a full list isn't one that lacks something
+  }
   shared_ = std::move(shared);
 }
 
@@ -630,6 +637,7 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     without_friction_ = false;
     if (!fine) q_ = reached;
   }
+  if (!lawful && !fine) went_in(q);  // in a part, of those that led nowhere
   beside_ = beside_m;
   unresolved_ = !lawful || !whole || overflow_ || crowded_;
   report(q);

@@ -104,6 +104,11 @@ class RigidWorld final : public PoseAlgorithm {
     std::array<Pair, ContactProblem::most> pairs;
     std::size_t count = 0;
   };
+  // Triangles of a mesh that is a part of the tool and of one that is an object.
+  struct NearFacesOfBoth {
+    std::uint16_t part = 0, entry = 0;
+    std::uint32_t own = 0, other = 0;
+  };
   // A pair at a pose.
   struct Found {
     Touch touch;  // in W
@@ -307,6 +312,8 @@ class RigidWorld final : public PoseAlgorithm {
   bool went_in(const ToolPose& q_old) noexcept;
   [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
+  [[nodiscard]] bool has_near_faces(const ToolPose& pose) const noexcept;
+  [[nodiscard]] double overlap_of_near_faces(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept;
   [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at,
                                         const Apart& apart) noexcept;
 
@@ -321,6 +328,10 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;                // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
+  // Of meshes, which triangles were near then. There is room for them only where both the tool and an object are
+  // meshes.
+  std::vector<NearFacesOfBoth> faces_of_both_;
+  std::size_t faces_of_both_count_ = 0;
   std::size_t pair_room_ = most_pairs, face_room_ = most_faces, near_faces_ = 0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take

@@ -92,20 +92,27 @@ double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMe
              : to_wrong_side_m(mesh, at * (cylinder ? solid.rims[0].centre : solid.points.front()), should_be_inside);
 }
 
+double overlap_of_faces(const TriangleMesh& own, std::uint32_t face, const TriangleMesh& other,
+                        std::uint32_t other_face, const View& at) noexcept {
+  const std::array<Vec3, 3> a = {at * own.corner(face, 0), at * own.corner(face, 1), at * own.corner(face, 2)};
+  const std::array<Vec3, 3> b = {other.corner(other_face, 0), other.corner(other_face, 1), other.corner(other_face, 2)};
+  return std::min(0.0, separation_of_triangles(a, b));
+}
+
+double overlap_of_all(const TriangleMesh& own, const TriangleMesh& other, const View& at,
+                      std::optional<bool> should_be_inside) noexcept {
+  const double other_in_own = to_wrong_side_m(own, at.to_T(other.vertex(0)), false);
+  return std::min(other_in_own, to_wrong_side_m(other, at * own.vertex(0), should_be_inside));
+}
+
 double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,
                          std::optional<bool> should_be_inside) noexcept {
   double deepest = 0.0;
   MeshPairs(own, other, at, 0.0).each([&](std::uint32_t face, std::uint32_t other_face) {
-    const std::array<Vec3, 3> a = {at * own.corner(face, 0), at * own.corner(face, 1), at * own.corner(face, 2)};
-    const std::array<Vec3, 3> b = {other.corner(other_face, 0), other.corner(other_face, 1),
-                                   other.corner(other_face, 2)};
-    deepest = std::min(deepest, separation_of_triangles(a, b));
+    deepest = std::min(deepest, overlap_of_faces(own, face, other, other_face, at));
     return true;
   });
-  if (deepest < 0.0) return deepest;
-  // One may be all inside of the other.
-  const double other_in_own = to_wrong_side_m(own, at.to_T(other.vertex(0)), false);
-  return std::min(other_in_own, to_wrong_side_m(other, at * own.vertex(0), should_be_inside));
+  return deepest < 0.0 ? deepest : overlap_of_all(own, other, at, should_be_inside);
 }
 
 }  // namespace proxarm::models

@@ -1,6 +1,7 @@
 // Whether what should be apart stands in a mesh, for setting up.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 
@@ -23,5 +24,10 @@ double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMe
 // Of two meshes the same; the own one is a closed body.
 double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,
                          std::optional<bool> should_be_inside) noexcept;
+// The two things that it looks at: one triangle of each, and whether one mesh is all on the wrong side of the other.
+double overlap_of_faces(const TriangleMesh& own, std::uint32_t face, const TriangleMesh& other,
+                        std::uint32_t other_face, const View& at) noexcept;
+double overlap_of_all(const TriangleMesh& own, const TriangleMesh& other, const View& at,
+                      std::optional<bool> should_be_inside) noexcept;
 
 }  // namespace proxarm::models

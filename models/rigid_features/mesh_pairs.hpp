@@ -41,6 +41,11 @@ class MeshPairs {
     }
   }
 
+  // Whether two of them come so near, by their boxes and planes.
+  [[nodiscard]] bool come_near(std::uint32_t own, std::uint32_t other) const noexcept {
+    return come_near(own_triangle(own), other);
+  }
+
  private:
   // A node of a tree: its box by middle and half, in its mesh's frame, and in the other one a box around that.
   struct Node {
@@ -83,20 +88,35 @@ class MeshPairs {
     if (reaches(own, other)) stack[top++] = {own, other};
   }
 
+  // A triangle of the own mesh, in the other frame.
+  struct Triangle {
+    std::array<Vec3, 3> corners;
+    Vec3 low, high, normal;
+  };
+  [[nodiscard]] Triangle own_triangle(std::uint32_t i) const noexcept {
+    Triangle out;
+    for (std::size_t k = 0; k < 3; ++k) out.corners[k] = at_ * own_->corner(i, k);
+    out.low = out.corners[0].cwiseMin(out.corners[1]).cwiseMin(out.corners[2]);
+    out.high = out.corners[0].cwiseMax(out.corners[1]).cwiseMax(out.corners[2]);
+    out.normal.noalias() = at_.R * own_->face(i).normal;
+    return out;
+  }
+  // By their boxes and their planes.
+  [[nodiscard]] bool come_near(const Triangle& own, std::uint32_t j) const noexcept {
+    const std::array<Vec3, 3> b = {other_->corner(j, 0), other_->corner(j, 1), other_->corner(j, 2)};
+    const Vec3 low = b[0].cwiseMin(b[1]).cwiseMin(b[2]), high = b[0].cwiseMax(b[1]).cwiseMax(b[2]);
+    if (((own.low - high).array() > near_).any() || ((low - own.high).array() > near_).any()) return false;
+    return !on_one_side(other_->face(j).normal, b[0], own.corners) && !on_one_side(own.normal, own.corners[0], b);
+  }
+
   template <typename Visit>
   bool look_at(const Node& own, const Node& other, Visit& visit) const noexcept {
     for (std::uint32_t i = own.first; i < own.first + own.count; ++i) {
-      const std::array<Vec3, 3> a = {at_ * own_->corner(i, 0), at_ * own_->corner(i, 1), at_ * own_->corner(i, 2)};
-      const Vec3 low = a[0].cwiseMin(a[1]).cwiseMin(a[2]), high = a[0].cwiseMax(a[1]).cwiseMax(a[2]);
-      const Vec3 way = other.middle - 0.5 * (low + high);  // (the other box has the room around it)
-      if (((way.cwiseAbs() - other.half - 0.5 * (high - low)).array() > 0.0).any()) continue;
-      const Vec3 normal = at_.R * own_->face(i).normal;
+      const Triangle triangle = own_triangle(i);
+      const Vec3 way = other.middle - 0.5 * (triangle.low + triangle.high);  // (the other box has the room around it)
+      if (((way.cwiseAbs() - other.half - 0.5 * (triangle.high - triangle.low)).array() > 0.0).any()) continue;
       for (std::uint32_t j = other.first; j < other.first + other.count; ++j) {
-        const std::array<Vec3, 3> b = {other_->corner(j, 0), other_->corner(j, 1), other_->corner(j, 2)};
-        const Vec3 b_low = b[0].cwiseMin(b[1]).cwiseMin(b[2]), b_high = b[0].cwiseMax(b[1]).cwiseMax(b[2]);
-        if (((low - b_high).array() > near_).any() || ((b_low - high).array() > near_).any()) continue;
-        if (on_one_side(other_->face(j).normal, b[0], a) || on_one_side(normal, a[0], b)) continue;
-        if (!visit(i, j)) return false;
+        if (come_near(triangle, j) && !visit(i, j)) return false;
       }
     }
     return true;

@@ -126,6 +126,14 @@ TEST(Stress, AToolThatSticksElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) {
   EXPECT_GE(run.edge, 1);
 }
 
+// Step 155 found no solution, and the last of the smaller parts that it was tried in had led 25 µm into the mesh: the
+// tool stayed there for the 845 steps that were left.
+TEST(Stress, AStepThatFindsNoSolutionLeavesTheToolOutside) {
+  const Tally run = clean_run(3898221416725126);
+  EXPECT_EQ(run.kind, "meshes");
+  EXPECT_LE(run.unresolved, 2);
+}
+
 // Step 4, of 22 mm: a corner slipped around an edge of a box and was sprung by 8 mm and 2 J. That the contacts gave
 // energy was seen, but nothing was left of the step's time to look again in smaller parts.
 TEST(Stress, WhatGivesEnergyAndCantBeLookedAtAgainIsUnresolved) {
