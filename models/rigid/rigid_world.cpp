@@ -439,6 +439,13 @@ double RigidWorld::normals_turn_by(const Twist& delta) const noexcept {
   return turned + bend * (delta.head<3>().norm() + shared_->reach * turned);
 }
 
+Vec3 RigidWorld::in_cone(Vec3 f, double mu) noexcept {
+  f[0] = std::max(f[0], 0.0);
+  const double size = f.tail<2>().norm(), limit = mu * f[0];
+  if (size > limit) f.tail<2>() *= limit / size;
+  return f;
+}
+
 // The local problem is solved to 1e-10 of the free motion's press where contacts hold each other. What forces are then
 // out of their cones by is taken off, and the tool moves by what wrenches lack to balance: 1e-9 N is 1e-16 m on a
 // coupling of 10 N/µm. Where gaps bend, the coupling isn't K, and the law is met more closely.
@@ -449,9 +456,7 @@ void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
   for (std::size_t k = 0; k < linear_count_; ++k) {
     LinearContact& contact = linear_[k];
     if (contact.state == ContactState::open) continue;
-    contact.f[0] = std::max(contact.f[0], 0.0);
-    const double size = contact.f.tail<2>().norm(), limit = contact.mu * contact.f[0];
-    if (size > limit) contact.f.tail<2>() *= limit / size;
+    contact.f = in_cone(contact.f, contact.mu);
     lack.noalias() += contact.J.transpose() * contact.f;
   }
   if (lack.squaredNorm() > kBalance * kBalance * wrench.squaredNorm()) delta += problem_.yield_to(lack);
@@ -739,7 +744,7 @@ void RigidWorld::collect_contacts() noexcept {
     contact.slips = linear_[k].state == ContactState::slip;
     contact.point_W = found.touch.point;
     contact.normal_W = found.touch.normal;
-    contact.force_W = axes_[k] * linear_[k].f;
+    contact.force_W = axes_[k] * in_cone(linear_[k].f, linear_[k].mu);
     contact.gap_m = found.touch.gap;
     contact.friction = friction(pair);
     of_contact_[count_ - 1] = pair.entry;

@@ -284,6 +284,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] bool on_features() const noexcept;
   [[nodiscard]] bool stays_balanced(const Twist& delta, const Twist& e) const noexcept;
   [[nodiscard]] double normals_turn_by(const Twist& delta) const noexcept;
+  [[nodiscard]] static Vec3 in_cone(Vec3 f, double mu) noexcept;  // of a contact's force, normal and across
   void balance(const Twist& e, Twist& delta) noexcept;
   [[nodiscard]] static double damped(double share, double size, double last) noexcept;
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
