@@ -667,8 +667,8 @@ bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, 
   return in_parts(p_hat, q_old, far, parts, q);
 }
 
-// In smaller parts; if they lead nowhere, what was found stays. False: nothing is left to look at what may be far from
-// lawful, and the tool stays where they led.
+// In smaller parts; if they lead nowhere or into a mesh, what was found stays. False: nothing is left to look at what
+// may be far from lawful, and the tool stays where they led.
 bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
   if (finer(parts) == 1) return true;
   const ToolPose found = q_;
@@ -676,7 +676,8 @@ bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double
   const std::array<std::uint16_t, ContactProblem::most> of_contact = of_contact_;
   const std::size_t count = count_;
   const bool rides = rides_;
-  if (in_smaller_parts(p_hat, q_old, far, parts, q_)) return true;
+  const bool led = in_smaller_parts(p_hat, q_old, far, parts, q_);
+  if (!went_in(q_old) && led) return true;
   if (looks_ <= 0) return false;
   let_go(1.0);
   squeezed_ = false;
