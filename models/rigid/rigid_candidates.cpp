@@ -136,6 +136,7 @@ class RigidWorld::NearFaces {
   }
 
  private:
+  // Whether a vertex of the triangles may rest on a face of the tool, by where the face is and by its normal.
   [[nodiscard]] bool may_hold(std::uint32_t index) const noexcept {
     const Solid::Face& face = solid_->faces[index];
     if (!normals_.holds(-face.normal, solid_->cones.around_faces[index] + corners_turn_)) return false;
