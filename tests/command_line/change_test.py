@@ -323,7 +323,8 @@ except ConnectionError:
     print(b'')
 """], capture_output=True, text=True, timeout=30)
             self.assertEqual(asked.stdout, "b''\n", asked.stderr)
-        self.stop()
+        self.run.terminate()
+        self.run.communicate(timeout=60)  # on a busy machine it hasn't begun to render, and says so by its status
         self.assertFalse(self.path.exists())
 
     def test_changes_take_effect_and_are_in_the_replay(self):
