@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
+#include <utility>
 
 #include "models/base/random.hpp"
 #include "models/rigid_features/rigid_object.hpp"
@@ -12,6 +14,8 @@
 
 namespace proxarm::models {
 namespace {
+
+Mat3 rotation_about(const Vec3& axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
 const NormalCone::Angle kNoTurn = NormalCone::Angle::of(1e-12);
 
@@ -119,6 +123,34 @@ TEST(NormalCones, WhatHasNoFacesAndWhatIsSharpRestsInAnyDirection) {
     EXPECT_TRUE(rod.cones.of_corners[0].holds(n, kNoTurn));
     EXPECT_TRUE(tip.holds(n, kNoTurn));
   }
+}
+
+// touch_edges_sharp() allows 0.02 rad beyond the faces' normals: 1e-9 rad around that is where it changes.
+TEST(NormalCones, AnEdgesConeEndsATouchsSlackBeyondItsFaces) {
+  const Solid box = solid_of(BoxTool{Vec3(0.02, 0.03, 0.04)}, Pose::Identity());
+  ASSERT_EQ(box.cones.of_edges.size(), 12U);
+  for (std::size_t i = 0; i < box.edges.size(); ++i) {
+    const Solid::Edge& edge = box.edges[i];
+    const Vec3 along = edge.left.cross(edge.right);
+    for (const auto& [angle, held] : {std::pair(0.0, true), std::pair(0.0199, true), std::pair(0.02 - 1e-9, true),
+                                      std::pair(0.02 + 1e-9, false), std::pair(1.0, false)}) {
+      EXPECT_EQ(box.cones.of_edges[i].holds(rotation_about(along, -angle) * edge.left, kNoTurn), held) << angle;
+      EXPECT_EQ(box.cones.of_edges[i].holds(rotation_about(along, angle) * edge.right, kNoTurn), held) << angle;
+    }
+  }
+  EXPECT_TRUE(cone_of_edge(Vec3::Zero(), Vec3::Zero()).holds(Vec3::UnitX(), kNoTurn));  // a capsule's
+}
+
+TEST(NormalCones, ASumOfAnglesMayBeAddedToOnlyBelowARadian) {
+  const auto sum_to = [](double angle) {
+    return NormalCone::Angle::between(Vec3::UnitX(), Vec3(std::cos(angle - 0.5), std::sin(angle - 0.5), 0.0)) +
+           NormalCone::Angle::of(0.5);
+  };
+  for (const double angle : {0.6, 0.9, 1.0 - 1e-9}) {
+    EXPECT_NEAR(sum_to(angle).narrow().cosine, std::cos(angle), 1e-15) << angle;
+  }
+  for (const double angle : {1.0 + 1e-9, 1.2, 1.9}) EXPECT_TRUE(sum_to(angle).narrow().is_any()) << angle;
+  EXPECT_TRUE(NormalCone::Angle::between(Vec3::UnitX(), -Vec3::UnitX()).is_any());
 }
 
 }  // namespace
