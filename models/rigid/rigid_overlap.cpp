@@ -1,6 +1,7 @@
 // Whether the tool stands in an object: how far it is from there, for figures, and whether a step has led it in.
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/mesh_overlap.hpp"
@@ -13,6 +14,11 @@ namespace proxarm::models {
 namespace {
 
 constexpr std::size_t kMostPlanes = 8;  // more contacts than hold a tool
+
+// Of a mesh; an open one has no inside.
+std::optional<bool> should_be_inside(const RigidObject& mesh, double held) noexcept {
+  return held != 0.0 ? std::optional<bool>(mesh.inside_out) : std::nullopt;
+}
 
 }  // namespace
 
@@ -91,7 +97,7 @@ double RigidWorld::overlap_of_near_faces(std::uint16_t part, std::uint16_t entry
     deepest = std::min(deepest, overlap_of_faces(own, faces.own, other, faces.other, at));
   }
   if (deepest < 0.0) return deepest;
-  return overlap_of_all(own, other, at, e.held != 0.0 ? std::optional<bool>(e.object.inside_out) : std::nullopt);
+  return overlap_of_all(own, other, at, should_be_inside(e.object, e.held));
 }
 
 // How deep a part of the tool stands in an object, or how far it is from a mesh's surface on the wrong side of it; 0 or
@@ -99,8 +105,7 @@ double RigidWorld::overlap_of_near_faces(std::uint16_t part, std::uint16_t entry
 double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& at, const Apart& apart) noexcept {
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
   if (mesh != nullptr) {
-    std::optional<bool> inside;
-    if (entry.held != 0.0) inside = entry.object.inside_out;
+    const std::optional<bool> inside = should_be_inside(entry.object, entry.held);
     if (part.mesh) return overlap_of_meshes(part.mesh->mesh(), (*mesh)->mesh(), at, inside);
     return overlap_with_mesh(part.solid, part.box, (*mesh)->mesh(), at, inside, apart);
   }

@@ -642,7 +642,7 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     without_friction_ = false;
     if (!fine) q_ = reached;
   }
-  if (!lawful && !fine) went_in(q);  // in a part, of those that led nowhere
+  if (!fine) went_in(q);  // in a part, of those that led nowhere
   beside_ = beside_m;
   unresolved_ = !lawful || !whole || overflow_ || crowded_;
   report(q);

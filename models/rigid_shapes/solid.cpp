@@ -6,7 +6,6 @@
 #include <map>
 #include <numbers>
 #include <stdexcept>
-#include <type_traits>
 #include <variant>
 
 #include "models/rigid_shapes/exact_hull.hpp"
@@ -348,13 +347,11 @@ Solid solid_of(const ConvexTool& shape, const Pose& X) {
 double reach_of(const Tool& tool) {
   double reach = 0.0;
   for (const ToolPart& part : tool.parts) {
-    if (const auto* mesh = std::get_if<MeshTool>(&part.shape)) {
-      for (const Vec3& p : mesh->points_m) reach = std::max(reach, (part.X_TP * p).norm());
-      continue;
-    }
     std::visit(
         [&](const auto& shape) {
-          if constexpr (!std::is_same_v<std::decay_t<decltype(shape)>, MeshTool>) {
+          if constexpr (requires { shape.points_m; }) {  // no hull is needed for its reach
+            for (const Vec3& p : shape.points_m) reach = std::max(reach, (part.X_TP * p).norm());
+          } else {
             reach = std::max(reach, solid_of(shape, part.X_TP).reach);
           }
         },

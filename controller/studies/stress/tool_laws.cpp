@@ -53,23 +53,24 @@ double along(const std::vector<Vec3>& points, const Vec3& n, double& highest) {
   return lowest;
 }
 
+// From an edge that leads from a place by d.
+double to_edge(const Vec3& from, const Vec3& d, const Vec3& p) {
+  return (p - from - std::clamp(d.dot(p - from) / d.squaredNorm(), 0.0, 1.0) * d).norm();
+}
+
 // The nearest point of a triangle, by the regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
 double to_triangle(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& p) {
   const Vec3 ab = b - a, ac = c - a, bc = c - b;
-  const auto to_edge = [&](const Vec3& from, const Vec3& d) {
-    return (p - from - std::clamp(d.dot(p - from) / d.squaredNorm(), 0.0, 1.0) * d).norm();
-  };
   const Vec3 n = ab.cross(ac);
   const bool over = n.dot(ab.cross(p - a)) >= 0.0 && n.dot(bc.cross(p - b)) >= 0.0 && n.dot(ac.cross(p - a)) <= 0.0;
   if (over) return std::abs(n.normalized().dot(p - a));
-  return std::min({to_edge(a, ab), to_edge(a, ac), to_edge(b, bc)});
+  return std::min({to_edge(a, ab, p), to_edge(a, ac, p), to_edge(b, bc, p)});
 }
 
 // Whether a contact may be one of an edge: it is on it, and the edge in the plane across its normal.
 bool lies_on(const PoseContact& contact, const Vec3& from, const Vec3& to, double within_m) {
-  const Vec3 d = to - from, off = contact.point_W - from;
-  if (std::abs(contact.normal_W.dot(d)) > within_m) return false;
-  return (off - std::clamp(d.dot(off) / d.squaredNorm(), 0.0, 1.0) * d).norm() <= within_m;
+  const Vec3 d = to - from;
+  return std::abs(contact.normal_W.dot(d)) <= within_m && to_edge(from, d, contact.point_W) <= within_m;
 }
 
 // By how much K yields at a contact to a newton along a direction, m.

@@ -8,14 +8,13 @@
 #include <utility>
 
 #include "models/base/random.hpp"
+#include "models/geometry/tool_pose.hpp"
 #include "models/rigid_features/rigid_object.hpp"
 #include "models/rigid_shapes/solid.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
 
 namespace proxarm::models {
 namespace {
-
-Mat3 rotation_about(const Vec3& axis, double angle) { return Eigen::AngleAxisd(angle, axis).toRotationMatrix(); }
 
 const NormalCone::Angle kNoTurn = NormalCone::Angle::of(1e-12);
 
@@ -134,8 +133,8 @@ TEST(NormalCones, AnEdgesConeEndsATouchsSlackBeyondItsFaces) {
     const Vec3 along = edge.left.cross(edge.right);
     for (const auto& [angle, held] : {std::pair(0.0, true), std::pair(0.0199, true), std::pair(0.02 - 1e-9, true),
                                       std::pair(0.02 + 1e-9, false), std::pair(1.0, false)}) {
-      EXPECT_EQ(box.cones.of_edges[i].holds(rotation_about(along, -angle) * edge.left, kNoTurn), held) << angle;
-      EXPECT_EQ(box.cones.of_edges[i].holds(rotation_about(along, angle) * edge.right, kNoTurn), held) << angle;
+      EXPECT_EQ(box.cones.of_edges[i].holds(rotation_by(-angle * along) * edge.left, kNoTurn), held) << angle;
+      EXPECT_EQ(box.cones.of_edges[i].holds(rotation_by(angle * along) * edge.right, kNoTurn), held) << angle;
     }
   }
   EXPECT_TRUE(cone_of_edge(Vec3::Zero(), Vec3::Zero()).holds(Vec3::UnitX(), kNoTurn));  // a capsule's
