@@ -330,17 +330,20 @@ void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View
   });
 }
 
+// By the ball around a part.
+bool RigidWorld::may_reach(const Part& part, const Entry& entry, const View& at, double reach) const noexcept {
+  if (!part.box.finite()) return true;
+  const double near = 0.5 * (part.box.high - part.box.low).norm() + part.solid.radius + reach;
+  return distance2_to_box(at * Vec3(0.5 * (part.box.low + part.box.high)), entry.bounds) <= near * near;
+}
+
 void RigidWorld::gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept {
   const Entry& e = shared_->entries[entry];
   const View at = seen_from(entry, view(pose));
   const double around = shared_->reach + reach;
   if (distance2_to_box(at.x, e.bounds) > around * around) return;
   for (std::size_t i = 0; i < shared_->parts.size() && !crowded_; ++i) {
-    const Part& part = shared_->parts[i];
-    if (part.box.finite()) {
-      const double near = 0.5 * (part.box.high - part.box.low).norm() + part.solid.radius + reach;
-      if (distance2_to_box(at * Vec3(0.5 * (part.box.low + part.box.high)), e.bounds) > near * near) continue;
-    }
+    if (!may_reach(shared_->parts[i], e, at, reach)) continue;
     gather_part(static_cast<std::uint16_t>(i), entry, at, reach);
   }
 }
@@ -376,8 +379,9 @@ void RigidWorld::gather(const ToolPose& pose, double reach) noexcept {
 bool RigidWorld::look_around(const ToolPose& pose, double reach, std::size_t pairs, std::size_t faces) noexcept {
   pair_room_ = pairs;
   face_room_ = faces;
-  pair_count_ = pressed_count_ = near_faces_ = faces_of_both_count_ = 0;
+  pair_count_ = pressed_count_ = near_faces_ = 0;
   crowded_ = false;
+  list_leaves(pose, reach);
   for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
     gather_entry(static_cast<std::uint16_t>(entry), pose, reach);
   }

@@ -1,4 +1,6 @@
 // Which pairs of features of a mesh that is a part of the tool and of one that is an object may meet.
+#include <algorithm>
+
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/mesh_pairs.hpp"
 #include "models/rigid_features/near.hpp"
@@ -66,6 +68,40 @@ class OfFaces {
 
 }  // namespace
 
+bool RigidWorld::lists_leaves(const ToolPose& pose, double reach) const noexcept {
+  return near_leaves_.all() && motion(pose, near_leaves_.at()) + reach <= near_leaves_.reach();
+}
+
+// Of all meshes that stand still. To list twice as many costs less than to list them again in the next step: as far
+// around as some hundreds of them are, and for what is gathered now if there is no room for so many.
+void RigidWorld::list_leaves(const ToolPose& pose, double reach) noexcept {
+  constexpr std::size_t few = 384, many = 640;
+  constexpr double furthest = 8.0;
+  if (!near_leaves_.has_room() || lists_leaves(pose, reach)) return;
+  const double further = list_further_;
+  list_leaves_within(pose, further * reach);
+  const bool listed = near_leaves_.all();
+  if (listed && near_leaves_.count() < few) list_further_ = std::min(1.5 * further, furthest);
+  if (!listed || near_leaves_.count() > many) list_further_ = std::max(further / 1.5, 1.0);
+  if (!listed && further > 1.0) list_leaves_within(pose, reach);
+}
+
+void RigidWorld::list_leaves_within(const ToolPose& pose, double reach) noexcept {
+  near_leaves_.begin(pose, reach);
+  const View at = view(pose);
+  for (std::uint16_t entry = 0; entry < shared_->first_moving; ++entry) {
+    const Entry& e = shared_->entries[entry];
+    for (std::uint16_t i = 0; i < shared_->parts.size(); ++i) {
+      const Part& part = shared_->parts[i];
+      if (!part.mesh || !e.discs.any() || !may_reach(part, e, at, reach)) continue;
+      near_leaves_.begin_with(i, entry);
+      const MeshPairs pairs(flat_mesh(part), flat_mesh(e), at, reach);
+      pairs.list([&](const MeshPairs::Leaves& leaves) { return near_leaves_.add(leaves); });
+      if (!near_leaves_.all()) return;
+    }
+  }
+}
+
 void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const Entry& e = shared_->entries[entry];
   const TriangleFeatures& own = *shared_->parts[part].mesh;
@@ -75,17 +111,20 @@ void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const Vi
     return [this, kind, part, entry](std::uint32_t i, std::uint32_t j) { add_pair(kind, part, entry, i, j); };
   };
   std::size_t looked_at = 0;
-  MeshPairs(own.mesh(), other.mesh(), at, reach).each([&](std::uint32_t face, std::uint32_t other_face) {
+  const auto look_at = [&](std::uint32_t face, std::uint32_t other_face) {
     crowded_ = crowded_ || looked_at++ == face_room_;
     if (crowded_) return false;
-    if (faces_of_both_count_ < faces_of_both_.size()) {
-      faces_of_both_[faces_of_both_count_++] = {part, entry, face, other_face};
-    }
     of.points_of_tool(face, other_face, add(Kind::point_face));
     of.points_of_object(face, other_face, add(Kind::face_point));
     of.edges(face, other_face, add(Kind::edges));
     return true;
-  });
+  };
+  MeshPairs pairs(flat_mesh(shared_->parts[part]), flat_mesh(e), at, reach);
+  if (!moves(entry) && near_leaves_.all()) {
+    pairs.each_of(near_leaves_.of(part, entry), look_at);
+  } else {
+    pairs.each(look_at);
+  }
   near_faces_ += looked_at;
 }
 

@@ -56,7 +56,7 @@ double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
 double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noexcept {
   double deepest = std::numeric_limits<double>::infinity();
   const View tool = view(pose);
-  const bool near_known = has_near_faces(pose);
+  const bool listed = lists_leaves(pose, 0.0);
   for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
     const Entry& e = shared_->entries[i];
     const auto* solid = std::get_if<Solid>(&e.object.shape);
@@ -69,8 +69,8 @@ double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noe
       continue;  // (beyond a mesh that it should be inside of, it is on the wrong side)
     for (std::size_t k = 0; k < shared_->parts.size(); ++k) {
       const auto part = static_cast<std::uint16_t>(k);
-      const bool known = near_known && mesh != nullptr && shared_->parts[part].mesh && !moves(entry);
-      const double gap = known ? overlap_of_near_faces(part, entry, at)
+      const bool known = listed && mesh != nullptr && shared_->parts[part].mesh && !moves(entry);
+      const double gap = known ? overlap_of_near_leaves(part, entry, at)
                                : overlap_m(shared_->parts[part], e, at, moves(entry) ? Apart{apart.enough} : apart);
       if (gap < 0.0) deepest = std::min(deepest, gap);
     }
@@ -78,26 +78,17 @@ double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noe
   return deepest;
 }
 
-// Whether all triangles of meshes that stand still are known that may meet at this pose: it is no further from where
-// they were gathered than they looked.
-bool RigidWorld::has_near_faces(const ToolPose& pose) const noexcept {
-  const bool all = !crowded_ && !faces_of_both_.empty() && faces_of_both_count_ < faces_of_both_.size();
-  return all && riding_ == nobody && motion(pose, gathered_at_) < gathered_reach_;
-}
-
-double RigidWorld::overlap_of_near_faces(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept {
+double RigidWorld::overlap_of_near_leaves(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept {
   const Entry& e = shared_->entries[entry];
-  const TriangleMesh& own = shared_->parts[part].mesh->mesh();
-  const TriangleMesh& other = (*std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape))->mesh();
-  const MeshPairs pairs(own, other, at, 0.0);
+  const FlatMesh own = flat_mesh(shared_->parts[part]), other = flat_mesh(e);
+  MeshPairs pairs(own, other, at, 0.0);
   double deepest = 0.0;
-  for (std::size_t k = 0; k < faces_of_both_count_; ++k) {
-    const NearFacesOfBoth& faces = faces_of_both_[k];
-    if (faces.part != part || faces.entry != entry || !pairs.come_near(faces.own, faces.other)) continue;
-    deepest = std::min(deepest, overlap_of_faces(own, faces.own, other, faces.other, at));
-  }
+  pairs.each_of(near_leaves_.of(part, entry), [&](std::uint32_t face, std::uint32_t other_face) {
+    deepest = std::min(deepest, overlap_of_faces(own.mesh, face, other.mesh, other_face, at));
+    return true;
+  });
   if (deepest < 0.0) return deepest;
-  return overlap_of_all(own, other, at, should_be_inside(e.object, e.held));
+  return overlap_of_all(own.mesh, other.mesh, at, should_be_inside(e.object, e.held));
 }
 
 // How deep a part of the tool stands in an object, or how far it is from a mesh's surface on the wrong side of it; 0 or
@@ -106,7 +97,7 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape);
   if (mesh != nullptr) {
     const std::optional<bool> inside = should_be_inside(entry.object, entry.held);
-    if (part.mesh) return overlap_of_meshes(part.mesh->mesh(), (*mesh)->mesh(), at, inside);
+    if (part.mesh) return overlap_of_meshes(flat_mesh(part), flat_mesh(entry), at, inside);
     return overlap_with_mesh(part.solid, part.box, (*mesh)->mesh(), at, inside, apart);
   }
   const Solid& solid = *std::get_if<Solid>(&entry.object.shape);

@@ -208,7 +208,14 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   };
   const bool of_tool = std::any_of(shared->parts.begin(), shared->parts.end(), [](const Part& p) { return p.mesh; });
   if (of_tool && std::any_of(shared->entries.begin(), shared->entries.end(), is_mesh)) {
-    faces_of_both_.resize(most_faces + 1);  // one more than room, so that a full list isn't one that lacks something
+    near_leaves_.make_room(most_leaves, shared->parts.size() * shared->first_moving);
+    for (Part& part : shared->parts) {
+      if (part.mesh) part.discs = NodeDiscs(part.mesh->mesh());
+    }
+    for (Entry& e : shared->entries) {
+      if (!is_mesh(e)) continue;
+      e.discs = NodeDiscs((*std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape))->mesh());
+    }
   }
   shared_ = std::move(shared);
 }
@@ -577,6 +584,7 @@ bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double f
 void RigidWorld::forget() noexcept {
   pair_count_ = pressed_count_ = 0;
   gathered_reach_ = -1.0;
+  near_leaves_.forget();
 }
 
 const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {

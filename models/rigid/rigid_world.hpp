@@ -34,6 +34,8 @@
 #include "models/rigid/beside_cylinder.hpp"
 #include "models/rigid/rigid_mover.hpp"
 #include "models/rigid_features/mesh_overlap.hpp"
+#include "models/rigid_features/near_leaves.hpp"
+#include "models/rigid_features/node_discs.hpp"
 #include "models/rigid_features/rigid_features.hpp"
 #include "models/rigid_shapes/cylinder.hpp"
 
@@ -104,11 +106,6 @@ class RigidWorld final : public PoseAlgorithm {
     std::array<Pair, ContactProblem::most> pairs;
     std::size_t count = 0;
   };
-  // Triangles of a mesh that is a part of the tool and of one that is an object.
-  struct NearFacesOfBoth {
-    std::uint16_t part = 0, entry = 0;
-    std::uint32_t own = 0, other = 0;
-  };
   // A pair at a pose.
   struct Found {
     Touch touch;  // in W
@@ -123,6 +120,7 @@ class RigidWorld final : public PoseAlgorithm {
     std::optional<double> friction;
     std::shared_ptr<const TriangleFeatures> mesh{};  // of a mesh, whose features are the solid's as well
     std::optional<Cylinder> cylinder{};
+    NodeDiscs discs{};  // of a mesh, where it may meet one
   };
   struct Entry {
     RigidObject object;
@@ -130,7 +128,13 @@ class RigidWorld final : public PoseAlgorithm {
     Bounds box{};       // of a solid's points
     double held = 0.0;  // of a closed mesh: 1 or −1, the side of its faces on which the tool is
     std::optional<Cylinder> cylinder{};
+    NodeDiscs discs{};  // of a mesh, where a part that is one may meet it
   };
+  // Of parts and entries that may meet as meshes.
+  [[nodiscard]] static FlatMesh flat_mesh(const Part& part) noexcept { return {part.mesh->mesh(), part.discs}; }
+  [[nodiscard]] static FlatMesh flat_mesh(const Entry& entry) noexcept {
+    return {(*std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape))->mesh(), entry.discs};
+  }
   struct Pressed {  // a place of a pair that pressed in the last solution, and how hard
     std::uint16_t pair = 0;
     std::uint8_t which = 0;
@@ -151,8 +155,9 @@ class RigidWorld final : public PoseAlgorithm {
   static constexpr int kMostStrides = 1 << 16;  // the same, among objects that move
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 512;
-  static constexpr std::size_t most_faces = 4096;  // of a mesh, near a part
-  static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
+  static constexpr std::size_t most_faces = 4096;   // of a mesh, near a part
+  static constexpr std::size_t most_leaves = 4096;  // of two meshes, near each other
+  static constexpr std::size_t most_edges = 6144;   // of a part: a hull of 2000 points has 5994 at most
 
   class NearFaces;
   // Of an entry that moves.
@@ -198,6 +203,9 @@ class RigidWorld final : public PoseAlgorithm {
                    std::size_t faces = most_faces) noexcept;
   [[nodiscard]] KeptPairs pressed_pairs() const noexcept;
   void restore(const KeptPairs& kept) noexcept;
+  void list_leaves(const ToolPose& pose, double reach) noexcept;
+  void list_leaves_within(const ToolPose& pose, double reach) noexcept;
+  [[nodiscard]] bool may_reach(const Part& part, const Entry& entry, const View& at, double reach) const noexcept;
   void gather_entry(std::uint16_t entry, const ToolPose& pose, double reach) noexcept;
   void gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
@@ -313,8 +321,8 @@ class RigidWorld final : public PoseAlgorithm {
   bool went_in(const ToolPose& q_old) noexcept;
   [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
-  [[nodiscard]] bool has_near_faces(const ToolPose& pose) const noexcept;
-  [[nodiscard]] double overlap_of_near_faces(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept;
+  [[nodiscard]] bool lists_leaves(const ToolPose& pose, double reach) const noexcept;
+  [[nodiscard]] double overlap_of_near_leaves(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept;
   [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at,
                                         const Apart& apart) noexcept;
 
@@ -329,10 +337,8 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;                // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
-  // Of meshes, which triangles were near then. There is room for them only where both the tool and an object are
-  // meshes.
-  std::vector<NearFacesOfBoth> faces_of_both_;
-  std::size_t faces_of_both_count_ = 0;
+  NearLeaves near_leaves_;     // of what stands still; without room where the tool or the objects are no meshes
+  double list_further_ = 2.0;  // leaves are listed so many times as far around as pairs are gathered
   std::size_t pair_room_ = most_pairs, face_room_ = most_faces, near_faces_ = 0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take

@@ -105,14 +105,14 @@ double overlap_of_all(const TriangleMesh& own, const TriangleMesh& other, const 
   return std::min(other_in_own, to_wrong_side_m(other, at * own.vertex(0), should_be_inside));
 }
 
-double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,
+double overlap_of_meshes(const FlatMesh& own, const FlatMesh& other, const View& at,
                          std::optional<bool> should_be_inside) noexcept {
   double deepest = 0.0;
   MeshPairs(own, other, at, 0.0).each([&](std::uint32_t face, std::uint32_t other_face) {
-    deepest = std::min(deepest, overlap_of_faces(own, face, other, other_face, at));
+    deepest = std::min(deepest, overlap_of_faces(own.mesh, face, other.mesh, other_face, at));
     return true;
   });
-  return deepest < 0.0 ? deepest : overlap_of_all(own, other, at, should_be_inside);
+  return deepest < 0.0 ? deepest : overlap_of_all(own.mesh, other.mesh, at, should_be_inside);
 }
 
 }  // namespace proxarm::models

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "models/rigid_features/node_discs.hpp"
 #include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
@@ -22,7 +23,7 @@ struct Apart {
 double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMesh& mesh, const View& at,
                          std::optional<bool> should_be_inside, const Apart& apart = {}) noexcept;
 // Of two meshes the same; the own one is a closed body.
-double overlap_of_meshes(const TriangleMesh& own, const TriangleMesh& other, const View& at,
+double overlap_of_meshes(const FlatMesh& own, const FlatMesh& other, const View& at,
                          std::optional<bool> should_be_inside) noexcept;
 // The two things that it looks at: one triangle of each, and whether one mesh is all on the wrong side of the other.
 double overlap_of_faces(const TriangleMesh& own, std::uint32_t face, const TriangleMesh& other,

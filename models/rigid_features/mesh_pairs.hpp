@@ -1,10 +1,11 @@
 // Which triangles of two meshes come near each other.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 
+#include "models/rigid_features/node_discs.hpp"
 #include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
@@ -12,80 +13,85 @@ namespace proxarm::models {
 // Goes down both trees at once. `at` leads from the frame of the first mesh to that of the second.
 class MeshPairs {
  public:
-  MeshPairs(const TriangleMesh& own, const TriangleMesh& other, const View& at, double near) noexcept
-      : own_(&own), other_(&other), at_(at), near_(near), spread_(at.R.cwiseAbs()) {}
+  MeshPairs(const FlatMesh& own, const FlatMesh& other, const View& at, double near) noexcept
+      : own_(&own.mesh), other_(&other.mesh), own_discs_(&own.discs), other_discs_(&other.discs), at_(at), near_(near) {
+    kept_of_.fill(0xFFFFFFFF);  // no face
+  }
+
+  // Leaves of both trees.
+  struct Leaves {
+    std::uint32_t own = 0, other = 0;  // twice the index of the pair of nodes, and which one it is
+  };
 
   // Calls visit(own face, other face) for each two that come so near, and some that don't, until it returns false.
   template <typename Visit>
-  void each(Visit visit) const noexcept {
+  void each(Visit visit) noexcept {
+    each_leaves([&](const Node& own, const Node& other) { return look_at(own, other, visit); });
+  }
+  // Calls visit(Leaves) for each two leaves that may hold such, until it returns false.
+  template <typename Visit>
+  void list(Visit visit) const noexcept {
+    each_leaves([&](const Node& own, const Node& other) { return visit(Leaves{own.index, other.index}); });
+  }
+  // As each(), of those that are listed: with the same meshes, and not nearer than all that is to be known.
+  template <typename List, typename Visit>
+  void each_of(const List& list, Visit visit) noexcept {
+    Node own;
+    bool any = false;
+    for (const Leaves& leaves : list) {
+      if (!any || own.index != leaves.own) own = own_node(leaves.own);
+      any = true;
+      const Node other = other_node(leaves.other);
+      if (!apart(own.disc, other.disc, near_) && !look_at(own, other, visit)) return;
+    }
+  }
+
+ private:
+  // A node of a tree, as of TriangleMesh::NodePair, and its disc in the other mesh's frame.
+  struct Node {
+    NodeDisc disc;
+    std::uint32_t index = 0, first = 0, count = 0;
+  };
+  struct NodesOfBoth {
+    Node own, other;
+  };
+
+  template <typename Visit>
+  void each_leaves(Visit visit) const noexcept {
     // Each of two trees halves its faces at each level, and a node that is divided leaves one of its halves to wait.
     std::array<NodesOfBoth, 130> stack;
     std::size_t top = 0;
-    // The root is alone in its pair.
-    push_near(stack, top, own_node(own_->structure().nodes.front(), 0),
-              other_node(other_->structure().nodes.front(), 0));
+    push_near(stack, top, own_node(0), other_node(0));  // (the root is alone in its pair)
     while (top > 0) {
       const NodesOfBoth next = stack[--top];
       if (next.own.count > 0 && next.other.count > 0) {
-        if (!look_at(next.own, next.other, visit)) return;
+        if (!visit(next.own, next.other)) return;
         continue;
       }
-      const bool divide_own = next.other.count > 0 || (next.own.count == 0 && next.own.size() > next.other.size());
-      for (std::size_t k = 0; k < 2; ++k) {
-        if (divide_own) {
-          push_near(stack, top, own_node(own_->structure().nodes[next.own.first], k), next.other);
-        } else {
-          push_near(stack, top, next.own, other_node(other_->structure().nodes[next.other.first], k));
-        }
+      const bool larger = next.own.disc.ball > next.other.disc.ball;
+      if (next.other.count > 0 || (next.own.count == 0 && larger)) {
+        for (const std::uint32_t k : {0U, 1U}) push_near(stack, top, own_node(2 * next.own.first + k), next.other);
+      } else {
+        for (const std::uint32_t k : {0U, 1U}) push_near(stack, top, next.own, other_node(2 * next.other.first + k));
       }
     }
   }
 
-  // Whether two of them come so near, by their boxes and planes.
-  [[nodiscard]] bool come_near(std::uint32_t own, std::uint32_t other) const noexcept {
-    return come_near(own_triangle(own), other);
+  [[nodiscard]] Node own_node(std::uint32_t index) const noexcept {
+    const TriangleMesh::NodePair& pair = own_->structure().nodes[index / 2];
+    const NodeDisc& disc = own_discs_->of(index);
+    return {{at_ * disc.middle, at_.R * disc.axis, disc.half, disc.radius, disc.ball},
+            index,
+            pair.first[index % 2],
+            pair.count[index % 2]};
   }
-
- private:
-  // A node of a tree: its box by middle and half, in its mesh's frame, and in the other one a box around that.
-  struct Node {
-    Vec3 middle, half, half_there;
-    std::uint32_t first = 0, count = 0;  // as of TriangleMesh::NodePair
-    [[nodiscard]] double size() const noexcept { return half.squaredNorm(); }
-  };
-  struct NodesOfBoth {
-    Node own, other;  // the own one's middle is in the other frame
-  };
-
-  [[nodiscard]] Node own_node(const TriangleMesh::NodePair& pair, std::size_t k) const noexcept {
-    Node node = box_of(pair, k);
-    node.half_there.noalias() = spread_ * node.half;
-    node.middle = at_ * node.middle;
-    return node;
-  }
-  // With as much room around it as may lie between.
-  [[nodiscard]] Node other_node(const TriangleMesh::NodePair& pair, std::size_t k) const noexcept {
-    Node node = box_of(pair, k);
-    node.half.array() += near_;
-    node.half_there.noalias() = spread_.transpose() * node.half;
-    return node;
-  }
-  static Node box_of(const TriangleMesh::NodePair& pair, std::size_t k) noexcept {
-    const Vec3 low(pair.low(k, 0), pair.low(k, 1), pair.low(k, 2));
-    const Vec3 high(pair.high(k, 0), pair.high(k, 1), pair.high(k, 2));
-    return {0.5 * (low + high), 0.5 * (high - low), {}, pair.first[k], pair.count[k]};
-  }
-
-  // The boxes, by the six axes of both.
-  [[nodiscard]] bool reaches(const Node& own, const Node& other) const noexcept {
-    const Vec3 way = other.middle - own.middle;
-    if (((way.cwiseAbs() - own.half_there - other.half).array() > 0.0).any()) return false;
-    const Vec3 way_there = at_.R.transpose() * way;
-    return ((way_there.cwiseAbs() - own.half - other.half_there).array() <= 0.0).all();
+  [[nodiscard]] Node other_node(std::uint32_t index) const noexcept {
+    const TriangleMesh::NodePair& pair = other_->structure().nodes[index / 2];
+    return {other_discs_->of(index), index, pair.first[index % 2], pair.count[index % 2]};
   }
   template <typename Stack>
   void push_near(Stack& stack, std::size_t& top, const Node& own, const Node& other) const noexcept {
-    if (reaches(own, other)) stack[top++] = {own, other};
+    if (!apart(own.disc, other.disc, near_)) stack[top++] = {own, other};
   }
 
   // A triangle of the own mesh, in the other frame.
@@ -110,16 +116,23 @@ class MeshPairs {
   }
 
   template <typename Visit>
-  bool look_at(const Node& own, const Node& other, Visit& visit) const noexcept {
+  bool look_at(const Node& own, const Node& other, Visit& visit) noexcept {
     for (std::uint32_t i = own.first; i < own.first + own.count; ++i) {
-      const Triangle triangle = own_triangle(i);
-      const Vec3 way = other.middle - 0.5 * (triangle.low + triangle.high);  // (the other box has the room around it)
-      if (((way.cwiseAbs() - other.half - 0.5 * (triangle.high - triangle.low)).array() > 0.0).any()) continue;
+      const Triangle& triangle = kept(i);
       for (std::uint32_t j = other.first; j < other.first + other.count; ++j) {
         if (come_near(triangle, j) && !visit(i, j)) return false;
       }
     }
     return true;
+  }
+  // The same triangles are asked for again and again, against others.
+  [[nodiscard]] const Triangle& kept(std::uint32_t face) noexcept {
+    const std::size_t at = face % kept_.size();
+    if (kept_of_[at] != face) {
+      kept_[at] = own_triangle(face);
+      kept_of_[at] = face;
+    }
+    return kept_[at];
   }
 
   // Whether a triangle is further from a plane than it may be.
@@ -131,9 +144,11 @@ class MeshPairs {
   }
 
   const TriangleMesh *own_, *other_;
+  const NodeDiscs *own_discs_, *other_discs_;
   View at_;
   double near_;
-  Mat3 spread_;
+  std::array<Triangle, 64> kept_;
+  std::array<std::uint32_t, 64> kept_of_;  // which ones they are
 };
 
 }  // namespace proxarm::models
