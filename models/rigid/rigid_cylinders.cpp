@@ -121,15 +121,14 @@ BesideCylinder RigidWorld::beside_cylinder(std::uint16_t part, std::uint16_t ent
 // A cylinder and what is beside it, at a pose of the tool, seen from the latter.
 struct RigidWorld::AtCylinder {
   AtCylinder(const RigidWorld& world, const Pair& pair, const View& tool) noexcept
+      : AtCylinder(world, pair, tool, world.seen_from_other(pair, tool)) {}
+  AtCylinder(const RigidWorld& world, const Pair& pair, const View& tool, const Cylinder& seen) noexcept
       : ours(world.shared_->parts[pair.part].cylinder.has_value()),
         round(ours ? pair.own : pair.other),
         feature(ours ? pair.other : pair.own),
         body(world.beside_cylinder(pair.part, pair.entry)),
-        at(tool) {
-    const View to = ours ? tool : inverse(tool);
-    cylinder = moved(ours ? *world.shared_->parts[pair.part].cylinder : *world.shared_->entries[pair.entry].cylinder,
-                     to.R, to.x);
-  }
+        at(tool),
+        cylinder(seen) {}
 
   // Seen from the object.
   [[nodiscard]] Touch touch(const Meeting& meeting) const noexcept {
@@ -235,9 +234,25 @@ View RigidWorld::from_of(const Pair& pair) const noexcept {
   return moves(pair.entry) ? moving(pair.entry).from : view(from_);
 }
 
-int RigidWorld::touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept {
+// The cylinder of the two, seen from what is beside it.
+Cylinder RigidWorld::seen_from_other(const Pair& pair, const View& at) const noexcept {
+  const std::optional<Cylinder>& own = shared_->parts[pair.part].cylinder;
+  if (own) return moved(*own, at.R, at.x);
+  const View to = inverse(at);
+  return moved(*shared_->entries[pair.entry].cylinder, to.R, to.x);
+}
+
+// Of a part and an entry many pairs follow each other.
+const Cylinder& RigidWorld::cylinder_found(const Pair& pair, const View& at) noexcept {
+  if (!at_pose_.known || at_pose_.part != pair.part || at_pose_.entry != pair.entry) {
+    at_pose_ = {true, pair.part, pair.entry, seen_from_other(pair, at)};
+  }
+  return at_pose_.cylinder;
+}
+
+int RigidWorld::touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) noexcept {
   if (pair.kind >= Kind::sides) return touch_cylinders(pair, at, out);
-  const AtCylinder here(*this, pair, at);
+  const AtCylinder here(*this, pair, at, cylinder_found(pair, at));
   std::array<Meeting, 4> places;
   const int count = meet(pair, here, places);
   for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {

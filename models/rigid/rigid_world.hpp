@@ -135,6 +135,11 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] static FlatMesh flat_mesh(const Entry& entry) noexcept {
     return {(*std::get_if<std::shared_ptr<const TriangleFeatures>>(&entry.object.shape))->mesh(), entry.discs};
   }
+  struct AtPose {  // the cylinder of such a part and entry, seen from the other one, at the pose of find()
+    bool known = false;
+    std::uint16_t part = 0, entry = 0;
+    Cylinder cylinder;
+  };
   struct Pressed {  // a place of a pair that pressed in the last solution, and how hard
     std::uint16_t pair = 0;
     std::uint8_t which = 0;
@@ -236,7 +241,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] bool crossed(const Pair& pair, const Vec3& p) const noexcept;
   [[nodiscard]] double signed_start(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
-  void evaluate(const Pair& pair, const View& at, Each each) const noexcept;
+  void evaluate(const Pair& pair, const View& at, Each each) noexcept;
   [[nodiscard]] std::optional<Touch> over_valley(const Pair& pair, const View& at) const noexcept;
   template <typename Each>
   void evaluate_over(const Pair& pair, const View& at, Each each) noexcept;
@@ -250,7 +255,9 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] bool was_behind_edge(const Pair& pair, const AtCylinder& here, const Vec3& place) const noexcept;
   [[nodiscard]] View from_of(const Pair& pair) const noexcept;
   // The places where the two may touch; infinitely far where one doesn't count. Returns their number.
-  [[nodiscard]] int touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept;
+  [[nodiscard]] int touch_cylinder(const Pair& pair, const View& at, std::array<Touch, 4>& out) noexcept;
+  [[nodiscard]] Cylinder seen_from_other(const Pair& pair, const View& at) const noexcept;
+  [[nodiscard]] const Cylinder& cylinder_found(const Pair& pair, const View& at) noexcept;
   // The rim of a pair, and the side that it lies on.
   [[nodiscard]] FlatSide side_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
   [[nodiscard]] FlatSide end_under_rim(const Pair& pair, const View& at, Solid::Rim& rim) const noexcept;
@@ -348,6 +355,7 @@ class RigidWorld final : public PoseAlgorithm {
 
   std::array<Found, most_found> found_;
   std::size_t found_count_ = 0;
+  AtPose at_pose_;  // of the pair that was looked at last
   Mat6 K_ = Mat6::Identity();
   ContactProblem problem_;
   std::array<Pressed, ContactProblem::most> pressed_;
