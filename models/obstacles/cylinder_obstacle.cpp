@@ -122,8 +122,9 @@ Obstacle::Step CylinderObstacle::beside_face(std::int32_t feature, const Step& s
   // The place on the rim, by its angle from q's towards p's. On its tangent the proxy is drawn on towards p at the
   // first, and held back towards q at the last.
   const Vec3 end = std::copysign(1.0, z) * e_, u_q = radial(q), first = (u_q.norm() > 0.0 ? u_q : u).normalized();
-  const Vec3 u_p = radial(p), aside = u_p - first * first.dot(u_p);
-  const Vec3 onward = aside.norm() > 0.0 ? Vec3(aside.normalized()) : e_.cross(first);
+  // (Not what is left of p's direction, which may be next to nothing.)
+  const Vec3 u_p = radial(p), tangent = e_.cross(first);
+  const Vec3 onward = tangent.dot(u_p) < 0.0 ? Vec3(-tangent) : tangent;
   const StepOnPlanes step{side_.friction(), K, end_[0].layer(), p, q};
   EdgeContact held{};
   Vec3 out;
