@@ -469,7 +469,7 @@ double ToolLaws::least_way_m(const ToolCall& call, const PoseContact& over, cons
   };
   for (const auto& [contact, force] : holders) {
     if (contact == &over) continue;
-    if (call.way_of(*contact).norm() <= 8.0 * rounding_m(call.r)) {
+    if (contact->friction > 0.0 && call.slip_of(*contact).norm() <= 8.0 * rounding_m(call.r)) {
       for (int k = 0; k < 3; ++k) hold(at(*contact, Vec3::Unit(k)), at(*contact, Vec3::Unit(k)));
     } else {
       hold(at(*contact, contact->normal_W), at(*contact, force / contact->normal_W.dot(force)));

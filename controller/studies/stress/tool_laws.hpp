@@ -70,7 +70,8 @@ class ToolLaws {
   // what would move it: C − Cφ gᵀC/gᵀCφ. Only what pressed there in the step before, and hasn't moved along its normal
   // since, is taken for such; and since friction may have turned φ meanwhile, both its first and its last must do. What
   // sticks holds along all directions: there each of three takes what moves the place along it, by the force that is
-  // needed for it. (A way is known to 8 roundings, as missed() has it.)
+  // needed for it. What rolls sticks as well: its material point comes off by what is of second order, along the
+  // normal, and slips by nothing. (A slip is known to 8 roundings, as missed() has it.)
   //
   // `earlier`: what touched before, in the step before or on the way; `before`: in the step before. What the place came
   // from behind says nothing about it.

@@ -126,6 +126,14 @@ TEST(Stress, AToolThatSticksElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) {
   EXPECT_GE(run.edge, 1);
 }
 
+// Step 280: a round end of the tool rolls in its place while a corner goes over a box's edge by 5 µm. The judge took
+// what comes off as it rolls, 5 nm, for slipping, let it hold along its normal only, and the push of the side beyond,
+// over 44 µm, for 5.3 µJ out of nowhere.
+TEST(Stress, AToolThatRollsElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) {
+  const Tally run = clean_run(1628963792831443);
+  EXPECT_GE(run.edge, 1);
+}
+
 // Step 155 found no solution, and the last of the smaller parts that it was tried in had led 25 µm into the mesh: the
 // tool stayed there for the 845 steps that were left.
 TEST(Stress, AStepThatFindsNoSolutionLeavesTheToolOutside) {

@@ -29,6 +29,7 @@ struct OverAnEdge {
     out.normal_W = normal.normalized();
     out.force_W = 10.0 * out.normal_W;
     out.point_W = call.r.position;
+    out.friction = 0.5;
     return out;
   }
   [[nodiscard]] double allowed_J(const Vec3& earlier) const {
@@ -132,6 +133,27 @@ TEST(ToolLaws, WhatSticksHoldsAlongAllDirectionsOverAnEdge) {
     here.call.q.position.x() -= 1e-14;  // 16 roundings
     EXPECT_FALSE(here.is_over({here.holds}));
   }
+}
+
+// A tool that rolls there, about a pivot 1/32 m aside, comes off by its curvature and sticks as much: θ² lever/2. What
+// nothing rubs on holds along its normal only, though it happens to stand still.
+TEST(ToolLaws, WhatRollsSticksAndWhatHasNoFrictionDoesNot) {
+  const double lever_m = 1.0 / 32.0, way_m = 0.55 * free_m, turn = 2.0 * std::asin(0.5 * way_m / lever_m);
+  OverAnEdgeHeld here(way_m);
+  const Vec3 pivot = lever_m * Vec3::UnitY(), n = here.holds.normal_W;
+  here.call.K.bottomRightCorner<3, 3>() *= lever_m * lever_m;
+  here.call.r.orientation = models::rotation_by(turn * Vec3::UnitZ());
+  here.call.r.position = pivot - here.call.r.orientation * pivot;
+  here.call.contacts[0].point_W = here.call.r.position;
+  here.call.contacts[1].point_W = here.holds.point_W = pivot;
+  const double off_m = 0.5 * turn * turn * lever_m;
+  for (const double share : {0.99, 1.01}) {
+    OverAnEdgeHeld rolls = here;
+    rolls.call.q.position -= share * off_m * n;
+    EXPECT_EQ(rolls.is_over({here.holds}), share < 1.0);
+  }
+  here.call.contacts[1].friction = 0.0;
+  EXPECT_FALSE(here.is_over({here.holds}));
 }
 
 // Two edges that cross at 0.05 rad, along x = 0 that of the object, and a tool that turns by 0.005 rad about x: the
