@@ -455,7 +455,9 @@ Vec3 RigidWorld::in_cone(Vec3 f, double mu) noexcept {
 
 // The local problem is solved to 1e-10 of the free motion's press where contacts hold each other. What forces are then
 // out of their cones by is taken off, and the tool moves by what wrenches lack to balance: 1e-9 N is 1e-16 m on a
-// coupling of 10 N/µm. Where gaps bend, the coupling isn't K, and the law is met more closely.
+// coupling of 10 N/µm. A coupling of 10 N/mm that presses by centimetres yields to 1e-10 of that by picometres: what
+// would use up half of what a gap may be short of is left to lack. Where gaps bend, the coupling isn't K, and the law
+// is met more closely.
 void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
   if (shared_->bends) return;
   const Twist wrench = K_ * (e + delta);
@@ -466,7 +468,9 @@ void RigidWorld::balance(const Twist& e, Twist& delta) noexcept {
     contact.f = in_cone(contact.f, contact.mu);
     lack.noalias() += contact.J.transpose() * contact.f;
   }
-  if (lack.squaredNorm() > kBalance * kBalance * wrench.squaredNorm()) delta += problem_.yield_to(lack);
+  if (!(lack.squaredNorm() > kBalance * kBalance * wrench.squaredNorm())) return;
+  const Twist way = problem_.yield_to(lack);
+  if (size_m(way) <= 0.5 * kGap_m) delta += way;
 }
 
 // The share of a step that is taken, from that of the step before and the sizes of both.

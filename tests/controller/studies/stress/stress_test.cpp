@@ -149,6 +149,13 @@ TEST(Stress, NoContactPullsByRoundingOfWhatTheOthersBear) {
   EXPECT_EQ(run.kind, "hollow");
 }
 
+// Steps 547 and 549, of 22 mm each: jammed in a hollow box's edge on a coupling of 11 N/mm, the tool yielded by
+// picometres to what its forces lacked, into the walls.
+TEST(Stress, AToolThatIsJammedOnASoftCouplingStaysOutside) {
+  const Tally run = clean_run(3251483843438735);
+  EXPECT_EQ(run.kind, "hollow");
+}
+
 // Step 4, of 22 mm: a corner slipped around an edge of a box and was sprung by 8 mm and 2 J. That the contacts gave
 // energy was seen, but nothing was left of the step's time to look again in smaller parts.
 TEST(Stress, WhatGivesEnergyAndCantBeLookedAtAgainIsUnresolved) {
