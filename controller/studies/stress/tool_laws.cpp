@@ -438,59 +438,17 @@ double ToolLaws::curvature_J(const ToolCall& call) const {
   return sum;
 }
 
-std::vector<ToolLaws::Holding> ToolLaws::holding(const ToolCall& call, const std::vector<PoseContact>& before) const {
-  std::vector<Holding> out;
-  const double turned = models::difference(call.r, call.q).tail<3>().norm();
-  const auto presses = [](const PoseContact& contact) { return contact.normal_W.dot(contact.force_W) > 0.0; };
-  for (const PoseContact& now : call.contacts) {
-    if (!presses(now) || std::abs(now.normal_W.dot(call.way_of(now))) > curvature_m(call, now) + 1e-12) continue;
-    const auto is_same = [&](const PoseContact& was) {
-      return was.object == now.object && was.feature == now.feature && was.part == now.part && presses(was) &&
-             (was.normal_W - now.normal_W).norm() <= turned + 1e-12;
-    };
-    const auto was = std::find_if(before.begin(), before.end(), is_same);
-    if (was != before.end()) out.push_back({&now, &*was});
-  }
-  return out;
+double ToolLaws::left_J(const ToolCall& call, double work_J, double short_m) const {
+  double forces_N = 0.0;
+  for (const PoseContact& contact : call.contacts) forces_N += contact.force_W.norm();
+  const Twist step = models::difference(call.p, call.q);
+  const double step_m = std::hypot(step.head<3>().norm(), lever_m * step.tail<3>().norm());
+  const double rounding_J = forces_N * (std::max(short_m, 0.0) + 8.0 * rounding_m(call.r) + 1e-10 * step_m) + 1e-12;
+  return work_J - curvature_J(call) - rounding_J;
 }
 
-double ToolLaws::least_way_m(const ToolCall& call, const PoseContact& over, const Vec3& n0, const Holders& holders) {
-  const auto at = [&](const PoseContact& contact, const Vec3& along) {
-    Twist out;
-    out << along, (contact.point_W - call.r.position).cross(along);
-    return out;
-  };
-  const Mat6 free = call.K.inverse();
-  Mat6 C = free;
-  const auto hold = [&](const Twist& along, const Twist& pushes) {
-    const Twist yielding = C * pushes;
-    const double yield = along.dot(yielding);
-    if (yield > 1e-6 * along.dot(free * along)) C -= yielding * (along.transpose() * C) / yield;
-  };
-  for (const auto& [contact, force] : holders) {
-    if (contact == &over) continue;
-    if (contact->friction > 0.0 && call.slip_of(*contact).norm() <= 8.0 * rounding_m(call.r)) {
-      for (int k = 0; k < 3; ++k) hold(at(*contact, Vec3::Unit(k)), at(*contact, Vec3::Unit(k)));
-    } else {
-      hold(at(*contact, contact->normal_W), at(*contact, force / contact->normal_W.dot(force)));
-    }
-  }
-  const Vec3& n = over.normal_W;
-  const Vec3 t = (n.dot(n0) * n - n0).normalized();
-  const auto G = [&](const Vec3& a, const Vec3& b) { return at(over, a).dot(C * at(over, b)); };
-  const double both = G(n, n0), sine = n.cross(n0).norm();
-  if (!(both > 0.0)) return beyond_all_m;
-  return sine * over.force_W.norm() * (G(n, n) * G(t, t) - G(t, n) * G(n, t)) / both;
-}
-
-double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier,
-                         const std::vector<PoseContact>& before) const {
+double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier) const {
   double sum = 0.0;
-  Holders now, then;
-  for (const Holding& holder : holding(call, before)) {
-    now.emplace_back(holder.now, holder.now->force_W);
-    then.emplace_back(holder.now, holder.was->force_W);
-  }
   for (const PoseContact& contact : call.contacts) {
     const Vec3 way = call.way_of(contact);
     const double s = way.norm(), bent_m = curvature_m(call, contact) + 1e-12;
@@ -511,11 +469,8 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
       if (from == nullptr || cosine_of(was) > cosine_of(*from)) from = &was;
     }
     if (from == nullptr || !(cosine_of(*from) > 0.0)) continue;
-    const double sine = contact.normal_W.cross(from->normal_W).norm(), force = contact.force_W.norm();
-    if (!(sine > 1e-9)) continue;
-    const double least_m =
-        std::max(least_way_m(call, contact, from->normal_W, now), least_way_m(call, contact, from->normal_W, then));
-    if (least_m <= s) sum += force * s * sine;
+    const double sine = contact.normal_W.cross(from->normal_W).norm();
+    if (sine > 1e-9) sum += contact.force_W.norm() * s * sine;
   }
   return sum;
 }

@@ -2,6 +2,7 @@
 // (models/geometry/pose_algorithm.hpp) and of distances, for the stress study.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -32,6 +33,14 @@ struct ToolCall {
     const models::Vec3 way = way_of(contact);
     return way - contact.normal_W * contact.normal_W.dot(way);
   }
+  // What the contacts' forces, as they are at r, do along the normals that the tool came along.
+  [[nodiscard]] double pushed_J() const {
+    double sum = 0.0;
+    for (const models::PoseContact& contact : contacts) {
+      sum += std::max(contact.normal_W.dot(contact.force_W) * contact.normal_W.dot(way_of(contact)), 0.0);
+    }
+    return sum;
+  }
 };
 
 class ToolLaws {
@@ -56,27 +65,17 @@ class ToolLaws {
   // material point at q, s = y − x leads from one edge's line to the other's, and −n₀ᵀs was the edges' gap. So
   // n₀ᵀs ≤ 0 but for rounding, and nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
   [[nodiscard]] double curvature_J(const ToolCall& call) const;
+  // What of a work of the contacts neither that nor rounding accounts for, below 0 if all is. What a gap was short of
+  // by rounding at q, `short_m` (1e-12 m at most, else it counts as inside), the contacts' forces push back; and where
+  // contacts hold each other, by thousands of newtons, a local problem is solved to 1e-10 of the step.
+  [[nodiscard]] double left_J(const ToolCall& call, double work_J, double short_m) const;
+
   // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once, from
   // n₀ to n. Along n₀ the place of contact has come to meet the feature or been held by it, n₀ᵀs ≤ 0 (but for what the
-  // curvature accounts for), so that nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖: sin α of the way, if p̂ isn't
-  // deeper below than a path over the edge can come.
-  //
-  // How deep that is: where the place is on the edge, a force λ₀n₀ becomes λn at the same p̂. By the compliance G of the
-  // place the tool yields by G(λn − λ₀n₀), and not along n, so that λ₀ nᵀGn₀ = λ nᵀGn; along the new feature's t, with
-  // n₀ = n cos α − t sin α, that is
-  //   λ (tᵀGn − tᵀGn₀ nᵀGn/nᵀGn₀) = λ sin α (nᵀGn tᵀGt − tᵀGn nᵀGt)/nᵀGn₀
-  // and s, to which what came before it adds, is no less. (All directions alike, G = y, it is y λ tan α.) Without other
-  // contacts G is that of C = K⁻¹. What presses on a feature all the time, along g, with a force along φ, takes from C
-  // what would move it: C − Cφ gᵀC/gᵀCφ. Only what pressed there in the step before, and hasn't moved along its normal
-  // since, is taken for such; and since friction may have turned φ meanwhile, both its first and its last must do. What
-  // sticks holds along all directions: there each of three takes what moves the place along it, by the force that is
-  // needed for it. What rolls sticks as well: its material point comes off by what is of second order, along the
-  // normal, and slips by nothing. (A slip is known to 8 roundings, as missed() has it.)
-  //
-  // `earlier`: what touched before, in the step before or on the way; `before`: in the step before. What the place came
-  // from behind says nothing about it.
-  [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier,
-                               const std::vector<models::PoseContact>& before) const;
+  // curvature accounts for), so that nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖: sin α of the way, if the parts of
+  // the step say that it is an edge (tool_parts.hpp). `earlier`: what touched before, in the step before or on the way.
+  // What the place came from behind says nothing about it.
+  [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier) const;
 
   // Rounding of a pose, as a length.
   [[nodiscard]] static double rounding_m(const models::ToolPose& pose);
@@ -110,16 +109,6 @@ class ToolLaws {
     double radius_m = 0.0, reach_m = 0.0;
     std::optional<double> friction;
   };
-
-  struct Holding {  // what pressed on the same feature in the step before
-    const models::PoseContact *now, *was;
-  };
-  using Holders = std::vector<std::pair<const models::PoseContact*, models::Vec3>>;  // and their forces
-  [[nodiscard]] std::vector<Holding> holding(const ToolCall& call,
-                                             const std::vector<models::PoseContact>& before) const;
-  // How far a contact goes at least where it comes over an edge from n₀; infinite where no path leads over it.
-  [[nodiscard]] static double least_way_m(const ToolCall& call, const models::PoseContact& over, const models::Vec3& n0,
-                                          const Holders& holders);
 
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
   [[nodiscard]] double normal_turns(const ToolCall& call, const models::PoseContact& contact) const;

@@ -9,6 +9,7 @@
 #include "controller/proxies/pose_proxy.hpp"
 #include "controller/studies/stress/random_tool.hpp"
 #include "controller/studies/stress/tool_laws.hpp"
+#include "controller/studies/stress/tool_parts.hpp"
 #include "scenes/compiler/obstacles.hpp"
 #include "scenes/rigid/compile_rigid.hpp"
 
@@ -109,7 +110,7 @@ Vec3 home_in(const std::string& kind, std::uint64_t seed) {
 class Judge {
  public:
   Judge(const ToolLaws& laws, PoseAlgorithm& g, Random& random, Tally& tally, std::string* report)
-      : laws_(laws), g_(g), fresh_(g.clone()), random_(random), tally_(tally), report_(report) {}
+      : laws_(laws), g_(g), fresh_(g.clone()), parts_(laws, *fresh_), random_(random), tally_(tally), report_(report) {}
 
   // `rise_J`: of the tool's energy beyond the hand's work.
   void step(std::int64_t k, bool fault, const ToolCall& call, double rise_J) {
@@ -159,60 +160,14 @@ class Judge {
 
   void judge_energy(const ToolCall& call, double rise_J) {
     if (call.contacts.empty()) return;
-    // What a gap was short of by rounding (1e-12 m at most, else it counts as `inside`), the contacts' forces push
-    // back; and where contacts hold each other, by thousands of newtons, a local problem is solved to 1e-10 of the
-    // step.
-    double forces_N = 0.0;
-    for (const PoseContact& contact : call.contacts) forces_N += contact.force_W.norm();
-    const double step_m = levers().cwiseProduct(models::difference(call.p, call.q)).norm();
-    const double short_m = std::max(depth_before_m_, 0.0) + 8.0 * ToolLaws::rounding_m(call.r) + 1e-10 * step_m;
-    const double rounding_J = forces_N * short_m + 1e-12;
-    const double rest_J = rise_J - laws_.curvature_J(call) - rounding_J;
+    const double rest_J = laws_.left_J(call, rise_J, depth_before_m_);
     if (!(rest_J > 0.0)) return;
-    if (rest_J <= laws_.edges_J(call, before_, before_) || rest_J <= laws_.edges_J(call, met(call), before_)) {
+    std::vector<PoseContact> touched = before_;
+    if (parts_.keep(call, depth_before_m_, touched) && rest_J <= laws_.edges_J(call, touched)) {
       ++tally_.edge;
     } else {
       note(work, call, "J", rest_J);
     }
-  }
-
-  // What the way from q to p̂ meets: a tool may come to a corner and slide over it in one step. Of replay
-  // 4460787946124040, step 41, it is pressed to one box, comes to a face of another one after a ninth of the way, is
-  // wedged between both by up to 7 kN, 0.5 mm before p̂, and leaves that face over its edge after three quarters: the
-  // edge, which it slides down, pushes forward, and that is the law's only solution. So each eighth of the way is
-  // looked at.
-  // What is first met between two of them may be left before the second one: of replay 7563174384567051, step 159, a
-  // corner of the tool comes down on a face 96 % of the way, 12 µm from the face's edge, and p̂ is over that edge by
-  // 6 µm. There the edges alone hold it (the corner's foot isn't on the face, and friction doesn't bring it back), with
-  // a normal that leads forward, and that turned the normal by 65° at once. So where an object is met first is looked
-  // for, to 1e-3 of an eighth, and what touches next to it is what was met.
-  std::vector<PoseContact> met(const ToolCall& call) {
-    const std::unique_ptr<PoseAlgorithm> g = fresh_->clone();
-    const Twist way = models::difference(call.p, call.q);
-    const auto touched_at = [&](double share) {
-      g->step(call.K, models::moved(call.q, share * way), call.q);
-      return g->contacts();
-    };
-    const auto touches = [](std::span<const PoseContact> contacts, int object) {
-      return std::any_of(contacts.begin(), contacts.end(), [&](const auto& c) { return c.object == object; });
-    };
-    std::vector<PoseContact> all = before_;
-    for (int k = 1; k <= 8; ++k) {
-      const std::span<const PoseContact> here = touched_at(0.125 * k);
-      const std::vector<PoseContact> now(here.begin(), here.end());
-      for (const PoseContact& contact : now) {
-        if (touches(all, contact.object)) continue;
-        double free = 0.125 * (k - 1), touching = 0.125 * k;
-        for (int i = 0; i < 10; ++i) {
-          const double half = 0.5 * (free + touching);
-          (touches(touched_at(half), contact.object) ? touching : free) = half;
-        }
-        const std::span<const PoseContact> first = touched_at(touching);
-        all.insert(all.end(), first.begin(), first.end());
-      }
-      if (k < 8) all.insert(all.end(), now.begin(), now.end());
-    }
-    return all;
   }
 
   // As tests/models/rigid/stiffness_independence_test.cpp, which says where what is allowed comes from.
@@ -257,6 +212,7 @@ class Judge {
   const ToolLaws& laws_;
   PoseAlgorithm& g_;
   std::unique_ptr<PoseAlgorithm> fresh_;  // that knows of no step
+  ToolParts parts_;
   Random& random_;
   Tally& tally_;
   std::string* report_;

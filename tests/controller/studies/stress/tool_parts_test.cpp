@@ -1,0 +1,156 @@
+#include "controller/studies/stress/tool_parts.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "scenes/rigid/compile_rigid.hpp"
+
+namespace proxarm::studies {
+namespace {
+
+using models::PoseAlgorithm;
+using models::PoseContact;
+using models::ToolPose;
+using models::Vec3;
+
+constexpr double stiffness_N_per_m = 1e5, slope = 0.5 * M_PI_2;
+
+// A point on a table that ends at x = 0 in a slope of 45°, with its faults.
+struct Table final : PoseAlgorithm {
+  double early_m = 0.0;    // before the edge, where it jumps onto the slope
+  double springs_m = 0.0;  // off the slope, and is held there
+  bool stuck = false;      // no solution beyond the edge
+  mutable int* asked = nullptr;
+
+  const ToolPose& step(const models::Mat6& /*K*/, const ToolPose& p_hat, const ToolPose& /*q*/) noexcept override {
+    if (asked != nullptr) ++*asked;
+    const bool over = p_hat.position.x() > -early_m;
+    contact_.normal_W = over ? Vec3(std::sin(slope), 0.0, std::cos(slope)) : Vec3(Vec3::UnitZ());
+    const double off_m = (over ? springs_m : 0.0) - contact_.normal_W.dot(p_hat.position);
+    q_ = p_hat;
+    q_.position += off_m * contact_.normal_W;
+    contact_.force_W = stiffness_N_per_m * off_m * contact_.normal_W;
+    contact_.point_W = q_.position;
+    unresolved_ = over && stuck;
+    return q_;
+  }
+  [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {&contact_, 1}; }
+  [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
+  [[nodiscard]] double clearance_m(const ToolPose& /*pose*/) const noexcept override { return 0.0; }
+  [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<Table>(*this); }
+  void copy_state(const PoseAlgorithm& /*other*/) noexcept override {}
+
+ private:
+  ToolPose q_;
+  PoseContact contact_;
+  bool unresolved_ = false;
+};
+
+// From 0.2 mm before the edge to 0.3 mm beyond it, pressed by 1 mm.
+struct OverTheTable {
+  scenes::Scene scene;
+  models::Tool tool{{{models::BoxTool{Vec3::Constant(0.001)}, models::Pose::Identity(), {}}}};
+  ToolCall call;
+
+  OverTheTable() {
+    scenes::Object far_below;
+    far_below.shape = scenes::PlaneShape{-Vec3::UnitZ(), Vec3::UnitZ()};
+    scene.objects.push_back(far_below);
+    call.K = stiffness_N_per_m * models::Mat6::Identity();
+    call.q.position = Vec3(-2e-4, 0.0, 0.0);
+    call.p.position = Vec3(3e-4, 0.0, -1e-3);
+  }
+  // Of the step that `world` makes of it, seen by the path of `way`.
+  [[nodiscard]] bool keeps(Table world, const Table& way) const {
+    ToolCall step = call;
+    step.r = world.step(call.K, call.p, call.q);
+    step.contacts.assign(world.contacts().begin(), world.contacts().end());
+    std::vector<PoseContact> touched;
+    return ToolParts(ToolLaws(scene, tool), way).keep(step, 0.0, touched);
+  }
+  [[nodiscard]] bool keeps(const Table& world) const { return keeps(world, world); }
+};
+
+TEST(ToolParts, AStepOverAnEdgeKeepsTheBoundInItsParts) {
+  const OverTheTable here;
+  EXPECT_TRUE(here.keeps(Table()));
+}
+
+TEST(ToolParts, AStepThatPushesNothingIsNotLookedAtInParts) {
+  OverTheTable here;
+  int asked = 0;
+  Table world, way;
+  way.asked = &asked;
+  here.call.p.position.x() = -1e-4;
+  EXPECT_TRUE(here.keeps(world, way));
+  EXPECT_EQ(asked, 0);
+}
+
+// It is pushed by d sin 45° where it jumps from d before the edge. A foot may lie 1e-10 m beside its feature on both
+// sides, and rounding is a thousandth of that.
+TEST(ToolParts, AStepThatJumpsOverAnEdgeFromBeforeItDoesNot) {
+  const OverTheTable here;
+  Table world;
+  world.early_m = 1.99e-10 / std::sin(slope);
+  EXPECT_TRUE(here.keeps(world));
+  world.early_m = 2.02e-10 / std::sin(slope);
+  EXPECT_FALSE(here.keeps(world));
+  world.early_m = 1e-5;
+  EXPECT_FALSE(here.keeps(world));
+}
+
+// Where it springs at the edge, and where only its end does, which the world asked anew knows nothing of.
+TEST(ToolParts, AStepThatSpringsDoesNot) {
+  const OverTheTable here;
+  Table world;
+  world.springs_m = 1.99e-10;
+  EXPECT_TRUE(here.keeps(world));
+  EXPECT_TRUE(here.keeps(world, Table()));
+  world.springs_m = 2.02e-10;
+  EXPECT_FALSE(here.keeps(world));
+  EXPECT_FALSE(here.keeps(world, Table()));
+}
+
+TEST(ToolParts, AWayOnWhichNoForcesAreFoundSaysNothing) {
+  const OverTheTable here;
+  Table stuck;
+  stuck.stuck = true;
+  EXPECT_FALSE(here.keeps(Table(), stuck));
+}
+
+// A tip of a pyramid slides on a box, from 20 µm before its edge to 100 µm beyond, pressed by 0.3 mm: one of its own
+// edges comes down on the box's.
+TEST(ToolParts, ATipThatComesOverABoxsEdgeKeepsTheBound) {
+  scenes::Scene scene;
+  scenes::Object box;
+  scenes::BoxShape shape;
+  shape.pose_W.translation() = Vec3(-0.025, 0.0, -0.025);
+  shape.size_m = Vec3(0.05, 0.1, 0.05);
+  box.shape = shape;
+  box.friction = 0.0;
+  scene.objects.push_back(box);
+  models::ConvexTool pyramid{{Vec3::Zero()}};
+  for (const double turn : {0.4, 2.0, 3.6, 5.2}) {
+    pyramid.points_m.emplace_back(0.01 * std::cos(turn), 0.01 * std::sin(turn), 0.01);
+  }
+  const models::Tool tool{{{pyramid, models::Pose::Identity(), {}}}};
+  const auto g = scenes::compile_rigid(scene, tool);
+  const ToolLaws laws(scene, tool);
+  ToolCall call;
+  call.K = stiffness_N_per_m * models::Mat6::Identity();
+  call.q.position.x() = -20e-6;
+  call.p.position = Vec3(100e-6, 0.0, -300e-6);
+  ASSERT_LE(laws.depth_m(call.q), 1e-15);
+  const auto stepping = g->clone();
+  call.r = stepping->step(call.K, call.p, call.q);
+  call.contacts.assign(stepping->contacts().begin(), stepping->contacts().end());
+  const double left_J = laws.left_J(call, call.pushed_J(), 0.0);
+  ASSERT_GT(left_J, 0.0);
+  std::vector<PoseContact> touched;
+  EXPECT_TRUE(ToolParts(laws, *g).keep(call, 0.0, touched));
+  EXPECT_LE(left_J, laws.edges_J(call, touched));
+}
+
+}  // namespace
+}  // namespace proxarm::studies
