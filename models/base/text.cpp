@@ -59,16 +59,17 @@ std::optional<double> strict_number(std::string_view text) noexcept {
   if (!rest.empty() && (rest[0] == '+' || rest[0] == '-')) rest.remove_prefix(1);
   if (text.starts_with('+')) text = rest;  // from_chars takes no plus
   const std::size_t whole = digits(rest);
-  if (whole == 0 || (whole > 1 && rest[0] == '0')) return std::nullopt;
-  bool zero = rest.substr(0, whole) == "0";
+  if (whole > 1 && rest[0] == '0') return std::nullopt;
+  bool zero = whole == 0 || rest[0] == '0';
   rest.remove_prefix(whole);
+  std::size_t fraction = 0;
   if (rest.starts_with('.')) {
     rest.remove_prefix(1);
-    const std::size_t fraction = digits(rest);
-    if (fraction == 0) return std::nullopt;
+    fraction = digits(rest);
     zero = zero && rest.substr(0, fraction).find_first_not_of('0') == std::string_view::npos;
     rest.remove_prefix(fraction);
   }
+  if (whole + fraction == 0) return std::nullopt;
   if (rest.starts_with('e') || rest.starts_with('E')) {
     rest.remove_prefix(1);
     if (!rest.empty() && (rest[0] == '+' || rest[0] == '-')) rest.remove_prefix(1);

@@ -14,8 +14,9 @@ namespace proxarm::description {
 // Length in bytes (1..4) of the well-formed UTF-8 character that `text` begins with; 0 if it doesn't.
 std::size_t utf8_length(std::string_view text) noexcept;
 
-// A decimal number: optional sign, digits without a leading zero, optional fraction and exponent; all of `text`. None
-// for anything else, and for what doesn't fit a finite double (1e999) or becomes zero without being it (1e-999).
+// A decimal number: optional sign, digits with at most one point before, among or after them, optional exponent; all of
+// `text`. Beside the point there may be nothing (.5, 1.), but no leading zeros (010). None for anything else, and for
+// what doesn't fit a finite double (1e999) or becomes zero without being it (1e-999).
 std::optional<double> strict_number(std::string_view text) noexcept;
 
 // An integer, decimal without leading zeros or hexadecimal with 0x; all of `text`.

@@ -78,8 +78,9 @@ class Reader {
     if (is_letter(rest_[0])) {
       return take(Token::Kind::word, length_of([](char c) { return is_letter(c) || is_digit(c); }));
     }
-    const bool signed_number = (rest_[0] == '-' || rest_[0] == '+') && rest_.size() > 1 && is_digit(rest_[1]);
-    if (!is_digit(rest_[0]) && !signed_number) return take(Token::Kind::sign, 1);
+    std::size_t before_digits = rest_[0] == '-' || rest_[0] == '+' ? 1 : 0;
+    before_digits += rest_.substr(before_digits).starts_with('.') ? 1 : 0;
+    if (rest_.size() <= before_digits || !is_digit(rest_[before_digits])) return take(Token::Kind::sign, 1);
     std::size_t length = 1;
     while (length < rest_.size() && (is_digit(rest_[length]) || rest_[length] == '.' || exponent_at(length))) ++length;
     take(Token::Kind::number, length);

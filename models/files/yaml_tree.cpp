@@ -138,9 +138,6 @@ std::string number_advice(std::string_view text) {
     return "write it without leading zeros";
   }
   if (digits.find(',') != std::string_view::npos) return "write a decimal point, not a comma";
-  if (digits.starts_with('.') && digits.size() > 1 && digits[1] >= '0' && digits[1] <= '9') {
-    return "write the zero before the point";
-  }
   // "3kg", "5 N": a number, then letters.
   const std::size_t end = text.find_first_not_of("+-0123456789.eE");
   if (end != std::string_view::npos && end > 0 && strict_number(text.substr(0, end))) {

@@ -85,6 +85,16 @@ TEST(DbcFile, ReadsMessagesAndPlaces) {
   EXPECT_TRUE(torque.find("Page")->multiplexed);
 }
 
+TEST(DbcFile, ReadsNumbersWithNothingBesideThePoint) {
+  std::string text = usual;
+  const std::string written = "(0.01,-300)";
+  text.replace(text.find(written), written.size(), "(.0796,-.5)");
+  const DbcFile dbc = parse_dbc(text, "own.dbc");
+  EXPECT_TRUE(dbc.remarks.empty());
+  EXPECT_EQ(dbc.messages[0].find("Fy")->factor, 0.0796);
+  EXPECT_EQ(dbc.messages[0].find("Fy")->offset, -0.5);
+}
+
 // A vehicle's file has hundreds of messages, of which a sensor needs two.
 TEST(DbcFile, LosesOneMessageByAMistakeAndNoOther) {
   const auto lost = [](const std::string& what, const std::string& instead) {
