@@ -10,6 +10,8 @@
 #include "models/files/yaml_file.hpp"
 #include "models/files/yaml_rules.hpp"
 #include "models/mesh/mesh_topology.hpp"
+#include "models/rigid_shapes/solid.hpp"
+#include "scenes/format/dent.hpp"
 #include "scenes/mesh_files/mesh_file.hpp"
 
 namespace proxarm::scenes {
@@ -37,8 +39,9 @@ models::Pose pose_of(const YamlNode& node) {
   return pose;
 }
 
-// How far a vertex stands out over a face of a mesh that should be convex, whichever side its normal is on.
-double dent_m(const models::TriangleMesh& mesh, const std::vector<Vec3>& points) {
+// How far a vertex stands out over a face of a mesh that should be convex, whichever side its normal is on. (No depth:
+// over a slanting face in a dent of 5 mm something may stand out by more.)
+double stands_out_m(const models::TriangleMesh& mesh, const std::vector<Vec3>& points) {
   double deepest = 0.0;
   for (std::uint32_t face = 0; face < mesh.size(); ++face) {
     const auto& [a, b, c] = mesh.triangle(face);
@@ -78,10 +81,10 @@ models::ConvexTool read_convex(const YamlNode& node, RigidTool& tool) {
   // Coordinates in files are rounded to 6e-8 of their size, and the plane of a slim triangle turns by some hundred
   // times that.
   constexpr double roundness = 1e-5;
-  const double dent = dent_m(*mesh, convex.points_m);
-  if (dent > roundness * size_m && !hull) {
+  if (!hull && stands_out_m(*mesh, convex.points_m) > roundness * size_m) {
+    const double dent_m = deepest_dent_m(*mesh, models::solid_of(convex, models::Pose::Identity()));
     throw node.error_at("file", "a convex mesh",
-                        file.string() + ", which has dents of up to " + description::number_text(1e3 * dent) + " mm",
+                        file.string() + ", which has dents of up to " + description::rounded_text(1e3 * dent_m) + " mm",
                         "`hull: true` takes its convex hull, and `mesh:` instead of `convex:` takes it as it is");
   }
   tool.meshes.push_back(file);

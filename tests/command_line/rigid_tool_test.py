@@ -232,6 +232,7 @@ class RigidTool(ProgramTest):
         told = self.refuse("--scene", SCENES / "free.yaml", "--tool", tool)
         self.assertIn("tool.yaml", told)
         self.assertIn("a convex mesh", told)
+        self.assertIn("which has dents of up to 5 mm", told)
         self.assertIn("hull: true", told)
         hull = self.written("hull.yaml", "convex: {file: dented.obj, scale_m: 0.001, hull: true}\n")
         self.summary("--scene", SCENES / "wall.yaml", "--tool", hull, "--duration", "1s")
