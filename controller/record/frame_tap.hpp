@@ -34,6 +34,7 @@ class FrameTap final : public fieldbus::CanNetwork {
   void sleep_until(std::int64_t deadline_ns) noexcept override { network_.sleep_until(deadline_ns); }
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override { return network_.wait_for_frame(deadline_ns); }
   [[nodiscard]] std::int64_t waited_ns() const noexcept override { return network_.waited_ns(); }
+  [[nodiscard]] std::int64_t behind_ns() const noexcept override { return network_.behind_ns(); }
 
  private:
   class TappedBus;

@@ -2,7 +2,9 @@
 //
 // On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun; the periods that it missed
 // are skipped, never caught up in a burst, and the drives see a longer step instead. So are periods that the loop slept
-// through, as a suspended process does. Late and skipped cycles in a row are counted together: Fault::overrun.
+// through, as a suspended process does. Late and skipped cycles in a row are counted together: Fault::overrun. Simulated
+// time that keeps pace with the clock waits for late cycles, up to 0.2 s (SimulatedCanNetwork): they are counted as
+// overruns, but none is skipped, and they are no fault.
 #pragma once
 
 #include <cstdint>
@@ -39,7 +41,7 @@ struct SessionLength {
 struct SessionTally {
   SessionEnd end = SessionEnd::fault;
   std::uint64_t cycles = 0;
-  std::uint64_t overruns = 0;  // cycles that ended late, and gaps that were slept through
+  std::uint64_t overruns = 0;  // cycles that ended after the next was due, and gaps that were slept through
   std::uint64_t skipped = 0;   // periods without a cycle
   PageFaults page_faults;      // of the loop's thread, after the first cycle
 };

@@ -74,6 +74,9 @@ class CanNetwork {
   virtual bool wait_for_frame(std::int64_t deadline_ns) noexcept = 0;
   // Time of this machine that went by in wait_for_frame() so far; 0 for who doesn't measure it.
   [[nodiscard]] virtual std::int64_t waited_ns() const noexcept { return 0; }
+  // By how much now_ns() is behind the clock that it is to keep pace with: above 0 only where time is simulated and
+  // waits for a machine that is late.
+  [[nodiscard]] virtual std::int64_t behind_ns() const noexcept { return 0; }
 };
 
 }  // namespace proxarm::fieldbus

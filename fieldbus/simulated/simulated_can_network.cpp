@@ -76,6 +76,10 @@ void SimulatedCanNetwork::follow_real_time() {
   woken_late_ns_ = std::numeric_limits<std::int64_t>::max();  // whatever lateness comes first is no gap
 }
 
+std::int64_t SimulatedCanNetwork::behind_ns() const noexcept {
+  return real_time_ ? std::max<std::int64_t>(0, monotonic_ns() - real_time_offset_ns_ - now_ns()) : 0;
+}
+
 void SimulatedCanNetwork::pace(std::int64_t time_ns) noexcept {
   const std::int64_t until = time_ns + real_time_offset_ns_;
   if (monotonic_ns() >= until) return;
@@ -101,7 +105,7 @@ void SimulatedCanNetwork::sleep_until(std::int64_t deadline_ns) noexcept {
 // A gap is lateness that has come since the last sleep. What has added up over many sleeps is a slow machine's.
 void SimulatedCanNetwork::live_through_gap() noexcept {
   const std::int64_t before_ns = woken_late_ns_;
-  woken_late_ns_ = std::max<std::int64_t>(0, monotonic_ns() - real_time_offset_ns_ - now_ns());
+  woken_late_ns_ = behind_ns();
   if (woken_late_ns_ - before_ns <= longest_catch_up_ns) return;
   events_.run_until(now_ns() + std::min(woken_late_ns_, longest_gap_ns));
   real_time_offset_ns_ = monotonic_ns() - now_ns();

@@ -57,6 +57,7 @@ class SimulatedCanNetwork final : public CanNetwork {
   // A frame that completes at the deadline itself is still in time.
   bool wait_for_frame(std::int64_t deadline_ns) noexcept override;
   [[nodiscard]] std::int64_t waited_ns() const noexcept override { return waited_ns_; }
+  [[nodiscard]] std::int64_t behind_ns() const noexcept override;  // 0 without follow_real_time()
 
  private:
   void pace(std::int64_t time_ns) noexcept;

@@ -149,6 +149,24 @@ class Ending(ProgramTest):
         self.assertIn("stopping", cycles[last + 1:])
 
 
+    def test_a_process_that_was_kept_waiting_tells_its_overruns(self):
+        """As by a busy machine: simulated time waits for it, but on a bus these cycles would have been late."""
+        run = subprocess.Popen([program(), "run", "--json", "--no-plot", "--pace", "realtime", "--duration", "3s"],
+                               cwd=self.folder, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE)
+        self.addCleanup(self.end, run)
+        time.sleep(2.0)
+        run.send_signal(signal.SIGSTOP)
+        time.sleep(0.08)
+        run.send_signal(signal.SIGCONT)
+        out, err = run.communicate(timeout=PATIENCE_S)
+        self.assertEqual(run.returncode, 0, err)
+        summary = json.loads(out)
+        self.assertGreater(summary["latency_us"]["wake_up"]["max"], 70e3)
+        self.assertGreater(summary["overruns"], 70)
+        self.assertEqual(summary["faults"], [])
+
+
 class Output(ProgramTest):
     def test_that_cant_be_written_is_a_failure(self):
         for command in (("run", "--json", "--duration", "0.1s"), ("run", "--no-plot", "--duration", "0.1s"), ("plan",),

@@ -86,7 +86,6 @@ int SimulatedRun::run() {
                        [this](fieldbus::ModbusLine& line) { controller::pump(network_, line, network_.now_ns()); });
   report_modbus_rates(session_, parts);
   output_.introduce(parts);
-  if (options_.pace == Pace::realtime) network_.follow_real_time();
   return run_cycles(std::move(parts));
 }
 
@@ -113,6 +112,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
                                          }
                                        },
                                        [&] { drain(cycle.records()); }};
+  if (options_.pace == Pace::realtime) network_.follow_real_time();  // now: what went before was no cycle's
   const controller::SessionTally tally =
       controller::run_session(cycle, network_, session_length(session_, options_), hooks);
   if (exploded_at_ns_) controller::refuse_explosion(1e-9 * static_cast<double>(*exploded_at_ns_ - power_on_ns_));
