@@ -229,7 +229,7 @@ void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) 
 }
 
 std::string PlotBuilder::write(const fs::path& svg) const {
-  if (samples_.size() < 2) return "no plot: nothing was rendered";
+  if (is_empty()) return "no plot: nothing was rendered";
   const Axes drawn = axes();
   return draw_svg(gnuplot_, script(drawn), data(drawn), svg);
 }

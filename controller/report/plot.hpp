@@ -29,6 +29,8 @@ class PlotBuilder {
 
   void add(const CycleRecord& record);
 
+  // Nothing was rendered, so there is nothing to draw.
+  [[nodiscard]] bool is_empty() const noexcept { return samples_.size() < 2; }
   // Writes the SVG. Returns a warning in one line where that didn't work; empty when it did.
   [[nodiscard]] std::string write(const std::filesystem::path& svg) const;
 

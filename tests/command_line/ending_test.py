@@ -78,6 +78,29 @@ class Ending(ProgramTest):
                 self.assert_controlled_stop(summary)
                 self.assertEqual(self.recorded_summary()["end"], summary["end"])
 
+    def test_before_anything_is_rendered_is_no_failure_of_the_plot(self):
+        """A session that waits for its enabling switch, and is called off."""
+        bench = self.copies() / "models/cells/bench.yaml"
+        bench.write_text(bench.read_text() + "enabling_input: {drive: shoulder, bit: 16}\n")
+        for arguments, plot in ((["--plot", "own.svg"], "own.svg"), ([], "proxarm-run.svg")):
+            with self.subTest(plot):
+                control = self.folder / "control" / plot
+                run = subprocess.Popen([program(), "run", bench, "--pace", "realtime", "--enabling", "100s..", "--control",
+                                        control, *arguments], cwd=self.folder, text=True, stdin=subprocess.DEVNULL,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=defaults)
+                self.addCleanup(self.end, run)
+                deadline = time.monotonic() + PATIENCE_S
+                while not control.exists():
+                    self.assertLess(time.monotonic(), deadline)
+                    self.assertIsNone(run.poll())
+                    time.sleep(0.02)
+                run.terminate()
+                out, err = run.communicate(timeout=PATIENCE_S)
+                self.assertEqual((run.returncode, err), (0, ""))
+                self.assertIn("stopped: SIGTERM; 0 of 10 s were rendered", out)
+                self.assertIn("plot:                     none; nothing was rendered\n", out)
+                self.assertFalse((self.folder / plot).exists())
+
     def test_nohup_is_obeyed(self):
         """Who starts a session so has said that the terminal's end isn't the session's."""
         run = self.start(preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))

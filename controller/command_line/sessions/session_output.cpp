@@ -286,6 +286,10 @@ int SessionOutput::finish(Summary summary, BlackBoxKeeper& keeper) {
 
 bool SessionOutput::draw_plot() {
   if (!plot_) return true;
+  if (plot_->is_empty()) {  // as of a session that was stopped before; whoever stops it knows
+    if (!options_.json) std::printf("  plot:                     none; nothing was rendered\n");
+    return true;
+  }
   fs::path file = options_.plot_file;
   if (file.empty()) file = options_.record_dir.empty() ? fs::path(default_plot) : options_.record_dir / "plot.svg";
   const std::string warning = plot_->write(file);
