@@ -4,7 +4,6 @@
 #include <cmath>
 #include <optional>
 
-#include "controller/cycle/compute_time.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -85,9 +84,8 @@ void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
   judge(t_k_ns);
   choose_setpoints(t_k_ns);
   send_setpoints(t_k_ns);
-  recorder_.record().compute_ns = timed.ns();
   write_record(t_k_ns);
-  end_cycle();
+  end_cycle(timed);
 }
 
 void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
@@ -173,7 +171,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   bus_.write_record(record);
 }
 
-void Cycle::end_cycle() noexcept {
+void Cycle::end_cycle(const ComputeTime& timed) noexcept {
   BoxCycle& entry = recorder_.entry();
   entry.overruns_in_a_row = overruns_in_a_row_;
   entry.rendered_ns = state_.rendered_ns;
@@ -185,6 +183,7 @@ void Cycle::end_cycle() noexcept {
                 .cause_lasts = !may_move(),
                 .timesteps_answered = timestep_.settled(),
                 .asked_timesteps = requests_.timesteps.taken_from_thread()});
+  recorder_.record().compute_ns = timed.ns();  // all but that the record is copied into its rings
   recorder_.finish();
   ++state_.cycle;
 }

@@ -17,6 +17,7 @@
 #include <span>
 
 #include "controller/cycle/bus_image.hpp"
+#include "controller/cycle/compute_time.hpp"
 #include "controller/cycle/cycle_recorder.hpp"
 #include "controller/cycle/cycle_status.hpp"
 #include "controller/cycle/fault_monitor.hpp"
@@ -129,7 +130,7 @@ class Cycle {
   void choose_setpoints(std::int64_t t_k_ns) noexcept;
   void send_setpoints(std::int64_t t_k_ns) noexcept;
   void write_record(std::int64_t t_k_ns) noexcept;
-  void end_cycle() noexcept;
+  void end_cycle(const ComputeTime& timed) noexcept;
   void apply(const Timestep& timestep) noexcept;
   void look_ahead(double horizon_s) noexcept;
 

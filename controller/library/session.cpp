@@ -76,14 +76,17 @@ Summary Session::State::run(const std::function<void(const CycleRecord&)>& each)
   controller::SimulatedLoop loop(session, parts);
   controller::SummaryBuilder builder(controller::summary_config(session));
   std::int64_t rendered_ns = 0, exploded_at_ns = -1;
+  SteadyClock::duration figures{};
   const SteadyClock::time_point begun = SteadyClock::now();
   const controller::SessionTally tally = loop.run([&](CycleRecord record, const sim::Truth& truth) {
     if (exploded_at_ns < 0 && !controller::is_possible(truth)) exploded_at_ns = truth.time_ns;
     if (exploded_at_ns >= 0 || thrown || stop_asked) loop.cycle().request_stop();
     if (record.phase == controller::Phase::rendering) rendered_ns += record.period_ns;
+    const SteadyClock::time_point completes = SteadyClock::now();
     controller::add_truth(record, truth);
     controller::complete(record, session, rendered_ns);
     builder.add(record);
+    figures += SteadyClock::now() - completes;
     if (each) each(record);
   });
   if (thrown) std::rethrow_exception(thrown);
@@ -91,6 +94,7 @@ Summary Session::State::run(const std::function<void(const CycleRecord&)>& each)
   Summary summary = controller::session_summary(builder, loop.cycle(), tally.end,
                                                 {.reason = "asked", .text = "by the program"}, session);
   summary.wall_time_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
+  summary.figures_s = std::chrono::duration<double>(figures).count();
   summary.overruns = tally.overruns;
   summary.virtual_time = true;
   if (loop.first_cycle_ns()) summary.first_cycle_s = 1e-9 * static_cast<double>(*loop.first_cycle_ns());

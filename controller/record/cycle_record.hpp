@@ -146,7 +146,7 @@ struct CycleRecord {
   std::array<double, 4> true_tool_q_W{0.0, 0.0, 0.0, 1.0};  // its orientation: x y z w
   Triple true_acceleration_W_m_per_s2{};
 
-  std::int64_t compute_ns = 0;  // wall-clock of the cycle, waiting apart; goes to timing.json alone
+  std::int64_t compute_ns = 0;  // wall-clock of the whole cycle, waiting apart; goes to timing.json alone
 
   [[nodiscard]] bool has(RecordFlag flag) const noexcept { return (flags & static_cast<std::uint32_t>(flag)) != 0; }
   void set(RecordFlag flag, bool on = true) noexcept {

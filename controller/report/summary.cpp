@@ -25,6 +25,7 @@ class Durations {
     ++bins_[bin_of(ns)];
     ++count_;
     max_ns_ = std::max(max_ns_, ns);
+    total_ns_ += ns;
   }
 
   // The duration that a fraction of all don't exceed, in µs, at most the longest.
@@ -39,6 +40,7 @@ class Durations {
     return max_us();
   }
   [[nodiscard]] double max_us() const { return 1e-3 * static_cast<double>(max_ns_); }
+  [[nodiscard]] double total_us() const { return 1e-3 * static_cast<double>(total_ns_); }
 
  private:
   static constexpr std::size_t fine = 100'000, coarse = 926;
@@ -54,7 +56,7 @@ class Durations {
 
   std::vector<std::uint32_t> bins_ = std::vector<std::uint32_t>(fine + coarse);
   std::uint64_t count_ = 0;
-  std::int64_t max_ns_ = 0;
+  std::int64_t max_ns_ = 0, total_ns_ = 0;
 };
 
 // Root mean square and maximum of a stream.
@@ -381,7 +383,8 @@ Summary SummaryBuilder::finish() {
   summary.rendered_time_s = seconds(s.rendered_ns);
   summary.contact_time_s = seconds(s.touching_ns);
   summary.sliding_time_s = seconds(s.slipping_ns);
-  summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us()};
+  summary.compute_us = {s.durations.quantile_us(0.5), s.durations.quantile_us(0.99), s.durations.max_us(),
+                        s.durations.total_us()};
   summary.tracking_rms_m = s.tracking.rms();
   summary.tracking_max_m = s.tracking.largest();
   summary.tracking_lag_rms_m = s.lagging.rms();

@@ -113,8 +113,9 @@ struct LimitSummary {
   std::string words;                   // what that was
 };
 
-struct ComputeTime {
+struct ComputeTimes {
   double median = 0.0, p99 = 0.0, max = 0.0;  // µs; median and p99 to 10 ns below 1 ms, to 1 % above
+  double total = 0.0;                         // µs
 };
 
 // Of a session in real time (latency.hpp), µs.
@@ -161,9 +162,10 @@ struct Summary {
   double simulated_time_s = 0.0;  // all cycles, whatever the phase
   double rendered_time_s = 0.0;
   double wall_time_s = 0.0;  // set by the caller
+  double figures_s = 0.0;    // processor time for records and figures, outside of the cycles; set by the caller
   std::uint64_t cycles = 0;
   std::uint64_t overruns = 0;                        // all phases
-  ComputeTime compute_us;                            // all phases
+  ComputeTimes compute_us;                           // all phases
   std::map<std::string, LatencySummary> latency_us;  // by name; set by the caller; empty in virtual time
   std::optional<PageFaults> page_faults;             // of the cycle's thread; set by the caller; absent in virtual time
   std::map<std::string, double> bus_load;            // set by the caller

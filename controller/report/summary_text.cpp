@@ -49,7 +49,11 @@ Json idle_orders(const Summary& summary) {
 void add_timing(Json& json, const Summary& s) {
   json["wall_time_s"] = s.wall_time_s;
   json["overruns"] = s.overruns;
-  json["compute_us"] = {{"median", s.compute_us.median}, {"p99", s.compute_us.p99}, {"max", s.compute_us.max}};
+  json["figures_s"] = s.figures_s;
+  json["compute_us"] = {{"median", s.compute_us.median},
+                        {"p99", s.compute_us.p99},
+                        {"max", s.compute_us.max},
+                        {"total", s.compute_us.total}};
   for (const auto& [name, latency] : s.latency_us) {
     json["latency_us"][name] = {{"median", latency.median},
                                 {"p99", latency.p99},
@@ -272,7 +276,9 @@ class Lines {
 // What it took: time, processor, buses.
 void tell_time(const Summary& s, Lines& line) {
   line("time", format("%.3f s in ", s.simulated_time_s) + std::to_string(s.cycles) + " cycles, " +
-                   format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s", s.wall_time_s));
+                   format("%.3f s of it rendered; ", s.rendered_time_s) + format("wall clock %.2f s: ", s.wall_time_s) +
+                   format("%.2f s for cycles, ", 1e-6 * s.compute_us.total) +
+                   format("%.2f s for records and figures", s.figures_s));
   line("compute per cycle",
        format("median %.1f, ", s.compute_us.median) + format("p99 %.1f, ", s.compute_us.p99) +
            format("max %.1f µs; ", s.compute_us.max) +

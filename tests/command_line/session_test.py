@@ -15,7 +15,7 @@ from harness import AXES, SOURCE, ProgramTest, program
 number = (int, float)
 maybe = (int, float, type(None))
 SUMMARY = {
-    "simulated_time_s": number, "wall_time_s": number, "cycles": int, "overruns": int, "compute_us": dict,
+    "simulated_time_s": number, "wall_time_s": number, "figures_s": number, "cycles": int, "overruns": int, "compute_us": dict,
     "bus_load": dict, "penetration_max_m": number, "tool_penetration_max_m": number, "tracking_rms_m": maybe,
     "tracking_max_m": maybe, "apparent_mass_kg": maybe, "contact_force_error_N": maybe, "friction_ratio_error": maybe,
     "pulling_force_max_N": number, "faults": list, "setpoint_sha256": str,
@@ -115,7 +115,11 @@ class Record(ProgramTest):
             if name != "timing.json":  # wall-clock figures, and nothing else
                 self.assertEqual((self.first / name).read_bytes(), (self.second / name).read_bytes(), name)
         timing = json.loads((self.first / "timing.json").read_text())
-        self.assertLessEqual({"wall_time_s", "compute_us"}, set(timing))
+        self.assertLessEqual({"wall_time_s", "compute_us", "figures_s"}, set(timing))
+        # What went by is the cycles', their records', and the simulated arm's.
+        cycles_s = 1e-6 * timing["compute_us"]["total"]
+        self.assertGreater(min(cycles_s, timing["figures_s"]), 0.0)
+        self.assertLess(cycles_s + timing["figures_s"], timing["wall_time_s"])
 
     def test_the_hash_is_of_the_setpoints_in_the_signals(self):
         digest = hashlib.sha256()

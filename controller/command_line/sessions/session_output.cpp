@@ -217,7 +217,13 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
                controller::poses_text(poses_summary(*poses_)).c_str());
 }
 
-void SessionOutput::add(CycleRecord record) {
+void SessionOutput::add(const CycleRecord& record) {
+  const auto begun = std::chrono::steady_clock::now();
+  tell(record);
+  spent_ += std::chrono::steady_clock::now() - begun;
+}
+
+void SessionOutput::tell(CycleRecord record) {
   if (record.phase == controller::Phase::rendering) rendered_ns_ += record.period_ns;
   // A hold for a change of the timestep ends by itself; one that doesn't is told of after it.
   if (record.phase != controller::Phase::holding || !record.has(controller::RecordFlag::timestep)) {
@@ -246,6 +252,7 @@ void SessionOutput::add_frame(std::string_view bus, const fieldbus::CanFrame& fr
 Summary SessionOutput::summary(const controller::Cycle& cycle, controller::SessionEnd end, const EndingCause& cause) {
   Summary summary =
       controller::session_summary(builder_, cycle, end, {.reason = cause.word, .text = cause.text}, session_);
+  summary.figures_s = std::chrono::duration<double>(spent_).count();
   if (poses_) summary.poses = poses_summary(*poses_);
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
     if (order.taken && order.refusal == nullptr) continue;

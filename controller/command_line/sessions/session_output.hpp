@@ -1,6 +1,7 @@
 // What a session leaves: summary, plot, record. Fed with every record, in order, outside of the cycle.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -31,7 +32,7 @@ class SessionOutput {
   // What the user should know before the arm moves.
   void introduce(const controller::CycleParts& parts) const;
   // Adds what only the scene knows (distances, friction), and passes the record on.
-  void add(controller::CycleRecord record);
+  void add(const controller::CycleRecord& record);
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);
 
   // Of all that was added and what the cycle found; the caller fills in what only it knows before finish(). `cause`: of
@@ -47,6 +48,7 @@ class SessionOutput {
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);
   void say_oscillation();
+  void tell(controller::CycleRecord record);
   void judge_pose(const controller::CycleRecord& record);
   void say_how_to_get_free(controller::Phase phase) const;
 
@@ -58,6 +60,7 @@ class SessionOutput {
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
   std::unique_ptr<controller::PassedPoses> poses_;  // admittance type
+  std::chrono::steady_clock::duration spent_{};  // on records and their figures
   std::int64_t rendered_ns_ = 0;
   std::int64_t told_period_ns_ = 0;  // that the user knows of
   bool told_oscillation_ = false;    // of the present spell

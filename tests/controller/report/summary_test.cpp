@@ -271,9 +271,11 @@ TEST(Summary, CountsDurationsToTenNanoseconds) {
 // Where a cycle in ten takes milliseconds, one of them seconds, p99 is that of the milliseconds, to a hundredth.
 TEST(Summary, QuantilesBeyondAMillisecondAreNotTheLongest) {
   SummaryBuilder builder({});
+  double total_us = 0.0;
   for (int k = 0; k < 1000; ++k) {
     const std::int64_t ns = k == 500 ? 3'000'000'000 : k % 10 == 0 ? 5'000'000 + 1000 * k : 20'000;
     builder.add({.cycle = static_cast<std::uint64_t>(k), .compute_ns = ns});
+    total_us += 1e-3 * static_cast<double>(ns);
   }
   const Summary s = builder.finish();
   EXPECT_NEAR(s.compute_us.median, 20.0, 0.01);
@@ -281,6 +283,7 @@ TEST(Summary, QuantilesBeyondAMillisecondAreNotTheLongest) {
   EXPECT_GE(s.compute_us.p99, 5900.0);
   EXPECT_LE(s.compute_us.p99, 5900.0 * 1.01);
   EXPECT_EQ(s.compute_us.max, 3e6);
+  EXPECT_NEAR(s.compute_us.total, total_us, 1e-9 * total_us);
 }
 
 TEST(Summary, JsonHasTheKeysThatProgramsReadAndOnlyRepeatableOnesInTheRecord) {
