@@ -423,35 +423,49 @@ double ToolLaws::normal_turns(const ToolCall& call, const PoseContact& contact) 
   return most;
 }
 
-double ToolLaws::curvature_m(const ToolCall& call, const PoseContact& contact) const {
-  const double turned = models::difference(call.r, call.q).tail<3>().norm();
-  const Vec3 lever = contact.point_W - call.r.position;
+double ToolLaws::forward_m(const ToolCall& call, const PoseContact& contact) const {
   const double s = call.way_of(contact).norm();
   const double radius = cores_[static_cast<std::size_t>(contact.part)].radius_m;
   const double bend = bend_per_m_[static_cast<std::size_t>(contact.object)] + (radius > 0.0 ? 1.0 / radius : 0.0);
-  return 0.5 * turned * turned * lever.norm() + normal_turns(call, contact) * s + 0.5 * bend * s * s;
+  return normal_turns(call, contact) * s + 0.5 * bend * s * s;
 }
 
 double ToolLaws::curvature_J(const ToolCall& call) const {
+  const double turned = models::difference(call.r, call.q).tail<3>().norm();
   double sum = 0.0;
-  for (const PoseContact& contact : call.contacts) sum += contact.force_W.norm() * curvature_m(call, contact);
+  for (const PoseContact& contact : call.contacts) {
+    const double lever = (contact.point_W - call.r.position).norm();
+    sum += contact.force_W.norm() * (0.5 * turned * turned * lever + forward_m(call, contact));
+  }
   return sum;
 }
 
-double ToolLaws::left_J(const ToolCall& call, double work_J, double short_m) const {
-  double forces_N = 0.0;
-  for (const PoseContact& contact : call.contacts) forces_N += contact.force_W.norm();
+double ToolLaws::slack_m(const ToolCall& call, double short_m) {
   const Twist step = models::difference(call.p, call.q);
   const double step_m = std::hypot(step.head<3>().norm(), lever_m * step.tail<3>().norm());
-  const double rounding_J = forces_N * (std::max(short_m, 0.0) + 8.0 * rounding_m(call.r) + 1e-10 * step_m) + 1e-12;
-  return work_J - curvature_J(call) - rounding_J;
+  return std::max(short_m, 0.0) + 8.0 * rounding_m(call.r) + 1e-10 * step_m;
+}
+
+double ToolLaws::left_J(const ToolCall& call, double rise_J, double short_m) const {
+  double forces_N = 0.0;
+  for (const PoseContact& contact : call.contacts) forces_N += contact.force_W.norm();
+  return rise_J - curvature_J(call) - forces_N * slack_m(call, short_m) - 1e-12;
+}
+
+double ToolLaws::pushed_J(const ToolCall& call, double short_m) const {
+  double sum = 0.0;
+  for (const PoseContact& contact : call.contacts) {
+    const double beyond_m = contact.normal_W.dot(call.way_of(contact)) - forward_m(call, contact);
+    sum += std::max(contact.normal_W.dot(contact.force_W) * (beyond_m - slack_m(call, short_m)), 0.0);
+  }
+  return sum;
 }
 
 double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& earlier) const {
   double sum = 0.0;
   for (const PoseContact& contact : call.contacts) {
     const Vec3 way = call.way_of(contact);
-    const double s = way.norm(), bent_m = curvature_m(call, contact) + 1e-12;
+    const double s = way.norm(), bent_m = forward_m(call, contact) + 1e-12;
     const auto met = [&](const PoseContact& was) {
       return was.object == contact.object && was.normal_W.dot(way) <= bent_m;
     };

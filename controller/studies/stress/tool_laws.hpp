@@ -2,7 +2,6 @@
 // (models/geometry/pose_algorithm.hpp) and of distances, for the stress study.
 #pragma once
 
-#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,14 +32,6 @@ struct ToolCall {
     const models::Vec3 way = way_of(contact);
     return way - contact.normal_W * contact.normal_W.dot(way);
   }
-  // What the contacts' forces, as they are at r, do along the normals that the tool came along.
-  [[nodiscard]] double pushed_J() const {
-    double sum = 0.0;
-    for (const models::PoseContact& contact : contacts) {
-      sum += std::max(contact.normal_W.dot(contact.force_W) * contact.normal_W.dot(way_of(contact)), 0.0);
-    }
-    return sum;
-  }
 };
 
 class ToolLaws {
@@ -65,10 +56,13 @@ class ToolLaws {
   // material point at q, s = y − x leads from one edge's line to the other's, and −n₀ᵀs was the edges' gap. So
   // n₀ᵀs ≤ 0 but for rounding, and nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
   [[nodiscard]] double curvature_J(const ToolCall& call) const;
-  // What of a work of the contacts neither that nor rounding accounts for, below 0 if all is. What a gap was short of
-  // by rounding at q, `short_m` (1e-12 m at most, else it counts as inside), the contacts' forces push back; and where
-  // contacts hold each other, by thousands of newtons, a local problem is solved to 1e-10 of the step.
-  [[nodiscard]] double left_J(const ToolCall& call, double work_J, double short_m) const;
+  // What neither that nor rounding accounts for of a rise of the tool's energy; below 0 if all is. What a gap was short
+  // of by rounding at q, `short_m` (1e-12 m at most, else it counts as inside), the contacts' forces push back; and
+  // where contacts hold each other, by thousands of newtons, a local problem is solved to 1e-10 of the step.
+  [[nodiscard]] double left_J(const ToolCall& call, double rise_J, double short_m) const;
+  // The same of what the contacts' forces at r do along those normals that places have come forward along. (The bend of
+  // a place's way by its lever isn't in that: ways are those of places.)
+  [[nodiscard]] double pushed_J(const ToolCall& call, double short_m) const;
 
   // And where the tool leaves one feature of an object for another, over an edge, the normal turns by α at once, from
   // n₀ to n. Along n₀ the place of contact has come to meet the feature or been held by it, n₀ᵀs ≤ 0 (but for what the
@@ -112,7 +106,9 @@ class ToolLaws {
 
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
   [[nodiscard]] double normal_turns(const ToolCall& call, const models::PoseContact& contact) const;
-  [[nodiscard]] double curvature_m(const ToolCall& call, const models::PoseContact& contact) const;
+  // What a place may come forward along its normal, as the normal turns and the surface falls off.
+  [[nodiscard]] double forward_m(const ToolCall& call, const models::PoseContact& contact) const;
+  [[nodiscard]] static double slack_m(const ToolCall& call, double short_m);
   [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
   [[nodiscard]] double apart_from_m(const Core& core, const models::ToolPose& pose, std::size_t object) const;
 

@@ -55,11 +55,32 @@ TEST(ToolLaws, WhereNothingWasMetNoEdgeIsTurnedOver) {
 // Forces along a normal count only where the tool came along it.
 TEST(ToolLaws, NeitherFrictionNorWhatComesDownPushes) {
   OverAnEdge here;
-  EXPECT_DOUBLE_EQ(here.call.pushed_J(), 10.0 * 1e-3 * std::sqrt(0.5));
+  const double work_J = 10.0 * 1e-3 * std::sqrt(0.5);  // all of it: nothing turned or is round
+  const auto pushed_J = [&] { return ToolLaws(here.scene, here.tool).pushed_J(here.call, 0.0); };
+  EXPECT_NEAR(pushed_J(), work_J, 1e-9 * work_J);
+  EXPECT_NEAR(ToolLaws(here.scene, here.tool).pushed_J(here.call, 1e-5), work_J - 1e-4, 1e-9 * work_J);
   here.call.contacts[0].force_W += 5.0 * Vec3(1.0, 0.0, -1.0);
-  EXPECT_DOUBLE_EQ(here.call.pushed_J(), 10.0 * 1e-3 * std::sqrt(0.5));
+  EXPECT_NEAR(pushed_J(), work_J, 1e-9 * work_J);
   here.call.contacts.push_back(here.contact(-Vec3::UnitX()));
-  EXPECT_DOUBLE_EQ(here.call.pushed_J(), 10.0 * 1e-3 * std::sqrt(0.5));
+  EXPECT_NEAR(pushed_J(), work_J, 1e-9 * work_J);
+}
+
+// By what the tool turns about a place far from its middle, that place comes along no normal; and what a place came
+// from behind by more than its normal turns, it met no edge on.
+TEST(ToolLaws, TheBendOfALeversWayIsNoneOfAPlaces) {
+  OverAnEdge here;
+  const double turn = 0.1, way_m = 1e-3;
+  here.call.q.orientation = models::rotation_by(turn * Vec3::UnitY());
+  here.call.q.position = Vec3(0.0, 0.0, 0.0);
+  PoseContact& contact = here.call.contacts[0];
+  contact.normal_W = Vec3(std::sin(0.5), 0.0, std::cos(0.5));
+  ASSERT_NEAR(here.call.way_of(contact).norm(), way_m, 1e-15);
+  const ToolLaws laws(here.scene, here.tool);
+  PoseContact was = contact;
+  for (const double share : {0.99, 1.01}) {
+    was.normal_W = Vec3(share * turn, 0.0, std::sqrt(1.0 - share * share * turn * turn));
+    EXPECT_EQ(laws.edges_J(here.call, {was}) > 0.0, share < 1.0);
+  }
 }
 
 // Two edges that cross at 0.05 rad, along x = 0 that of the object, and a tool that turns by 0.005 rad about x: the
