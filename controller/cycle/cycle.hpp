@@ -65,8 +65,8 @@ class Cycle {
   // ---- the loop's owner, between cycles
   // Precondition: no cycle has run. From then on each cycle's inputs and outputs are also written to `box`.
   void write_to(CycleBox& box) noexcept { recorder_.write_to(box); }
-  // Tells the next cycle how many cycles in a row were late; and whether the last one was late by the clock on the wall,
-  // which simulated time waited for: that is recorded, and nothing more.
+  // Tells the next cycle how many cycles in a row were late; and whether the last one was late by the clock on the
+  // wall, which simulated time waited for: that is recorded, and nothing more.
   void report_overruns(std::uint32_t in_a_row, bool was_waited_for = false) noexcept {
     overruns_in_a_row_ = in_a_row;
     was_waited_for_ = was_waited_for;

@@ -2,9 +2,9 @@
 //
 // On time: t_{k+1} = t_k + T. A cycle that ends after the next t_k is an overrun; the periods that it missed
 // are skipped, never caught up in a burst, and the drives see a longer step instead. So are periods that the loop slept
-// through, as a suspended process does. Late and skipped cycles in a row are counted together: Fault::overrun. Simulated
-// time that keeps pace with the clock waits for late cycles, up to 0.2 s (SimulatedCanNetwork): they are counted as
-// overruns, but none is skipped, and they are no fault.
+// through, as a suspended process does. Late and skipped cycles in a row are counted together: Fault::overrun.
+// Simulated time that keeps pace with the clock waits for late cycles, up to 0.2 s (SimulatedCanNetwork): they are
+// counted as overruns, but none is skipped, and they are no fault.
 #pragma once
 
 #include <cstdint>

@@ -16,13 +16,12 @@ using Triangle = std::array<Vec3, 3>;
 double below(const Solid::Face& face, const Vec3& x) { return face.offset - face.normal.dot(x); }
 
 const Solid::Face& nearest(const Solid& hull, const Vec3& x) {
-  return *std::min_element(hull.faces.begin(), hull.faces.end(), [&](const Solid::Face& a, const Solid::Face& b) {
-    return below(a, x) < below(b, x);
-  });
+  return *std::min_element(hull.faces.begin(), hull.faces.end(),
+                           [&](const Solid::Face& a, const Solid::Face& b) { return below(a, x) < below(b, x); });
 }
 
-// The depth is the least of linear functions of the place. So over a triangle it is at most what any one of them is at a
-// corner; here the one that is least in the middle.
+// The depth is the least of linear functions of the place. So over a triangle it is at most what any one of them is at
+// a corner; here the one that is least in the middle.
 struct Depth {
   double there, at_most;
 };

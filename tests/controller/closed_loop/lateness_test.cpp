@@ -1,4 +1,5 @@
-// Simulated time that keeps pace with a clock waits for a machine that is late: what is told of it, and what it changes.
+// Simulated time that keeps pace with a clock waits for a machine that is late: what is told of it, and what it
+// changes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -48,9 +48,9 @@ TEST(Duration, NeedsItsUnit) {
 }
 
 TEST(Duration, RefusesWhatIsNoneOrNotAboveZero) {
-  for (const char* bad :
-       {"",        " ",    "s",      "ms",    "-1ms", "0s",   "0.0ms", "nan",   "inf",    "nans", "infs",     "1e999s",
-        "1e-999s", "01ms", "0x10ms", "1,5ms", ".ms", "1.5.ms", "1 2ms", "--1ms", "1ms1ms", "1m s", "\x1b[31m", "\xff"}) {
+  for (const char* bad : {"",    " ",      "s",     "ms",     "-1ms",    "0s",   "0.0ms",    "nan",
+                          "inf", "nans",   "infs",  "1e999s", "1e-999s", "01ms", "0x10ms",   "1,5ms",
+                          ".ms", "1.5.ms", "1 2ms", "--1ms",  "1ms1ms",  "1m s", "\x1b[31m", "\xff"}) {
     EXPECT_THAT(told(parse_duration, bad), HasSubstr("expected a duration above zero")) << bad;
   }
   EXPECT_EQ(told(parse_duration, "\x1b[31m").find('\x1b'), std::string::npos);

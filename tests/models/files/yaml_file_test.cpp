@@ -119,15 +119,15 @@ TEST(YamlFile, AnUnknownKeyIsToldWithTheNearestKnownOne) {
 
 TEST(YamlFile, OnlyPlainFiniteDecimalNumbersAreNumbers) {
   for (const char* bad :
-       {"010",   "-010",  "00",     "1,5",    ".",   "-.",   "0x10", "1_000", ".nan", ".inf", "-.inf", "nan",
-        "inf",   "1e999", "1e-999", "1e",     "--1", "+-1",  "1 2",  "3kg",   "~",    "null", "true",  "one",
-        "\"3\"", "'3'",   "[3]",    "{a: 3}", "",    "0o17", "1:30", "1e5.5", "1d3",  "٣",    ".e1",   "1.5.", "00.5"}) {
+       {"010",   "-010",   "00", "1,5",  ".",    "-.",    "0x10", "1_000", ".nan", ".inf", "-.inf", "nan",   "inf",
+        "1e999", "1e-999", "1e", "--1",  "+-1",  "1 2",   "3kg",  "~",     "null", "true", "one",   "\"3\"", "'3'",
+        "[3]",   "{a: 3}", "",   "0o17", "1:30", "1e5.5", "1d3",  "٣",     ".e1",  "1.5.", "00.5"}) {
     EXPECT_THAT(objects("  - mass_kg: " + std::string(bad) + "\n"),
                 StartsWith("scenes/wall.yaml:3: objects[0].mass_kg: found "))
         << bad;
   }
-  for (const char* good : {"1", "+1", "1.0", "1e1", "1E+1", "0.5", "99.999", "1e-300", "1.00000000000000000000001", ".0796", "+.5",
-                           "1.", "1.e1", ".5e1"}) {
+  for (const char* good : {"1", "+1", "1.0", "1e1", "1E+1", "0.5", "99.999", "1e-300", "1.00000000000000000000001",
+                           ".0796", "+.5", "1.", "1.e1", ".5e1"}) {
     EXPECT_EQ(objects("  - mass_kg: " + std::string(good) + "\n"), "no error") << good;
   }
   EXPECT_THAT(objects("  - mass_kg: 010\n"), HasSubstr("write it without leading zeros"));
