@@ -158,6 +158,12 @@ struct PosesSummary {
 // "at 3.2 s the arm came …". Precondition: unstable.
 std::string poses_text(const PosesSummary& poses);
 
+// Of a tool that is led and turned: the swing that is damped least, by the linear loop of the stability
+// check.
+struct ExpectedSwing {
+  double frequency_Hz = 0.0, tenth_s = 0.0;  // until a tenth is left
+};
+
 struct Summary {
   double simulated_time_s = 0.0;  // all cycles, whatever the phase
   double rendered_time_s = 0.0;
@@ -191,19 +197,20 @@ struct Summary {
   std::uint64_t limited_cycles = 0;                   // some limit was active
   std::map<std::string, LimitSummary> active_limits;  // by the parameter that holds the limit
   std::optional<PassivitySummary> passivity;
-  std::optional<Oscillation> oscillation;  // the longest; absent: not looked for
-  std::optional<PosesSummary> poses;       // set by the caller; absent: impedance type
-  double lookahead_s = 0.0;                // horizon at the start; 0: none
-  double hands_off_s = 0.0;                // nobody held the handle
-  std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor
-  std::size_t unresolved_steps = 0;        // of a rigid tool: steps of 𝒢 that keep not all laws
-  EndSummary end;                          // set by the caller
-  std::vector<OrderSummary> idle_orders;   // set by the caller
-  std::vector<std::string> drives_lack;    // what drives haven't got, and what is lost by it; set by the caller
-  std::vector<FaultSummary> faults;        // set by the caller
-  std::string black_box;                   // its folder, after a fault; set by the caller
-  std::optional<ViewSummary> view;         // set by the caller; absent: there was none
-  std::vector<NoticeSummary> notices;      // set by the caller
+  std::optional<Oscillation> oscillation;       // the longest; absent: not looked for
+  std::optional<ExpectedSwing> expected_swing;  // set by the caller
+  std::optional<PosesSummary> poses;            // set by the caller; absent: impedance type
+  double lookahead_s = 0.0;                     // horizon at the start; 0: none
+  double hands_off_s = 0.0;                     // nobody held the handle
+  std::uint64_t held_samples = 0;               // cycles without a new sample of the sensor
+  std::size_t unresolved_steps = 0;             // of a rigid tool: steps of 𝒢 that keep not all laws
+  EndSummary end;                               // set by the caller
+  std::vector<OrderSummary> idle_orders;        // set by the caller
+  std::vector<std::string> drives_lack;         // what drives haven't got, and what is lost by it; set by the caller
+  std::vector<FaultSummary> faults;             // set by the caller
+  std::string black_box;                        // its folder, after a fault; set by the caller
+  std::optional<ViewSummary> view;              // set by the caller; absent: there was none
+  std::vector<NoticeSummary> notices;           // set by the caller
   std::vector<TimestepSummary> timesteps;
   bool from_truth = false;
   std::string setpoint_sha256;

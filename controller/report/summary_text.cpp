@@ -176,6 +176,10 @@ void add_repeatable(Json& json, const Summary& s) {
   }
   json["lookahead_s"] = s.lookahead_s;
   json["oscillation"] = oscillation(s.oscillation);
+  json["expected_swing"] = nullptr;
+  if (s.expected_swing) {
+    json["expected_swing"] = {{"frequency_Hz", s.expected_swing->frequency_Hz}, {"tenth_s", s.expected_swing->tenth_s}};
+  }
   json["poses"] = poses(s.poses);
   json["passivity"] = passivity(s.passivity);
   json["hands_off_s"] = s.hands_off_s;

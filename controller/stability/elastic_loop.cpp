@@ -19,7 +19,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 3, 1>;  // in the tool's space
+using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;  // in the tool's space
 
 // exp(A) by scaling and squaring: Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22,
 // squared s times.
@@ -36,17 +36,23 @@ MatrixXd exponential(MatrixXd A) {
   return sum;
 }
 
-// A(w) T²: the coefficients of q(k−i).
-std::array<double, 6> proxy_polynomial(int order, double M, double BT, double KTT) {
-  if (order == 1) return {M + BT + KTT, -2.0 * M - BT, M, 0.0, 0.0, 0.0};
-  std::array<double, 6> a{M, -2.0 * M, M, 0.0, 0.0, 0.0};
-  for (std::size_t i = 0; i < order2_weights.size(); ++i) {
-    for (std::size_t j = 0; j < order2_difference.size(); ++j) {
-      const double own = order2_difference[j] * BT + (j == 0 ? KTT : 0.0);
-      a[i + j] += order2_weights[i] * own;
-    }
+// A(w) T² = Σ (mass_i M + damping_i BT + spring_i K_vT²) wⁱ.
+struct ProxyPolynomial {
+  std::array<double, 6> mass{1.0, -2.0, 1.0}, damping{}, spring{};
+};
+ProxyPolynomial proxy_polynomial(int order) {
+  ProxyPolynomial A;
+  if (order == 1) {
+    A.damping = {1.0, -1.0};
+    A.spring = {1.0};
+    return A;
   }
-  return a;
+  for (std::size_t i = 0; i < order2_weights.size(); ++i) {
+    A.spring[i] = order2_weights[i];
+    for (std::size_t j = 0; j < order2_difference.size(); ++j)
+      A.damping[i + j] += order2_weights[i] * order2_difference[j];
+  }
+  return A;
 }
 
 // The damping ratio of the arm's first mode, and the frequency that a rigid gear is given: far above all others here.
@@ -90,6 +96,17 @@ ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector
   out.mass += hand_mass_kg * moved.transpose() * moved;
   out.jacobian = kinematics.J_W.bottomRows<3>();
   out.joints_per_m = models::joints_per_rad(kinematics.J_W);
+  return out;
+}
+
+ElasticArm elastic_pose_arm(const models::Arm& arm, const models::JointVector& pose_rad,
+                            const description::Cell& cell) {
+  ElasticArm out = elastic_arm(arm, pose_rad, cell);
+  models::ToolKinematics kinematics;
+  arm.kinematics(pose_rad, kinematics);
+  out.jacobian = kinematics.J_W;
+  out.joints_per_m.resize(arm.axes(), 6);
+  out.joints_per_m << models::joints_per_m(kinematics.J_W), models::joints_per_rad(kinematics.J_W);
   return out;
 }
 
@@ -138,7 +155,18 @@ struct ElasticLoop::State {
   [[nodiscard]] Index size() const { return forces() + d * ages; }
 };
 
+namespace {
+// The same in each of d directions.
+Grip grip_of(const HandModel& hand, double handle_kg, Index d) {
+  const MatrixXd one = MatrixXd::Identity(d, d);
+  return {hand.stiffness_N_per_m * one, hand.damping_Ns_per_m * one, hand.mass_kg * one, handle_kg * one};
+}
+}  // namespace
+
 ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const LoopModel& loop)
+    : ElasticLoop(arm, grip_of(hand, loop.handle_mass_kg, arm.jacobian.rows()), loop) {}
+
+ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopModel& loop)
     : arm_(arm),
       period_s_(loop.period_s),
       damping_(loop.damping_Ns_per_m),
@@ -154,20 +182,19 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const HandModel& hand, const Loo
   // for Störmer's correction at order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
   twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
-  make_plant(hand, loop.gear_stiffness_ratio);
-  const double after_sensor_kg = hand.mass_kg + loop.handle_mass_kg;
-  // h = −K_h Jφ − D_h Jφ̇ − m Jφ̈, with φ̈ the plant's second block of rows.
+  make_plant(grip, loop.gear_stiffness_ratio);
+  // h = −K_h Jφ − D_h Jφ̇ − (m_h + m_t) Jφ̈, with φ̈ the plant's second block of rows.
   const MatrixXd& J = arm_.jacobian;
-  force_ = -after_sensor_kg * J * force_;
-  force_.leftCols(joints_) -= hand.stiffness_N_per_m * J;
-  force_.middleCols(joints_, joints_) -= hand.damping_Ns_per_m * J;
+  force_ = -(grip.hand_mass + grip.handle_mass) * J * force_;
+  force_.leftCols(joints_) -= grip.stiffness * J;
+  force_.middleCols(joints_, joints_) -= grip.damping * J;
 }
 
 // ż = A z for z = [φ, φ̇, θ, r, ṙ] with ṙ constant. Leaves the rows of φ̈ in force_.
-void ElasticLoop::make_plant(const HandModel& hand, double gear_stiffness_ratio) {
+void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
-  const MatrixXd mass = arm_.mass + hand.mass_kg * J.transpose() * J;
+  const MatrixXd mass = arm_.mass + J.transpose() * grip.hand_mass * J;
   MatrixXd k = (gear_stiffness_ratio * arm_.stiffness).asDiagonal(), d = arm_.damping.asDiagonal();
   MatrixXd A = MatrixXd::Zero(5 * n, 5 * n);
   const auto block = [&](Index row, Index column) { return A.block(row * n, column * n, n, n); };
@@ -183,8 +210,8 @@ void ElasticLoop::make_plant(const HandModel& hand, double gear_stiffness_ratio)
     block(2, 4) = one;
   }
   MatrixXd torque = MatrixXd::Zero(n, 5 * n);
-  torque.leftCols(n) = -k - hand.stiffness_N_per_m * J.transpose() * J;
-  torque.middleCols(n, n) = -d - hand.damping_Ns_per_m * J.transpose() * J;
+  torque.leftCols(n) = -k - J.transpose() * grip.stiffness * J;
+  torque.middleCols(n, n) = -d - J.transpose() * grip.damping * J;
   torque.middleCols(2 * n, n) = k;
   torque += d * A.middleRows(2 * n, n);
   A.middleRows(n, n) = mass.llt().solve(torque);
@@ -192,10 +219,27 @@ void ElasticLoop::make_plant(const HandModel& hand, double gear_stiffness_ratio)
   plant_ = exponential(A * period_s_);
 }
 
+// q(k) = Σ X_i q(k−i) + X₀ h: what the world forbids is taken out by forces along N.
+ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixXd& N) const {
+  const double T = period_s_;
+  const ProxyPolynomial A = proxy_polynomial(order_);
+  const auto coefficient = [&](std::size_t i) -> MatrixXd {
+    return A.mass[i] * proxy.mass + A.damping[i] * T * proxy.damping + A.spring[i] * T * T * proxy.spring;
+  };
+  MatrixXd X = coefficient(0).inverse();
+  if (N.cols() > 0) {
+    const MatrixXd along = X * N;
+    X -= along * (N.transpose() * along).inverse() * along.transpose();
+  }
+  Step step{.of_force = T * T * X, .of_proxies = {}};
+  for (Index i = 1; i <= proxies_; ++i) step.of_proxies.emplace_back(-X * coefficient(static_cast<std::size_t>(i)));
+  return step;
+}
+
 Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_, proxies_}.size(); }
 
 // One period, from just before one reading of the sensor to just before the next.
-void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const {
+void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
   const State at{n, d, ages_, proxies_};
   const double T = period_s_;
@@ -218,11 +262,9 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
   Place h = read(whole);
   if (order_ == 2) h = order2_force[0] * h + order2_force[1] * read(whole + 1) + order2_force[2] * read(whole + 2);
 
-  const std::array<double, 6> a = proxy_polynomial(order_, M, damping_ * T, spring_ * T * T);
-  Place q = T * T * h;
+  Place q = step.of_force * h;
   for (Index i = 1; i <= proxies_; ++i)
-    q -= a[static_cast<std::size_t>(i)] * state.segment(at.proxies() + d * (i - 1), d);
-  q /= a[0];
+    q += step.of_proxies[static_cast<std::size_t>(i - 1)] * state.segment(at.proxies() + d * (i - 1), d);
   const Place p = q + horizon_s_ / T * (q - state.segment(at.proxies(), d));
 
   // As in ElasticSetpoint::step().
@@ -248,16 +290,30 @@ void ElasticLoop::advance(const VectorXd& state, double M, VectorXd& next) const
 }
 
 double ElasticLoop::spectral_radius(double proxy_mass_kg) const {
+  const MatrixXd one = MatrixXd::Identity(dimensions_, dimensions_);
+  return spectral_radius({proxy_mass_kg * one, damping_ * one, spring_ * one}, MatrixXd(dimensions_, 0));
+}
+
+double ElasticLoop::spectral_radius(const ProxyMatrices& proxy, const MatrixXd& forbidden) const {
+  return models::spectral_radius(map(proxy, forbidden));
+}
+
+Eigen::VectorXcd ElasticLoop::eigenvalues(const ProxyMatrices& proxy, const MatrixXd& forbidden) const {
+  return models::eigenvalues(map(proxy, forbidden));
+}
+
+MatrixXd ElasticLoop::map(const ProxyMatrices& proxy, const MatrixXd& forbidden) const {
   const Index rows = size();
+  const Step step = step_of(proxy, forbidden);
   MatrixXd map(rows, rows);
   VectorXd unit = VectorXd::Zero(rows), column(rows);
   for (Index i = 0; i < rows; ++i) {
     unit[i] = 1.0;
-    advance(unit, proxy_mass_kg, column);
+    advance(unit, step, column);
     map.col(i) = column;
     unit[i] = 0.0;
   }
-  return models::spectral_radius(map);
+  return map;
 }
 
 }  // namespace proxarm::controller

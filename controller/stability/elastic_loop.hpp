@@ -49,11 +49,24 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
 ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector& pose_rad,
                                const description::Cell& cell, double hand_mass_kg);
 
+// The same for place and rotation together: J and G have three rows and columns for the place, then three for angles.
+ElasticArm elastic_pose_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell);
+
 // The arm at the start, and at the places to which the tool is led from there, one after the other, as far as it gets.
 // Modes change with the pose: over 0.3 m, the default cell's smallest stable mass changes by a third. Places within 50
 // mm of another one are left out, and so are those after the sixteenth.
 std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
                                      const std::vector<models::Vec3>& offsets_W);
+
+// Who holds the tool, in matrices of its space: K_h, D_h and m_h of the hand, m_t of the handle.
+struct Grip {
+  Eigen::MatrixXd stiffness, damping, hand_mass, handle_mass;
+};
+
+// M, B and K_v of the proxy, likewise.
+struct ProxyMatrices {
+  Eigen::MatrixXd mass, damping, spring;
+};
 
 class ElasticLoop {
  public:
@@ -62,11 +75,25 @@ class ElasticLoop {
   // The largest |z|; the loop is stable below 1. M is the proxy's, > 0.
   [[nodiscard]] double spectral_radius(double proxy_mass_kg) const;
 
+  ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopModel& loop);
+  // The same of a proxy that can't move along the columns N of `forbidden`: Nᵀ q = 0.
+  [[nodiscard]] double spectral_radius(const ProxyMatrices& proxy, const Eigen::MatrixXd& forbidden) const;
+  // All z, of which the largest |z| is the spectral radius.
+  [[nodiscard]] Eigen::VectorXcd eigenvalues(const ProxyMatrices& proxy, const Eigen::MatrixXd& forbidden) const;
+
  private:
   struct State;
+  // What the proxy's next place is of the force and of its last places.
+  struct Step {
+    Eigen::MatrixXd of_force;
+    std::vector<Eigen::MatrixXd> of_proxies;
+  };
+  [[nodiscard]] Step step_of(const ProxyMatrices& proxy, const Eigen::MatrixXd& N) const;
   [[nodiscard]] Eigen::Index size() const noexcept;
-  void advance(const Eigen::VectorXd& state, double proxy_mass_kg, Eigen::VectorXd& next) const;
-  void make_plant(const HandModel& hand, double gear_stiffness_ratio);
+  // From period to period.
+  [[nodiscard]] Eigen::MatrixXd map(const ProxyMatrices& proxy, const Eigen::MatrixXd& forbidden) const;
+  void advance(const Eigen::VectorXd& state, const Step& step, Eigen::VectorXd& next) const;
+  void make_plant(const Grip& grip, double gear_stiffness_ratio);
 
   ElasticArm arm_;
   double period_s_, damping_, spring_, horizon_s_, time_constant_s_;

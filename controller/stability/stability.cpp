@@ -156,8 +156,7 @@ std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   return masses;
 }
 
-// The loops in all poses. Compared with the simulated arm, their smallest stable masses are off by −8 to 15 %, so a
-// twentieth more is asked for.
+// The loops in all poses.
 class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop) {
@@ -174,7 +173,7 @@ class ElasticLoops {
   }
 
  private:
-  static constexpr double margin = 1.05;
+  static constexpr double margin = elastic_margin;
   std::vector<ElasticLoop> loops_;
 };
 
@@ -207,12 +206,6 @@ std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
   return {free, at_events};
 }
 
-// Rounds up to two significant digits.
-double round_up(double mass_kg) {
-  const double unit = std::pow(10.0, std::floor(std::log10(mass_kg)) - 1.0);
-  return std::ceil(mass_kg / unit * (1.0 + 1e-9)) * unit;
-}
-
 std::string text(const char* pattern, double value) {
   char buffer[80];
   std::snprintf(buffer, sizeof buffer, pattern, value);
@@ -220,6 +213,11 @@ std::string text(const char* pattern, double value) {
 }
 
 }  // namespace
+
+double round_up(double mass) {
+  const double unit = std::pow(10.0, std::floor(std::log10(mass)) - 1.0);
+  return std::ceil(mass / unit * (1.0 + 1e-9)) * unit;
+}
 
 double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
   if (loop.order == 2 && loop.with_events) {

@@ -7,8 +7,10 @@
 
 namespace proxarm::models {
 
-// These two take matrices of any size, and allocate. The largest |λ| of a square matrix:
+// These three take matrices of any size, and allocate. The largest |λ| of a square matrix:
 double spectral_radius(const Eigen::MatrixXd& A);
+// All λ of a square matrix.
+Eigen::VectorXcd eigenvalues(const Eigen::MatrixXd& A);
 // λ of K v = λ M v, ascending. Precondition: K is symmetric, M symmetric and positive definite, of the same size.
 Eigen::VectorXd generalized_eigenvalues(const Eigen::MatrixXd& K, const Eigen::MatrixXd& M);
 

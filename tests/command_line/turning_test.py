@@ -109,6 +109,51 @@ class Turning(ProgramTest):
         calm = self.summary(*few, "--inertia", smallest, "--duration", "4s")
         self.assertFalse(calm["oscillation"] and calm["oscillation"]["lasts"])
 
+    def test_a_tool_that_is_led_and_turned_at_once_is_judged_so(self):
+        """Each for itself, 2 kg and 0.01 kg m² are stable; on elastic gears together they swing, and a box that was
+        laid on a table with them went on for as long as it lay there."""
+        laid = self.written("lay.yaml", hand().split("multisine")[0].replace("rad: 2\n", "rad: 0.5\n") +
+                            "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0], turn_rad: [0, 0, 0]}\n"
+                            "  - {time_s: 2, offset_m: [0, 0, -0.04], turn_rad: [0.1, 0.1, 0]}\n"
+                            "  - {time_s: 6, offset_m: [0, 0, -0.04], turn_rad: [0.1, 0.1, 0]}\n")
+        few = ("run", "--json", "--scene", SOURCE / "scenes/box_on_table.yaml", "--hand", laid, "--duration", "6s",
+               "--passivity", "observe", "--mass", "2")
+        refused = self.call(*few, "--inertia", "0.01")
+        self.assertEqual(refused.status, 2, refused.err)
+        self.assertIn("the smallest that is stable with 2 kg, led and turned at once", refused.err)
+        swings = self.call(*few, "--inertia", "0.01", "--force-unstable")
+        self.assertTrue(swings.summary["oscillation"]["lasts"])
+        self.assertIsNone(swings.summary["expected_swing"])
+        smallest = refused.err.split("at least ")[1].split(" kg m²")[0]
+        for more, held in (("--set", "inertia=0.01@1s"), "--set inertia"), (("--set", "mass=1.8@1s"), "--set mass"):
+            live = self.call(*few, "--inertia", smallest, *more)
+            self.assertEqual(live.status, 2, held)
+            self.assertIn("led and turned at once", live.err)
+        calm = self.call(*few, "--inertia", smallest)
+        self.assertEqual(calm.status, 0, calm.err)
+        self.assertFalse(calm.summary["oscillation"]["lasts"])
+        self.assertGreater(calm.summary["expected_swing"]["frequency_Hz"], 3.0)
+
+    def test_a_swing_falls_within_the_time_that_is_told(self):
+        """By the steel's way in the record, against the session's own word of the swing that is damped least."""
+        jerk = self.written("jerk.yaml", hand().split("multisine")[0].replace("rad: 2\n", "rad: 0.5\n") +
+                            "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0], turn_rad: [0, 0, 0]}\n"
+                            "  - {time_s: 0.55, offset_m: [0, 0, 0], turn_rad: [0, 0.2, 0]}\n")
+        told = self.summary(*FREE, "--hand", jerk, "--mass", "2", "--inertia", "0.05", "--duration", "3s", "--passivity",
+                            "off", "--record", "swing")["expected_swing"]
+        rows = self.rows("swing")
+
+        def swing(begin):  # over 0.3 s, with a window that leaves out the slow way back
+            length = 300
+            return math.sqrt(sum(abs(sum(float(rows[begin + k][f"true_tool_W_{axis}_m"]) *
+                                         math.sin(math.pi * k / length) ** 4 *
+                                         cmath.exp(-2j * math.pi * told["frequency_Hz"] * PERIOD_S * k)
+                                         for k in range(length))) ** 2 for axis in "xyz"))
+
+        fallen = math.log10(swing(750) / swing(1750))
+        self.assertLess(1.0 / fallen, told["tenth_s"])
+        self.assertGreater(1.0 / fallen, 0.25 * told["tenth_s"])
+
     def test_changes_while_it_turns_make_no_bump(self):
         """The angular velocity goes on: no step of the proxy's rotation differs from the one before by more than the
         torques of a period explain."""

@@ -18,6 +18,7 @@
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/key_line.hpp"
+#include "models/rigid_shapes/furthest.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "scenes/format/tool_file.hpp"
 #include "scenes/rigid/compile_rigid.hpp"
@@ -331,6 +332,54 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
   return loop;
 }
 
+namespace {
+// By its hand. One that doesn't twist the handle closes no loop: the proxy's own pole at 1 would be taken for an
+// unstable one.
+bool is_turned(const PreparedSession& session) {
+  return !session.impedance() && session.settings.orientation != controller::OrientationMode::held &&
+         session.cell.drives.size() >= 6 && session.hand.twists();
+}
+
+// A tool with a shape is taken to touch where it ends in the directions of a cube's faces and corners, a point in
+// itself.
+std::vector<controller::TouchedPlace> touched_places(const PreparedSession& session, const models::Mat3& R_WT) {
+  std::vector<controller::TouchedPlace> places;
+  const bool is_point = !session.scene.tool;
+  for (int i = 0; i < 27; ++i) {
+    const models::Vec3 way(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    if (way.squaredNorm() != 1.0 && way.squaredNorm() != 3.0) continue;
+    if (is_point && i > 13) continue;  // the opposite ways, which are held likewise
+    const models::Vec3 n_T = way.normalized();
+    const models::Vec3 r_T = is_point ? models::Vec3::Zero() : models::furthest_of(session.scene.tool->shape, n_T);
+    places.push_back({R_WT * r_T, R_WT * n_T});
+  }
+  return places;
+}
+}  // namespace
+
+controller::PoseLoop pose_loop(const PreparedSession& session) {
+  const models::Arm arm(session.cell);
+  const models::Mat3 R_WT = arm.tool_pose(arm.start_rad()).linear();
+  controller::PoseLoopModel model{.place = hand_model(session),
+                                  .turning = turning_hand_model(session),
+                                  .behind_sensor_W = controller::behind_sensor_W(session.cell, R_WT),
+                                  .turning_damping_Nms_per_rad = session.settings.rotational_damping_Nms_per_rad,
+                                  .turning_spring_Nm_per_rad = session.settings.rotational_spring_Nm_per_rad,
+                                  .loop = session.loop,
+                                  .touched = touched_places(session, R_WT)};
+  model.loop.horizon_s = 0.0;  // as in require_stable()
+  model.loop.order = 1;        // in which rotation is computed, and contacts
+  model.loop.arms = nullptr;
+  return {controller::elastic_pose_arm(arm, arm.start_rad(), session.cell), model};
+}
+
+std::optional<controller::Swing> least_damped_swing(const PreparedSession& session) {
+  if (!is_turned(session)) return {};
+  const controller::PoseLoop loop = pose_loop(session);
+  const double mass_kg = session.settings.mass_kg, inertia_kg_m2 = felt_inertia_kg_m2(session);
+  return loop.least_damped_swing(mass_kg, inertia_kg_m2);
+}
+
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options) {
   if (options.period_s) return {.key = "--timestep"};
   return {.file = cell.file.string(),
@@ -515,10 +564,18 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (!options.force_unstable) require_stable_horizon(session);
   if (session.settings.orientation == controller::OrientationMode::held || session.cell.drives.size() < 6) return;
   require_inertia_above_handle(session);
-  // A hand that doesn't twist the handle closes no loop: the proxy's own pole at 1 would be taken for an unstable one.
-  if (!session.hand.twists()) return;
-  controller::require_stable_inertia(felt_inertia_kg_m2(session), turning_hand_model(session), turning_loop(session),
-                                     options.force_unstable);
+  if (options.force_unstable || !is_turned(session)) return;
+  const controller::HandModel hand = turning_hand_model(session);
+  const controller::LoopModel alone = turning_loop(session);
+  const controller::PoseLoop both = pose_loop(session);
+  const double mass_kg = session.settings.mass_kg, inertia_kg_m2 = felt_inertia_kg_m2(session);
+  const bool is_stable = controller::spectral_radius(hand, alone, inertia_kg_m2 - alone.handle_mass_kg) < 1.0;
+  if (is_stable && both.stable(mass_kg, inertia_kg_m2)) return;
+  const std::optional<double> least_alone = controller::smallest_stable_mass(hand, alone);
+  if (!least_alone) controller::require_stable_inertia(inertia_kg_m2, hand, alone, false);  // which no mass helps
+  std::optional<double> smallest = both.smallest_inertia(mass_kg);
+  if (smallest) smallest = std::max(*smallest, *least_alone + alone.handle_mass_kg);
+  controller::refuse_unstable_pose(mass_kg, inertia_kg_m2, smallest);
 }
 
 double motion_delay_s(const PreparedSession& session) {

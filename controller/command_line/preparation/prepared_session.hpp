@@ -4,6 +4,7 @@
 #include <string>
 
 #include "controller/command_line/preparation/run_options.hpp"
+#include "controller/stability/pose_loop.hpp"
 #include "controller/stability/stability.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/description/cell.hpp"
@@ -35,6 +36,11 @@ controller::HandModel hand_model(const PreparedSession& session);
 // The same of the tool's rotation, in Nm/rad, Nms/rad and kg m².
 controller::HandModel turning_hand_model(const PreparedSession& session);
 controller::LoopModel turning_loop(const PreparedSession& session);
+// Both at once, in the start pose, free and where the tool touches with its ends. Precondition: the orientation is
+// free.
+controller::PoseLoop pose_loop(const PreparedSession& session);
+// The swing of such a loop that is damped least. Absent: the tool isn't turned, or it isn't stable.
+std::optional<controller::Swing> least_damped_swing(const PreparedSession& session);
 // What the hand feels, the tool behind the sensor included. Precondition: the orientation is free.
 double felt_inertia_kg_m2(const PreparedSession& session);
 

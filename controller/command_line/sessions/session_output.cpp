@@ -78,6 +78,7 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
   if (!session.impedance()) {
     poses_ = std::make_unique<controller::PassedPoses>(deriver_.arm(), session.cell, hand_model(session), session.loop);
   }
+  swing_ = least_damped_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
@@ -142,6 +143,10 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
   std::printf("the arm itself, without control: %.3g to %.3g kg at the tip", tip.min_kg, tip.max_kg);
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
   std::printf("\n");
+  if (swing_) {
+    std::printf("led and turned at once: a swing of %.1f Hz falls to a tenth within %.2f s\n", swing_->frequency_Hz,
+                swing_->tenth_s);
+  }
   if (!session_.impedance()) std::printf("%s", axes_text(parts.arm->axes(), reach.dimensions).c_str());
   std::fflush(stdout);
 }
@@ -253,6 +258,7 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
   Summary summary =
       controller::session_summary(builder_, cycle, end, {.reason = cause.word, .text = cause.text}, session_);
   summary.figures_s = std::chrono::duration<double>(spent_).count();
+  if (swing_) summary.expected_swing = {swing_->frequency_Hz, swing_->tenth_s};
   if (poses_) summary.poses = poses_summary(*poses_);
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
     if (order.taken && order.refusal == nullptr) continue;

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -60,7 +61,8 @@ class SessionOutput {
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
   std::unique_ptr<controller::PassedPoses> poses_;  // admittance type
-  std::chrono::steady_clock::duration spent_{};  // on records and their figures
+  std::optional<controller::Swing> swing_;          // of a tool that is turned
+  std::chrono::steady_clock::duration spent_{};     // on records and their figures
   std::int64_t rendered_ns_ = 0;
   std::int64_t told_period_ns_ = 0;  // that the user knows of
   bool told_oscillation_ = false;    // of the present spell

@@ -1,0 +1,145 @@
+#include "controller/stability/pose_loop.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+#include <numbers>
+
+#include "models/arm/tool_inertia.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using models::Mat6;
+using models::Vec3;
+
+Mat6 of_both(double place, double turning) {
+  Mat6 m = Mat6::Zero();
+  m.diagonal() << place, place, place, turning, turning, turning;
+  return m;
+}
+
+Grip grip_of(const PoseLoopModel& model) {
+  const HandModel &place = model.place, &turning = model.turning;
+  return {of_both(place.stiffness_N_per_m, turning.stiffness_N_per_m),
+          of_both(place.damping_Ns_per_m, turning.damping_Ns_per_m), of_both(place.mass_kg, turning.mass_kg),
+          model.behind_sensor_W};
+}
+
+// The place r, held in these directions.
+MatrixXd held(const Vec3& r, const models::Mat3& directions, Eigen::Index count) {
+  MatrixXd N(6, count);
+  for (Eigen::Index i = 0; i < count; ++i) N.col(i) << directions.col(i), r.cross(directions.col(i));
+  return N;
+}
+
+std::vector<MatrixXd> all_forbidden(const std::vector<TouchedPlace>& touched) {
+  std::vector<MatrixXd> all{MatrixXd(6, 0)};
+  for (const TouchedPlace& at : touched) {
+    models::Mat3 directions;
+    directions.col(0) = at.n_W;
+    directions.col(1) = at.n_W.unitOrthogonal();
+    directions.col(2) = at.n_W.cross(directions.col(1));
+    all.push_back(held(at.r_W_m, directions, 1));
+    all.push_back(held(at.r_W_m, directions, 3));
+  }
+  return all;
+}
+
+}  // namespace
+
+Mat6 behind_sensor_W(const description::Cell& cell, const models::Mat3& R_WT) {
+  const models::ToolInertia tool = models::tool_inertia(cell.tool);
+  const Vec3 c = R_WT * tool.centre_T_m;
+  models::Mat3 cross;
+  cross << 0.0, -c.z(), c.y(), c.z(), 0.0, -c.x(), -c.y(), c.x(), 0.0;
+  Mat6 m;
+  m << tool.mass_kg * models::Mat3::Identity(), -tool.mass_kg * cross, tool.mass_kg * cross,
+      R_WT * tool.about_T_kg_m2 * R_WT.transpose();
+  return m;
+}
+
+PoseLoop::PoseLoop(const ElasticArm& arm, const PoseLoopModel& model)
+    : loop_(arm, grip_of(model), model.loop),
+      behind_(model.behind_sensor_W),
+      own_{Mat6::Zero(), of_both(model.loop.damping_Ns_per_m, model.turning_damping_Nms_per_rad),
+           of_both(model.loop.spring_N_per_m, model.turning_spring_Nm_per_rad)},
+      forbidden_(all_forbidden(model.touched)),
+      period_s_(model.loop.period_s) {}
+
+ProxyMatrices PoseLoop::proxy(double mass_kg, double inertia_kg_m2, double margin) const {
+  ProxyMatrices proxy = own_;
+  proxy.mass = (of_both(mass_kg, inertia_kg_m2) - behind_) / margin;
+  return proxy;
+}
+
+bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
+  const ProxyMatrices lighter = proxy(mass_kg, inertia_kg_m2, elastic_margin);
+  // Else what hangs behind the sensor is felt as more than was asked for.
+  if (Eigen::LLT<MatrixXd>(lighter.mass).info() != Eigen::Success) return false;
+  return std::all_of(forbidden_.begin(), forbidden_.end(),
+                     [&](const MatrixXd& N) { return loop_.spectral_radius(lighter, N) < 1.0; });
+}
+
+// As with masses: from the top down until one isn't, and the last step is bisected.
+std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
+  constexpr double step = 1.4, close_enough = 1.005, least_kg_m2 = 1e-6;
+  const auto holds = [&](double inertia_kg_m2) { return stable(mass_kg, inertia_kg_m2); };
+  if (!holds(largest_kg_m2)) return std::nullopt;
+  double high = largest_kg_m2, low = high / step;
+  while (low > least_kg_m2 && holds(low)) {
+    high = low;
+    low /= step;
+  }
+  while (high > close_enough * low && low > least_kg_m2) {
+    const double middle = std::sqrt(low * high);
+    (holds(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
+std::optional<Swing> PoseLoop::least_damped_swing(double mass_kg, double inertia_kg_m2) const {
+  constexpr double pi = std::numbers::pi, slowest_Hz = 3.0;
+  const ProxyMatrices as_it_is = proxy(mass_kg, inertia_kg_m2, 1.0);
+  std::optional<Swing> ringing;
+  double least_ratio = 1.0;
+  for (const MatrixXd& N : forbidden_) {
+    for (const std::complex<double>& z : loop_.eigenvalues(as_it_is, N)) {
+      if (!(std::abs(z) < 1.0)) return std::nullopt;
+      const std::complex<double> s = std::log(z) / period_s_;
+      const double frequency_Hz = std::abs(s.imag()) / (2.0 * pi), ratio = -s.real() / std::abs(s);
+      if (frequency_Hz < slowest_Hz || !(ratio < least_ratio)) continue;
+      least_ratio = ratio;
+      ringing = Swing{frequency_Hz, std::log(0.1) / s.real()};
+    }
+  }
+  return ringing;
+}
+
+void refuse_unstable_pose(double mass_kg, double inertia_kg_m2, const std::optional<double>& smallest) {
+  std::array<char, 80> found{};
+  std::array<char, 160> expected{};
+  std::snprintf(found.data(), found.size(), "%.6g kg m²", inertia_kg_m2);
+  if (smallest) {
+    std::snprintf(expected.data(), expected.size(),
+                  "at least %.2g kg m², the smallest that is stable with %.4g kg, led and turned at once by this hand",
+                  round_up(*smallest), mass_kg);
+  } else {
+    std::snprintf(expected.data(), expected.size(),
+                  "an inertia that is stable with %.4g kg, led and turned at once by this hand; none is", mass_kg);
+  }
+  throw description::SetupError({.key = "--inertia",
+                                 .found = found.data(),
+                                 .expected = expected.data(),
+                                 .advice = smallest ? "choose a larger inertia, or a larger --mass (--force-unstable "
+                                                      "overrides, in simulation)"
+                                                    : "choose a larger --mass (--force-unstable overrides, in "
+                                                      "simulation)"});
+}
+
+}  // namespace proxarm::controller
