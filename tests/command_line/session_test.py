@@ -61,7 +61,7 @@ class Json(ProgramTest):
         for key, kind in SUMMARY.items():
             self.assertIn(key, summary)
             self.assertIsInstance(summary[key], kind, key)
-        self.assertEqual(set(summary["compute_us"]), {"median", "p99", "max"})
+        self.assertEqual(set(summary["compute_us"]), {"median", "p99", "max", "total"})
         self.assertEqual(set(summary["bus_load"]), {"axes_1_3", "axes_4_6", "sensor"})
         self.assertRegex(summary["setpoint_sha256"], "^[0-9a-f]{64}$")
         self.assertEqual(summary["cycles"], round(summary["simulated_time_s"] / 1e-3))
