@@ -47,11 +47,10 @@ double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept {
 
 // Their common normal is outside of the faces' normals beside one of them (touch_edges_sharp() asks for that). It turns
 // by as much over the sine of the angle between the edges; twice that, for the normals it is compared with turn too.
-// The 0.02 rad are those that touch_edges_sharp() allows.
 bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept {
   Vec3 n = (own.to - own.from).normalized().cross((other.to - other.from).normalized());
   const double sine = n.norm();
-  const double slack = 0.02 + 2.0 * turn * (1.0 + 1.0 / sine);
+  const double slack = askew_rad + 2.0 * turn * (1.0 + 1.0 / sine);
   if (!(slack < 0.3)) return false;
   n /= sine;
   const auto held = [&](const Vec3& normal) {

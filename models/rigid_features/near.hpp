@@ -26,8 +26,8 @@ double distance2_of_segments(const EdgeLine& a, const EdgeLine& b) noexcept;
 bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcept;
 
 // By how much a corner and a face may turn until they touch, for the corner's cone of normals. Either may, and normals
-// of narrow faces are known to some 0.02 rad only.
-inline NormalCone::Angle turn_of_corners(double turn) noexcept { return NormalCone::Angle::of(0.02 + 2.0 * turn); }
+// of narrow faces are known to askew_rad only.
+inline NormalCone::Angle turn_of_corners(double turn) noexcept { return NormalCone::Angle::of(askew_rad + 2.0 * turn); }
 
 // Whether a point may be so near to a triangle, or to a face of a solid: by its height, and by how far its foot lies
 // beyond the sides.

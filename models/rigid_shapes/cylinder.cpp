@@ -7,9 +7,6 @@
 namespace proxarm::models {
 namespace {
 
-// As for sharp edges (touch.cpp), in radians: what lies in one plane with the end, or with the side, may miss the cone
-// between both by so much.
-constexpr double kAskew = 0.02;
 // Where a round body lies on an end, or along the side, it rocks between two places of a rim: so far over, in radians,
 // both are held. Either keeps to its law anywhere: no place of a rim may come into the body.
 constexpr double kNearlyLevel = 0.05;
@@ -89,7 +86,7 @@ int nearest_to_line(const Solid::Rim& rim, const Vec3& y, const Vec3& d, std::ar
 }
 
 bool out_of_rim(const Vec3& out, const Vec3& beside, const Vec3& before) noexcept {
-  return out.dot(beside) >= -kAskew && out.dot(before) >= -kAskew && out.dot(beside + before) > 0.0;
+  return out.dot(beside) >= -askew_rad && out.dot(before) >= -askew_rad && out.dot(beside + before) > 0.0;
 }
 
 double reach_along(const Cylinder& cylinder, const Vec3& n) noexcept {

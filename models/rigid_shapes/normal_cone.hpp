@@ -9,6 +9,12 @@
 
 namespace proxarm::models {
 
+// By how much, in radians, a direction may miss the cone between the normals beside an edge, or those of a cylinder's
+// end and side. Where a face lies on an edge, the direction lies on the cone's border, and either side of it must do;
+// and normals of narrow faces are known to no more. At a place where both edges really meet, solids that are outside of
+// each other keep the cone; so this admits no false contact.
+inline constexpr double askew_rad = 0.02;
+
 // A corner that rests on a plane is furthest along the plane's normal, and that is a sum of the normals of the faces
 // that meet there (each times something not negative: the faces that the plane, moved inwards, cuts off around a corner
 // have the area of the cut in sum). So it is within the cone around those normals, where that is less than half of all
@@ -57,12 +63,12 @@ struct NormalCones {
   std::vector<NormalCone> of_edges{};
 };
 
-// Around the normals beside an edge, and as far beyond them as touch_edges_sharp() allows.
+// Around the normals beside an edge, and askew_rad beyond them.
 inline NormalCone cone_of_edge(const Vec3& left, const Vec3& right) noexcept {
   const Vec3 sum = left + right;
   if (!(sum.norm() > 0.0)) return {};
   const Vec3 axis = sum.normalized();
-  return {axis, NormalCone::Angle::of(std::acos(std::clamp(axis.dot(left), -1.0, 1.0)) + 0.02)};
+  return {axis, NormalCone::Angle::of(std::acos(std::clamp(axis.dot(left), -1.0, 1.0)) + askew_rad)};
 }
 
 // `each_face` calls with the unit normal and the corners of every face.

@@ -6,11 +6,6 @@
 namespace proxarm::models {
 namespace {
 
-// By how much, in radians, a direction may miss the cone between the normals beside an edge. Where a face lies on an
-// edge, the direction lies on the cone's border, and either side of it must do. At a place where both edges really
-// meet, solids that are outside of each other keep the cone; so this admits no false contact.
-constexpr double kAskew = 0.02;
-
 // A rim whose lowest point is lower than its middle by less is level: a tenth of what a gap may be short of.
 constexpr double kLevel_m = 1e-13;
 // Up to this angle, in radians, more than the lowest point of a rim is held.
@@ -49,8 +44,9 @@ std::optional<Crossing> cross(const EdgeLine& own, const EdgeLine& other, double
 bool between(const Vec3& n, const Vec3& left, const Vec3& right) noexcept {
   const Vec3 w = left.cross(right);
   const double size = w.norm();
-  if (size < 1e-9) return n.dot(left) > 1.0 - kAskew;
-  return left.cross(n).dot(w) >= -kAskew * size && n.cross(right).dot(w) >= -kAskew * size && n.dot(left + right) > 0.0;
+  if (size < 1e-9) return n.dot(left) > 1.0 - askew_rad;
+  return left.cross(n).dot(w) >= -askew_rad * size && n.cross(right).dot(w) >= -askew_rad * size &&
+         n.dot(left + right) > 0.0;
 }
 
 Touch touch(const FlatSide& side, const Vec3& p, double radius) noexcept {
