@@ -12,7 +12,7 @@
 // N = (n, r × n), and (26b) is q = p̂ − K⁻¹N (Nᵀ K⁻¹ N)⁻¹ Nᵀ p̂. The steel isn't held by it: it is on its gears, and in
 // the hand. Judged are free motion, and each of the contacts that are given alone, sliding without friction (n) and
 // sticking (all directions at r). A tool that lies on an edge or a face has several at once; swept over such (two and
-// three at random places within 0.03 m, default cell, 1.7 to 6 kg), the smallest stable inertia was within 12 % of that
+// three at random places within 0.03 m, default cell, 2 to 6 kg), the smallest stable inertia was within 12 % of that
 // of the one or the other.
 //
 // Not modelled: what elastic_loop.hpp leaves out, and contacts that come and go.
