@@ -89,12 +89,12 @@ void RigidWorld::list_leaves(const ToolPose& pose, double reach) noexcept {
 void RigidWorld::list_leaves_within(const ToolPose& pose, double reach) noexcept {
   near_leaves_.begin(pose, reach);
   const View at = view(pose);
-  for (std::uint16_t entry = 0; entry < shared_->first_moving; ++entry) {
+  for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
     const Entry& e = shared_->entries[entry];
-    for (std::uint16_t i = 0; i < shared_->parts.size(); ++i) {
+    for (std::size_t i = 0; i < shared_->parts.size(); ++i) {
       const Part& part = shared_->parts[i];
       if (!part.mesh || !e.discs.any() || !may_reach(part, e, at, reach)) continue;
-      near_leaves_.begin_with(i, entry);
+      near_leaves_.begin_with(static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(entry));
       const MeshPairs pairs(flat_mesh(part), flat_mesh(e), at, reach);
       pairs.list([&](const MeshPairs::Leaves& leaves) { return near_leaves_.add(leaves); });
       if (!near_leaves_.all()) return;
