@@ -346,8 +346,8 @@ std::vector<controller::TouchedPlace> touched_places(const PreparedSession& sess
   std::vector<controller::TouchedPlace> places;
   const bool is_point = !session.scene.tool;
   for (int i = 0; i < 27; ++i) {
-    const Eigen::Vector3i step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    const models::Vec3 way = step.cast<double>();
+    const int x = i % 3 - 1, y = i / 3 % 3 - 1, z = i / 9 - 1;
+    const models::Vec3 way(x, y, z);
     if (way.squaredNorm() != 1.0 && way.squaredNorm() != 3.0) continue;
     if (is_point && i > 13) continue;  // the opposite ways, which are held likewise
     const models::Vec3 n_T = way.normalized();
