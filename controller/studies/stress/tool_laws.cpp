@@ -218,10 +218,11 @@ ToolLaws::Piece ToolLaws::moved(const Piece& piece, const ToolPose& pose) {
   return out;
 }
 
-// The separation by all axes; of pieces that are clear of each other no more than that of the balls around them.
-double ToolLaws::between_m(const Piece& a, const Piece& b) {
+// The separation by all axes; of pieces that are clear of each other, or whose balls are by `enough`, no more than that
+// of the balls around them.
+double ToolLaws::between_m(const Piece& a, const Piece& b, double enough) {
   double gap = (a.middle - b.middle).norm() - a.reach_m - b.reach_m;
-  if (gap > 1e-3) return gap;
+  if (gap > 1e-3 || gap >= enough) return gap;
   gap = -beyond_all_m;
   const auto by = [&](const Vec3& n) {
     double a_high = 0.0, b_high = 0.0;
@@ -239,10 +240,10 @@ double ToolLaws::between_m(const Piece& a, const Piece& b) {
   return gap;
 }
 
-double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to) {
+double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to, double enough) {
   const Vec3 &a = triangle.corners[0], &b = triangle.corners[1], &c = triangle.corners[2];
   const double clear = (0.5 * (from + to) - triangle.middle).norm() - triangle.reach_m - 0.5 * (to - from).norm();
-  if (clear > 0.1) return clear;
+  if (clear > 0.1 || clear >= enough) return clear;
   return least_along(from, to, [&](const Vec3& x) { return to_triangle(a, b, c, x); });
 }
 
@@ -273,17 +274,20 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
   std::vector<Piece> own;
   for (const Piece& piece : core.pieces_T) own.push_back(moved(piece, pose));
   for (const Piece& other : pieces_[index]) {
-    for (const Piece& piece : own) gap = std::min(gap, between_m(piece, other));
+    for (const Piece& piece : own) gap = std::min(gap, between_m(piece, other, gap));
     if (own.empty()) {
       gap = std::min(
-          gap, from_segment_m(other, pose * core.corners_T.front(), pose * core.corners_T.back()) - core.radius_m);
+          gap, from_segment_m(other, pose * core.corners_T.front(), pose * core.corners_T.back(), gap + core.radius_m) -
+                   core.radius_m);
     }
   }
   for (const Piece& piece : own) {
     if (sphere != nullptr)
-      gap = std::min(gap, from_segment_m(piece, sphere->centre_m, sphere->centre_m) - sphere->radius_m);
+      gap = std::min(
+          gap, from_segment_m(piece, sphere->centre_m, sphere->centre_m, gap + sphere->radius_m) - sphere->radius_m);
     if (capsule != nullptr)
-      gap = std::min(gap, from_segment_m(piece, capsule->from_m, capsule->to_m) - capsule->radius_m);
+      gap = std::min(
+          gap, from_segment_m(piece, capsule->from_m, capsule->to_m, gap + capsule->radius_m) - capsule->radius_m);
   }
   return gap;
 }

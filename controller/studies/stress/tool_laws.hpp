@@ -88,8 +88,8 @@ class ToolLaws {
   static Edges sharp_edges_of(const Piece& piece);
   static Edges sharp_edges_of(const models::TriangleMesh& mesh);
   static Piece moved(const Piece& piece, const models::ToolPose& pose);
-  static double between_m(const Piece& a, const Piece& b);
-  static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to);
+  static double between_m(const Piece& a, const Piece& b, double enough);
+  static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to, double enough);
 
   // All points within a radius of the hull of some: one for a sphere, two for a capsule.
   struct Core {
