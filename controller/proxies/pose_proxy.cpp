@@ -57,7 +57,7 @@ void PoseConfig::validate() const {
   require_option(is_not_negative(turning_spring_Nm_per_rad), "--turning-spring", turning_spring_Nm_per_rad,
                  "Nm/rad, 0 or more");
   require_option(held || is_positive_definite(mass_T()), "--inertia", inertia_kg_m2,
-                 "more kg m² than the tool behind the sensor has about any axis, with this --mass");
+                 "kg m², more than the tool behind the sensor has about any axis, with this --mass");
 }
 
 PoseProxy::PoseProxy(const PoseConfig& config, models::PoseAlgorithm& g) : config_(config), g_(&g) {

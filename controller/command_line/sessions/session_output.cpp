@@ -144,8 +144,8 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
   if (std::isfinite(mode_Hz)) std::printf(", first mode %.1f Hz", mode_Hz);
   std::printf("\n");
   if (swing_) {
-    std::printf("led and turned at once: a swing of %.1f Hz falls to a tenth within %.2f s\n", swing_->frequency_Hz,
-                swing_->tenth_s);
+    std::printf("led and turned at once, about here: a swing of %.1f Hz falls to a tenth within %.2f s\n",
+                swing_->frequency_Hz, swing_->tenth_s);
   }
   if (!session_.impedance()) std::printf("%s", axes_text(parts.arm->axes(), reach.dimensions).c_str());
   std::fflush(stdout);
