@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "controller/stability/smallest.hpp"
 #include "models/arm/tool_inertia.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -86,21 +87,10 @@ bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
                      [&](const MatrixXd& N) { return loop_.spectral_radius(lighter, N) < 1.0; });
 }
 
-// As with masses: from the top down until one isn't, and the last step is bisected.
 std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
-  constexpr double step = 1.4, close_enough = 1.005, least_kg_m2 = 1e-6;
+  constexpr double least_kg_m2 = 1e-6, close_enough = 1.005;
   const auto holds = [&](double inertia_kg_m2) { return stable(mass_kg, inertia_kg_m2); };
-  if (!holds(largest_kg_m2)) return std::nullopt;
-  double high = largest_kg_m2, low = high / step;
-  while (low > least_kg_m2 && holds(low)) {
-    high = low;
-    low /= step;
-  }
-  while (high > close_enough * low && low > least_kg_m2) {
-    const double middle = std::sqrt(low * high);
-    (holds(middle) ? high : low) = middle;
-  }
-  return high;
+  return smallest_from_above(holds, largest_kg_m2, least_kg_m2, close_enough);
 }
 
 std::optional<Swing> PoseLoop::least_damped_swing(double mass_kg, double inertia_kg_m2) const {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/stability/order2_polynomials.hpp"
+#include "controller/stability/smallest.hpp"
 #include "models/base/option_check.hpp"
 #include "models/geometry/eigenvalues.hpp"
 
@@ -164,16 +165,17 @@ class ElasticLoops {
   }
   [[nodiscard]] double spectral_radius(double proxy_mass_kg) const {
     double largest = 0.0;
-    for (const ElasticLoop& loop : loops_) largest = std::max(largest, loop.spectral_radius(proxy_mass_kg / margin));
+    for (const ElasticLoop& loop : loops_)
+      largest = std::max(largest, loop.spectral_radius(proxy_mass_kg / elastic_margin));
     return largest;
   }
   [[nodiscard]] bool stable(double proxy_mass_kg) const {
-    return std::all_of(loops_.begin(), loops_.end(),
-                       [&](const ElasticLoop& loop) { return loop.spectral_radius(proxy_mass_kg / margin) < 1.0; });
+    return std::all_of(loops_.begin(), loops_.end(), [&](const ElasticLoop& loop) {
+      return loop.spectral_radius(proxy_mass_kg / elastic_margin) < 1.0;
+    });
   }
 
  private:
-  static constexpr double margin = elastic_margin;
   std::vector<ElasticLoop> loops_;
 };
 
@@ -181,21 +183,10 @@ class ElasticLoops {
 // couldn't tell the eigenvalues of the slowest modes from 1; a proxy has two that are close to it.
 constexpr double heaviest_on_gears_kg = 50.0;
 
-// The same if only eigenvalues decide: masses are tried from the top down until one isn't stable, and the last step is
-// then bisected. Unstable masses between stable ones aren't seen if their interval is narrower than a step.
+// The same if only eigenvalues decide.
 std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mass_kg) {
-  constexpr double step = 1.4, close_enough = 1.002, least_kg = 1e-3;
-  if (!loop.stable(max_mass_kg)) return std::nullopt;
-  double high = max_mass_kg, low = high / step;
-  while (low > least_kg && loop.stable(low)) {
-    high = low;
-    low /= step;
-  }
-  while (high > close_enough * low && low > least_kg) {
-    const double middle = std::sqrt(low * high);
-    (loop.stable(middle) ? high : low) = middle;
-  }
-  return high;
+  constexpr double least_kg = 1e-3, close_enough = 1.002;
+  return smallest_from_above([&](double mass_kg) { return loop.stable(mass_kg); }, max_mass_kg, least_kg, close_enough);
 }
 
 // Of an order 2 whose events count: its free motion, and (26).

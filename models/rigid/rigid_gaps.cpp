@@ -17,12 +17,6 @@ constexpr double kLift_m = 1e-13;
 // What a pair of a cylinder's features costs more than others, in their 15 ns: 120 to 150 ns.
 constexpr int kOfCylinder = 10, kOfTwoCylinders = 30, kRims = 600;
 
-int extra_looks(bool of_cylinder, bool of_two, bool of_rims) noexcept {
-  if (!of_cylinder) return 0;
-  if (!of_two) return kOfCylinder;
-  return of_rims ? kRims : kOfTwoCylinders;
-}
-
 // A sine. Steps that are long beside a tool turn it by tenths of a radian on their way to where it ends.
 constexpr double kLeans = 0.2;
 
@@ -347,8 +341,12 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
     if (on != nullptr && !on->close) continue;
     const View& at = on == nullptr ? at_W : on->tool;
     const Kind kind = pairs_[i].kind;
-    looks_ -= extra_looks(kind >= Kind::side_point, kind >= Kind::sides, kind == Kind::rims);
-    if (is_flat_rim(pairs_[i].kind)) remember_lowest(pairs_[i], at);
+    if (kind >= Kind::sides) {
+      looks_ -= kind == Kind::rims ? kRims : kOfTwoCylinders;
+    } else if (kind >= Kind::side_point) {
+      looks_ -= kOfCylinder;
+    }
+    if (is_flat_rim(kind)) remember_lowest(pairs_[i], at);
     const std::size_t before = found_count_;
     const auto add = [&](const Touch& t, int which) {
       if (t.gap > gathered_reach_) return;  // no step that stays among the pairs comes so far

@@ -210,11 +210,10 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   if (of_tool && std::any_of(shared->entries.begin(), shared->entries.end(), is_mesh)) {
     near_leaves_.make_room(most_leaves, shared->parts.size() * shared->first_moving);
     for (Part& part : shared->parts) {
-      if (part.mesh) part.discs = NodeDiscs(part.mesh->mesh());
+      if (part.mesh) part.discs = NodeDiscs(flat_mesh(part).mesh);
     }
     for (Entry& e : shared->entries) {
-      if (!is_mesh(e)) continue;
-      e.discs = NodeDiscs((*std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape))->mesh());
+      if (is_mesh(e)) e.discs = NodeDiscs(flat_mesh(e).mesh);
     }
   }
   shared_ = std::move(shared);

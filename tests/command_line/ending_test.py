@@ -146,20 +146,24 @@ class Ending(ProgramTest):
         self.assert_cause(self.recorded_summary(), "terminal_lost", "the terminal was lost")
         self.assert_controlled_stop(self.recorded_summary())
 
-    def test_a_process_that_was_suspended_finds_the_gap_and_stops(self):
-        """SIGSTOP can't be caught. Drives have stopped by themselves in the meantime; what catches up is no order of
-        anybody who is there."""
-        run = subprocess.Popen([program(), "run", "--json", "--no-plot", "--pace", "realtime", "--duration", "60s",
-                                "--record", "session"], cwd=self.folder, text=True, stdin=subprocess.DEVNULL,
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    def suspended(self, pause_s, status, *arguments):
+        """The summary of a session in real time that stood still for so long, after two seconds."""
+        run = subprocess.Popen([program(), "run", "--json", "--no-plot", "--pace", "realtime", *arguments],
+                               cwd=self.folder, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE)
         self.addCleanup(self.end, run)
         time.sleep(2.0)
         run.send_signal(signal.SIGSTOP)
-        time.sleep(0.7)
+        time.sleep(pause_s)
         run.send_signal(signal.SIGCONT)
         out, err = run.communicate(timeout=PATIENCE_S)
-        self.assertEqual(run.returncode, 1, err)
-        summary = json.loads(out)
+        self.assertEqual(run.returncode, status, err)
+        return json.loads(out)
+
+    def test_a_process_that_was_suspended_finds_the_gap_and_stops(self):
+        """SIGSTOP can't be caught. Drives have stopped by themselves in the meantime; what catches up is no order of
+        anybody who is there."""
+        summary = self.suspended(0.7, 1, "--duration", "60s", "--record", "session")
         self.assertEqual([fault["fault"] for fault in summary["faults"]], ["overrun"])
         self.assertIn("was the process suspended?", summary["faults"][0]["text"])
         self.assertLess(summary["simulated_time_s"], 30.0)
@@ -171,20 +175,9 @@ class Ending(ProgramTest):
         self.assertGreater(gap_s, 0.3, "the first cycle after it is the stop's")
         self.assertIn("stopping", cycles[last + 1:])
 
-
     def test_a_process_that_was_kept_waiting_tells_its_overruns(self):
         """As by a busy machine: simulated time waits for it, but on a bus these cycles would have been late."""
-        run = subprocess.Popen([program(), "run", "--json", "--no-plot", "--pace", "realtime", "--duration", "3s"],
-                               cwd=self.folder, text=True, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE)
-        self.addCleanup(self.end, run)
-        time.sleep(2.0)
-        run.send_signal(signal.SIGSTOP)
-        time.sleep(0.08)
-        run.send_signal(signal.SIGCONT)
-        out, err = run.communicate(timeout=PATIENCE_S)
-        self.assertEqual(run.returncode, 0, err)
-        summary = json.loads(out)
+        summary = self.suspended(0.08, 0, "--duration", "3s")
         self.assertGreater(summary["latency_us"]["wake_up"]["max"], 70e3)
         self.assertGreater(summary["overruns"], 70)
         self.assertEqual(summary["faults"], [])

@@ -273,21 +273,16 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
   }
   std::vector<Piece> own;
   for (const Piece& piece : core.pieces_T) own.push_back(moved(piece, pose));
+  const auto meet = [&](const Piece& triangle, const Vec3& from, const Vec3& to, double radius) {
+    gap = std::min(gap, from_segment_m(triangle, from, to, gap + radius) - radius);
+  };
   for (const Piece& other : pieces_[index]) {
     for (const Piece& piece : own) gap = std::min(gap, between_m(piece, other, gap));
-    if (own.empty()) {
-      gap = std::min(
-          gap, from_segment_m(other, pose * core.corners_T.front(), pose * core.corners_T.back(), gap + core.radius_m) -
-                   core.radius_m);
-    }
+    if (own.empty()) meet(other, pose * core.corners_T.front(), pose * core.corners_T.back(), core.radius_m);
   }
   for (const Piece& piece : own) {
-    if (sphere != nullptr)
-      gap = std::min(
-          gap, from_segment_m(piece, sphere->centre_m, sphere->centre_m, gap + sphere->radius_m) - sphere->radius_m);
-    if (capsule != nullptr)
-      gap = std::min(
-          gap, from_segment_m(piece, capsule->from_m, capsule->to_m, gap + capsule->radius_m) - capsule->radius_m);
+    if (sphere != nullptr) meet(piece, sphere->centre_m, sphere->centre_m, sphere->radius_m);
+    if (capsule != nullptr) meet(piece, capsule->from_m, capsule->to_m, capsule->radius_m);
   }
   return gap;
 }
@@ -457,10 +452,11 @@ double ToolLaws::left_J(const ToolCall& call, double rise_J, double short_m) con
 }
 
 double ToolLaws::pushed_J(const ToolCall& call, double short_m) const {
+  const double slack = slack_m(call, short_m);
   double sum = 0.0;
   for (const PoseContact& contact : call.contacts) {
     const double beyond_m = contact.normal_W.dot(call.way_of(contact)) - forward_m(call, contact);
-    sum += std::max(contact.normal_W.dot(contact.force_W) * (beyond_m - slack_m(call, short_m)), 0.0);
+    sum += std::max(contact.normal_W.dot(contact.force_W) * (beyond_m - slack), 0.0);
   }
   return sum;
 }

@@ -32,6 +32,11 @@ Tally clean_run(std::uint64_t seed) {
   return run;
 }
 
+// Such runs, each of which has gone over an edge.
+void expect_edges(std::initializer_list<std::uint64_t> seeds) {
+  for (const std::uint64_t seed : seeds) EXPECT_GE(clean_run(seed).edge, 1) << seed;
+}
+
 TEST(Stress, HoldsInRandomWorlds) { expect_no_violation(2, 10'000); }
 
 TEST(Stress, HoldsAmongMeshes) { expect_no_violation(2, 1'000, Stress::Worlds::meshes); }
@@ -55,10 +60,7 @@ TEST(Stress, AToolThatComesOverAnEdgeAtTheVeryEndOfAStepIsCountedAsAtAnEdge) {
 // the other a corner goes over a mesh's ridge, pressed by 1.2 kN: what lay on the mesh before the step, next to there,
 // had its place behind it, and said nothing about the ridge.
 TEST(Stress, AToolThatIsPressedOverAnEdgeThatItMeetsWithinTheStepIsCountedAsAtAnEdge) {
-  for (const std::uint64_t seed : {4460787946124040ULL, 6498936351365718ULL}) {
-    const Tally run = clean_run(seed);
-    EXPECT_GE(run.edge, 1) << seed;
-  }
+  expect_edges({4460787946124040ULL, 6498936351365718ULL});
 }
 
 // A corner lies in a mesh's valley, a valley of a mesh as a tool on a corner: steps 105 and 85 lost it for a pose of
@@ -99,10 +101,7 @@ TEST(Stress, AnEdgeStaysOnAVertexAndATipIsHeldByTheSideItLiesOn) {
 // Step 167: held by two faces, a corner of the tool goes over a mesh's edge. The judge took the way that it would have
 // to go there with nothing else around it, 68 µm, for the least, and the edge's push over 55 µm for 0.6 mJ out of
 // nowhere.
-TEST(Stress, AHeldToolThatGoesOverAnEdgeIsCountedAsAtAnEdge) {
-  const Tally run = clean_run(4364724033303900);
-  EXPECT_GE(run.edge, 1);
-}
+TEST(Stress, AHeldToolThatGoesOverAnEdgeIsCountedAsAtAnEdge) { expect_edges({4364724033303900}); }
 
 // Step 12: a part of a step that led nowhere had left a corner behind the face that it pressed on, and from then on it
 // counted as behind it: the tool went 0.3 mm into the box, unflagged.
@@ -121,27 +120,18 @@ TEST(Stress, ANormalOfEdgesThatNearlyLieAlongEachOtherTurnsByMoreThanTheTool) {
 
 // Step 132: the tool sticks to one box while a corner of another one goes over one of its edges. The judge let what
 // sticks hold along its normal only, and took the push of the side beyond, over 60 µm, for 29 µJ out of nowhere.
-TEST(Stress, AToolThatSticksElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) {
-  const Tally run = clean_run(431851761038966);
-  EXPECT_GE(run.edge, 1);
-}
+TEST(Stress, AToolThatSticksElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) { expect_edges({431851761038966}); }
 
 // Step 280: a round end of the tool rolls in its place while a corner goes over a box's edge by 5 µm. The judge took
 // what comes off as it rolls, 5 nm, for slipping, let it hold along its normal only, and the push of the side beyond,
 // over 44 µm, for 5.3 µJ out of nowhere.
-TEST(Stress, AToolThatRollsElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) {
-  const Tally run = clean_run(1628963792831443);
-  EXPECT_GE(run.edge, 1);
-}
+TEST(Stress, AToolThatRollsElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) { expect_edges({1628963792831443}); }
 
 // Of the first, step 427: a corner of a mesh goes over another one's edge and by that takes a second corner off its
 // face, which had held part of what it pressed with. The judge took the way over the edge as it were with nothing let
 // go, 10.7 µm for 10.0, and the push of the side beyond for 1.6 µJ out of nowhere. The second, step 380, is like it.
 TEST(Stress, AToolThatGoesOverAnEdgeAndLetsGoElsewhereIsCountedAsAtAnEdge) {
-  for (const std::uint64_t seed : {2680412759127761ULL, 6084606718299497ULL}) {
-    const Tally run = clean_run(seed);
-    EXPECT_GE(run.edge, 1) << seed;
-  }
+  expect_edges({2680412759127761ULL, 6084606718299497ULL});
 }
 
 // Of the first, step 23: on its way the tool comes over an edge a micrometre early, where both sides are solutions. Of
@@ -149,10 +139,7 @@ TEST(Stress, AToolThatGoesOverAnEdgeAndLetsGoElsewhereIsCountedAsAtAnEdge) {
 // 0.16 rad, what came over the edge just before the end was taken for what it came from; of the last, step 55, three
 // places are met at a vertex, by a way of which a part is unresolved.
 TEST(Stress, AToolMayComeOverAnEdgeWhereBothSidesAreSolutions) {
-  for (const std::uint64_t seed : {2679357126334080ULL, 7836632257535979ULL, 813388677158608ULL, 1180702795386827ULL}) {
-    const Tally run = clean_run(seed);
-    EXPECT_GE(run.edge, 1) << seed;
-  }
+  expect_edges({2679357126334080ULL, 7836632257535979ULL, 813388677158608ULL, 1180702795386827ULL});
 }
 
 // Step 155 found no solution, and the last of the smaller parts that it was tried in had led 25 µm into the mesh: the
