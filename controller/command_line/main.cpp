@@ -214,21 +214,7 @@ void add_arm_option(CLI::App& app, std::filesystem::path& arm) {
       ->type_name("FILE");
 }
 
-void add_run_options(CLI::App& app, RunOptions& options) {
-  add_session_options(app, options);
-  add_fault_option(app, options);
-  add_arm_option(app, options.arm);
-  add_enabling_option(app, options);
-  add_supervision_options(app, options);
-  app.add_option("--pace",
-                 choice<Pace>("--pace", {{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}},
-                              [&](Pace value) { options.pace = value; }),
-                 "virtual (default in-process) or realtime")
-      ->type_name("virtual|realtime");
-  app.add_option("--order",
-                 choice<int>("--order", {{"1", 1}, {"2", 2}}, [&](int value) { options.settings.order = value; }),
-                 "1: eq. (26) (default); 2: its second-order sibling")
-      ->type_name("1|2");
+void add_turning_options(CLI::App& app, RunOptions& options) {
   using controller::OrientationMode;
   app.add_option(
          "--orientation",
@@ -261,6 +247,24 @@ void add_run_options(CLI::App& app, RunOptions& options) {
                   [&](double value) { options.turning_spring_Nm_per_rad = value; }),
          "spring of a tool that turns to its orientation at the start, in Nm/rad (default 0)")
       ->type_name("NM/RAD");
+}
+
+void add_run_options(CLI::App& app, RunOptions& options) {
+  add_session_options(app, options);
+  add_fault_option(app, options);
+  add_arm_option(app, options.arm);
+  add_enabling_option(app, options);
+  add_supervision_options(app, options);
+  app.add_option("--pace",
+                 choice<Pace>("--pace", {{"virtual", Pace::virtual_time}, {"realtime", Pace::realtime}},
+                              [&](Pace value) { options.pace = value; }),
+                 "virtual (default in-process) or realtime")
+      ->type_name("virtual|realtime");
+  app.add_option("--order",
+                 choice<int>("--order", {{"1", 1}, {"2", 2}}, [&](int value) { options.settings.order = value; }),
+                 "1: eq. (26) (default); 2: its second-order sibling")
+      ->type_name("1|2");
+  add_turning_options(app, options);
   using controller::Passivity;
   app.add_option(
          "--passivity",
@@ -529,10 +533,11 @@ class Commands {
   }
 
   void add_judges() {
-    CLI::App* tune = add("tune", "advice on mass, damping and timestep for a cell and a hand",
+    CLI::App* tune = add("tune", "advice on mass, inertia, damping and timestep for a cell and a hand",
                          [this] { return tune_command(tune_); });
     add_session_options(*tune, tune_);
-    leave_out(*tune, {"--scene", "--stiffness", "--duration", "--bus"});
+    add_turning_options(*tune, tune_);
+    leave_out(*tune, {"--stiffness", "--duration", "--bus"});
     add_prove_options(
         *add("prove",
              "whether an arm is as its cell says, by small slow motions and pushes: joint signs, gear ratios, the "

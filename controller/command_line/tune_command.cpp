@@ -9,6 +9,7 @@
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/trials/inertia_advice.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"
 #include "controller/report/summary.hpp"
 #include "models/base/setup_error.hpp"
@@ -129,11 +130,62 @@ void print_mass(const Tuned& of, const std::optional<double>& smallest) {
       "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
       mass_text(smallest).c_str(), of.loop.handle_mass_kg, mass_text(smallest_felt(of.hand, start)).c_str());
   const auto safe = smallest_with_margins(of.hand, of.loop);
-  const TriedAdvice tried = safe ? tried_advice(of.session, rounded_up(*safe)) : TriedAdvice{};
+  const TriedAdvice tried = safe ? tried_mass(of.session, rounded_up(*safe)) : TriedAdvice{};
   std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
-              tried.mass_kg ? ("--mass " + mass_text(tried.mass_kg)).c_str() : "no mass up to 1000 kg",
-              tried.mass_kg ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
+              tried.steady ? ("--mass " + mass_text(tried.steady)).c_str() : "no mass up to 1000 kg",
+              tried.steady ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
   if (safe) std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
+}
+
+std::string inertia_text(const std::optional<double>& inertia_kg_m2) {
+  if (!inertia_kg_m2) return "none";
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.2g kg m²", rounded_up(*inertia_kg_m2));
+  return text.data();
+}
+
+// `also`: another option that it takes.
+void print_tried_inertia(const PreparedSession& session, double least_kg_m2, const std::string& also) {
+  const TriedAdvice tried = tried_inertia(session, rounded_up(least_kg_m2));
+  const std::string advised = tried.steady ? "--inertia " + inertia_text(tried.steady) : "no inertia";
+  std::printf("advice: with %.3g kg %s%s, with the same margins\n", session.settings.mass_kg, advised.c_str(),
+              also.c_str());
+  std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
+}
+
+// The least turning damping, of a few, with which some inertia is stable with the margins. A hand that is stiffer than
+// it is damped, K L > D, needs it at any inertia.
+void print_turning_damping(PreparedSession session) {
+  const double own = session.settings.rotational_damping_Nms_per_rad;
+  for (const double damping : {0.1, 0.2, 0.5, 1.0, 2.0, 5.0}) {
+    if (!(damping > own)) continue;
+    session.settings.rotational_damping_Nms_per_rad = damping;
+    const std::optional<double> least = smallest_inertias(session).with_margins;
+    if (!least) continue;
+    std::array<char, 60> also{};
+    std::snprintf(also.data(), also.size(), " and --turning-damping %.2g Nms/rad", damping);
+    return print_tried_inertia(session, *least, also.data());
+  }
+  std::printf("advice: a larger mass; with %.3g kg no inertia is stable with these margins\n",
+              session.settings.mass_kg);
+}
+
+// Of a tool that is led and turned at once, with the mass that was asked for.
+void print_inertia(const PreparedSession& session) {
+  if (session.settings.orientation == controller::OrientationMode::held) return;
+  if (!turned_model(session)) {
+    std::printf("inertia: this hand doesn't turn the tool (turning_stiffness_Nm_per_rad in its file)\n");
+    return;
+  }
+  const SmallestInertias smallest = smallest_inertias(session);
+  std::printf(
+      "smallest stable inertia with %.3g kg: %s felt, handle's %.2g kg m² included; %s in the start pose alone, by "
+      "which "
+      "`run` refuses\n",
+      session.settings.mass_kg, inertia_text(smallest.everywhere).c_str(), turning_loop(session).handle_mass_kg,
+      inertia_text(smallest.at_start).c_str());
+  if (smallest.with_margins) return print_tried_inertia(session, *smallest.with_margins, "");
+  print_turning_damping(session);
 }
 
 void print_damping(const Tuned& of) {
@@ -150,7 +202,7 @@ void print_damping(const Tuned& of) {
                 mass_text(least).c_str());
     PreparedSession with_damping = of.session;
     with_damping.settings.damping_Ns_per_m = *damping;
-    if (least) std::printf("  tried: %s\n", tried_advice(with_damping, rounded_up(*least)).text.c_str());
+    if (least) std::printf("  tried: %s\n", tried_mass(with_damping, rounded_up(*least)).text.c_str());
   } else {
     std::printf(
         "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
@@ -199,6 +251,7 @@ int tune_command(const RunOptions& options) {
   const auto smallest = smallest_felt(of.hand, of.loop);
   print_delays(of);
   print_mass(of, smallest);
+  print_inertia(session);
   print_damping(of);
   std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
               1e3 * longest_horizon_s(session), session.settings.mass_kg);

@@ -424,7 +424,10 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   models::Pose X_WT = models::Pose::Identity();
   X_WT.translation() = sent_W();
   X_WT.linear() = parts_.orientation.R_WT().toRotationMatrix();
-  if (parts_.orientation.config().free) cycle.record.proxy_inertia_kg_m2 = parts_.orientation.config().inertia_kg_m2;
+  if (const OrientationConfig& turning = parts_.orientation.config(); turning.free) {
+    cycle.record.proxy_inertia_kg_m2 = turning.inertia_kg_m2;
+    cycle.record.proxy_turning_damping_Nms_per_rad = turning.damping_Nms_per_rad;
+  }
   const Vec3 reached_k1_W = solution_.kinematics.X_WT.translation();
   const models::Mat3 reached_k1_rotation = solution_.kinematics.X_WT.linear();
   const JointVector link_k1_rad = state_.link_rad;

@@ -132,6 +132,7 @@ struct CycleRecord {
   std::array<double, 4> proxy_q_W{0.0, 0.0, 0.0, 1.0};  // the proxy's orientation: x y z w
   Triple contact_torque_W_Nm{};                         // of the contacts on the proxy, about the rendered point
   double proxy_inertia_kg_m2 = 0.0;                     // J of this step, felt; 0: the orientation is held
+  double proxy_turning_damping_Nms_per_rad = 0.0;       // of this step
 
   // Of PassivityObserver, where it is wanted.
   PortEnergies energies_J{};

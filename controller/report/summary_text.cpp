@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "controller/report/summary.hpp"
+#include "controller/stability/stability.hpp"
 #include "models/files/json.hpp"
 
 namespace proxarm::controller {
@@ -93,11 +94,16 @@ Json poses(const std::optional<PosesSummary>& summary) {
   if (!summary) return nullptr;
   Json json{{"judged", summary->judged}, {"unstable", nullptr}};
   if (!summary->unstable) return json;
-  const PosesSummary::Unstable& there = *summary->unstable;
+  const UnstablePlaces& there = *summary->unstable;
+  const auto smallest = [&](bool is_lacking) { return is_lacking ? there.smallest_stable : std::nullopt; };
   json["unstable"] = {{"first_s", there.first_s},
                       {"worst_s", there.worst_s},
                       {"felt_mass_kg", there.felt_mass_kg},
-                      {"smallest_stable_mass_kg", there.smallest_stable_mass_kg}};
+                      {"felt_inertia_kg_m2", nullptr},
+                      {"lacks", there.lacks_mass ? "mass" : "inertia"},
+                      {"smallest_stable_mass_kg", smallest(there.lacks_mass)},
+                      {"smallest_stable_inertia_kg_m2", smallest(!there.lacks_mass)}};
+  if (there.felt_inertia_kg_m2 > 0.0) json["unstable"]["felt_inertia_kg_m2"] = there.felt_inertia_kg_m2;
   return json;
 }
 
@@ -371,14 +377,15 @@ std::string oscillation_text(const Oscillation& o) {
          format(" to either side, for %.2f s ", o.duration_s) + format("from %.2f s on", o.from_s);
 }
 
-std::string poses_text(const PosesSummary& poses) {
-  const PosesSummary::Unstable& there = *poses.unstable;
-  const std::string came = format("at %.2f s the arm came where ", there.first_s) +
-                           format("%.3g kg isn't stable with this hand", there.felt_mass_kg);
-  if (!there.smallest_stable_mass_kg) return came + ", nor is any other mass";
-  return came + (there.worst_s > there.first_s ? format("; it takes up to %.3g kg", *there.smallest_stable_mass_kg) +
-                                                     format(" (at %.2f s)", there.worst_s)
-                                               : format("; it takes %.3g kg there", *there.smallest_stable_mass_kg));
+std::string poses_text(const UnstablePlaces& there) {
+  std::string felt = format("%.3g kg", there.felt_mass_kg);
+  if (there.felt_inertia_kg_m2 > 0.0) felt += format(" with %.3g kg m²", there.felt_inertia_kg_m2);
+  const std::string came = format("at %.2f s the arm came where ", there.first_s) + felt +
+                           " isn't stable with this hand" + (there.lacks_mass ? "" : ", led and turned at once");
+  if (!there.smallest_stable) return came + ", nor is any other " + (there.lacks_mass ? "mass" : "inertia");
+  const std::string takes = format("%.3g kg", round_up(*there.smallest_stable)) + (there.lacks_mass ? "" : " m²");
+  if (!(there.worst_s > there.first_s)) return came + "; it takes " + takes + " there";
+  return came + "; it takes up to " + takes + format(" (at %.2f s)", there.worst_s);
 }
 
 namespace {
@@ -445,7 +452,7 @@ std::string summary_text(const Summary& s) {
   tell_time(s, line);
   tell_motion(s, line);
   tell_oscillation(s, line);
-  if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses));
+  if (s.poses && s.poses->unstable) line("not stable everywhere", poses_text(*s.poses->unstable));
   tell_limits(s, line);
   if (s.hands_off_s > 0.0) line("hands off", format("%.3g s: nobody at the handle, the arm stands", s.hands_off_s));
   if (s.held_samples > 0) line("sensor samples held", std::to_string(s.held_samples) + " cycles");

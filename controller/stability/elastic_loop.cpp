@@ -110,37 +110,77 @@ ElasticArm elastic_pose_arm(const models::Arm& arm, const models::JointVector& p
   return out;
 }
 
-std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
-                                     const std::vector<models::Vec3>& offsets_W) {
-  constexpr double step_m = 0.005;  // away from singularities, this turns no joint by the inverse kinematics' 0.01 rad
-  constexpr double apart_m = 0.05;
-  constexpr std::size_t most_poses = 16;
-  const models::InverseKinematics inverse(arm);  // throws for an arm that can't move the tool
-  std::vector<ElasticArm> arms{elastic_arm(arm, arm.start_rad(), cell)};
-  const models::Pose start = arm.tool_pose(arm.start_rad());
-  models::InverseKinematicsResult solution;
-  models::JointVector q = arm.start_rad();
-  models::Vec3 at = models::Vec3::Zero();
-  std::vector<models::Vec3> known{at};
-  for (const models::Vec3& offset : offsets_W) {
-    const auto near = [&](const models::Vec3& place) { return (offset - place).norm() < apart_m; };
-    if (arms.size() == most_poses) break;
-    if (std::any_of(known.begin(), known.end(), near)) continue;
-    known.push_back(offset);
-    const models::Vec3 way = offset - at;
-    const int steps = static_cast<int>(std::ceil(std::min(2.0, way.norm()) / step_m));
+bool are_near(const models::ToolPose& a, const models::ToolPose& b) noexcept {
+  constexpr double apart_m = 0.05, apart_rad = 0.1;
+  return (a.position - b.position).squaredNorm() < apart_m * apart_m &&
+         a.orientation.angularDistance(b.orientation) < apart_rad;
+}
+
+namespace {
+
+// An arm that is led from its start pose.
+class LedArm {
+ public:
+  explicit LedArm(const models::Arm& arm)  // throws for an arm that can't move the tool
+      : inverse_(arm), start_(arm.tool_pose(arm.start_rad())), q_(arm.start_rad()) {}
+
+  [[nodiscard]] const models::JointVector& link_rad() const noexcept { return q_; }
+  [[nodiscard]] models::ToolPose tool(const Lead& lead) const {
+    return {start_.translation() + lead.offset_m,
+            (models::rotation_by(lead.turn_rad) * models::Quaternion(start_.linear())).normalized()};
+  }
+  // On a straight way, as far as the arm gets; false: it doesn't get away from where it is.
+  bool lead_to(const Lead& lead) {
+    // Away from singularities, such steps turn no joint by the inverse kinematics' 0.01 rad.
+    constexpr double step_m = 0.005, step_rad = 0.005, most_steps = 400.0;
+    const Lead from = at_, way{lead.offset_m - from.offset_m, lead.turn_rad - from.turn_rad};
+    const double wanted = std::max(way.offset_m.norm() / step_m, way.turn_rad.norm() / step_rad);
+    const int steps = static_cast<int>(std::ceil(std::min(most_steps, wanted)));
     int gone = 0;
     for (; gone < steps; ++gone) {
-      models::Pose X_WT = start;
-      X_WT.translation() += at + (gone + 1.0) / steps * way;
-      inverse.solve(q, X_WT, solution);
-      if (solution.status != models::InverseKinematicsResult::Status::converged || solution.out_of_range) break;
-      q = solution.q;
+      const double share = (gone + 1.0) / steps;
+      const Lead next{from.offset_m + share * way.offset_m, from.turn_rad + share * way.turn_rad};
+      if (!go_to(next)) break;
+      at_ = next;
     }
-    if (gone > 0) arms.push_back(elastic_arm(arm, q, cell));
-    at += gone > 0 ? models::Vec3(static_cast<double>(gone) / steps * way) : models::Vec3::Zero();
+    return gone > 0;
   }
-  return arms;
+
+ private:
+  bool go_to(const Lead& lead) {
+    const models::ToolPose wanted = tool(lead);
+    models::Pose X_WT = models::Pose::Identity();
+    X_WT.linear() = wanted.orientation.toRotationMatrix();
+    X_WT.translation() = wanted.position;
+    inverse_.solve(q_, X_WT, solution_);
+    if (solution_.status != models::InverseKinematicsResult::Status::converged || solution_.out_of_range) return false;
+    q_ = solution_.q;
+    return true;
+  }
+
+  models::InverseKinematics inverse_;
+  models::InverseKinematicsResult solution_;
+  models::Pose start_;
+  models::JointVector q_;
+  Lead at_;
+};
+
+}  // namespace
+
+std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::vector<Lead>& leads) {
+  constexpr std::size_t most_poses = 16;
+  LedArm led(arm);
+  std::vector<models::JointVector> poses{led.link_rad()};
+  std::vector<models::ToolPose> known{led.tool({})};
+  for (const Lead& lead : leads) {
+    const models::ToolPose there = led.tool(lead);
+    const auto near = [&](const models::ToolPose& place) { return are_near(there, place); };
+    if (poses.size() == most_poses) break;
+    if (std::any_of(known.begin(), known.end(), near)) continue;
+    known.push_back(there);
+    if (led.lead_to(lead)) poses.push_back(led.link_rad());
+  }
+  return poses;
 }
 
 // The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the

@@ -25,6 +25,7 @@
 
 #include "models/arm/arm.hpp"
 #include "models/description/cell.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
 
@@ -52,11 +53,18 @@ ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector
 // The same for place and rotation together: J and G have three rows and columns for the place, then three for angles.
 ElasticArm elastic_pose_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell);
 
-// The arm at the start, and at the places to which the tool is led from there, one after the other, as far as it gets.
-// Modes change with the pose: over 0.3 m, the default cell's smallest stable mass changes by a third. Places within 50
-// mm of another one are left out, and so are those after the sixteenth.
-std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
-                                     const std::vector<models::Vec3>& offsets_W);
+// How far from where it is at the start a hand leads the tool, along W's axes, and turns it, by a rotation vector in W.
+struct Lead {
+  models::Vec3 offset_m = models::Vec3::Zero(), turn_rad = models::Vec3::Zero();
+};
+
+// Modes change with the pose: over 0.3 m, the default cell's smallest stable mass changes by a third. Poses of the tool
+// that are nearer than 50 mm and 0.1 rad are taken for one.
+bool are_near(const models::ToolPose& a, const models::ToolPose& b) noexcept;
+
+// The links' angles at the start, and where the tool is led to from there, one after the other, as far as the arm gets.
+// What is near to another one is left out, and so is what comes after the sixteenth.
+std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::vector<Lead>& leads);
 
 // Who holds the tool, in matrices of its space: K_h, D_h and m_h of the hand, m_t of the handle.
 struct Grip {

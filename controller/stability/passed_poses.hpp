@@ -1,60 +1,71 @@
-// Whether the mass felt is stable where a session comes by. A session is refused by the pose in which it starts; the
-// arm's modes, and with them the smallest stable mass, change with the pose: by a third over 0.3 m in the default cell.
+// Whether what is felt is stable where a session comes by. A session is refused by the pose in which it starts; the
+// arm's modes, and with them the smallest stable mass and inertia, change with the pose: the mass by a third over 0.3 m
+// in the default cell, the inertia of a tool that is led and turned at once (pose_loop.hpp) by far more.
 //
-// A place is judged where the tool is 50 mm or more from all that were judged before with the same proxy: the spacing
-// of elastic_arms(). Some milliseconds then, else a comparison; never in the cycle. While mass or damping change from
-// one cycle to the next, nothing is judged.
+// A place is judged where the tool is 50 mm or more from all that were judged before with the same proxy, the spacing
+// of led_poses(), or turned from them by 0.1 rad or more. Some milliseconds then, of a tool that turns some twenty,
+// half a second where it isn't stable; else a comparison; never in the cycle. While mass, inertia or damping change
+// from one cycle to the next, nothing is judged.
 #pragma once
 
 #include <cstddef>
 #include <optional>
 #include <vector>
 
+#include "controller/stability/pose_loop.hpp"
 #include "controller/stability/stability.hpp"
+#include "controller/stability/verdict.hpp"
 #include "models/arm/arm.hpp"
 #include "models/description/cell.hpp"
 #include "models/geometry/geometry.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
 
 class PassedPoses {
  public:
-  // The first place in which the mass isn't stable, and of all such the one that asks for the largest.
-  struct Unstable {
-    double first_s = 0.0;
-    double worst_s = 0.0;
-    double felt_mass_kg = 0.0;                      // that was felt there
-    std::optional<double> smallest_stable_mass_kg;  // felt, there; absent: none is stable
+  // The proxy as it is felt, what hangs behind the sensor included. Inertia 0: the tool isn't turned.
+  struct Felt {
+    double mass_kg = 0.0, damping_Ns_per_m = 0.0;
+    double inertia_kg_m2 = 0.0, turning_damping_Nms_per_rad = 0.0;
+    bool operator==(const Felt&) const = default;
   };
 
-  // `loop`: without arms. The arm and the cell must outlive it.
-  PassedPoses(const models::Arm& arm, const description::Cell& cell, const HandModel& hand, const LoopModel& loop);
+  // `loop`: without arms. `turned`, as pose_loop_at() takes it: of a tool that is led and turned at once; its loop is
+  // `loop`. The arm and the cell must outlive it.
+  PassedPoses(const models::Arm& arm, const description::Cell& cell, const HandModel& hand, const LoopModel& loop,
+              std::optional<PoseLoopModel> turned = {});
 
   // From now on the loop is this; what has been judged is judged again when the tool comes by.
   void change(const LoopModel& loop);
-  // The tool is there at that time, felt with so much mass and so much damping of the proxy; `joints_rad`, called only
-  // where the place is to be judged, gives the links' angles. True: the mass isn't stable there, and it was the first.
+  // The tool is there at that time, and felt so; `joints_rad`, called only where the place is to be judged, gives the
+  // links' angles. What should be told: it isn't stable there, which wasn't told yet of this mass and inertia, or it
+  // asks for half as much again as was told.
   template <class Joints>
-  bool pass(double time_s, const models::Vec3& tool_W_m, double felt_mass_kg, double damping_Ns_per_m,
-            const Joints& joints_rad) {
-    return is_new(tool_W_m, felt_mass_kg, damping_Ns_per_m) && judge(time_s, joints_rad());
+  std::optional<UnstablePlaces> pass(double time_s, const models::ToolPose& tool_W, const Felt& felt,
+                                     const Joints& joints_rad) {
+    if (!is_new(tool_W, felt)) return {};
+    return judge(time_s, joints_rad());
   }
 
   [[nodiscard]] std::size_t judged() const noexcept { return judged_; }
-  [[nodiscard]] const std::optional<Unstable>& unstable() const noexcept { return unstable_; }
+  // Of all that was felt.
+  [[nodiscard]] const std::optional<UnstablePlaces>& unstable() const noexcept { return unstable_; }
 
  private:
-  bool is_new(const models::Vec3& tool_W_m, double felt_mass_kg, double damping_Ns_per_m);
-  bool judge(double time_s, const models::JointVector& joints_rad);
+  bool is_new(const models::ToolPose& tool_W, const Felt& felt);
+  std::optional<UnstablePlaces> judge(double time_s, const models::JointVector& joints_rad);
+  [[nodiscard]] std::optional<UnstablePlaces> unstable_at(const models::JointVector& joints_rad) const;
 
   const models::Arm& arm_;
   const description::Cell& cell_;
   HandModel hand_;
   LoopModel loop_;
-  double felt_mass_kg_ = 0.0;
-  std::vector<models::Vec3> places_;  // judged with this loop and mass; the last is the one that the tool is near
+  std::optional<PoseLoopModel> turned_;
+  Felt felt_;
+  std::vector<models::ToolPose> places_;  // judged with this loop and proxy; the last is the one that the tool is near
   std::size_t judged_ = 0;
-  std::optional<Unstable> unstable_;
+  std::optional<UnstablePlaces> unstable_, told_;  // told_: of what is felt now
 };
 
 }  // namespace proxarm::controller

@@ -65,6 +65,17 @@ Mat6 behind_sensor_W(const description::Cell& cell, const models::Mat3& R_WT) {
   return m;
 }
 
+PoseLoop pose_loop_at(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell,
+                      PoseLoopModel model) {
+  const models::Mat3 R_WT = arm.tool_pose(pose_rad).linear();
+  model.behind_sensor_W = behind_sensor_W(cell, R_WT);
+  for (TouchedPlace& at : model.touched) at = {R_WT * at.r_W_m, R_WT * at.n_W};
+  model.loop.horizon_s = 0.0;
+  model.loop.order = 1;
+  model.loop.arms = nullptr;
+  return {elastic_pose_arm(arm, pose_rad, cell), model};
+}
+
 PoseLoop::PoseLoop(const ElasticArm& arm, const PoseLoopModel& model)
     : loop_(arm, grip_of(model), model.loop),
       behind_(model.behind_sensor_W),

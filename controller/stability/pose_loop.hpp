@@ -25,6 +25,7 @@
 
 #include "controller/stability/elastic_loop.hpp"
 #include "controller/stability/stability.hpp"
+#include "controller/stability/verdict.hpp"
 
 namespace proxarm::controller {
 
@@ -39,13 +40,6 @@ struct PoseLoopModel {
   double turning_damping_Nms_per_rad = 0.0, turning_spring_Nm_per_rad = 0.0;  // of the proxy; those of its place …
   LoopModel loop{};                                                           // … are here, with all times
   std::vector<TouchedPlace> touched{};
-};
-
-// A mode that swings faster than hands move by will (3 Hz), and how long it takes at most to fall to a tenth: friction
-// in the drives, which isn't modelled, lets it fall sooner (the default cell's, with 2 kg: in a sixth to a half of
-// that).
-struct Swing {
-  double frequency_Hz = 0.0, tenth_s = 0.0;
 };
 
 // m_t of the tool behind the cell's sensor, turned so.
@@ -75,6 +69,12 @@ class PoseLoop {
   std::vector<Eigen::MatrixXd> forbidden_;  // N, beginning with none
   double period_s_;
 };
+
+// With the arm in this pose. `model`: its touched places from T in T's own axes; what hangs behind the sensor is the
+// cell's, and of its loop neither horizon nor order count: only a place is predicted, and rotation and contacts are
+// computed with order 1.
+PoseLoop pose_loop_at(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell,
+                      PoseLoopModel model);
 
 // Throws description::SetupError about --inertia that names the smallest stable felt inertia, rounded up to two digits,
 // or says that none is with this mass.

@@ -86,6 +86,21 @@ class Tune(ProgramTest):
                      "what limits it", "timestep of at most", "handle"):
             self.assertIn(word, outcome.out)
 
+    def test_a_tool_that_is_turned_gets_an_inertia_advised(self):
+        lean = ("tune", "--scene", SOURCE / "scenes/rod_over_edge.yaml", "--hand", SOURCE / "sim/hands/lean.yaml",
+                "--mass", "4", "--inertia", "0.05")
+        told = self.call(*lean).out
+        at_start = float(told.split("included; ")[2].split(" kg m²")[0])
+        everywhere = float(told.split("smallest stable inertia with 4 kg: ")[1].split(" kg m²")[0])
+        self.assertGreater(everywhere, at_start)
+        # This hand is stiffer than damped once it is half as stiff again: K L > D.
+        self.assertIn("--turning-damping", told)
+        advised = float(told.split("--inertia ")[1].split(" kg m²")[0])
+        self.assertGreater(advised, everywhere)
+        self.assertIn(f"{advised:g} kg m² is steady for 10 s, with the stiffer and heavier hand, too", told)
+        self.assertIn("this hand doesn't turn the tool", self.call("tune", "--inertia", "0.05").out)
+        self.assertNotIn("inertia", self.call("tune").out)
+
     def test_a_timestep_that_a_mass_needs_and_no_bus_carries_is_told_as_such(self):
         self.assertIn("a timestep of at most 0.5 ms, which the cell's buses can't carry", self.call("tune").out)
         self.assertNotIn("can't carry", self.call("tune", "--mass", "6").out)

@@ -310,16 +310,16 @@ class NewCell {
       advice_ = "by the model of the loop none is";
       return std::nullopt;
     }
-    const TriedAdvice touching = tried_advice(session, rounded_up(*least));
+    const TriedAdvice touching = tried_mass(session, rounded_up(*least));
     advice_ = touching.text;
-    if (!touching.mass_kg) return std::nullopt;
+    if (!touching.steady) return std::nullopt;
     RunOptions sweep = run_;
     sweep.scene = shipped_file("scenes/free.yaml");
     sweep.hand = shipped_file("sim/hands/sweep.yaml");
     sweep.duration_s = 20.0;
-    const TriedAdvice free = tried_advice(prepare(sweep), *touching.mass_kg);
+    const TriedAdvice free = tried_mass(prepare(sweep), *touching.steady);
     advice_ += "; in free space " + free.text;
-    return free.mass_kg;
+    return free.steady;
   }
 
   // Where none is stable or steady the arm's gears are too soft for the filter: a slower one is tried.

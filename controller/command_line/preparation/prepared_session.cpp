@@ -301,10 +301,13 @@ void require_profile(const PreparedSession& session) {
 }
 
 std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const PreparedSession& session,
-                                                                   const std::vector<models::Vec3>& offsets_W) {
+                                                                   const std::vector<models::JointVector>& poses_rad) {
   const models::Arm arm(session.cell);
-  return std::make_shared<const std::vector<controller::ElasticArm>>(
-      controller::elastic_arms(arm, session.cell, offsets_W));
+  auto arms = std::make_shared<std::vector<controller::ElasticArm>>();
+  for (const models::JointVector& pose_rad : poses_rad) {
+    arms->push_back(controller::elastic_arm(arm, pose_rad, session.cell));
+  }
+  return arms;
 }
 
 }  // namespace
@@ -342,7 +345,7 @@ bool is_turned(const PreparedSession& session) {
 
 // A tool with a shape is taken to touch where it ends in the directions of a cube's faces and corners, a point in
 // itself.
-std::vector<controller::TouchedPlace> touched_places(const PreparedSession& session, const models::Mat3& R_WT) {
+std::vector<controller::TouchedPlace> touched_places_T(const PreparedSession& session) {
   std::vector<controller::TouchedPlace> places;
   const bool is_point = !session.scene.tool;
   for (int i = 0; i < 27; ++i) {
@@ -352,33 +355,37 @@ std::vector<controller::TouchedPlace> touched_places(const PreparedSession& sess
     if (is_point && i > 13) continue;  // the opposite ways, which are held likewise
     const models::Vec3 n_T = way.normalized();
     const models::Vec3 r_T = is_point ? models::Vec3::Zero() : models::furthest_of(session.scene.tool->shape, n_T);
-    places.push_back({R_WT * r_T, R_WT * n_T});
+    places.push_back({r_T, n_T});
   }
   return places;
 }
 }  // namespace
 
-controller::PoseLoop pose_loop(const PreparedSession& session) {
-  const models::Arm arm(session.cell);
-  const models::Mat3 R_WT = arm.tool_pose(arm.start_rad()).linear();
-  controller::PoseLoopModel model{.place = hand_model(session),
-                                  .turning = turning_hand_model(session),
-                                  .behind_sensor_W = controller::behind_sensor_W(session.cell, R_WT),
-                                  .turning_damping_Nms_per_rad = session.settings.rotational_damping_Nms_per_rad,
-                                  .turning_spring_Nm_per_rad = session.settings.rotational_spring_Nm_per_rad,
-                                  .loop = session.loop,
-                                  .touched = touched_places(session, R_WT)};
-  model.loop.horizon_s = 0.0;  // as in require_stable()
-  model.loop.order = 1;        // in which rotation is computed, and contacts
-  model.loop.arms = nullptr;
-  return {controller::elastic_pose_arm(arm, arm.start_rad(), session.cell), model};
+std::optional<controller::PoseLoopModel> turned_model(const PreparedSession& session) {
+  if (!is_turned(session)) return {};
+  controller::PoseLoopModel model;
+  model.place = hand_model(session);
+  model.turning = turning_hand_model(session);
+  model.turning_damping_Nms_per_rad = session.settings.rotational_damping_Nms_per_rad;
+  model.turning_spring_Nm_per_rad = session.settings.rotational_spring_Nm_per_rad;
+  model.loop = session.loop;
+  model.touched = touched_places_T(session);
+  return model;
 }
 
+namespace {
+std::optional<controller::PoseLoop> pose_loop_at_start(const PreparedSession& session) {
+  const std::optional<controller::PoseLoopModel> model = turned_model(session);
+  if (!model) return {};
+  const models::Arm arm(session.cell);
+  return controller::pose_loop_at(arm, arm.start_rad(), session.cell, *model);
+}
+}  // namespace
+
 std::optional<controller::Swing> least_damped_swing(const PreparedSession& session) {
-  if (!is_turned(session)) return {};
-  const controller::PoseLoop loop = pose_loop(session);
-  const double mass_kg = session.settings.mass_kg, inertia_kg_m2 = felt_inertia_kg_m2(session);
-  return loop.least_damped_swing(mass_kg, inertia_kg_m2);
+  const std::optional<controller::PoseLoop> loop = pose_loop_at_start(session);
+  if (!loop) return {};
+  return loop->least_damped_swing(session.settings.mass_kg, felt_inertia_kg_m2(session));
 }
 
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options) {
@@ -401,23 +408,25 @@ controller::HandModel hand_model(const PreparedSession& session) {
   return {loosest_N_per_m, std::max(grip.damping_Ns_per_m, loosest_Ns_per_m), session.hand.mass_kg};
 }
 
-namespace {
-// Where a trajectory leads, some dozens of its rows for the sake of time.
-void add_places(const std::vector<description::TimedVector>& trajectory, std::vector<models::Vec3>& offsets_W) {
+std::vector<models::JointVector> led_poses(const PreparedSession& session) {
+  std::vector<controller::Lead> leads;
+  for (const description::Waypoint& waypoint : session.hand.waypoints) {
+    leads.push_back({.offset_m = models::Vec3(waypoint.offset_m.data())});
+    if (is_turned(session)) leads.back().turn_rad = models::Vec3(waypoint.turn_rad.data());
+  }
+  // Some dozens of a trajectory's rows, for the sake of time.
   constexpr std::size_t places = 48;
+  const std::vector<description::TimedVector>& trajectory = session.hand.trajectory;
   const std::size_t step = std::max<std::size_t>(1, trajectory.size() / places);
-  for (std::size_t i = 0; i < trajectory.size(); i += step) offsets_W.emplace_back(trajectory[i].value.data());
+  for (std::size_t i = 0; i < trajectory.size(); i += step) {
+    leads.push_back({.offset_m = models::Vec3(trajectory[i].value.data())});
+  }
+  return controller::led_poses(models::Arm(session.cell), leads);
 }
-}  // namespace
 
 controller::LoopModel led_loop(const PreparedSession& session) {
-  std::vector<models::Vec3> offsets_W;
-  for (const description::Waypoint& waypoint : session.hand.waypoints) {
-    offsets_W.emplace_back(waypoint.offset_m[0], waypoint.offset_m[1], waypoint.offset_m[2]);
-  }
-  add_places(session.hand.trajectory, offsets_W);
   controller::LoopModel loop = session.loop;
-  loop.arms = arms_at(session, offsets_W);
+  loop.arms = arms_at(session, led_poses(session));
   return loop;
 }
 
@@ -483,7 +492,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.damping_Ns_per_m = session.settings.damping_Ns_per_m;
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
-  session.loop.arms = arms_at(session, {});
+  session.loop.arms = arms_at(session, controller::led_poses(models::Arm(session.cell), {}));
   session.settings.force_age_s = session.cell.sensor.delay_s;
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
   require_renderable_tool(session);
@@ -565,16 +574,16 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (!options.force_unstable) require_stable_horizon(session);
   if (session.settings.orientation == controller::OrientationMode::held || session.cell.drives.size() < 6) return;
   require_inertia_above_handle(session);
-  if (options.force_unstable || !is_turned(session)) return;
+  const std::optional<controller::PoseLoop> both = pose_loop_at_start(session);
+  if (options.force_unstable || !both) return;
   const controller::HandModel hand = turning_hand_model(session);
   const controller::LoopModel alone = turning_loop(session);
-  const controller::PoseLoop both = pose_loop(session);
   const double mass_kg = session.settings.mass_kg, inertia_kg_m2 = felt_inertia_kg_m2(session);
   const bool is_stable = controller::spectral_radius(hand, alone, inertia_kg_m2 - alone.handle_mass_kg) < 1.0;
-  if (is_stable && both.stable(mass_kg, inertia_kg_m2)) return;
+  if (is_stable && both->stable(mass_kg, inertia_kg_m2)) return;
   const std::optional<double> least_alone = controller::smallest_stable_mass(hand, alone);
   if (!least_alone) controller::require_stable_inertia(inertia_kg_m2, hand, alone, false);  // which no mass helps
-  std::optional<double> smallest = both.smallest_inertia(mass_kg);
+  std::optional<double> smallest = both->smallest_inertia(mass_kg);
   if (smallest) smallest = std::max(*smallest, *least_alone + alone.handle_mass_kg);
   controller::refuse_unstable_pose(mass_kg, inertia_kg_m2, smallest);
 }

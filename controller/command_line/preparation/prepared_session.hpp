@@ -36,15 +36,17 @@ controller::HandModel hand_model(const PreparedSession& session);
 // The same of the tool's rotation, in Nm/rad, Nms/rad and kg m².
 controller::HandModel turning_hand_model(const PreparedSession& session);
 controller::LoopModel turning_loop(const PreparedSession& session);
-// Both at once, in the start pose, free and where the tool touches with its ends. Precondition: the orientation is
-// free.
-controller::PoseLoop pose_loop(const PreparedSession& session);
-// The swing of such a loop that is damped least. Absent: the tool isn't turned, or it isn't stable.
+// Both at once, as pose_loop_at() takes it, free and where the tool touches with its ends. Absent: the hand doesn't
+// turn the tool.
+std::optional<controller::PoseLoopModel> turned_model(const PreparedSession& session);
+// The swing of that loop in the start pose that is damped least. Absent: the tool isn't turned, or it isn't stable.
 std::optional<controller::Swing> least_damped_swing(const PreparedSession& session);
 // What the hand feels, the tool behind the sensor included. Precondition: the orientation is free.
 double felt_inertia_kg_m2(const PreparedSession& session);
 
-// The loop in all poses that the hand means to lead the arm to, whatever the scene has in its way.
+// The poses that the hand means to lead the arm to, beginning with the start, whatever the scene has in its way.
+std::vector<models::JointVector> led_poses(const PreparedSession& session);
+// The loop in all of them.
 controller::LoopModel led_loop(const PreparedSession& session);
 
 // The longest horizon of a lookahead that is stable with margins for the session's mass and loop.

@@ -76,7 +76,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
       deriver_(session.cell) {
   refuse_lost_plot();
   if (!session.impedance()) {
-    poses_ = std::make_unique<controller::PassedPoses>(deriver_.arm(), session.cell, hand_model(session), session.loop);
+    poses_ = std::make_unique<controller::PassedPoses>(deriver_.arm(), session.cell, hand_model(session), session.loop,
+                                                       turned_model(session));
   }
   swing_ = least_damped_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
@@ -200,26 +201,22 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
-namespace {
-controller::PosesSummary poses_summary(const controller::PassedPoses& poses) {
-  controller::PosesSummary summary{.judged = poses.judged(), .unstable = {}};
-  if (!poses.unstable()) return summary;
-  const controller::PassedPoses::Unstable& there = *poses.unstable();
-  summary.unstable = {there.first_s, there.worst_s, there.felt_mass_kg, there.smallest_stable_mass_kg};
-  return summary;
-}
-}  // namespace
-
-// On standard error, once: at the start only the start pose was judged. Who forced an unstable mass knows.
+// On standard error: at the start only the start pose was judged. Who forced an unstable mass knows.
 void SessionOutput::judge_pose(const CycleRecord& record) {
   if (!poses_ || record.phase != controller::Phase::rendering) return;
   const auto joints_rad = [&] { return deriver_.link_rad(record); };
-  const double felt_mass_kg = record.proxy_mass_kg + session_.cell.tool.mass_kg;
-  const bool first = poses_->pass(1e-9 * static_cast<double>(record.time_ns), controller::vec3(record.tool_W_m),
-                                  felt_mass_kg, record.proxy_damping_Ns_per_m, joints_rad);
-  if (!first || options_.force_unstable) return;
-  std::fprintf(stderr, "proxarm: %s; if it swings: a larger mass, or lead it elsewhere\n",
-               controller::poses_text(poses_summary(*poses_)).c_str());
+  const bool turns = record.proxy_inertia_kg_m2 > 0.0;
+  const controller::PassedPoses::Felt felt{.mass_kg = record.proxy_mass_kg + session_.cell.tool.mass_kg,
+                                           .damping_Ns_per_m = record.proxy_damping_Ns_per_m,
+                                           .inertia_kg_m2 = record.proxy_inertia_kg_m2,
+                                           .turning_damping_Nms_per_rad = record.proxy_turning_damping_Nms_per_rad};
+  const models::ToolPose tool_W{controller::vec3(record.tool_W_m),
+                                turns ? models::Quaternion(record.proxy_q_W.data()) : models::Quaternion::Identity()};
+  const std::optional<controller::UnstablePlaces> found =
+      poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
+  if (!found || options_.force_unstable) return;
+  std::fprintf(stderr, "proxarm: %s; if it swings: a larger %s, or lead it elsewhere\n",
+               controller::poses_text(*found).c_str(), found->lacks_mass ? "mass" : "inertia or mass");
 }
 
 void SessionOutput::add(const CycleRecord& record) {
@@ -258,8 +255,8 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
   Summary summary =
       controller::session_summary(builder_, cycle, end, {.reason = cause.word, .text = cause.text}, session_);
   summary.figures_s = std::chrono::duration<double>(spent_).count();
-  if (swing_) summary.expected_swing = {swing_->frequency_Hz, swing_->tenth_s};
-  if (poses_) summary.poses = poses_summary(*poses_);
+  summary.expected_swing = swing_;
+  if (poses_) summary.poses = {.judged = poses_->judged(), .unstable = poses_->unstable()};
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
     if (order.taken && order.refusal == nullptr) continue;
     summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,

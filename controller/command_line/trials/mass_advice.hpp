@@ -3,9 +3,9 @@
 #pragma once
 
 #include <optional>
-#include <string>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/trials/trial.hpp"
 
 namespace proxarm::command_line {
 
@@ -13,14 +13,6 @@ namespace proxarm::command_line {
 // of the hand as described and of one that is stiffer and heavier, and of the delay as it is and longer.
 std::optional<double> smallest_with_margins(const controller::HandModel& hand, const controller::LoopModel& loop);
 
-// Two digits, not less.
-double rounded_up(double value);
-
-struct TriedAdvice {
-  std::optional<double> mass_kg;  // that is steady; none: of six none was
-  std::string text;
-};
-// What comes of that mass on the simulated arm. Heavier ones are tried where it isn't steady, a quarter more each time.
-TriedAdvice tried_advice(const PreparedSession& session, double mass_kg);
+TriedAdvice tried_mass(const PreparedSession& session, double mass_kg);
 
 }  // namespace proxarm::command_line

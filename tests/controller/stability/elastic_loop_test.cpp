@@ -23,6 +23,16 @@ using models::Vec3;
 using testing::ClosedLoopRig;
 using testing::RigOptions;
 
+// At the start, and where the tool is led to without being turned.
+std::vector<ElasticArm> elastic_arms(const models::Arm& arm, const description::Cell& cell,
+                                     const std::vector<Vec3>& offsets_W) {
+  std::vector<Lead> leads;
+  for (const Vec3& offset_m : offsets_W) leads.push_back({.offset_m = offset_m});
+  std::vector<ElasticArm> arms;
+  for (const models::JointVector& pose_rad : led_poses(arm, leads)) arms.push_back(elastic_arm(arm, pose_rad, cell));
+  return arms;
+}
+
 LoopModel loop_of(const description::Cell& cell, double period_s, const std::vector<Vec3>& offsets_W = {}) {
   const double pi = std::numbers::pi;
   const models::Arm arm(cell);
@@ -151,6 +161,25 @@ TEST(ElasticLoop, PosesEndAtTheEndOfTheReachAndAtSixteen) {
   for (const ElasticArm& at : elastic_arms(arm, cell, {Vec3(5.0, 0.0, 0.0), Vec3(-5.0, 0.0, 0.0)})) {
     EXPECT_TRUE(at.mass.allFinite() && at.joints_per_m.allFinite());
   }
+}
+
+TEST(ElasticLoop, ALedToolGetsWhereItIsLedAndTurnedAsItIsTurned) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  const models::Arm arm(cell);
+  const models::Pose start = arm.tool_pose(arm.start_rad());
+  const Vec3 away(0.1, 0.05, -0.02), turned(0.1, -0.3, 0.2);
+  const auto poses =
+      led_poses(arm, {{away, Vec3::Zero()}, {away, turned}, {away, 0.9 * turned}, {Vec3::Zero(), turned}});
+  ASSERT_EQ(poses.size(), 4u) << "0.9 of the turning is within 0.1 rad of it";
+  const models::Mat3 turning = Eigen::AngleAxisd(turned.norm(), turned.normalized()).toRotationMatrix();
+  const auto expect = [&](std::size_t i, const Vec3& offset, const models::Mat3& R) {
+    const models::Pose there = arm.tool_pose(poses[i]);
+    EXPECT_LT((there.translation() - start.translation() - offset).norm(), 1e-6) << i;
+    EXPECT_LT((there.linear() - R * start.linear()).norm(), 1e-6) << i;
+  };
+  expect(1, away, models::Mat3::Identity());
+  expect(2, away, turning);
+  expect(3, Vec3::Zero(), turning);
 }
 
 // What the horizon promises: of hands that it wasn't chosen for, too, and gears of 0.7 to 1.4 times what is believed,

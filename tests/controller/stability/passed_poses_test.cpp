@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "models/arm/inverse_kinematics.hpp"
@@ -55,9 +56,9 @@ class PassedPosesTest : public ::testing::Test {
   // Two cycles, since in the first the mass may have just changed.
   bool pass(PassedPoses& poses, double time_s, const Vec3& offset_W, double felt_kg) const {
     const auto joints = [&] { return joints_at(offset_W); };
-    const Vec3 tool_W_m = arm_.tool_pose(arm_.start_rad()).translation() + offset_W;
-    const bool told = poses.pass(time_s, tool_W_m, felt_kg, 0.0, joints);
-    return poses.pass(time_s, tool_W_m, felt_kg, 0.0, joints) || told;
+    const models::ToolPose tool_W{.position = arm_.tool_pose(arm_.start_rad()).translation() + offset_W};
+    const bool told = poses.pass(time_s, tool_W, {.mass_kg = felt_kg}, joints).has_value();
+    return poses.pass(time_s, tool_W, {.mass_kg = felt_kg}, joints) || told;
   }
 
   const description::Cell cell_ = description::load_cell(source_file("models/cells/default.yaml"));
@@ -76,10 +77,11 @@ TEST_F(PassedPosesTest, AMassThatIsStableAtTheStartIsToldWhereItIsNot) {
   EXPECT_FALSE(poses.unstable());
   EXPECT_TRUE(pass(poses, 2.0, away, felt_kg));
   ASSERT_TRUE(poses.unstable());
+  EXPECT_TRUE(poses.unstable()->lacks_mass);
   EXPECT_EQ(poses.unstable()->first_s, 2.0);
   EXPECT_EQ(poses.unstable()->felt_mass_kg, felt_kg);
   // The sweep's own resolution: tests/controller/stability/elastic_loop_test.cpp holds it to a per mille.
-  EXPECT_NEAR(*poses.unstable()->smallest_stable_mass_kg, away_kg, 2e-3 * away_kg);
+  EXPECT_NEAR(*poses.unstable()->smallest_stable, away_kg, 2e-3 * away_kg);
   EXPECT_FALSE(pass(poses, 3.0, Vec3(0.0, 0.25, 0.0), felt_kg)) << "it is told once";
 }
 
@@ -104,7 +106,8 @@ TEST_F(PassedPosesTest, APlaceIsJudgedOnceForEachMassAndNotWhileTheMassChanges) 
   EXPECT_EQ(poses.judged(), 3u);
   const auto joints = [&] { return arm_.start_rad(); };
   for (int cycle = 0; cycle < 100; ++cycle) {
-    poses.pass(3.0, arm_.tool_pose(arm_.start_rad()).translation(), 12.0 + 0.01 * cycle, 0.0, joints);
+    const models::ToolPose tool_W{.position = arm_.tool_pose(arm_.start_rad()).translation()};
+    poses.pass(3.0, tool_W, {.mass_kg = 12.0 + 0.01 * cycle}, joints);
   }
   EXPECT_EQ(poses.judged(), 3u);
 }
@@ -118,6 +121,98 @@ TEST_F(PassedPosesTest, AnotherTimestepIsJudgedAnew) {
   slow.delay_s = 0.026;
   poses.change(slow);
   EXPECT_TRUE(pass(poses, 2.0, Vec3::Zero(), felt_kg));
+}
+
+// A tool that is led and turned at once, at 1 ms.
+class TurnedPosesTest : public ::testing::Test {
+ protected:
+  TurnedPosesTest() {
+    loop_.period_s = 1e-3;
+    loop_.delay_s = 15e-3;
+    loop_.handle_mass_kg = cell_.tool.mass_kg;
+    turned_.place = hand_;
+    turned_.turning = {20.0, 0.5, 0.003};
+    turned_.loop = loop_;
+    turned_.touched = {{Vec3(0.0, 0.0, 0.1), Vec3(0.0, 0.0, 1.0)}};
+  }
+
+  JointVector joints_at(const Vec3& offset_W, const Vec3& turn_W) const {
+    return led_poses(arm_, {{offset_W, turn_W}}).back();
+  }
+  double least_kg_m2_at(const JointVector& joints_rad) const {
+    const PoseLoop loop = pose_loop_at(arm_, joints_rad, cell_, turned_);
+    double low = 1e-3, high = 10.0;
+    while (high > 1.0001 * low) {
+      const double middle = std::sqrt(low * high);
+      (loop.stable(mass_kg, middle) ? high : low) = middle;
+    }
+    return high;
+  }
+  std::optional<UnstablePlaces> pass(PassedPoses& poses, double time_s, const Vec3& offset_W, const Vec3& turn_W,
+                                     double inertia_kg_m2) const {
+    const auto joints = [&] { return joints_at(offset_W, turn_W); };
+    const models::Pose start = arm_.tool_pose(arm_.start_rad());
+    const models::ToolPose tool_W{start.translation() + offset_W,
+                                  models::rotation_by(turn_W) * models::Quaternion(start.linear())};
+    const PassedPoses::Felt felt{.mass_kg = mass_kg, .inertia_kg_m2 = inertia_kg_m2};
+    const std::optional<UnstablePlaces> told = poses.pass(time_s, tool_W, felt, joints);
+    return told ? told : poses.pass(time_s, tool_W, felt, joints);
+  }
+
+  static constexpr double mass_kg = 4.0;
+  const description::Cell cell_ = description::load_cell(source_file("models/cells/default.yaml"));
+  const models::Arm arm_{cell_};
+  const HandModel hand_;
+  LoopModel loop_;
+  PoseLoopModel turned_;
+};
+
+TEST_F(TurnedPosesTest, AnInertiaThatIsStableAtTheStartIsToldWhereTheToolIsTurned) {
+  const Vec3 away(0.2, 0.0, 0.0), turned(0.0, 0.4, 0.0), none = Vec3::Zero();
+  const double at_start = least_kg_m2_at(arm_.start_rad()), there = least_kg_m2_at(joints_at(away, turned));
+  ASSERT_GT(there, 1.5 * at_start);
+  PassedPoses poses(arm_, cell_, hand_, loop_, turned_);
+  const double inertia = std::sqrt(at_start * there);
+  EXPECT_FALSE(pass(poses, 1.0, none, none, inertia));
+  const std::optional<UnstablePlaces> told = pass(poses, 2.0, away, turned, inertia);
+  ASSERT_TRUE(told);
+  EXPECT_FALSE(told->lacks_mass);
+  EXPECT_EQ(told->felt_inertia_kg_m2, inertia);
+  EXPECT_NEAR(*told->smallest_stable, there, 6e-3 * there);  // smallest_inertia's own resolution
+  EXPECT_FALSE(pass(poses, 3.0, away, turned, 1.01 * there)) << "what it takes is stable there";
+}
+
+TEST_F(TurnedPosesTest, WhatAsksForHalfAsMuchAgainIsToldAnew) {
+  const Vec3 none = Vec3::Zero();
+  PassedPoses poses(arm_, cell_, hand_, loop_, turned_);
+  const double at_start = least_kg_m2_at(arm_.start_rad()), inertia = 0.9 * at_start;
+  ASSERT_TRUE(pass(poses, 1.0, none, none, inertia));
+  std::optional<UnstablePlaces> last;
+  double told = at_start;
+  for (int i = 1; i <= 8; ++i) {
+    const Vec3 away(0.025 * i, 0.0, 0.0), turned(0.0, 0.05 * i, 0.0);
+    const double there = least_kg_m2_at(joints_at(away, turned));
+    const std::optional<UnstablePlaces> now = pass(poses, 1.0 + i, away, turned, inertia);
+    if (!now) continue;
+    EXPECT_NEAR(*now->smallest_stable, there, 6e-3 * there);
+    EXPECT_GT(there, 1.49 * told);
+    EXPECT_EQ(now->first_s, 1.0);
+    EXPECT_EQ(now->worst_s, 1.0 + i);
+    told = there;
+    last = now;
+  }
+  EXPECT_TRUE(last);
+  EXPECT_TRUE(pass(poses, 20.0, none, none, 0.8 * at_start)) << "another inertia is told of anew";
+}
+
+TEST_F(TurnedPosesTest, ATurnedToolIsJudgedAnewBeyondATenthOfARadian) {
+  const Vec3 none = Vec3::Zero();
+  PassedPoses poses(arm_, cell_, hand_, loop_, turned_);
+  pass(poses, 1.0, none, none, 0.1);
+  pass(poses, 1.0, none, Vec3(0.0, 0.099, 0.0), 0.1);
+  EXPECT_EQ(poses.judged(), 1u);
+  pass(poses, 1.0, none, Vec3(0.0, 0.101, 0.0), 0.1);
+  EXPECT_EQ(poses.judged(), 2u);
 }
 
 }  // namespace

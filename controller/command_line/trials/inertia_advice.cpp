@@ -1,0 +1,67 @@
+#include "controller/command_line/trials/inertia_advice.hpp"
+
+#include <algorithm>
+#include <vector>
+
+namespace proxarm::command_line {
+namespace {
+
+using controller::HandModel;
+using controller::LoopModel;
+using controller::PoseLoopModel;
+
+// The hand in rotation, as much stiffer and heavier as it is in place.
+HandModel likewise(const HandModel& turning, const HandModel& place, const HandModel& other_place) {
+  HandModel other = turning;
+  other.stiffness_N_per_m *= other_place.stiffness_N_per_m / place.stiffness_N_per_m;
+  if (place.mass_kg > 0.0) other.mass_kg *= other_place.mass_kg / place.mass_kg;
+  return other;
+}
+
+// `least`, or what the worst of the poses asks for beyond it.
+std::optional<double> smallest_in(const PreparedSession& session, const PoseLoopModel& model,
+                                  const std::vector<models::JointVector>& poses_rad, double least_kg_m2) {
+  const models::Arm arm(session.cell);
+  const double mass_kg = session.settings.mass_kg;
+  for (const models::JointVector& pose_rad : poses_rad) {
+    const controller::PoseLoop loop = controller::pose_loop_at(arm, pose_rad, session.cell, model);
+    if (least_kg_m2 > 0.0 && loop.stable(mass_kg, least_kg_m2)) continue;
+    const std::optional<double> smallest = loop.smallest_inertia(mass_kg);
+    if (!smallest) return {};
+    least_kg_m2 = std::max(least_kg_m2, *smallest);
+  }
+  return least_kg_m2;
+}
+
+}  // namespace
+
+SmallestInertias smallest_inertias(const PreparedSession& session) {
+  const PoseLoopModel model = *turned_model(session);
+  const std::vector<models::JointVector> poses_rad = led_poses(session);
+  SmallestInertias out;
+  out.at_start = smallest_in(session, model, {poses_rad.front()}, 0.0);
+  if (out.at_start) out.everywhere = smallest_in(session, model, poses_rad, *out.at_start);
+  if (!out.everywhere) return out;
+  double worst = *out.everywhere;
+  const auto holds = [&](const HandModel& hand, const LoopModel& loop) {
+    PoseLoopModel other = model;
+    other.place = hand;
+    other.turning = likewise(model.turning, model.place, hand);
+    other.loop = loop;
+    const std::optional<double> smallest = smallest_in(session, other, poses_rad, worst);
+    worst = smallest.value_or(worst);
+    return smallest.has_value();
+  };
+  if (controller::with_margins(model.place, model.loop, holds)) out.with_margins = worst;
+  return out;
+}
+
+TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2) {
+  return try_from(inertia_kg_m2, "kg m²", [&](double kg_m2) {
+    PreparedSession other = session;
+    other.settings.rotational_inertia_kg_m2 = kg_m2;
+    return other;
+  });
+}
+
+}  // namespace proxarm::command_line
