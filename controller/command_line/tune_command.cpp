@@ -11,6 +11,7 @@
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/trials/inertia_advice.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"
+#include "controller/command_line/trials/trial.hpp"
 #include "controller/report/summary.hpp"
 #include "models/base/setup_error.hpp"
 

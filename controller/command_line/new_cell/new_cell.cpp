@@ -17,6 +17,7 @@
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"
+#include "controller/command_line/trials/trial.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/base/setup_error.hpp"

@@ -56,12 +56,4 @@ SmallestInertias smallest_inertias(const PreparedSession& session) {
   return out;
 }
 
-TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2) {
-  return try_from(inertia_kg_m2, "kg m²", [&](double kg_m2) {
-    PreparedSession other = session;
-    other.settings.rotational_inertia_kg_m2 = kg_m2;
-    return other;
-  });
-}
-
 }  // namespace proxarm::command_line

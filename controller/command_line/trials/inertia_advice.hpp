@@ -1,11 +1,10 @@
 // The inertia that `tune` advises for a tool that is led and turned at once: stable with margins by the pose loop's
-// eigenvalues, in all poses that the hand leads to, and steady on the simulated arm.
+// eigenvalues, in all poses that the hand leads to.
 #pragma once
 
 #include <optional>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/command_line/trials/trial.hpp"
 
 namespace proxarm::command_line {
 
@@ -16,7 +15,5 @@ struct SmallestInertias {
 };
 // Precondition: the session has a turned_model().
 SmallestInertias smallest_inertias(const PreparedSession& session);
-
-TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2);
 
 }  // namespace proxarm::command_line

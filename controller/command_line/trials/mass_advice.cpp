@@ -17,12 +17,4 @@ std::optional<double> smallest_with_margins(const HandModel& hand, const LoopMod
   return all ? std::optional<double>(worst) : std::nullopt;
 }
 
-TriedAdvice tried_mass(const PreparedSession& session, double mass_kg) {
-  return try_from(mass_kg, "kg", [&](double kg) {
-    PreparedSession other = session;
-    other.settings.mass_kg = kg;
-    return other;
-  });
-}
-
 }  // namespace proxarm::command_line

@@ -5,14 +5,11 @@
 #include <optional>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
-#include "controller/command_line/trials/trial.hpp"
 
 namespace proxarm::command_line {
 
 // Felt mass, handle included, at which the loop is just stable with the margins of controller::with_margins: the worst
 // of the hand as described and of one that is stiffer and heavier, and of the delay as it is and longer.
 std::optional<double> smallest_with_margins(const controller::HandModel& hand, const controller::LoopModel& loop);
-
-TriedAdvice tried_mass(const PreparedSession& session, double mass_kg);
 
 }  // namespace proxarm::command_line

@@ -32,13 +32,16 @@ double rounded_up(double value) {
   return std::ceil(value / unit * (1.0 - 1e-9)) * unit;
 }
 
-TriedAdvice try_from(double value, const char* unit, const std::function<PreparedSession(double)>& with) {
+namespace {
+TriedAdvice try_from(PreparedSession session, double controller::SessionSettings::*felt, double value,
+                     const char* unit) {
   TriedAdvice out;
   for (int tries = 0; tries < 6; ++tries, value = rounded_up(1.25 * value)) {
+    session.settings.*felt = value;
     std::array<char, 200> text{};
     bool steady = true;
     for (const double factor : {1.0, controller::hand_margin}) {
-      const Trial trial = try_out(with(value), factor);
+      const Trial trial = try_out(session, factor);
       if (trial.steady()) continue;
       const std::string what =
           trial.fault.empty() ? "swings: " + oscillation_text(trial.oscillation) : "is stopped by " + trial.fault;
@@ -50,13 +53,22 @@ TriedAdvice try_from(double value, const char* unit, const std::function<Prepare
     out.text += text.data();
     if (!steady) continue;
     std::snprintf(text.data(), text.size(), "%.3g %s is steady for %.3g s, with the stiffer and heavier hand, too",
-                  value, unit, with(value).duration_s);
+                  value, unit, session.duration_s);
     out.text += text.data();
     out.steady = value;
     return out;
   }
   out.text += "none of these is steady";
   return out;
+}
+}  // namespace
+
+TriedAdvice tried_mass(const PreparedSession& session, double mass_kg) {
+  return try_from(session, &controller::SessionSettings::mass_kg, mass_kg, "kg");
+}
+
+TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2) {
+  return try_from(session, &controller::SessionSettings::rotational_inertia_kg_m2, inertia_kg_m2, "kg m²");
 }
 
 }  // namespace proxarm::command_line

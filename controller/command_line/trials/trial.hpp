@@ -2,7 +2,6 @@
 // advises one.
 #pragma once
 
-#include <functional>
 #include <optional>
 #include <string>
 
@@ -25,9 +24,10 @@ struct TriedAdvice {
   std::optional<double> steady;  // the first that is; none: of six none was
   std::string text;
 };
-// What comes of a mass or an inertia on the simulated arm: `with` makes the session of it, `unit` is its own. Larger
-// ones are tried where it isn't steady, a quarter more each time.
-TriedAdvice try_from(double value, const char* unit, const std::function<PreparedSession(double)>& with);
+// What comes of a felt mass, or a felt inertia, on the simulated arm. Larger ones are tried where it isn't steady, a
+// quarter more each time.
+TriedAdvice tried_mass(const PreparedSession& session, double mass_kg);
+TriedAdvice tried_inertia(const PreparedSession& session, double inertia_kg_m2);
 
 // Two digits, not less.
 double rounded_up(double value);
