@@ -18,8 +18,9 @@ bool is_setpoint(const fieldbus::CanFrame& frame) {
 
 LatencySummary latency_summary(const LatencyHistogram& times) {
   LatencySummary summary{times.quantile_us(0.5), times.quantile_us(0.99), times.quantile_us(0.999), times.max_us(), {}};
-  for (std::size_t us = 0; us < times.counts().size(); ++us) {
-    if (times.counts()[us] > 0) summary.histogram.emplace_back(static_cast<int>(us), times.counts()[us]);
+  for (std::size_t bin = 0; bin < times.counts().size(); ++bin) {
+    if (times.counts()[bin] == 0) continue;
+    summary.histogram.emplace_back(static_cast<std::int64_t>(times.begin_us(bin)), times.counts()[bin]);
   }
   return summary;
 }

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -17,14 +18,14 @@
 
 namespace proxarm::controller {
 
-// Bins of a microsecond up to 4 ms, and one for all beyond.
+// Bins of a microsecond up to 4096 µs, of a sixteenth of an octave beyond, up to an hour.
 class LatencyHistogram {
  public:
-  static constexpr std::size_t bins = 4096;
+  static constexpr std::size_t fine = 4096, per_octave = 16, octaves = 20, bins = fine + per_octave * octaves;
 
   void add(std::int64_t time_ns) noexcept {
     const std::int64_t us = std::max<std::int64_t>(time_ns, 0) / 1000;
-    ++counts_[std::min(static_cast<std::size_t>(us), bins - 1)];
+    ++counts_[bin_of(static_cast<std::uint64_t>(us))];
     ++count_;
     max_ns_ = std::max(max_ns_, time_ns);
   }
@@ -37,14 +38,27 @@ class LatencyHistogram {
     for (std::size_t bin = 0; bin + 1 < bins; ++bin) {
       below += counts_[bin];
       if (static_cast<double>(below) >= share * static_cast<double>(count_)) {
-        return std::min(static_cast<double>(bin + 1), max_us());
+        return std::min(static_cast<double>(begin_us(bin + 1)), max_us());
       }
     }
     return max_us();
   }
   [[nodiscard]] const std::array<std::uint64_t, bins>& counts() const noexcept { return counts_; }
+  // Where this bin begins.
+  [[nodiscard]] static constexpr std::uint64_t begin_us(std::size_t bin) noexcept {
+    if (bin < fine) return bin;
+    const std::size_t octave = (bin - fine) / per_octave, part = (bin - fine) % per_octave;
+    return static_cast<std::uint64_t>(per_octave + part) * (fine / per_octave) << octave;
+  }
 
  private:
+  static constexpr std::size_t bin_of(std::uint64_t us) noexcept {
+    if (us < fine) return static_cast<std::size_t>(us);
+    const auto octave = static_cast<std::size_t>(std::bit_width(us / fine)) - 1;
+    const auto part = static_cast<std::size_t>(us >> octave) * per_octave / fine - per_octave;
+    return std::min(fine + per_octave * octave + part, bins - 1);
+  }
+
   std::array<std::uint64_t, bins> counts_{};
   std::uint64_t count_ = 0;
   std::int64_t max_ns_ = 0;

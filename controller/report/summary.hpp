@@ -122,7 +122,7 @@ struct ComputeTimes {
 // Of a session in real time (latency.hpp), µs.
 struct LatencySummary {
   double median = 0.0, p99 = 0.0, p999 = 0.0, max = 0.0;
-  std::vector<std::pair<int, std::uint64_t>> histogram;  // µs and how many, of bins that aren't empty
+  std::vector<std::pair<std::int64_t, std::uint64_t>> histogram;  // µs and how many, of bins that aren't empty
 };
 
 // A timestep that was asked for while the session ran.

@@ -296,6 +296,11 @@ NoInside why_no_inside(const TriangleMesh& mesh) {
   const auto at = [](const MeshDefect& defect) { return ", the first at " + place_text(defect.first_W); };
   if (!found.holes.empty()) {
     const MeshHole& largest = found.holes.back();
+    if (!(largest.size_m > 0.0)) {
+      return {"is open along an edge that faces of one side have whole and those of the other in parts, at " +
+                  place_text(largest.centre),
+              "its parts need a corner in the whole edge as well"};
+    }
     return {"is open, with a hole of " + size_text(largest.size_m) + " at " + place_text(largest.centre),
             "close_holes_m may close it"};
   }

@@ -101,6 +101,19 @@ class Ending(ProgramTest):
                 self.assertIn("plot:                     none; nothing was rendered\n", out)
                 self.assertFalse((self.folder / plot).exists())
 
+    def test_from_the_first_line_on(self):
+        """Who reads it and wants out was killed, with status -2 and no summary."""
+        for _ in range(10):
+            run = subprocess.Popen([program(), "run", "--no-plot", "--duration", "1h"], cwd=self.folder, text=True,
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   preexec_fn=defaults)
+            self.addCleanup(self.end, run)
+            self.assertIn("kg felt", run.stdout.readline())
+            run.send_signal(signal.SIGINT)
+            out, err = run.communicate(timeout=PATIENCE_S)
+            self.assertEqual((run.returncode, err), (0, ""))
+            self.assertIn("stopped: SIGINT; ", out)
+
     def test_nohup_is_obeyed(self):
         """Who starts a session so has said that the terminal's end isn't the session's."""
         run = self.start(preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))

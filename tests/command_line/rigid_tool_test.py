@@ -260,6 +260,14 @@ class RigidTool(ProgramTest):
         self.assertIn("open.yaml", told)
         self.assertIn("which is open, with a hole of ", told)
         self.assertIn("close_holes_m", told)
+        # An edge of the rim has a corner in it on one side alone: a triangle without an area would close it.
+        rim = [tuple(i + 1 for i in f) for f in faces if f != (0, 8, 4)] + [(1, 9, 10), (10, 9, 5)]
+        self.written("seam.obj", "".join("v %g %g %g\n" % c for c in corners + [(0, -10, 0)]) +
+                     "".join("f %d %d %d\n" % f for f in rim))
+        seam = self.refuse("--scene", SCENES / "wall.yaml", "--tool",
+                           self.written("seam.yaml", "mesh: {file: seam.obj, scale_m: 0.001}\n"))
+        self.assertNotIn("a hole", seam)
+        self.assertIn("open along an edge that faces of one side have whole and those of the other in parts, at x ", seam)
         # The last face turned round: every edge still has two faces.
         last = text.rsplit("f", 1)[1].split()
         self.written("flipped.obj", text.rsplit("f", 1)[0] + "f " + " ".join(last[::-1]) + "\n")

@@ -174,11 +174,11 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   keeper.set_head(replay_head(session, names_in(tap), indices));
   bring_up_devices(parts);
   report_modbus_rates(session, parts);
-  output.introduce(parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
   cycle.write_to(keeper.box());
   SignalWatch signals([&] { cycle.request_stop(); });
+  output.introduce();
   const std::unique_ptr<ControlSocket> control = take_changes(cycle, session, options, keeper.box());
   controller::LatencyMeter meter(keeper.box(), cycle.parts().sensor_bus, cycle.parts().sensor->wanted_ids());
   Drain drain(cycle.records(), tap, output, bit_rates(session.cell, indices), keeper, meter, replay.get(),

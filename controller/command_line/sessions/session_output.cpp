@@ -132,12 +132,13 @@ std::string axes_text(int axes, int dimensions) {
 }
 }  // namespace
 
-void SessionOutput::introduce(const controller::CycleParts& parts) const {
-  const double mode_Hz = parts.arm->first_elastic_frequency_Hz(parts.arm->start_rad());
+void SessionOutput::introduce() const {
+  const models::Arm& arm = deriver_.arm();
+  const double mode_Hz = arm.first_elastic_frequency_Hz(arm.start_rad());
   if (!session_.impedance()) warn_if_it_chatters(session_.cell, mode_Hz);
   if (options_.json) return;  // nothing but the summary goes to standard output then
-  const models::ToolSpace reach = models::tool_space(*parts.arm);
-  const models::TipMass tip = parts.arm->effective_mass_range(parts.arm->start_rad(), reach.dimensions);
+  const models::ToolSpace reach = models::tool_space(arm);
+  const models::TipMass tip = arm.effective_mass_range(arm.start_rad(), reach.dimensions);
   std::printf("%s, scene %s: %s, T = %.4g ms, loop delay %.3g ms\n", session_.cell.name.c_str(),
               session_.scene.name.c_str(), rendered_text(session_).c_str(), 1e3 * session_.settings.period_s,
               1e3 * total_delay_s(session_));
@@ -148,7 +149,7 @@ void SessionOutput::introduce(const controller::CycleParts& parts) const {
     std::printf("led and turned at once, about here: a swing of %.1f Hz falls to a tenth within %.2f s\n",
                 swing_->frequency_Hz, swing_->tenth_s);
   }
-  if (!session_.impedance()) std::printf("%s", axes_text(parts.arm->axes(), reach.dimensions).c_str());
+  if (!session_.impedance()) std::printf("%s", axes_text(arm.axes(), reach.dimensions).c_str());
   std::fflush(stdout);
 }
 

@@ -30,8 +30,8 @@ class SessionOutput {
   // truth.
   SessionOutput(const PreparedSession& session, const RunOptions& options, bool with_truth);
 
-  // What the user should know before the arm moves.
-  void introduce(const controller::CycleParts& parts) const;
+  // What the user should know before the arm moves. Whoever reads it may want it to end: signals are watched by then.
+  void introduce() const;
   // Adds what only the scene knows (distances, friction), and passes the record on.
   void add(const controller::CycleRecord& record);
   void add_frame(std::string_view bus, const fieldbus::CanFrame& frame, std::int64_t time_ns);

@@ -85,7 +85,6 @@ int SimulatedRun::run() {
   controller::bring_up(parts,
                        [this](fieldbus::ModbusLine& line) { controller::pump(network_, line, network_.now_ns()); });
   report_modbus_rates(session_, parts);
-  output_.introduce(parts);
   return run_cycles(std::move(parts));
 }
 
@@ -93,6 +92,7 @@ int SimulatedRun::run_cycles(controller::CycleParts parts) {
   Cycle cycle(std::move(parts), session_.settings, session_.cell.limits, record_capacity);
   cycle.write_to(keeper_.box());
   SignalWatch signals([&] { cycle.request_stop(); });
+  output_.introduce();
   const std::unique_ptr<ControlSocket> control = take_changes(cycle, session_, options_, keeper_.box());
   for (std::size_t i = 0; i < network_.bus_count(); ++i) {
     network_.simulated_bus(i).statistics().reset(network_.now_ns());

@@ -35,6 +35,20 @@ TEST(Latency, OfWhatIsLaterThanTheBinsTheLargestIsKnown) {
   EXPECT_EQ(histogram.counts()[0], 1u);
 }
 
+// Beyond 4 ms, all were in one bin, and the median of a late session was its latest cycle.
+TEST(Latency, LateCyclesHaveQuantilesToo) {
+  for (const double exact_us : {4095.0, 4096.0, 4351.5, 4352.0, 8191.9, 8192.0, 150e3, 3e9}) {
+    LatencyHistogram histogram;
+    for (int i = 0; i < 3; ++i) histogram.add(static_cast<std::int64_t>(1e3 * exact_us));
+    histogram.add(3'500'000'000'000);
+    EXPECT_GE(histogram.quantile_us(0.5), exact_us);
+    EXPECT_LE(histogram.quantile_us(0.5), (1.0 + 1.0 / 16.0) * exact_us + 1.0);
+  }
+  LatencyHistogram days;
+  days.add(std::int64_t{1} << 62);
+  EXPECT_EQ(days.quantile_us(0.5), days.max_us());
+}
+
 TEST(Latency, OfACycleIsTakenFromItsFrames) {
   BlackBox box(1e-3, 20);
   LatencyMeter meter(box, 2, {0x680, 0x681});
