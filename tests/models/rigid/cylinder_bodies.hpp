@@ -133,11 +133,12 @@ inline Vec3 nearest_of(const Can& can, const Vec3& p) {
 inline double apart(const Can& a, const Can& b, const std::vector<Vec3>& claimed) {
   double best = -std::numeric_limits<double>::infinity();
   Vec3 best_along = Vec3::UnitZ();
+  const auto left_along = [&](const Vec3& out) { return -furthest_along(b, -out) - furthest_along(a, out); };
   const auto try_along = [&](const Vec3& n) {
     const double before = best;
     if (!(n.norm() > 1e-12)) return false;
     for (const Vec3& out : {Vec3(n.normalized()), Vec3(-n.normalized())}) {
-      const double left = -furthest_along(b, -out) - furthest_along(a, out);
+      const double left = left_along(out);
       if (left > best) best_along = out;
       best = std::max(best, left);
     }
@@ -153,7 +154,21 @@ inline double apart(const Can& a, const Can& b, const std::vector<Vec3>& claimed
     x = nearest_of(a, y);
     if (k % 50 == 0) try_along(y - x);
   }
-  // Where they touch but nobody says along what, around the best one.
+  // Where they touch but nobody says along what: out of the side of either, about where they come nearest, or else
+  // around the best one. (That search alone stalls where what is best is a ridge, as along a side.)
+  for (const double sign : {1.0, -1.0}) {
+    const Can& can = sign > 0.0 ? a : b;
+    const Vec3 z = can.X.linear().col(2), away = x - can.X.translation(),
+               out = sign * (away - z * z.dot(away)).normalized();
+    const auto along = [&](double angle) { return Vec3(Eigen::AngleAxisd(angle, z) * out); };
+    double low = -0.1, high = 0.1;
+    for (int k = 0; k < 100; ++k) {
+      const double third = (high - low) / 3.0;
+      const bool rises = left_along(along(low + third)) < left_along(along(high - third));
+      (rises ? low : high) += rises ? third : -third;
+    }
+    try_along(along(0.5 * (low + high)));
+  }
   Random random(1);
   for (double step = 1e-2; step > 1e-14 && best < -1e-13; step *= 0.8) {
     for (int k = 0; k < 400; ++k) {
