@@ -53,6 +53,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       limits_(limits),
       supervision_(supervision),
       period_s_(settings.period_s),
+      tool_mass_kg_(tool_mass_kg),
       limiter_(drives_, limits, settings.period_s),
       joint_limits_(arm, drives_, settings.period_s),
       guard_(drives_, settings.period_s),
@@ -96,6 +97,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   world().start(state_.q_k1_W);
   if (sent_) sent_->start(state_.q_k1_W);
   if (passivity_) passivity_->start(measured.tool_W);
+  if (parts_.links) parts_.links->start(measured.link_rad);
   if (empty_handle_) empty_handle_->start();
   reversed_.start();
   straight_.start();
@@ -139,6 +141,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   parts_.world->set_period(period_s);
   parts_.release->set_period(period_s);
   if (passivity_) passivity_->set_period(period_s);
+  if (parts_.links) parts_.links->set_period(period_s);
   if (empty_handle_) empty_handle_->set_period(period_s);
   limiter_.set_period(period_s);
   joint_limits_.set_period(period_s);
@@ -175,6 +178,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   parts_.world->archive(state);
   parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
+  if (parts_.links) parts_.links->archive(state);
   if (empty_handle_) empty_handle_->archive(state);
   if (sent_) sent_->archive(state);
   state(parts_.elastic, parts_.orientation, guard_, tool_guard_, envelope_, reversed_, straight_,
@@ -188,7 +192,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
 bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   const Measured& measured = cycle.measured;
   make_limits(cycle);
-  if (passivity_) parts_.world->add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
+  if (passivity_) observe_hand(measured);
   let_force_in(cycle.record);
   const models::Wrench h_W = acting_wrench_W(cycle);
   if (parts_.pose != nullptr) parts_.pose->set_torque_W(h_W.torque);
@@ -356,8 +360,44 @@ void AdmittanceMotion::count_work(const WorldStep& step) noexcept {
   work_.guarded = tool_guard_.judged_exactly();
 }
 
+// ρ² of what is felt, with the tool behind the sensor; 0 before the first step.
+double AdmittanceMotion::gyration_m2() const noexcept {
+  return state_.mass_kg > 0.0 ? parts_.orientation.config().inertia_kg_m2 / (state_.mass_kg + tool_mass_kg_) : 0.0;
+}
+
+void AdmittanceMotion::observe_hand(const Measured& measured) noexcept {
+  if (!parts_.links) {
+    return parts_.world->add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
+  }
+  const double rho2 = gyration_m2();
+  const double added =
+      passivity_->observe_hand(measured.hand_W, parts_.links->step(measured.link_rad, measured.hand_W), rho2);
+  parts_.world->add_damping(added);
+  if (pose() != nullptr) return pose()->add_turning_damping(rho2 * added);
+  parts_.orientation.add_damping(rho2 * added);
+}
+
+void AdmittanceMotion::observe_proxy(const WorldStep& step) noexcept {
+  const Vec3 force_W = step.f_W + step.limit_force_W;
+  if (!parts_.links) return passivity_->observe_proxy(step.v_W, force_W, step.mass_kg, step.damping_Ns_per_m);
+  const OrientationProxy& turns = parts_.orientation;
+  const bool rigid = parts_.pose != nullptr;
+  TurningPort port{.kinetic_J = rigid ? parts_.pose->kinetic_J()
+                                      : 0.5 * step.mass_kg * step.v_W.squaredNorm() + turns.kinetic_J(),
+                   .damping_Ns_per_m = step.damping_Ns_per_m,
+                   .turning_damping_Nms_per_rad =
+                       rigid ? parts_.pose->turning_damping_Nms_per_rad() : turns.damping_Nms_per_rad()};
+  port.velocity_W << step.v_W, turns.velocity_W();
+  port.world_W << force_W, rigid ? Vec3(step.torque_W + step.limit_torque_W) : turns.limit_torque_W();
+  passivity_->observe_proxy(port);
+}
+
 void AdmittanceMotion::record_passivity(const WorldStep& step, CycleRecord& record) noexcept {
-  passivity_->observe_proxy(step.v_W, step.f_W + step.limit_force_W, step.mass_kg, step.damping_Ns_per_m);
+  observe_proxy(step);
+  if (parts_.links) {
+    record.links_W_m = triple(passivity_->moved_W().head<3>());
+    record.links_W_rad = triple(passivity_->moved_W().tail<3>());
+  }
   record.energies_J = passivity_->energies_J();
   record.added_damping_Ns_per_m = passivity_->added_damping_Ns_per_m();
   record.oscillation_m_per_s = passivity_->oscillation_m_per_s();

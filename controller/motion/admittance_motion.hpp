@@ -111,6 +111,9 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] models::Vec3 moving_force_W(const models::Vec3& force_W) const noexcept;
   void advance_proxy(const models::Vec3& q_W) noexcept;
   void count_work(const WorldStep& step) noexcept;
+  void observe_hand(const Measured& measured) noexcept;
+  [[nodiscard]] double gyration_m2() const noexcept;
+  void observe_proxy(const WorldStep& step) noexcept;
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;
   void shorten_step(const models::JointVector& link_k1_rad, const models::Vec3& reached_k1_W) noexcept;
@@ -127,7 +130,7 @@ class AdmittanceMotion final : public Motion {
   std::vector<description::DriveDescription> drives_;
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
-  double period_s_;
+  double period_s_, tool_mass_kg_;
   models::Mat3 R_TS_;                           // of the sensor in the tool
   std::optional<PassivityObserver> passivity_;  // nullopt: not wanted
   std::optional<EmptyHandle> empty_handle_;     // nullopt: the proxy coasts

@@ -15,6 +15,7 @@
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/torque_rendering.hpp"
 #include "controller/setpoints/elastic_setpoint.hpp"
+#include "controller/stability/link_motion.hpp"
 #include "controller/supervision/enabling_input.hpp"
 #include "fieldbus/can/can_network.hpp"
 #include "fieldbus/canopen/canopen_heartbeat.hpp"
@@ -51,6 +52,7 @@ struct AdmittanceParts {
   PoseWorld* pose;  // the same world, where a rigid tool is rendered; null: a point
   OrientationProxy orientation;
   models::Mat3 behind_sensor_T;  // inertia of the tool behind the sensor, as in OrientationConfig
+  std::optional<LinkMotion> links;  // of a tool that turns, for its passivity observer
   std::unique_ptr<Release> release;
 };
 

@@ -77,6 +77,16 @@ void OrientationProxy::set_damping(double damping_Nms_per_rad) noexcept {
   if (is_not_negative(damping_Nms_per_rad)) config_.damping_Nms_per_rad = damping_Nms_per_rad;
 }
 
+void OrientationProxy::add_damping(double damping_Nms_per_rad) noexcept {
+  if (is_not_negative(damping_Nms_per_rad)) added_ = damping_Nms_per_rad;
+}
+
+double OrientationProxy::kinetic_J() const noexcept {
+  const Mat3 R = R_WT_.toRotationMatrix();
+  const Vec3 omega_T = R.transpose() * omega_W_;
+  return 0.5 * (config_.inertia_kg_m2 * omega_T.squaredNorm() - omega_T.dot(config_.behind_sensor_T * omega_T));
+}
+
 // K'φ' = Kφ keeps the torque when K becomes K'. A spring that becomes softer throws nobody, so its reference stays.
 void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
   if (!is_not_negative(spring_Nm_per_rad)) return;
@@ -90,8 +100,8 @@ void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
 // With the default damping, J/D is `braking_s` already, and nothing is added.
 Vec3 OrientationProxy::braking_torque_W() const noexcept {
   const double wanted = config_.inertia_kg_m2 / braking_s;
-  if (!(wanted > config_.damping_Nms_per_rad)) return Vec3::Zero();
-  return -(wanted - config_.damping_Nms_per_rad) * omega_W_;
+  if (!(wanted > damping_Nms_per_rad())) return Vec3::Zero();
+  return -(wanted - damping_Nms_per_rad()) * omega_W_;
 }
 
 void OrientationProxy::return_reference() noexcept {
@@ -101,8 +111,15 @@ void OrientationProxy::return_reference() noexcept {
   R_ref_ = left <= step ? R_start_ : (rotation(step / left * way) * R_ref_).normalized();
 }
 
+Mat3 OrientationProxy::impedance_W() const noexcept {
+  const double T = config_.period_s;
+  const Mat3 R = R_WT_.toRotationMatrix(), I = R * config_.behind_sensor_T * R.transpose();
+  const double isotropic = config_.inertia_kg_m2 + T * damping_Nms_per_rad() + T * T * config_.spring_Nm_per_rad;
+  return isotropic * Mat3::Identity() - I;
+}
+
 Vec3 OrientationProxy::next_velocity(const Vec3& torque_W_Nm) noexcept {
-  const double J = config_.inertia_kg_m2, D = config_.damping_Nms_per_rad, T = config_.period_s;
+  const double J = config_.inertia_kg_m2, D = damping_Nms_per_rad(), T = config_.period_s;
   const double K = config_.spring_Nm_per_rad;
   if (K == 0.0 && config_.behind_sensor_T.isZero(0.0)) return (J * omega_W_ + T * torque_W_Nm) / (J + T * D);
   const Mat3 R = R_WT_.toRotationMatrix(), I = R * config_.behind_sensor_T * R.transpose();
@@ -118,6 +135,7 @@ ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
   if (config_.spring_Nm_per_rad > 0.0) return_reference();
   Vec3 omega = next_velocity(torque_W_Nm);
   if (!std::isfinite(omega.norm())) return ProxyFault::result_not_finite;
+  const Vec3 unlimited = omega;
 
   const double fastest = speed_share_ * config_.max_speed_rad_per_s;
   const bool too_fast = omega.norm() > fastest;
@@ -134,6 +152,8 @@ ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
     R = (rotation(reachable_rad / phi.norm() * phi) * R_start_).normalized();
     omega = rotation_vector(R * R_WT_.conjugate()) / T;
   }
+  limit_torque_W_.setZero();
+  if (too_fast || too_far) limit_torque_W_ = impedance_W() * (omega - unlimited) / T;
   R_WT_ = R;
   omega_W_ = omega;
   speed_limited_ = too_fast;

@@ -64,6 +64,8 @@ class OrientationProxy {
   void set_inertia(double inertia_kg_m2, const models::Mat3& behind_sensor_T) noexcept;
   void set_damping(double damping_Nms_per_rad) noexcept;
   void set_spring(double spring_Nm_per_rad) noexcept;
+  // Damping beside D from the next step on (passivity.hpp).
+  void add_damping(double damping_Nms_per_rad) noexcept;
   // The torque of a damping that brings the tool to rest within `braking_s`, for the next step: beyond its own D.
   // Precondition: nobody holds the handle.
   [[nodiscard]] models::Vec3 braking_torque_W() const noexcept;
@@ -74,12 +76,17 @@ class OrientationProxy {
 
   [[nodiscard]] const Eigen::Quaterniond& R_WT() const noexcept { return R_WT_; }
   [[nodiscard]] const models::Vec3& velocity_W() const noexcept { return omega_W_; }  // rad/s, mean over the last step
+  // D of a step, with what was added.
+  [[nodiscard]] double damping_Nms_per_rad() const noexcept { return config_.damping_Nms_per_rad + added_; }
+  [[nodiscard]] double kinetic_J() const noexcept;
+  // By which limits held the last step back.
+  [[nodiscard]] const models::Vec3& limit_torque_W() const noexcept { return limit_torque_W_; }
   [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }        // in the last step
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
   [[nodiscard]] const OrientationConfig& config() const noexcept { return config_; }
   void archive(fieldbus::StateArchive& state) noexcept {
     state(R_WT_, R_start_, R_ref_, omega_W_, speed_share_, started_, config_.inertia_kg_m2, config_.behind_sensor_T,
-          config_.damping_Nms_per_rad, config_.spring_Nm_per_rad);
+          config_.damping_Nms_per_rad, config_.spring_Nm_per_rad, added_);
   }
 
   // How far from the start the next step may lead, from `angle_rad` away.
@@ -93,6 +100,8 @@ class OrientationProxy {
   static constexpr double braking_s = 0.1;            // J/D with the default inertia and damping
 
  private:
+  // J + T D + T² K, less what hangs behind the sensor.
+  [[nodiscard]] models::Mat3 impedance_W() const noexcept;
   [[nodiscard]] models::Vec3 next_velocity(const models::Vec3& torque_W_Nm) noexcept;
   void return_reference() noexcept;
 
@@ -100,8 +109,8 @@ class OrientationProxy {
   Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();
   Eigen::Quaterniond R_start_ = Eigen::Quaterniond::Identity();
   Eigen::Quaterniond R_ref_ = Eigen::Quaterniond::Identity();
-  models::Vec3 omega_W_ = models::Vec3::Zero();
-  double speed_share_ = 1.0;
+  models::Vec3 omega_W_ = models::Vec3::Zero(), limit_torque_W_ = models::Vec3::Zero();
+  double speed_share_ = 1.0, added_ = 0.0;
   bool started_ = false;
   bool speed_limited_ = false, angle_limited_ = false;
 };

@@ -70,6 +70,10 @@ class PoseProxy {
   [[nodiscard]] const models::Mat6& K() const noexcept { return K_; }
   [[nodiscard]] double time_s() const noexcept { return time_s_; }
   [[nodiscard]] const PoseConfig& config() const noexcept { return config_; }
+  // ½ of the last step's velocity times M₆ times it.
+  [[nodiscard]] double kinetic_J() const noexcept {
+    return 0.5 * move_.dot(mass_W_ * move_) / (config_.period_s * config_.period_s);
+  }
   [[nodiscard]] const models::ToolPose& reference() const noexcept { return reference_; }
   void set_reference(const models::ToolPose& reference) noexcept { reference_ = reference; }
 

@@ -136,6 +136,7 @@ struct CycleRecord {
 
   // Of PassivityObserver, where it is wanted.
   PortEnergies energies_J{};
+  Triple links_W_m{}, links_W_rad{};  // of a tool that turns: by its links, since rendering began
   double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
 
   std::int64_t refused_period_ns = 0;          // a timestep that was given up in this cycle; 0: none

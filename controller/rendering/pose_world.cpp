@@ -36,7 +36,8 @@ PoseWorld::PoseWorld(std::unique_ptr<models::PoseAlgorithm> g, scenes::CompiledS
       changes_(scene, config.proxy.period_s),
       limits_(no_world_),
       proxy_(config_.proxy, *g_),
-      damping_Ns_per_m_(config_.proxy.damping_Ns_per_m) {}
+      damping_Ns_per_m_(config_.proxy.damping_Ns_per_m),
+      turning_damping_Nms_per_rad_(config_.proxy.turning_damping_Nms_per_rad) {}
 
 void PoseWorld::turn_to(const Eigen::Quaterniond& R_WT, const Vec3& omega_W) noexcept {
   R_WT_ = R_WT;
@@ -136,8 +137,9 @@ void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept 
   last_.p_hat_W = p_hat.position;
   last_.f_W = proxy_.wrench_W().head<3>();
   last_.torque_W = proxy_.wrench_W().tail<3>();
-  const Twist held_back = models::difference(limited, p_hat);
-  last_.limit_force_W = (proxy_.K() * held_back).head<3>();
+  const Twist held_back = proxy_.K() * models::difference(limited, p_hat);
+  last_.limit_force_W = held_back.head<3>();
+  last_.limit_torque_W = held_back.tail<3>();
   last_.limits = limits_.active();
   last_.soft_limits_met = limits_.soft_limits_met();
   last_.v_W = proxy_.move().head<3>() / proxy_.config().period_s;
@@ -183,8 +185,9 @@ void PoseWorld::set(const Change& change) noexcept {
       changed.inertia_kg_m2 = change.value;
       break;
     case Parameter::turning_damping:
-      changed.turning_damping_Nms_per_rad = change.value;
-      break;
+      changed.turning_damping_Nms_per_rad = change.value + added_Nms_per_rad_;
+      if (proxy_.set(changed)) turning_damping_Nms_per_rad_ = change.value;
+      return;
     case Parameter::spring:
       changed.spring_N_per_m = change.value;
       return set_springs(changed);
@@ -221,9 +224,17 @@ void PoseWorld::add_damping(double damping_Ns_per_m) noexcept {
   }
 }
 
+void PoseWorld::add_turning_damping(double damping_Nms_per_rad) noexcept {
+  PoseConfig changed = proxy_.config();
+  changed.turning_damping_Nms_per_rad = turning_damping_Nms_per_rad_ + damping_Nms_per_rad;
+  if (changed.turning_damping_Nms_per_rad == proxy_.config().turning_damping_Nms_per_rad || proxy_.set(changed)) {
+    added_Nms_per_rad_ = damping_Nms_per_rad;
+  }
+}
+
 void PoseWorld::archive(fieldbus::StateArchive& state) noexcept {
   state(proxy_, torque_W_, omega_W_, R_WT_, home_.position, home_.orientation, last_.q_W, damping_Ns_per_m_,
-        added_Ns_per_m_, speed_share_, started_, no_room_);
+        added_Ns_per_m_, turning_damping_Nms_per_rad_, added_Nms_per_rad_, speed_share_, started_, no_room_);
   changes_.archive(state);
 }
 

@@ -37,6 +37,12 @@ class PoseWorld final : public RenderedWorld {
   void turn_to(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
   // A share of the speed limit of turning, from 0 to 1.
   void limit_turning(double share) noexcept { speed_share_ = share; }
+  // As add_damping(), of turning.
+  void add_turning_damping(double damping_Nms_per_rad) noexcept;
+  [[nodiscard]] double turning_damping_Nms_per_rad() const noexcept {
+    return proxy_.config().turning_damping_Nms_per_rad;
+  }
+  [[nodiscard]] double kinetic_J() const noexcept { return proxy_.kinetic_J(); }
   [[nodiscard]] const Eigen::Quaterniond& orientation() const noexcept { return proxy_.q().orientation; }
   [[nodiscard]] models::Vec3 angular_velocity_W() const noexcept {
     return proxy_.move().tail<3>() / proxy_.config().period_s;
@@ -78,6 +84,7 @@ class PoseWorld final : public RenderedWorld {
   Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()
   models::ToolPose home_;                                     // of the first start
   double damping_Ns_per_m_, added_Ns_per_m_ = 0.0, speed_share_ = 1.0;
+  double turning_damping_Nms_per_rad_, added_Nms_per_rad_ = 0.0;
   bool started_ = false, turning_limited_ = false;
   bool no_room_ = false;  // the tool was to start inside of something
 };

@@ -44,6 +44,7 @@ struct WorldStep {
   ActiveLimits limits;                                // that held the proxy back
   bool soft_limits_met = true;                        // whether leash and power were satisfied
   models::Vec3 limit_force_W = models::Vec3::Zero();  // the limits' force on the proxy; not in f_W
+  models::Vec3 limit_torque_W = models::Vec3::Zero();  // likewise; of a rigid tool
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // M and B of this step
   bool settled = false;  // the start was moved to where the scene allows it; the proxy rests there
   ProxyFault fault = ProxyFault::none;

@@ -8,6 +8,7 @@
 #include "controller/record/flag_words.hpp"
 #include "controller/record/setpoint_hash.hpp"
 #include "controller/report/apparent_mass.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -115,6 +116,7 @@ struct SummaryBuilder::State {
   void count_limit(const std::string& parameter, RecordFlag flag, const CycleRecord& record);
   void track(const CycleRecord& record);
   void observe(const CycleRecord& record);
+  [[nodiscard]] OscillationWatch::Cycle swing(const CycleRecord& record);
   void follow_changes(const CycleRecord& record);
   void follow_timestep(const CycleRecord& record);
   void take_period(std::int64_t period_ns);
@@ -134,6 +136,8 @@ struct SummaryBuilder::State {
   std::optional<Eigen::Quaterniond> R0;  // where rendering began
   double inertia_kg_m2 = 0.0;            // of the proxy, in the record before
   OscillationWatch oscillation;
+  std::optional<Eigen::Quaterniond> R_k1;  // of the steel, where it turns, in the record before,
+  Vec3 turned_W = Vec3::Zero();            // and the sum of its angles
   Slide sliding;
   double contact_s = 0.0;  // how long the contact has lasted
   // Whole periods, so that no sum of them rounds.
@@ -264,14 +268,32 @@ void SummaryBuilder::State::observe(const CycleRecord& record) {
   p.oscillation_max_m_per_s = std::max(p.oscillation_max_m_per_s, record.oscillation_m_per_s);
   p.added_damping_max_Ns_per_m = std::max(p.added_damping_max_Ns_per_m, record.added_damping_Ns_per_m);
   if (record.added_damping_Ns_per_m >= noticeable_Ns_per_m) p.added_time_s += config.period_s;
-  const Triple& tool = record.has(RecordFlag::truth) ? record.true_tool_W_m : record.tool_W_m;
-  oscillation.add(seconds(record.time_ns), config.period_s,
-                  {.oscillates = record.has(RecordFlag::oscillation),
-                   .lasts = record.has(RecordFlag::oscillation_lasts),
-                   .tool_W = vec3(tool)});
+  oscillation.add(seconds(record.time_ns), config.period_s, swing(record));
   if (!record.has(RecordFlag::oscillation)) return;
   p.oscillating_time_s += config.period_s;
   p.felt_damping_min_Ns_per_m = std::min(p.felt_damping_min_Ns_per_m, record.felt_damping_Ns_per_m);
+}
+
+// By the truth where there is one. Else the links of a tool that turns are those that the controller takes them for; of
+// another one the encoders tell.
+OscillationWatch::Cycle SummaryBuilder::State::swing(const CycleRecord& record) {
+  const bool truth = record.has(RecordFlag::truth);
+  OscillationWatch::Cycle cycle{.oscillates = record.has(RecordFlag::oscillation),
+                                .lasts = record.has(RecordFlag::oscillation_lasts),
+                                .tool_W = vec3(truth ? record.true_tool_W_m : record.tool_W_m)};
+  if (!(record.proxy_inertia_kg_m2 > 0.0 && record.proxy_mass_kg > 0.0)) return cycle;
+  cycle.turns = true;
+  cycle.gyration_m2 = record.proxy_inertia_kg_m2 / record.proxy_mass_kg;
+  if (!truth) {
+    cycle.tool_W = vec3(record.links_W_m);
+    cycle.turned_W = vec3(record.links_W_rad);
+    return cycle;
+  }
+  const Eigen::Quaterniond R(record.true_tool_q_W.data());
+  if (R_k1) turned_W += models::rotation_vector(R * R_k1->conjugate());
+  R_k1 = R;
+  cycle.turned_W = turned_W;
+  return cycle;
 }
 
 void SummaryBuilder::State::penetrate(const CycleRecord& record) {

@@ -71,6 +71,7 @@ Json oscillation(const std::optional<Oscillation>& summary) {
           {"duration_s", summary->duration_s},
           {"frequency_Hz", summary->frequency_Hz},
           {"amplitude_m", summary->amplitude_m},
+          {"amplitude_rad", summary->amplitude_rad ? Json(*summary->amplitude_rad) : Json(nullptr)},
           {"lasts", summary->lasts}};
 }
 
@@ -373,7 +374,9 @@ void tell_motion(const Summary& s, Lines& line) {
 }  // namespace
 
 std::string oscillation_text(const Oscillation& o) {
-  return format("%.3g Hz, ", o.frequency_Hz) + length(o.amplitude_m) +
+  const std::string angle =
+      o.amplitude_rad ? format(" and %.2g°", *o.amplitude_rad * 180.0 / std::numbers::pi) : std::string();
+  return format("%.3g Hz, ", o.frequency_Hz) + length(o.amplitude_m) + angle +
          format(" to either side, for %.2f s ", o.duration_s) + format("from %.2f s on", o.from_s);
 }
 
@@ -396,7 +399,8 @@ void tell_oscillation(const Summary& s, Lines& line) {
   if (s.oscillation->duration_s == 0.0) return line("oscillation", "none");
   line(s.oscillation->lasts ? "OSCILLATION" : "oscillation", oscillation_text(*s.oscillation));
   if (!s.oscillation->lasts) return;
-  line("", "the loop isn't stable with this hand and arm: a larger mass or damping, a shorter timestep,");
+  const char* larger = s.oscillation->amplitude_rad ? "mass, inertia or damping" : "mass or damping";
+  line("", std::string("the loop isn't stable with this hand and arm: a larger ") + larger + ", a shorter timestep,");
   line("", "a longer setpoint filter; `proxarm tune` says which mass, and `damping added` what --passivity did");
 }
 

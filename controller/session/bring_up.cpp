@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "controller/stability/elastic_loop.hpp"
 #include "controller/supervision/drive_monitor.hpp"
 #include "fieldbus/budget/identifier_check.hpp"
 #include "fieldbus/canopen/canopen_pdo.hpp"
@@ -214,6 +215,19 @@ std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes
   return std::make_unique<PoseWorld>(std::move(g), scene, pose_config(cell, settings));
 }
 
+// What the passivity observer of a tool that turns looks at.
+std::optional<LinkMotion> make_links(const description::Cell& cell, const models::Arm& arm,
+                                     const SessionSettings& settings) {
+  if (settings.orientation != OrientationMode::free || settings.passivity == Passivity::off) return std::nullopt;
+  const ElasticArm elastic = elastic_arm(arm, arm.start_rad(), cell);
+  return LinkMotion(arm,
+                    {.stiffness = elastic.stiffness,
+                     .damping = elastic.damping,
+                     .behind_sensor = models::tool_inertia(cell.tool),
+                     .force_age_s = settings.force_age_s},
+                    settings.period_s);
+}
+
 ImpedanceConfig impedance_config(const SessionSettings& settings) {
   return {.stiffness_N_per_m = settings.coupling_stiffness_N_per_m,
           .damping_Ns_per_m = settings.coupling_damping_Ns_per_m,
@@ -241,6 +255,7 @@ decltype(CycleParts::rendering) build_rendering(const description::Cell& cell, s
                          .pose = pose,
                          .orientation = OrientationProxy(orientation_config(cell, settings)),
                          .behind_sensor_T = models::tool_inertia(cell.tool).about_T_kg_m2,
+                         .links = make_links(cell, arm, settings),
                          .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
 }
 

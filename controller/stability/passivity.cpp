@@ -6,6 +6,7 @@
 
 namespace proxarm::controller {
 
+using models::Twist;
 using models::Vec3;
 
 namespace {
@@ -14,24 +15,6 @@ namespace {
 constexpr double kept_share = 0.5, died_away = 1.0 / 16.0;
 
 }  // namespace
-
-// Bilinear transform of the all-pass: s = (2/T)(1 − z⁻¹)/(1 + z⁻¹), with c = 2τ/T:
-//   a₀ = c² + 6c + 12,   a₁ = (24 − 2c²)/a₀,   a₂ = (c² − 6c + 12)/a₀
-void PassivityObserver::Delay::design(double delay_s, double period_s) noexcept {
-  const double c = 2.0 * delay_s / period_s;
-  acts = c >= 1.0;
-  const double a0 = c * c + 6.0 * c + 12.0;
-  a1 = (24.0 - 2.0 * c * c) / a0;
-  a2 = (c * c - 6.0 * c + 12.0) / a0;
-}
-
-Vec3 PassivityObserver::Delay::step(const Vec3& in) noexcept {
-  if (!acts) return in;
-  const Vec3 out = a2 * in + s1;
-  s1 = s2 + a1 * (in - out);
-  s2 = in - a2 * out;
-  return out;
-}
 
 // Bilinear transform, prewarped so that the corner frequency is kept: Ω = tan(π f T), and per section, of quality Q,
 //   H(z) = (1 − z⁻¹)²/(1 + Ω/Q + Ω²) / (1 + a₁z⁻¹ + a₂z⁻²)
@@ -70,23 +53,30 @@ void PassivityObserver::set_period(double period_s) noexcept {
   period_s_ = period_s;
   average_ = 1.0 - std::exp(-period_s / config_.average_s);
   delay_.design(config_.force_age_s, period_s);
-  force_.design(config_.low_Hz, period_s);
-  motion_.design(config_.low_Hz, period_s);
-  place_.design(config_.low_Hz, period_s);
+  for (HighPass* filter : {&force_, &torque_}) filter->design(config_.low_Hz, period_s);
+  for (View* view : {&seen_, &motors_}) {
+    for (HighPass* filter : {&view->motion, &view->place, &view->turning, &view->angle}) {
+      filter->design(config_.low_Hz, period_s);
+    }
+  }
 }
 
 void PassivityObserver::start(const Vec3& tool_W) noexcept {
-  delay_.s1.setZero();
-  delay_.s2.setZero();
+  delay_.reset(Vec3::Zero());
   force_.reset();
-  motion_.reset();
-  place_.reset();
+  torque_.reset();
+  for (View* view : {&seen_, &motors_}) {
+    for (HighPass* filter : {&view->motion, &view->place, &view->turning, &view->angle}) filter->reset();
+    view->moved_W.setZero();
+    view->power = view->band = view->all = view->square = 0.0;
+    view->tank = config_.tank_J;
+  }
   start_W_ = tool_k1_ = tool_W;
   h_.setZero();
   h_k1_.setZero();
-  power_ = band_ = all_ = square_ = force_square_ = added_ = remembered_s_ = 0.0;
+  torque_W_.setZero();
+  force_square_ = added_ = remembered_s_ = 0.0;
   spell_ = {};
-  tank_ = config_.tank_J;
   release_s_ = config_.release_s;
   oscillates_ = false;
   energies_ = {};
@@ -99,15 +89,61 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
   const Vec3 step = delay_.step(tool_W - tool_k1_), velocity = step / period_s_;
   tool_k1_ = tool_W;
   energies_.hand += 0.5 * (h_ + h_k1_).dot(step);
-  const Vec3 force = force_.step(h_), motion = motion_.step(velocity);
-  power_ += average_ * (force.dot(motion) - power_);
-  band_ += average_ * (motion.squaredNorm() - band_);
-  all_ += average_ * (velocity.squaredNorm() - all_);
-  tank_ = std::clamp(tank_ + period_s_ * (power_ + config_.refill_W), -config_.tank_J, config_.tank_J);
+  const Vec3 force = force_.step(h_), motion = seen_.motion.step(velocity);
+  take(seen_, {.power = force.dot(motion),
+               .band = motion.squaredNorm(),
+               .all = velocity.squaredNorm(),
+               .square = seen_.place.step(tool_W - start_W_).squaredNorm()});
+  return judge(force.squaredNorm());
+}
+
+double PassivityObserver::observe_hand(const models::Wrench& h_W, const ToolMove& move, double gyration_m2) noexcept {
+  const bool finite = h_W.force.allFinite() && h_W.torque.allFinite() && move.links_W.allFinite() &&
+                      move.motors_W.allFinite();
+  if (!finite) return added_;
+  gyration_m2_ = gyration_m2;
+  h_k1_ = h_;
+  h_ = h_W.force;
+  const Vec3 torque_k1 = torque_W_;
+  torque_W_ = h_W.torque;
+  energies_.hand +=
+      0.5 * ((h_ + h_k1_).dot(move.links_W.head<3>()) + (torque_W_ + torque_k1).dot(move.links_W.tail<3>()));
+  const Vec3 force = force_.step(h_), torque = torque_.step(torque_W_);
+  take(seen_, look(seen_, move.links_W, force, torque));
+  take(motors_, look(motors_, move.motors_W, force, torque));
+  return judge(force.squaredNorm() + torque.squaredNorm() / (config_.grip_m * config_.grip_m));
+}
+
+PassivityObserver::Moment PassivityObserver::look(View& view, const Twist& move_W, const Vec3& force,
+                                                  const Vec3& torque) const noexcept {
+  view.moved_W += move_W;
+  const Vec3 velocity = move_W.head<3>() / period_s_, omega = move_W.tail<3>() / period_s_;
+  const Vec3 motion = view.motion.step(velocity), turning = view.turning.step(omega);
+  const Vec3 place = view.place.step(view.moved_W.head<3>()), angle = view.angle.step(view.moved_W.tail<3>());
+  const double rho2 = gyration_m2_;
+  return {.power = force.dot(motion) + torque.dot(turning),
+          .band = motion.squaredNorm() + rho2 * turning.squaredNorm(),
+          .all = velocity.squaredNorm() + rho2 * omega.squaredNorm(),
+          .square = place.squaredNorm() + rho2 * angle.squaredNorm()};
+}
+
+void PassivityObserver::take(View& view, const Moment& now) const noexcept {
+  view.power += average_ * (now.power - view.power);
+  view.band += average_ * (now.band - view.band);
+  view.all += average_ * (now.all - view.all);
+  view.square += average_ * (now.square - view.square);
+  view.tank =
+      std::clamp(view.tank + period_s_ * (view.power + config_.refill_W), -config_.tank_J, config_.tank_J);
+}
+
+bool PassivityObserver::gives(const View& view) const noexcept {
+  return view.tank < 0.0 && view.power < -config_.refill_W && view.band > config_.share * view.all;
+}
+
+double PassivityObserver::judge(double force_square) noexcept {
   const bool did = oscillates_;
-  square_ += average_ * (place_.step(tool_W - start_W_).squaredNorm() - square_);
-  force_square_ += average_ * (force.squaredNorm() - force_square_);
-  oscillates_ = shakes() || (tank_ < 0.0 && power_ < -config_.refill_W && band_ > config_.share * all_);
+  force_square_ += average_ * (force_square - force_square_);
+  oscillates_ = shakes() || gives(seen_) || gives(motors_);
   follow_spell();
   if (damping_ != Damping::never) follow_damping(oscillates_ && !did);
   return added_;
@@ -115,7 +151,7 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
 
 bool PassivityObserver::shakes() const noexcept {
   const double omega = 2.0 * std::numbers::pi * config_.shake_Hz;
-  return force_square_ > config_.shake_N * config_.shake_N && band_ > omega * omega * square_;
+  return force_square_ > config_.shake_N * config_.shake_N && seen_.band > omega * omega * seen_.square;
 }
 
 void PassivityObserver::follow_spell() noexcept {
@@ -124,20 +160,20 @@ void PassivityObserver::follow_spell() noexcept {
   spell_.pause_s = oscillates_ && !spell_.over ? 0.0 : spell_.pause_s + period_s_;
   if (spell_.over) {
     if (spell_.pause_s < config_.pause_s) return;
-    spell_ = {.most = square_, .over = square_ < kept_share * spell_.most};
+    spell_ = {.most = seen_.square, .over = seen_.square < kept_share * spell_.most};
     return;
   }
   if (spell_.pause_s > config_.pause_s) spell_ = {};
   if (!oscillates_ && !(spell_.lasted_s > 0.0)) return;
   spell_.lasted_s += period_s_;
-  spell_.most = std::max(spell_.most, square_);
-  if (square_ < died_away * spell_.most) spell_ = {.most = square_, .over = true};
+  spell_.most = std::max(spell_.most, seen_.square);
+  if (seen_.square < died_away * spell_.most) spell_ = {.most = seen_.square, .over = true};
   if (lasts()) remembered_s_ = config_.remembered_s;
 }
 
 bool PassivityObserver::lasts() const noexcept {
-  if (!oscillates_ || spell_.lasted_s < config_.lasting_s || square_ < kept_share * spell_.most) return false;
-  return 2.0 * square_ >= config_.felt_m * config_.felt_m || spell_.lasted_s >= config_.small_lasting_s;
+  if (!oscillates_ || spell_.lasted_s < config_.lasting_s || seen_.square < kept_share * spell_.most) return false;
+  return 2.0 * seen_.square >= config_.felt_m * config_.felt_m || spell_.lasted_s >= config_.small_lasting_s;
 }
 
 // `begins`: another oscillation begins.
@@ -168,8 +204,21 @@ void PassivityObserver::observe_proxy(const Vec3& v_W, const Vec3& f_W, double m
   energies_.added += period_s_ * added_ * speed_squared;
 }
 
-double PassivityObserver::oscillation_m_per_s() const noexcept { return std::sqrt(band_); }
+void PassivityObserver::observe_proxy(const TurningPort& port) noexcept {
+  const Vec3 v = port.velocity_W.head<3>(), omega = port.velocity_W.tail<3>();
+  const double v2 = v.squaredNorm(), omega2 = omega.squaredNorm();
+  energies_.proxy += period_s_ * (h_.dot(v) + torque_W_.dot(omega));
+  energies_.world += period_s_ * port.world_W.dot(port.velocity_W);
+  energies_.kinetic = port.kinetic_J;
+  energies_.damping += period_s_ * (port.damping_Ns_per_m * v2 + port.turning_damping_Nms_per_rad * omega2);
+  energies_.added += period_s_ * added_ * (v2 + gyration_m2_ * omega2);
+}
 
-double PassivityObserver::felt_damping_Ns_per_m() const noexcept { return band_ > 0.0 ? power_ / band_ : 0.0; }
+double PassivityObserver::oscillation_m_per_s() const noexcept { return std::sqrt(seen_.band); }
+
+double PassivityObserver::felt_damping_Ns_per_m() const noexcept {
+  const double felt = seen_.band > 0.0 ? seen_.power / seen_.band : 0.0;
+  return gives(motors_) ? std::min(felt, motors_.power / motors_.band) : felt;
+}
 
 }  // namespace proxarm::controller

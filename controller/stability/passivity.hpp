@@ -18,10 +18,8 @@
 // oscillates.
 //
 // A force reading of age τ belongs to the motion τ ago. At 3 Hz and 50 ms the two are 54° apart, enough to mistake a
-// hand that is shaken for one that shakes. So the motion is delayed by τ, too, by the all-pass of the second-order Padé
-// approximation
-//   e^(−sτ) ≈ (s²τ² − 6sτ + 12)/(s²τ² + 6sτ + 12)      phase within 0.1° up to ωτ = 1.5, 2° up to 2.5; magnitude 1
-// discretised by the bilinear transform. Below, x is the delayed motion.
+// hand that is shaken for one that shakes. So the motion is delayed by τ, too (delay.hpp). Below, x is the delayed
+// motion.
 //
 // Oscillation is judged at the hand's port, above the band in which hands move deliberately (low_Hz). A Butterworth
 // high-pass of order 4 filters force and motion alike, which keeps the phase between them. Averages are over average_s:
@@ -37,7 +35,18 @@
 // stable the oscillation returns as soon as B_a allows it. B_a is part of (26)'s B, which is implicit, so it changes
 // neither position nor velocity by itself.
 //
-// The encoders don't see the gears' twist. If the hand's mass oscillates on the gears, its force shakes the proxy, and
+// A tool that turns does all this with place and rotation together. τ_h is the hand's torque about the rendered point, ω
+// the tool's angular velocity, and a rotation counts by the way of what is ρ off: ρ² = J/M, the radius of gyration of
+// what is felt, in m²/rad², so that M(ẋ² + ρ²ω²) is twice its energy.
+//   W_h += ½(τ_h(k) + τ_h(k−1))·Δφ(k),   W_p += T τ_h·ω,   W_w += T τ_w·ω
+//   P̂ = ⟨h̃·ẋ̃ + τ̃·ω̃⟩,   and ⟨ẋ̃² + ρ²ω̃²⟩, ⟨x̃² + ρ²φ̃²⟩, ⟨h̃² + τ̃²/g²⟩ where it says ⟨ẋ̃²⟩, ⟨x̃²⟩, ⟨h̃²⟩
+// Place and rotation give and take in turns: neither alone says who gives. A torque is what two forces on the ends of a
+// grip make, whose breadth is g. The added damping acts on the place as B_a and on the rotation as ρ²B_a, so both fall
+// at the rate B_a/M. Its motion is looked at twice: by the links as the arm's model has them (link_motion.hpp), and by the motors. It
+// oscillates if either says so, and b̂ is the smaller one. Near the arm's first mode the motors' phase is wrong, and so
+// is the links' where the gears' stiffness isn't what it is said to be. Energies, ⟨x̃²⟩ and frequency are the links'.
+//
+// The encoders of a tool that doesn't turn don't see the gears' twist. If the hand's mass oscillates on the gears, its force shakes the proxy, and
 // this drives the gears' own mode. The links then move far more than the motors, and P̂ doesn't show it. So the device
 // also counts as oscillating if the force itself shakes as no hand can: ⟨h̃²⟩ > shake_N² at a frequency (⟨ẋ̃²⟩/⟨x̃²⟩)^½
 // above shake_Hz, the fastest at which people shake something. Damping then grows as for the largest −b̂.
@@ -56,9 +65,12 @@
 #include <array>
 #include <cstdint>
 
+#include "controller/stability/delay.hpp"
 #include "controller/stability/port_energies.hpp"
+#include "controller/stability/tool_move.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
 
@@ -78,6 +90,9 @@ struct PassivityConfig {
   // A grip of K N/m is stabilised by about K L, L being the loop's delay: 670 Ns/m for 10,000 N/m and 67 ms.
   double max_damping_Ns_per_m = 1000.0;
   double shake_N = 20.0, shake_Hz = 7.0;
+  // g: palm and fingertips are so far apart, and so are the ends of a handle. 20 N there make 2 Nm. Shaking a hand of
+  // 0.003 kg m² by 0.15 rad at 7 Hz takes 0.9 Nm.
+  double grip_m = 0.1;
   // A blow oscillates for 0.1 to 0.3 s. Gears ring for up to 1.4 s after it, with a decreasing amplitude.
   double lasting_s = 0.5, small_lasting_s = 3.0, felt_m = 0.5e-3;
   double pause_s = 0.25;
@@ -91,6 +106,13 @@ enum class Damping : std::uint8_t {
   at_once,
 };
 
+// What a proxy that turns did in a step: twists are (m/s, rad/s), wrenches (N, Nm) about the rendered point.
+struct TurningPort {
+  models::Twist velocity_W = models::Twist::Zero(), world_W = models::Twist::Zero();
+  double kinetic_J = 0.0;
+  double damping_Ns_per_m = 0.0, turning_damping_Nms_per_rad = 0.0;  // B_a and ρ²B_a included
+};
+
 class PassivityObserver {
  public:
   PassivityObserver(const PassivityConfig& config, double period_s, Damping damping);
@@ -101,10 +123,13 @@ class PassivityObserver {
   // Precondition: called before each step, with this period's force and the tool's position. Returns the step's B_a,
   // Ns/m.
   double observe_hand(const models::Vec3& h_W, const models::Vec3& tool_W) noexcept;
+  // The same of a tool that turns, with ρ² in m²/rad². Precondition: a session calls one of the two throughout.
+  double observe_hand(const models::Wrench& h_W, const ToolMove& move, double gyration_m2) noexcept;
   // Precondition: called after each step, with the proxy's velocity, the world's force on it, its mass and total
   // damping.
   void observe_proxy(const models::Vec3& v_W, const models::Vec3& f_W, double mass_kg,
                      double damping_Ns_per_m) noexcept;
+  void observe_proxy(const TurningPort& port) noexcept;
 
   [[nodiscard]] double added_damping_Ns_per_m() const noexcept { return added_; }
   [[nodiscard]] bool oscillates() const noexcept { return oscillates_; }
@@ -113,28 +138,25 @@ class PassivityObserver {
   [[nodiscard]] double oscillation_m_per_s() const noexcept;
   [[nodiscard]] double felt_damping_Ns_per_m() const noexcept;
   [[nodiscard]] const PortEnergies& energies_J() const noexcept { return energies_; }
+  // Of a tool that turns: the sums of its ways, m, and of its angles, rad, since rendering began.
+  [[nodiscard]] const models::Twist& moved_W() const noexcept { return seen_.moved_W; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
-    for (HighPass* filter : {&force_, &motion_, &place_}) {
-      for (Section& section : filter->sections) state(section.s1, section.s2);
+    for (HighPass* filter : {&force_, &torque_}) archive(state, *filter);
+    for (View* view : {&seen_, &motors_}) {
+      for (HighPass* filter : {&view->motion, &view->place, &view->turning, &view->angle}) archive(state, *filter);
+      state(view->moved_W, view->power, view->band, view->all, view->square, view->tank);
     }
-    state(delay_.s1, delay_.s2, release_s_, start_W_, square_, force_square_, spell_.lasted_s, spell_.pause_s,
-          spell_.most, spell_.over, remembered_s_);
-    state(h_k1_, h_, tool_k1_, power_, band_, all_, tank_, added_, oscillates_, energies_.hand, energies_.proxy,
-          energies_.world, energies_.kinetic, energies_.damping, energies_.added);
+    state(delay_.s1, delay_.s2, release_s_, start_W_, force_square_, spell_.lasted_s, spell_.pause_s, spell_.most,
+          spell_.over, remembered_s_, torque_W_, gyration_m2_);
+    state(h_k1_, h_, tool_k1_, added_, oscillates_, energies_.hand, energies_.proxy, energies_.world, energies_.kinetic,
+          energies_.damping, energies_.added);
   }
 
  private:
   struct Section {  // second order, transposed direct form II
     double gain = 1.0, a1 = 0.0, a2 = 0.0;
     models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();
-    models::Vec3 step(const models::Vec3& in) noexcept;
-  };
-  struct Delay {  // the all-pass, transposed direct form II: (a₂ + a₁z⁻¹ + z⁻²)/(1 + a₁z⁻¹ + a₂z⁻²)
-    bool acts = false;
-    double a1 = 0.0, a2 = 0.0;
-    models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();
-    void design(double delay_s, double period_s) noexcept;
     models::Vec3 step(const models::Vec3& in) noexcept;
   };
   struct HighPass {
@@ -149,7 +171,26 @@ class PassivityObserver {
     double most = 0.0;     // the largest ⟨x̃²⟩
     bool over = false;     // it is decaying; `most` is then the value of pause_s ago
   };
+  struct View {  // the motion by one account
+    HighPass motion, place;
+    HighPass turning, angle;  // of a tool that turns, as the next
+    models::Twist moved_W = models::Twist::Zero();
+    double power = 0.0, band = 0.0, all = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩
+    double square = 0.0;                        // ⟨x̃²⟩
+    double tank = 0.0;
+  };
+  struct Moment {
+    double power, band, all, square;
+  };
+  static void archive(fieldbus::StateArchive& state, HighPass& filter) noexcept {
+    for (Section& section : filter.sections) state(section.s1, section.s2);
+  }
+  [[nodiscard]] Moment look(View& view, const models::Twist& move_W, const models::Vec3& force,
+                            const models::Vec3& torque) const noexcept;
+  void take(View& view, const Moment& now) const noexcept;
+  [[nodiscard]] bool gives(const View& view) const noexcept;
   [[nodiscard]] bool shakes() const noexcept;
+  double judge(double force_square) noexcept;
   void follow_spell() noexcept;
   void follow_damping(bool begins) noexcept;
 
@@ -158,13 +199,14 @@ class PassivityObserver {
   Damping damping_;
   double average_ = 0.0;    // weight of a new value in an average
   double release_s_ = 0.0;  // present time constant of B_a's decay
-  Delay delay_;             // delays the motion by the force's age
-  HighPass force_, motion_, place_;
+  Delay<models::Vec3> delay_;  // delays the motion by the force's age
+  HighPass force_, torque_;
+  View seen_, motors_;  // by what counts; and of a tool that turns also by the motors
   models::Vec3 start_W_ = models::Vec3::Zero();  // where the tool was when rendering began
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();
-  double power_ = 0.0, band_ = 0.0, all_ = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩
-  double square_ = 0.0, force_square_ = 0.0;     // ⟨x̃²⟩, ⟨h̃²⟩
-  double tank_ = 0.0;
+  models::Vec3 torque_W_ = models::Vec3::Zero();  // τ_h
+  double gyration_m2_ = 0.0;                      // ρ²
+  double force_square_ = 0.0;                     // ⟨h̃²⟩
   double added_ = 0.0;  // B_a
   Spell spell_;
   double remembered_s_ = 0.0;  // how long the next oscillation is still damped at once

@@ -33,6 +33,7 @@ struct AdmittanceMotionTest : ::testing::Test {
         .pose = nullptr,
         .orientation = OrientationProxy({}),
         .behind_sensor_T = models::Mat3::Zero(),
+        .links = std::nullopt,
         .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
     return std::make_unique<AdmittanceMotion>(std::move(parts), arm, cell.drives, cell.limits, cell.supervision,
                                               settings);

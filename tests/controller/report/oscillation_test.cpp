@@ -40,6 +40,32 @@ TEST(OscillationWatch, TellsFrequencyAmplitudeAndTimeWhateverTheHandDoesByWill) 
   }
 }
 
+// Place and rotation swing together, and each has its amplitude; a rotation alone has a frequency, too.
+TEST(OscillationWatch, TellsByWhatAngleToo) {
+  for (const double amplitude_m : {0.0, 1e-3}) {
+    OscillationWatch watch;
+    for (int k = 0; k < 6000; ++k) {
+      const double t = k * T;
+      OscillationWatch::Cycle each = cycle(t >= 2.0, tool(t, 16.0, amplitude_m));
+      each.turns = true;
+      each.turned_W = 0.01 * std::sin(2.0 * std::numbers::pi * 16.0 * t + 1.0) * Vec3(0.0, 0.8, -0.6);
+      each.gyration_m2 = 0.002;
+      watch.add(t, T, each);
+    }
+    const Oscillation o = watch.longest();
+    EXPECT_NEAR(o.frequency_Hz, 16.0, 0.3);
+    EXPECT_NEAR(o.amplitude_m, amplitude_m, 0.05e-3);
+    ASSERT_TRUE(o.amplitude_rad);
+    EXPECT_NEAR(*o.amplitude_rad, 0.01, 0.05 * 0.01);
+  }
+}
+
+TEST(OscillationWatch, AToolThatDoesntTurnHasNoAngle) {
+  OscillationWatch watch;
+  for (int k = 0; k < 2000; ++k) watch.add(k * T, T, cycle(true, tool(k * T, 8.0, 1e-3)));
+  EXPECT_FALSE(watch.longest().amplitude_rad);
+}
+
 // As a blow that rings for long beside an oscillation that is short, since it was damped.
 TEST(OscillationWatch, TheOneThatLastsIsTheVerdict) {
   OscillationWatch watch;

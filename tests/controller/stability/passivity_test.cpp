@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "controller/proxies/admittance_proxy.hpp"
+#include "controller/proxies/orientation_proxy.hpp"
 #include "models/surfaces/friction_plane.hpp"
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 #include "tests/models/surfaces/random_states.hpp"
@@ -44,6 +45,47 @@ TEST(Passivity, TheProxysBalanceIsExact) {
   EXPECT_EQ(e.hand, 0.0);  // the tool stood still
   // κ times an ulp of q, 2.5e6 N/m · 1e-18 m, in f; 5000 steps of it.
   EXPECT_NEAR(e.proxy + e.world, e.kinetic + e.damping + lost_J, 1e-10 * gross_J);
+}
+
+// The same of one that turns, also where limits hold it back, in a step or at the end of its range.
+TEST(Passivity, TheBalanceOfAProxyThatTurnsIsExact) {
+  models::FrictionPlane<3> wall(Vec3(0.01, 0.0, 0.0), Vec3(-1.0, 0.0, 0.0), 0.3);
+  const AdmittanceConfig config{.mass_kg = 2.5, .damping_Ns_per_m = 7.0};
+  AdmittanceProxy<3> proxy(config, wall);
+  OrientationProxy turns({.free = true, .inertia_kg_m2 = 0.02, .damping_Nms_per_rad = 0.1, .max_angle_rad = 0.3});
+  ASSERT_TRUE(turns.start(Eigen::Quaterniond::Identity()));
+  turns.add_damping(0.03);
+  PassivityObserver observer({}, config.period_s, Damping::never);
+  observer.start(Vec3::Zero());
+  Random random(6);
+  double lost_J = 0.0, gross_J = 0.0;
+  int limited = 0;
+  Vec3 v_k1 = Vec3::Zero(), omega_k1 = Vec3::Zero();
+  for (int k = 0; k < 5000; ++k) {
+    const Vec3 h(random.uniform(-10.0, 12.0), random.uniform(-8.0, 8.0), random.uniform(-8.0, 8.0));
+    const Vec3 torque = 4.0 * h.reverse() + Vec3(std::sin(1e-3 * k), 0.0, 0.0);
+    observer.observe_hand({h, torque}, ToolMove{}, 0.008);
+    ASSERT_EQ(proxy.step(h), ProxyFault::none);
+    ASSERT_EQ(turns.step(torque), ProxyFault::none);
+    const Vec3 v = proxy.velocity(), omega = turns.velocity_W();
+    TurningPort port{.kinetic_J = 0.5 * config.mass_kg * v.squaredNorm() + turns.kinetic_J(),
+                     .damping_Ns_per_m = config.damping_Ns_per_m,
+                     .turning_damping_Nms_per_rad = turns.damping_Nms_per_rad()};
+    port.velocity_W << v, omega;
+    port.world_W << proxy.f(), turns.limit_torque_W();
+    observer.observe_proxy(port);
+    lost_J += 0.5 * config.mass_kg * (v - v_k1).squaredNorm() + 0.5 * 0.02 * (omega - omega_k1).squaredNorm();
+    gross_J += std::abs(config.period_s * h.dot(v)) + std::abs(config.period_s * torque.dot(omega));
+    limited += turns.speed_limited() || turns.angle_limited();
+    v_k1 = v;
+    omega_k1 = omega;
+  }
+  const PortEnergies& e = observer.energies_J();
+  EXPECT_GT(limited, 100);
+  EXPECT_GT(e.damping, 0.0);
+  EXPECT_EQ(e.hand, 0.0);
+  // As above; log and exp of a rotation of a milliradian are exact to some ulp of 1, 1e-15 rad: in ω 1e-12 rad/s.
+  EXPECT_NEAR(e.proxy + e.world, e.kinetic + e.damping + lost_J, 1e-9 * gross_J);
 }
 
 struct Felt {
@@ -94,6 +136,112 @@ TEST(Passivity, AForceThatShakesAsNoHandCanIsAnOscillationWhateverItsPower) {
   EXPECT_FALSE(felt(12.0, 2.0, 30.0, 0.002).oscillates);  // 16 N
 }
 
+// A hand that swings place and rotation at one frequency, with a damping for each, some of it negative.
+struct BothSwing {
+  double frequency_Hz = 8.0;
+  double amplitude_m = 0.0, damping_Ns_per_m = 0.0;
+  double amplitude_rad = 0.0, damping_Nms_per_rad = 0.0;
+  double inertia_kg_m2 = 0.02;
+  double gyration_m2 = 0.005;
+};
+
+Felt felt(const BothSwing& swing) {
+  const double T = 1e-3, omega = 2.0 * std::numbers::pi * swing.frequency_Hz;
+  PassivityObserver observer({}, T, Damping::never);
+  observer.start(Vec3(0.8, 0.1, 0.5));
+  Felt result{0.0, false};
+  int averaged = 0;
+  const Vec3 along(0.6, 0.0, 0.8), about(0.0, -0.6, 0.8);
+  const auto wave = [&](double t) { return std::min(1.0, std::max(t, 0.0)) * std::sin(omega * t); };
+  for (int k = 1; k < 6000; ++k) {
+    const double t = k * T, speed = (wave(t) - wave(t - T)) / T;
+    const double acceleration = (wave(t) - 2.0 * wave(t - T) + wave(t - 2.0 * T)) / (T * T);
+    models::Twist move;
+    move << swing.amplitude_m * T * speed * along, swing.amplitude_rad * T * speed * about;
+    const double torque = swing.inertia_kg_m2 * acceleration + swing.damping_Nms_per_rad * speed;
+    observer.observe_hand({swing.damping_Ns_per_m * swing.amplitude_m * speed * along,
+                           torque * swing.amplitude_rad * about},
+                          {move, move}, swing.gyration_m2);
+    result.oscillates = result.oscillates || observer.oscillates();
+    if (k < 3000) continue;
+    result.damping_Ns_per_m += observer.felt_damping_Ns_per_m();
+    ++averaged;
+  }
+  result.damping_Ns_per_m /= averaged;
+  return result;
+}
+
+// The story: of a tool that turns only the place was looked at, so the energy of its rotation was nobody's.
+TEST(Passivity, ARotationThatGivesEnergyIsToldWhateverThePlaceDoes) {
+  EXPECT_TRUE(felt(BothSwing{.amplitude_rad = 0.01, .damping_Nms_per_rad = -0.1}).oscillates);
+  EXPECT_FALSE(felt(BothSwing{.amplitude_rad = 0.01, .damping_Nms_per_rad = 0.1}).oscillates);
+  // 8 Hz: 0.1 Nms/rad at 0.01 rad are 13 mW, as many as 40 Ns/m at 0.5 mm.
+  BothSwing both{.amplitude_m = 0.5e-3, .damping_Ns_per_m = 30.0, .amplitude_rad = 0.01, .damping_Nms_per_rad = -0.1};
+  EXPECT_TRUE(felt(both).oscillates);
+  both.damping_Ns_per_m = 50.0;  // the place takes more than the rotation gives
+  EXPECT_FALSE(felt(both).oscillates);
+  both.damping_Ns_per_m = -50.0;  // and the other way round
+  both.damping_Nms_per_rad = 0.1;
+  EXPECT_TRUE(felt(both).oscillates);
+  both.damping_Ns_per_m = -30.0;
+  EXPECT_FALSE(felt(both).oscillates);
+}
+
+// b̂ is what B_a must outweigh: of a pure rotation D/ρ², since ρ²B_a is what is added to D.
+TEST(Passivity, TheDampingOfARotationIsFoundByTheRadiusOfGyration) {
+  for (const double gyration_m2 : {0.001, 0.0125, 0.1}) {
+    for (const double damping : {-0.1, 0.02}) {
+      const Felt found =
+          felt(BothSwing{.amplitude_rad = 0.01, .damping_Nms_per_rad = damping, .gyration_m2 = gyration_m2});
+      EXPECT_NEAR(found.damping_Ns_per_m, damping / gyration_m2, 0.02 * std::abs(damping) / gyration_m2 + 0.2);
+    }
+  }
+}
+
+TEST(Passivity, ATorqueThatShakesAsNoHandCanIsAnOscillationWhateverItsPower) {
+  const double omega = 2.0 * std::numbers::pi * 12.0;
+  const auto shaken = [&](double rms_Nm) {  // a mass that a torque of that size swings, with some damping
+    const double amplitude_rad = 0.004, J = std::sqrt(2.0) * rms_Nm / (omega * omega * amplitude_rad);
+    return felt(BothSwing{.frequency_Hz = 12.0, .amplitude_rad = amplitude_rad, .damping_Nms_per_rad = 0.05,
+                          .inertia_kg_m2 = J})
+        .oscillates;
+  };
+  EXPECT_TRUE(shaken(2.1));  // 20 N at 0.1 m
+  EXPECT_FALSE(shaken(1.9));
+}
+
+TEST(Passivity, LetsHandsTurnByWill) {
+  const auto turned = [](double frequency_Hz, double amplitude_rad) {
+    return felt(BothSwing{.frequency_Hz = frequency_Hz, .amplitude_rad = amplitude_rad, .damping_Nms_per_rad = -0.05})
+        .oscillates;
+  };
+  EXPECT_FALSE(turned(1.0, 0.5));
+  EXPECT_FALSE(turned(2.0, 0.1));
+  EXPECT_FALSE(turned(4.0, 0.003));
+  EXPECT_TRUE(turned(4.0, 0.02));
+}
+
+// A tool that doesn't turn is looked at as before: with no torque and no angle both ways say the same, to the bit.
+TEST(Passivity, ATurningToolThatDoesntTurnIsAPoint) {
+  PassivityObserver point({}, 1e-3, Damping::at_once), turning({}, 1e-3, Damping::at_once);
+  point.start(Vec3::Zero());
+  turning.start(Vec3::Zero());
+  double most = 0.0;
+  Vec3 before = Vec3::Zero();
+  for (int k = 1; k < 3000; ++k) {
+    // In binary fractions of a metre, so that the sum of the steps is the place.
+    const Vec3 x(std::round(0x1p30 * 0.002 * std::sin(0.05 * k)) * 0x1p-30, 0.0, 0.0), h(-40.0 * std::cos(0.05 * k), 0.0, 0.0);
+    models::Twist move = models::Twist::Zero();
+    move.head<3>() = x - before;
+    before = x;
+    const double added = point.observe_hand(h, x);
+    ASSERT_EQ(turning.observe_hand({h, Vec3::Zero()}, {move, move}, 0.01), added);
+    most = std::max(most, added);
+  }
+  EXPECT_GT(most, 10.0);
+  EXPECT_EQ(point.energies_J().hand, turning.energies_J().hand);
+}
+
 TEST(Passivity, LetsHandsMoveByWillAndTheSmallestBe) {
   EXPECT_FALSE(felt(1.0, 4.0, -10.0, 0.1).oscillates);
   EXPECT_FALSE(felt(2.0, 4.0, -20.0, 0.02).oscillates);
@@ -108,6 +256,17 @@ TEST(Passivity, OutlivesWhatIsNotFinite) {
   observer.observe_hand(Vec3(1.0, 0.0, 0.0), Vec3(0.0, INFINITY, 0.0));
   EXPECT_EQ(observer.observe_hand(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 0.0, 1e-5)), 0.0);
   EXPECT_TRUE(std::isfinite(observer.energies_J().hand));
+
+  PassivityObserver turning({}, 1e-3, Damping::at_once);
+  turning.start(Vec3::Zero());
+  const Vec3 one(1.0, 0.0, 0.0), bad(std::nan(""), 0.0, 0.0);
+  const models::Twist far = models::Twist::Constant(INFINITY), near = models::Twist::Constant(1e-5);
+  turning.observe_hand({one, bad}, ToolMove{}, 0.01);
+  turning.observe_hand({one, one}, {near, far}, 0.01);
+  turning.observe_hand({one, one}, {far, near}, 0.01);
+  EXPECT_EQ(turning.observe_hand({one, one}, {near, near}, 0.01), 0.0);
+  EXPECT_TRUE(std::isfinite(turning.energies_J().hand));
+  EXPECT_TRUE(turning.moved_W().allFinite());
 }
 
 // ---- in the loop: a hand that tightens its grip while it holds still, and the readings 8 ms late
