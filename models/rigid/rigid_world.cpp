@@ -530,7 +530,7 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     if (solved && !roughly && on && size < rest) {
       rest = size;
       resting = q;
-      collect_contacts();
+      collect_contacts(q);
     }
     last = size;
   }
@@ -707,7 +707,7 @@ bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double
 // which it was below and beside. An object that moves does honest work, too: with it only what the tool moves relative
 // to it counts.
 bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
-  if (!collected_) collect_contacts();
+  if (!collected_) collect_contacts(q_);
   if (count_ == 0) return false;
   const View now = view(q_), old = view(q_old);
   double work = 0.0, bends = 0.0;
@@ -723,7 +723,7 @@ bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
     const double s = way.norm(), lever = (contact.point_W - q_.position).norm();
     const double turned = goes(entry) ? moving(entry).turned.norm() : turned_W;
     work += contact.force_W.dot(way);
-    bends += force * (turned * (0.5 * turned * lever + s) + 0.5 * bend_[k] * s * s);
+    bends += force * (turned * (0.5 * turned * lever + turns_[k] * s) + 0.5 * bend_[k] * s * s);
   }
   return work > bends + kNothing_J;
 }
@@ -741,7 +741,22 @@ double RigidWorld::bend_per_m(const Pair& pair) const noexcept {
   return bend;
 }
 
-void RigidWorld::collect_contacts() noexcept {
+// Of the angle γ at which two rims cross; 1: the contact is of others. Where a point of one goes across the other by s,
+// the place of contact goes along by up to s/sin γ, on circles that bend: their gap bends by up to (1/r + 1/r')/sin² γ.
+// Their normal is across both, and turns by up to θ/sin γ where one turns by θ.
+double RigidWorld::sine_of_rims(const Found& found, const ToolPose& pose) const noexcept {
+  const Pair& pair = pairs_[found.pair];
+  if (pair.kind != Kind::rims) return 1.0;
+  const Vec3& n = found.touch.normal;
+  const Vec3 own = pose.orientation * shared_->parts[pair.part].cylinder->axis;
+  Vec3 other = shared_->entries[pair.entry].cylinder->axis;
+  if (moves(pair.entry)) other = moving(pair.entry).mover.at().R * other;
+  const Vec3 along_own = own.cross(n), along_other = other.cross(n);
+  const double lengths = along_own.norm() * along_other.norm();
+  return lengths > kAlong ? std::max(along_own.cross(along_other).norm() / lengths, kAlong) : kAlong;
+}
+
+void RigidWorld::collect_contacts(const ToolPose& pose) noexcept {
   count_ = 0;
   collected_ = true;
   rides_ = false;
@@ -760,13 +775,15 @@ void RigidWorld::collect_contacts() noexcept {
     contact.gap_m = found.touch.gap;
     contact.friction = friction(pair);
     of_contact_[count_ - 1] = pair.entry;
-    bend_[count_ - 1] = bend_per_m(pair);
+    const double sine = sine_of_rims(found, pose);
+    turns_[count_ - 1] = 1.0 / sine;
+    bend_[count_ - 1] = bend_per_m(pair) / (sine * sine);
     rides_ = rides_ || goes(pair.entry);
   }
 }
 
 void RigidWorld::report(const ToolPose& q_old) noexcept {
-  if (!collected_) collect_contacts();
+  if (!collected_) collect_contacts(q_);
   if (count_ == 0) return;
   const double rounding =
       8.0 * std::numeric_limits<double>::epsilon() * (q_old.position.lpNorm<1>() + shared_->reach + extent_m_);

@@ -322,7 +322,8 @@ class RigidWorld final : public PoseAlgorithm {
   bool look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept;
   [[nodiscard]] bool gives_energy(const ToolPose& q_old) noexcept;
   [[nodiscard]] double bend_per_m(const Pair& pair) const noexcept;
-  void collect_contacts() noexcept;
+  [[nodiscard]] double sine_of_rims(const Found& found, const ToolPose& pose) const noexcept;
+  void collect_contacts(const ToolPose& pose) noexcept;
   void report(const ToolPose& q_old) noexcept;
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
   bool went_in(const ToolPose& q_old) noexcept;
@@ -366,7 +367,9 @@ class RigidWorld final : public PoseAlgorithm {
   std::size_t linear_count_ = 0;
 
   std::array<PoseContact, ContactProblem::most> contacts_;
-  std::array<double, ContactProblem::most> bend_;  // of each contact, 1/m: 1/radius where tool or object is round
+  // Of each contact: 1/m, 1/radius where tool or object is round; and by how many times more than the tool its normal
+  // may turn.
+  std::array<double, ContactProblem::most> bend_, turns_;
   std::array<std::uint16_t, ContactProblem::most> of_contact_{};  // the entries
   std::size_t count_ = 0;
   bool collected_ = false;  // of a pose before the last one that was tried
