@@ -382,11 +382,10 @@ void AdmittanceMotion::observe_proxy(const WorldStep& step) noexcept {
   if (!parts_.links) return passivity_->observe_proxy(step.v_W, force_W, step.mass_kg, step.damping_Ns_per_m);
   const OrientationProxy& turns = parts_.orientation;
   const bool rigid = parts_.pose != nullptr;
-  TurningPort port{.kinetic_J = rigid ? parts_.pose->kinetic_J()
-                                      : 0.5 * step.mass_kg * step.v_W.squaredNorm() + turns.kinetic_J(),
-                   .damping_Ns_per_m = step.damping_Ns_per_m,
-                   .turning_damping_Nms_per_rad =
-                       rigid ? parts_.pose->turning_damping_Nms_per_rad() : turns.damping_Nms_per_rad()};
+  TurningPort port{
+      .kinetic_J = rigid ? parts_.pose->kinetic_J() : 0.5 * step.mass_kg * step.v_W.squaredNorm() + turns.kinetic_J(),
+      .damping_Ns_per_m = step.damping_Ns_per_m,
+      .turning_damping_Nms_per_rad = rigid ? parts_.pose->turning_damping_Nms_per_rad() : turns.damping_Nms_per_rad()};
   port.velocity_W << step.v_W, turns.velocity_W();
   port.world_W << force_W, rigid ? Vec3(step.torque_W + step.limit_torque_W) : turns.limit_torque_W();
   passivity_->observe_proxy(port);

@@ -51,7 +51,7 @@ struct AdmittanceParts {
   std::unique_ptr<RenderedWorld> world;
   PoseWorld* pose;  // the same world, where a rigid tool is rendered; null: a point
   OrientationProxy orientation;
-  models::Mat3 behind_sensor_T;  // inertia of the tool behind the sensor, as in OrientationConfig
+  models::Mat3 behind_sensor_T;     // inertia of the tool behind the sensor, as in OrientationConfig
   std::optional<LinkMotion> links;  // of a tool that turns, for its passivity observer
   std::unique_ptr<Release> release;
 };

@@ -81,7 +81,7 @@ class OrientationProxy {
   [[nodiscard]] double kinetic_J() const noexcept;
   // By which limits held the last step back.
   [[nodiscard]] const models::Vec3& limit_torque_W() const noexcept { return limit_torque_W_; }
-  [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }        // in the last step
+  [[nodiscard]] bool speed_limited() const noexcept { return speed_limited_; }  // in the last step
   [[nodiscard]] bool angle_limited() const noexcept { return angle_limited_; }
   [[nodiscard]] const OrientationConfig& config() const noexcept { return config_; }
   void archive(fieldbus::StateArchive& state) noexcept {

@@ -40,12 +40,12 @@ struct WorldStep {
   std::array<Contact, 2> others;                 // further contacts that press
   int contacts = 0;
   bool slips = false;
-  bool unresolved = false;                            // of a rigid tool (pose_algorithm.hpp)
-  ActiveLimits limits;                                // that held the proxy back
-  bool soft_limits_met = true;                        // whether leash and power were satisfied
-  models::Vec3 limit_force_W = models::Vec3::Zero();  // the limits' force on the proxy; not in f_W
+  bool unresolved = false;                             // of a rigid tool (pose_algorithm.hpp)
+  ActiveLimits limits;                                 // that held the proxy back
+  bool soft_limits_met = true;                         // whether leash and power were satisfied
+  models::Vec3 limit_force_W = models::Vec3::Zero();   // the limits' force on the proxy; not in f_W
   models::Vec3 limit_torque_W = models::Vec3::Zero();  // likewise; of a rigid tool
-  double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // M and B of this step
+  double mass_kg = 0.0, damping_Ns_per_m = 0.0;        // M and B of this step
   bool settled = false;  // the start was moved to where the scene allows it; the proxy rests there
   ProxyFault fault = ProxyFault::none;
 };

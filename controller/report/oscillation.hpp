@@ -56,7 +56,7 @@ class OscillationWatch {
  private:
   struct Spell {
     double from_s = 0.0, until_s = 0.0;
-    double z2 = 0.0, zdot2 = 0.0;         // sums of the squares, place and rotation together,
+    double z2 = 0.0, zdot2 = 0.0;          // sums of the squares, place and rotation together,
     double place2 = 0.0, rotation2 = 0.0;  // and each for itself,
     double cycles = 0.0;                   // of so many
     bool turns = false, lasts = false;

@@ -56,10 +56,9 @@ ToolMove LinkMotion::step(const JointVector& resting_rad, const models::Wrench& 
   A.diagonal() += 0.5 * T * config_.damping + 0.25 * T * T * config_.stiffness;
   const JointVector angle = angle_rad_ + T * speed_ + 0.25 * T * T * acceleration_;
   const JointVector speed = speed_ + 0.5 * T * acceleration_;
-  const JointVector torque = config_.stiffness.cwiseProduct(delayed_rad_ - angle) +
-                             config_.damping.cwiseProduct(moved / T - speed) +
-                             at.J_W.topRows<3>().transpose() * wrench_W.force +
-                             at.J_W.bottomRows<3>().transpose() * wrench_W.torque;
+  const JointVector torque =
+      config_.stiffness.cwiseProduct(delayed_rad_ - angle) + config_.damping.cwiseProduct(moved / T - speed) +
+      at.J_W.topRows<3>().transpose() * wrench_W.force + at.J_W.bottomRows<3>().transpose() * wrench_W.torque;
   acceleration_ = models::solve_positive_definite(A, JointMatrix(torque));
   speed_ = speed + 0.5 * T * acceleration_;
   const JointVector reached = angle + 0.25 * T * T * acceleration_;

@@ -51,8 +51,8 @@ class LinkMotion {
   LinkMotionConfig config_;
   double period_s_ = 0.0;
   Delay<models::JointVector> delay_;
-  models::JointVector resting_rad_;    // the last y, as it came in,
-  models::JointVector delayed_rad_;    // and the delayed one
+  models::JointVector resting_rad_;                       // the last y, as it came in,
+  models::JointVector delayed_rad_;                       // and the delayed one
   models::JointVector angle_rad_, speed_, acceleration_;  // φ, φ̇, φ̈
 };
 

@@ -98,8 +98,8 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
 }
 
 double PassivityObserver::observe_hand(const models::Wrench& h_W, const ToolMove& move, double gyration_m2) noexcept {
-  const bool finite = h_W.force.allFinite() && h_W.torque.allFinite() && move.links_W.allFinite() &&
-                      move.motors_W.allFinite();
+  const bool finite =
+      h_W.force.allFinite() && h_W.torque.allFinite() && move.links_W.allFinite() && move.motors_W.allFinite();
   if (!finite) return added_;
   gyration_m2_ = gyration_m2;
   h_k1_ = h_;
@@ -132,8 +132,7 @@ void PassivityObserver::take(View& view, const Moment& now) const noexcept {
   view.band += average_ * (now.band - view.band);
   view.all += average_ * (now.all - view.all);
   view.square += average_ * (now.square - view.square);
-  view.tank =
-      std::clamp(view.tank + period_s_ * (view.power + config_.refill_W), -config_.tank_J, config_.tank_J);
+  view.tank = std::clamp(view.tank + period_s_ * (view.power + config_.refill_W), -config_.tank_J, config_.tank_J);
 }
 
 bool PassivityObserver::gives(const View& view) const noexcept {

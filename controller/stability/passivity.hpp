@@ -35,21 +35,23 @@
 // stable the oscillation returns as soon as B_a allows it. B_a is part of (26)'s B, which is implicit, so it changes
 // neither position nor velocity by itself.
 //
-// A tool that turns does all this with place and rotation together. τ_h is the hand's torque about the rendered point, ω
-// the tool's angular velocity, and a rotation counts by the way of what is ρ off: ρ² = J/M, the radius of gyration of
+// A tool that turns does all this with place and rotation together. τ_h is the hand's torque about the rendered point,
+// ω the tool's angular velocity, and a rotation counts by the way of what is ρ off: ρ² = J/M, the radius of gyration of
 // what is felt, in m²/rad², so that M(ẋ² + ρ²ω²) is twice its energy.
 //   W_h += ½(τ_h(k) + τ_h(k−1))·Δφ(k),   W_p += T τ_h·ω,   W_w += T τ_w·ω
 //   P̂ = ⟨h̃·ẋ̃ + τ̃·ω̃⟩,   and ⟨ẋ̃² + ρ²ω̃²⟩, ⟨x̃² + ρ²φ̃²⟩, ⟨h̃² + τ̃²/g²⟩ where it says ⟨ẋ̃²⟩, ⟨x̃²⟩, ⟨h̃²⟩
 // Place and rotation give and take in turns: neither alone says who gives. A torque is what two forces on the ends of a
 // grip make, whose breadth is g. The added damping acts on the place as B_a and on the rotation as ρ²B_a, so both fall
-// at the rate B_a/M. Its motion is looked at twice: by the links as the arm's model has them (link_motion.hpp), and by the motors. It
-// oscillates if either says so, and b̂ is the smaller one. Near the arm's first mode the motors' phase is wrong, and so
-// is the links' where the gears' stiffness isn't what it is said to be. Energies, ⟨x̃²⟩ and frequency are the links'.
+// at the rate B_a/M. Its motion is looked at twice: by the links as the arm's model has them (link_motion.hpp), and by
+// the motors. It oscillates if either says so, and b̂ is the smaller one. Near the arm's first mode the motors' phase is
+// wrong, and so is the links' where the gears' stiffness isn't what it is said to be. Energies, ⟨x̃²⟩ and frequency are
+// the links'.
 //
-// The encoders of a tool that doesn't turn don't see the gears' twist. If the hand's mass oscillates on the gears, its force shakes the proxy, and
-// this drives the gears' own mode. The links then move far more than the motors, and P̂ doesn't show it. So the device
-// also counts as oscillating if the force itself shakes as no hand can: ⟨h̃²⟩ > shake_N² at a frequency (⟨ẋ̃²⟩/⟨x̃²⟩)^½
-// above shake_Hz, the fastest at which people shake something. Damping then grows as for the largest −b̂.
+// The encoders of a tool that doesn't turn don't see the gears' twist. If the hand's mass oscillates on the gears, its
+// force shakes the proxy, and this drives the gears' own mode. The links then move far more than the motors, and P̂
+// doesn't show it. So the device also counts as oscillating if the force itself shakes as no hand can: ⟨h̃²⟩ > shake_N²
+// at a frequency (⟨ẋ̃²⟩/⟨x̃²⟩)^½ above shake_Hz, the fastest at which people shake something. Damping then grows as for
+// the largest −b̂.
 //
 // A blow on a wall, a hand that shakes for a moment, and ringing gears look the same at first, but end by themselves.
 // An oscillation lasts if it has gone on for lasting_s, pauses up to pause_s included (a wall interrupts it in every
@@ -197,17 +199,17 @@ class PassivityObserver {
   PassivityConfig config_;
   double period_s_ = 0.0;
   Damping damping_;
-  double average_ = 0.0;    // weight of a new value in an average
-  double release_s_ = 0.0;  // present time constant of B_a's decay
+  double average_ = 0.0;       // weight of a new value in an average
+  double release_s_ = 0.0;     // present time constant of B_a's decay
   Delay<models::Vec3> delay_;  // delays the motion by the force's age
   HighPass force_, torque_;
-  View seen_, motors_;  // by what counts; and of a tool that turns also by the motors
+  View seen_, motors_;                           // by what counts; and of a tool that turns also by the motors
   models::Vec3 start_W_ = models::Vec3::Zero();  // where the tool was when rendering began
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();
   models::Vec3 torque_W_ = models::Vec3::Zero();  // τ_h
   double gyration_m2_ = 0.0;                      // ρ²
   double force_square_ = 0.0;                     // ⟨h̃²⟩
-  double added_ = 0.0;  // B_a
+  double added_ = 0.0;                            // B_a
   Spell spell_;
   double remembered_s_ = 0.0;  // how long the next oscillation is still damped at once
   bool oscillates_ = false;

@@ -116,8 +116,14 @@ class Turning(ProgramTest):
         self.assertIn("the smallest that is stable", outcome.err)
         smallest = outcome.err.split("at least ")[1].split(" kg m²")[0]
         self.assertGreater(float(smallest), 0.002)
-        calm = self.summary(*few, "--inertia", smallest, "--duration", "4s")
+        # A wrist swings so fast that a drive isn't one lag any more: it takes up to a seventh more than is said, as an arm of
+        # stiff gears does (elastic_loop_test). At what is said the steel swings by 2.5 mm, which the place, by the motors,
+        # didn't show: this test took it for calm.
+        calm = self.summary(*few, "--inertia", f"{1.15 * float(smallest):.5f}", "--duration", "4s", "--record", "calm")
         self.assertFalse(calm["oscillation"] and calm["oscillation"]["lasts"])
+        speeds = [math.dist(*([float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz"] for row in pair)) / PERIOD_S
+                  for pair in zip(self.rows("calm"), self.rows("calm")[1:])]
+        self.assertLess(max(speeds[500:]), 0.02)  # nobody leads the place; a swing of 2.5 mm at 13 Hz has 0.2 m/s
 
     def test_a_tool_that_is_led_and_turned_at_once_is_judged_so(self):
         """Each for itself, 2 kg and 0.01 kg m² are stable; on elastic gears together they swing, and a box that was

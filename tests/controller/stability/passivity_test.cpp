@@ -155,13 +155,14 @@ Felt felt(const BothSwing& swing) {
   const auto wave = [&](double t) { return std::min(1.0, std::max(t, 0.0)) * std::sin(omega * t); };
   for (int k = 1; k < 6000; ++k) {
     const double t = k * T, speed = (wave(t) - wave(t - T)) / T;
-    const double acceleration = (wave(t) - 2.0 * wave(t - T) + wave(t - 2.0 * T)) / (T * T);
+    // As above, force and speed are those of a period's middle.
+    const double acceleration = (wave(t + 0.5 * T) - 2.0 * wave(t - 0.5 * T) + wave(t - 1.5 * T)) / (T * T);
     models::Twist move;
     move << swing.amplitude_m * T * speed * along, swing.amplitude_rad * T * speed * about;
     const double torque = swing.inertia_kg_m2 * acceleration + swing.damping_Nms_per_rad * speed;
-    observer.observe_hand({swing.damping_Ns_per_m * swing.amplitude_m * speed * along,
-                           torque * swing.amplitude_rad * about},
-                          {move, move}, swing.gyration_m2);
+    observer.observe_hand(
+        {swing.damping_Ns_per_m * swing.amplitude_m * speed * along, torque * swing.amplitude_rad * about},
+        {move, move}, swing.gyration_m2);
     result.oscillates = result.oscillates || observer.oscillates();
     if (k < 3000) continue;
     result.damping_Ns_per_m += observer.felt_damping_Ns_per_m();
@@ -202,7 +203,9 @@ TEST(Passivity, ATorqueThatShakesAsNoHandCanIsAnOscillationWhateverItsPower) {
   const double omega = 2.0 * std::numbers::pi * 12.0;
   const auto shaken = [&](double rms_Nm) {  // a mass that a torque of that size swings, with some damping
     const double amplitude_rad = 0.004, J = std::sqrt(2.0) * rms_Nm / (omega * omega * amplitude_rad);
-    return felt(BothSwing{.frequency_Hz = 12.0, .amplitude_rad = amplitude_rad, .damping_Nms_per_rad = 0.05,
+    return felt(BothSwing{.frequency_Hz = 12.0,
+                          .amplitude_rad = amplitude_rad,
+                          .damping_Nms_per_rad = 0.05,
                           .inertia_kg_m2 = J})
         .oscillates;
   };
@@ -230,7 +233,8 @@ TEST(Passivity, ATurningToolThatDoesntTurnIsAPoint) {
   Vec3 before = Vec3::Zero();
   for (int k = 1; k < 3000; ++k) {
     // In binary fractions of a metre, so that the sum of the steps is the place.
-    const Vec3 x(std::round(0x1p30 * 0.002 * std::sin(0.05 * k)) * 0x1p-30, 0.0, 0.0), h(-40.0 * std::cos(0.05 * k), 0.0, 0.0);
+    const Vec3 x(std::round(0x1p30 * 0.002 * std::sin(0.05 * k)) * 0x1p-30, 0.0, 0.0),
+        h(-40.0 * std::cos(0.05 * k), 0.0, 0.0);
     models::Twist move = models::Twist::Zero();
     move.head<3>() = x - before;
     before = x;
