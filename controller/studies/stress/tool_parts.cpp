@@ -1,29 +1,42 @@
 #include "controller/studies/stress/tool_parts.hpp"
 
 #include <algorithm>
-#include <limits>
-#include <utility>
 
 namespace proxarm::studies {
 namespace {
 
 constexpr int kEighths = 8;
 constexpr double kLeast = 1e-12;  // of the way, a part
-constexpr std::size_t kMost = 200;
+constexpr std::size_t kMost = 100;
 // A foot may lie so far beside its feature and count (touch.hpp, beside_m): before an edge by that, and behind it.
 constexpr double kBeside_m = 1e-10;
 
+// The middle of the widest part of a way between two places; no wider than kLeast: none, 0. (Poses for which no forces
+// were found are left out, so that there may be more than one.)
+double middle_of_widest(const std::vector<double>& shares, double from, double to) {
+  double widest = kLeast, middle = 0.0;
+  for (auto i = std::lower_bound(shares.begin(), shares.end(), from); *i < to; ++i) {
+    if (!(i[1] - i[0] > widest)) continue;
+    widest = i[1] - i[0];
+    middle = 0.5 * (i[0] + i[1]);
+  }
+  return middle;
+}
+
 }  // namespace
 
-ToolParts::Pose ToolParts::pose_at(const ToolCall& call, double share, const models::ToolPose& from) const {
-  Pose out{share, call, 0.0};
-  const auto g = fresh_.clone();
-  out.call.p = models::moved(call.q, share * models::difference(call.p, call.q));
-  out.call.r = g->step(call.K, out.call.p, from);
-  out.call.contacts.assign(g->contacts().begin(), g->contacts().end());
-  out.call.unresolved = g->unresolved();
-  out.short_m = laws_.depth_m(out.call.r);
-  return out;
+void ToolParts::follow(const ToolCall& call, const std::vector<double>& shares, std::vector<Pose>& way) const {
+  const double reached = way.back().share;
+  for (auto share = std::upper_bound(shares.begin(), shares.end(), reached); share != shares.end(); ++share) {
+    Pose next{*share, call, 0.0};
+    const auto g = fresh_.clone();
+    next.call.p = models::moved(call.q, *share * models::difference(call.p, call.q));
+    next.call.r = g->step(call.K, next.call.p, way.back().call.r);
+    if (g->unresolved()) continue;
+    next.call.contacts.assign(g->contacts().begin(), g->contacts().end());
+    next.short_m = laws_.depth_m(next.call.r);
+    way.push_back(next);
+  }
 }
 
 double ToolParts::pushed_J(const Pose& from, const Pose& to) const {
@@ -32,47 +45,47 @@ double ToolParts::pushed_J(const Pose& from, const Pose& to) const {
   return laws_.pushed_J(part, std::max(from.short_m, 0.0) + 2.0 * kBeside_m);
 }
 
-double ToolParts::least_J(const std::vector<Pose>& poses) const {
-  std::vector<double> least(poses.size(), std::numeric_limits<double>::infinity());
-  least.front() = 0.0;
-  for (std::size_t j = 1; j < poses.size(); ++j) {
-    for (std::size_t i = 0; i < j; ++i) least[j] = std::min(least[j], least[i] + pushed_J(poses[i], poses[j]));
+ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector<double>& shares,
+                                 const ToolCall& call) const {
+  const Pose end{1.0, call, 0.0}, &last = way.back();
+  const bool arrives = last.share == 1.0;
+  const bool either = arrives && pushed_J(way.front(), end) <= pushed_J(way.front(), last);
+  const std::size_t parts = arrives ? way.size() - 1 : way.size();
+  Sum sum;
+  for (std::size_t k = 0; k < parts; ++k) {
+    const bool to_end = k + 1 == parts;
+    double pushed = pushed_J(way[k], to_end ? end : way[k + 1]);
+    if (to_end && either) pushed = std::min(pushed, pushed_J(way[k], last));
+    sum.all_J += pushed;
+    const double middle = middle_of_widest(shares, way[k].share, to_end ? 1.0 : way[k + 1].share);
+    if (middle == 0.0) sum.undivided_J += pushed;
+    if (middle == 0.0 || !(pushed > sum.most_J)) continue;
+    sum.most_J = pushed;
+    sum.share = middle;
+    sum.before = k;
   }
-  return least.back();
+  return sum;
 }
 
 bool ToolParts::keep(const ToolCall& call, double short_m, std::vector<models::PoseContact>& touched) const {
-  Pose begin{0.0, call, short_m};
-  begin.call.r = call.q;
-  std::vector<Pose> poses{begin, {1.0, call, 0.0}};
-  std::vector<Part> parts{{pushed_J(poses[0], poses[1]), true}};
-  // Divides the part that ends at a pose; false if nothing is known there.
-  const auto divide = [&](std::size_t i, double share) {
-    Pose middle = pose_at(call, share, call.q);
-    if (middle.call.unresolved) middle = pose_at(call, share, poses[i - 1].call.r);
-    if (middle.call.unresolved) return false;
-    touched.insert(touched.end(), middle.call.contacts.begin(), middle.call.contacts.end());
-    parts[i - 1] = {pushed_J(middle, poses[i]), poses[i].share - share > kLeast};
-    parts.insert(parts.begin() + static_cast<std::ptrdiff_t>(i) - 1,
-                 {pushed_J(poses[i - 1], middle), share - poses[i - 1].share > kLeast});
-    poses.insert(poses.begin() + static_cast<std::ptrdiff_t>(i), middle);
-    return true;
-  };
-  for (int k = 1; k < kEighths; ++k) divide(poses.size() - 1, static_cast<double>(k) / kEighths);
-  const auto less = [](const Part& a, const Part& b) {
-    return std::pair(a.divides, a.pushed_J) < std::pair(b.divides, b.pushed_J);
-  };
+  std::vector<double> shares;
+  for (int k = 0; k <= kEighths; ++k) shares.push_back(static_cast<double>(k) / kEighths);
+  std::vector<Pose> way{{0.0, call, short_m}};
+  way.front().call.r = call.q;
   const double allowed_J = laws_.curvature_J(call);
-  while (poses.size() < kMost) {
-    double sum_J = 0.0;
-    for (const Part& part : parts) sum_J += part.pushed_J;
-    if (sum_J <= allowed_J) return true;
-    const auto most = std::max_element(parts.begin(), parts.end(), less);
-    if (!most->divides) break;
-    const auto i = static_cast<std::size_t>(most - parts.begin()) + 1;
-    if (!divide(i, 0.5 * (poses[i - 1].share + poses[i].share))) parts[i - 1].divides = false;
+  follow(call, shares, way);
+  Sum sum = sum_of(way, shares, call);
+  while (sum.all_J > allowed_J && sum.undivided_J <= allowed_J && sum.most_J > 0.0 && shares.size() < kMost) {
+    shares.insert(std::upper_bound(shares.begin(), shares.end(), sum.share), sum.share);
+    way.erase(way.begin() + static_cast<std::ptrdiff_t>(sum.before) + 1, way.end());
+    follow(call, shares, way);
+    sum = sum_of(way, shares, call);
   }
-  return least_J(poses) <= allowed_J;
+  for (std::size_t k = 1; k < way.size(); ++k) {
+    if (way[k].share == 1.0) continue;
+    touched.insert(touched.end(), way[k].call.contacts.begin(), way[k].call.contacts.end());
+  }
+  return sum.all_J <= allowed_J;
 }
 
 }  // namespace proxarm::studies

@@ -142,6 +142,18 @@ TEST(Stress, AToolMayComeOverAnEdgeWhereBothSidesAreSolutions) {
   expect_edges({2679357126334080ULL, 7836632257535979ULL, 813388677158608ULL, 1180702795386827ULL});
 }
 
+// Steps 435 and 74: an edge of the tool comes onto a vertex, lies on it for a part of the way and goes on beyond it.
+// The judge asked for the poses of that part from q, found no forces or those beyond the vertex, and took what these
+// push by for 19 and 7 mJ out of nowhere.
+TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) {
+  expect_edges({1126755579853460ULL, 5530763864440370ULL});
+}
+
+// Step 25: a vertex leaves a face of the tool over its edge, and on the edge there and on the corner next to it the
+// tool may lie. The step found the corner, its parts lead to the edge, which pushes by more. The judge knew of no way
+// to the corner and took its push for 0.6 mJ out of nowhere.
+TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_edges({54327521292900ULL}); }
+
 // Step 155 found no solution, and the last of the smaller parts that it was tried in had led 25 µm into the mesh: the
 // tool stayed there for the 845 steps that were left.
 TEST(Stress, AStepThatFindsNoSolutionLeavesTheToolOutside) {

@@ -21,20 +21,22 @@ constexpr double stiffness_N_per_m = 1e5, slope = 0.5 * M_PI_2;
 struct Table final : PoseAlgorithm {
   double early_m = 0.0;    // before the edge, where it jumps onto the slope
   double springs_m = 0.0;  // off the slope, and is held there
-  double each_m = 0.0;     // and back again, until it is there
   bool stuck = false;      // no solution beyond the edge
+  // From where p̂ goes by more than this, another slope is found, or no solution.
+  double far_m = 1.0, other_slope = slope;
+  bool stuck_far = false;
 
-  const ToolPose& step(const models::Mat6& /*K*/, const ToolPose& p_hat, const ToolPose& /*q*/) noexcept override {
+  const ToolPose& step(const models::Mat6& /*K*/, const ToolPose& p_hat, const ToolPose& q) noexcept override {
     const double x = p_hat.position.x();
-    const bool back = each_m > 0.0 && x < 0.0 && std::fmod(-x, 2.0 * each_m) < each_m;
-    const bool over = x > -early_m && !back;
-    contact_.normal_W = over ? Vec3(std::sin(slope), 0.0, std::cos(slope)) : Vec3(Vec3::UnitZ());
+    const bool over = x > -early_m, far = x - q.position.x() > far_m;
+    const double angle = far ? other_slope : slope;
+    contact_.normal_W = over ? Vec3(std::sin(angle), 0.0, std::cos(angle)) : Vec3(Vec3::UnitZ());
     const double off_m = (over ? springs_m : 0.0) - contact_.normal_W.dot(p_hat.position);
     q_ = p_hat;
     q_.position += off_m * contact_.normal_W;
     contact_.force_W = stiffness_N_per_m * off_m * contact_.normal_W;
     contact_.point_W = q_.position;
-    unresolved_ = over && stuck;
+    unresolved_ = over && (stuck || (far && stuck_far));
     return q_;
   }
   [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {&contact_, 1}; }
@@ -93,7 +95,7 @@ TEST(ToolParts, WhatTouchedOnTheWayIsTold) {
   };
   EXPECT_TRUE(touches(Vec3::UnitZ()));
   EXPECT_TRUE(touches(Vec3(std::sin(slope), 0.0, std::cos(slope))));
-  // A step that needs no parts: at seven places.
+  // A step that needs no smaller parts: at seven places.
   here.call.p.position.x() = -1e-4;
   touched.clear();
   EXPECT_TRUE(here.keeps(Table(), Table(), &touched));
@@ -142,13 +144,40 @@ TEST(ToolParts, AJumpThatPushesByLessThanCurvatureMayGiveIsNoSpring) {
   EXPECT_FALSE(here.keeps(world));
 }
 
-// Between 0.1 mm before the edge and the edge it is now on this side, now on the other one, a hundred times.
-TEST(ToolParts, PosesThatTakeNowOneSolutionAndNowTheOtherMayBeLeftOut) {
+// As where the tool lies on a vertex for a part of the way, and from q is found beyond: from there on it is asked anew.
+TEST(ToolParts, APoseOfTheWayIsFoundFromTheOneBefore) {
   const OverTheTable here;
-  Table to_and_fro;
-  to_and_fro.early_m = 1e-4;
-  to_and_fro.each_m = 1e-6;
-  EXPECT_TRUE(here.keeps(to_and_fro));
+  Table otherwise_from_far, stuck_from_far;
+  otherwise_from_far.far_m = stuck_from_far.far_m = 1e-4;
+  otherwise_from_far.other_slope = 0.3 * M_PI_2;
+  EXPECT_TRUE(here.keeps(Table(), otherwise_from_far));
+  stuck_from_far.stuck_far = true;
+  EXPECT_TRUE(here.keeps(Table(), stuck_from_far));
+}
+
+// The step ends on another slope than its parts lead to, which both keep the law: it may if it is pushed by no more.
+TEST(ToolParts, WhereThereAreSeveralSolutionsAStepMayTakeOneThatPushesNoMoreThanTheOneThatItsPartsLeadTo) {
+  const OverTheTable here;
+  const ToolLaws laws(here.scene, here.tool);
+  Table world;
+  world.far_m = 1e-4;
+  const double led_J = laws.pushed_J(here.step_of(Table()), 0.0);
+  const auto pushed_J = [&](double angle) {
+    world.other_slope = angle;
+    return laws.pushed_J(here.step_of(world), 0.0);
+  };
+  // As much on a slope of 32°.
+  double low = 0.3 * M_PI_2, high = 0.4 * M_PI_2;
+  ASSERT_LT(pushed_J(low), led_J);
+  ASSERT_GT(pushed_J(high), led_J);
+  for (int k = 0; k < 50; ++k) {
+    const double middle = 0.5 * (low + high);
+    (pushed_J(middle) < led_J ? low : high) = middle;
+  }
+  world.other_slope = 0.999 * low;
+  EXPECT_TRUE(here.keeps(world));
+  world.other_slope = 1.001 * high;
+  EXPECT_FALSE(here.keeps(world));
 }
 
 // So it isn't known where the edge is: the parts are those up to before it, and from there to the end.
