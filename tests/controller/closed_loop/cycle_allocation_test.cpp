@@ -106,6 +106,7 @@ TEST(CycleAllocation, IsNoneInTwoContactsAtOnce) {
 TEST(CycleAllocation, IsNoneWithATurningTool) {
   RigOptions options{.duration_s = 2.0};
   options.settings.orientation = OrientationMode::free;
+  options.settings.passivity = Passivity::on;
   expect_no_allocation(options, Fault::none);
 }
 

@@ -62,7 +62,8 @@ std::vector<Can> add_cans(World& world, Random& random, int count) {
   return cans;
 }
 
-Pushed pushed(std::uint64_t seed, const std::function<World(Random&)>& make, std::int64_t worlds = tests::scaled(40, 40)) {
+Pushed pushed(std::uint64_t seed, const std::function<World(Random&)>& make,
+              std::int64_t worlds = tests::scaled(40, 40)) {
   Pushed out;
   for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(worlds); ++i) {
     Random random(seed + i);
