@@ -116,9 +116,8 @@ class Turning(ProgramTest):
         self.assertIn("the smallest that is stable", outcome.err)
         smallest = outcome.err.split("at least ")[1].split(" kg m²")[0]
         self.assertGreater(float(smallest), 0.002)
-        # A wrist swings so fast that a drive isn't one lag any more: it takes up to a seventh more than is said, as an arm of
-        # stiff gears does (elastic_loop_test). At what is said the steel swings by 2.5 mm, which the place, by the motors,
-        # didn't show: this test took it for calm.
+        # It isn't all: at what is said the steel swings by 2.5 mm, against joints' limits, which the place by the motors
+        # didn't show (this test took it for calm). A seventh more is calm.
         calm = self.summary(*few, "--inertia", f"{1.15 * float(smallest):.5f}", "--duration", "4s", "--record", "calm")
         self.assertFalse(calm["oscillation"] and calm["oscillation"]["lasts"])
         speeds = [math.dist(*([float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz"] for row in pair)) / PERIOD_S
