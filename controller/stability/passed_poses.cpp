@@ -18,7 +18,6 @@ void PassedPoses::change(const LoopModel& loop) {
 
 bool PassedPoses::is_new(const models::ToolPose& tool_W, const Felt& felt) {
   if (!(felt == felt_)) {
-    if (felt.mass_kg != felt_.mass_kg || felt.inertia_kg_m2 != felt_.inertia_kg_m2) told_.reset();
     felt_ = felt;
     places_.clear();
     return false;
@@ -47,39 +46,48 @@ void add(UnstablePlaces there, std::optional<UnstablePlaces>& to) {
 }
 }  // namespace
 
-std::optional<UnstablePlaces> PassedPoses::judge(double time_s, const models::JointVector& joints_rad) {
+std::optional<UnstablePlaces> PassedPoses::judge(const Asked& asked) {
   constexpr double worth_telling = 1.5;
   ++judged_;
-  std::optional<UnstablePlaces> there = unstable_at(joints_rad);
+  if (asked.felt.mass_kg != told_felt_.mass_kg || asked.felt.inertia_kg_m2 != told_felt_.inertia_kg_m2) told_.reset();
+  told_felt_ = asked.felt;
+  std::optional<UnstablePlaces> there = unstable_at(asked);
   if (!there) return {};
-  there->first_s = there->worst_s = time_s;
+  there->first_s = there->worst_s = asked.time_s;
   add(*there, unstable_);
   if (!asks_for_more(*there, told_, worth_telling)) return {};
   add(*there, told_);
   return told_;
 }
 
-std::optional<UnstablePlaces> PassedPoses::unstable_at(const models::JointVector& joints_rad) const {
+std::optional<UnstablePlaces> PassedPoses::unstable_at(const Asked& asked) const {
   UnstablePlaces there;
-  there.felt_mass_kg = felt_.mass_kg;
-  there.felt_inertia_kg_m2 = felt_.inertia_kg_m2;
-  LoopModel loop = loop_;
-  loop.damping_Ns_per_m = felt_.damping_Ns_per_m;
-  loop.arms = std::make_shared<const std::vector<ElasticArm>>(1, elastic_arm(arm_, joints_rad, cell_));
-  if (!(spectral_radius(hand_, loop, felt_.mass_kg - loop.handle_mass_kg) < 1.0)) {
+  const double mass_kg = there.felt_mass_kg = asked.felt.mass_kg;
+  const double inertia_kg_m2 = there.felt_inertia_kg_m2 = asked.felt.inertia_kg_m2;
+  LoopModel loop = asked.loop;
+  loop.damping_Ns_per_m = asked.felt.damping_Ns_per_m;
+  loop.arms = std::make_shared<const std::vector<ElasticArm>>(1, elastic_arm(arm_, asked.joints_rad, cell_));
+  if (!(spectral_radius(hand_, loop, mass_kg - loop.handle_mass_kg) < 1.0)) {
     there.smallest_stable = smallest_stable_mass(hand_, loop);
     if (there.smallest_stable) *there.smallest_stable += loop.handle_mass_kg;
     return there;
   }
-  if (!turned_ || !(felt_.inertia_kg_m2 > 0.0)) return {};
+  if (!turned_ || !(inertia_kg_m2 > 0.0)) return {};
   PoseLoopModel model = *turned_;
   model.loop = loop;
-  model.turning_damping_Nms_per_rad = felt_.turning_damping_Nms_per_rad;
-  const PoseLoop both = pose_loop_at(arm_, joints_rad, cell_, model);
-  if (both.stable(felt_.mass_kg, felt_.inertia_kg_m2)) return {};
+  model.turning_damping_Nms_per_rad = asked.felt.turning_damping_Nms_per_rad;
+  const PoseLoop both = pose_loop_at(arm_, asked.joints_rad, cell_, model);
+  if (both.stable(mass_kg, inertia_kg_m2)) return {};
   there.lacks_mass = false;
-  there.smallest_stable = both.smallest_inertia(felt_.mass_kg);
+  there.smallest_stable = smallest_inertia(both, mass_kg);
   return there;
+}
+
+// Where what was told is enough, that: a place that asks for no more needn't be searched.
+std::optional<double> PassedPoses::smallest_inertia(const PoseLoop& both, double mass_kg) const {
+  const bool known = told_ && !told_->lacks_mass && told_->smallest_stable;
+  if (known && both.stable(mass_kg, *told_->smallest_stable)) return told_->smallest_stable;
+  return both.smallest_inertia(mass_kg);
 }
 
 }  // namespace proxarm::controller

@@ -31,6 +31,14 @@ class PassedPoses {
     bool operator==(const Felt&) const = default;
   };
 
+  // A place to be judged.
+  struct Asked {
+    double time_s = 0.0;
+    Felt felt;
+    LoopModel loop;
+    models::JointVector joints_rad;  // of the links
+  };
+
   // `loop`: without arms. `turned`, as pose_loop_at() takes it: of a tool that is led and turned at once; its loop is
   // `loop`. The arm and the cell must outlive it.
   PassedPoses(const models::Arm& arm, const description::Cell& cell, const HandModel& hand, const LoopModel& loop,
@@ -39,14 +47,17 @@ class PassedPoses {
   // From now on the loop is this; what has been judged is judged again when the tool comes by.
   void change(const LoopModel& loop);
   // The tool is there at that time, and felt so; `joints_rad`, called only where the place is to be judged, gives the
-  // links' angles. What should be told: it isn't stable there, which wasn't told yet of this mass and inertia, or it
-  // asks for half as much again as was told.
+  // links' angles.
   template <class Joints>
-  std::optional<UnstablePlaces> pass(double time_s, const models::ToolPose& tool_W, const Felt& felt,
-                                     const Joints& joints_rad) {
+  std::optional<Asked> come_to(double time_s, const models::ToolPose& tool_W, const Felt& felt,
+                               const Joints& joints_rad) {
     if (!is_new(tool_W, felt)) return {};
-    return judge(time_s, joints_rad());
+    return Asked{time_s, felt, loop_, joints_rad()};
   }
+  // What should be told: it isn't stable there, which wasn't told yet of this mass and inertia, or it asks for half as
+  // much again as was told. Another thread may call this, one at a time, while the tool goes on; what follows is then
+  // that thread's as well.
+  std::optional<UnstablePlaces> judge(const Asked& asked);
 
   [[nodiscard]] std::size_t judged() const noexcept { return judged_; }
   // Of all that was felt.
@@ -54,8 +65,8 @@ class PassedPoses {
 
  private:
   bool is_new(const models::ToolPose& tool_W, const Felt& felt);
-  std::optional<UnstablePlaces> judge(double time_s, const models::JointVector& joints_rad);
-  [[nodiscard]] std::optional<UnstablePlaces> unstable_at(const models::JointVector& joints_rad) const;
+  [[nodiscard]] std::optional<UnstablePlaces> unstable_at(const Asked& asked) const;
+  [[nodiscard]] std::optional<double> smallest_inertia(const PoseLoop& both, double mass_kg) const;
 
   const models::Arm& arm_;
   const description::Cell& cell_;
@@ -64,8 +75,10 @@ class PassedPoses {
   std::optional<PoseLoopModel> turned_;
   Felt felt_;
   std::vector<models::ToolPose> places_;  // judged with this loop and proxy; the last is the one that the tool is near
+  // Of judge().
   std::size_t judged_ = 0;
-  std::optional<UnstablePlaces> unstable_, told_;  // told_: of what is felt now
+  std::optional<UnstablePlaces> unstable_, told_;  // told_: of what was felt last
+  Felt told_felt_;
 };
 
 }  // namespace proxarm::controller

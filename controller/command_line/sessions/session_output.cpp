@@ -76,8 +76,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
       deriver_(session.cell) {
   refuse_lost_plot();
   if (!session.impedance()) {
-    poses_ = std::make_unique<controller::PassedPoses>(deriver_.arm(), session.cell, hand_model(session), session.loop,
-                                                       turned_model(session));
+    poses_ = std::make_unique<PoseWatch>(controller::PassedPoses(deriver_.arm(), session.cell, hand_model(session),
+                                                                 session.loop, turned_model(session)));
   }
   swing_ = least_damped_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
@@ -202,22 +202,28 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
-// On standard error: at the start only the start pose was judged. Who forced an unstable mass knows.
 void SessionOutput::judge_pose(const CycleRecord& record) {
   if (!poses_ || record.phase != controller::Phase::rendering) return;
+  if (!(record.added_damping_Ns_per_m > 0.0)) user_damping_Ns_per_m_ = record.proxy_damping_Ns_per_m;
   const auto joints_rad = [&] { return deriver_.link_rad(record); };
   const bool turns = record.proxy_inertia_kg_m2 > 0.0;
   const controller::PassedPoses::Felt felt{.mass_kg = record.proxy_mass_kg + session_.cell.tool.mass_kg,
-                                           .damping_Ns_per_m = record.proxy_damping_Ns_per_m,
+                                           .damping_Ns_per_m = user_damping_Ns_per_m_,
                                            .inertia_kg_m2 = record.proxy_inertia_kg_m2,
                                            .turning_damping_Nms_per_rad = record.proxy_turning_damping_Nms_per_rad};
-  const models::ToolPose tool_W{controller::vec3(record.tool_W_m),
-                                turns ? models::Quaternion(record.proxy_q_W.data()) : models::Quaternion::Identity()};
-  const std::optional<controller::UnstablePlaces> found =
-      poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
-  if (!found || options_.force_unstable) return;
-  std::fprintf(stderr, "proxarm: %s; if it swings: a larger %s, or lead it elsewhere\n",
-               controller::poses_text(*found).c_str(), found->lacks_mass ? "mass" : "inertia or mass");
+  const models::ToolPose tool_W{controller::vec3(record.tool_W_m), turns ? models::Quaternion(record.proxy_q_W.data())
+                                                                         : models::Quaternion::Identity()};
+  poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
+  say_poses();
+}
+
+// On standard error: at the start only the start pose was judged. Who forced an unstable mass knows.
+void SessionOutput::say_poses() {
+  for (const controller::UnstablePlaces& there : poses_->news()) {
+    if (options_.force_unstable) continue;
+    std::fprintf(stderr, "proxarm: %s; if it swings: a larger %s, or lead it elsewhere\n",
+                 controller::poses_text(there).c_str(), there.lacks_mass ? "mass" : "inertia or mass");
+  }
 }
 
 void SessionOutput::add(const CycleRecord& record) {
@@ -257,7 +263,10 @@ Summary SessionOutput::summary(const controller::Cycle& cycle, controller::Sessi
       controller::session_summary(builder_, cycle, end, {.reason = cause.word, .text = cause.text}, session_);
   summary.figures_s = std::chrono::duration<double>(spent_).count();
   summary.expected_swing = swing_;
-  if (poses_) summary.poses = {.judged = poses_->judged(), .unstable = poses_->unstable()};
+  if (poses_) {
+    summary.poses = poses_->summary();
+    say_poses();
+  }
   for (const controller::ScheduledCommand& order : cycle.scheduled_commands()) {
     if (order.taken && order.refusal == nullptr) continue;
     summary.idle_orders.push_back({order_name(order.request.order), static_cast<double>(order.at_ns) / 1e9,

@@ -10,6 +10,7 @@
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/sessions/black_box_keeper.hpp"
+#include "controller/command_line/sessions/pose_watch.hpp"
 #include "controller/cycle/cycle.hpp"
 #include "controller/report/plot.hpp"
 #include "controller/report/progress.hpp"
@@ -17,7 +18,6 @@
 #include "controller/report/summary.hpp"
 #include "controller/session/session.hpp"
 #include "controller/signals/derived_signals.hpp"
-#include "controller/stability/passed_poses.hpp"
 
 namespace proxarm::command_line {
 
@@ -51,6 +51,7 @@ class SessionOutput {
   void say_oscillation();
   void tell(controller::CycleRecord record);
   void judge_pose(const controller::CycleRecord& record);
+  void say_poses();
   void say_how_to_get_free(controller::Phase phase) const;
 
   const PreparedSession& session_;
@@ -60,7 +61,8 @@ class SessionOutput {
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
-  std::unique_ptr<controller::PassedPoses> poses_;  // admittance type
+  std::unique_ptr<PoseWatch> poses_;                // admittance type
+  double user_damping_Ns_per_m_ = 0.0;              // without what passivity adds
   std::optional<controller::Swing> swing_;          // of a tool that is turned
   std::chrono::steady_clock::duration spent_{};     // on records and their figures
   std::int64_t rendered_ns_ = 0;

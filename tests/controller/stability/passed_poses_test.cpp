@@ -57,8 +57,12 @@ class PassedPosesTest : public ::testing::Test {
   bool pass(PassedPoses& poses, double time_s, const Vec3& offset_W, double felt_kg) const {
     const auto joints = [&] { return joints_at(offset_W); };
     const models::ToolPose tool_W{.position = arm_.tool_pose(arm_.start_rad()).translation() + offset_W};
-    const bool told = poses.pass(time_s, tool_W, {.mass_kg = felt_kg}, joints).has_value();
-    return poses.pass(time_s, tool_W, {.mass_kg = felt_kg}, joints) || told;
+    bool told = false;
+    for (int cycle = 0; cycle < 2; ++cycle) {
+      const auto asked = poses.come_to(time_s, tool_W, {.mass_kg = felt_kg}, joints);
+      told = (asked && poses.judge(*asked)) || told;
+    }
+    return told;
   }
 
   const description::Cell cell_ = description::load_cell(source_file("models/cells/default.yaml"));
@@ -107,7 +111,7 @@ TEST_F(PassedPosesTest, APlaceIsJudgedOnceForEachMassAndNotWhileTheMassChanges) 
   const auto joints = [&] { return arm_.start_rad(); };
   for (int cycle = 0; cycle < 100; ++cycle) {
     const models::ToolPose tool_W{.position = arm_.tool_pose(arm_.start_rad()).translation()};
-    poses.pass(3.0, tool_W, {.mass_kg = 12.0 + 0.01 * cycle}, joints);
+    EXPECT_FALSE(poses.come_to(3.0, tool_W, {.mass_kg = 12.0 + 0.01 * cycle}, joints));
   }
   EXPECT_EQ(poses.judged(), 3u);
 }
@@ -155,8 +159,11 @@ class TurnedPosesTest : public ::testing::Test {
     const models::ToolPose tool_W{start.translation() + offset_W,
                                   models::rotation_by(turn_W) * models::Quaternion(start.linear())};
     const PassedPoses::Felt felt{.mass_kg = mass_kg, .inertia_kg_m2 = inertia_kg_m2};
-    const std::optional<UnstablePlaces> told = poses.pass(time_s, tool_W, felt, joints);
-    return told ? told : poses.pass(time_s, tool_W, felt, joints);
+    std::optional<UnstablePlaces> told;
+    for (int cycle = 0; cycle < 2 && !told; ++cycle) {
+      if (const auto asked = poses.come_to(time_s, tool_W, felt, joints)) told = poses.judge(*asked);
+    }
+    return told;
   }
 
   static constexpr double mass_kg = 4.0;

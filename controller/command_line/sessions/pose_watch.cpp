@@ -1,0 +1,53 @@
+#include "controller/command_line/sessions/pose_watch.hpp"
+
+#include <utility>
+
+namespace proxarm::command_line {
+
+PoseWatch::~PoseWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    ends_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void PoseWatch::ask(controller::PassedPoses::Asked asked) {
+  {
+    const std::lock_guard lock(mutex_);
+    asked_.push_back(std::move(asked));
+  }
+  changed_.notify_all();
+  if (!thread_.joinable()) thread_ = std::thread([this] { work(); });
+}
+
+void PoseWatch::work() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return ends_ || !asked_.empty(); });
+    if (ends_) return;
+    const controller::PassedPoses::Asked asked = std::move(asked_.front());
+    asked_.pop_front();
+    busy_ = true;
+    lock.unlock();
+    const std::optional<controller::UnstablePlaces> told = poses_.judge(asked);
+    lock.lock();
+    busy_ = false;
+    if (told) news_.push_back(*told);
+    changed_.notify_all();
+  }
+}
+
+std::vector<controller::UnstablePlaces> PoseWatch::news() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(news_, {});
+}
+
+controller::PosesSummary PoseWatch::summary() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return asked_.empty() && !busy_; });
+  return {.judged = poses_.judged(), .unstable = poses_.unstable()};
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,48 @@
+// PassedPoses in a thread of its own: whoever drains a session's records doesn't wait for it, which with --pace realtime
+// is the simulation itself. The thread begins with the first place.
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "controller/report/summary.hpp"
+#include "controller/stability/passed_poses.hpp"
+
+namespace proxarm::command_line {
+
+class PoseWatch {
+ public:
+  explicit PoseWatch(controller::PassedPoses poses) : poses_(std::move(poses)) {}
+  PoseWatch(const PoseWatch&) = delete;
+  PoseWatch& operator=(const PoseWatch&) = delete;
+  ~PoseWatch();  // what isn't judged by then isn't
+
+  void change(const controller::LoopModel& loop) { poses_.change(loop); }
+  template <class Joints>
+  void pass(double time_s, const models::ToolPose& tool_W, const controller::PassedPoses::Felt& felt,
+            const Joints& joints_rad) {
+    if (auto asked = poses_.come_to(time_s, tool_W, felt, joints_rad)) ask(std::move(*asked));
+  }
+  // What should be told by now and wasn't yet, in its order.
+  [[nodiscard]] std::vector<controller::UnstablePlaces> news();
+  // Waits until all is judged.
+  [[nodiscard]] controller::PosesSummary summary();
+
+ private:
+  void ask(controller::PassedPoses::Asked asked);
+  void work();
+
+  controller::PassedPoses poses_;
+  std::mutex mutex_;  // of what follows
+  std::condition_variable changed_;
+  std::deque<controller::PassedPoses::Asked> asked_;
+  std::vector<controller::UnstablePlaces> news_;
+  bool busy_ = false, ends_ = false;
+  std::thread thread_;
+};
+
+}  // namespace proxarm::command_line
