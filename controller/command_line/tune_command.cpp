@@ -9,6 +9,7 @@
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/trials/inertia_advice.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"
 #include "controller/command_line/trials/trial.hpp"
@@ -132,9 +133,13 @@ void print_mass(const Tuned& of, const std::optional<double>& smallest) {
       mass_text(smallest).c_str(), of.loop.handle_mass_kg, mass_text(smallest_felt(of.hand, start)).c_str());
   const auto safe = smallest_with_margins(of.hand, of.loop);
   const TriedAdvice tried = safe ? tried_mass(of.session, rounded_up(*safe)) : TriedAdvice{};
-  std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
-              tried.steady ? ("--mass " + mass_text(tried.steady)).c_str() : "no mass up to 1000 kg",
-              tried.steady ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
+  if (safe && !tried.steady) {
+    std::printf("advice: none: no mass from %s on that was tried was steady\n", mass_text(safe).c_str());
+  } else {
+    std::printf("advice: %s%s with a hand %.1f times as stiff and as heavy and %.0f %% more delay\n",
+                tried.steady ? ("--mass " + mass_text(tried.steady)).c_str() : "no mass up to 1000 kg",
+                tried.steady ? ", which is stable" : " is stable", hand_margin, 100.0 * (delay_margin - 1.0));
+  }
   if (safe) std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
 }
 
@@ -148,9 +153,14 @@ std::string inertia_text(const std::optional<double>& inertia_kg_m2) {
 // `also`: another option that it takes.
 void print_tried_inertia(const PreparedSession& session, double least_kg_m2, const std::string& also) {
   const TriedAdvice tried = tried_inertia(session, rounded_up(least_kg_m2));
-  const std::string advised = tried.steady ? "--inertia " + inertia_text(tried.steady) : "no inertia";
-  std::printf("advice: with %.3g kg %s%s, with the same margins\n", session.settings.mass_kg, advised.c_str(),
-              also.c_str());
+  const double mass_kg = session.settings.mass_kg;
+  if (tried.steady) {
+    std::printf("advice: with %.3g kg --inertia %s%s, with the same margins\n", mass_kg,
+                inertia_text(tried.steady).c_str(), also.c_str());
+  } else {
+    std::printf("advice: none: with %.3g kg no inertia from %s%s on that was tried was steady\n", mass_kg,
+                inertia_text(least_kg_m2).c_str(), also.c_str());
+  }
   std::printf("tried on the simulated arm: %s\n", tried.text.c_str());
 }
 
@@ -248,6 +258,8 @@ int tune_command(const RunOptions& options) {
                                    .found = "a cell of the impedance type",
                                    .expected = "one whose drives take positions: `run` judges a coupling's K and B"});
   }
+  require_usable_start(session);
+  require_inertia_in_range(session);
   const Tuned of = tuned(session);
   const auto smallest = smallest_felt(of.hand, of.loop);
   print_delays(of);

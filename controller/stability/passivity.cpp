@@ -172,6 +172,10 @@ void PassivityObserver::follow_spell() noexcept {
 
 bool PassivityObserver::lasts() const noexcept {
   if (!oscillates_ || spell_.lasted_s < config_.lasting_s || seen_.square < kept_share * spell_.most) return false;
+  if (gyration_m2_ > 0.0) {
+    const double periods = spell_.lasted_s / (2.0 * std::numbers::pi) * std::sqrt(seen_.band / seen_.square);
+    if (!(periods >= config_.lasting_periods)) return false;
+  }
   return 2.0 * seen_.square >= config_.felt_m * config_.felt_m || spell_.lasted_s >= config_.small_lasting_s;
 }
 

@@ -247,6 +247,24 @@ class Oscillation(ProgramTest):
                 self.assertLess(seconds, 1.0)
                 self.assertIsNone(outcome.summary["poses"]["unstable"])
 
+    def test_a_jerk_that_a_turned_tool_rings_from_does_not_last(self):
+        """A hand of 20 Nm/rad on 0.05 kg m² swings at 4.4 Hz: two periods of that were taken for an unstable loop."""
+        for jerk, turn in (("[0, 0, 0.02]", "[0.05, 0, 0]"), ("[0, 0, 0.01]", "[0.03, 0, 0]"), ("[0, 0, 0]", "[0, 0.2, 0]")):
+            with self.subTest(jerk=jerk, turn=turn):
+                hand = self.written("jerk.yaml", "name: jerk\nmass_kg: 1\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
+                                    "inertia_kg_m2: 0.003\nturning_stiffness_Nm_per_rad: 20\n"
+                                    "turning_damping_Nms_per_rad: 0.5\nwaypoints:\n"
+                                    "  - {time_s: 1.0, offset_m: [0, 0, 0], turn_rad: [0, 0, 0]}\n"
+                                    f"  - {{time_s: 1.06, offset_m: {jerk}, turn_rad: {turn}}}\n"
+                                    "  - {time_s: 1.12, offset_m: [0, 0, 0], turn_rad: [0, 0, 0]}\n")
+                outcome = self.call("run", "--json", "--no-plot", "--scene", SOURCE / "scenes/free.yaml", "--hand", hand,
+                                    "--mass", "4", "--inertia", "0.05", "--duration", "6s", "--record", "jerk")
+                self.assertEqual((outcome.status, outcome.err), (0, ""))
+                self.assertFalse(outcome.summary["oscillation"]["lasts"])
+                track = Track(self.folder / "jerk")
+                late = track.place[track.at(5.2):track.at(5.9)]
+                self.assertLess(max(math.dist(late[0], place) for place in late), 1e-4, "it did die away")
+
     def test_no_shipped_scene_is_blamed(self):
         for scene in sorted((SOURCE / "scenes").glob("*.yaml")):
             for hand in ("touch", "explore"):

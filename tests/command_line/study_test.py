@@ -101,6 +101,23 @@ class Tune(ProgramTest):
         self.assertIn("this hand doesn't turn the tool", self.call("tune", "--inertia", "0.05").out)
         self.assertNotIn("inertia", self.call("tune").out)
 
+    def test_what_run_refuses_of_a_tool_that_turns_tune_refuses(self):
+        lean = ("--hand", SOURCE / "sim/hands/lean.yaml")
+        for arguments, said in (((*lean, "--inertia", "0.0005"), "more than the handle's own"),
+                                ((*lean, "--inertia", "1e7"), "at most 1000 kg m²"),
+                                ((SOURCE / "models/cells/scara.yaml", *lean, "--inertia", "0.05"), "fewer than six axes")):
+            self.assert_refused(self.call("tune", *arguments), said)
+            self.assert_refused(self.call("run", *arguments), said)
+
+    def test_where_sines_lead_counts(self):
+        hand = self.written("sines.yaml", "name: sines\nmass_kg: 1\nstiffness_N_per_m: 500\ndamping_Ns_per_m: 20\n"
+                            "inertia_kg_m2: 0.003\nturning_stiffness_Nm_per_rad: 20\nturning_damping_Nms_per_rad: 0.5\n"
+                            "multisine:\n  - {frequency_Hz: 0.1, amplitude_m: 0.2, amplitude_rad: 0.4, direction: [0, 1, 0]}\n")
+        told = self.call("tune", "--scene", SOURCE / "scenes/free.yaml", "--hand", hand, "--mass", "4", "--inertia",
+                         "0.05").out
+        everywhere = float(told.split("smallest stable inertia with 4 kg: ")[1].split(" kg m²")[0])
+        self.assertGreater(everywhere, 1.2 * float(told.split("included; ")[2].split(" kg m²")[0]))
+
     def test_a_timestep_that_a_mass_needs_and_no_bus_carries_is_told_as_such(self):
         self.assertIn("a timestep of at most 0.5 ms, which the cell's buses can't carry", self.call("tune").out)
         self.assertNotIn("can't carry", self.call("tune", "--mass", "6").out)

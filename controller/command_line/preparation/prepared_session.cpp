@@ -414,6 +414,20 @@ std::vector<models::JointVector> led_poses(const PreparedSession& session) {
     leads.push_back({.offset_m = models::Vec3(waypoint.offset_m.data())});
     if (is_turned(session)) leads.back().turn_rad = models::Vec3(waypoint.turn_rad.data());
   }
+  // Each sine's two ends, and those of all at once.
+  controller::Lead all;
+  const auto add_both = [&](const controller::Lead& lead) {
+    leads.push_back(lead);
+    leads.push_back({-lead.offset_m, -lead.turn_rad});
+  };
+  for (const description::Sine& sine : session.hand.multisine) {
+    const models::Vec3 direction(sine.direction.data());
+    const controller::Lead end{sine.amplitude_m * direction,
+                               (is_turned(session) ? sine.amplitude_rad : 0.0) * direction};
+    all = {all.offset_m + end.offset_m, all.turn_rad + end.turn_rad};
+    add_both(end);
+  }
+  if (session.hand.multisine.size() > 1) add_both(all);
   // Some dozens of a trajectory's rows, for the sake of time.
   constexpr std::size_t places = 48;
   const std::vector<description::TimedVector>& trajectory = session.hand.trajectory;
@@ -538,18 +552,23 @@ void require_stable_horizon(const PreparedSession& session) {
 
 }  // namespace
 
-namespace {
-void require_inertia_above_handle(const PreparedSession& session) {
+void require_inertia_in_range(const PreparedSession& session) {
+  constexpr double most_kg_m2 = 1000.0;  // a tonne, a metre off
+  if (session.settings.orientation == controller::OrientationMode::held) return;
   const double handle_kg_m2 = models::tool_inertia(session.cell.tool).largest_kg_m2, felt = felt_inertia_kg_m2(session);
-  if (felt > handle_kg_m2) return;
+  if (felt > handle_kg_m2 && felt <= most_kg_m2) return;
+  const bool is_small = !(felt > handle_kg_m2);
   std::array<char, 80> expected{};
-  std::snprintf(expected.data(), expected.size(), "more than the handle's own %.3g kg m²", handle_kg_m2);
+  std::snprintf(expected.data(), expected.size(),
+                is_small ? "more than the handle's own %.3g kg m²" : "at most %.4g kg m²",
+                is_small ? handle_kg_m2 : most_kg_m2);
   throw description::SetupError({.key = "--inertia",
                                  .found = description::number_text(felt) + " kg m²",
                                  .expected = expected.data(),
-                                 .advice = "the handle sits after the sensor, so no control can make it lighter"});
+                                 .advice = is_small
+                                               ? "the handle sits after the sensor, so no control can make it lighter"
+                                               : "--orientation held keeps the tool from turning at all"});
 }
-}  // namespace
 
 void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (session.impedance()) return require_stable_coupling(session);
@@ -573,7 +592,7 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
   }
   if (!options.force_unstable) require_stable_horizon(session);
   if (session.settings.orientation == controller::OrientationMode::held || session.cell.drives.size() < 6) return;
-  require_inertia_above_handle(session);
+  require_inertia_in_range(session);
   const std::optional<controller::PoseLoop> both = pose_loop_at_start(session);
   if (options.force_unstable || !both) return;
   const controller::HandModel hand = turning_hand_model(session);

@@ -69,6 +69,9 @@ description::SetupProblem timestep_problem(const description::Cell& cell, const 
 // would be unstable (unless forced, which only a simulation may be). Impedance type: the virtual coupling is judged.
 void require_stable(const PreparedSession& session, const RunOptions& options);
 
+// The inertia of a tool that turns: throws SetupError at or below the handle's own, and for one that nothing turns.
+void require_inertia_in_range(const PreparedSession& session);
+
 // From the proxy's step to the links being where it went: latched at the next SYNC, reached a period later, and what
 // the filter of the setpoints takes. Impedance type: 0, the proxy is where the tool may be.
 double motion_delay_s(const PreparedSession& session);
