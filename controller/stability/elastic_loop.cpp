@@ -60,6 +60,26 @@ constexpr double ringing = 0.03, rigid_Hz = 300.0;
 
 }  // namespace
 
+namespace {
+// Of a drive's loops, by their speeds.
+constexpr double place_share = 0.25, integral_share = 0.1;
+
+void add_drives(const description::Cell& cell, ElasticArm& arm) {
+  constexpr double pi = std::numbers::pi, least = 0.02, none_kg_m2 = 1e6;
+  VectorXd rotor(arm.stiffness.size()), omega(arm.stiffness.size());
+  double yields = 0.0;  // as a share of the gear's twist
+  for (Index i = 0; i < rotor.size(); ++i) {
+    const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(i)];
+    rotor[i] = drive.rotor_inertia_kg_m2 > 0.0 ? drive.rotor_inertia_kg_m2 : none_kg_m2;
+    omega[i] = 2.0 * 2.0 * pi * drive.position_bandwidth_Hz;
+    yields = std::max(yields, arm.stiffness[i] / (rotor[i] * (place_share + integral_share) * omega[i] * omega[i]));
+  }
+  if (yields < least) return;
+  arm.rotor_kg_m2 = rotor;
+  arm.drive_rad_per_s = omega;
+}
+}  // namespace
+
 ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_rad, const description::Cell& cell) {
   constexpr double pi = std::numbers::pi;
   models::ToolKinematics kinematics;
@@ -84,6 +104,7 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
     }
     d = cell.drives[static_cast<std::size_t>(i)].gear_damping_Nms_per_rad.value_or(2.0 * ringing * k / first);
   }
+  add_drives(cell, out);
   return out;
 }
 
@@ -186,13 +207,14 @@ std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::ve
 // The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the
 // filter's x_f and ẋ_f, and the forces that were read.
 struct ElasticLoop::State {
-  Index n, d, ages, kept;
+  Index n, d, ages, kept, drives;
   [[nodiscard]] Index plant() const { return 0; }
   [[nodiscard]] Index sent() const { return 3 * n; }
   [[nodiscard]] Index proxies() const { return 5 * n; }
   [[nodiscard]] Index filter() const { return 5 * n + kept * d; }
   [[nodiscard]] Index forces() const { return 5 * n + (kept + 2) * d; }
-  [[nodiscard]] Index size() const { return forces() + d * ages; }
+  [[nodiscard]] Index drive() const { return forces() + d * ages; }
+  [[nodiscard]] Index size() const { return drive() + drives; }
 };
 
 namespace {
@@ -217,7 +239,8 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
       order_(loop.order),
       joints_(arm.stiffness.size()),
       dimensions_(arm.jacobian.rows()),
-      proxies_(loop.order == 2 ? 5 : 4) {
+      proxies_(loop.order == 2 ? 5 : 4),
+      drives_(3 * arm.rotor_kg_m2.size()) {
   // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
   // for Störmer's correction at order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
@@ -230,13 +253,13 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
   force_.middleCols(joints_, joints_) -= grip.damping * J;
 }
 
-// ż = A z for z = [φ, φ̇, θ, r, ṙ] with ṙ constant. Leaves the rows of φ̈ in force_.
+// ż = A z for z = [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ] with ṙ constant. Leaves the rows of φ̈ in force_.
 void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
   const MatrixXd mass = arm_.mass + J.transpose() * grip.hand_mass * J;
   MatrixXd k = (gear_stiffness_ratio * arm_.stiffness).asDiagonal(), d = arm_.damping.asDiagonal();
-  MatrixXd A = MatrixXd::Zero(5 * n, 5 * n);
+  MatrixXd A = MatrixXd::Zero(5 * n + drives_, 5 * n + drives_);
   const auto block = [&](Index row, Index column) { return A.block(row * n, column * n, n, n); };
   const MatrixXd one = MatrixXd::Identity(n, n);
   block(0, 1) = one;
@@ -249,11 +272,26 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   } else {
     block(2, 4) = one;
   }
-  MatrixXd torque = MatrixXd::Zero(n, 5 * n);
-  torque.leftCols(n) = -k - J.transpose() * grip.stiffness * J;
-  torque.middleCols(n, n) = -d - J.transpose() * grip.damping * J;
-  torque.middleCols(2 * n, n) = k;
-  torque += d * A.middleRows(2 * n, n);
+  MatrixXd gear = MatrixXd::Zero(n, A.cols());  // its torque on the link
+  gear.leftCols(n) = -k;
+  gear.middleCols(n, n) = -d;
+  gear.middleCols(2 * n, n) = k;
+  gear += d * A.middleRows(2 * n, n);
+  if (drives_ > 0) {
+    gear.middleCols(5 * n, n) = k;
+    gear.middleCols(6 * n, n) = d;
+    const VectorXd& omega = arm_.drive_rad_per_s;
+    const VectorXd rotor = arm_.rotor_kg_m2.cwiseInverse(), omega2 = omega.cwiseProduct(omega);
+    block(5, 6) = one;
+    block(7, 5) = one;
+    block(6, 6) = (-omega).asDiagonal();
+    block(6, 5) = (-(place_share + integral_share) * omega2).asDiagonal();
+    block(6, 7) = (-place_share * integral_share * omega2.cwiseProduct(omega)).asDiagonal();
+    A.middleRows(6 * n, n) -= rotor.asDiagonal() * gear;
+  }
+  MatrixXd torque = gear;
+  torque.leftCols(n) -= J.transpose() * grip.stiffness * J;
+  torque.middleCols(n, n) -= J.transpose() * grip.damping * J;
   A.middleRows(n, n) = mass.llt().solve(torque);
   force_ = A.middleRows(n, n);
   plant_ = exponential(A * period_s_);
@@ -276,22 +314,23 @@ ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixX
   return step;
 }
 
-Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_, proxies_}.size(); }
+Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_, proxies_, drives_}.size(); }
 
 // One period, from just before one reading of the sensor to just before the next.
 void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
-  const State at{n, d, ages_, proxies_};
+  const State at{n, d, ages_, proxies_, drives_};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
   // The present force follows from the slope of the setpoints in the period before, at whose end θ and r meet.
-  VectorXd z = VectorXd::Zero(5 * n);
+  VectorXd z = VectorXd::Zero(5 * n + drives_);
   z.head(3 * n) = state.head(3 * n);
   if (!(time_constant_s_ > 0.0))
     z.segment(2 * n, n) = old_sent;  // otherwise a difference between θ and r would never decay
   z.segment(3 * n, n) = old_sent;
-  z.tail(n) = (last_sent - old_sent) / T;
+  z.segment(4 * n, n) = (last_sent - old_sent) / T;
+  z.tail(drives_) = state.segment(at.drive(), drives_);
   const Place h_now = force_ * z;
   const auto force = [&](Index age) -> Place {
     return age == 0 ? h_now : Place(state.segment(at.forces() + d * (age - 1), d));
@@ -318,7 +357,9 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
     acceleration = omega * omega * (p - x) - 2.0 * omega * v;
   }
 
-  next.head(3 * n) = (plant_ * z).head(3 * n);
+  const VectorXd then = plant_ * z;
+  next.head(3 * n) = then.head(3 * n);
+  next.segment(at.drive(), drives_) = then.tail(drives_);
   next.segment(at.sent(), n) = arm_.joints_per_m * x + twist_ * acceleration;
   next.segment(at.sent() + n, n) = last_sent;
   next.segment(at.proxies(), d) = q;

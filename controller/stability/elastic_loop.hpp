@@ -5,6 +5,8 @@
 // model is linearised about a pose, with φ the links' angles, θ the motors', and x = J φ the tool's position:
 //   links     (M + m_h JᵀJ) φ̈ = k(θ − φ) + d(θ̇ − φ̇) − Jᵀ(K_h J φ + D_h J φ̇)          in continuous time
 //   motors    θ̇ = (r − θ)/τ, with r on a straight line from one setpoint to the next, a period later (τ = 0: θ = r)
+//   drives    the motor is at θ + δ, for what the gear pulls it away:
+//             J_r (δ̈ + ω_v δ̇ + ω_v(ω_p + ω_i) δ + ω_v ω_i ω_p ∫δ) = −(gear's torque on the link)
 //   sensor    h = −K_h x − D_h ẋ − (m_h + m_t) ẍ                                        m_t, m_h: handle and hand
 //   proxy     A(w) q = w^(age/T) h                                                     as in stability.hpp
 //   sent to   p = q + (H/T)(q − q₁)                                                    with lookahead
@@ -12,6 +14,12 @@
 // G = ∂(joint angles)/∂(tool position), orientation held. M includes handle and tool. Over a period the continuous part
 // is integrated exactly, by its matrix exponential. Together this is one linear map from period to period, whose
 // largest eigenvalue decides on stability. For six joints it is a matrix of some 45 rows.
+//
+// A drive's loops aren't known; ω_v is taken to be twice the bandwidth of its position loop, ω_p = ω_v/4, ω_i = ω_v/10,
+// as is usual. Its integral part pushes behind the gear, against the mode's damping: where rotors are light, as in arms
+// that weigh little, a mode loses a third of its damping to that (the collaborative arm of models/cells: 3.9 kg are the
+// smallest that come to rest, and 2.7 were said to be). Left out where the drives yield less than a fiftieth of the
+// gears (the default cell: 0.4 %).
 //
 // The gears' true stiffness may differ from the believed one, in k but not in k⁻¹ (gear_stiffness_ratio).
 //
@@ -39,6 +47,8 @@ struct ElasticArm {
   Eigen::MatrixXd joints_per_m;        // G: a column for each of these dimensions
   Eigen::VectorXd stiffness, damping;  // k > 0 and d ≥ 0 of each gear
   double filter_s = 0.0;               // 1/ω of the setpoints' filter; 0: none
+  // J_r of each rotor, at the joint, and ω_v of its drive; empty: the drives don't yield.
+  Eigen::VectorXd rotor_kg_m2{}, drive_rad_per_s{};
 };
 
 // Gears without a stiffness are rigid. If a drive doesn't tell its gear's damping, gears have 0.03 of the critical
@@ -107,11 +117,11 @@ class ElasticLoop {
   double period_s_, damping_, spring_, horizon_s_, time_constant_s_;
   double force_age_periods_;
   int order_;
-  Eigen::MatrixXd plant_;  // the map of [φ, φ̇, θ, r, ṙ] over a period
-  Eigen::MatrixXd force_;  // h from [φ, φ̇, θ, r, ṙ]
+  Eigen::MatrixXd plant_;  // the map of [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ] over a period
+  Eigen::MatrixXd force_;  // h from these
   Eigen::MatrixXd twist_;  // k⁻¹ M G
-  // Numbers of joints n, of tool dimensions, and of old forces and proxies that are kept.
-  Eigen::Index joints_, dimensions_, ages_, proxies_;
+  // Numbers of joints n, of tool dimensions, of old forces and proxies that are kept, and of the drives' states.
+  Eigen::Index joints_, dimensions_, ages_, proxies_, drives_;
 };
 
 }  // namespace proxarm::controller
