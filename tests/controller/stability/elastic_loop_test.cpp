@@ -108,17 +108,22 @@ TEST(ElasticLoop, FindsTheSmallestMassThatTheSimulatedArmBears) {
 
 TEST(ElasticLoop, FindsItForArmsThatDontHaveSixAxes) {
   const HandModel hand{500.0, 20.0, 1.0};
-  // The gantry's gears swing at 41 Hz, where a drive of 100 Hz isn't one lag any more: it needs 13 % more than is said.
-  const std::pair<const char*, double> cells[] = {{"bench", 1.06}, {"gantry", 1.2}, {"scara", 1.06}, {"seven", 1.06}};
-  for (const auto& [name, share] : cells) {
+  // (Friction in the scara's joints brings a nudge's swing to rest down to two thirds; led by a hand, it goes on at
+  // 0.8.)
+  struct Case {
+    const char* name;
+    double below;
+  };
+  for (const auto& [name, share_below] : {Case{"bench", 0.75}, {"gantry", 0.75}, {"scara", 0.65}, {"seven", 0.75}}) {
     const std::string file = std::string("models/cells/") + name + ".yaml";
     description::Cell cell = description::load_cell(source_file(file));
     const auto smallest = smallest_stable_mass(hand, loop_of(cell, 1e-3));
     ASSERT_TRUE(smallest) << name;
     const double felt_kg = *smallest + cell.tool.mass_kg;
-    const double above = left_m(hand, 1e-3, share * felt_kg, file), below = left_m(hand, 1e-3, 0.75 * felt_kg, file);
-    std::printf("%s: %.2f kg; at %.2f of it a swing of %.2g mm is left, at 0.75 %.2g\n", name, felt_kg, share,
-                1e3 * above, 1e3 * below);
+    const double above = left_m(hand, 1e-3, 1.06 * felt_kg, file);
+    const double below = left_m(hand, 1e-3, share_below * felt_kg, file);
+    std::printf("%s: %.2f kg; at 1.06 of it a swing of %.2g mm is left, at %.2f %.2g\n", name, felt_kg, 1e3 * above,
+                share_below, 1e3 * below);
     EXPECT_LT(above, 0.05e-3) << name;
     EXPECT_GT(below, 0.3e-3) << name;
   }
