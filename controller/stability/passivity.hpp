@@ -60,8 +60,8 @@
 // what is left counts as a new one once it no longer halves within pause_s. Below the amplitude felt_m, an oscillation
 // must go on for small_lasting_s. If an oscillation lasts, the loop isn't stable with this grip. Damping::what_lasts
 // begins then, and acts at once for remembered_s after each oscillation. A tool that turns must also have swung
-// lasting_periods: a hand of 20 Nm/rad on 0.05 kg m² swings at 3 to 4.5 Hz after a jerk, within this band, of which 0.5 s
-// are two periods, and dies away in the next three.
+// lasting_periods: a hand of 20 Nm/rad on 0.05 kg m² swings at 3 to 4.5 Hz after a jerk, within this band, of which 0.5
+// s are two periods, and dies away in the next three.
 //
 // Vectors in W. Neither allocates, locks nor throws. A session without passivity doesn't have this object.
 #pragma once

@@ -1,5 +1,5 @@
-// PassedPoses in a thread of its own: whoever drains a session's records doesn't wait for it, which with --pace realtime
-// is the simulation itself. The thread begins with the first place.
+// PassedPoses in a thread of its own: whoever drains a session's records doesn't wait for it, which with --pace
+// realtime is the simulation itself. The thread begins with the first place.
 #pragma once
 
 #include <condition_variable>

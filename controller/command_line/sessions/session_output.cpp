@@ -211,8 +211,8 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
                                            .damping_Ns_per_m = user_damping_Ns_per_m_,
                                            .inertia_kg_m2 = record.proxy_inertia_kg_m2,
                                            .turning_damping_Nms_per_rad = record.proxy_turning_damping_Nms_per_rad};
-  const models::ToolPose tool_W{controller::vec3(record.tool_W_m), turns ? models::Quaternion(record.proxy_q_W.data())
-                                                                         : models::Quaternion::Identity()};
+  const models::ToolPose tool_W{controller::vec3(record.tool_W_m),
+                                turns ? models::Quaternion(record.proxy_q_W.data()) : models::Quaternion::Identity()};
   poses_->pass(1e-9 * static_cast<double>(record.time_ns), tool_W, felt, joints_rad);
   say_poses();
 }

@@ -61,10 +61,10 @@ class SessionOutput {
   std::unique_ptr<controller::PlotBuilder> plot_;
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
-  std::unique_ptr<PoseWatch> poses_;                // admittance type
-  double user_damping_Ns_per_m_ = 0.0;              // without what passivity adds
-  std::optional<controller::Swing> swing_;          // of a tool that is turned
-  std::chrono::steady_clock::duration spent_{};     // on records and their figures
+  std::unique_ptr<PoseWatch> poses_;             // admittance type
+  double user_damping_Ns_per_m_ = 0.0;           // without what passivity adds
+  std::optional<controller::Swing> swing_;       // of a tool that is turned
+  std::chrono::steady_clock::duration spent_{};  // on records and their figures
   std::int64_t rendered_ns_ = 0;
   std::int64_t told_period_ns_ = 0;  // that the user knows of
   bool told_oscillation_ = false;    // of the present spell
