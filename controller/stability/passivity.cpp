@@ -46,6 +46,7 @@ Vec3 PassivityObserver::Section::step(const Vec3& in) noexcept {
 
 PassivityObserver::PassivityObserver(const PassivityConfig& config, double period_s, Damping damping)
     : config_(config), damping_(damping) {
+  delay_.reset(Vec3::Zero());
   set_period(period_s);
 }
 

@@ -128,7 +128,7 @@ class Shown(ProgramTest):
 
 class Apart(ProgramTest):
     def test_without_the_flag_there_is_nothing_of_it(self):
-        """What the session has, by itself and in full: two threads, these libraries, no socket, and the keeper of the black
+        """What the session has, by itself and in full: three threads, these libraries, no socket, and the keeper of the black
         box; and the same beside a view."""
         process = subprocess.Popen([program(), "run", "--pace", "realtime", "--duration", "20s", "--no-plot"], cwd=self.folder,
                                    stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
@@ -143,7 +143,7 @@ class Apart(ProgramTest):
                 unknown = {re.match(r"[a-z_]+(-[a-z]+)*", name)[0] for name in self.libraries(one)} - LIBRARIES
                 self.assertEqual({name for name in unknown if not re.fullmatch("lib([atl]|ub)san", name)}, set())
             if not os.environ.get("PROXARM_SLOW_BUILD"):
-                self.assertEqual(self.threads(process.pid), ["proxarm", "proxarm"])  # the cycle; signals
+                self.assertEqual(self.threads(process.pid), ["proxarm"] * 3)  # the cycle; signals; the poses' stability
             without = self.libraries(process.pid)
             threads = self.threads(process.pid)
         finally:
