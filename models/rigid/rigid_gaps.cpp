@@ -1,6 +1,7 @@
 // On which side of a feature the tool is, and how far from it.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "models/rigid/rigid_world.hpp"
@@ -19,6 +20,31 @@ constexpr int kOfCylinder = 10, kOfTwoCylinders = 30, kRims = 600;
 
 // A sine. Steps that are long beside a tool turn it by tenths of a radian on their way to where it ends.
 constexpr double kLeans = 0.2;
+
+// Whether a part of an edge is behind both of the faces beside another one, as far as these go on.
+bool enters(const EdgeLine& edge, const EdgeLine& wedge) noexcept {
+  double low = 0.0, high = 1.0;
+  for (const Vec3& n : {wedge.left, wedge.right}) {
+    const double from = n.dot(edge.from - wedge.from) + kGap_m, to = n.dot(edge.to - wedge.from) + kGap_m;
+    if (from > 0.0 && to > 0.0) return false;
+    if (from > 0.0) low = std::max(low, from / (from - to));
+    if (to > 0.0) high = std::min(high, from / (from - to));
+  }
+  return low <= high;
+}
+
+// Whether the line along an edge goes through a convex solid. (A ridge may be several edges of a mesh.)
+bool pierces(const EdgeLine& edge, const Solid& solid) noexcept {
+  double low = -std::numeric_limits<double>::infinity(), high = -low;
+  for (const Solid::Face& face : solid.faces) {
+    const double height = face.normal.dot(edge.from) - face.offset - kGap_m,
+                 rise = face.normal.dot(edge.to - edge.from);
+    if (rise == 0.0 && height > 0.0) return false;
+    if (rise > 0.0) high = std::min(high, -height / rise);
+    if (rise < 0.0) low = std::max(low, -height / rise);
+  }
+  return low <= high;
+}
 
 }  // namespace
 
@@ -398,6 +424,31 @@ bool RigidWorld::beside(const Found& deep, const View& at) const noexcept {
   return false;
 }
 
+// An edge of a convex solid and one of a mesh that cross behind each other hold nothing where the solid is beside the
+// mesh's edge. Where that is sharper than 90°, the place behind it may lie before one of its faces, and an edge that
+// ends there, with its corner on that face, isn't in the mesh; nor is the mesh's edge in the solid. One of both would
+// not be enough: an edge that ends before it comes to the mesh may go on as the next one at a corner that is nearly
+// flat, and what holds them out is this pair alone.
+bool RigidWorld::passes_by(const Found& deep, const View& at) const noexcept {
+  const Pair& pair = pairs_[deep.pair];
+  if (pair.kind != Kind::edges) return false;
+  const RigidObject& object = shared_->entries[pair.entry].object;
+  const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&object.shape);
+  const Solid* solid = std::get_if<Solid>(&object.shape);
+  const Part& part = shared_->parts[pair.part];
+  const View& seen = moves(pair.entry) ? moving(pair.entry).tool : at;
+  const auto passes = [](const Solid& convex, std::uint32_t index, const EdgeLine& of_mesh) {
+    if (convex.radius > 0.0 || of_mesh.open) return false;
+    return !enters(edge_of(convex, index), of_mesh) && !pierces(of_mesh, convex);
+  };
+  if (mesh != nullptr && !part.mesh) {
+    const TriangleFeatures::Edge& edge = (*mesh)->edge(pair.other);
+    return passes(part.solid, pair.own, edge_in_T(edge.line, seen, edge.ridge ? 1.0 : -1.0));
+  }
+  if (solid == nullptr || !part.mesh) return false;
+  return passes(*solid, pair.other, moved_edge(edge_of(part.solid, pair.own), seen));
+}
+
 // Whether a solid would stand in a face on which a corner of it lies: parts of it are behind that face by far, seen
 // from the corner. Such a face holds the corner of no lawful pose near this one.
 bool RigidWorld::leans_into(const Found& corner, const View& at) const noexcept {
@@ -469,7 +520,7 @@ void RigidWorld::drop_deeper(const View& at) noexcept {
     if (!(found_[i].touch.gap < -kGap_m) || found_[i].over) continue;
     const Pair& pair = pairs_[found_[i].pair];
     const bool is_sharp = pair.kind == Kind::edges || pair.kind == Kind::rim_edge || pair.kind == Kind::rims;
-    if (is_sharp && beside(found_[i], at)) {
+    if (is_sharp && (beside(found_[i], at) || passes_by(found_[i], at))) {
       found_[i--] = found_[--found_count_];
       continue;
     }

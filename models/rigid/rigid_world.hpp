@@ -271,6 +271,7 @@ class RigidWorld final : public PoseAlgorithm {
   void find(const ToolPose& pose) noexcept;
   void drop_deeper(const View& at) noexcept;
   [[nodiscard]] bool beside(const Found& deep, const View& at) const noexcept;
+  [[nodiscard]] bool passes_by(const Found& deep, const View& at) const noexcept;
   [[nodiscard]] bool rises_from(const Pair& one, const Pair& other) const noexcept;
   [[nodiscard]] bool leans_into(const Found& corner, const View& at) const noexcept;
   [[nodiscard]] double friction(const Pair& pair) const noexcept;

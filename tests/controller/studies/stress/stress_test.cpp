@@ -154,6 +154,13 @@ TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) {
 // to the corner and took its push for 0.6 mJ out of nowhere.
 TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_edges({54327521292900ULL}); }
 
+// Step 257: a corner of the tool slides on a face next to an edge of less than 90°. An edge that ends in the corner was
+// taken for one that crosses that edge 0.5 mm behind it, by the lines of both, and the tool sprang by 1.5 mm and 0.6 J.
+TEST(Stress, AnEdgeThatEndsBesideASharpWedgeIsNotHeldBehindIt) {
+  const Tally run = clean_run(2042847571053003);
+  EXPECT_EQ(run.kind, "meshes");
+}
+
 // Step 155 found no solution, and the last of the smaller parts that it was tried in had led 25 µm into the mesh: the
 // tool stayed there for the 845 steps that were left.
 TEST(Stress, AStepThatFindsNoSolutionLeavesTheToolOutside) {
