@@ -125,9 +125,23 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
 // none of them: nothing then holds it, and it would go in, though all else rests where it did. A tool that went in goes
 // back to where it was.
 bool RigidWorld::went_in(const ToolPose& q_old) noexcept {
-  if (!shared_->dense || something_comes() || !stands_in(q_)) return false;
-  q_ = q_old;
+  if (!shared_->dense) return false;
+  if (something_comes()) let_go(1.0);  // all the way, though the tool's parts may have ended before
+  if (!stands_in(q_)) return false;
+  q_ = something_comes() ? out_of_its_way(q_old) : q_old;
   return true;
+}
+
+// Where the tool was, or where that is on something that moves: the first that isn't in anything, or else where it is
+// now.
+ToolPose RigidWorld::out_of_its_way(const ToolPose& q_old) const noexcept {
+  if (!stands_in(q_old)) return q_old;
+  for (const Moving& m : moving_) {
+    if (!m.close || m.mover.rests()) continue;
+    const ToolPose with = m.mover.at() * m.mover.was().back(q_old);
+    if (!stands_in(with)) return with;
+  }
+  return q_;
 }
 
 // What the tool touches is mostly on the other side of a plane through a contact, and so is what is next to it.

@@ -328,6 +328,7 @@ class RigidWorld final : public PoseAlgorithm {
   void report(const ToolPose& q_old) noexcept;
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
   bool went_in(const ToolPose& q_old) noexcept;
+  [[nodiscard]] ToolPose out_of_its_way(const ToolPose& q_old) const noexcept;
   [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
   [[nodiscard]] bool lists_leaves(const ToolPose& pose, double reach) const noexcept;
