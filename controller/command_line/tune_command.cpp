@@ -191,8 +191,7 @@ void print_inertia(const PreparedSession& session) {
   const SmallestInertias smallest = smallest_inertias(session);
   std::printf(
       "smallest stable inertia with %.3g kg: %s felt, handle's %.2g kg m² included; %s in the start pose alone, by "
-      "which "
-      "`run` refuses\n",
+      "which `run` refuses\n",
       session.settings.mass_kg, inertia_text(smallest.everywhere).c_str(), turning_loop(session).handle_mass_kg,
       inertia_text(smallest.at_start).c_str());
   if (smallest.with_margins) return print_tried_inertia(session, *smallest.with_margins, "");

@@ -593,8 +593,9 @@ void require_stable(const PreparedSession& session, const RunOptions& options) {
   if (!options.force_unstable) require_stable_horizon(session);
   if (session.settings.orientation == controller::OrientationMode::held || session.cell.drives.size() < 6) return;
   require_inertia_in_range(session);
+  if (options.force_unstable) return;
   const std::optional<controller::PoseLoop> both = pose_loop_at_start(session);
-  if (options.force_unstable || !both) return;
+  if (!both) return;
   const controller::HandModel hand = turning_hand_model(session);
   const controller::LoopModel alone = turning_loop(session);
   const double mass_kg = session.settings.mass_kg, inertia_kg_m2 = felt_inertia_kg_m2(session);

@@ -1,5 +1,5 @@
-// The mass that `tune` and `new-cell` advise: stable with margins by the closed loop's eigenvalues, and steady on the
-// simulated arm.
+// The mass that `tune` and `new-cell` advise, before it is tried (trial.hpp): stable with margins by the closed loop's
+// eigenvalues.
 #pragma once
 
 #include <optional>
