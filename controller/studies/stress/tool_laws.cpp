@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <variant>
 
 #include "scenes/compiler/obstacles.hpp"
@@ -18,20 +19,27 @@ using models::Vec3;
 
 constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
-// The least of a convex function along a segment, by thirds.
-template <typename Function>
-double least_along(const Vec3& a, const Vec3& b, Function f) {
+// The least of a distance along a segment, by the golden section; where it is `enough` or more, some bound of that. (It
+// is convex, and grows by no more than one goes along.)
+template <typename Distance>
+double least_along(const Vec3& a, const Vec3& b, Distance f, double enough = beyond_all_m) {
   if (a == b) return f(a);
-  double low = 0.0, high = 1.0;
-  for (int k = 0; k < 80; ++k) {
-    const double x = low + (high - low) / 3.0, y = high - (high - low) / 3.0;
-    if (f(a + x * (b - a)) < f(a + y * (b - a))) {
-      high = y;
+  constexpr double share = 0.61803398874989485;
+  const double length_m = (b - a).norm();
+  const auto at = [&](double x) { return f(a + x * (b - a)); };
+  double low = 0.0, high = 1.0, x = 1.0 - share, y = share, f_x = at(x), f_y = at(y);
+  for (int k = 0; k < 70; ++k) {
+    const double bound = std::min(f_x, f_y) - (high - low) * length_m;
+    if (bound >= enough) return bound;
+    if (f_x < f_y) {
+      high = std::exchange(y, x);
+      f_y = std::exchange(f_x, at(x = high - share * (high - low)));
     } else {
-      low = x;
+      low = std::exchange(x, y);
+      f_x = std::exchange(f_y, at(y = low + share * (high - low)));
     }
   }
-  return std::min({f(a + low * (b - a)), f(a), f(b)});
+  return std::min({f_x, f_y, f(a), f(b)});
 }
 
 std::vector<Vec3> corners_of_box(const models::Pose& X, const Vec3& size) {
@@ -218,33 +226,53 @@ ToolLaws::Piece ToolLaws::moved(const Piece& piece, const ToolPose& pose) {
   return out;
 }
 
-// The separation by all axes; of pieces that are clear of each other, or whose balls are by `enough`, no more than that
-// of the balls around them.
+// Whether two balls are so far from each other that what is in them needn't be looked at. The least gap so far is
+// lowered to theirs.
+bool ToolLaws::are_clear(const Vec3& a, double a_reach_m, const Vec3& b, double b_reach_m, double& gap) {
+  const double clear = (a - b).norm() - a_reach_m - b_reach_m;
+  if (!(clear > clear_m || clear >= gap)) return false;
+  gap = std::min(gap, clear);
+  return true;
+}
+
+// The separation by all axes; of pieces that are `enough` apart by some of them, no more than by those.
 double ToolLaws::between_m(const Piece& a, const Piece& b, double enough) {
-  double gap = (a.middle - b.middle).norm() - a.reach_m - b.reach_m;
-  if (gap > 1e-3 || gap >= enough) return gap;
+  double gap = enough;
+  if (are_clear(a.middle, a.reach_m, b.middle, b.reach_m, gap)) return gap;
   gap = -beyond_all_m;
-  const auto by = [&](const Vec3& n) {
+  const auto suffices = [&](const Vec3& n) {
     double a_high = 0.0, b_high = 0.0;
     const double a_low = along(a.corners, n, a_high), b_low = along(b.corners, n, b_high);
     gap = std::max({gap, a_low - b_high, b_low - a_high});
+    return gap >= enough;
   };
-  for (const Vec3& n : a.normals) by(n);
-  for (const Vec3& n : b.normals) by(n);
+  if (std::any_of(a.normals.begin(), a.normals.end(), suffices)) return gap;
+  if (std::any_of(b.normals.begin(), b.normals.end(), suffices)) return gap;
   for (const Vec3& e : a.edges) {
     for (const Vec3& f : b.edges) {
       const Vec3 across = e.cross(f);
-      if (across.norm() > 1e-7) by(across.normalized());
+      if (across.norm() > 1e-7 && suffices(across.normalized())) return gap;
     }
   }
   return gap;
 }
 
-double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to, double enough) {
+// From what is around a segment by a radius; where balls or one of the triangle's normals part the two by `enough`, no
+// more than by that.
+double ToolLaws::from_segment_m(const Piece& triangle, const Vec3& from, const Vec3& to, double radius, double enough) {
+  double gap = enough;
+  if (are_clear(triangle.middle, triangle.reach_m, 0.5 * (from + to), 0.5 * (to - from).norm() + radius, gap))
+    return gap;
+  for (const Vec3& n : triangle.normals) {
+    double high = 0.0;
+    const double low = along(triangle.corners, n, high), one = n.dot(from), other = n.dot(to);
+    gap = std::max(low - std::max(one, other), std::min(one, other) - high) - radius;
+    if (gap >= enough) return gap;
+  }
   const Vec3 &a = triangle.corners[0], &b = triangle.corners[1], &c = triangle.corners[2];
-  const double clear = (0.5 * (from + to) - triangle.middle).norm() - triangle.reach_m - 0.5 * (to - from).norm();
-  if (clear > 0.1 || clear >= enough) return clear;
-  return least_along(from, to, [&](const Vec3& x) { return to_triangle(a, b, c, x); });
+  return least_along(
+             from, to, [&](const Vec3& x) { return to_triangle(a, b, c, x); }, enough + radius) -
+         radius;
 }
 
 // Of a mesh, as tool or as object, that is met by something with a volume; planes are met by corners.
@@ -262,8 +290,8 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
   if (mesh != nullptr && all_in(*mesh->mesh, core.corners_T, [&](const Vec3& x) { return pose * x; })) {
     return -core.reach_m - core.radius_m;
   }
+  const auto in_T = [&](const Vec3& x) { return Vec3(pose.orientation.conjugate() * (x - pose.position)); };
   if (core.mesh_T) {
-    const auto in_T = [&](const Vec3& x) { return Vec3(pose.orientation.conjugate() * (x - pose.position)); };
     const auto is_in = [&](const Piece& piece) { return all_in(*core.mesh_T, piece.corners, in_T); };
     const std::vector<Piece>& pieces = pieces_[index];
     const bool inside = sphere != nullptr    ? core.mesh_T->encloses(in_T(sphere->centre_m))
@@ -271,18 +299,22 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
                                              : std::all_of(pieces.begin(), pieces.end(), is_in);
     if (inside) return -core.reach_m;
   }
-  std::vector<Piece> own;
-  for (const Piece& piece : core.pieces_T) own.push_back(moved(piece, pose));
+  const Vec3 middle = pose * core.middle_T;
+  const double reach_m = core.reach_m + core.radius_m;
   const auto meet = [&](const Piece& triangle, const Vec3& from, const Vec3& to, double radius) {
-    gap = std::min(gap, from_segment_m(triangle, from, to, gap + radius) - radius);
+    gap = std::min(gap, from_segment_m(triangle, from, to, radius, gap));
   };
   for (const Piece& other : pieces_[index]) {
-    for (const Piece& piece : own) gap = std::min(gap, between_m(piece, other, gap));
-    if (own.empty()) meet(other, pose * core.corners_T.front(), pose * core.corners_T.back(), core.radius_m);
+    if (are_clear(other.middle, other.reach_m, middle, reach_m, gap)) continue;
+    if (core.pieces_T.empty()) meet(other, pose * core.corners_T.front(), pose * core.corners_T.back(), core.radius_m);
+    for (const Piece& piece : core.pieces_T) {
+      if (are_clear(pose * piece.middle, piece.reach_m, other.middle, other.reach_m, gap)) continue;
+      gap = std::min(gap, between_m(moved(piece, pose), other, gap));
+    }
   }
-  for (const Piece& piece : own) {
-    if (sphere != nullptr) meet(piece, sphere->centre_m, sphere->centre_m, sphere->radius_m);
-    if (capsule != nullptr) meet(piece, capsule->from_m, capsule->to_m, capsule->radius_m);
+  for (const Piece& piece : core.pieces_T) {
+    if (sphere != nullptr) meet(piece, in_T(sphere->centre_m), in_T(sphere->centre_m), sphere->radius_m);
+    if (capsule != nullptr) meet(piece, in_T(capsule->from_m), in_T(capsule->to_m), capsule->radius_m);
   }
   return gap;
 }

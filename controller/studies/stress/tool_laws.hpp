@@ -88,8 +88,11 @@ class ToolLaws {
   static Edges sharp_edges_of(const Piece& piece);
   static Edges sharp_edges_of(const models::TriangleMesh& mesh);
   static Piece moved(const Piece& piece, const models::ToolPose& pose);
+  static constexpr double clear_m = 1e-3;  // what is farther apart is known by balls around it
+  static bool are_clear(const models::Vec3& a, double a_reach_m, const models::Vec3& b, double b_reach_m, double& gap);
   static double between_m(const Piece& a, const Piece& b, double enough);
-  static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to, double enough);
+  static double from_segment_m(const Piece& triangle, const models::Vec3& from, const models::Vec3& to, double radius,
+                               double enough);
 
   // All points within a radius of the hull of some: one for a sphere, two for a capsule.
   struct Core {
