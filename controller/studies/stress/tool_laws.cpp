@@ -290,7 +290,8 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
   if (mesh != nullptr && all_in(*mesh->mesh, core.corners_T, [&](const Vec3& x) { return pose * x; })) {
     return -core.reach_m - core.radius_m;
   }
-  const auto in_T = [&](const Vec3& x) { return Vec3(pose.orientation.conjugate() * (x - pose.position)); };
+  const ToolPose W_in_T{pose.orientation.conjugate() * -pose.position, pose.orientation.conjugate()};
+  const auto in_T = [&](const Vec3& x) { return W_in_T * x; };
   if (core.mesh_T) {
     const auto is_in = [&](const Piece& piece) { return all_in(*core.mesh_T, piece.corners, in_T); };
     const std::vector<Piece>& pieces = pieces_[index];
@@ -306,11 +307,12 @@ double ToolLaws::apart_from_m(const Core& core, const ToolPose& pose, std::size_
   };
   for (const Piece& other : pieces_[index]) {
     if (are_clear(other.middle, other.reach_m, middle, reach_m, gap)) continue;
-    if (core.pieces_T.empty()) meet(other, pose * core.corners_T.front(), pose * core.corners_T.back(), core.radius_m);
-    for (const Piece& piece : core.pieces_T) {
-      if (are_clear(pose * piece.middle, piece.reach_m, other.middle, other.reach_m, gap)) continue;
-      gap = std::min(gap, between_m(moved(piece, pose), other, gap));
+    if (core.pieces_T.empty()) {
+      meet(other, pose * core.corners_T.front(), pose * core.corners_T.back(), core.radius_m);
+      continue;
     }
+    const Piece other_T = moved(other, W_in_T);
+    for (const Piece& piece : core.pieces_T) gap = std::min(gap, between_m(piece, other_T, gap));
   }
   for (const Piece& piece : core.pieces_T) {
     if (sphere != nullptr) meet(piece, in_T(sphere->centre_m), in_T(sphere->centre_m), sphere->radius_m);
