@@ -1,6 +1,7 @@
 // Which pairs of features may meet in the steps to come.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/near.hpp"
@@ -12,53 +13,74 @@ namespace {
 
 // More pairs than this are worth a smaller reach: a pair costs some 15 ns at each of the poses that a step looks at.
 constexpr std::size_t kFewPairs = 192;
+// By how much less than itself a length is, so that rounded to a float it is no more.
+constexpr double kOfFloats = std::numeric_limits<float>::epsilon();
 // And more triangles than this: one costs some 100 ns whenever pairs are gathered.
 constexpr std::size_t kFewFaces = 256;
+
+// Whether the box around two points comes near another one.
+bool is_near(const Bounds& box, const Vec3& a, const Vec3& b, double near) noexcept {
+  return (a.cwiseMin(b).array() <= box.high.array() + near).all() &&
+         (a.cwiseMax(b).array() >= box.low.array() - near).all();
+}
 
 }  // namespace
 
 template <typename Add>
-void RigidWorld::pairs_with(const Solid& own, const Solid& other, const View& at, double reach,
-                            Add add) const noexcept {
+void RigidWorld::pairs_with(const Solid& own, const Bounds& own_box, const Solid& other, const Bounds& other_box,
+                            const View& at, double reach, Add add) const noexcept {
   const double radii = own.radius + other.radius, near = reach + radii, near2 = near * near;
   const bool round = radii > 0.0;
   const double turn = reach / shared_->reach;
   const NormalCone::Angle corners_turn = turn_of_corners(turn);
+  const auto within = [&](double distance2, Kind kind, std::uint32_t i, std::uint32_t j) {
+    if (distance2 <= near2) add(kind, i, j, std::sqrt(distance2) - radii);
+  };
   for (std::uint32_t i = 0; i < own.points.size(); ++i) {
     const Vec3 p = at * own.points[i];
+    if (!is_near(other_box, p, p, near)) continue;
     const NormalCone cone = own.cones.of_corners[i].seen_by(at.R);
     for (std::uint32_t j = 0; j < other.faces.size(); ++j) {
       const Solid::Face& face = other.faces[j];
       if (!cone.holds(-face.normal, other.cones.around_faces[j] + corners_turn)) continue;
-      if (comes_near(other, face, p, near)) add(Kind::point_face, i, j);
+      within(distance2_within(other, face, p, near), Kind::point_face, i, j);
     }
     if (!round) continue;
     for (std::uint32_t j = 0; j < other.points.size(); ++j) {
-      if ((p - other.points[j]).squaredNorm() <= near2) add(Kind::point_point, i, j);
+      within((p - other.points[j]).squaredNorm(), Kind::point_point, i, j);
     }
     for (std::uint32_t j = 0; j < other.edges.size(); ++j) {
-      if (distance2_to_segment(p, edge_of(other, j)) <= near2) add(Kind::point_edge, i, j);
+      within(distance2_to_segment(p, edge_of(other, j)), Kind::point_edge, i, j);
     }
   }
   for (std::uint32_t j = 0; j < other.points.size(); ++j) {
     const Vec3 y = at.to_T(other.points[j]);
+    if (!is_near(own_box, y, y, near)) continue;
     const NormalCone cone = other.cones.of_corners[j].seen_by(at.R.transpose());
     for (std::uint32_t i = 0; i < own.faces.size(); ++i) {
       const Solid::Face& face = own.faces[i];
       if (!cone.holds(-face.normal, own.cones.around_faces[i] + corners_turn)) continue;
-      if (comes_near(own, face, y, near)) add(Kind::face_point, i, j);
+      within(distance2_within(own, face, y, near), Kind::face_point, i, j);
     }
     if (!round) continue;
     for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
-      if (distance2_to_segment(y, edge_of(own, i)) <= near2) add(Kind::edge_point, i, j);
+      within(distance2_to_segment(y, edge_of(own, i)), Kind::edge_point, i, j);
     }
   }
-  for (std::uint32_t i = 0; i < own.edges.size(); ++i) {
+  std::array<std::uint16_t, most_edges> near_edges;
+  std::size_t count = 0;
+  for (std::uint32_t j = 0; j < other.edges.size(); ++j) {
+    const Vec3 &from = other.points[other.edges[j].from], &to = other.points[other.edges[j].to];
+    if (is_near(own_box, at.to_T(from), at.to_T(to), near)) near_edges[count++] = static_cast<std::uint16_t>(j);
+  }
+  for (std::uint32_t i = 0; count > 0 && i < own.edges.size(); ++i) {
     const EdgeLine edge = moved_edge(edge_of(own, i), at);
-    for (std::uint32_t j = 0; j < other.edges.size(); ++j) {
+    if (!is_near(other_box, edge.from, edge.to, near)) continue;
+    for (const std::uint32_t j : std::span(near_edges).first(count)) {
       const EdgeLine line = edge_of(other, j);
-      if (distance2_of_segments(edge, line) > near2 || (!round && never_hold(edge, line, turn))) continue;
-      add(Kind::edges, i, j);
+      const double distance2 = distance2_of_segments(edge, line);
+      if (distance2 > near2 || (!round && never_hold(edge, line, turn))) continue;
+      within(distance2, Kind::edges, i, j);
     }
   }
 }
@@ -188,22 +210,26 @@ template <typename Add>
 void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, double side, const NearFaces& close,
                              const View& at, Add add) const noexcept {
   const double near = close.near(), near2 = near * near;
+  const auto within = [&](double distance2, Kind kind, std::uint32_t i, std::uint32_t j) {
+    if (distance2 <= near2) add(kind, i, j, std::sqrt(distance2) - own.radius);
+  };
   for (std::uint32_t i = 0; i < own.points.size(); ++i) {
     if (!close.meets(own.points[i], own.points[i]) || !close.faces_some(own.cones.of_corners[i])) continue;
     const Vec3 p = at * own.points[i];
     const NormalCone cone = own.cones.of_corners[i].seen_by(at.R);
     other.mesh().within(p, near, [&](std::uint32_t face) {
       if (crowded_) return false;
-      if (!comes_near(other.mesh(), face, p, near)) return true;
+      const double distance2 = distance2_within(other.mesh(), face, p, near);
+      if (distance2 > near2) return true;
       const NormalCone::Angle turn = other.around(face) + close.corners_turn();
       const bool may_rest = side == 0.0 || cone.holds(-side * face_of(other, face).normal, turn);
-      if (may_rest) add(Kind::point_face, i, face);
+      if (may_rest) within(distance2, Kind::point_face, i, face);
       if (!(own.radius > 0.0)) return true;
       for (const std::uint32_t v : other.vertices_of(face)) {
-        if ((p - other.vertex(v)).squaredNorm() <= near2) add(Kind::point_point, i, v);
+        within((p - other.vertex(v)).squaredNorm(), Kind::point_point, i, v);
       }
       for (const std::uint32_t e : other.edges_of(face)) {
-        if (distance2_to_segment(p, other.edge(e).line) <= near2) add(Kind::point_edge, i, e);
+        within(distance2_to_segment(p, other.edge(e).line), Kind::point_edge, i, e);
       }
       return true;
     });
@@ -214,18 +240,20 @@ void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, do
 template <typename Add>
 void RigidWorld::vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, const NormalCone& cone, NearFaces& close,
                              Add add) const noexcept {
-  const double near = close.near();
+  const double near = close.near(), near2 = near * near;
+  const auto within = [&](double distance2, Kind kind, std::uint32_t i) {
+    if (distance2 <= near2) add(kind, i, v, std::sqrt(distance2) - own.radius);
+  };
   if (!close.beyond(y, y)) {
     for (const std::uint16_t i : close.facing()) {
       const Solid::Face& face = own.faces[i];
       if (!cone.holds(-face.normal, own.cones.around_faces[i] + close.corners_turn())) continue;
-      if (comes_near(own, face, y, near)) add(Kind::face_point, i, v);
+      within(distance2_within(own, face, y, near), Kind::face_point, i);
     }
   }
   if (!(own.radius > 0.0)) return;
-  close.each_crossing(y, 0.0, [&](std::uint16_t i) {
-    if (distance2_to_segment(y, edge_of(own, i)) <= near * near) add(Kind::edge_point, i, v);
-  });
+  close.each_crossing(y, 0.0,
+                      [&](std::uint16_t i) { within(distance2_to_segment(y, edge_of(own, i)), Kind::edge_point, i); });
 }
 
 // An edge of the mesh, seen from T, with the tool's edges.
@@ -237,9 +265,10 @@ void RigidWorld::edge_with(const Solid& own, std::uint32_t e, const EdgeLine& li
   const double half = 0.5 * (line.to - line.from).norm();
   close.each_crossing(middle, half, [&](std::uint16_t i) {
     const EdgeLine edge = edge_of(own, i);
-    if (distance2_of_segments(edge, line) > close.near() * close.near()) return;
+    const double distance2 = distance2_of_segments(edge, line);
+    if (distance2 > close.near() * close.near()) return;
     if (!(own.radius > 0.0) && never_hold(edge, line, close.turn())) return;
-    add(Kind::edges, i, e);
+    add(Kind::edges, i, e, std::sqrt(distance2) - own.radius);
   });
 }
 
@@ -269,8 +298,8 @@ void RigidWorld::pairs_with(const Solid& own, const Bounds& box, const TriangleF
   }
 }
 
-void RigidWorld::add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own,
-                          std::uint32_t other) noexcept {
+void RigidWorld::add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other,
+                          double apart_m) noexcept {
   if (pair_count_ == pair_room_) {
     crowded_ = true;
     return;
@@ -282,6 +311,7 @@ void RigidWorld::add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, st
   pair.entry = entry;
   pair.own = own;
   pair.other = other;
+  pair.apart_m = static_cast<float>(apart_m * (1.0 - kOfFloats));
 }
 
 // Of a pair whose features have changed places.
@@ -303,7 +333,9 @@ RigidWorld::Kind RigidWorld::other_way_round(Kind kind) noexcept {
 void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const Entry& e = shared_->entries[entry];
   const Part& own = shared_->parts[part];
-  const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j) { add_pair(kind, part, entry, i, j); };
+  const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j, double apart_m) {
+    add_pair(kind, part, entry, i, j, apart_m);
+  };
   const Solid* solid = std::get_if<Solid>(&e.object.shape);
   const auto* mesh = std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
   if (e.cylinder || (own.cylinder && (mesh != nullptr || solid != nullptr))) {
@@ -314,18 +346,21 @@ void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View
     return pairs_with(own.solid, own.box, **mesh, e.held, at, reach, add);
   }
   if (solid != nullptr) {
-    if (!own.mesh) return pairs_with(own.solid, *solid, at, reach, add);
+    if (!own.mesh) return pairs_with(own.solid, own.box, *solid, e.box, at, reach, add);
     // Seen from the tool it is a solid near a mesh.
     return pairs_with(*solid, e.box, *own.mesh, 1.0, inverse(at), reach,
-                      [&](Kind kind, std::uint32_t i, std::uint32_t j) { add(other_way_round(kind), j, i); });
+                      [&](Kind kind, std::uint32_t i, std::uint32_t j, double apart_m) {
+                        add(other_way_round(kind), j, i, apart_m);
+                      });
   }
   with_flat_or_hollow(e.object, [&](const auto& shape) {
     for (std::uint32_t i = 0; i < own.solid.points.size(); ++i) {
-      if (touch(shape, at * own.solid.points[i], own.solid.radius).gap <= reach) add(Kind::point_field, i, 0);
+      const double gap = touch(shape, at * own.solid.points[i], own.solid.radius).gap;
+      if (gap <= reach) add(Kind::point_field, i, 0, gap);
     }
     for (std::uint32_t i = 0; i < own.solid.rims.size(); ++i) {
       const Solid::Rim& rim = own.solid.rims[i];
-      if (touch(shape, at * rim.centre, rim.radius).gap <= reach) add(Kind::rim_field, i, 0);
+      if (touch(shape, at * rim.centre, rim.radius).gap <= reach) add(Kind::rim_field, i, 0, 0.0);
     }
   });
 }
@@ -411,7 +446,10 @@ void RigidWorld::restore(const KeptPairs& kept) noexcept {
     for (std::size_t i = 0; i < pair_count_; ++i) {
       Pair& pair = pairs_[i];
       if (pair.kind != old.kind || pair.part != old.part || pair.entry != old.entry) continue;
-      if (pair.own == old.own && pair.other == old.other) pair = old;
+      if (pair.own != old.own || pair.other != old.other) continue;
+      const float apart_m = pair.apart_m;
+      pair = old;
+      pair.apart_m = apart_m;
     }
   }
 }

@@ -30,7 +30,9 @@ struct RigidWorld::TwoCylinders {
 
 void RigidWorld::gather_cylinders(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const TwoCylinders here(*this, part, entry, at);
-  const auto add = [&](Kind kind, std::uint32_t own, std::uint32_t other) { add_pair(kind, part, entry, own, other); };
+  const auto add = [&](Kind kind, std::uint32_t own, std::uint32_t other) {
+    add_pair(kind, part, entry, own, other, 0.0);
+  };
   const EdgeLine own = axis_of(here.own), other = axis_of(here.other);
   const double most = reach + here.own.radius + here.other.radius;
   if (distance2_of_segments(own, other) > most * most) return;

@@ -83,7 +83,7 @@ void RigidWorld::gather_cylinder(std::uint16_t part, std::uint16_t entry, const 
   const Cylinder cylinder = moved(ours ? *own.cylinder : *other.cylinder, to.R, to.x);
   const CylinderPairs pairs(Kind::side_point, cylinder, body, reach,
                             [&](Kind kind, std::uint32_t round, std::uint32_t feature) {
-                              add_pair(kind, part, entry, ours ? round : feature, ours ? feature : round);
+                              add_pair(kind, part, entry, ours ? round : feature, ours ? feature : round, 0.0);
                             });
   if (const TriangleFeatures* mesh = body.mesh()) {
     const Solid& solid = ours ? own.solid : *std::get_if<Solid>(&other.object.shape);

@@ -354,17 +354,41 @@ bool RigidWorld::is_beyond_edge(const Pair& pair, double gap, const View& at) co
                      [&](const Solid::Face& face) { return height(face) > kGap_m; });
 }
 
-void RigidWorld::find(const ToolPose& pose) noexcept {
+void RigidWorld::find(const ToolPose& pose, double within_m) noexcept {
+  looks_ -= static_cast<int>(pair_count_);
+  look_at_pairs(pose, within_m);
+  const auto needs = [&](const Found& found) { return needs_others(found); };
+  const auto end = found_.begin() + static_cast<std::ptrdiff_t>(found_count_);
+  if (within_m_ < kEverywhere_m && std::any_of(found_.begin(), end, needs)) look_at_pairs(pose, kEverywhere_m);
+  drop_deeper(view(pose));
+}
+
+// Whether what is far away may tell that this one holds nothing: edges that cross behind each other, or what is behind
+// by more than the others are before.
+bool RigidWorld::needs_others(const Found& found) const noexcept {
+  const Kind kind = pairs_[found.pair].kind;
+  return found.touch.gap < (kind == Kind::edges ? -kGap_m : -within_m_);
+}
+
+void RigidWorld::look_at_pairs(const ToolPose& pose, double within_m) noexcept {
   found_count_ = 0;
   at_pose_.known = false;
-  looks_ -= static_cast<int>(pair_count_);
+  within_m_ = kEverywhere_m;
   const View at_W = view(pose);
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     moving_[i].tool = seen_from(static_cast<std::uint16_t>(shared_->first_moving + i), at_W);
   }
+  // A foot may lie beside a feature by as much.
+  const bool all = within_m == kEverywhere_m;
+  const double near_m =
+      all ? kEverywhere_m : motion(pose, gathered_at_) + within_m + std::max(beside_, over_m_) + kFront_m;
   for (std::size_t i = first_pair(); i < pair_count_; ++i) {
     const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
     if (on != nullptr && !on->close) continue;
+    if (on == nullptr && pairs_[i].apart_m > near_m && !pairs_[i].pressed) {
+      within_m_ = within_m;
+      continue;
+    }
     const View& at = on == nullptr ? at_W : on->tool;
     const Kind kind = pairs_[i].kind;
     if (kind >= Kind::sides) {
@@ -397,7 +421,6 @@ void RigidWorld::find(const ToolPose& pose) noexcept {
     evaluate_over(pairs_[i], at, add);
     if (found_count_ > before) found_[before].over = true;
   }
-  drop_deeper(at_W);
 }
 
 // Two sharp edges that cross far behind each other hold nothing where another feature of the two solids keeps them

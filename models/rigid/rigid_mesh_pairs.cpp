@@ -1,5 +1,6 @@
 // Which pairs of features of a mesh that is a part of the tool and of one that is an object may meet.
 #include <algorithm>
+#include <cmath>
 
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/mesh_pairs.hpp"
@@ -29,7 +30,8 @@ class OfFaces {
     const NormalCone::Angle turn = other_->around(other_face) + corners_turn_;
     for (const std::uint32_t v : own_->vertices_of(face)) {
       if (held_ != 0.0 && !own_->cone(v).holds(inwards, turn)) continue;
-      if (comes_near(other_->mesh(), other_face, at_ * own_->vertex(v), near_)) add(v, other_face);
+      const double distance2 = distance2_within(other_->mesh(), other_face, at_ * own_->vertex(v), near_);
+      if (distance2 <= near_ * near_) add(v, other_face, std::sqrt(distance2));
     }
   }
   template <typename Add>
@@ -38,7 +40,8 @@ class OfFaces {
     const NormalCone::Angle turn = own_->around(face) + corners_turn_;
     for (const std::uint32_t v : other_->vertices_of(other_face)) {
       if (!other_->cone(v).holds(inwards, turn)) continue;
-      if (comes_near(own_->mesh(), face, at_.to_T(other_->vertex(v)), near_)) add(face, v);
+      const double distance2 = distance2_within(own_->mesh(), face, at_.to_T(other_->vertex(v)), near_);
+      if (distance2 <= near_ * near_) add(face, v, std::sqrt(distance2));
     }
   }
   // A valley is touched by nothing sharp.
@@ -50,10 +53,11 @@ class OfFaces {
       for (const std::uint32_t j : other_->edges_of(other_face)) {
         if (other_->edge(j).ridge != (held_ > 0.0)) continue;
         EdgeLine line = other_->edge(j).line;
-        if (distance2_of_segments(edge, line) > near_ * near_) continue;
+        const double distance2 = distance2_of_segments(edge, line);
+        if (distance2 > near_ * near_) continue;
         line.left *= held_;
         line.right *= held_;
-        if (!never_hold(edge, line, turn_)) add(i, j);
+        if (!never_hold(edge, line, turn_)) add(i, j, std::sqrt(distance2));
       }
     }
   }
@@ -108,7 +112,9 @@ void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const Vi
   const TriangleFeatures& other = **std::get_if<std::shared_ptr<const TriangleFeatures>>(&e.object.shape);
   const OfFaces of(own, other, e.held, at, reach, reach / shared_->reach);
   const auto add = [&](Kind kind) {
-    return [this, kind, part, entry](std::uint32_t i, std::uint32_t j) { add_pair(kind, part, entry, i, j); };
+    return [this, kind, part, entry](std::uint32_t i, std::uint32_t j, double apart_m) {
+      add_pair(kind, part, entry, i, j, apart_m);
+    };
   };
   std::size_t looked_at = 0;
   const auto look_at = [&](std::uint32_t face, std::uint32_t other_face) {

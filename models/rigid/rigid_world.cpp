@@ -43,6 +43,11 @@ constexpr double kRoughShare = 1e-5;
 constexpr double kNear_m = 1e-9;
 // And the last step turns normals by no more than 1e-10 of a clearance of ten micrometres.
 constexpr double kStill_m = 1e-15;
+// What is further away than so many times the way to p̂ isn't looked at: a stiff coupling seldom yields by more than
+// that way, to either side. Where it does, all is looked at.
+constexpr double kWithin = 2.0;
+// Of so many pairs it pays to know which are far.
+constexpr std::size_t kManyPairs = 12;
 // By how much normals may still turn in the last step, whose forces are those of normals before it: of 10 N that is a
 // tenth of a nanonewton across.
 constexpr double kTurned = 1e-11;
@@ -219,7 +224,9 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   shared_ = std::move(shared);
 }
 
-double RigidWorld::motion(const ToolPose& a, const ToolPose& b) const noexcept { return size_m(difference(a, b)); }
+double RigidWorld::motion(const ToolPose& a, const ToolPose& b) const noexcept {
+  return a == b ? 0.0 : size_m(difference(a, b));
+}
 
 double RigidWorld::size_m(const Twist& xi) const noexcept {
   return xi.head<3>().norm() + shared_->reach * xi.tail<3>().norm();
@@ -315,6 +322,9 @@ bool RigidWorld::join(const ToolPose& pose, const ToolPose& q_old, const Twist& 
   return linear_count_ > before;
 }
 
+// Whether pairs that are far may be left out. Where gaps bend the coupling yields as the pairs that pressed have it.
+bool RigidWorld::may_leave_out() const noexcept { return pair_count_ >= kManyPairs && !shared_->bends; }
+
 // Solves the local problem at a pose that is by e off p̂. Contacts that neither pressed last time nor are passed on the
 // way to p̂ join when a solution passes them. `still_m`: rounding, where the last solution may hold already; or 0.
 bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
@@ -326,6 +336,12 @@ bool RigidWorld::solve_linear(const ToolPose& pose, const Twist& e, const ToolPo
   bool solved = true;
   delta = -e;
   for (int round = 0; round < kRounds; ++round) {
+    if (within_m_ < kEverywhere_m && size_m(delta) > within_m_) {
+      find(pose);
+      linear_count_ = 0;
+      delta = -e;
+      round = 0;
+    }
     if (!join(pose, q_old, delta, round == 0, still_m)) break;
     held_ = round == 0 && still_m > 0.0 && still_holds(pose, e_coupled, still_m, delta);
     if (held_) continue;
@@ -494,14 +510,14 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     if (--budget_ < 0 || looks_ < 0 || problem_.exhausted()) break;
     beside_ = k < kToAndFro ? beside_m : std::clamp(last, beside_m, kBesideAtMost_m);
     over_m_ = std::isfinite(last) ? std::clamp(last, beside_m, kBesideAtMost_m) : beside_m;
-    find(q);
-    over_m_ = beside_m;
+    const Twist e = difference(q, p_hat);
+    find(q, may_leave_out() ? kWithin * size_m(e) : kEverywhere_m);
     Twist delta;
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
-    const Twist e = difference(q, p_hat);
     const double still_m = shared_->bends && !roughly && last < kNear_m ? rounding : 0.0;
     const bool solved = solve_linear(q, e, q_old, rough, still_m, delta);
+    over_m_ = beside_m;
     if (!delta.allFinite() || (!solved && collected_) || overflow_) break;
     const double size = size_m(delta);
     if (linear_count_ == 0) {

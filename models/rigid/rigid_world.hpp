@@ -25,6 +25,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -99,6 +100,7 @@ class RigidWorld final : public PoseAlgorithm {
     std::uint32_t own = 0, other = 0;
     float side = 0.0F;  // of a two-sided surface: 1 or −1, or 0 where the pair is not to be judged in this step
     bool pressed = false;
+    float apart_m = 0.0F;                   // at least, when it was gathered; of a cylinder's 0
     Vec3 force_W = Vec3::Zero();            // of the last solution
     std::array<double, 2> level{1.0, 0.0};  // where a rim that lies flat was lowest, in its u and v
   };
@@ -156,6 +158,7 @@ class RigidWorld final : public PoseAlgorithm {
     bool bends = false;            // something is hollow, or the tool has rims: gaps' curvature counts
     bool dense = false;            // there is a mesh, or there are many solids
   };
+  static constexpr double kEverywhere_m = std::numeric_limits<double>::infinity();
   static constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
   static constexpr int kMostStrides = 1 << 16;  // the same, among objects that move
   static constexpr std::size_t most_pairs = 768;
@@ -215,13 +218,15 @@ class RigidWorld final : public PoseAlgorithm {
   void gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void gather_cylinder(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
   void gather_meshes(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept;
-  void add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other) noexcept;
+  void add_pair(Kind kind, std::uint16_t part, std::uint16_t entry, std::uint32_t own, std::uint32_t other,
+                double apart_m) noexcept;
   [[nodiscard]] static bool is_flat_rim(Kind kind) noexcept {  // a rim over something flat
     return kind == Kind::rim_field || kind == Kind::rim_face || kind == Kind::rim_end || kind == Kind::end_rim;
   }
   [[nodiscard]] static Kind other_way_round(Kind kind) noexcept;
   template <typename Add>
-  void pairs_with(const Solid& own, const Solid& other, const View& at, double reach, Add add) const noexcept;
+  void pairs_with(const Solid& own, const Bounds& own_box, const Solid& other, const Bounds& other_box, const View& at,
+                  double reach, Add add) const noexcept;
   template <typename Add>
   void points_with(const Solid& own, const TriangleFeatures& other, double side, const NearFaces& close, const View& at,
                    Add add) const noexcept;
@@ -268,7 +273,10 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] int touch_cylinders(const Pair& pair, const View& at, std::array<Touch, 4>& out) const noexcept;
   [[nodiscard]] static Solid::Rim rim_at(const Solid::Rim& rim, const View& at) noexcept;
   void remember_lowest(Pair& pair, const View& at) const noexcept;
-  void find(const ToolPose& pose) noexcept;
+  // Of what may be touched where the tool moves on by no more than `within_m`.
+  void find(const ToolPose& pose, double within_m = kEverywhere_m) noexcept;
+  void look_at_pairs(const ToolPose& pose, double within_m) noexcept;
+  [[nodiscard]] bool needs_others(const Found& found) const noexcept;
   void drop_deeper(const View& at) noexcept;
   [[nodiscard]] bool beside(const Found& deep, const View& at) const noexcept;
   [[nodiscard]] bool passes_by(const Found& deep, const View& at) const noexcept;
@@ -291,6 +299,7 @@ class RigidWorld final : public PoseAlgorithm {
   void keep_forces() noexcept;
   [[nodiscard]] static double approach(const Found& found, const ToolPose& pose, const Twist& xi) noexcept;
   [[nodiscard]] double worst_passed(const Twist& xi, const ToolPose& pose) const noexcept;
+  [[nodiscard]] bool may_leave_out() const noexcept;
   bool join(const ToolPose& pose, const ToolPose& q_old, const Twist& delta, bool first, double still_m) noexcept;
   bool solve_linear(const ToolPose& pose, const Twist& e, const ToolPose& q_old, double rough, double still_m,
                     Twist& delta) noexcept;
@@ -358,7 +367,8 @@ class RigidWorld final : public PoseAlgorithm {
 
   std::array<Found, most_found> found_;
   std::size_t found_count_ = 0;
-  AtPose at_pose_;  // of the pair that was looked at last
+  double within_m_ = 0.0;  // as far the tool may move on among them
+  AtPose at_pose_;         // of the pair that was looked at last
   Mat6 K_ = Mat6::Identity();
   ContactProblem problem_;
   std::array<Pressed, ContactProblem::most> pressed_;

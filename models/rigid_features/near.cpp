@@ -1,6 +1,7 @@
 #include "models/rigid_features/near.hpp"
 
 #include <cmath>
+#include <limits>
 #include <span>
 
 namespace proxarm::models {
@@ -15,16 +16,21 @@ bool misses(const Vec3& n, const Vec3& left, const Vec3& right, double slack) no
 }
 
 // Corners go round counter-clockwise, seen from where the normal points.
-bool comes_near_polygon(const Vec3& normal, double height, std::span<const Vec3> points,
-                        std::span<const std::uint32_t> corners, const Vec3& p, double near) noexcept {
-  if (!(std::abs(height) <= near)) return false;
+double distance2_to_polygon(const Vec3& normal, double height, std::span<const Vec3> points,
+                            std::span<const std::uint32_t> corners, const Vec3& p, double near) noexcept {
+  constexpr double too_far = std::numeric_limits<double>::infinity();
+  if (!(std::abs(height) <= near)) return too_far;
+  double beyond2 = 0.0;
   for (std::size_t k = 0; k < corners.size(); ++k) {
     const Vec3& corner = points[corners[k]];
     const Vec3 outwards = (points[corners[k + 1 < corners.size() ? k + 1 : 0]] - corner).cross(normal);
     const double beyond = outwards.dot(p - corner);
-    if (beyond > 0.0 && beyond * beyond > (near * near - height * height) * outwards.squaredNorm()) return false;
+    if (!(beyond > 0.0)) continue;
+    const double size2 = outwards.squaredNorm();
+    if (beyond * beyond > (near * near - height * height) * size2) return too_far;
+    if (beyond * beyond > beyond2 * size2) beyond2 = beyond * beyond / size2;
   }
-  return true;
+  return height * height + beyond2;
 }
 
 }  // namespace
@@ -60,14 +66,15 @@ bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcep
   return !held(n) && !held(-n);
 }
 
-bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept {
+double distance2_within(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept {
   const TriangleMesh::Face& face = mesh.face(index);
-  return comes_near_polygon(face.normal, TriangleMesh::height(face, p), mesh.structure().vertices, mesh.triangle(index),
-                            p, near);
+  return distance2_to_polygon(face.normal, TriangleMesh::height(face, p), mesh.structure().vertices,
+                              mesh.triangle(index), p, near);
 }
 
-bool comes_near(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept {
-  return comes_near_polygon(face.normal, face.normal.dot(p) - face.offset, solid.points, solid.corners(face), p, near);
+double distance2_within(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept {
+  return distance2_to_polygon(face.normal, face.normal.dot(p) - face.offset, solid.points, solid.corners(face), p,
+                              near);
 }
 
 }  // namespace proxarm::models

@@ -29,9 +29,9 @@ bool never_hold(const EdgeLine& own, const EdgeLine& other, double turn) noexcep
 // of narrow faces are known to askew_rad only.
 inline NormalCone::Angle turn_of_corners(double turn) noexcept { return NormalCone::Angle::of(askew_rad + 2.0 * turn); }
 
-// Whether a point may be so near to a triangle, or to a face of a solid: by its height, and by how far its foot lies
-// beyond the sides.
-bool comes_near(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept;
-bool comes_near(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept;
+// The square of what a point is at least away from a triangle, or from a face of a solid: by its height, and by how far
+// its foot lies beyond one of the sides. Beyond `near` it is infinite.
+double distance2_within(const TriangleMesh& mesh, std::uint32_t index, const Vec3& p, double near) noexcept;
+double distance2_within(const Solid& solid, const Solid::Face& face, const Vec3& p, double near) noexcept;
 
 }  // namespace proxarm::models
