@@ -249,35 +249,6 @@ MeshTopology topology_of(const TriangleMesh& mesh) {
   return found;
 }
 
-MeshDefect crossing_faces(const TriangleMesh& mesh) {
-  MeshDefect found;
-  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
-    const Vec3 centre = middle(mesh, f);
-    double radius = 0.0;
-    for (std::size_t k = 0; k < 3; ++k) radius = std::max(radius, (mesh.corner(f, k) - centre).norm());
-    const auto& own = mesh.triangle(f);
-    const auto is_own = [&own](std::uint32_t v) { return v == own[0] || v == own[1] || v == own[2]; };
-    // Whether an edge of `of` that ends in no vertex of `other` touches that face.
-    const auto cuts = [&mesh](std::uint32_t of, std::uint32_t other) {
-      const auto& there = mesh.triangle(other);
-      const auto shared = [&there](std::uint32_t v) { return v == there[0] || v == there[1] || v == there[2]; };
-      for (std::size_t k = 0; k < 3; ++k) {
-        const std::uint32_t a = mesh.triangle(of)[k], b = mesh.triangle(of)[(k + 1) % 3];
-        if (!shared(a) && !shared(b) && mesh.touched_by(other, mesh.vertex(a), mesh.vertex(b))) return true;
-      }
-      return false;
-    };
-    mesh.within(centre, radius, [&](std::uint32_t g) {
-      if (g <= f) return true;
-      const auto& there = mesh.triangle(g);
-      const auto shared = std::count_if(there.begin(), there.end(), is_own);
-      if (shared == 3 || (shared < 2 && (cuts(f, g) || cuts(g, f)))) note(found, centre);
-      return true;
-    });
-  }
-  return found;
-}
-
 TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m) {
   TriangleSoup soup{mesh.structure().vertices, mesh.structure().triangles};
   for (const MeshHole& hole : topology_of(mesh).holes) {
@@ -288,12 +259,17 @@ TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m) {
 }
 
 NoInside why_no_inside(const TriangleMesh& mesh) {
+  const auto at = [](const MeshDefect& defect) { return ", the first at " + place_text(defect.first_W); };
   if (mesh.closed()) {
-    if (mesh.size() >= 4) return {};
-    return {"has " + std::to_string(mesh.size()) + " triangles, and the smallest body has 4", ""};
+    if (mesh.size() < 4) return {"has " + std::to_string(mesh.size()) + " triangles, and the smallest body has 4", ""};
+    const MeshDefect found = crossing_faces(mesh);
+    if (found.count == 0) return {};
+    return {"has faces that cross or lie on one another: " + std::to_string(found.count) +
+                (found.count == 1 ? " pair" : " pairs") + at(found),
+            "in the program that made it, unite what overlaps and take out folds and sheets of no thickness; bodies "
+            "that only touch may be objects of their own"};
   }
   const MeshTopology found = topology_of(mesh);
-  const auto at = [](const MeshDefect& defect) { return ", the first at " + place_text(defect.first_W); };
   if (!found.holes.empty()) {
     const MeshHole& largest = found.holes.back();
     if (!(largest.size_m > 0.0)) {

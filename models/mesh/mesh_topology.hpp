@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "models/mesh/mesh.hpp"
+#include "models/mesh/mesh_crossings.hpp"
 
 namespace proxarm::models {
 
@@ -20,12 +21,6 @@ struct MeshHole {
   // Four times the area that closes it over its length: the diameter of a round hole, the side of a square one, twice
   // the width of a crack.
   double size_m = 0.0;
-};
-
-// Something of which there are several: how many, and one of them.
-struct MeshDefect {
-  std::size_t count = 0;
-  Vec3 first_W = Vec3::Zero();
 };
 
 struct MeshTopology {
@@ -44,10 +39,6 @@ struct NoInside {
   std::string what, advice;
 };
 NoInside why_no_inside(const TriangleMesh& mesh);
-
-// Faces that cut through others with which they share no edge, and faces that lie in the same three vertices. Costs
-// about as much as building the mesh: not for each start of a session.
-MeshDefect crossing_faces(const TriangleMesh& mesh);
 
 // The mesh with all holes up to that size closed by triangles between their vertices. Where nothing is to be closed the
 // soup is that of the mesh.

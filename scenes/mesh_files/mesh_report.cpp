@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "models/base/setup_error.hpp"
+#include "models/mesh/mesh_crossings.hpp"
 #include "models/mesh/mesh_topology.hpp"
 
 namespace proxarm::scenes {
@@ -58,8 +59,8 @@ std::vector<std::string> mesh_report(const LoadedMesh& loaded) {
   if (found.inside_out > 0) {
     lines.push_back(counted(found.inside_out, "closed part", "closed parts") + " with the fronts of all faces inside");
   }
-  add(lines, models::crossing_faces(mesh), "pair of faces that cross or are the same",
-      "pairs of faces that cross or are the same");
+  add(lines, models::crossing_faces(mesh), "pair of faces that cross or lie on one another",
+      "pairs of faces that cross or lie on one another");
   return lines;
 }
 

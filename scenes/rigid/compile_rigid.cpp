@@ -90,8 +90,11 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
   if (const auto* mesh = std::get_if<MeshShape>(&object.shape); mesh != nullptr) {
     const models::NoInside found = models::why_no_inside(*mesh->mesh);
     const std::string advice = found.advice.empty() ? "" : " (" + found.advice + ")";
-    if (!found.what.empty())
-      return "a rigid tool is held by closed meshes only, and " + name + " " + found.what + advice;
+    const std::string file = mesh->file.empty() ? "" : ", " + mesh->file.string() + ",";
+    if (!found.what.empty()) {
+      return "a rigid tool is held by closed meshes only, whose faces don't cross, and " + name + file + " " +
+             found.what + advice;
+    }
   }
   if (!has_cylinder(tool.parts) || !is_inside_out(object.shape)) return {};
   if (std::holds_alternative<CapsuleShape>(object.shape)) {

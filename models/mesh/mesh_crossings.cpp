@@ -1,0 +1,311 @@
+#include "models/mesh/mesh_crossings.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace proxarm::models {
+namespace {
+
+using Place = std::optional<Vec3>;
+
+// How the corners of a face are to the plane of another one.
+struct Beside {
+  int above = 0, below = 0;
+  int on = 0;           // in the plane
+  std::size_t off = 0;  // a corner that isn't
+
+  double most = 0.0;  // of their heights
+  [[nodiscard]] bool both_sides() const noexcept { return above > 0 && below > 0; }
+  [[nodiscard]] bool edge_in_plane() const noexcept { return on == 2; }
+  // It meets the plane in a point at most.
+  [[nodiscard]] bool clear() const noexcept { return most > kSheet_m && on < 2 && !both_sides(); }
+};
+
+// The directions from a line to the faces on both sides of an edge that lies in it.
+using Wedge = std::array<Vec3, 2>;
+
+// Whether two wedges about one line go through each other: the one's faces are on both sides of the other one's.
+bool cross_about(const Vec3& line, const Wedge& a, const Wedge& b) noexcept {
+  const Vec3 u = a[0].normalized(), v = line.cross(u);
+  const auto angle = [&](const Vec3& x) {
+    const double at = std::atan2(v.dot(x), u.dot(x));
+    return at < 0.0 ? at + 2.0 * std::numbers::pi : at;
+  };
+  const double opening = angle(a[1]);
+  return (angle(b[0]) < opening) != (angle(b[1]) < opening);
+}
+
+Vec3 across(const Vec3& from, const Vec3& line, const Vec3& to) noexcept {
+  return (to - from) - line.dot(to - from) * line;
+}
+
+// Of two faces of a mesh: do they cross or lie on one another, and where?
+class FacePairs {
+ public:
+  explicit FacePairs(const TriangleMesh& mesh)
+      : mesh_(mesh), crossing_(std::max(kCrossing_m, mesh.lift_m())), sheet_(std::max(kSheet_m, crossing_)) {}
+
+  [[nodiscard]] Place place(std::uint32_t f, std::uint32_t g) const {
+    if (std::isinf(mesh_.face(f).trust) || std::isinf(mesh_.face(g).trust)) return {};
+    int shared = 0;
+    for (const std::uint32_t v : mesh_.triangle(g)) shared += has(f, v) ? 1 : 0;
+    if (shared == 3) return middle(f);
+    if (shared == 2) return folded(f, g) ? Place(middle(g)) : std::nullopt;
+    const Beside g_to_f = beside(f, g);
+    if (g_to_f.clear()) return {};
+    const Beside f_to_g = beside(g, f);
+    if (f_to_g.clear()) return {};
+    if (std::min(g_to_f.most, f_to_g.most) <= sheet_) {
+      const bool in_f = g_to_f.most <= f_to_g.most;
+      return overlap(in_f ? f : g, in_f ? g : f) ? Place(middle(in_f ? g : f)) : std::nullopt;
+    }
+    if (g_to_f.both_sides() && f_to_g.both_sides()) return cut(f, g);
+    if (g_to_f.edge_in_plane()) return passed(f, g, g_to_f.off);
+    return f_to_g.edge_in_plane() ? passed(g, f, f_to_g.off) : std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] bool has(std::uint32_t f, std::uint32_t vertex) const noexcept {
+    const auto& t = mesh_.triangle(f);
+    return vertex == t[0] || vertex == t[1] || vertex == t[2];
+  }
+  [[nodiscard]] Vec3 middle(std::uint32_t f) const noexcept {
+    return (mesh_.corner(f, 0) + mesh_.corner(f, 1) + mesh_.corner(f, 2)) / 3.0;
+  }
+  [[nodiscard]] Vec3 side(std::uint32_t f, std::size_t k) const noexcept {
+    return mesh_.corner(f, (k + 1) % 3) - mesh_.corner(f, k);
+  }
+
+  [[nodiscard]] Beside beside(std::uint32_t f, std::uint32_t g) const noexcept {
+    Beside found;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double h = has(f, mesh_.triangle(g)[k]) ? 0.0 : TriangleMesh::height(mesh_.face(f), mesh_.corner(g, k));
+      found.above += h > crossing_ ? 1 : 0;
+      found.below += h < -crossing_ ? 1 : 0;
+      found.on += std::abs(h) <= crossing_ ? 1 : 0;
+      if (std::abs(h) > crossing_) found.off = k;
+      found.most = std::max(found.most, std::abs(h));
+    }
+    return found;
+  }
+
+  // Of faces that share an edge.
+  [[nodiscard]] bool folded(std::uint32_t f, std::uint32_t g) const noexcept {
+    return std::min(beside(f, g).most, beside(g, f).most) <= sheet_ && overlap(f, g);
+  }
+
+  // By how much the shadows of two faces overlap in a direction.
+  [[nodiscard]] double overlap_along(const Vec3& unit, std::uint32_t f, std::uint32_t g) const noexcept {
+    const Vec3& origin = mesh_.corner(f, 0);
+    const auto shadow = [&](std::uint32_t face) {
+      const double a = unit.dot(mesh_.corner(face, 0) - origin), b = unit.dot(mesh_.corner(face, 1) - origin),
+                   c = unit.dot(mesh_.corner(face, 2) - origin);
+      return std::pair(std::min({a, b, c}), std::max({a, b, c}));
+    };
+    const auto [low_f, high_f] = shadow(f);
+    const auto [low_g, high_g] = shadow(g);
+    return std::min(high_f - low_g, high_g - low_f);
+  }
+
+  // In the plane of f, by the separating-axis theorem: convex polygons lie apart if and only if one of their sides
+  // separates them.
+  [[nodiscard]] bool overlap(std::uint32_t f, std::uint32_t g) const noexcept {
+    const Vec3& n = mesh_.face(f).normal;
+    for (const std::uint32_t of : {f, g}) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3 axis = n.cross(side(of, k));
+        if (const double size = axis.norm(); size > 0.0 && !(overlap_along(axis / size, f, g) > sheet_)) return false;
+      }
+    }
+    return true;
+  }
+
+  // Where one goes through the other: exactly, and deeper than rounding. The latter is how far one has to be moved for
+  // them to be apart, least of all directions: the normals, and those across an edge of either. (Any direction proves
+  // that they are, so it does no harm that the one across nearly parallel edges is rounded.)
+  [[nodiscard]] Place cut(std::uint32_t f, std::uint32_t g) const noexcept {
+    Place at = cut_by_edge(f, g);
+    if (!at) at = cut_by_edge(g, f);
+    for (std::size_t k = 0; k < 3 && at; ++k) {
+      for (std::size_t l = 0; l < 3 && at; ++l) {
+        const Vec3 axis = side(f, k).cross(side(g, l));
+        if (const double size = axis.norm(); size > 0.0 && !(overlap_along(axis / size, f, g) > crossing_)) at.reset();
+      }
+    }
+    return at;
+  }
+  [[nodiscard]] Place cut_by_edge(std::uint32_t f, std::uint32_t g) const noexcept {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = (k + 1) % 3;
+      if (has(f, mesh_.triangle(g)[k]) || has(f, mesh_.triangle(g)[next])) continue;
+      const Vec3 &x = mesh_.corner(g, k), &y = mesh_.corner(g, next);
+      if (!mesh_.touched_by(f, x, y)) continue;
+      const double from = TriangleMesh::height(mesh_.face(f), x), to = TriangleMesh::height(mesh_.face(f), y);
+      return from == to ? x : x + std::clamp(from / (from - to), 0.0, 1.0) * (y - x);
+    }
+    return {};
+  }
+
+  // The edge of g across from the corner `off` lies in f's plane: does g's surface go on behind it, on the other side
+  // of f, or of the two faces beside f's own edge that it lies on?
+  [[nodiscard]] Place passed(std::uint32_t f, std::uint32_t g, std::size_t off) const noexcept {
+    const std::size_t k = (off + 1) % 3;
+    const Vec3 &from = mesh_.corner(g, k), &to = mesh_.corner(g, (k + 1) % 3);
+    const double length = (to - from).norm();
+    const Vec3 line = (to - from) / length;
+    const auto wedge = [&](std::uint32_t face, std::size_t edge) -> std::optional<Wedge> {
+      const std::optional<Vec3> other = apex_beyond(face, edge);
+      if (!other) return {};
+      return Wedge{across(from, line, mesh_.corner(face, (edge + 2) % 3)), across(from, line, *other)};
+    };
+    const std::optional<Wedge> own = wedge(g, k);
+    if (!own) return {};
+    if (const Piece in = inside(f, from, line, length); in.high - in.low > crossing_) {
+      const Vec3 flat = mesh_.face(f).normal.cross(line);
+      return cross_about(line, *own, {flat, -flat}) ? Place(from + 0.5 * (in.low + in.high) * line) : std::nullopt;
+    }
+    for (std::size_t edge = 0; edge < 3; ++edge) {
+      const Piece on = on_side(f, edge, from, line, length);
+      if (!(on.high - on.low > crossing_)) continue;
+      const std::optional<Wedge> other = wedge(f, edge);
+      if (other && cross_about(line, *own, *other)) return from + 0.5 * (on.low + on.high) * line;
+    }
+    return {};
+  }
+
+  // A piece of a line, by the distance from its first point.
+  struct Piece {
+    double low, high;
+  };
+  // Into the face, across its side k.
+  [[nodiscard]] Vec3 inwards(std::uint32_t f, std::size_t k) const noexcept {
+    return mesh_.face(f).normal.cross(side(f, k)).normalized();
+  }
+  // That is inside of a face in whose plane the line lies, and on none of its sides.
+  [[nodiscard]] Piece inside(std::uint32_t f, const Vec3& from, const Vec3& line, double length) const noexcept {
+    Piece piece{0.0, length};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 in = inwards(f, k);
+      const double start = in.dot(from - mesh_.corner(f, k)) - crossing_, rise = in.dot(line);
+      if (start <= 0.0 && start + rise * length <= 0.0) return {0.0, 0.0};
+      if (start < 0.0) piece.low = std::max(piece.low, -start / rise);
+      if (start + rise * length < 0.0) piece.high = std::min(piece.high, -start / rise);
+    }
+    return piece;
+  }
+  // That is on the face's side k.
+  [[nodiscard]] Piece on_side(std::uint32_t f, std::size_t k, const Vec3& from, const Vec3& line,
+                              double length) const noexcept {
+    const Vec3 in = inwards(f, k), start = mesh_.corner(f, k) - from, end = start + side(f, k);
+    if (std::abs(in.dot(start)) > crossing_ || std::abs(in.dot(start - length * line)) > crossing_) return {0.0, 0.0};
+    return {std::max(0.0, std::min(line.dot(start), line.dot(end))),
+            std::min(length, std::max(line.dot(start), line.dot(end)))};
+  }
+
+  // The corner of the one other face at a face's edge k that isn't on the edge.
+  [[nodiscard]] std::optional<Vec3> apex_beyond(std::uint32_t f, std::size_t k) const noexcept {
+    const std::uint32_t a = mesh_.triangle(f)[k], b = mesh_.triangle(f)[(k + 1) % 3];
+    std::optional<Vec3> apex;
+    bool one = true;
+    mesh_.within(0.5 * (mesh_.vertex(a) + mesh_.vertex(b)), crossing_, [&](std::uint32_t other) {
+      if (other == f || !has(other, a) || !has(other, b)) return true;
+      one = !apex;
+      for (const std::uint32_t v : mesh_.triangle(other)) {
+        if (v != a && v != b) apex = mesh_.vertex(v);
+      }
+      return one;
+    });
+    return one ? apex : std::nullopt;
+  }
+
+  const TriangleMesh& mesh_;
+  double crossing_, sheet_;
+};
+
+// The tree's nodes by the pair and the place in it.
+struct Node {
+  std::uint32_t pair, of;
+  [[nodiscard]] bool operator==(const Node&) const = default;
+};
+
+// A face's box, in float, so wide that faces whose boxes don't meet are further apart than a sheet is thick.
+struct Box {
+  std::array<float, 3> low, high;
+};
+
+std::vector<Box> boxes_of(const TriangleMesh& mesh, double margin) {
+  std::vector<Box> boxes(mesh.size());
+  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
+    const Vec3 &a = mesh.corner(f, 0), &b = mesh.corner(f, 1), &c = mesh.corner(f, 2);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      const double low = std::min({a[i], b[i], c[i]}) - margin, high = std::max({a[i], b[i], c[i]}) + margin;
+      boxes[f].low[k] = std::nextafter(static_cast<float>(low), -std::numeric_limits<float>::infinity());
+      boxes[f].high[k] = std::nextafter(static_cast<float>(high), std::numeric_limits<float>::infinity());
+    }
+  }
+  return boxes;
+}
+
+bool meet(const Box& a, const Box& b) noexcept {
+  return a.low[0] <= b.high[0] && b.low[0] <= a.high[0] && a.low[1] <= b.high[1] && b.low[1] <= a.high[1] &&
+         a.low[2] <= b.high[2] && b.low[2] <= a.high[2];
+}
+
+// Calls visit(f, g), f < g, once for each two faces whose boxes meet.
+template <typename Visit>
+void each_near_pair(const TriangleMesh& mesh, double margin, Visit visit) {
+  const auto& nodes = mesh.structure().nodes;
+  const std::vector<Box> boxes = boxes_of(mesh, margin);
+  const auto count = [&nodes](Node n) { return nodes[n.pair].count[n.of]; };
+  const auto first = [&nodes](Node n) { return nodes[n.pair].first[n.of]; };
+  const auto apart = [&](Node a, Node b) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+      if (nodes[a.pair].low(a.of, k) > nodes[b.pair].high(b.of, k) + margin) return true;
+      if (nodes[b.pair].low(b.of, k) > nodes[a.pair].high(a.of, k) + margin) return true;
+    }
+    return false;
+  };
+  std::vector<std::pair<Node, Node>> waiting{{{0, 0}, {0, 0}}};
+  while (!waiting.empty()) {
+    const auto [a, b] = waiting.back();
+    waiting.pop_back();
+    const bool same = a == b;
+    if (!same && apart(a, b)) continue;
+    if (count(a) > 0 && count(b) > 0) {
+      for (std::uint32_t f = first(a); f < first(a) + count(a); ++f) {
+        for (std::uint32_t g = same ? f + 1 : first(b); g < first(b) + count(b); ++g) {
+          if (meet(boxes[f], boxes[g])) visit(std::min(f, g), std::max(f, g));
+        }
+      }
+      continue;
+    }
+    // Of an inner node, those within it. A node beside itself is both of them, and one beside the other.
+    const std::uint32_t of_a = count(a) > 0 ? 1 : 2, of_b = count(b) > 0 ? 1 : 2;
+    for (std::uint32_t i = 0; i < of_a; ++i) {
+      for (std::uint32_t j = same ? i : 0; j < of_b; ++j) {
+        waiting.emplace_back(of_a == 1 ? a : Node{first(a), i}, of_b == 1 ? b : Node{first(b), j});
+      }
+    }
+  }
+}
+
+}  // namespace
+
+MeshDefect crossing_faces(const TriangleMesh& mesh) {
+  const FacePairs pairs(mesh);
+  MeshDefect found;
+  each_near_pair(mesh, std::max(kSheet_m, mesh.lift_m()), [&](std::uint32_t f, std::uint32_t g) {
+    const Place at = pairs.place(f, g);
+    if (at && found.count++ == 0) found.first_W = *at;
+  });
+  return found;
+}
+
+}  // namespace proxarm::models
