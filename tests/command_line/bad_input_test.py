@@ -288,6 +288,29 @@ class SceneFile(ProgramTest):
                 expected = {"lost.stl": ":2: objects[0].mesh.file", "flat.obj": "none of the triangles has an area"}
                 self.assert_refused(outcome, name, expected.get(name, "expected a mesh"))
 
+    def test_meshes_whose_faces_cross(self):
+        """Two cubes in one file that stand in each other: as an object beside a rigid tool, and as the tool. A point is
+        held by each face, whatever the others do."""
+        corners = [(100 * (k & 1), 50 * (k & 2), 25 * (k & 4)) for k in range(8)]
+        faces = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6)]
+        text = ""
+        for shift in (0, 30):
+            text += "".join("v %d %d %d\n" % tuple(x + shift for x in c) for c in corners)
+        for first in (0, 8):
+            text += "".join("f %d %d %d %d\n" % tuple(i + first for i in f) for f in faces)
+        self.written("crossing.obj", text)
+        told = "crossing.obj, %s faces that cross or lie on one another: 18 pairs, the first at x %s"
+        repair = "in the program that made it, unite what overlaps"
+        objects = "objects:\n  - mesh: {file: crossing.obj, scale_m: 0.001, position_m: [2, 0, 0]}\n"
+        beside = self.written("beside.yaml", "dimensions: 3\ntool: {sphere: {radius_m: 0.01}}\n" + objects)
+        tool = self.written("tool.yaml", "mesh: {file: crossing.obj, scale_m: 0.001}\n")
+        for command in (["run", "--inertia", "0.05", "--scene"], ["check"]):
+            self.assert_refused(self.call(*command, beside), "beside.yaml:4", told % ("has", "2"), repair)
+        self.assert_refused(self.call("run", "--inertia", "0.05", "--tool", tool), "tool.yaml:1",
+                            told % ("which has", "0.1"), repair)
+        self.assert_refused(self.call("check", tool), "tool.yaml:1", told % ("which has", "0.1"), repair)
+        self.assertEqual(self.call("run", "--scene", self.written("point.yaml", objects), "--duration", "10ms").status, 0)
+
     def test_a_start_inside_of_each_kind(self):
         self.written("cube.obj", "".join(f"v {0.6 + 0.2 * (k & 1)} {-0.1 + 0.1 * (k & 2)} {0.5 + 0.05 * (k & 4)}\n" for k in range(8)) +
                      "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n")
