@@ -27,13 +27,14 @@ struct MeshDefect {
 
 // In metres. What a rigid tool's gap may be short of (kGap_m of models/rigid_features), and the distance of a face
 // within which the side that a feature is on is taken from the step before (kFront_m there): a sheet thinner than that
-// has no two sides. Typical sheets are a thousand times as thick.
+// has no two sides. (Of 24,000 steps that press a box through a sheet of 2 nm 10 are unresolved, of 0.1 nm 895; one of
+// no thickness let it in by 0.3 mm.) Typical sheets are a thousand times as thick.
 inline constexpr double kCrossing_m = 1e-12, kSheet_m = 1e-9;
 
 // Pairs of faces that cross by more than kCrossing_m, or that lie within kSheet_m of one another's plane and overlap
-// there by more than that. Needles so thin that they have no normal (Face::trust) don't count. Takes as long as building
-// the mesh: 0.1 s for 328,000 triangles; each two faces around a vertex are looked at, which takes 2 s for a fan of
-// 10,000.
+// there by more than that. Needles so thin that they have no normal (Face::trust) don't count. Takes as long as
+// building the mesh: 0.1 s for 328,000 triangles; each two faces around a vertex are looked at, which takes 2 s for a
+// fan of 10,000.
 MeshDefect crossing_faces(const TriangleMesh& mesh);
 
 }  // namespace proxarm::models
