@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
+#include <ctime>
 #include <numbers>
 
 #include "models/mesh/mesh_topology.hpp"
@@ -295,9 +295,9 @@ TEST(MeshCrossings, TimingOfALargeMesh) {
   const TriangleMesh mesh(ball(7, 0.1));
   double least_s = 1e9;
   for (int round = 0; round < 3; ++round) {
-    const auto begun = std::chrono::steady_clock::now();
+    const std::clock_t begun = std::clock();  // the processor's time: others may use the machine as well
     EXPECT_EQ(models::crossing_faces(mesh).count, 0u);
-    least_s = std::min(least_s, std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count());
+    least_s = std::min(least_s, static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC);
   }
   std::printf("%zu faces: %.0f ms\n", mesh.size(), 1e3 * least_s);
   EXPECT_LT(least_s, 0.5) << "0.1 s on an idle core";
