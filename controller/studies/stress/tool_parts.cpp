@@ -6,34 +6,48 @@ namespace proxarm::studies {
 namespace {
 
 constexpr int kEighths = 8;
-constexpr double kLeast = 1e-12;  // of the way, a part
-constexpr std::size_t kMost = 100;
+constexpr double kLeast = 1e-12;  // of the way, or of a wait, a part
+constexpr std::size_t kMost = 400;
 // A foot may lie so far beside its feature and count (touch.hpp, beside_m): before an edge by that, and behind it.
 constexpr double kBeside_m = 1e-10;
 
-// The middle of the widest part of a way between two places; no wider than kLeast: none, 0. (Poses for which no forces
-// were found are left out, so that there may be more than one.)
-double middle_of_widest(const std::vector<double>& shares, double from, double to) {
-  double widest = kLeast, middle = 0.0;
-  for (auto i = std::lower_bound(shares.begin(), shares.end(), from); *i < to; ++i) {
-    if (!(i[1] - i[0] > widest)) continue;
-    widest = i[1] - i[0];
-    middle = 0.5 * (i[0] + i[1]);
-  }
-  return middle;
-}
-
 }  // namespace
 
-void ToolParts::follow(const ToolCall& call, const std::vector<double>& shares, std::vector<Pose>& way) const {
-  const double reached = way.back().share;
-  for (auto share = std::upper_bound(shares.begin(), shares.end(), reached); share != shares.end(); ++share) {
-    Pose next{*share, call, 0.0};
+// The middle of the widest part of a way between two places, or of the longest wait in it; if they are no more than
+// kLeast: none. (Poses for which no forces were found are left out, so that there may be more than one.)
+std::optional<ToolParts::Mark> ToolParts::middle_of_widest(const std::vector<Mark>& marks, const Mark& from,
+                                                           const Mark& to) {
+  double widest = kLeast, longest = kLeast;
+  std::optional<Mark> way, wait;
+  for (auto i = std::lower_bound(marks.begin(), marks.end(), from); *i < to; ++i) {
+    const Mark &a = i[0], &b = i[1];
+    if (b.share - a.share > widest) {
+      widest = b.share - a.share;
+      way = Mark{0.5 * (a.share + b.share), 1.0};
+    }
+    const double waited = a.share == b.share ? a.waited : 0.0;
+    if (!(b.waited - waited > longest)) continue;
+    longest = b.waited - waited;
+    wait = Mark{b.share, 0.5 * (waited + b.waited)};
+  }
+  return way ? way : wait;
+}
+
+void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, std::vector<Pose>& way) const {
+  const Mark reached = way.back().mark;
+  for (auto mark = std::upper_bound(marks.begin(), marks.end(), reached); mark != marks.end(); ++mark) {
+    Pose next{*mark, call, 0.0};
+    const Pose& last = way.back();
     const auto g = fresh_.clone();
-    next.call.p = models::moved(call.q, *share * models::difference(call.p, call.q));
-    next.call.r = g->step(call.K, next.call.p, way.back().call.r);
+    next.call.p = models::moved(call.q, mark->share * models::difference(call.p, call.q));
+    const double since = last.mark.share == mark->share ? last.mark.waited : 0.0, waited = mark->waited;
+    // h/(1 + h)
+    const double drawn = waited == 1.0 ? 1.0 : (waited - since) / (waited - since + (1.0 - since) * (1.0 - waited));
+    if (drawn < 1.0) next.call.p = models::moved(last.call.r, drawn * models::difference(next.call.p, last.call.r));
+    next.call.r = g->step(call.K, next.call.p, last.call.r);
     if (g->unresolved()) continue;
     next.call.contacts.assign(g->contacts().begin(), g->contacts().end());
+    for (models::PoseContact& contact : next.call.contacts) contact.force_W /= drawn;
     next.short_m = laws_.depth_m(next.call.r);
     way.push_back(next);
   }
@@ -45,10 +59,10 @@ double ToolParts::pushed_J(const Pose& from, const Pose& to) const {
   return laws_.pushed_J(part, std::max(from.short_m, 0.0) + 2.0 * kBeside_m);
 }
 
-ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector<double>& shares,
+ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector<Mark>& marks,
                                  const ToolCall& call) const {
-  const Pose end{1.0, call, 0.0}, &last = way.back();
-  const bool arrives = last.share == 1.0;
+  const Pose end{{1.0, 1.0}, call, 0.0}, &last = way.back();
+  const bool arrives = last.mark == end.mark;
   const bool either = arrives && pushed_J(way.front(), end) <= pushed_J(way.front(), last);
   const std::size_t parts = arrives ? way.size() - 1 : way.size();
   Sum sum;
@@ -57,32 +71,32 @@ ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector
     double pushed = pushed_J(way[k], to_end ? end : way[k + 1]);
     if (to_end && either) pushed = std::min(pushed, pushed_J(way[k], last));
     sum.all_J += pushed;
-    const double middle = middle_of_widest(shares, way[k].share, to_end ? 1.0 : way[k + 1].share);
-    if (middle == 0.0) sum.undivided_J += pushed;
-    if (middle == 0.0 || !(pushed > sum.most_J)) continue;
+    const auto middle = middle_of_widest(marks, way[k].mark, to_end ? end.mark : way[k + 1].mark);
+    if (!middle) sum.undivided_J += pushed;
+    if (!middle || !(pushed > sum.most_J)) continue;
     sum.most_J = pushed;
-    sum.share = middle;
+    sum.divide = *middle;
     sum.before = k;
   }
   return sum;
 }
 
 bool ToolParts::keep(const ToolCall& call, double short_m, std::vector<models::PoseContact>& touched) const {
-  std::vector<double> shares;
-  for (int k = 0; k <= kEighths; ++k) shares.push_back(static_cast<double>(k) / kEighths);
-  std::vector<Pose> way{{0.0, call, short_m}};
+  std::vector<Mark> marks;
+  for (int k = 0; k <= kEighths; ++k) marks.push_back({static_cast<double>(k) / kEighths, 1.0});
+  std::vector<Pose> way{{marks.front(), call, short_m}};
   way.front().call.r = call.q;
   const double allowed_J = laws_.curvature_J(call);
-  follow(call, shares, way);
-  Sum sum = sum_of(way, shares, call);
-  while (sum.all_J > allowed_J && sum.undivided_J <= allowed_J && sum.most_J > 0.0 && shares.size() < kMost) {
-    shares.insert(std::upper_bound(shares.begin(), shares.end(), sum.share), sum.share);
+  follow(call, marks, way);
+  Sum sum = sum_of(way, marks, call);
+  while (sum.all_J > allowed_J && sum.undivided_J <= allowed_J && sum.most_J > 0.0 && marks.size() < kMost) {
+    marks.insert(std::upper_bound(marks.begin(), marks.end(), sum.divide), sum.divide);
     way.erase(way.begin() + static_cast<std::ptrdiff_t>(sum.before) + 1, way.end());
-    follow(call, shares, way);
-    sum = sum_of(way, shares, call);
+    follow(call, marks, way);
+    sum = sum_of(way, marks, call);
   }
   for (std::size_t k = 1; k < way.size(); ++k) {
-    if (way[k].share == 1.0) continue;
+    if (way[k].mark.share == 1.0) continue;
     touched.insert(touched.end(), way[k].call.contacts.begin(), way[k].call.contacts.end());
   }
   return sum.all_J <= allowed_J;

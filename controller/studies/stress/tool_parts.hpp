@@ -9,11 +9,24 @@
 //   nᵀ(x(b) − x(a)) ≤ what the normal's turn and the surface's bend allow of the way from r(a) to r(b)
 //
 // holds for each contact that presses at r(b), where no edge is between them: it either pressed at r(a), with a gap of
-// 0 at both, or came down to its feature since. It also holds for a whole jump from next before an edge, r⁻, to next
-// behind it, r⁺: in r⁻ the place lies on the edge, and so on what is behind it. Its gap there is 0 at both,
-// nᵀ(x⁺ − x⁻) = 0, and whatever else lets the tool go or comes to hold it meanwhile, its gap is 0 at r⁺ if it presses,
-// and was not below before. (So without friction the tool's potential ½‖r − p̂‖²_K falls by ½‖r⁺ − r⁻‖²_K or more.) Thus
-// what the forces push forward by, f_n nᵀ(x(b) − x(a)), summed over smaller and smaller parts, goes to zero, but for
+// 0 at both, or came down to its feature since. It also holds for a jump from next before an edge, r⁻, to next behind
+// it, r⁺, if what holds the tool in r⁺ is met there first: in r⁻ the place lies on the edge, and so on what is behind
+// it. Its gap there is 0 at both, nᵀ(x⁺ − x⁻) = 0, and whatever else lets the tool go or comes to hold it meanwhile, its
+// gap is 0 at r⁺ if it presses, and was not below before. (So without friction the tool's potential ½‖r − p̂‖²_K falls
+// by ½‖r⁺ − r⁻‖²_K or more.)
+//
+// But let go at one edge a tool may come far, and over others: a vertex leaves its face, one of the tool's edges slides
+// along the object's to a corner, and over that onto a side that the place was behind in r⁻, beyond the edge (replay
+// 5381286054045804, step 12: 1 mm with p̂ as good as at rest, and up along the normal at r⁺ by 0.6). So a jump is a way,
+// too. There p̂ waits, and draws the tool on against a drag,
+//
+//   K dr/dτ = K (p̂ − r) + what the contacts exert,   r(0) = r⁻,   r(∞) = r⁺
+//
+// by steps of 𝒢 again: one of h has K (r(b) − p̂) + K (r(b) − r(a))/h for its wrench, that of 𝒢 with (1 + 1/h) K for
+// p' = r(a) + η (p̂ − r(a)), η = h/(1 + h), or by Assumption 1 with K, 1/η of the forces. For parts of it the bound holds
+// as it does for those of the step.
+//
+// Thus what the forces push forward by, f_n nᵀ(x(b) − x(a)), summed over smaller and smaller parts, goes to zero, but for
 // places where the tool springs: there it stays. Those may give what curvature_J() says of the step, no more.
 //
 // A step asks the world at p̂ alone, and next to an edge it may have several solutions there. An edge of the tool that
@@ -28,6 +41,8 @@
 // Nor does a pose for which no forces are found: parts are those between the others.
 #pragma once
 
+#include <compare>
+#include <optional>
 #include <vector>
 
 #include "controller/studies/stress/tool_laws.hpp"
@@ -44,22 +59,29 @@ class ToolParts {
   [[nodiscard]] bool keep(const ToolCall& call, double short_m, std::vector<models::PoseContact>& touched) const;
 
  private:
+  // A place on the way: of p̂, and while p̂ waits there, of time: τ = waited/(1 − waited). At 1 it goes on.
+  struct Mark {
+    double share = 0.0, waited = 1.0;
+    friend auto operator<=>(const Mark&, const Mark&) = default;
+  };
   struct Pose {
-    double share;
+    Mark mark;
     ToolCall call;
     double short_m;
   };
   struct Sum {
     double all_J = 0.0, undivided_J = 0.0;  // of what can't be divided any more
-    double most_J = 0.0, share = 0.0;       // the part that pushes most, and where to divide it
-    std::size_t before = 0;                 // the pose that it begins at
+    double most_J = 0.0;                    // the part that pushes most,
+    Mark divide;                            // where to divide it
+    std::size_t before = 0;                 // and the pose that it begins at
   };
+  static std::optional<Mark> middle_of_widest(const std::vector<Mark>& marks, const Mark& from, const Mark& to);
   // From the last of the poses on, to p̂.
-  void follow(const ToolCall& call, const std::vector<double>& shares, std::vector<Pose>& way) const;
+  void follow(const ToolCall& call, const std::vector<Mark>& marks, std::vector<Pose>& way) const;
   [[nodiscard]] double pushed_J(const Pose& from, const Pose& to) const;
   // Of a way's parts, the last of which leads to the step's end, or to the way's where that one pushes since q by as
   // much or more.
-  [[nodiscard]] Sum sum_of(const std::vector<Pose>& way, const std::vector<double>& shares, const ToolCall& call) const;
+  [[nodiscard]] Sum sum_of(const std::vector<Pose>& way, const std::vector<Mark>& marks, const ToolCall& call) const;
 
   const ToolLaws& laws_;
   const models::PoseAlgorithm& fresh_;

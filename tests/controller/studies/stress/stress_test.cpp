@@ -154,6 +154,12 @@ TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) {
 // to the corner and took its push for 0.6 mJ out of nowhere.
 TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_edges({54327521292900ULL}); }
 
+// Step 12: a vertex of a box leaves the tool's face over its edge, that edge slides along one of the box's to a corner of
+// the tool, and over it the corner comes onto the box's next face, all with p̂ as good as at rest. The judge took the
+// jump for one over a single edge, and that the corner came up along the last normal by 0.6 mm for 0.08 J out of
+// nowhere.
+TEST(Stress, AToolThatJumpsOverSeveralEdgesAtOnceIsCountedAsAtAnEdge) { expect_edges({5381286054045804}); }
+
 // Step 257: a corner of the tool slides on a face next to an edge of less than 90°. An edge that ends in the corner was
 // taken for one that crosses that edge 0.5 mm behind it, by the lines of both, and the tool sprang by 1.5 mm and 0.6 J.
 TEST(Stress, AnEdgeThatEndsBesideASharpWedgeIsNotHeldBehindIt) {

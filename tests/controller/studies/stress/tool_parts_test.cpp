@@ -51,6 +51,42 @@ struct Table final : PoseAlgorithm {
   bool unresolved_ = false;
 };
 
+// A point on a table whose edge is broken: a bevel of 45° leads from x = 0 to its side.
+struct BrokenEdge final : PoseAlgorithm {
+  static constexpr double bevel_m = 1e-4;  // its width and depth
+  double springs_m = 0.0;                  // off the side, and is held there
+  double early_m = 0.0;                    // before the bevel's end, where it jumps onto the side
+
+  // What it lies on, or the first after it that its foot is on.
+  const ToolPose& step(const models::Mat6& /*K*/, const ToolPose& p_hat, const ToolPose& q) noexcept override {
+    const double diagonal = std::sqrt(0.5);
+    const Vec3 &p = p_hat.position, bevel(diagonal, 0.0, diagonal);
+    const Vec3 foot = p - bevel.dot(p) * bevel;
+    contact_.normal_W = Vec3::UnitX();
+    double off_m = bevel_m + springs_m - p.x();
+    if (q.position.x() <= 0.0 && p.x() <= 0.0) {
+      contact_.normal_W = Vec3::UnitZ();
+      off_m = -p.z();
+    } else if (q.position.x() < bevel_m && foot.x() < bevel_m - early_m) {
+      contact_.normal_W = bevel;
+      off_m = -bevel.dot(p);
+    }
+    q_ = p_hat;
+    q_.position += off_m * contact_.normal_W;
+    contact_.force_W = stiffness_N_per_m * off_m * contact_.normal_W;
+    contact_.point_W = q_.position;
+    return q_;
+  }
+  [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {&contact_, 1}; }
+  [[nodiscard]] double clearance_m(const ToolPose& /*pose*/) const noexcept override { return 0.0; }
+  [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<BrokenEdge>(*this); }
+  void copy_state(const PoseAlgorithm& /*other*/) noexcept override {}
+
+ private:
+  ToolPose q_;
+  PoseContact contact_;
+};
+
 // From 0.2 mm before the edge to 0.3 mm beyond it, pressed by 1 mm.
 struct OverTheTable {
   scenes::Scene scene;
@@ -65,20 +101,25 @@ struct OverTheTable {
     call.q.position = Vec3(-2e-4, 0.0, 0.0);
     call.p.position = Vec3(3e-4, 0.0, -1e-3);
   }
-  [[nodiscard]] ToolCall step_of(Table world) const {
+  template <typename World>
+  [[nodiscard]] ToolCall step_of(World world) const {
     ToolCall step = call;
     step.r = world.step(call.K, call.p, call.q);
     step.contacts.assign(world.contacts().begin(), world.contacts().end());
     return step;
   }
   // Of the step that `world` makes of it, seen by the path of `way`.
-  [[nodiscard]] bool keeps(const Table& world, const Table& way, std::vector<PoseContact>* all = nullptr) const {
+  template <typename World>
+  [[nodiscard]] bool keeps(const World& world, const World& way, std::vector<PoseContact>* all = nullptr) const {
     std::vector<PoseContact> touched;
     const bool keeps = ToolParts(ToolLaws(scene, tool), way).keep(step_of(world), 0.0, touched);
     if (all != nullptr) *all = touched;
     return keeps;
   }
-  [[nodiscard]] bool keeps(const Table& world) const { return keeps(world, world); }
+  template <typename World>
+  [[nodiscard]] bool keeps(const World& world) const {
+    return keeps(world, world);
+  }
 };
 
 TEST(ToolParts, AStepOverAnEdgeKeepsTheBoundInItsParts) {
@@ -142,6 +183,35 @@ TEST(ToolParts, AJumpThatPushesByLessThanCurvatureMayGiveIsNoSpring) {
   EXPECT_TRUE(here.keeps(world));
   world.springs_m = 1.001 * most_m;
   EXPECT_FALSE(here.keeps(world));
+}
+
+// Over the table's end, pressed by 1 mm, with p̂ before the table's side.
+struct OverABrokenEdge : OverTheTable {
+  OverABrokenEdge() { call.p.position.x() = 0.5 * BrokenEdge::bevel_m; }
+};
+
+// It jumps over the bevel, up along the side's normal by its width.
+TEST(ToolParts, AJumpOverSeveralEdgesKeepsTheBoundInItsParts) {
+  const OverABrokenEdge here;
+  const ToolCall step = here.step_of(BrokenEdge());
+  ASSERT_EQ(step.contacts[0].normal_W, Vec3::UnitX());
+  EXPECT_TRUE(here.keeps(BrokenEdge()));
+}
+
+// Where it springs at the last of them, or jumps over that one from before it.
+TEST(ToolParts, AJumpThatSpringsOnItsWayDoesNot) {
+  const OverABrokenEdge here;
+  BrokenEdge springs, jumps;
+  springs.springs_m = 1.99e-10;
+  EXPECT_TRUE(here.keeps(springs));
+  EXPECT_TRUE(here.keeps(springs, BrokenEdge()));
+  springs.springs_m = 2.02e-10;
+  EXPECT_FALSE(here.keeps(springs));
+  EXPECT_FALSE(here.keeps(springs, BrokenEdge()));
+  jumps.early_m = 1.99e-10;
+  EXPECT_TRUE(here.keeps(jumps));
+  jumps.early_m = 2.02e-10;
+  EXPECT_FALSE(here.keeps(jumps));
 }
 
 // As where the tool lies on a vertex for a part of the way, and from q is found beyond: from there on it is asked anew.
