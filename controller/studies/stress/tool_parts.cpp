@@ -81,25 +81,27 @@ ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector
   return sum;
 }
 
-bool ToolParts::keep(const ToolCall& call, double short_m, std::vector<models::PoseContact>& touched) const {
+bool ToolParts::keep(const ToolCall& call, double short_m, double rest_J,
+                     std::vector<models::PoseContact>& touched) const {
   std::vector<Mark> marks;
   for (int k = 0; k <= kEighths; ++k) marks.push_back({static_cast<double>(k) / kEighths, 1.0});
   std::vector<Pose> way{{marks.front(), call, short_m}};
   way.front().call.r = call.q;
   const double allowed_J = laws_.curvature_J(call);
-  follow(call, marks, way);
-  Sum sum = sum_of(way, marks, call);
-  while (sum.all_J > allowed_J && sum.undivided_J <= allowed_J && sum.most_J > 0.0 && marks.size() < kMost) {
+  const std::size_t before = touched.size();
+  while (true) {
+    follow(call, marks, way);
+    touched.resize(before);
+    for (std::size_t k = 1; k < way.size(); ++k) {
+      if (way[k].mark.share == 1.0) continue;
+      touched.insert(touched.end(), way[k].call.contacts.begin(), way[k].call.contacts.end());
+    }
+    const Sum sum = sum_of(way, marks, call);
+    if (sum.all_J <= allowed_J && rest_J <= laws_.edges_J(call, touched)) return true;
+    if (sum.undivided_J > allowed_J || !(sum.most_J > 0.0) || marks.size() >= kMost) return false;
     marks.insert(std::upper_bound(marks.begin(), marks.end(), sum.divide), sum.divide);
     way.erase(way.begin() + static_cast<std::ptrdiff_t>(sum.before) + 1, way.end());
-    follow(call, marks, way);
-    sum = sum_of(way, marks, call);
   }
-  for (std::size_t k = 1; k < way.size(); ++k) {
-    if (way[k].mark.share == 1.0) continue;
-    touched.insert(touched.end(), way[k].call.contacts.begin(), way[k].call.contacts.end());
-  }
-  return sum.all_J <= allowed_J;
 }
 
 }  // namespace proxarm::studies

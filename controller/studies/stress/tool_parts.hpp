@@ -54,9 +54,11 @@ class ToolParts {
   // `fresh`: a world that knows of no step. Precondition: the laws and it outlive this.
   ToolParts(const ToolLaws& laws, const models::PoseAlgorithm& fresh) : laws_(laws), fresh_(fresh) {}
 
-  // Whether what is pushed forward in the parts is no more than curvature may give. What touched on the way, at each
-  // eighth at least where forces were found, is added. `short_m`: of gaps at q.
-  [[nodiscard]] bool keep(const ToolCall& call, double short_m, std::vector<models::PoseContact>& touched) const;
+  // Whether what is pushed forward in the parts is no more than curvature may give, and edges that it goes over account
+  // for `rest_J`, by what touched before the step, to be given, and on the way, added: at each eighth at least where
+  // forces were found, and closer where the parts push while something isn't accounted for. `short_m`: of gaps at q.
+  [[nodiscard]] bool keep(const ToolCall& call, double short_m, double rest_J,
+                          std::vector<models::PoseContact>& touched) const;
 
  private:
   // A place on the way: of p̂, and while p̂ waits there, of time: τ = waited/(1 − waited). At 1 it goes on.

@@ -163,7 +163,7 @@ class Judge {
     const double rest_J = laws_.left_J(call, rise_J, depth_before_m_);
     if (!(rest_J > 0.0)) return;
     std::vector<PoseContact> touched = before_;
-    if (parts_.keep(call, depth_before_m_, touched) && rest_J <= laws_.edges_J(call, touched)) {
+    if (parts_.keep(call, depth_before_m_, rest_J, touched)) {
       ++tally_.edge;
     } else {
       note(work, call, "J", rest_J);
