@@ -17,6 +17,7 @@ StudyList all_studies(const ArmRun& arm, const CycleRun& cycles) {
   list.push_back(std::make_unique<Stress>(Stress::Worlds::layers));
   list.push_back(std::make_unique<Stress>(Stress::Worlds::order_2));
   list.push_back(std::make_unique<Stress>(Stress::Worlds::tools));
+  list.push_back(std::make_unique<Stress>(Stress::Worlds::moving_tools));
   list.push_back(std::make_unique<ErrorStudy>());
   list.push_back(std::make_unique<StabilityMap>());
   list.push_back(std::make_unique<Fidelity>(arm));

@@ -53,6 +53,7 @@ constexpr StudyText study_texts[] = {
     {"stress_tools",
      "Random rigid tools among planes, solids and in hollow objects: the invariants of stress for poses, and no energy "
      "made beyond what is of second order in a step."},
+    {"stress_moving", "The same as stress_tools, among objects that move; the work that they do is taken off."},
     {"merge", "Joins the parts of a study (--shard) in the named folders to the files of one run, in --out."},
 };
 
@@ -72,7 +73,7 @@ int study_command(const StudyOptions& options) {
     const auto& known = studies::Stress::worlds_names;
     const auto which = std::find(known.begin(), known.end(), name);
     require(which != known.end() && options.words.size() == 1, "--replay", "another study",
-            "study stress --replay SEED, or stress_meshes, stress_layers, stress_order2, stress_tools");
+            "study stress --replay SEED, or stress_meshes, stress_layers, stress_order2, stress_tools, stress_moving");
     std::string text;
     const auto worlds = static_cast<studies::Stress::Worlds>(which - known.begin());
     const bool violated = studies::Stress::replay(*options.replay, text, worlds);

@@ -2,8 +2,10 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "controller/studies/stress/globe_mesh.hpp"
+#include "scenes/compiler/obstacles.hpp"
 
 namespace proxarm::studies {
 namespace {
@@ -105,7 +107,29 @@ void add(Random& random, scenes::Scene& scene, scenes::Shape shape) {
   scene.objects.push_back(std::move(object));
 }
 
+scenes::Motion some_motion(Random& random, const scenes::Shape& shape) {
+  scenes::Motion motion;
+  const double speed = random.log_uniform(1e-3, 0.3);
+  motion.frequency_Hz = random.log_uniform(0.3, 8.0);
+  motion.amplitude_m = speed / (2.0 * std::numbers::pi * motion.frequency_Hz) * random.direction();
+  motion.phase_rad = random.uniform(0.0, 6.0);
+  if (random.chance(0.3)) motion.velocity_m_per_s = random.in_box(0.02);
+  if (random.chance(0.5)) {
+    const auto* plane = std::get_if<scenes::PlaneShape>(&shape);
+    motion.turn_rad_per_s = random.log_uniform(1e-2, 3.0);
+    motion.centre_m = scenes::middle_of(shape);
+    motion.axis = plane != nullptr ? plane->normal : random.direction();
+  }
+  return motion;
+}
+
 }  // namespace
+
+void set_in_motion(Random& random, scenes::Scene& scene) {
+  for (scenes::Object& object : scene.objects) {
+    if (random.chance(0.75)) object.motion = some_motion(random, object.shape);
+  }
+}
 
 RandomToolScene random_tool_scene(Random& random) {
   RandomToolScene made;

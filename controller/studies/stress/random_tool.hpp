@@ -26,4 +26,8 @@ RandomToolScene random_tool_scene(Random& random);
 // both, beside up to two solids or planes.
 RandomToolScene random_mesh_tool_scene(Random& random);
 
+// Three objects in four begin to move: to and fro by 1 mm/s to 0.3 m/s at 0.3 to 8 Hz, straight ahead by up to 20 mm/s,
+// or about an axis through their middle by up to 3 rad/s (planes: about their normal).
+void set_in_motion(Random& random, scenes::Scene& scene);
+
 }  // namespace proxarm::studies

@@ -31,8 +31,8 @@ namespace proxarm::studies {
 class Stress final : public Study {
  public:
   using Worlds = StressWorlds;
-  static constexpr std::array<std::string_view, 5> worlds_names{"stress", "stress_meshes", "stress_layers",
-                                                                "stress_order2", "stress_tools"};
+  static constexpr std::array<std::string_view, 6> worlds_names{"stress",        "stress_meshes", "stress_layers",
+                                                                "stress_order2", "stress_tools",  "stress_moving"};
   explicit Stress(Worlds worlds = Worlds::all) : worlds_(worlds) {}
 
   std::string name() const override { return std::string(worlds_names[static_cast<std::size_t>(worlds_)]); }

@@ -300,7 +300,8 @@ void run_in(const scenes::Scene& scene, const scenes::CompiledScene& compiled, c
 }  // namespace
 
 Tally run_seed(std::uint64_t seed, StressWorlds worlds, std::string* report) {
-  if (worlds == StressWorlds::tools) return run_tool_seed(seed, report);
+  if (worlds == StressWorlds::tools) return run_tool_seed(seed, false, report);
+  if (worlds == StressWorlds::moving_tools) return run_tool_seed(seed, true, report);
   Random random(seed);
   const RandomScene made = worlds == StressWorlds::meshes   ? random_mesh_scene(random)
                            : worlds == StressWorlds::layers ? random_layer_scene(random)

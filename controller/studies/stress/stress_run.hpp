@@ -10,8 +10,8 @@ namespace proxarm::studies {
 
 // Which worlds: those of random_scene(), random_mesh_scene() or random_layer_scene(), each a study of its own, so that
 // what a seed gives in the one stays what it was. order_2: those of random_scene(), all stepped by order 2. tools:
-// rigid tools in those of random_tool_scene() (tool_run.hpp).
-enum class StressWorlds { all, meshes, layers, order_2, tools };
+// rigid tools in those of random_tool_scene() (tool_run.hpp); moving_tools: the same, set in motion.
+enum class StressWorlds { all, meshes, layers, order_2, tools, moving_tools };
 
 enum Invariant { finite, inside, law, stiffness, work, invariant_count };
 inline constexpr std::array<const char*, invariant_count> invariant_names{"finite", "inside", "law", "stiffness",

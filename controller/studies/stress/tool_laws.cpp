@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <variant>
 
@@ -144,6 +145,7 @@ ToolLaws::ToolLaws(const scenes::Scene& scene, const models::Tool& tool) : scene
   }
   for (const scenes::Object& object : scene.objects) {
     hollow_ = hollow_ || scenes::is_inside_out(object.shape);
+    moves_ = moves_ || object.motion;
     double radius = beyond_all_m;
     if (const auto* sphere = std::get_if<scenes::SphereShape>(&object.shape)) radius = sphere->radius_m;
     if (const auto* capsule = std::get_if<scenes::CapsuleShape>(&object.shape)) radius = capsule->radius_m;
@@ -367,11 +369,59 @@ double ToolLaws::apart_m(const Core& core, const ToolPose& pose, const scenes::O
   return gap;
 }
 
-double ToolLaws::depth_m(const ToolPose& pose) const {
+// The text of a script: c + R(ωt)(x − c) + vt + a sin(2πft + φ), R by Rodrigues' formula.
+models::Pose ToolLaws::place(std::size_t index, double time_s) const {
+  models::Pose X = models::Pose::Identity();
+  const std::optional<scenes::Motion>& motion = scene_.objects[index].motion;
+  if (!motion) return X;
+  const Vec3 axis = motion->axis.normalized();
+  models::Mat3 k;
+  k << 0.0, -axis.z(), axis.y(), axis.z(), 0.0, -axis.x(), -axis.y(), axis.x(), 0.0;
+  const double angle = motion->turn_rad_per_s * time_s,
+               phase = 2.0 * std::numbers::pi * motion->frequency_Hz * time_s + motion->phase_rad;
+  X.linear() = models::Mat3::Identity() + std::sin(angle) * k + (1.0 - std::cos(angle)) * k * k;
+  X.translation() = motion->centre_m - X.linear() * motion->centre_m + motion->velocity_m_per_s * time_s +
+                    motion->amplitude_m * std::sin(phase);
+  return X;
+}
+
+models::Pose ToolLaws::motion(std::size_t object, double since_s, double time_s) const {
+  return place(object, time_s) * place(object, since_s).inverse(Eigen::Isometry);
+}
+
+void ToolLaws::carry(ToolCall& call) const {
+  call.with.clear();
+  for (std::size_t i = 0; moves_ && i < scene_.objects.size(); ++i) {
+    const models::Pose c = motion(i, call.since_s, call.time_s);
+    call.with.push_back({c * call.q.position, (models::Quaternion(c.linear()) * call.q.orientation).normalized()});
+  }
+}
+
+std::vector<PoseContact> ToolLaws::carried(std::vector<PoseContact> contacts, double since_s, double time_s) const {
+  if (!moves_) return contacts;
+  for (PoseContact& contact : contacts) {
+    const models::Pose c = motion(static_cast<std::size_t>(contact.object), since_s, time_s);
+    contact.point_W = c * contact.point_W;
+    contact.normal_W = c.linear() * contact.normal_W;
+  }
+  return contacts;
+}
+
+// Of a pose that is carried, too: by two places of the object, each known to as much.
+double ToolLaws::rounding_of_ways_m(const ToolCall& call) const {
+  return (moves_ ? 3.0 : 1.0) * 8.0 * rounding_m(call.r);
+}
+
+double ToolLaws::depth_m(const ToolPose& pose_W, double time_s) const {
   double gap = beyond_all_m;
-  for (const Core& core : cores_) {
-    for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
-      const scenes::Object& object = scene_.objects[i];
+  for (std::size_t i = 0; i < scene_.objects.size(); ++i) {
+    const scenes::Object& object = scene_.objects[i];
+    ToolPose pose = pose_W;
+    if (object.motion) {
+      const models::Pose back = place(i, time_s).inverse(Eigen::Isometry);
+      pose = {back * pose_W.position, (models::Quaternion(back.linear()) * pose_W.orientation).normalized()};
+    }
+    for (const Core& core : cores_) {
       const bool mesh = std::holds_alternative<scenes::MeshShape>(object.shape) ||
                         (core.mesh_T && !std::holds_alternative<scenes::PlaneShape>(object.shape));
       gap = std::min(gap, mesh ? apart_from_m(core, pose, i) : apart_m(core, pose, object));
@@ -431,7 +481,7 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     if (!(s > 0.0)) continue;
     const double least = std::max(limit * yields(call, contact, slip / s), 1e-9);
     const double off = (f_t + limit / s * slip).norm();
-    const double allowed = 1e-8 * size * std::max(s, least) + 2.0 * limit * 8.0 * rounding_m(call.r);
+    const double allowed = 1e-8 * size * std::max(s, least) + 2.0 * limit * rounding_of_ways_m(call);
     if (!(off * s <= allowed)) return "not against the slip";
   }
   return {};
@@ -439,16 +489,19 @@ std::string ToolLaws::missed(const ToolCall& call) const {
 
 // As a sine, where that is more than the tool's own turn.
 double ToolLaws::normal_turns(const ToolCall& call, const PoseContact& contact) const {
-  double most = models::difference(call.r, call.q).tail<3>().norm();
+  const ToolPose& q = call.from(contact);
+  double most = models::difference(call.r, q).tail<3>().norm();
   // At either pose a gap may be short of 1e-12 m.
-  const double within_m = 2e-12 + 8.0 * rounding_m(call.r);
+  const double within_m = 2e-12 + rounding_of_ways_m(call);
   const Vec3 &n = contact.normal_W, way = call.way_of(contact);
+  const auto object = static_cast<std::size_t>(contact.object);
+  const models::Pose X = place(object, call.time_s);
   for (const auto& [a, b] : cores_[static_cast<std::size_t>(contact.part)].sharp_T) {
     if (!lies_on(contact, call.r * a, call.r * b, within_m)) continue;
-    for (const auto& [from, to] : sharp_[static_cast<std::size_t>(contact.object)]) {
-      if (!lies_on(contact, from, to, within_m)) continue;
-      const Vec3 now = (call.r.orientation * (b - a)).cross(to - from),
-                 was = (call.q.orientation * (b - a)).cross(to - from);
+    for (const auto& [from, to] : sharp_[object]) {
+      if (!lies_on(contact, X * from, X * to, within_m)) continue;
+      const Vec3 along = X.linear() * (to - from);
+      const Vec3 now = (call.r.orientation * (b - a)).cross(along), was = (q.orientation * (b - a)).cross(along);
       const Vec3 n0 = n.dot(now) < 0.0 ? Vec3(-was.normalized()) : Vec3(was.normalized());
       if (n0.dot(n) > 0.0 && n0.dot(way) <= within_m) most = std::max(most, n0.cross(n).norm());
     }
@@ -473,15 +526,19 @@ double ToolLaws::curvature_J(const ToolCall& call) const {
   return sum;
 }
 
-double ToolLaws::slack_m(const ToolCall& call, double short_m) {
+double ToolLaws::slack_m(const ToolCall& call, double short_m) const {
   const Twist step = models::difference(call.p, call.q);
   const double step_m = std::hypot(step.head<3>().norm(), lever_m * step.tail<3>().norm());
-  return std::max(short_m, 0.0) + 8.0 * rounding_m(call.r) + 1e-10 * step_m;
+  return std::max(short_m, 0.0) + rounding_of_ways_m(call) + 1e-10 * step_m;
 }
 
 double ToolLaws::left_J(const ToolCall& call, double rise_J, double short_m) const {
   double forces_N = 0.0;
-  for (const PoseContact& contact : call.contacts) forces_N += contact.force_W.norm();
+  for (const PoseContact& contact : call.contacts) {
+    forces_N += contact.force_W.norm();
+    const Vec3 y = call.on_tool(contact);
+    rise_J -= contact.force_W.dot(call.from(contact) * y - call.q * y);  // the object's own work
+  }
   return rise_J - curvature_J(call) - forces_N * slack_m(call, short_m) - 1e-12;
 }
 

@@ -1,5 +1,9 @@
-// What is known of a rigid tool among objects that stand still, whatever its 𝒢: the judge's own copy of the laws
-// (models/geometry/pose_algorithm.hpp) and of distances, for the stress study.
+// What is known of a rigid tool among objects, whatever its 𝒢: the judge's own copy of the laws
+// (models/geometry/pose_algorithm.hpp), of distances, and of where a script leads an object, for the stress study.
+//
+// An object that moves, by X(t), carries what it touches. With c = X(t) X(t − T)⁻¹ a material point of the tool that
+// was at y slips by x − c y, and what the contact's force does on that way is judged as where the object stands still:
+// seen from it, the tool goes from c q to r. The rest, fᵀ(c y − y), the object did, and no law limits it.
 #pragma once
 
 #include <memory>
@@ -22,11 +26,20 @@ struct ToolCall {
   models::ToolPose p, q, r;
   std::vector<models::PoseContact> contacts;
   bool unresolved = false;
+  double since_s = 0.0, time_s = 0.0;    // when the tool was at q, and when it is at r
+  std::vector<models::ToolPose> with{};  // of each object: q, carried along with it; empty where nothing moves
+
+  [[nodiscard]] const models::ToolPose& from(const models::PoseContact& contact) const {
+    return with.empty() ? q : with[static_cast<std::size_t>(contact.object)];
+  }
 
   [[nodiscard]] models::Twist wrench() const { return K * models::difference(r, p); }
-  // Of the tool's material point at a contact since q, and what of it isn't along the normal.
+  // Of the tool's material point at a contact since q, relative to the object, and what of it isn't along the normal.
   [[nodiscard]] models::Vec3 way_of(const models::PoseContact& contact) const {
-    return contact.point_W - q * (r.orientation.conjugate() * (contact.point_W - r.position));
+    return contact.point_W - from(contact) * on_tool(contact);
+  }
+  [[nodiscard]] models::Vec3 on_tool(const models::PoseContact& contact) const {
+    return r.orientation.conjugate() * (contact.point_W - r.position);
   }
   [[nodiscard]] models::Vec3 slip_of(const models::PoseContact& contact) const {
     const models::Vec3 way = way_of(contact);
@@ -42,7 +55,14 @@ class ToolLaws {
   ToolLaws(const scenes::Scene& scene, const models::Tool& tool);
 
   // How deep the tool is inside of anything, metres; below 0 it is so far outside, or farther.
-  [[nodiscard]] double depth_m(const models::ToolPose& pose) const;
+  [[nodiscard]] double depth_m(const models::ToolPose& pose, double time_s = 0.0) const;
+
+  // Tells a call where its objects carried q.
+  void carry(ToolCall& call) const;
+  // Contacts where and as their objects have carried them since.
+  [[nodiscard]] std::vector<models::PoseContact> carried(std::vector<models::PoseContact> contacts, double since_s,
+                                                         double time_s) const;
+  [[nodiscard]] bool moves() const { return moves_; }
 
   // What of the law the call misses; empty if nothing.
   [[nodiscard]] std::string missed(const ToolCall& call) const;
@@ -107,16 +127,21 @@ class ToolLaws {
     std::optional<double> friction;
   };
 
+  // Where an object is, relative to where it was described, and what has become of it since.
+  [[nodiscard]] models::Pose place(std::size_t object, double time_s) const;
+  [[nodiscard]] models::Pose motion(std::size_t object, double since_s, double time_s) const;
+  // Rounding of a material point's way, m.
+  [[nodiscard]] double rounding_of_ways_m(const ToolCall& call) const;
   [[nodiscard]] double friction(const models::PoseContact& contact) const;
   [[nodiscard]] double normal_turns(const ToolCall& call, const models::PoseContact& contact) const;
   // What a place may come forward along its normal, as the normal turns and the surface falls off.
   [[nodiscard]] double forward_m(const ToolCall& call, const models::PoseContact& contact) const;
-  [[nodiscard]] static double slack_m(const ToolCall& call, double short_m);
+  [[nodiscard]] double slack_m(const ToolCall& call, double short_m) const;
   [[nodiscard]] double apart_m(const Core& core, const models::ToolPose& pose, const scenes::Object& object) const;
   [[nodiscard]] double apart_from_m(const Core& core, const models::ToolPose& pose, std::size_t object) const;
 
   const scenes::Scene& scene_;
-  bool hollow_ = false;
+  bool hollow_ = false, moves_ = false;
   std::vector<Core> cores_;
   std::vector<std::vector<Piece>> pieces_;  // of each object: a mesh's triangles, a box; of others none
   std::vector<Edges> sharp_;                // of each object

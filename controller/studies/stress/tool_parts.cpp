@@ -44,11 +44,13 @@ void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, std
     // h/(1 + h)
     const double drawn = waited == 1.0 ? 1.0 : (waited - since) / (waited - since + (1.0 - since) * (1.0 - waited));
     if (drawn < 1.0) next.call.p = models::moved(last.call.r, drawn * models::difference(next.call.p, last.call.r));
+    next.call.time_s = time_of(call, *mark);
+    g->set_time({.time_s = next.call.time_s, .period_s = next.call.time_s - time_of(call, last.mark)});
     next.call.r = g->step(call.K, next.call.p, last.call.r);
     if (g->unresolved()) continue;
     next.call.contacts.assign(g->contacts().begin(), g->contacts().end());
     for (models::PoseContact& contact : next.call.contacts) contact.force_W /= drawn;
-    next.short_m = laws_.depth_m(next.call.r);
+    next.short_m = laws_.depth_m(next.call.r, next.call.time_s);
     way.push_back(next);
   }
 }
@@ -56,6 +58,8 @@ void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, std
 double ToolParts::pushed_J(const Pose& from, const Pose& to) const {
   ToolCall part = to.call;
   part.q = from.call.r;
+  part.since_s = from.call.time_s;
+  laws_.carry(part);
   return laws_.pushed_J(part, std::max(from.short_m, 0.0) + 2.0 * kBeside_m);
 }
 
@@ -87,6 +91,7 @@ bool ToolParts::keep(const ToolCall& call, double short_m, double rest_J,
   for (int k = 0; k <= kEighths; ++k) marks.push_back({static_cast<double>(k) / kEighths, 1.0});
   std::vector<Pose> way{{marks.front(), call, short_m}};
   way.front().call.r = call.q;
+  way.front().call.time_s = call.since_s;
   const double allowed_J = laws_.curvature_J(call);
   const std::size_t before = touched.size();
   while (true) {
@@ -94,7 +99,8 @@ bool ToolParts::keep(const ToolCall& call, double short_m, double rest_J,
     touched.resize(before);
     for (std::size_t k = 1; k < way.size(); ++k) {
       if (way[k].mark.share == 1.0) continue;
-      touched.insert(touched.end(), way[k].call.contacts.begin(), way[k].call.contacts.end());
+      const auto met = laws_.carried(way[k].call.contacts, way[k].call.time_s, call.time_s);
+      touched.insert(touched.end(), met.begin(), met.end());
     }
     const Sum sum = sum_of(way, marks, call);
     if (sum.all_J <= allowed_J && rest_J <= laws_.edges_J(call, touched)) return true;

@@ -11,9 +11,9 @@
 // holds for each contact that presses at r(b), where no edge is between them: it either pressed at r(a), with a gap of
 // 0 at both, or came down to its feature since. It also holds for a jump from next before an edge, r⁻, to next behind
 // it, r⁺, if what holds the tool in r⁺ is met there first: in r⁻ the place lies on the edge, and so on what is behind
-// it. Its gap there is 0 at both, nᵀ(x⁺ − x⁻) = 0, and whatever else lets the tool go or comes to hold it meanwhile, its
-// gap is 0 at r⁺ if it presses, and was not below before. (So without friction the tool's potential ½‖r − p̂‖²_K falls
-// by ½‖r⁺ − r⁻‖²_K or more.)
+// it. Its gap there is 0 at both, nᵀ(x⁺ − x⁻) = 0, and whatever else lets the tool go or comes to hold it meanwhile,
+// its gap is 0 at r⁺ if it presses, and was not below before. (So without friction the tool's potential ½‖r − p̂‖²_K
+// falls by ½‖r⁺ − r⁻‖²_K or more.)
 //
 // But let go at one edge a tool may come far, and over others: a vertex leaves its face, one of the tool's edges slides
 // along the object's to a corner, and over that onto a side that the place was behind in r⁻, beyond the edge (replay
@@ -23,11 +23,11 @@
 //   K dr/dτ = K (p̂ − r) + what the contacts exert,   r(0) = r⁻,   r(∞) = r⁺
 //
 // by steps of 𝒢 again: one of h has K (r(b) − p̂) + K (r(b) − r(a))/h for its wrench, that of 𝒢 with (1 + 1/h) K for
-// p' = r(a) + η (p̂ − r(a)), η = h/(1 + h), or by Assumption 1 with K, 1/η of the forces. For parts of it the bound holds
-// as it does for those of the step.
+// p' = r(a) + η (p̂ − r(a)), η = h/(1 + h), or by Assumption 1 with K, 1/η of the forces. For parts of it the bound
+// holds as it does for those of the step.
 //
-// Thus what the forces push forward by, f_n nᵀ(x(b) − x(a)), summed over smaller and smaller parts, goes to zero, but for
-// places where the tool springs: there it stays. Those may give what curvature_J() says of the step, no more.
+// Thus what the forces push forward by, f_n nᵀ(x(b) − x(a)), summed over smaller and smaller parts, goes to zero, but
+// for places where the tool springs: there it stays. Those may give what curvature_J() says of the step, no more.
 //
 // A step asks the world at p̂ alone, and next to an edge it may have several solutions there. An edge of the tool that
 // comes onto a vertex lies on it for a part of the way, from 0.62 to 0.72 in replay 5530763864440370, step 74; from q a
@@ -71,6 +71,9 @@ class ToolParts {
     ToolCall call;
     double short_m;
   };
+  [[nodiscard]] static double time_of(const ToolCall& call, const Mark& mark) {
+    return call.since_s + mark.share * (call.time_s - call.since_s);
+  }
   struct Sum {
     double all_J = 0.0, undivided_J = 0.0;  // of what can't be divided any more
     double most_J = 0.0;                    // the part that pushes most,

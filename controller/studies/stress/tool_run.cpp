@@ -120,7 +120,7 @@ class Judge {
     tally_.contact += call.contacts.empty() ? 0 : 1;
     tally_.slipping += std::any_of(call.contacts.begin(), call.contacts.end(), [](const auto& c) { return c.slips; });
     // A step that finds no forces keeps its gaps nevertheless.
-    const double depth = laws_.depth_m(call.r);
+    const double depth = laws_.depth_m(call.r, call.time_s);
     tally_.deepest_m = std::max(tally_.deepest_m, depth / (1.0 + call.r.position.norm()));
     if (!(depth <= 1e-12)) note(inside, call, "", depth);
     if (call.unresolved) {
@@ -162,7 +162,7 @@ class Judge {
     if (call.contacts.empty()) return;
     const double rest_J = laws_.left_J(call, rise_J, depth_before_m_);
     if (!(rest_J > 0.0)) return;
-    std::vector<PoseContact> touched = before_;
+    std::vector<PoseContact> touched = laws_.carried(before_, call.since_s, call.time_s);
     if (parts_.keep(call, depth_before_m_, rest_J, touched)) {
       ++tally_.edge;
     } else {
@@ -190,18 +190,25 @@ class Judge {
     other.stiffest = condition * least;
     other.p = models::moved(call.r, -other.K.ldlt().solve(w));
     other.q = call.q;
-    other.r = g_.step(other.K, other.p, call.q);
-    other.contacts.assign(g_.contacts().begin(), g_.contacts().end());
+    other.since_s = call.since_s;
+    other.time_s = call.time_s;
+    other.with = call.with;
+    // (One that has made the step finds its objects at rest.)
+    const std::unique_ptr<PoseAlgorithm> again = laws_.moves() ? fresh_->clone() : nullptr;
+    PoseAlgorithm& g = again ? *again : g_;
+    g.set_time({.time_s = call.time_s, .period_s = call.time_s - call.since_s});
+    other.r = g.step(other.K, other.p, call.q);
+    other.contacts.assign(g.contacts().begin(), g.contacts().end());
     const double off = levers().cwiseProduct(models::difference(other.r, call.r)).norm();
     const double allowed =
         64.0 * ToolLaws::rounding_m(call.r) *
             (std::sqrt(condition) + call.stiffest / least + w.cwiseQuotient(levers()).norm() / least / least_slip_m) +
         1e-12 * std::sqrt(condition) * depth_m;
-    if (g_.unresolved()) {
+    if (g.unresolved()) {
       ++tally_.unresolved;
     } else if (!(off <= std::min(allowed, 1e-10))) {
       // Two answers that both keep the laws of the same state are Coulomb's, not the algorithm's.
-      if (laws_.missed(other).empty() && laws_.depth_m(other.r) <= 1e-12) {
+      if (laws_.missed(other).empty() && laws_.depth_m(other.r, other.time_s) <= 1e-12) {
         ++tally_.several;
       } else {
         note(stiffness, other, laws_.missed(other), off);
@@ -233,11 +240,12 @@ bool find_start(Random& random, const ToolLaws& laws, ToolPose& q) {
 
 }  // namespace
 
-Tally run_tool_seed(std::uint64_t seed, std::string* report) {
+Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
   Random random(seed);
   // (Drawn apart, so that the others stay what they were before there were meshes.)
   const bool meshes = Random(seed + 2).chance(0.2);
-  const RandomToolScene made = meshes ? random_mesh_tool_scene(random) : random_tool_scene(random);
+  RandomToolScene made = meshes ? random_mesh_tool_scene(random) : random_tool_scene(random);
+  if (moving) set_in_motion(random, made.scene);
   Tally tally;
   tally.kind = made.kind;
   tally.objects = made.scene.objects.size();
@@ -269,15 +277,18 @@ Tally run_tool_seed(std::uint64_t seed, std::string* report) {
     // Flung away or spun, it is where a session's limits have ended it.
     const Twist way = models::difference(call.p, call.q);
     if (way.head<3>().norm() > most_m || way.tail<3>().norm() > most_rad || call.q.position.norm() > furthest_m) break;
+    call.since_s = proxy.time_s();
     call.K = proxy.K();
     call.stiffest = std::max(call.K(0, 0), call.K(3, 3) / (lever * lever));
     const bool fault = proxy.step(call.p) != controller::ProxyFault::none;
     call.r = proxy.q();
+    call.time_s = proxy.time_s();
+    laws.carry(call);
     call.contacts.assign(g->contacts().begin(), g->contacts().end());
     call.unresolved = g->unresolved();
     const double hand_J = h.force.dot(proxy.move().head<3>()) + h.torque.dot(proxy.move().tail<3>());
-    judge.step(k, fault, call, energy_J() - before_J - hand_J);
-    if (fault) break;
+    if (!g->squeezed()) judge.step(k, fault, call, energy_J() - before_J - hand_J);
+    if (fault || g->squeezed()) break;  // nothing is known of a tool that has no room
   }
   return tally;
 }

@@ -13,7 +13,7 @@
 
 namespace proxarm::studies {
 
-// As run_seed().
-Tally run_tool_seed(std::uint64_t seed, std::string* report);
+// As run_seed(). `moving`: objects move; a run ends where they leave the tool no room.
+Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report);
 
 }  // namespace proxarm::studies

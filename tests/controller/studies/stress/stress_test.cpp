@@ -27,7 +27,7 @@ void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds 
 
 // A run with a rigid tool that violated something once.
 Tally clean_run(std::uint64_t seed) {
-  Tally run = run_tool_seed(seed, nullptr);
+  Tally run = run_tool_seed(seed, false, nullptr);
   EXPECT_EQ(run.first, "none") << seed << " step " << run.first_step;
   return run;
 }
@@ -46,6 +46,8 @@ TEST(Stress, HoldsAmongLayers) { expect_no_violation(2, 400, Stress::Worlds::lay
 TEST(Stress, HoldsAtOrder2) { expect_no_violation(3, 2'000, Stress::Worlds::order_2); }
 
 TEST(Stress, HoldsWithRigidTools) { expect_no_violation(4, 200, Stress::Worlds::tools); }
+
+TEST(Stress, HoldsWithRigidToolsAmongObjectsThatMove) { expect_no_violation(4, 200, Stress::Worlds::moving_tools); }
 
 // Step 159: a corner of the tool comes down on a box's face at 96 % of the way, 12 µm from an edge, and p̂ is over that
 // edge. The judge looked at seven eighths of the way for what was met, where nothing is yet, and took the turn of the
@@ -154,8 +156,8 @@ TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) {
 // to the corner and took its push for 0.6 mJ out of nowhere.
 TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_edges({54327521292900ULL}); }
 
-// Step 12: a vertex of a box leaves the tool's face over its edge, that edge slides along one of the box's to a corner of
-// the tool, and over it the corner comes onto the box's next face, all with p̂ as good as at rest. The judge took the
+// Step 12: a vertex of a box leaves the tool's face over its edge, that edge slides along one of the box's to a corner
+// of the tool, and over it the corner comes onto the box's next face, all with p̂ as good as at rest. The judge took the
 // jump for one over a single edge, and that the corner came up along the last normal by 0.6 mm for 0.08 J out of
 // nowhere.
 TEST(Stress, AToolThatJumpsOverSeveralEdgesAtOnceIsCountedAsAtAnEdge) { expect_edges({5381286054045804}); }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 namespace proxarm::studies {
 namespace {
@@ -81,6 +82,60 @@ TEST(ToolLaws, TheBendOfALeversWayIsNoneOfAPlaces) {
     was.normal_W = Vec3(share * turn, 0.0, std::sqrt(1.0 - share * share * turn * turn));
     EXPECT_EQ(laws.edges_J(here.call, {was}) > 0.0, share < 1.0);
   }
+}
+
+// A corner of a box on a plate that goes by 0.1 m/s along x: pressed by 10 N, it drags the tool by 4.
+struct OnABelt {
+  static constexpr double T = 1e-3, v = 0.1, f_n = 10.0, f_t = 4.0;
+  scenes::Scene scene;
+  models::Tool tool{{{models::BoxTool{Vec3::Constant(0.01)}, models::Pose::Identity(), {}}}};
+  ToolCall call;
+
+  // `tool_m_per_s`: the tool's own.
+  OnABelt(double friction, double tool_m_per_s) {
+    scenes::Object plate;
+    plate.shape = scenes::PlaneShape{Vec3::Zero(), Vec3::UnitZ()};
+    plate.friction = friction;
+    plate.motion.emplace().velocity_m_per_s = {v, 0.0, 0.0};
+    scene.objects.push_back(plate);
+    PoseContact contact;
+    contact.normal_W = Vec3::UnitZ();
+    contact.force_W = {f_t, 0.0, f_n};
+    call.contacts.push_back(contact);
+    call.K = 1e6 * models::Mat6::Identity();
+    call.stiffest = 1e6 / (ToolLaws::lever_m * ToolLaws::lever_m);
+    call.since_s = 0.7;
+    call.time_s = call.since_s + T;
+    call.r.position = Vec3(0.005, 0.005, 0.005);
+    call.q.position = call.r.position - Vec3(tool_m_per_s * T, 0.0, 0.0);
+    models::Twist w;
+    w << contact.force_W, (-call.r.position).cross(contact.force_W);
+    call.p = models::moved(call.r, -call.K.ldlt().solve(w));
+    ToolLaws(scene, tool).carry(call);
+  }
+  [[nodiscard]] std::string missed() const { return ToolLaws(scene, tool).missed(call); }
+  [[nodiscard]] double left_J(double rise_J) const { return ToolLaws(scene, tool).left_J(call, rise_J, 0.0); }
+};
+
+TEST(ToolLaws, WhatGoesAlongWithAnObjectSticksToIt) {
+  EXPECT_EQ(OnABelt(0.6, OnABelt::v).missed(), "");
+  EXPECT_EQ(OnABelt(0.3, OnABelt::v).missed(), "out of the cone");
+}
+
+// Slower than the belt it is dragged along, with all of the friction; faster it would be held back.
+TEST(ToolLaws, FrictionIsAgainstTheSlipOnAnObjectThatMoves) {
+  const double friction = OnABelt::f_t / OnABelt::f_n;
+  EXPECT_EQ(OnABelt(friction, 0.0).missed(), "");
+  EXPECT_EQ(OnABelt(friction, 0.5 * OnABelt::v).missed(), "");
+  EXPECT_EQ(OnABelt(friction, 2.0 * OnABelt::v).missed(), "not against the slip");
+  EXPECT_EQ(OnABelt(0.6, 0.0).missed(), "not against the slip");
+}
+
+TEST(ToolLaws, WhatAnObjectDoesIsItsOwnWork) {
+  const OnABelt here(0.6, OnABelt::v);
+  const double work_J = OnABelt::f_t * OnABelt::v * OnABelt::T;
+  EXPECT_LE(here.left_J(work_J * (1.0 - 1e-9)), 0.0);
+  EXPECT_NEAR(here.left_J(1.5 * work_J), 0.5 * work_J, 2e-12);  // (1e-12 J and what rounding may do are taken off)
 }
 
 // Two edges that cross at 0.05 rad, along x = 0 that of the object, and a tool that turns by 0.005 rad about x: the
