@@ -3,14 +3,15 @@
 // 1. Candidates (rigid_candidates.cpp): pairs of features, one of the tool and one of an object, that come within a
 //    distance of each other that the steps to come won't exceed. They are gathered anew only when the tool has moved so
 //    far.
-// 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_gaps.cpp, rigid_shapes/touch.hpp).
-//    Linearised there, those that press or would be passed make a local problem (contact_problem.hpp); its solution is
-//    the next pose. Gaps and normals are taken again until nothing moves: a fixed point is exact, since at δ = 0
+// 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_gaps.cpp, rigid_deeper.cpp,
+//    rigid_shapes/touch.hpp). Linearised there, those that press or would be passed make a local problem
+//    (rigid_linear.cpp, contact_problem.hpp); its solution is the next pose. Gaps and normals are taken again until nothing moves: a fixed point is exact, since at δ = 0
 //    nothing is linearised. It converges by the ratio of the step's penetration to the radius of curvature, a
 //    thousandth or less. Where surfaces conform (a peg in its hole) that radius is their clearance, and the ratio far
 //    above one: there the gaps' curvature goes into the problem as well (rigid_bends.cpp), which makes this Newton's
 //    method.
-// 3. On which side of a face or an edge the tool is, is what it was at q(k−1). A long step is taken in parts, on the
+// 3. On which side of a face or an edge the tool is, is what it was at q(k−1) (rigid_sides.cpp). A long step is taken in
+//    parts (rigid_steps.cpp), on the
 //    way from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from
 //    q(k−1). A solution in which the contacts did work on the tool is on a side to which it didn't come: then the parts
 //    are made smaller.
@@ -33,11 +34,11 @@
 #include "models/geometry/pose_algorithm.hpp"
 #include "models/local_problem/contact_problem.hpp"
 #include "models/rigid/beside_cylinder.hpp"
-#include "models/rigid/rigid_mover.hpp"
 #include "models/rigid_features/mesh_overlap.hpp"
 #include "models/rigid_features/near_leaves.hpp"
 #include "models/rigid_features/node_discs.hpp"
 #include "models/rigid_features/rigid_features.hpp"
+#include "models/rigid_features/rigid_mover.hpp"
 #include "models/rigid_shapes/cylinder.hpp"
 
 namespace proxarm::models {
@@ -159,6 +160,12 @@ class RigidWorld final : public PoseAlgorithm {
     bool dense = false;            // there is a mesh, or there are many solids
   };
   static constexpr double kEverywhere_m = std::numeric_limits<double>::infinity();
+  // So many contacts may be looked at in a step's local problems, some 0.2 µs each. Without it local problems that have
+  // no solution took up to 13 ms of a cycle.
+  static constexpr int kWork = 1200;
+  // Where gaps bend the last step of the iteration turns normals by no more than 1e-10 of a clearance of ten
+  // micrometres.
+  static constexpr double kStill_m = 1e-15;
   static constexpr int kMostParts = 512;  // of a step. A longer one, 10 cm for a tool of a millimetre, ends before p̂
   static constexpr int kMostStrides = 1 << 16;  // the same, among objects that move
   static constexpr std::size_t most_pairs = 768;

@@ -1,4 +1,4 @@
-#include "models/rigid/rigid_mover.hpp"
+#include "models/rigid_features/rigid_mover.hpp"
 
 namespace proxarm::models {
 
