@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "models/geometry/linear_systems.hpp"
@@ -9,19 +10,26 @@
 namespace proxarm::models {
 namespace {
 
+// Rounding of a square and its root is less.
+constexpr double kNextToLimit = 1e-14;
+
 // Alart and Curnier's projection of z = f − u/w, and the state that it tells.
 struct Projected {
   Vec3 f = Vec3::Zero();
   ContactState state = ContactState::open;
 };
 
-Projected project(const Vec3& z, double mu) noexcept {
+inline Projected project(const Vec3& z, double mu) noexcept {
   Projected out;
   if (!(z[0] > 0.0)) return out;
-  const double z_t = z.tail<2>().norm(), limit = mu * z[0];
+  const double z_t2 = z.tail<2>().squaredNorm(), limit = mu * z[0];
   out.f = z;
-  out.state = z_t <= limit ? ContactState::stick : ContactState::slip;
-  if (out.state == ContactState::slip) out.f.tail<2>() *= limit / z_t;
+  out.state = ContactState::stick;
+  if (z_t2 < (1.0 - kNextToLimit) * (limit * limit)) return out;  // most do, and need no root
+  const double z_t = std::sqrt(z_t2);
+  if (z_t <= limit) return out;
+  out.state = ContactState::slip;
+  out.f.tail<2>() *= limit / z_t;
   return out;
 }
 
@@ -65,6 +73,7 @@ double ContactProblem::make_rows(const Twist& e, std::span<const LinearContact> 
     row.b = contact.c - contact.J * e;
     row.mu = contact.mu;
     row.w = row.H.squaredNorm();
+    row.root_w = std::sqrt(row.w);
     row.f = contact.f;
     row.state = contact.state;
   }
@@ -75,12 +84,25 @@ double ContactProblem::make_rows(const Twist& e, std::span<const LinearContact> 
 double ContactProblem::violation(Rows rows, const Twist& y) noexcept {
   Twist off = -y;
   double law = 0.0;
-  for (const Row& row : rows) {
-    const Vec3 u = row.H * y + row.b;
+  for (Row& row : rows) {
+    row.u = row.H * y + row.b;
+    const Projected now = project(row.f - row.u / row.w, row.mu);
+    row.seen = now.state;
     off += row.H.transpose() * row.f;
-    law = std::max(law, (row.f - project(row.f - u / row.w, row.mu).f).norm() * std::sqrt(row.w));
+    law = std::max(law, (row.f - now.f).norm() * row.root_w);
   }
   return std::max(off.norm(), law);  // in this order: what isn't a number stays so
+}
+
+void ContactProblem::look(Rows rows, const Twist& y) noexcept {
+  for (Row& row : rows) {
+    row.u = row.H * y + row.b;
+    row.seen = project(row.f - row.u / row.w, row.mu).state;
+  }
+}
+
+void ContactProblem::take_seen_states(Rows rows) noexcept {
+  for (Row& row : rows) row.state = row.seen;
 }
 
 // The same as a sum of squares.
@@ -110,9 +132,10 @@ bool ContactProblem::newton_step(Rows rows, Twist& y) noexcept {
       continue;
     }
     const double R = kStiff / row.w;
-    const Vec3 u = row.H * y + row.b;
+    const Vec3& u = row.u;
     if (row.state == ContactState::stick) {
-      P[i] = R * Mat3::Identity();
+      off.noalias() += row.H.transpose() * (row.f - R * u);
+      A.noalias() += row.H.transpose() * (R * row.H);
     } else {
       const Eigen::Vector2d z_t = row.f.tail<2>() - u.tail<2>() / row.w;
       const double size = z_t.norm(), z_n = std::max(row.f[0] - u[0] / row.w, 0.0);
@@ -123,22 +146,25 @@ bool ContactProblem::newton_step(Rows rows, Twist& y) noexcept {
       P[i].block<2, 1>(1, 0) = row.mu * R * d;
       P[i].block<2, 2>(1, 1) = a / ((1.0 - a) * row.w) * (Eigen::Matrix2d::Identity() - d * d.transpose());
       row.f.tail<2>() = row.mu * row.f[0] * d;
+      off.noalias() += row.H.transpose() * (row.f - P[i] * u);
+      A.noalias() += row.H.transpose() * (P[i] * row.H);
     }
-    off.noalias() += row.H.transpose() * (row.f - P[i] * u);
-    A.noalias() += row.H.transpose() * (P[i] * row.H);
   }
   const Twist step = solved(A, off);
   if (!step.allFinite()) return false;
   y += step;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (rows[i].state != ContactState::open) rows[i].f -= P[i] * (rows[i].H * y + rows[i].b);
+    Row& row = rows[i];
+    if (row.state == ContactState::stick) row.f -= kStiff / row.w * (row.H * y + row.b);
+    if (row.state == ContactState::slip) row.f -= P[i] * (row.H * y + row.b);
   }
   return true;
 }
 
 bool ContactProblem::newton(Rows rows, Twist& y, double size, int most_iterations) noexcept {
+  look(rows, y);
   for (int k = 0; k < most_iterations && may_look_at(rows); ++k) {
-    for (Row& row : rows) row.state = project(row.f - (row.H * y + row.b) / row.w, row.mu).state;
+    take_seen_states(rows);
     if (!newton_step(rows, y)) return false;
     if (is_solved(rows, y, size, k < kQuiet ? kTolerance : kNoisyTolerance)) return true;
   }
@@ -166,7 +192,8 @@ void ContactProblem::go_to(const Iterate& a, Rows rows, Twist& y) noexcept {
 // residual is taken, or the least of all.
 bool ContactProblem::damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept {
   for (int k = 0; k < most_iterations && may_look_at(rows); ++k) {
-    for (Row& row : rows) row.state = project(row.f - (row.H * y + row.b) / row.w, row.mu).state;
+    look(rows, y);
+    take_seen_states(rows);
     const Iterate before = kept(rows, y);
     const double wanted = residual2(rows, y);
     if (!newton_step(rows, y)) return false;
@@ -197,24 +224,30 @@ bool ContactProblem::is_solved(Rows rows, const Twist& y, double size, double to
 // Forces carry the rounding of u times r. What the sum lacks of y is made up for by the smallest changes that the
 // states allow: along the normal and the tangents where it sticks, along the cone's ray where it slips.
 void ContactProblem::balance(Rows rows, const Twist& y) noexcept {
+  FactoredMatrix factors;
+  bool changes = true;  // rays of what slips, with its forces
   for (int k = 0; k < 2; ++k) {
     Mat6 G = Mat6::Zero();
     Twist lack = y;
     double size = 0.0;
+    const bool known = !changes;
+    changes = false;
     for (const Row& row : rows) {
       if (row.state == ContactState::open) continue;
       lack.noalias() -= row.H.transpose() * row.f;
       size += row.w;
       if (row.state == ContactState::stick) {
-        G.noalias() += row.H.transpose() * row.H;
+        if (!known) G.noalias() += row.H.transpose() * row.H;
       } else if (row.f[0] > 0.0) {
+        changes = true;
         const Twist ray = row.H.transpose() * (row.f / row.f[0]);
         G.noalias() += ray * ray.transpose();
       }
     }
     if (!(size > 0.0)) return;
     G.diagonal().array() += 1e-10 * size;
-    const Twist share = solved(G, lack);
+    if (!known) factors.factor(G);
+    const Twist share = factors.solve(lack);
     for (Row& row : rows) {
       if (row.state == ContactState::open) continue;
       if (row.state == ContactState::stick) {
@@ -311,7 +344,8 @@ bool ContactProblem::next_to(const Iterate& reached, Rows rows, Twist& y, double
   for (std::size_t flipped = 0; flipped < rows.size(); ++flipped) {
     for (int turn = 1; turn <= 2; ++turn) {
       go_to(reached, rows, y);
-      for (Row& row : rows) row.state = project(row.f - (row.H * y + row.b) / row.w, row.mu).state;
+      look(rows, y);
+      take_seen_states(rows);
       Row& row = rows[flipped];
       row.state = static_cast<ContactState>((static_cast<int>(row.state) + turn) % 3);
       if (held_newton(rows, y, size, 12)) return true;
@@ -332,6 +366,7 @@ bool ContactProblem::held_newton(Rows rows, Twist& y, double size, int most_iter
 bool ContactProblem::newton_with_states(Rows rows, Twist& y, double size, Twist start) noexcept {
   y = start;
   for (Row& row : rows) row.f.setZero();
+  look(rows, y);
   return held_newton(rows, y, size, 30);
 }
 

@@ -78,8 +78,12 @@ class ContactProblem {
     Vec3 b;
     double mu = 0.0;
     double w = 0.0;  // the trace of H Hᵀ: how far the contact yields to a newton, m/N
+    double root_w = 0.0;
     Vec3 f;
     ContactState state = ContactState::open;
+    // What look() or violation() saw last: u at y, and the state that the projection tells.
+    Vec3 u;
+    ContactState seen = ContactState::open;
   };
   using Rows = std::span<Row>;
   struct Iterate {
@@ -88,6 +92,9 @@ class ContactProblem {
   };
 
   static bool one_contact(Row& row, Twist& y, double size, double tolerance) noexcept;
+  static void look(Rows rows, const Twist& y) noexcept;
+  static void take_seen_states(Rows rows) noexcept;
+  // Precondition: rows have been looked at, at y.
   static bool newton_step(Rows rows, Twist& y) noexcept;
   bool newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
   bool damped_newton(Rows rows, Twist& y, double size, int most_iterations) noexcept;
