@@ -222,10 +222,11 @@ void RigidWorld::look_at_pairs(const ToolPose& pose, double within_m) noexcept {
   for (std::size_t i = 0; i < moving_.size(); ++i) {
     moving_[i].tool = seen_from(static_cast<std::uint16_t>(shared_->first_moving + i), at_W);
   }
-  // A foot may lie beside a feature by as much.
-  const bool all = within_m == kEverywhere_m;
-  const double near_m =
-      all ? kEverywhere_m : motion(pose, gathered_at_) + within_m + std::max(beside_, over_m_) + kFront_m;
+  // What the tool is behind, having come through another feature, is no deeper than it has come since it was outside.
+  // And a foot may lie beside a feature.
+  const double near_m = within_m == kEverywhere_m ? kEverywhere_m
+                                                  : motion(pose, gathered_at_) + motion(pose, from_) + within_m +
+                                                        std::max(beside_, over_m_) + kFront_m;
   for (std::size_t i = first_pair(); i < pair_count_; ++i) {
     const Moving* on = i < still_count_ ? nullptr : &moving(pairs_[i].entry);
     if (on != nullptr && !on->close) continue;

@@ -122,10 +122,11 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
 }
 
 // Where a mesh bends both ways, as at a valley's end, a corner of the tool may be behind faces and have its foot on
-// none of them: nothing then holds it, and it would go in, though all else rests where it did. A tool that went in goes
-// back to where it was.
+// none of them: nothing then holds it, and it would go in, though all else rests where it did. And among solids a pose
+// of the iteration may have left all that pressed in the one before, over an edge, and p̂ is in there. A tool that went
+// in goes back to where it was.
 bool RigidWorld::went_in(const ToolPose& q_old) noexcept {
-  if (!shared_->dense) return false;
+  if (!may_be_in()) return false;
   if (something_comes()) let_go(1.0);  // all the way, though the tool's parts may have ended before
   if (!stands_in(q_)) return false;
   q_ = something_comes() ? out_of_its_way(q_old) : q_old;

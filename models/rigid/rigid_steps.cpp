@@ -83,7 +83,9 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
     const double still_m = shared_->bends && !roughly && last < kNear_m ? rounding : 0.0;
+    const bool pressed = k > 0 && pressed_count_ > 0;
     const bool solved = solve_linear(q, e, q_old, rough, still_m, delta);
+    let_loose_ = let_loose_ || (pressed && linear_count_ == 0);
     over_m_ = beside_m;
     if (!delta.allFinite() || (!solved && collected_) || overflow_) break;
     const double size = size_m(delta);
@@ -129,6 +131,7 @@ void RigidWorld::share_out(bool last) noexcept {
 
 bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
   const bool comes = something_comes();
+  let_loose_ = false;
   if (comes && parts > 1) return in_strides(p_hat, q_old, far, parts, q);
   int left_out = 0;  // the parts just before this one
   ToolPose reached = q_old;
@@ -232,7 +235,7 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     without_friction_ = true;
     const ToolPose reached = q_;
     // The iteration may have gone by far in a part: in the dent of a mesh past a face that holds only over itself.
-    fine = in_parts(goal, q, to_goal, parts, q_) && !(shared_->dense && stands_in(q_));
+    fine = in_parts(goal, q, to_goal, parts, q_) && !(may_be_in() && stands_in(q_));
     without_friction_ = false;
     if (!fine) q_ = reached;
   }

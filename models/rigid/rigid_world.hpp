@@ -5,12 +5,13 @@
 //    far.
 // 2. At a pose q_i each pair has a gap, a normal and a material point (rigid_gaps.cpp, rigid_deeper.cpp,
 //    rigid_shapes/touch.hpp). Linearised there, those that press or would be passed make a local problem
-//    (rigid_linear.cpp, contact_problem.hpp); its solution is the next pose. Gaps and normals are taken again until nothing moves: a fixed point is exact, since at δ = 0
-//    nothing is linearised. It converges by the ratio of the step's penetration to the radius of curvature, a
-//    thousandth or less. Where surfaces conform (a peg in its hole) that radius is their clearance, and the ratio far
-//    above one: there the gaps' curvature goes into the problem as well (rigid_bends.cpp), which makes this Newton's
-//    method.
-// 3. On which side of a face or an edge the tool is, is what it was at q(k−1) (rigid_sides.cpp). A long step is taken in
+//    (rigid_linear.cpp, contact_problem.hpp); its solution is the next pose. Gaps and normals are taken again until
+//    nothing moves: a fixed point is exact, since at δ = 0 nothing is linearised. It converges by the ratio of the
+//    step's penetration to the radius of curvature, a thousandth or less. Where surfaces conform (a peg in its hole)
+//    that radius is their clearance, and the ratio far above one: there the gaps' curvature goes into the problem as
+//    well (rigid_bends.cpp), which makes this Newton's method.
+// 3. On which side of a face or an edge the tool is, is what it was at q(k−1) (rigid_sides.cpp). A long step is taken
+// in
 //    parts (rigid_steps.cpp), on the
 //    way from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from
 //    q(k−1). A solution in which the contacts did work on the tool is on a side to which it didn't come: then the parts
@@ -344,6 +345,7 @@ class RigidWorld final : public PoseAlgorithm {
   void report(const ToolPose& q_old) noexcept;
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
   bool went_in(const ToolPose& q_old) noexcept;
+  [[nodiscard]] bool may_be_in() const noexcept { return shared_->dense || let_loose_; }
   [[nodiscard]] ToolPose out_of_its_way(const ToolPose& q_old) const noexcept;
   [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
   [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
@@ -400,6 +402,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool without_friction_ = false;  // in the present attempt
   double behind_m_ = kFront_m;     // so far behind a feature of a cylinder may be what it holds in a part of the step
   bool lies_along_ = false;        // a side along another, pressing in the last solution
+  bool let_loose_ = false;         // a pose of the iteration left all that pressed before it, in some part of the step
   bool held_ = false;              // the last local problem by the forces of the one before
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
   double over_m_ = beside_m;       // and how far beyond a valley or an edge's end, of what pressed in the last solution

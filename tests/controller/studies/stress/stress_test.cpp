@@ -211,5 +211,9 @@ TEST(Stress, ARunIsTheSameAgainByItsSeed) {
   EXPECT_EQ(tools.run(3, options), tools.run(3, options));
 }
 
+// Step 14: in the smaller parts of a step of 7 mm, a pose of the iteration lost the edge that held the tool, and the
+// next one the corner that came instead. Nothing held it any more, and it went on to p̂, 0.57 mm in a box.
+TEST(Stress, AToolThatAPoseOfTheIterationLetsLooseStaysOutsideOfBoxes) { clean_run(5510004007522600); }
+
 }  // namespace
 }  // namespace proxarm::studies
