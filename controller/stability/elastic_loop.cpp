@@ -61,8 +61,8 @@ constexpr double ringing = 0.03, rigid_Hz = 300.0;
 }  // namespace
 
 namespace {
-// Of a drive's loops, by their speeds.
-constexpr double place_share = 0.25, integral_share = 0.1;
+// Of a drive's loops, by their speeds: ω_v/(2π f), ω_p/ω_v, ω_i/ω_v.
+constexpr double velocity_share = 2.0, place_share = 0.25, integral_share = 0.1;
 
 void add_drives(const description::Cell& cell, ElasticArm& arm) {
   constexpr double pi = std::numbers::pi, least = 0.02, none_kg_m2 = 1e6;
@@ -71,7 +71,7 @@ void add_drives(const description::Cell& cell, ElasticArm& arm) {
   for (Index i = 0; i < rotor.size(); ++i) {
     const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(i)];
     rotor[i] = drive.rotor_inertia_kg_m2 > 0.0 ? drive.rotor_inertia_kg_m2 : none_kg_m2;
-    omega[i] = 2.0 * 2.0 * pi * drive.position_bandwidth_Hz;
+    omega[i] = velocity_share * 2.0 * pi * drive.position_bandwidth_Hz;
     yields = std::max(yields, arm.stiffness[i] / (rotor[i] * (place_share + integral_share) * omega[i] * omega[i]));
   }
   if (yields < least) return;
@@ -205,16 +205,17 @@ std::vector<models::JointVector> led_poses(const models::Arm& arm, const std::ve
 }
 
 // The indices of the state at a period's beginning: the plant's [φ, φ̇, θ], the last two setpoints, proxies, the
-// filter's x_f and ẋ_f, and the forces that were read.
+// filter's x_f and ẋ_f, the forces that were read, and the drives' [δ, δ̇, ∫δ] and [θ̇, f].
 struct ElasticLoop::State {
-  Index n, d, ages, kept, drives;
+  Index n, d, ages, kept, drives, forward;
   [[nodiscard]] Index plant() const { return 0; }
   [[nodiscard]] Index sent() const { return 3 * n; }
   [[nodiscard]] Index proxies() const { return 5 * n; }
   [[nodiscard]] Index filter() const { return 5 * n + kept * d; }
   [[nodiscard]] Index forces() const { return 5 * n + (kept + 2) * d; }
   [[nodiscard]] Index drive() const { return forces() + d * ages; }
-  [[nodiscard]] Index size() const { return drive() + drives; }
+  [[nodiscard]] Index following() const { return drive() + drives; }
+  [[nodiscard]] Index size() const { return following() + forward; }
 };
 
 namespace {
@@ -235,12 +236,14 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
       spring_(loop.spring_N_per_m),
       horizon_s_(loop.horizon_s),
       time_constant_s_(loop.drive_time_constant_s),
+      feeds_forward_(loop.feed_forward && time_constant_s_ > 0.0),
       force_age_periods_(std::max(0.0, (loop.delay_s - 2.0 * arm.filter_s) / loop.period_s - 1.0)),
       order_(loop.order),
       joints_(arm.stiffness.size()),
       dimensions_(arm.jacobian.rows()),
       proxies_(loop.order == 2 ? 5 : 4),
-      drives_(3 * arm.rotor_kg_m2.size()) {
+      drives_(3 * arm.rotor_kg_m2.size()),
+      forward_(feeds_forward_ ? 2 * joints_ : 0) {
   // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
   // for Störmer's correction at order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
@@ -253,20 +256,30 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
   force_.middleCols(joints_, joints_) -= grip.damping * J;
 }
 
-// ż = A z for z = [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ] with ṙ constant. Leaves the rows of φ̈ in force_.
+// ż = A z for z = [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ, θ̇, f, ḟ] with ṙ and ḟ constant. Leaves the rows of φ̈ in force_.
 void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
   const MatrixXd mass = arm_.mass + J.transpose() * grip.hand_mass * J;
   MatrixXd k = (gear_stiffness_ratio * arm_.stiffness).asDiagonal(), d = arm_.damping.asDiagonal();
-  MatrixXd A = MatrixXd::Zero(5 * n + drives_, 5 * n + drives_);
+  const Index states = plant_size();
+  MatrixXd A = MatrixXd::Zero(states, states);
   const auto block = [&](Index row, Index column) { return A.block(row * n, column * n, n, n); };
   const MatrixXd one = MatrixXd::Identity(n, n);
   block(0, 1) = one;
   block(3, 4) = one;
   // θ̇ = (r − θ)/τ. Without a lag, θ is r and has its speed.
-  const bool lags = time_constant_s_ > 0.0;
-  if (lags) {
+  if (feeds_forward_) {
+    const double omega_v = velocity_share / time_constant_s_;
+    const Index at = 5 * n + drives_;
+    const auto follow = [&](Index row, Index column) { return A.block(row, column, n, n); };
+    follow(2 * n, at) = one;
+    follow(at, 2 * n) = -place_share * omega_v * omega_v * one;
+    follow(at, 3 * n) = place_share * omega_v * omega_v * one;
+    follow(at, at) = -omega_v * one;
+    follow(at, at + n) = omega_v * one;
+    follow(at, at + 2 * n) = follow(at + n, at + 2 * n) = one;
+  } else if (time_constant_s_ > 0.0) {
     block(2, 2) = -one / time_constant_s_;
     block(2, 3) = one / time_constant_s_;
   } else {
@@ -314,23 +327,31 @@ ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixX
   return step;
 }
 
-Index ElasticLoop::size() const noexcept { return State{joints_, dimensions_, ages_, proxies_, drives_}.size(); }
+Index ElasticLoop::size() const noexcept {
+  return State{joints_, dimensions_, ages_, proxies_, drives_, forward_}.size();
+}
+
+Index ElasticLoop::plant_size() const noexcept { return 5 * joints_ + drives_ + (feeds_forward_ ? 3 * joints_ : 0); }
 
 // One period, from just before one reading of the sensor to just before the next.
 void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& next) const {
   const Index n = joints_, d = dimensions_;
-  const State at{n, d, ages_, proxies_, drives_};
+  const State at{n, d, ages_, proxies_, drives_, forward_};
   const double T = period_s_;
   const auto old_sent = state.segment(at.sent() + n, n), last_sent = state.segment(at.sent(), n);
 
   // The present force follows from the slope of the setpoints in the period before, at whose end θ and r meet.
-  VectorXd z = VectorXd::Zero(5 * n + drives_);
+  VectorXd z = VectorXd::Zero(plant_size());
   z.head(3 * n) = state.head(3 * n);
   if (!(time_constant_s_ > 0.0))
     z.segment(2 * n, n) = old_sent;  // otherwise a difference between θ and r would never decay
   z.segment(3 * n, n) = old_sent;
   z.segment(4 * n, n) = (last_sent - old_sent) / T;
-  z.tail(drives_) = state.segment(at.drive(), drives_);
+  z.segment(5 * n, drives_) = state.segment(at.drive(), drives_);
+  if (feeds_forward_) {
+    z.segment(5 * n + drives_, forward_) = state.segment(at.following(), forward_);
+    z.tail(n) = (z.segment(4 * n, n) - state.tail(n)) / T;
+  }
   const Place h_now = force_ * z;
   const auto force = [&](Index age) -> Place {
     return age == 0 ? h_now : Place(state.segment(at.forces() + d * (age - 1), d));
@@ -359,7 +380,8 @@ void ElasticLoop::advance(const VectorXd& state, const Step& step, VectorXd& nex
 
   const VectorXd then = plant_ * z;
   next.head(3 * n) = then.head(3 * n);
-  next.segment(at.drive(), drives_) = then.tail(drives_);
+  next.segment(at.drive(), drives_) = then.segment(5 * n, drives_);
+  next.segment(at.following(), forward_) = then.segment(5 * n + drives_, forward_);
   next.segment(at.sent(), n) = arm_.joints_per_m * x + twist_ * acceleration;
   next.segment(at.sent() + n, n) = last_sent;
   next.segment(at.proxies(), d) = q;

@@ -3,7 +3,7 @@
 // in the default cell, the inertia of a tool that is led and turned at once (pose_loop.hpp) by far more.
 //
 // A place is judged where the tool is 50 mm or more from all that were judged before with the same proxy, the spacing
-// of led_poses(), or turned from them by 0.1 rad or more. Some milliseconds then, of a tool that turns some twenty,
+// of led_poses(), or turned from them by 0.1 rad or more. Some milliseconds then, of a tool that turns some forty,
 // half a second where it isn't stable; else a comparison; never in the cycle. While mass, inertia or damping change
 // from one cycle to the next, nothing is judged.
 #pragma once

@@ -52,6 +52,17 @@ std::vector<MatrixXd> all_forbidden(const std::vector<TouchedPlace>& touched) {
   return all;
 }
 
+// How a drive follows isn't known: as a lag or by feed-forward. Without a lag there is but the one.
+std::vector<ElasticLoop> with_both_drives(const ElasticArm& arm, const PoseLoopModel& model) {
+  const Grip grip = grip_of(model);
+  LoopModel loop = model.loop;
+  loop.feed_forward = false;
+  std::vector<ElasticLoop> loops{{arm, grip, loop}};
+  loop.feed_forward = true;
+  if (loop.drive_time_constant_s > 0.0) loops.emplace_back(arm, grip, loop);
+  return loops;
+}
+
 }  // namespace
 
 Mat6 behind_sensor_W(const description::Cell& cell, const models::Mat3& R_WT) {
@@ -77,7 +88,7 @@ PoseLoop pose_loop_at(const models::Arm& arm, const models::JointVector& pose_ra
 }
 
 PoseLoop::PoseLoop(const ElasticArm& arm, const PoseLoopModel& model)
-    : loop_(arm, grip_of(model), model.loop),
+    : loops_(with_both_drives(arm, model)),
       behind_(model.behind_sensor_W),
       own_{Mat6::Zero(), of_both(model.loop.damping_Ns_per_m, model.turning_damping_Nms_per_rad),
            of_both(model.loop.spring_N_per_m, model.turning_spring_Nm_per_rad)},
@@ -90,36 +101,59 @@ ProxyMatrices PoseLoop::proxy(double mass_kg, double inertia_kg_m2, double margi
   return proxy;
 }
 
-bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
+bool PoseLoop::stable(const ElasticLoop& loop, const MatrixXd& N, double mass_kg, double inertia_kg_m2) const {
   const ProxyMatrices lighter = proxy(mass_kg, inertia_kg_m2, elastic_margin);
   // Else what hangs behind the sensor is felt as more than was asked for.
   if (Eigen::LLT<MatrixXd>(lighter.mass).info() != Eigen::Success) return false;
-  return std::all_of(forbidden_.begin(), forbidden_.end(),
-                     [&](const MatrixXd& N) { return loop_.spectral_radius(lighter, N) < 1.0; });
+  return loop.spectral_radius(lighter, N) < 1.0;
 }
 
+bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
+  return std::all_of(loops_.begin(), loops_.end(), [&](const ElasticLoop& loop) {
+    return std::all_of(forbidden_.begin(), forbidden_.end(),
+                       [&](const MatrixXd& N) { return stable(loop, N, mass_kg, inertia_kg_m2); });
+  });
+}
+
+// Where a contact is stable with what the others ask for, it isn't searched: most aren't.
 std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
   constexpr double least_kg_m2 = 1e-6, close_enough = 1.005;
-  const auto holds = [&](double inertia_kg_m2) { return stable(mass_kg, inertia_kg_m2); };
-  return smallest_from_above(holds, largest_kg_m2, least_kg_m2, close_enough);
-}
-
-std::optional<Swing> PoseLoop::least_damped_swing(double mass_kg, double inertia_kg_m2) const {
-  constexpr double pi = std::numbers::pi, slowest_Hz = 3.0;
-  const ProxyMatrices as_it_is = proxy(mass_kg, inertia_kg_m2, 1.0);
-  std::optional<Swing> ringing;
-  double least_ratio = 1.0;
-  for (const MatrixXd& N : forbidden_) {
-    for (const std::complex<double>& z : loop_.eigenvalues(as_it_is, N)) {
-      if (!(std::abs(z) < 1.0)) return std::nullopt;
-      const std::complex<double> s = std::log(z) / period_s_;
-      const double frequency_Hz = std::abs(s.imag()) / (2.0 * pi), ratio = -s.real() / std::abs(s);
-      if (frequency_Hz < slowest_Hz || !(ratio < least_ratio)) continue;
-      least_ratio = ratio;
-      ringing = Swing{frequency_Hz, std::log(0.1) / s.real()};
+  double smallest = 0.0;
+  for (const ElasticLoop& loop : loops_) {
+    for (const MatrixXd& N : forbidden_) {
+      const auto holds = [&](double inertia_kg_m2) { return stable(loop, N, mass_kg, inertia_kg_m2); };
+      if (smallest > 0.0 && holds(smallest) && holds(largest_kg_m2)) continue;
+      const auto here = smallest_from_above(holds, largest_kg_m2, least_kg_m2, close_enough);
+      if (!here) return std::nullopt;
+      smallest = std::max(smallest, *here);
     }
   }
-  return ringing;
+  return smallest;
+}
+
+namespace {
+// Whether a mode goes to and fro: half a period later, on the other side, more than a tenth of it is left. One that
+// doesn't has fallen to the tenth, which is told, before it swings back.
+bool swings(const std::complex<double>& s) { return s.real() * std::numbers::pi > std::log(0.1) * std::abs(s.imag()); }
+}  // namespace
+
+std::optional<Swing> PoseLoop::slowest_swing(double mass_kg, double inertia_kg_m2) const {
+  constexpr double pi = std::numbers::pi, slowest_Hz = 3.0;
+  const ProxyMatrices as_it_is = proxy(mass_kg, inertia_kg_m2, 1.0);
+  std::optional<Swing> slowest;
+  for (const ElasticLoop& loop : loops_) {
+    for (const MatrixXd& N : forbidden_) {
+      for (const std::complex<double>& z : loop.eigenvalues(as_it_is, N)) {
+        if (!(std::abs(z) < 1.0)) return std::nullopt;
+        if (z == 0.0) continue;  // gone after a period
+        const std::complex<double> s = std::log(z) / period_s_;
+        const double frequency_Hz = std::abs(s.imag()) / (2.0 * pi), tenth_s = std::log(0.1) / s.real();
+        if (frequency_Hz < slowest_Hz || !swings(s) || (slowest && tenth_s <= slowest->tenth_s)) continue;
+        slowest = Swing{frequency_Hz, tenth_s};
+      }
+    }
+  }
+  return slowest;
 }
 
 void refuse_unstable_pose(double mass_kg, double inertia_kg_m2, const std::optional<double>& smallest) {

@@ -5,7 +5,7 @@
 
 namespace proxarm::controller {
 
-// A mode that swings faster than hands move by will (3 Hz), and how long it takes at most to fall to a tenth: friction
+// A mode that swings, faster than hands move by will (3 Hz), and how long it takes at most to fall to a tenth: friction
 // in the drives, which isn't modelled, lets it fall sooner (the default cell's, with 2 kg: in a sixth to a half of
 // that).
 struct Swing {

@@ -116,13 +116,30 @@ class Turning(ProgramTest):
         self.assertIn("the smallest that is stable", outcome.err)
         smallest = outcome.err.split("at least ")[1].split(" kg m²")[0]
         self.assertGreater(float(smallest), 0.002)
-        # It isn't all: at what is said the steel swings by 2.5 mm, against joints' limits, which the place by the motors
-        # didn't show (this test took it for calm). A seventh more is calm.
-        calm = self.summary(*few, "--inertia", f"{1.15 * float(smallest):.5f}", "--duration", "4s", "--record", "calm")
+        # 0.0031 kg m² were said, by drives that lag: with the arm's, which feed forward, a mode of the wrist grew at 82 Hz
+        # until joints' limits held it, and the steel swung by 2.5 mm. The place by the motors didn't show it.
+        calm = self.summary_of_unstable_places(*few, "--inertia", smallest, "--duration", "4s", "--record", "calm")
         self.assertFalse(calm["oscillation"] and calm["oscillation"]["lasts"])
-        speeds = [math.dist(*([float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz"] for row in pair)) / PERIOD_S
-                  for pair in zip(self.rows("calm"), self.rows("calm")[1:])]
-        self.assertLess(max(speeds[500:]), 0.02)  # nobody leads the place; a swing of 2.5 mm at 13 Hz has 0.2 m/s
+        self.assertLess(self.fastest("calm"), 0.02)  # nobody leads the place; a swing of 2.5 mm at 13 Hz has 0.2 m/s
+        # Nor is much more said than it takes.
+        swings = self.call("run", "--json", *few, "--inertia", f"{0.88 * float(smallest):.5f}", "--force-unstable",
+                           "--duration", "4s", "--record", "swings")
+        self.assertTrue(swings.summary["oscillation"]["lasts"])
+        self.assertGreater(self.fastest("swings"), 0.1)
+
+    def summary_of_unstable_places(self, *arguments):
+        """Of a hand whose way makes the arm ask for a little more than at the start, which is told and no more."""
+        outcome = self.call("run", "--json", *arguments)
+        self.assertEqual(outcome.status, 0, outcome.err)
+        self.assertTrue(all("isn't stable with this hand, led and turned at once; it takes" in line
+                            for line in outcome.err.splitlines()), outcome.err)
+        return outcome.summary
+
+    def fastest(self, folder):
+        """Of the steel's point that is rendered, from half a second on."""
+        rows = self.rows(folder)[500:]
+        return max(math.dist(*([float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz"] for row in pair)) / PERIOD_S
+                   for pair in zip(rows, rows[1:]))
 
     def test_a_tool_that_is_led_and_turned_at_once_is_judged_so(self):
         """Each for itself, 2 kg and 0.01 kg m² are stable; on elastic gears together they swing, and a box that was
@@ -182,24 +199,39 @@ class Turning(ProgramTest):
                    for begin in range(0, len(ends) - length, 200) for hertz in range(10, 21, 2) for axis in range(3))
 
     def test_a_swing_falls_within_the_time_that_is_told(self):
-        """By the steel's way in the record, against the session's own word of the swing that is damped least."""
-        jerk = self.written("jerk.yaml", hand().split("multisine")[0].replace("rad: 2\n", "rad: 0.5\n") +
-                            "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0], turn_rad: [0, 0, 0]}\n"
-                            "  - {time_s: 0.55, offset_m: [0, 0, 0], turn_rad: [0, 0.2, 0]}\n")
-        told = self.summary(*FREE, "--hand", jerk, "--mass", "2", "--inertia", "0.05", "--duration", "3s", "--passivity",
-                            "off", "--record", "swing")["expected_swing"]
-        rows = self.rows("swing")
+        """By the steel's way in the record, against the session's own word of the swing that takes longest. With 4 kg it
+        is the hand's turning, at 3 Hz; the one at 17 Hz that was told has less damping, and is gone in 0.6 s."""
+        def places(rows):
+            return [[float(row[f"true_tool_W_{axis}_m"]) for axis in "xyz"] for row in rows]
 
-        def swing(begin):  # over 0.3 s, with a window that leaves out the slow way back
-            length = 300
-            return math.sqrt(sum(abs(sum(float(rows[begin + k][f"true_tool_W_{axis}_m"]) *
+        def turns(rows):  # apart from the places, which a slower swing of the hand moves
+            poses = [[float(row[f"true_tool_W_q{part}"]) for part in "xyzw"] for row in rows]
+            return [rotation_vector(pose, poses[-1]) for pose in poses]
+
+        for mass, turn, seen, least_Hz, most_Hz in ((2, [0, 0.2, 0], places, 10, 20), (4, [0.1, 0.1, 0.1], turns, 3, 5)):
+            jerk = self.written("jerk.yaml", hand().split("multisine")[0].replace("rad: 2\n", "rad: 0.5\n") +
+                                "waypoints:\n  - {time_s: 0.5, offset_m: [0, 0, 0], turn_rad: [0, 0, 0]}\n"
+                                f"  - {{time_s: 0.55, offset_m: [0, 0, 0], turn_rad: {turn}}}\n")
+            told = self.summary(*FREE, "--hand", jerk, "--mass", mass, "--inertia", "0.05", "--duration", "3s",
+                                "--passivity", "off", "--record", f"swing-{mass}")["expected_swing"]
+            self.assertGreater(told["frequency_Hz"], least_Hz)
+            self.assertLess(told["frequency_Hz"], most_Hz)
+            falls_s = self.tenth_s(seen(self.rows(f"swing-{mass}")), told["frequency_Hz"])
+            print(f"{mass} kg: a tenth within {told['tenth_s']:.2f} s told, {falls_s:.2f} s seen")
+            self.assertLess(falls_s, told["tenth_s"])
+            self.assertGreater(falls_s, 0.25 * told["tenth_s"])
+
+    def tenth_s(self, way, frequency_Hz):
+        """How long a swing of this frequency takes to fall to a tenth, from 0.75 to 1.75 s."""
+        length = 400  # a window that leaves out the slow way back
+
+        def swing(begin):
+            return math.sqrt(sum(abs(sum((way[begin + k][axis] - way[begin][axis]) *
                                          math.sin(math.pi * k / length) ** 4 *
-                                         cmath.exp(-2j * math.pi * told["frequency_Hz"] * PERIOD_S * k)
-                                         for k in range(length))) ** 2 for axis in "xyz"))
+                                         cmath.exp(-2j * math.pi * frequency_Hz * PERIOD_S * k)
+                                         for k in range(length))) ** 2 for axis in range(3)))
 
-        fallen = math.log10(swing(750) / swing(1750))
-        self.assertLess(1.0 / fallen, told["tenth_s"])
-        self.assertGreater(1.0 / fallen, 0.25 * told["tenth_s"])
+        return 1.0 / math.log10(swing(750) / swing(1750))
 
     def test_changes_while_it_turns_make_no_bump(self):
         """The angular velocity goes on: no step of the proxy's rotation differs from the one before by more than the

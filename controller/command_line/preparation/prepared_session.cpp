@@ -382,10 +382,10 @@ std::optional<controller::PoseLoop> pose_loop_at_start(const PreparedSession& se
 }
 }  // namespace
 
-std::optional<controller::Swing> least_damped_swing(const PreparedSession& session) {
+std::optional<controller::Swing> slowest_swing(const PreparedSession& session) {
   const std::optional<controller::PoseLoop> loop = pose_loop_at_start(session);
   if (!loop) return {};
-  return loop->least_damped_swing(session.settings.mass_kg, felt_inertia_kg_m2(session));
+  return loop->slowest_swing(session.settings.mass_kg, felt_inertia_kg_m2(session));
 }
 
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options) {

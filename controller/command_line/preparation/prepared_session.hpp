@@ -39,8 +39,9 @@ controller::LoopModel turning_loop(const PreparedSession& session);
 // Both at once, as pose_loop_at() takes it, free and where the tool touches with its ends. Absent: the hand doesn't
 // turn the tool.
 std::optional<controller::PoseLoopModel> turned_model(const PreparedSession& session);
-// The swing of that loop in the start pose that is damped least. Absent: the tool isn't turned, or it isn't stable.
-std::optional<controller::Swing> least_damped_swing(const PreparedSession& session);
+// The swing of that loop in the start pose that takes longest to die away. Absent: the tool isn't turned, or it isn't
+// stable.
+std::optional<controller::Swing> slowest_swing(const PreparedSession& session);
 // What the hand feels, the tool behind the sensor included. Precondition: the orientation is free.
 double felt_inertia_kg_m2(const PreparedSession& session);
 

@@ -79,7 +79,7 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
     poses_ = std::make_unique<PoseWatch>(controller::PassedPoses(deriver_.arm(), session.cell, hand_model(session),
                                                                  session.loop, turned_model(session)));
   }
-  swing_ = least_damped_swing(session);
+  swing_ = slowest_swing(session);
   const bool wanted = !options.json || !options.plot_file.empty() || !options.record_dir.empty();
   if (options.plot && wanted) plot_ = std::make_unique<controller::PlotBuilder>(plot_title(session));
   if (options.record_dir.empty()) return;
