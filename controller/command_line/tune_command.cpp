@@ -13,6 +13,7 @@
 #include "controller/command_line/trials/inertia_advice.hpp"
 #include "controller/command_line/trials/mass_advice.hpp"
 #include "controller/command_line/trials/trial.hpp"
+#include "controller/report/progress.hpp"
 #include "controller/report/summary.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -99,18 +100,40 @@ std::optional<double> timestep_for(double mass_kg, const HandModel& hand, const 
   return largest;
 }
 
+// What is being looked for, on a terminal: it takes some seconds, a dozen with an inertia. Short, for a line of 80.
+class Stages {
+ public:
+  // Until the next one, or until something is printed.
+  void begin(const std::string& what) {
+    done();
+    progress_.update(begun_++, what);
+  }
+  void done() { progress_.clear(); }
+
+ private:
+  static constexpr int most = 13;  // of all that may come
+  controller::Progress progress_{most, stderr, "steps"};
+  int begun_ = 0;
+};
+
+std::string in_poses(const std::string& what, std::size_t poses) {
+  return what + ", " + std::to_string(poses) + (poses == 1 ? " pose" : " poses");
+}
+std::string trying(const std::string& what) { return "trying " + what; }
+
 // What the advice is asked for: the hand as described, and the loop in the poses that it leads to.
 struct Tuned {
   const PreparedSession& session;
   HandModel hand;
   LoopModel loop;
+  Stages& stages;
 };
 
-Tuned tuned(const PreparedSession& session) {
+Tuned tuned(const PreparedSession& session, Stages& stages) {
   const description::Grip grip = description::tightest_grip(session.hand);
   LoopModel loop = led_loop(session);
   loop.horizon_s = 0.0;
-  return {session, {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg}, loop};
+  return {session, {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg}, loop, stages};
 }
 
 void print_delays(const Tuned& of) {
@@ -128,11 +151,16 @@ void print_delays(const Tuned& of) {
 void print_mass(const Tuned& of, const std::optional<double>& smallest) {
   LoopModel start = of.session.loop;  // in its pose
   start.horizon_s = 0.0;
+  const std::string at_start = mass_text(smallest_felt(of.hand, start));
+  of.stages.done();
   std::printf(
       "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
-      mass_text(smallest).c_str(), of.loop.handle_mass_kg, mass_text(smallest_felt(of.hand, start)).c_str());
+      mass_text(smallest).c_str(), of.loop.handle_mass_kg, at_start.c_str());
+  of.stages.begin(in_poses("mass with margins", of.loop.arms->size()));
   const auto safe = smallest_with_margins(of.hand, of.loop);
+  if (safe) of.stages.begin(trying(mass_text(safe)));
   const TriedAdvice tried = safe ? tried_mass(of.session, rounded_up(*safe)) : TriedAdvice{};
+  of.stages.done();
   if (safe && !tried.steady) {
     std::printf("advice: none: no mass from %s on that was tried was steady\n", mass_text(safe).c_str());
   } else {
@@ -151,8 +179,10 @@ std::string inertia_text(const std::optional<double>& inertia_kg_m2) {
 }
 
 // `also`: another option that it takes.
-void print_tried_inertia(const PreparedSession& session, double least_kg_m2, const std::string& also) {
+void print_tried_inertia(const PreparedSession& session, double least_kg_m2, const std::string& also, Stages& stages) {
+  stages.begin(trying(inertia_text(least_kg_m2)));
   const TriedAdvice tried = tried_inertia(session, rounded_up(least_kg_m2));
+  stages.done();
   const double mass_kg = session.settings.mass_kg;
   if (tried.steady) {
     std::printf("advice: with %.3g kg --inertia %s%s, with the same margins\n", mass_kg,
@@ -166,7 +196,8 @@ void print_tried_inertia(const PreparedSession& session, double least_kg_m2, con
 
 // The least turning damping, of a few, with which some inertia is stable with the margins. A hand that is stiffer than
 // it is damped, K L > D, needs it at any inertia.
-void print_turning_damping(PreparedSession session) {
+void print_turning_damping(PreparedSession session, Stages& stages) {
+  stages.begin("inertia with more damping");
   const double own = session.settings.rotational_damping_Nms_per_rad;
   for (const double damping : {0.1, 0.2, 0.5, 1.0, 2.0, 5.0}) {
     if (!(damping > own)) continue;
@@ -175,32 +206,38 @@ void print_turning_damping(PreparedSession session) {
     if (!least) continue;
     std::array<char, 60> also{};
     std::snprintf(also.data(), also.size(), " and --turning-damping %.2g Nms/rad", damping);
-    return print_tried_inertia(session, *least, also.data());
+    return print_tried_inertia(session, *least, also.data(), stages);
   }
+  stages.done();
   std::printf("advice: a larger mass; with %.3g kg no inertia is stable with these margins\n",
               session.settings.mass_kg);
 }
 
 // Of a tool that is led and turned at once, with the mass that was asked for.
-void print_inertia(const PreparedSession& session) {
+void print_inertia(const Tuned& of) {
+  const PreparedSession& session = of.session;
   if (session.settings.orientation == controller::OrientationMode::held) return;
   if (!turned_model(session)) {
     std::printf("inertia: this hand doesn't turn the tool (turning_stiffness_Nm_per_rad in its file)\n");
     return;
   }
+  of.stages.begin(in_poses("inertia with margins", of.loop.arms->size()));
   const SmallestInertias smallest = smallest_inertias(session);
+  of.stages.done();
   std::printf(
       "smallest stable inertia with %.3g kg: %s felt, handle's %.2g kg m² included; %s in the start pose alone, by "
       "which `run` refuses\n",
       session.settings.mass_kg, inertia_text(smallest.everywhere).c_str(), turning_loop(session).handle_mass_kg,
       inertia_text(smallest.at_start).c_str());
-  if (smallest.with_margins) return print_tried_inertia(session, *smallest.with_margins, "");
-  print_turning_damping(session);
+  if (smallest.with_margins) return print_tried_inertia(session, *smallest.with_margins, "", of.stages);
+  print_turning_damping(session, of.stages);
 }
 
 void print_damping(const Tuned& of) {
   const LoopModel& loop = of.loop;
+  of.stages.begin("damping with margins");
   const auto damping = damping_needed(of.hand, loop);
+  of.stages.done();
   if (!damping) {
     std::printf("damping: not even %.3g Ns/m gives it these margins: shorten the delay\n",
                 std::max(500.0, loop.damping_Ns_per_m));
@@ -212,7 +249,11 @@ void print_damping(const Tuned& of) {
                 mass_text(least).c_str());
     PreparedSession with_damping = of.session;
     with_damping.settings.damping_Ns_per_m = *damping;
-    if (least) std::printf("  tried: %s\n", tried_mass(with_damping, rounded_up(*least)).text.c_str());
+    if (!least) return;
+    of.stages.begin(trying(mass_text(least)));
+    const TriedAdvice tried = tried_mass(with_damping, rounded_up(*least));
+    of.stages.done();
+    std::printf("  tried: %s\n", tried.text.c_str());
   } else {
     std::printf(
         "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
@@ -223,7 +264,9 @@ void print_damping(const Tuned& of) {
 
 // Returns what limits the smallest mass most, in words.
 std::string print_limits(const Tuned& of, const std::optional<double>& smallest) {
+  of.stages.begin(in_poses("what limits the mass", of.loop.arms->size()));
   const auto sorted = limits(of.session, of.loop, of.hand);
+  of.stages.done();
   constexpr double no_mass = 1e9, gain = 0.9;  // less than a tenth isn't worth naming
   const bool helps = sorted.front().mass_without.value_or(no_mass) < gain * smallest.value_or(0.5 * no_mass);
   const std::string limit = helps ? sorted.front().what : "none of these alone";
@@ -237,7 +280,10 @@ std::string print_limits(const Tuned& of, const std::optional<double>& smallest)
 
 void print_timestep(const Tuned& of, const RunOptions& options, const std::string& limit) {
   const double wanted = of.session.settings.mass_kg;
-  if (const auto timestep = timestep_for(wanted, of.hand, of.loop)) {
+  of.stages.begin("timestep with margins");
+  const auto timestep = timestep_for(wanted, of.hand, of.loop);
+  of.stages.done();
+  if (timestep) {
     const bool carried = is_carried(with_timestep(of.session, options, *timestep));
     std::printf("for %.3g kg with these margins: a timestep of at most %.4g ms%s\n", wanted, 1e3 * *timestep,
                 carried ? "" : ", which the cell's buses can't carry");
@@ -259,14 +305,21 @@ int tune_command(const RunOptions& options) {
   }
   require_usable_start(session);
   require_inertia_in_range(session);
-  const Tuned of = tuned(session);
-  const auto smallest = smallest_felt(of.hand, of.loop);
+  Stages stages;
+  stages.begin("poses of the hand");
+  const Tuned of = tuned(session, stages);
+  stages.done();
   print_delays(of);
+  stages.begin(in_poses("smallest mass", of.loop.arms->size()));
+  const auto smallest = smallest_felt(of.hand, of.loop);
   print_mass(of, smallest);
-  print_inertia(session);
+  print_inertia(of);
   print_damping(of);
-  std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n",
-              1e3 * longest_horizon_s(session), session.settings.mass_kg);
+  stages.begin("lookahead");
+  const double horizon_s = longest_horizon_s(session);
+  stages.done();
+  std::printf("lookahead: --lookahead auto sends the arm %.3g ms ahead of the proxy at %.3g kg\n", 1e3 * horizon_s,
+              session.settings.mass_kg);
   print_timestep(of, options, print_limits(of, smallest));
   return smallest ? 0 : 1;
 }

@@ -229,7 +229,7 @@ struct Script {
 
 struct TimedText {
   double time_s;
-  std::string text;
+  std::string text, time;  // time: as it was written
 };
 
 // "mass=3@4s", after four seconds of rendering, in the order of their times. Throws SetupError.
@@ -243,11 +243,24 @@ std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
                         .expected = "NAME=VALUE@TIME",
                         .advice = "such as mass=3@4s: after four seconds of rendering"});
     }
-    timed.push_back({description::parse_duration(text.substr(at + 1), "--set"), text.substr(0, at)});
+    const std::string time = text.substr(at + 1);
+    timed.push_back({description::parse_duration(time, "--set"), text.substr(0, at), time});
   }
   std::stable_sort(timed.begin(), timed.end(),
                    [](const TimedText& a, const TimedText& b) { return a.time_s < b.time_s; });
   return timed;
+}
+
+// What refuses a change may be about something else: more mass is asked for where a timestep is set. The message names
+// the line that it comes from, and that behind it.
+[[noreturn]] void refuse_scripted(const TimedText& change, const SetupError& error) {
+  description::SetupProblem problem = error.problem();
+  const std::string line = "--set " + change.text + "@" + change.time;
+  std::string about = problem.key;
+  about.erase(0, std::min(about.find_first_not_of('-'), about.size()));
+  const std::string own = change.text.substr(0, change.text.find('='));
+  problem.key = about.empty() || about == own || about == "set" ? line : line + ": " + about;
+  throw SetupError(problem);
 }
 
 Script script_of(const std::vector<std::string>& texts, const PreparedSession& session, const RunOptions& options) {
@@ -255,10 +268,14 @@ Script script_of(const std::vector<std::string>& texts, const PreparedSession& s
   Script script;
   for (const TimedText& change : timed_texts(texts)) {
     const std::int64_t rendered_ns = std::llround(1e9 * change.time_s);
-    if (LiveParameters::is_timestep(change.text)) {
-      script.timesteps.push_back({rendered_ns, parameters.take_timestep(change.text)});
-    } else {
-      script.changes.push_back({rendered_ns, parameters.take(change.text)});
+    try {
+      if (LiveParameters::is_timestep(change.text)) {
+        script.timesteps.push_back({rendered_ns, parameters.take_timestep(change.text)});
+      } else {
+        script.changes.push_back({rendered_ns, parameters.take(change.text)});
+      }
+    } catch (const SetupError& error) {
+      refuse_scripted(change, error);
     }
   }
   return script;
