@@ -130,10 +130,9 @@ struct Tuned {
 };
 
 Tuned tuned(const PreparedSession& session, Stages& stages) {
-  const description::Grip grip = description::tightest_grip(session.hand);
   LoopModel loop = led_loop(session);
   loop.horizon_s = 0.0;
-  return {session, {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg}, loop, stages};
+  return {session, hand_model(session, loop), loop, stages};
 }
 
 void print_delays(const Tuned& of) {

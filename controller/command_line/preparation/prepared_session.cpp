@@ -400,13 +400,49 @@ description::SetupProblem timestep_problem(const description::Cell& cell, const 
 // kilogram with a period of six seconds, far below all that oscillates, and D > K L at any delay L below a second.
 constexpr double loosest_N_per_m = 1.0, loosest_Ns_per_m = 1.0;
 
-controller::HandModel hand_model(const PreparedSession& session) {
-  const description::Grip grip = description::tightest_grip(session.hand);
-  if (grip.stiffness_N_per_m >= loosest_N_per_m) {
-    return {grip.stiffness_N_per_m, grip.damping_Ns_per_m, session.hand.mass_kg};
-  }
-  return {loosest_N_per_m, std::max(grip.damping_Ns_per_m, loosest_Ns_per_m), session.hand.mass_kg};
+namespace {
+controller::HandModel held_with(const description::Grip& grip, double mass_kg) {
+  if (grip.stiffness_N_per_m >= loosest_N_per_m) return {grip.stiffness_N_per_m, grip.damping_Ns_per_m, mass_kg};
+  return {loosest_N_per_m, std::max(grip.damping_Ns_per_m, loosest_Ns_per_m), mass_kg};
 }
+
+// Each once, as stiff as it varies to. One that neither holds nor damps has let go.
+std::vector<description::Grip> other_grips(const description::HandDescription& hand,
+                                           const description::Grip& tightest) {
+  std::vector<description::Grip> all{{0.0, hand.stiffness_N_per_m, hand.damping_Ns_per_m}}, others;
+  all.insert(all.end(), hand.grips.begin(), hand.grips.end());
+  for (description::Grip grip : all) {
+    grip.stiffness_N_per_m *= 1.0 + hand.variation.share;
+    grip.damping_Ns_per_m *= 1.0 + hand.variation.share;
+    const auto same = [&](const description::Grip& other) {
+      return other.stiffness_N_per_m == grip.stiffness_N_per_m && other.damping_Ns_per_m == grip.damping_Ns_per_m;
+    };
+    const bool holds = grip.stiffness_N_per_m >= loosest_N_per_m || grip.damping_Ns_per_m >= loosest_Ns_per_m;
+    if (holds && !same(tightest) && std::none_of(others.begin(), others.end(), same)) others.push_back(grip);
+  }
+  return others;
+}
+}  // namespace
+
+// A grip that is stable with what the others ask for isn't searched.
+controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop) {
+  const description::Grip tightest = description::tightest_grip(session.hand);
+  controller::HandModel worst = held_with(tightest, session.hand.mass_kg);
+  const std::vector<description::Grip> others = other_grips(session.hand, tightest);
+  if (session.impedance() || others.empty()) return worst;
+  loop.horizon_s = 0.0;
+  std::optional<double> least_kg = controller::smallest_stable_mass(worst, loop);
+  for (const description::Grip& grip : others) {
+    const controller::HandModel hand = held_with(grip, session.hand.mass_kg);
+    if (!least_kg) return worst;
+    if (controller::spectral_radius(hand, loop, *least_kg) < 1.0) continue;
+    least_kg = controller::smallest_stable_mass(hand, loop);
+    worst = hand;
+  }
+  return worst;
+}
+
+controller::HandModel hand_model(const PreparedSession& session) { return hand_model(session, session.loop); }
 
 std::vector<models::JointVector> led_poses(const PreparedSession& session) {
   std::vector<controller::Lead> leads;

@@ -30,7 +30,10 @@ struct PreparedSession {
   [[nodiscard]] bool impedance() const noexcept { return settings.scheme == controller::Scheme::impedance; }
 };
 
-// The hand at its tightest grip, as the stability check takes it.
+// The hand as the stability check takes it: at the one of its grips that asks for most mass in this loop, which needn't
+// be the stiffest: one that is nearly as stiff and damps little asks for more. Where no mass is stable with one, that.
+controller::HandModel hand_model(const PreparedSession& session, controller::LoopModel loop);
+// In the session's own.
 controller::HandModel hand_model(const PreparedSession& session);
 
 // The same of the tool's rotation, in Nm/rad, Nms/rad and kg m².
