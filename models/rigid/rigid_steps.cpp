@@ -23,6 +23,8 @@ constexpr int kWorkOfFar = 2400;
 // A part that finds no forces may be left out where the next one finds some, but not two in a row: sides reach as far
 // as two parts do.
 constexpr int kMostLeftOut = 1;
+// So many parts are made of one where it leads nowhere, or to a solution that gives energy.
+constexpr int kFiner = 8;
 constexpr int kFewer = 6;
 constexpr int kWorkInside = 600;  // of hollow objects, where a look costs 0.5 µs and most steps take thirty
 // Newton's iteration with the gaps' curvature: what comes before a step of this size needn't be exact. A local problem
@@ -220,7 +222,7 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   // What has used up what it may look at finds no more in smaller parts, nor without friction.
   const auto may = [&] { return looks_ > 0 || !something_comes(); };
   if (fine && gives_energy(q)) {
-    if (may()) looked = look_again(goal, q, to_goal, parts);
+    if (may()) looked = look_closely(goal, q, to_goal, parts);
   } else if (!fine && budget_ > 0 && finer(parts) > 1 && may()) {
     fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in(q);
   }
@@ -252,7 +254,7 @@ void RigidWorld::allow_for(int parts) noexcept {
 
 // How many smaller parts are made of one. What comes fast takes many parts already.
 int RigidWorld::finer(int parts) const noexcept {
-  return something_comes() ? std::clamp(kMostParts / 2 / parts, 1, 8) : 8;
+  return something_comes() ? std::clamp(kMostParts / 2 / parts, 1, kFiner) : kFiner;
 }
 
 bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts,
@@ -264,9 +266,18 @@ bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, 
   return in_parts(p_hat, q_old, far, parts, q);
 }
 
+// Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step leads
+// by it, the iteration may come to a solution beyond, where two vertices meet, say: what still gives energy is looked at
+// once more, if something is left for that. (Found by the stress study, replay 5459542357847018, step 719.)
+bool RigidWorld::look_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
+  if (!look_again(p_hat, q_old, far, parts)) return false;
+  if (!something_comes() && gives_energy(q_old)) look_again(p_hat, q_old, far, kFiner * parts, true);
+  return true;
+}
+
 // In smaller parts; if they lead nowhere or into a mesh, what was found stays. False: nothing is left to look at what
-// may be far from lawful, and the tool stays where they led.
-bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
+// may be far from lawful, and the tool stays where they led, unless what was found is to stay (`stays`).
+bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, bool stays) noexcept {
   if (finer(parts) == 1) return true;
   const ToolPose found = q_;
   const std::array<PoseContact, ContactProblem::most> contacts = contacts_;
@@ -275,7 +286,7 @@ bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double
   const bool rides = rides_;
   const bool led = in_smaller_parts(p_hat, q_old, far, parts, q_);
   if (!went_in(q_old) && led) return true;
-  if (looks_ <= 0) return false;
+  if (looks_ <= 0 && !stays) return false;
   let_go(1.0);
   squeezed_ = false;
   q_ = found;
