@@ -1,11 +1,13 @@
 #include "controller/studies/stress/tool_parts.hpp"
 
 #include <algorithm>
+#include <array>
 
 namespace proxarm::studies {
 namespace {
 
-constexpr int kEighths = 8;
+// In how many parts a way is divided first, one after the other.
+constexpr std::array kFirst{8, 1, 3, 5, 7, 13, 29};
 constexpr double kLeast = 1e-12;  // of the way, or of a wait, a part
 constexpr std::size_t kMost = 400;
 // A foot may lie so far beside its feature and count (touch.hpp, beside_m): before an edge by that, and behind it.
@@ -13,24 +15,28 @@ constexpr double kBeside_m = 1e-10;
 
 }  // namespace
 
-// The middle of the widest part of a way between two places, or of the longest wait in it; if they are no more than
-// kLeast: none. (Poses for which no forces were found are left out, so that there may be more than one.)
-std::optional<ToolParts::Mark> ToolParts::middle_of_widest(const std::vector<Mark>& marks, const Mark& from,
-                                                           const Mark& to) {
-  double widest = kLeast, longest = kLeast;
-  std::optional<Mark> way, wait;
-  for (auto i = std::lower_bound(marks.begin(), marks.end(), from); *i < to; ++i) {
-    const Mark &a = i[0], &b = i[1];
-    if (b.share - a.share > widest) {
-      widest = b.share - a.share;
-      way = Mark{0.5 * (a.share + b.share), 1.0};
-    }
-    const double waited = a.share == b.share ? a.waited : 0.0;
-    if (!(b.waited - waited > longest)) continue;
-    longest = b.waited - waited;
-    wait = Mark{b.share, 0.5 * (waited + b.waited)};
+// In the middle of two marks that follow each other: of the way, or of the wait at the second.
+std::optional<ToolParts::Mark> ToolParts::between(const Mark& a, const Mark& b) {
+  if (b.share - a.share > kLeast) return Mark{0.5 * (a.share + b.share), 1.0};
+  const double waited = a.share == b.share ? a.waited : 0.0;
+  if (b.waited - waited > kLeast) return Mark{b.share, 0.5 * (waited + b.waited)};
+  return {};
+}
+
+// Where no forces were found for marks that follow a pose, closer to it, since a step that finds none may find some by
+// smaller ones; and where there are none next to it, in the widest gap.
+std::optional<ToolParts::Mark> ToolParts::divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to) {
+  auto i = std::lower_bound(marks.begin(), marks.end(), from);
+  if (const auto first = between(i[0], i[1])) return first;
+  double widest = 0.0;
+  std::optional<Mark> out;
+  for (++i; *i < to; ++i) {
+    const auto middle = between(i[0], i[1]);
+    if (!middle || !(i[1].share - i[0].share > widest)) continue;
+    widest = i[1].share - i[0].share;
+    out = middle;
   }
-  return way ? way : wait;
+  return out;
 }
 
 void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, std::vector<Pose>& way) const {
@@ -75,7 +81,7 @@ ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector
     double pushed = pushed_J(way[k], to_end ? end : way[k + 1]);
     if (to_end && either) pushed = std::min(pushed, pushed_J(way[k], last));
     sum.all_J += pushed;
-    const auto middle = middle_of_widest(marks, way[k].mark, to_end ? end.mark : way[k + 1].mark);
+    const auto middle = divide(marks, way[k].mark, to_end ? end.mark : way[k + 1].mark);
     if (!middle) sum.undivided_J += pushed;
     if (!middle || !(pushed > sum.most_J)) continue;
     sum.most_J = pushed;
@@ -87,8 +93,17 @@ ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector
 
 bool ToolParts::keep(const ToolCall& call, double short_m, double rest_J,
                      std::vector<models::PoseContact>& touched) const {
+  const std::size_t before = touched.size();
+  return std::any_of(kFirst.begin(), kFirst.end(), [&](int parts) {
+    touched.resize(before);
+    return keep_from(parts, call, short_m, rest_J, touched);
+  });
+}
+
+bool ToolParts::keep_from(int parts, const ToolCall& call, double short_m, double rest_J,
+                          std::vector<models::PoseContact>& touched) const {
   std::vector<Mark> marks;
-  for (int k = 0; k <= kEighths; ++k) marks.push_back({static_cast<double>(k) / kEighths, 1.0});
+  for (int k = 0; k <= parts; ++k) marks.push_back({static_cast<double>(k) / parts, 1.0});
   std::vector<Pose> way{{marks.front(), call, short_m}};
   way.front().call.r = call.q;
   way.front().call.time_s = call.since_s;

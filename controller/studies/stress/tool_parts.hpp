@@ -37,6 +37,13 @@
 // an edge is what it gets where its parts lead. So the step's end, too, must push forward since q by no more than that
 // one does.
 //
+// And where two vertices meet, or a vertex and an edge that leans over it, the tool may lie for long, held by normals
+// of which each alone would let it go: as on a needle's point. On which side of that place p̂'s first poses are decides
+// whether it comes to lie there (1958603531041721, step 829: of ways that begin with eighths, quarters or fifths, but
+// not of those with halves, thirds or sevenths). A step that goes by keeps the law, if one of the ways leads to where
+// it does. None leads to where a fault does: 5459542357847018, step 719, was by a wedge, held by two vertices beyond
+// it, and of ways of 1 to 64 parts all came to lie in the wedge.
+//
 // Friction is against the slip, by which it takes energy; what part of it a place comes back in a jump says nothing.
 // Nor does a pose for which no forces are found: parts are those between the others.
 #pragma once
@@ -56,7 +63,8 @@ class ToolParts {
 
   // Whether what is pushed forward in the parts is no more than curvature may give, and edges that it goes over account
   // for `rest_J`, by what touched before the step, to be given, and on the way, added: at each eighth at least where
-  // forces were found, and closer where the parts push while something isn't accounted for. `short_m`: of gaps at q.
+  // forces were found, and closer where the parts push while something isn't accounted for. If that isn't so of a way
+  // that is divided in eighths first, of one that is divided otherwise. `short_m`: of gaps at q.
   [[nodiscard]] bool keep(const ToolCall& call, double short_m, double rest_J,
                           std::vector<models::PoseContact>& touched) const;
 
@@ -80,7 +88,10 @@ class ToolParts {
     Mark divide;                            // where to divide it
     std::size_t before = 0;                 // and the pose that it begins at
   };
-  static std::optional<Mark> middle_of_widest(const std::vector<Mark>& marks, const Mark& from, const Mark& to);
+  static std::optional<Mark> between(const Mark& a, const Mark& b);
+  static std::optional<Mark> divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to);
+  [[nodiscard]] bool keep_from(int parts, const ToolCall& call, double short_m, double rest_J,
+                               std::vector<models::PoseContact>& touched) const;
   // From the last of the poses on, to p̂.
   void follow(const ToolCall& call, const std::vector<Mark>& marks, std::vector<Pose>& way) const;
   [[nodiscard]] double pushed_J(const Pose& from, const Pose& to) const;

@@ -59,6 +59,7 @@ struct BrokenEdge final : PoseAlgorithm {
   static constexpr double bevel_m = 1e-4;  // its width and depth
   double springs_m = 0.0;                  // off the side, and is held there
   double early_m = 0.0;                    // before the bevel's end, where it jumps onto the side
+  double needle_m = -1.0;                  // where p̂ comes here from over the table, it comes to lie on the edge
 
   // What it lies on, or the first after it that its foot is on.
   const ToolPose& step(const models::Mat6& /*K*/, const ToolPose& p_hat, const ToolPose& q) noexcept override {
@@ -70,6 +71,12 @@ struct BrokenEdge final : PoseAlgorithm {
     if (q.position.x() <= 0.0 && p.x() <= 0.0) {
       contact_.normal_W = Vec3::UnitZ();
       off_m = -p.z();
+    } else if (q.position.isZero(0.0) || (q.position.x() < 0.0 && std::abs(p.x() - needle_m) < 1e-6)) {
+      q_ = ToolPose();
+      contact_.normal_W = Vec3::UnitZ();
+      contact_.force_W = -stiffness_N_per_m * p.z() * Vec3::UnitZ();
+      contact_.point_W.setZero();
+      return q_;
     } else if (q.position.x() < bevel_m && foot.x() < bevel_m - early_m) {
       contact_.normal_W = bevel;
       off_m = -bevel.dot(p);
@@ -238,6 +245,22 @@ TEST(ToolParts, AJumpThatSpringsOnItsWayDoesNot) {
   EXPECT_TRUE(here.keeps(jumps));
   jumps.early_m = 2.02e-10;
   EXPECT_FALSE(here.keeps(jumps));
+}
+
+// Of a way in eighths one pose is on the needle's point, and stays there, of one in thirds none.
+TEST(ToolParts, AStepThatGoesByAPlaceWhereSomeOfItsWaysEndKeepsTheBoundIfOneGoesByToo) {
+  const OverABrokenEdge here;
+  const Vec3 &from = here.call.q.position, to = here.call.p.position;
+  BrokenEdge world, springs;
+  world.needle_m = from.x() + 0.875 * (to.x() - from.x());
+  ToolCall eighths = here.call;
+  eighths.p.position = from + 0.875 * (to - from);
+  ASSERT_TRUE(world.step(here.call.K, eighths.p, here.call.q).position.isZero(0.0));
+  EXPECT_TRUE(here.keeps(world));
+  springs = world;
+  springs.springs_m = 2.02e-10;
+  EXPECT_FALSE(here.keeps(springs));
+  EXPECT_FALSE(here.keeps(springs, world));
 }
 
 // As where the tool lies on a vertex for a part of the way, and from q is found beyond: from there on it is asked anew.
