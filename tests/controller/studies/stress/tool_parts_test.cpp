@@ -299,14 +299,16 @@ TEST(ToolParts, WhereThereAreSeveralSolutionsAStepMayTakeOneThatPushesNoMoreThan
   EXPECT_FALSE(here.keeps(world));
 }
 
-// So it isn't known where the edge is: the parts are those up to before it, and from there to the end.
+// Parts are those up to before it, and from there to the end: none that pushes, if they come up to the edge.
 TEST(ToolParts, APoseOnTheWayForWhichNoForcesAreFoundSaysNothing) {
   const OverTheTable here;
   Table stuck, springs;
   stuck.stuck = true;
-  EXPECT_FALSE(here.keeps(Table(), stuck));
+  EXPECT_TRUE(here.keeps(Table(), stuck));
   springs.springs_m = 1e-6;
   EXPECT_FALSE(here.keeps(springs, stuck));
+  stuck.early_m = 2.02e-10 / std::sin(slope);
+  EXPECT_FALSE(here.keeps(Table(), stuck));
 }
 
 // A tip of a pyramid slides on a box, from 20 µm before its edge to 100 µm beyond, pressed by 0.3 mm: one of its own
