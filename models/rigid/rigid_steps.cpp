@@ -266,9 +266,9 @@ bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, 
   return in_parts(p_hat, q_old, far, parts, q);
 }
 
-// Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step leads
-// by it, the iteration may come to a solution beyond, where two vertices meet, say: what still gives energy is looked at
-// once more, if something is left for that. (Found by the stress study, replay 5459542357847018, step 719.)
+// Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step
+// leads by it, the iteration may come to a solution beyond, where two vertices meet, say: what still gives energy is
+// looked at once more, if something is left for that. (Found by the stress study, replay 5459542357847018, step 719.)
 bool RigidWorld::look_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
   if (!look_again(p_hat, q_old, far, parts)) return false;
   if (!something_comes() && gives_energy(q_old)) look_again(p_hat, q_old, far, kFiner * parts, true);

@@ -18,6 +18,7 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
+constexpr double kSlips_m = 1e-9;  // a million roundings of a way
 constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
 // The least of a distance along a segment, by the golden section; where it is `enough` or more, some bound of that. (It
@@ -479,6 +480,7 @@ std::string ToolLaws::missed(const ToolCall& call) const {
     const Vec3 slip = call.slip_of(contact);
     const double s = slip.norm();
     if (!(s > 0.0)) continue;
+    if (s > kSlips_m && f_n > 1e-9 * size && !contact.slips) return "a slip that isn't told";
     const double least = std::max(limit * yields(call, contact, slip / s), 1e-9);
     const double off = (f_t + limit / s * slip).norm();
     const double allowed = 1e-8 * size * std::max(s, least) + 2.0 * limit * rounding_of_ways_m(call);

@@ -12,7 +12,9 @@ namespace {
 
 // Always the same worlds, so that a change of the code is what a failure shows; it names the run's own seed.
 // `proxarm study stress --seed N` is for others.
-void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds = Stress::Worlds::all) {
+// `most_unresolved`: of the steps in contact, for what gives up is judged by nothing but its gaps.
+void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds = Stress::Worlds::all,
+                         double most_unresolved = 1.0) {
   const Stress study(worlds);
   const Options options{.seed = seed};
   Table table(study.columns());
@@ -22,7 +24,11 @@ void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds 
   }
   const nlohmann::json headline = study.headline(table, options);
   EXPECT_FALSE(study.failed(headline)) << study.text(headline);
-  EXPECT_GT(headline.at("contact_steps").get<double>(), 0.05 * headline.at("steps").get<double>());
+  const auto contact = headline.at("contact_steps").get<double>(), steps = headline.at("steps").get<double>();
+  EXPECT_GT(contact, 0.05 * steps);
+  if (most_unresolved == 1.0) return;
+  EXPECT_LE(headline.at("unresolved").get<double>(), most_unresolved * contact);
+  EXPECT_GT(steps, 900.0 * static_cast<double>(count));  // few are flung away, or end where there is no room
 }
 
 // A run with a rigid tool that violated something once.
@@ -45,9 +51,11 @@ TEST(Stress, HoldsAmongLayers) { expect_no_violation(2, 400, Stress::Worlds::lay
 
 TEST(Stress, HoldsAtOrder2) { expect_no_violation(3, 2'000, Stress::Worlds::order_2); }
 
-TEST(Stress, HoldsWithRigidTools) { expect_no_violation(4, 200, Stress::Worlds::tools); }
+TEST(Stress, HoldsWithRigidTools) { expect_no_violation(4, 200, Stress::Worlds::tools, 0.02); }
 
-TEST(Stress, HoldsWithRigidToolsAmongObjectsThatMove) { expect_no_violation(4, 200, Stress::Worlds::moving_tools); }
+TEST(Stress, HoldsWithRigidToolsAmongObjectsThatMove) {
+  expect_no_violation(4, 200, Stress::Worlds::moving_tools, 0.03);
+}
 
 // Step 159: a corner of the tool comes down on a box's face at 96 % of the way, 12 µm from an edge, and p̂ is over that
 // edge. The judge looked at seven eighths of the way for what was met, where nothing is yet, and took the turn of the
@@ -159,8 +167,8 @@ TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_
 // Step 12: a vertex of a box leaves the tool's face over its edge, that edge slides along one of the box's to a corner
 // of the tool, and over it the corner comes onto the box's next face, all with p̂ as good as at rest. The judge took the
 // jump for one over a single edge, and that the corner came up along the last normal by 0.6 mm for 0.08 J out of
-// nowhere. The others are like it: step 523, 4.6 mm, where a step asked for poses beyond the jump finds none from before
-// it; step 20.
+// nowhere. The others are like it: step 523, 4.6 mm, where a step asked for poses beyond the jump finds none from
+// before it; step 20.
 TEST(Stress, AToolThatJumpsOverSeveralEdgesAtOnceIsCountedAsAtAnEdge) {
   expect_edges({5381286054045804ULL, 5420777331294883ULL, 3226308497210590ULL});
 }
