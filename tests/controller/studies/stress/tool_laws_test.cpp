@@ -101,6 +101,7 @@ struct OnABelt {
     PoseContact contact;
     contact.normal_W = Vec3::UnitZ();
     contact.force_W = {f_t, 0.0, f_n};
+    contact.slips = tool_m_per_s != v;
     call.contacts.push_back(contact);
     call.K = 1e6 * models::Mat6::Identity();
     call.stiffest = 1e6 / (ToolLaws::lever_m * ToolLaws::lever_m);
@@ -129,6 +130,12 @@ TEST(ToolLaws, FrictionIsAgainstTheSlipOnAnObjectThatMoves) {
   EXPECT_EQ(OnABelt(friction, 0.5 * OnABelt::v).missed(), "");
   EXPECT_EQ(OnABelt(friction, 2.0 * OnABelt::v).missed(), "not against the slip");
   EXPECT_EQ(OnABelt(0.6, 0.0).missed(), "not against the slip");
+}
+
+TEST(ToolLaws, ASlipIsTold) {
+  OnABelt here(OnABelt::f_t / OnABelt::f_n, 0.0);
+  here.call.contacts[0].slips = false;
+  EXPECT_EQ(here.missed(), "a slip that isn't told");
 }
 
 TEST(ToolLaws, WhatAnObjectDoesIsItsOwnWork) {
