@@ -357,7 +357,9 @@ void tell_motion(const Summary& s, Lines& line) {
                         format("%.2f s, ", s.contact_time_s) + format("%.2f s of it sliding", s.sliding_time_s));
   }
   if (s.unresolved_steps > 0) {
-    line("unresolved", std::to_string(s.unresolved_steps) + " steps that keep not all laws of contact");
+    line("unresolved", std::to_string(s.unresolved_steps) +
+                           (s.unresolved_steps == 1 ? " step that keeps" : " steps that keep") +
+                           " not all laws of contact");
   }
   line("penetration, proxy", length(s.penetration_max_m));
   line("penetration, tool", length(s.tool_penetration_max_m) + "; at the touch " +
