@@ -8,7 +8,7 @@ import unittest
 
 from harness import SOURCE, ProgramTest, program
 
-PATIENCE_S = 120.0
+PATIENCE_S = 900.0
 
 
 class Tune(ProgramTest):
