@@ -17,8 +17,28 @@ using models::Vec3;
 
 constexpr double stiffness_N_per_m = 1e5, slope = 0.5 * M_PI_2;
 
+// A point that something flat holds.
+class PointWorld : public PoseAlgorithm {
+ public:
+  [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {&contact_, count_}; }
+  [[nodiscard]] double clearance_m(const ToolPose& /*pose*/) const noexcept override { return 0.0; }
+  void copy_state(const PoseAlgorithm& /*other*/) noexcept override {}
+
+ protected:
+  // By so much off p̂ along the contact's normal.
+  void lie(const ToolPose& p_hat, double off_m) noexcept {
+    q_ = p_hat;
+    q_.position += off_m * contact_.normal_W;
+    contact_.force_W = stiffness_N_per_m * off_m * contact_.normal_W;
+    contact_.point_W = q_.position;
+  }
+  ToolPose q_;
+  PoseContact contact_;
+  std::size_t count_ = 1;
+};
+
 // A point on a table that ends at x = 0 in a slope of 45°, with its faults.
-struct Table final : PoseAlgorithm {
+struct Table final : PointWorld {
   double early_m = 0.0;    // before the edge, where it jumps onto the slope
   double springs_m = 0.0;  // off the slope, and is held there
   bool stuck = false;      // no solution beyond the edge
@@ -32,30 +52,21 @@ struct Table final : PoseAlgorithm {
     const double angle = far ? other_slope : slope;
     contact_.normal_W = over ? Vec3(std::sin(angle), 0.0, std::cos(angle)) : Vec3(Vec3::UnitZ());
     const double off_m = (over ? springs_m : 0.0) - contact_.normal_W.dot(p_hat.position);
-    q_ = p_hat;
-    q_.position += off_m * contact_.normal_W;
-    contact_.force_W = stiffness_N_per_m * off_m * contact_.normal_W;
-    contact_.point_W = q_.position;
+    lie(p_hat, off_m);
     count_ = off_m > 0.0 ? 1 : 0;
     if (count_ == 0) q_ = p_hat;
     unresolved_ = over && (stuck || (far && stuck_far));
     return q_;
   }
-  [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {&contact_, count_}; }
   [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
-  [[nodiscard]] double clearance_m(const ToolPose& /*pose*/) const noexcept override { return 0.0; }
   [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<Table>(*this); }
-  void copy_state(const PoseAlgorithm& /*other*/) noexcept override {}
 
  private:
-  ToolPose q_;
-  PoseContact contact_;
-  std::size_t count_ = 0;
   bool unresolved_ = false;
 };
 
 // A point on a table whose edge is broken: a bevel of 45° leads from x = 0 to its side.
-struct BrokenEdge final : PoseAlgorithm {
+struct BrokenEdge final : PointWorld {
   static constexpr double bevel_m = 1e-4;  // its width and depth
   double springs_m = 0.0;                  // off the side, and is held there
   double early_m = 0.0;                    // before the bevel's end, where it jumps onto the side
@@ -81,20 +92,10 @@ struct BrokenEdge final : PoseAlgorithm {
       contact_.normal_W = bevel;
       off_m = -bevel.dot(p);
     }
-    q_ = p_hat;
-    q_.position += off_m * contact_.normal_W;
-    contact_.force_W = stiffness_N_per_m * off_m * contact_.normal_W;
-    contact_.point_W = q_.position;
+    lie(p_hat, off_m);
     return q_;
   }
-  [[nodiscard]] std::span<const PoseContact> contacts() const noexcept override { return {&contact_, 1}; }
-  [[nodiscard]] double clearance_m(const ToolPose& /*pose*/) const noexcept override { return 0.0; }
   [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<BrokenEdge>(*this); }
-  void copy_state(const PoseAlgorithm& /*other*/) noexcept override {}
-
- private:
-  ToolPose q_;
-  PoseContact contact_;
 };
 
 // From 0.2 mm before the edge to 0.3 mm beyond it, pressed by 1 mm.
