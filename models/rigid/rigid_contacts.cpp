@@ -9,7 +9,7 @@
 namespace proxarm::models {
 namespace {
 
-// Rounding of the work of 1000 N over a millimetre is ten thousand times less.
+// A millinewton over a nanometre.
 constexpr double kNothing_J = 1e-12;
 
 }  // namespace
@@ -25,6 +25,7 @@ bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
   const View now = view(q_), old = view(q_old);
   double work = 0.0, bends = 0.0;
   const double turned_W = rotation_vector(q_.orientation * q_old.orientation.conjugate()).norm();
+  const double rounding = 2.0 * rounding_m(q_);  // of a way, between two poses
   see_slip(q_, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     const PoseContact& contact = contacts_[k];
@@ -36,7 +37,7 @@ bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
     const double s = way.norm(), lever = (contact.point_W - q_.position).norm();
     const double turned = goes(entry) ? moving(entry).turned.norm() : turned_W;
     work += contact.force_W.dot(way);
-    bends += force * (turned * (0.5 * turned * lever + turns_[k] * s) + 0.5 * bend_[k] * s * s);
+    bends += force * (turned * (0.5 * turned * lever + turns_[k] * s) + 0.5 * bend_[k] * s * s + rounding);
   }
   return work > bends + kNothing_J;
 }

@@ -15,7 +15,7 @@ namespace {
 constexpr double kPart = 0.2;
 // A step may take so many poses; a local problem that has no solution, or none that is found, costs a hundred times
 // what one at hand does. What is left then counts as unresolved: the tool goes as far as the parts of the step got.
-constexpr int kBudget = 400, kBudgetOfPart = 50;
+constexpr int kBudget = 400, kPosesOfPart = 8, kBudgetOfPart = 50;
 // And for each part of the step so many contacts more may be looked at.
 constexpr int kWorkOfPart = 60;
 // Twice that in a step of several parts, and once more for the last of them, whose forces are asked for.
@@ -212,24 +212,24 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
   const bool whole = wanted <= (something_comes() ? kMostStrides : kMostParts);
   const int parts = whole ? static_cast<int>(wanted) : kMostParts;
   const ToolPose goal = whole ? p_hat : moved(q, difference(p_hat, q) * (kMostParts / wanted));
-  budget_ = kBudget + 8 * parts;
+  budget_ = kBudget + kPosesOfPart * parts;
   looks_ = kLooks;
   fewer_ = kFewer;
   allow_for(parts);
   // (far shrinks with the goal only where nothing moves)
   const double to_goal = moving_.empty() && !whole ? motion(goal, q) : far;
-  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(q), looked = true;
+  bool fine = in_parts(goal, q, to_goal, parts, q_) && !went_in(q);
   // What has used up what it may look at finds no more in smaller parts, nor without friction.
   const auto may = [&] { return looks_ > 0 || !something_comes(); };
   if (fine && gives_energy(q)) {
-    if (may()) looked = look_closely(goal, q, to_goal, parts);
+    if (may()) fine = look_closely(goal, q, to_goal, parts);
   } else if (!fine && budget_ > 0 && finer(parts) > 1 && may()) {
     fine = in_smaller_parts(goal, q, to_goal, parts, q_) && !went_in(q);
   }
   // Where no forces are found that keep all laws, friction is left out of this step. A tool that stayed where it is
   // would meet the same problem in the next one. In a hole it stays nevertheless, where a part of the step last kept
   // the law: there a jam is what most often has no solution, and without friction it would slip right through.
-  const bool lawful = fine && looked;
+  const bool lawful = fine;
   if (!fine && !shared_->hollow && may()) {
     budget_ = kBudget;
     looks_ = something_comes() ? std::min(looks_, kLooks / 2) : kLooks / 2;
@@ -260,7 +260,8 @@ int RigidWorld::finer(int parts) const noexcept {
 bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts,
                                   ToolPose& q) noexcept {
   parts *= finer(parts);
-  allow_for(parts);
+  budget_ += kPosesOfPart * parts;
+  allow_for(2 * parts);  // (of 192 along a corner each took 80 contacts)
   let_go(0.0);
   gather(q_old, gathered_reach_);
   return in_parts(p_hat, q_old, far, parts, q);
@@ -268,34 +269,13 @@ bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, 
 
 // Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step
 // leads by it, the iteration may come to a solution beyond, where two vertices meet, say: what still gives energy is
-// looked at once more, if something is left for that. (Found by the stress study, replay 5459542357847018, step 719.)
+// looked at once more. (Found by the stress study, replay 5459542357847018, step 719.) False: smaller parts lead
+// nowhere or into a mesh, and the tool stays where they led.
 bool RigidWorld::look_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
-  if (!look_again(p_hat, q_old, far, parts)) return false;
-  if (!something_comes() && gives_energy(q_old)) look_again(p_hat, q_old, far, kFiner * parts, true);
-  return true;
-}
-
-// In smaller parts; if they lead nowhere or into a mesh, what was found stays. False: nothing is left to look at what
-// may be far from lawful, and the tool stays where they led, unless what was found is to stay (`stays`).
-bool RigidWorld::look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, bool stays) noexcept {
   if (finer(parts) == 1) return true;
-  const ToolPose found = q_;
-  const std::array<PoseContact, ContactProblem::most> contacts = contacts_;
-  const std::array<std::uint16_t, ContactProblem::most> of_contact = of_contact_;
-  const std::size_t count = count_;
-  const bool rides = rides_;
-  const bool led = in_smaller_parts(p_hat, q_old, far, parts, q_);
-  if (!went_in(q_old) && led) return true;
-  if (looks_ <= 0 && !stays) return false;
-  let_go(1.0);
-  squeezed_ = false;
-  q_ = found;
-  contacts_ = contacts;
-  of_contact_ = of_contact;
-  count_ = count;
-  rides_ = rides;
-  collected_ = true;
-  return true;
+  if (!in_smaller_parts(p_hat, q_old, far, parts, q_) || went_in(q_old)) return false;
+  if (finer(kFiner * parts) == 1 || !gives_energy(q_old)) return true;
+  return in_smaller_parts(p_hat, q_old, far, kFiner * parts, q_) && !went_in(q_old);
 }
 
 }  // namespace proxarm::models

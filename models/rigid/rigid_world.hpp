@@ -338,7 +338,6 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] int finer(int parts) const noexcept;
   bool in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
   bool look_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept;
-  bool look_again(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, bool stays = false) noexcept;
   [[nodiscard]] bool gives_energy(const ToolPose& q_old) noexcept;
   [[nodiscard]] double bend_per_m(const Pair& pair) const noexcept;
   [[nodiscard]] double sine_of_rims(const Found& found, const ToolPose& pose) const noexcept;

@@ -26,7 +26,7 @@ void expect_no_violation(std::uint64_t seed, double runs, Stress::Worlds worlds 
   EXPECT_FALSE(study.failed(headline)) << study.text(headline);
   const auto contact = headline.at("contact_steps").get<double>(), steps = headline.at("steps").get<double>();
   EXPECT_GT(contact, 0.05 * steps);
-  if (most_unresolved == 1.0) return;
+  if (most_unresolved == 1.0 || static_cast<double>(count) < runs) return;  // a few runs tell no share
   EXPECT_LE(headline.at("unresolved").get<double>(), most_unresolved * contact);
   EXPECT_GT(steps, 900.0 * static_cast<double>(count));  // few are flung away, or end where there is no room
 }
@@ -137,12 +137,10 @@ TEST(Stress, AToolThatSticksElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) { exp
 // over 44 µm, for 5.3 µJ out of nowhere.
 TEST(Stress, AToolThatRollsElsewhereAndGoesOverAnEdgeIsCountedAsAtAnEdge) { expect_edges({1628963792831443}); }
 
-// Of the first, step 427: a corner of a mesh goes over another one's edge and by that takes a second corner off its
+// Step 427: a corner of a mesh goes over another one's edge and by that takes a second corner off its
 // face, which had held part of what it pressed with. The judge took the way over the edge as it were with nothing let
-// go, 10.7 µm for 10.0, and the push of the side beyond for 1.6 µJ out of nowhere. The second, step 380, is like it.
-TEST(Stress, AToolThatGoesOverAnEdgeAndLetsGoElsewhereIsCountedAsAtAnEdge) {
-  expect_edges({2680412759127761ULL, 6084606718299497ULL});
-}
+// go, 10.7 µm for 10.0, and the push of the side beyond for 1.6 µJ out of nowhere.
+TEST(Stress, AToolThatGoesOverAnEdgeAndLetsGoElsewhereIsCountedAsAtAnEdge) { expect_edges({2680412759127761}); }
 
 // Of the first, step 23: on its way the tool comes over an edge a micrometre early, where both sides are solutions. Of
 // the second, step 214, poses on the way are now on this side, now on the other. Of the third, step 318, turned by
@@ -152,25 +150,30 @@ TEST(Stress, AToolMayComeOverAnEdgeWhereBothSidesAreSolutions) {
   expect_edges({2679357126334080ULL, 7836632257535979ULL, 813388677158608ULL, 1180702795386827ULL});
 }
 
-// Steps 435 and 74: an edge of the tool comes onto a vertex, lies on it for a part of the way and goes on beyond it.
-// The judge asked for the poses of that part from q, found no forces or those beyond the vertex, and took what these
-// push by for 19 and 7 mJ out of nowhere.
-TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) {
-  expect_edges({1126755579853460ULL, 5530763864440370ULL});
-}
+// Step 74: an edge of the tool comes onto a vertex, lies on it for a part of the way and goes on beyond it. The judge
+// asked for the poses of that part from q, found no forces or those beyond the vertex, and took what these push by for
+// 7 mJ out of nowhere.
+TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) { expect_edges({5530763864440370}); }
 
 // Step 25: a vertex leaves a face of the tool over its edge, and on the edge there and on the corner next to it the
 // tool may lie. The step found the corner, its parts lead to the edge, which pushes by more. The judge knew of no way
 // to the corner and took its push for 0.6 mJ out of nowhere.
 TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_edges({54327521292900ULL}); }
 
-// Step 12: a vertex of a box leaves the tool's face over its edge, that edge slides along one of the box's to a corner
-// of the tool, and over it the corner comes onto the box's next face, all with p̂ as good as at rest. The judge took the
-// jump for one over a single edge, and that the corner came up along the last normal by 0.6 mm for 0.08 J out of
-// nowhere. The others are like it: step 523, 4.6 mm, where a step asked for poses beyond the jump finds none from
-// before it; step 20.
-TEST(Stress, AToolThatJumpsOverSeveralEdgesAtOnceIsCountedAsAtAnEdge) {
-  expect_edges({5381286054045804ULL, 5420777331294883ULL, 3226308497210590ULL});
+// Of the first, step 42: a mesh's edge jumps over others, pressed by 700 kN, and all smaller parts lead nowhere. What
+// the step had found gave 7.5 J more than those edges may, and stood unflagged; so it was with 67 µJ in the second,
+// step 621. The step of the last three, 12, 523 and 20, found a place some edges on with p̂ as good as at rest.
+TEST(Stress, AStepThatGivesEnergyAndWhosePartsLeadNowhereIsUnresolved) {
+  for (const std::uint64_t seed :
+       {7445413601923195ULL, 3251747089534111ULL, 5381286054045804ULL, 5420777331294883ULL, 3226308497210590ULL}) {
+    EXPECT_GE(clean_run(seed).unresolved, 1) << seed;
+  }
+}
+
+// Step 193: beside a box that moves a step gave 8 mJ in eighths, too, and wasn't looked at any closer.
+TEST(Stress, AStepAmongWhatMovesThatGivesEnergyInEighthsIsLookedAtOnceMore) {
+  const Tally run = run_tool_seed(4313607320623893, true, nullptr);
+  EXPECT_EQ(run.first, "none") << run.first_step;
 }
 
 // Step 829: an edge of the tool comes to a vertex of a mesh and goes by, onto the next edge. Of the judge's way a pose
