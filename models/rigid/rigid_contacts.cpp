@@ -14,27 +14,27 @@ constexpr double kNothing_J = 1e-12;
 
 }  // namespace
 
-// Whether the contacts' work since q(k−1) is above 0 by more than what is of second order in the step: the way of a
-// point that turns by θ at a lever bends by θ² lever/2, a normal turns by θ while the point goes on by s, and something
-// round falls off by s²/2r. That is so of solutions on another side than the one that the tool came to: of a face, say,
-// which it was below and beside. An object that moves does honest work, too: with it only what the tool moves relative
-// to it counts.
-bool RigidWorld::gives_energy(const ToolPose& q_old) noexcept {
-  if (!collected_) collect_contacts(q_);
+// Whether the contacts' work since q(k−1), or another pose, is above 0 by more than what is of second order in the
+// step: the way of a point that turns by θ at a lever bends by θ² lever/2, a normal turns by θ while the point goes on
+// by s, and something round falls off by s²/2r. That is so of solutions on another side than the one that the tool came
+// to: of a face, say, which it was below and beside. An object that moves does honest work, too: with it only what the
+// tool moves relative to it counts.
+bool RigidWorld::gives_energy_at(const ToolPose& pose, const ToolPose& q_old) noexcept {
+  if (!collected_) collect_contacts(pose);
   if (count_ == 0) return false;
-  const View now = view(q_), old = view(q_old);
+  const View now = view(pose), old = view(q_old);
   double work = 0.0, bends = 0.0;
-  const double turned_W = rotation_vector(q_.orientation * q_old.orientation.conjugate()).norm();
-  const double rounding = 2.0 * rounding_m(q_);  // of a way, between two poses
-  see_slip(q_, q_old);
+  const double turned_W = rotation_vector(pose.orientation * q_old.orientation.conjugate()).norm();
+  const double rounding = 2.0 * rounding_m(pose);  // of a way, between two poses
+  see_slip(pose, q_old);
   for (std::size_t k = 0; k < count_; ++k) {
     const PoseContact& contact = contacts_[k];
     const double force = contact.force_W.norm();
     if (force == 0.0) continue;
     const std::uint16_t entry = of_contact_[k];
-    const Vec3 way = goes(entry) ? slip_on(entry, contact.point_W - q_.position)
+    const Vec3 way = goes(entry) ? slip_on(entry, contact.point_W - pose.position)
                                  : Vec3(contact.point_W - old * now.to_T(contact.point_W));
-    const double s = way.norm(), lever = (contact.point_W - q_.position).norm();
+    const double s = way.norm(), lever = (contact.point_W - pose.position).norm();
     const double turned = goes(entry) ? moving(entry).turned.norm() : turned_W;
     work += contact.force_W.dot(way);
     bends += force * (turned * (0.5 * turned * lever + turns_[k] * s) + 0.5 * bend_[k] * s * s + rounding);

@@ -132,43 +132,57 @@ void RigidWorld::share_out(bool last) noexcept {
 }
 
 bool RigidWorld::in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept {
-  const bool comes = something_comes();
   let_loose_ = false;
-  if (comes && parts > 1) return in_strides(p_hat, q_old, far, parts, q);
-  int left_out = 0;  // the parts just before this one
-  ToolPose reached = q_old;
+  if (something_comes() && parts > 1) return in_strides(p_hat, q_old, far, parts, q);
   overflow_ = squeezed_ = false;
   let_go(0.0);
-  set_sides(q_old, far / parts);
-  for (int k = 1; k <= parts; ++k) {
-    if (crowded_) {  // what isn't known may be in the way
-      q = reached;
-      return false;
-    }
+  q = q_old;
+  return go_on(p_hat, q_old, far / parts, parts, {1, parts}, q);
+}
+
+// From q, some of the parts, of each of which no point's way is more than `far`.
+bool RigidWorld::go_on(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, const Range& range,
+                       ToolPose& q) noexcept {
+  const bool comes = something_comes();
+  int left_out = 0;  // the parts just before this one
+  set_sides(q, far);
+  for (int k = range.first; k <= range.last; ++k) {
+    if (crowded_) return false;  // what isn't known may be in the way
     const double share = static_cast<double>(k) / parts;
-    reached = let_go_with(reached, share);
-    const ToolPose p = k == parts ? p_hat : on_the_way(p_hat, q_old, share);
+    q = let_go_with(q, share);
+    const ToolPose p = k == parts ? p_hat : on_the_way(p_hat, q_old, share), from = q;
     if (comes || (k == parts && parts > 1)) share_out(k == parts);
-    ToolPose next = reached;
+    ToolPose next = q;
     if (settle(p, q_old, next)) {
       left_out = 0;
-      reached = next;
+      q = next;
+      if (closely_ && gives_energy_at(q, from)) {
+        q = from;
+        if (!go_closely(p_hat, q_old, far, parts, k, q)) return false;
+      }
     } else {
       // Only the last part's forces are asked for. Before it, any pose will do that leads through nothing.
-      const bool may = comes || (k < parts && left_out++ < kMostLeftOut);
-      const bool on = may && (overflow_ = false, give_way(reached)) && k < parts;
-      if (!on) {
-        q = reached;
-        return false;
-      }
+      const bool may = comes || (k < range.last && left_out++ < kMostLeftOut);
+      const bool on = may && (overflow_ = false, give_way(q)) && k < range.last;
+      if (!on) return false;
     }
     if (k < parts) {
-      if (came_m(reached) > 0.5 * gathered_reach_) gather(reached, gathered_reach_);
-      set_sides(reached, far / parts);
+      if (came_m(q) > 0.5 * gathered_reach_) gather(q, gathered_reach_);
+      set_sides(q, far);
     }
   }
-  q = reached;
   return true;
+}
+
+// One part, in smaller ones.
+bool RigidWorld::go_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, int part,
+                            ToolPose& q) noexcept {
+  closely_ = false;
+  budget_ += kPosesOfPart * kFiner;
+  allow_for(2 * kFiner);
+  const bool led = go_on(p_hat, q_old, far / kFiner, kFiner * parts, {(part - 1) * kFiner + 1, part * kFiner}, q);
+  closely_ = true;
+  return led;
 }
 
 // The tool begins anew, elsewhere: nothing is known about where it is.
@@ -268,13 +282,15 @@ bool RigidWorld::in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, 
 }
 
 // Over an edge a step gives energy in smaller parts, too. But from so far before a wedge that an eighth of the step
-// leads by it, the iteration may come to a solution beyond, where two vertices meet, say: what still gives energy is
-// looked at once more. (Found by the stress study, replay 5459542357847018, step 719.) False: smaller parts lead
+// leads by it, the iteration may come to a solution beyond, where two vertices meet, say: an eighth that gives energy
+// is looked at once more. (Found by the stress study, replay 5459542357847018, step 719.) False: smaller parts lead
 // nowhere or into a mesh, and the tool stays where they led.
 bool RigidWorld::look_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept {
   if (finer(parts) == 1) return true;
-  if (!in_smaller_parts(p_hat, q_old, far, parts, q_) || went_in(q_old)) return false;
-  if (finer(kFiner * parts) == 1 || !gives_energy(q_old)) return true;
+  closely_ = !something_comes();
+  const bool led = in_smaller_parts(p_hat, q_old, far, parts, q_) && !went_in(q_old);
+  closely_ = false;
+  if (!led || !something_comes() || finer(kFiner * parts) == 1 || !gives_energy(q_old)) return led;
   return in_smaller_parts(p_hat, q_old, far, kFiner * parts, q_) && !went_in(q_old);
 }
 

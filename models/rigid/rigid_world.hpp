@@ -11,11 +11,9 @@
 //    that radius is their clearance, and the ratio far above one: there the gaps' curvature goes into the problem as
 //    well (rigid_bends.cpp), which makes this Newton's method.
 // 3. On which side of a face or an edge the tool is, is what it was at q(k−1) (rigid_sides.cpp). A long step is taken
-// in
-//    parts (rigid_steps.cpp), on the
-//    way from q(k−1) to p̂, each so short that no feature gets past the sides' reach; each part is a step of 𝒢 from
-//    q(k−1). A solution in which the contacts did work on the tool is on a side to which it didn't come: then the parts
-//    are made smaller.
+//    in parts (rigid_steps.cpp), on the way from q(k−1) to p̂, each so short that no feature gets past the sides' reach;
+//    each part is a step of 𝒢 from q(k−1). A solution in which the contacts did work on the tool is on a side to which
+//    it didn't come: then the parts are made smaller, and where they lead nowhere the step is unresolved.
 //
 // 4. An object that moves is touched in its own frame (rigid_motion.cpp): there the tool comes from where it was
 //    relative to where the object was. What was at rest on it moves with it, and slip is what a material point of the
@@ -323,6 +321,12 @@ class RigidWorld final : public PoseAlgorithm {
   bool settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& q) noexcept;
   void share_out(bool last) noexcept;
   bool in_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
+  struct Range {
+    int first = 1, last = 1;
+  };
+  bool go_on(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, const Range& range,
+             ToolPose& q) noexcept;
+  bool go_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, int part, ToolPose& q) noexcept;
   struct Strides;
   enum class Strode { on, again, nowhere, to_the_end };
   [[nodiscard]] ToolPose way(const Strides& s, int part) const noexcept;
@@ -338,7 +342,8 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] int finer(int parts) const noexcept;
   bool in_smaller_parts(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts, ToolPose& q) noexcept;
   bool look_closely(const ToolPose& p_hat, const ToolPose& q_old, double far, int parts) noexcept;
-  [[nodiscard]] bool gives_energy(const ToolPose& q_old) noexcept;
+  [[nodiscard]] bool gives_energy(const ToolPose& q_old) noexcept { return gives_energy_at(q_, q_old); }
+  [[nodiscard]] bool gives_energy_at(const ToolPose& pose, const ToolPose& q_old) noexcept;
   [[nodiscard]] double bend_per_m(const Pair& pair) const noexcept;
   [[nodiscard]] double sine_of_rims(const Found& found, const ToolPose& pose) const noexcept;
   void collect_contacts(const ToolPose& pose) noexcept;
@@ -371,6 +376,7 @@ class RigidWorld final : public PoseAlgorithm {
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
   int looks_ = 0;         // pairs that it may still look at
+  bool closely_ = false;  // parts that give energy are taken in smaller ones
   int fewer_ = 0;         // local problems that it may still try with less
   double clearance_ = -1.0;
 
