@@ -34,7 +34,7 @@ json by_kind(const Table& table) {
   for (const std::string& kind : kinds) {
     json& one = all[kind];
     for (const char* name :
-         {"steps", "contact_steps", "slipping_steps", "several", "unresolved", "edge", "not_judged"}) {
+         {"steps", "contact_steps", "slipping_steps", "several", "unresolved", "edge", "not_judged", "squeezed"}) {
       one[name] = sum(table, name, kind);
     }
     std::int64_t count = 0;
@@ -70,6 +70,7 @@ json keys(const std::string& study) {
       {"not_judged",
        "steps in contact whose work isn't judged: moving objects, layers (they give back what they took), order 2 "
        "from another point than the proxy's, several contacts with a convex one"},
+      {"squeezed", "runs that ended where objects that move left the tool no room; that step isn't judged"},
       {"deepest_m", "the deepest that any proxy was inside of anything in a resolved step, per metre of coordinates"},
       {"failing", "up to 50 runs with a violation: proxarm study " + study + " --replay RUN_SEED shows one"},
       {"seed", "of the study; run seeds follow from it"}};
@@ -78,10 +79,10 @@ json keys(const std::string& study) {
 }  // namespace
 
 std::vector<Column> Stress::columns() const {
-  std::vector<Column> columns{{"run_seed"},   {"kind", true},    {"dimensions"},     {"objects"},
-                              {"order"},      {"mass_kg"},       {"period_s"},       {"force_N"},
-                              {"steps"},      {"contact_steps"}, {"slipping_steps"}, {"several"},
-                              {"unresolved"}, {"edge"},          {"not_judged"},     {"deepest"}};
+  std::vector<Column> columns{{"run_seed"},       {"kind", true}, {"dimensions"}, {"objects"}, {"order"},
+                              {"mass_kg"},        {"period_s"},   {"force_N"},    {"steps"},   {"contact_steps"},
+                              {"slipping_steps"}, {"several"},    {"unresolved"}, {"edge"},    {"not_judged"},
+                              {"squeezed"},       {"deepest"}};
   for (const char* name : invariant_names) columns.push_back({name});
   columns.push_back({"first", true});
   columns.push_back({"first_step"});
@@ -110,6 +111,7 @@ std::vector<Row> Stress::run(std::size_t job, const Options& options) const {
           number(t.unresolved),
           number(t.edge),
           number(t.not_judged),
+          number(t.squeezed),
           t.deepest_m};
   for (const std::int64_t count : t.violations) row.emplace_back(number(count));
   row.emplace_back(t.first);
@@ -137,6 +139,7 @@ json Stress::headline(const Table& table, const Options& options) const {
           {"unresolved", sum(table, "unresolved")},
           {"edge", sum(table, "edge")},
           {"not_judged", sum(table, "not_judged")},
+          {"squeezed", sum(table, "squeezed")},
           {"deepest_m", deepest},
           {"by_kind", by_kind(table)},
           {"failing", failing(table)},
@@ -189,7 +192,8 @@ std::string Stress::text(const json& headline) const {
   text << headline.at("runs") << " runs, " << headline.at("steps") << " steps, " << headline.at("contact_steps")
        << " in contact, seed " << headline.at("seed") << ": " << headline.at("violations") << " violations\n"
        << "counted apart: unresolved " << headline.at("unresolved") << ", several solutions " << headline.at("several")
-       << ", edges " << headline.at("edge") << ", work not judged " << headline.at("not_judged") << "\n";
+       << ", edges " << headline.at("edge") << ", work not judged " << headline.at("not_judged")
+       << ", runs that ended squeezed " << headline.at("squeezed") << "\n";
   for (const json& run : headline.at("failing")) {
     text << "run seed " << run.at("run_seed") << ": " << run.at("first").get<std::string>() << " at step "
          << run.at("step") << " (" << run.at("kind").get<std::string>() << "); proxarm study " << name() << " --replay "

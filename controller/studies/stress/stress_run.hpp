@@ -23,6 +23,7 @@ struct Tally {
   std::size_t objects = 0;
   double mass_kg = 0.0, period_s = 0.0, force_N = 0.0;
   std::int64_t steps = 0, contact = 0, slipping = 0, several = 0, unresolved = 0, edge = 0, not_judged = 0;
+  std::int64_t squeezed = 0;
   double deepest_m = 0.0;
   std::array<std::int64_t, invariant_count> violations{};
   std::string first = "none";

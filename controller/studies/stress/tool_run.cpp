@@ -288,6 +288,7 @@ Tally run_tool_seed(std::uint64_t seed, bool moving, std::string* report) {
     call.unresolved = g->unresolved();
     const double hand_J = h.force.dot(proxy.move().head<3>()) + h.torque.dot(proxy.move().tail<3>());
     if (!g->squeezed()) judge.step(k, fault, call, energy_J() - before_J - hand_J);
+    tally.squeezed += g->squeezed() ? 1 : 0;
     if (fault || g->squeezed()) break;  // nothing is known of a tool that has no room
   }
   return tally;
