@@ -155,6 +155,7 @@ bool RigidWorld::go_on(const ToolPose& p_hat, const ToolPose& q_old, double far,
     ToolPose next = q;
     if (settle(p, q_old, next)) {
       left_out = 0;
+      let_loose_ = let_loose_ || motion(next, q) > 2.0 * far;  // past the sides' reach
       q = next;
       if (closely_ && gives_energy_at(q, from)) {
         q = from;

@@ -367,6 +367,7 @@ except ConnectionError:
             outcome = self.ask(change)
             self.assertEqual(outcome.status, 2, change)
             self.assertIn("refused: ", outcome.err)
+        self.assertIn("refused: mass=0.01: found 0.01 kg", self.ask("mass=0.01").err)
         self.assertEqual(self.ask("y" * 300).status, 2)
         # Who says nothing, or too much, holds nobody up for long.
         with socket.socket(socket.AF_UNIX) as silent, socket.socket(socket.AF_UNIX) as loud:

@@ -253,12 +253,11 @@ std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
 
 // What refuses a change may be about something else: more mass is asked for where a timestep is set. The message names
 // the line that it comes from, and that behind it.
-[[noreturn]] void refuse_scripted(const TimedText& change, const SetupError& error) {
+[[noreturn]] void refuse_line(const std::string& line, const std::string& change, const SetupError& error) {
   description::SetupProblem problem = error.problem();
-  const std::string line = "--set " + change.text + "@" + change.time;
   std::string about = problem.key;
   about.erase(0, std::min(about.find_first_not_of('-'), about.size()));
-  const std::string own = change.text.substr(0, change.text.find('='));
+  const std::string own = change.substr(0, change.find('='));
   problem.key = about.empty() || about == own || about == "set" ? line : line + ": " + about;
   throw SetupError(problem);
 }
@@ -275,7 +274,7 @@ Script script_of(const std::vector<std::string>& texts, const PreparedSession& s
         script.changes.push_back({rendered_ns, parameters.take(change.text)});
       }
     } catch (const SetupError& error) {
-      refuse_scripted(change, error);
+      refuse_line("--set " + change.text + "@" + change.time, change.text, error);
     }
   }
   return script;
@@ -307,7 +306,11 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
       refuse("timestep", "one that is set together with others", "one that is set by itself",
              "set the others when the drives have confirmed it: what they may be depends on it");
     }
-    changes.push_back(changed.take(text));
+    try {
+      changes.push_back(changed.take(text));
+    } catch (const SetupError& error) {
+      refuse_line(text, text, error);
+    }
   }
   if (cycle.changes().room() < changes.size()) {
     throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});
@@ -325,7 +328,11 @@ std::string change(controller::Cycle& cycle, LiveParameters& parameters, const s
   if (LiveParameters::is_timestep(line) && line.find('\t') == std::string::npos) {
     if (const char* const refusal = cycle.status().timestep_refusal())
       throw SetupError({.key = "timestep", .message = refusal});
-    if (!cycle.timesteps().push(parameters.take_timestep(line))) throw SetupError({.found = "too many at once"});
+    try {
+      if (!cycle.timesteps().push(parameters.take_timestep(line))) throw SetupError({.found = "too many at once"});
+    } catch (const SetupError& error) {
+      refuse_line(line, line, error);
+    }
     parameters.count_timestep();
     return line + ": the arm stops, the drives are told, rendering goes on; the session says whether all have taken it";
   }
