@@ -110,9 +110,13 @@ void tell_sources(const fs::path& file) {
   }
 }
 
-// What is wrong with a mesh is told; whether that matters is for its scene to say.
-void tell_mesh(const fs::path& file) {
-  for (const std::string& line : scenes::mesh_report(scenes::load_mesh(file, {}))) std::printf("%s\n", line.c_str());
+// What is wrong with a mesh is told; whether that matters is for its scene to say. What the mesh is.
+const char* tell_mesh(const fs::path& file) {
+  const scenes::LoadedMesh loaded = scenes::load_mesh(file, {});
+  for (const std::string& line : scenes::mesh_report(loaded)) std::printf("%s\n", line.c_str());
+  return scenes::is_a_body(loaded)
+             ? "mesh"
+             : "mesh for a point tool; with a rigid tool it is refused, as an object and as the tool";
 }
 
 const char* check(const fs::path& file, const CheckFilesOptions& options) {
@@ -143,8 +147,7 @@ const char* check(const fs::path& file, const CheckFilesOptions& options) {
       models::compile(models::load_urdf(file));
       return "arm";
     case FileKind::mesh:
-      tell_mesh(file);
-      return "mesh";
+      return tell_mesh(file);
     case FileKind::scene:
     case FileKind::unknown:
       return check_scene_file(scenes::load_scene(file), options.states);

@@ -9,8 +9,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <vector>
 
 #include "models/obstacles/obstacle.hpp"
@@ -22,6 +25,12 @@ namespace proxarm::models {
 struct TriangleSoup {
   std::vector<Vec3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+// Something of which there are several: how many, and one of them.
+struct MeshDefect {
+  std::size_t count = 0;
+  Vec3 first_W = Vec3::Zero();
 };
 
 class TriangleMesh {
@@ -97,6 +106,14 @@ class TriangleMesh {
   [[nodiscard]] std::size_t bytes() const noexcept;  // of memory
   [[nodiscard]] std::size_t dropped_triangles() const noexcept { return structure_.dropped; }
   [[nodiscard]] bool closed() const noexcept { return structure_.closed; }  // each edge has one face on either side
+
+  // What find() has found where it was asked first: crossing_faces() (mesh_crossings.hpp), of which a session's parts
+  // ask one after the other. Copies of a mesh, which have the same faces, keep it together. For setting up.
+  template <typename Find>
+  [[nodiscard]] MeshDefect crossings(Find find) const {
+    std::call_once(crossings_->asked, [&] { crossings_->found = find(); });
+    return crossings_->found;
+  }
 
   // How far the surface that a proxy touches is in front of the triangles, metres, so that rounding can't take a proxy
   // in contact through them.
@@ -200,6 +217,11 @@ class TriangleMesh {
   std::vector<Face> faces_;
   Bounds bounds_;
   double mean_edge_ = 0.0, lift_ = 0.0;
+  struct Crossings {
+    std::once_flag asked;
+    MeshDefect found;
+  };
+  std::shared_ptr<Crossings> crossings_ = std::make_shared<Crossings>();
 };
 
 }  // namespace proxarm::models

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
-#include <vector>
+
+#include "models/mesh/mesh_near_pairs.hpp"
 
 namespace proxarm::models {
 namespace {
@@ -228,84 +229,26 @@ class FacePairs {
   double crossing_, sheet_;
 };
 
-// The tree's nodes by the pair and the place in it.
-struct Node {
-  std::uint32_t pair, of;
-  [[nodiscard]] bool operator==(const Node&) const = default;
-};
-
-// A face's box, in float, so wide that faces whose boxes don't meet are further apart than a sheet is thick.
-struct Box {
-  std::array<float, 3> low, high;
-};
-
-std::vector<Box> boxes_of(const TriangleMesh& mesh, double margin) {
-  std::vector<Box> boxes(mesh.size());
-  for (std::uint32_t f = 0; f < mesh.size(); ++f) {
-    const Vec3 &a = mesh.corner(f, 0), &b = mesh.corner(f, 1), &c = mesh.corner(f, 2);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto i = static_cast<Eigen::Index>(k);
-      const double low = std::min({a[i], b[i], c[i]}) - margin, high = std::max({a[i], b[i], c[i]}) + margin;
-      boxes[f].low[k] = std::nextafter(static_cast<float>(low), -std::numeric_limits<float>::infinity());
-      boxes[f].high[k] = std::nextafter(static_cast<float>(high), std::numeric_limits<float>::infinity());
-    }
-  }
-  return boxes;
-}
-
-bool meet(const Box& a, const Box& b) noexcept {
-  return a.low[0] <= b.high[0] && b.low[0] <= a.high[0] && a.low[1] <= b.high[1] && b.low[1] <= a.high[1] &&
-         a.low[2] <= b.high[2] && b.low[2] <= a.high[2];
-}
-
-// Calls visit(f, g), f < g, once for each two faces whose boxes meet.
-template <typename Visit>
-void each_near_pair(const TriangleMesh& mesh, double margin, Visit visit) {
-  const auto& nodes = mesh.structure().nodes;
-  const std::vector<Box> boxes = boxes_of(mesh, margin);
-  const auto count = [&nodes](Node n) { return nodes[n.pair].count[n.of]; };
-  const auto first = [&nodes](Node n) { return nodes[n.pair].first[n.of]; };
-  const auto apart = [&](Node a, Node b) {
-    for (Eigen::Index k = 0; k < 3; ++k) {
-      if (nodes[a.pair].low(a.of, k) > nodes[b.pair].high(b.of, k) + margin) return true;
-      if (nodes[b.pair].low(b.of, k) > nodes[a.pair].high(a.of, k) + margin) return true;
-    }
-    return false;
-  };
-  std::vector<std::pair<Node, Node>> waiting{{{0, 0}, {0, 0}}};
-  while (!waiting.empty()) {
-    const auto [a, b] = waiting.back();
-    waiting.pop_back();
-    const bool same = a == b;
-    if (!same && apart(a, b)) continue;
-    if (count(a) > 0 && count(b) > 0) {
-      for (std::uint32_t f = first(a); f < first(a) + count(a); ++f) {
-        for (std::uint32_t g = same ? f + 1 : first(b); g < first(b) + count(b); ++g) {
-          if (meet(boxes[f], boxes[g])) visit(std::min(f, g), std::max(f, g));
-        }
-      }
-      continue;
-    }
-    // Of an inner node, those within it. A node beside itself is both of them, and one beside the other.
-    const std::uint32_t of_a = count(a) > 0 ? 1 : 2, of_b = count(b) > 0 ? 1 : 2;
-    for (std::uint32_t i = 0; i < of_a; ++i) {
-      for (std::uint32_t j = same ? i : 0; j < of_b; ++j) {
-        waiting.emplace_back(of_a == 1 ? a : Node{first(a), i}, of_b == 1 ? b : Node{first(b), j});
-      }
-    }
-  }
-}
-
 }  // namespace
 
-MeshDefect crossing_faces(const TriangleMesh& mesh) {
+std::optional<Vec3> crossing_at(const TriangleMesh& mesh, std::uint32_t f, std::uint32_t g) {
+  return FacePairs(mesh).place(f, g);
+}
+
+MeshDefect find_crossing_faces(const TriangleMesh& mesh, std::size_t most) {
   const FacePairs pairs(mesh);
   MeshDefect found;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> known;
   each_near_pair(mesh, std::max(kSheet_m, mesh.lift_m()), [&](std::uint32_t f, std::uint32_t g) {
     const Place at = pairs.place(f, g);
-    if (at && found.count++ == 0) found.first_W = *at;
+    if (at && known.emplace(f, g).second && found.count++ == 0) found.first_W = *at;
+    return found.count < most;
   });
   return found;
+}
+
+MeshDefect crossing_faces(const TriangleMesh& mesh) {
+  return mesh.crossings([&mesh] { return find_crossing_faces(mesh, kMostCrossings); });
 }
 
 }  // namespace proxarm::models

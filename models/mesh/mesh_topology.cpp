@@ -258,16 +258,30 @@ TriangleSoup with_holes_closed(const TriangleMesh& mesh, double up_to_m) {
   return soup;
 }
 
-NoInside why_no_inside(const TriangleMesh& mesh) {
+namespace {
+
+NoInside why_crossing(const MeshDefect& found, std::uint64_t closing) {
+  const std::string pairs = found.count < kMostCrossings ? (found.count == 1 ? " pair" : " pairs") : " pairs or more";
+  const std::string what = "has faces that cross or lie on one another: " + std::to_string(found.count) + pairs +
+                           ", the first at " + place_text(found.first_W);
+  if (closing > 0) {
+    return {what, "close_holes_m has added " + std::to_string(closing) + (closing == 1 ? " triangle" : " triangles") +
+                      " over holes, which may be what does: close the hole in the program that made the mesh, and "
+                      "where a corner lies on the whole edge of a neighbour, put a corner into that edge as well"};
+  }
+  return {what,
+          "in the program that made it, unite what overlaps and take out folds and sheets of no thickness; bodies that "
+          "only touch may be objects of their own"};
+}
+
+}  // namespace
+
+NoInside why_no_inside(const TriangleMesh& mesh, std::uint64_t closing) {
   const auto at = [](const MeshDefect& defect) { return ", the first at " + place_text(defect.first_W); };
   if (mesh.closed()) {
     if (mesh.size() < 4) return {"has " + std::to_string(mesh.size()) + " triangles, and the smallest body has 4", ""};
     const MeshDefect found = crossing_faces(mesh);
-    if (found.count == 0) return {};
-    return {"has faces that cross or lie on one another: " + std::to_string(found.count) +
-                (found.count == 1 ? " pair" : " pairs") + at(found),
-            "in the program that made it, unite what overlaps and take out folds and sheets of no thickness; bodies "
-            "that only touch may be objects of their own"};
+    return found.count == 0 ? NoInside{} : why_crossing(found, closing);
   }
   const MeshTopology found = topology_of(mesh);
   if (!found.holes.empty()) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -34,11 +35,12 @@ struct MeshTopology {
 MeshTopology topology_of(const TriangleMesh& mesh);
 
 // What keeps a mesh from being a body, with an inside: "is open, with a hole of 12 mm at …" and the like; and what may
-// be done about it. Empty for one that is.
+// be done about it. Empty for one that is. `closing`: how many of its triangles close_holes_m has added, which may be
+// those that lie on others.
 struct NoInside {
   std::string what, advice;
 };
-NoInside why_no_inside(const TriangleMesh& mesh);
+NoInside why_no_inside(const TriangleMesh& mesh, std::uint64_t closing = 0);
 
 // The mesh with all holes up to that size closed by triangles between their vertices. Where nothing is to be closed the
 // soup is that of the mesh.

@@ -96,8 +96,8 @@ models::MeshTool read_mesh(const YamlNode& node, RigidTool& tool) {
   MeshPlacement placement;
   placement.scale = node.number_or("scale_m", 1.0, between(1e-6, 1e6));
   placement.close_holes_m = node.number_or("close_holes_m", 0.0, between(0.0, 1e3));
-  const auto mesh = load_mesh(file, placement).mesh;
-  if (const models::NoInside found = models::why_no_inside(*mesh); !found.what.empty()) {
+  const auto [mesh, account] = load_mesh(file, placement);
+  if (const models::NoInside found = models::why_no_inside(*mesh, account.closing); !found.what.empty()) {
     throw node.error_at("file", "a closed mesh, which has an inside", file.string() + ", which " + found.what,
                         found.advice);
   }

@@ -59,9 +59,15 @@ std::vector<std::string> mesh_report(const LoadedMesh& loaded) {
   if (found.inside_out > 0) {
     lines.push_back(counted(found.inside_out, "closed part", "closed parts") + " with the fronts of all faces inside");
   }
-  add(lines, models::crossing_faces(mesh), "pair of faces that cross or lie on one another",
-      "pairs of faces that cross or lie on one another");
+  const MeshDefect crossing = models::crossing_faces(mesh);
+  add(lines, crossing, "pair of faces that cross or lie on one another",
+      crossing.count < models::kMostCrossings ? "pairs of faces that cross or lie on one another"
+                                              : "or more pairs of faces that cross or lie on one another");
   return lines;
+}
+
+bool is_a_body(const LoadedMesh& loaded) {
+  return models::why_no_inside(*loaded.mesh, loaded.account.closing).what.empty();
 }
 
 std::vector<std::string> mesh_surprises(const models::TriangleMesh& mesh, double reach_m, double scale) {

@@ -12,6 +12,9 @@ namespace proxarm::scenes {
 // unit. Takes as long as loading the mesh.
 std::vector<std::string> mesh_report(const LoadedMesh& mesh);
 
+// Whether it may be with a rigid tool (models/mesh/mesh_topology.hpp). A point tool takes any mesh.
+bool is_a_body(const LoadedMesh& mesh);
+
 // Of an open mesh: holes that are small against it, through which a proxy falls though they can hardly be seen. And a
 // mesh that is hundreds of times as large as what the arm reaches (or a thousandth of it), which is in another unit
 // than the scene takes it for. Empty for most meshes; of one that is closed it costs nothing.

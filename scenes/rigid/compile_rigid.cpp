@@ -88,7 +88,7 @@ std::string why_not_beside(const Object& object, const models::Tool& tool) {
     return "a rigid tool feels one friction for all of an object, and " + name + " has regions";
   }
   if (const auto* mesh = std::get_if<MeshShape>(&object.shape); mesh != nullptr) {
-    const models::NoInside found = models::why_no_inside(*mesh->mesh);
+    const models::NoInside found = models::why_no_inside(*mesh->mesh, mesh->account.closing);
     const std::string advice = found.advice.empty() ? "" : " (" + found.advice + ")";
     const std::string file = mesh->file.empty() ? "" : ", " + mesh->file.string() + ",";
     if (!found.what.empty()) {

@@ -287,6 +287,42 @@ class RigidTool(ProgramTest):
         self.assertIn("turned.yaml:1: tool: a mesh as a tool can't have faces of which some have their fronts outside",
                       unclear.out + unclear.err)
 
+    CUBE = ([(x, y, z) for x in (-10, 10) for y in (-10, 10) for z in (0, 20)],
+            [(0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3), (0, 5, 1), (0, 4, 5), (2, 3, 7), (2, 7, 6), (0, 1, 3),
+             (0, 3, 2), (4, 6, 7), (4, 7, 5)])
+
+    def mesh(self, name, corners, faces):
+        return self.written(name, "".join("v %g %g %g\n" % c for c in corners) +
+                            "".join("f %d %d %d\n" % tuple(i + 1 for i in f) for f in faces))
+
+    def test_check_says_that_a_mesh_whose_faces_cross_is_for_a_point_tool(self):
+        corners, faces = self.CUBE
+        told = self.call("check", self.mesh("cube.obj", corners, faces))
+        self.assertEqual(told.status, 0, told.err)
+        self.assertRegex(told.out, r"cube\.obj: fine, a mesh\n$")
+        again = [(x + 5, y + 6, z + 7) for x, y, z in corners]
+        told = self.call("check", self.mesh("two.obj", corners + again,
+                                            faces + [tuple(i + 8 for i in f) for f in faces]))
+        self.assertEqual(told.status, 0, told.err)
+        self.assertIn("pairs of faces that cross or lie on one another, such as at x ", told.out)
+        self.assertRegex(told.out, r"two\.obj: fine, a mesh for a point tool; with a rigid tool it is refused, as an "
+                                   r"object and as the tool\n$")
+
+    def test_a_closed_hole_that_makes_faces_lie_on_one_another_is_told_as_that(self):
+        """An edge of the bottom has a corner beside its middle, on a side of the cube: what closes the hole lies on
+        that side."""
+        corners, faces = self.CUBE
+        faces = [f for f in faces if f != (0, 6, 4)] + [(0, 6, 8), (8, 6, 4)]
+        self.mesh("seam.obj", corners + [(0, -10, 0.01)], faces)
+        shape = "mesh: {file: seam.obj, scale_m: 0.001, close_holes_m: 0.001}\n"
+        scene = "dimensions: 3\nobjects:\n  - mesh: {file: seam.obj, scale_m: 0.001, close_holes_m: 0.001}\n"
+        ball = self.written("ball.yaml", "sphere: {radius_m: 0.01}\n")
+        for told in (self.refuse("--scene", SCENES / "wall.yaml", "--tool", self.written("seam.yaml", shape)),
+                     self.refuse("--scene", self.written("scene.yaml", scene), "--tool", ball)):
+            self.assertIn("has faces that cross or lie on one another: ", told)
+            self.assertIn("close_holes_m has added 1 triangle over holes, which may be what does: ", told)
+            self.assertIn("put a corner into that edge as well", told)
+
     def test_check_and_explain_know_tools(self):
         outcome = self.call("check", SCENES / "tools/rod.yaml", SCENES / "box_on_table.yaml")
         self.assertEqual(outcome.status, 0, outcome.err)
