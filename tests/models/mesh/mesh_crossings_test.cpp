@@ -328,28 +328,31 @@ TriangleSoup fan(std::uint32_t sectors) {
   return turned(soup, random);
 }
 
-// Sheets of a tenth of a millimetre, turned in the same way.
-TriangleSoup stack(int sheets) {
+// Sheets of ten micrometres, turned in the same way.
+TriangleSoup stack(std::uint32_t sheets) {
   Random random(817);
   TriangleSoup soup;
-  for (int k = 0; k < sheets; ++k) join(soup, moved(block({0.1, 0.1, 1e-4}), {0.0, 0.0, 2e-4 * k}));
+  for (std::uint32_t k = 0; k < sheets; ++k) join(soup, moved(block({0.1, 0.1, 1e-5}), {0.0, 0.0, 2e-5 * k}));
   return turned(soup, random);
 }
 
-// Twice the fan or the stack has four times the pairs whose boxes meet: they took 17 s for these fans and 11 for the
-// stacks, on the machine that does them in half a second.
+// Twice the fan, or the stack, has four times the pairs whose boxes meet; looking at each took four times as long.
 TEST(MeshCrossings, OfFansAndStacksAreFoundInATimeThatGrowsAboutAsTheirFacesDo) {
 #ifdef PROXARM_SANITIZED
   GTEST_SKIP() << "sanitized";
 #endif
   const auto seconds = [](const TriangleSoup& soup) {
-    const TriangleMesh mesh(soup);
-    const double begun = processor_s();
-    EXPECT_EQ(models::crossing_faces(mesh).count, 0u);
-    return processor_s() - begun;
+    double least_s = 1e9;
+    for (int round = 0; round < 3; ++round) {
+      const TriangleMesh mesh(soup);
+      const double begun = processor_s();
+      EXPECT_EQ(models::crossing_faces(mesh).count, 0u);
+      least_s = std::min(least_s, processor_s() - begun);
+    }
+    return least_s;
   };
-  EXPECT_LT(seconds(fan(20000)), 5.0);
-  EXPECT_LT(seconds(stack(3000)), 5.0);
+  EXPECT_LT(seconds(fan(10000)) / seconds(fan(5000)), 3.0);
+  EXPECT_LT(seconds(stack(2000)) / seconds(stack(1000)), 3.0);
 }
 
 // One needle crosses the fan's other side, or its neighbours; with so many faces that cells are searched.
