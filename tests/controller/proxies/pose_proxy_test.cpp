@@ -141,8 +141,8 @@ TEST(PoseProxy, TakesNoInertiaThatTheHandleExceeds) {
   EXPECT_THROW(config.validate(), description::SetupError);
 }
 
-// By 2π − 0.01 rad in a step it would be turned back. (Found by the stress study, replay 2031848355241022: that gave the
-// tool 28 mJ a step.)
+// By 2π − 0.01 rad in a step it would be turned back. (Found by the stress study, replay 2031848355241022: that gave
+// the tool 28 mJ a step.)
 TEST(PoseProxy, ATorqueThatTurnsByAWholeRevolutionInAStepDoesNotTurnBack) {
   const double T = 4e-3, J = 2.5e-5;
   FreePose g;
