@@ -350,7 +350,7 @@ TEST(MeshCrossings, OfFansAreFoundInATimeThatGrowsAboutAsTheirFacesDo) {
 TEST(MeshCrossings, OfAFanAreThoseThatAllPairsHave) {
   Random random(818);
   std::size_t crossing = 0;
-  for (int i = 0; i < scaled(30); ++i) {
+  for (int i = 0; i < scaled(30, 30); ++i) {
     TriangleSoup soup = globe(2, static_cast<std::uint32_t>(300 + random.below(200)), 0.1);
     const double flat = random.log_uniform(1e-3, 1.0);
     for (Vec3& x : soup.vertices) x.z() *= flat;
