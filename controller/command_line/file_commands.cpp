@@ -110,7 +110,7 @@ void tell_sources(const fs::path& file) {
   }
 }
 
-// What is wrong with a mesh is told; whether that matters is for its scene to say. What the mesh is.
+// What is wrong with a mesh is told; whether that matters is for its scene to say. Returns what is fine.
 const char* tell_mesh(const fs::path& file) {
   const scenes::LoadedMesh loaded = scenes::load_mesh(file, {});
   for (const std::string& line : scenes::mesh_report(loaded)) std::printf("%s\n", line.c_str());

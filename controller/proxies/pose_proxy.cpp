@@ -9,15 +9,15 @@
 namespace proxarm::controller {
 namespace {
 
-// What would turn by more in a step comes around and pulls back, at a whole turn by nothing: as 10 Nm do with 3e-5 kg
-// m² at 250 Hz. It pulls as if to here.
-constexpr double kMostTurn_rad = 1.0;
-
 using models::Mat3;
 using models::Mat6;
 using models::ToolPose;
 using models::Twist;
 using models::Vec3;
+
+// What would turn by more in a step comes around and pulls back, at a whole turn by nothing: as 10 Nm do with 3e-5 kg
+// m² at 250 Hz. It pulls as if to here.
+constexpr double kMostTurn_rad = 1.0;
 
 Mat3 cross_matrix(const Vec3& v) noexcept {
   Mat3 m;

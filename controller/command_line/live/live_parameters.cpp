@@ -251,15 +251,20 @@ std::vector<TimedText> timed_texts(const std::vector<std::string>& texts) {
   return timed;
 }
 
-// What refuses a change may be about something else: more mass is asked for where a timestep is set. The message names
-// the line that it comes from, and that behind it.
-[[noreturn]] void refuse_line(const std::string& line, const std::string& change, const SetupError& error) {
-  description::SetupProblem problem = error.problem();
-  std::string about = problem.key;
-  about.erase(0, std::min(about.find_first_not_of('-'), about.size()));
-  const std::string own = change.substr(0, change.find('='));
-  problem.key = about.empty() || about == own || about == "set" ? line : line + ": " + about;
-  throw SetupError(problem);
+// What take() makes of a change. What refuses it may be about something else: more mass is asked for where a timestep
+// is set. The message names the line that the change comes from, and that behind it.
+template <typename Take>
+auto taken_from(const std::string& line, const std::string& change, Take take) {
+  try {
+    return take(change);
+  } catch (const SetupError& error) {
+    description::SetupProblem problem = error.problem();
+    std::string about = problem.key;
+    about.erase(0, std::min(about.find_first_not_of('-'), about.size()));
+    const std::string own = change.substr(0, change.find('='));
+    problem.key = about.empty() || about == own || about == "set" ? line : line + ": " + about;
+    throw SetupError(problem);
+  }
 }
 
 Script script_of(const std::vector<std::string>& texts, const PreparedSession& session, const RunOptions& options) {
@@ -267,14 +272,13 @@ Script script_of(const std::vector<std::string>& texts, const PreparedSession& s
   Script script;
   for (const TimedText& change : timed_texts(texts)) {
     const std::int64_t rendered_ns = std::llround(1e9 * change.time_s);
-    try {
-      if (LiveParameters::is_timestep(change.text)) {
-        script.timesteps.push_back({rendered_ns, parameters.take_timestep(change.text)});
-      } else {
-        script.changes.push_back({rendered_ns, parameters.take(change.text)});
-      }
-    } catch (const SetupError& error) {
-      refuse_line("--set " + change.text + "@" + change.time, change.text, error);
+    const std::string line = "--set " + change.text + "@" + change.time;
+    const auto timestep = [&](const std::string& text) { return parameters.take_timestep(text); };
+    const auto other = [&](const std::string& text) { return parameters.take(text); };
+    if (LiveParameters::is_timestep(change.text)) {
+      script.timesteps.push_back({rendered_ns, taken_from(line, change.text, timestep)});
+    } else {
+      script.changes.push_back({rendered_ns, taken_from(line, change.text, other)});
     }
   }
   return script;
@@ -306,11 +310,7 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
       refuse("timestep", "one that is set together with others", "one that is set by itself",
              "set the others when the drives have confirmed it: what they may be depends on it");
     }
-    try {
-      changes.push_back(changed.take(text));
-    } catch (const SetupError& error) {
-      refuse_line(text, text, error);
-    }
+    changes.push_back(taken_from(text, text, [&](const std::string& one) { return changed.take(one); }));
   }
   if (cycle.changes().room() < changes.size()) {
     throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});
@@ -328,11 +328,9 @@ std::string change(controller::Cycle& cycle, LiveParameters& parameters, const s
   if (LiveParameters::is_timestep(line) && line.find('\t') == std::string::npos) {
     if (const char* const refusal = cycle.status().timestep_refusal())
       throw SetupError({.key = "timestep", .message = refusal});
-    try {
-      if (!cycle.timesteps().push(parameters.take_timestep(line))) throw SetupError({.found = "too many at once"});
-    } catch (const SetupError& error) {
-      refuse_line(line, line, error);
-    }
+    const auto timestep =
+        taken_from(line, line, [&](const std::string& text) { return parameters.take_timestep(text); });
+    if (!cycle.timesteps().push(timestep)) throw SetupError({.key = line, .found = "too many at once"});
     parameters.count_timestep();
     return line + ": the arm stops, the drives are told, rendering goes on; the session says whether all have taken it";
   }
