@@ -559,8 +559,9 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
   for (const PoseContact& contact : call.contacts) {
     const Vec3 way = call.way_of(contact);
     const double s = way.norm(), bent_m = forward_m(call, contact) + 1e-12;
+    const auto cosine_of = [&](const PoseContact& was) { return was.normal_W.dot(contact.normal_W); };
     const auto met = [&](const PoseContact& was) {
-      return was.object == contact.object && was.normal_W.dot(way) <= bent_m;
+      return was.object == contact.object && was.normal_W.dot(way) <= bent_m && cosine_of(was) > 0.0;
     };
     // A normal turns where it is: of what touched the object before, what was as near as a place may have come, if
     // there is such. (Replay 2305703389568219, step 172: one edge of the tool leaves a face of a mesh for the next
@@ -569,13 +570,12 @@ double ToolLaws::edges_J(const ToolCall& call, const std::vector<PoseContact>& e
       return met(was) && (was.point_W - contact.point_W).norm() <= 2.0 * s;
     };
     const bool near = std::any_of(earlier.begin(), earlier.end(), came);
-    const auto cosine_of = [&](const PoseContact& was) { return was.normal_W.dot(contact.normal_W); };
     const PoseContact* from = nullptr;
     for (const PoseContact& was : earlier) {
       if (near ? !came(was) : !met(was)) continue;
       if (from == nullptr || cosine_of(was) > cosine_of(*from)) from = &was;
     }
-    if (from == nullptr || !(cosine_of(*from) > 0.0)) continue;
+    if (from == nullptr) continue;
     const double sine = contact.normal_W.cross(from->normal_W).norm();
     if (sine > 1e-9) sum += contact.force_W.norm() * s * sine;
   }

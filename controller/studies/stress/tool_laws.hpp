@@ -88,7 +88,8 @@ class ToolLaws {
   // n₀ to n. Along n₀ the place of contact has come to meet the feature or been held by it, n₀ᵀs ≤ 0 (but for what the
   // curvature accounts for), so that nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖: sin α of the way, if the parts of
   // the step say that it is an edge (tool_parts.hpp). `earlier`: what touched before, in the step before or on the way.
-  // What the place came from behind says nothing about it.
+  // What the place came from behind says nothing about it, nor does a normal at a right angle to n or more, where
+  // cos α n₀ᵀs ≥ 0 bounds nothing.
   [[nodiscard]] double edges_J(const ToolCall& call, const std::vector<models::PoseContact>& earlier) const;
 
   // Rounding of a pose, as a length.

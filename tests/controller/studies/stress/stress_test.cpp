@@ -162,6 +162,12 @@ TEST(Stress, AToolThatLiesOnAVertexForAPartOfAStepIsCountedAsAtAnEdge) { expect_
 // to the corner and took its push for 0.6 mJ out of nowhere.
 TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_edges({54327521292900ULL}); }
 
+// Step 18, of 3.4 mm: a corner leaves a box's face over its edge, the tool's edge there slides along that to the box's
+// corner, and goes over it. While it lies on the corner, for a micrometre of the way, both sides of the tool's edge
+// hold it, at 106° to each other. The judge took the far one for where the place came from, since nothing else was as
+// near, and the push of the other one at the end for 334 J out of nowhere.
+TEST(Stress, AToolThatIsHeldAcrossForAMomentOnItsWayOverEdgesIsCountedAsAtAnEdge) { expect_edges({8841141407056297}); }
+
 // Of the first, step 42: a mesh's edge jumps over others, pressed by 700 kN, and all smaller parts lead nowhere. What
 // the step had found gave 7.5 J more than those edges may, and stood unflagged; so it was with 67 µJ in the second,
 // step 621. The step of the last three, 12, 523 and 20, found a place some edges on with p̂ as good as at rest.

@@ -48,6 +48,21 @@ TEST(ToolLaws, WhatAPlaceCameFromBehindSaysNothingAboutAnEdge) {
   EXPECT_EQ(OverAnEdge().allowed_J(Vec3(1.0, 0.0, 1.0)), 0.0);
 }
 
+// At the vertex where a tool turns over one edge it may touch the far side of it, too, at an angle of 90° or more.
+TEST(ToolLaws, ANormalAtARightAngleOrMoreSaysNothingAboutAnEdge) {
+  const OverAnEdge here;
+  PoseContact far = here.contact(Vec3::UnitZ());
+  far.point_W.y() += 2.1e-3;  // from where no place has come that went a millimetre
+  for (const double lean : {-1e-9, 1e-9}) {
+    const PoseContact near = here.contact(Vec3(-1.0, 0.0, 1.0 + lean));
+    const double alone_J = ToolLaws(here.scene, here.tool).edges_J(here.call, {near});
+    const double both_J = ToolLaws(here.scene, here.tool).edges_J(here.call, {far, near});
+    const double sine = lean > 0.0 ? 1.0 : std::sqrt(0.5);
+    EXPECT_EQ(alone_J > 0.0, lean > 0.0);
+    EXPECT_NEAR(both_J, 10.0 * 1e-3 * sine, 1e-12) << lean;
+  }
+}
+
 TEST(ToolLaws, WhereNothingWasMetNoEdgeIsTurnedOver) {
   const OverAnEdge here;
   EXPECT_EQ(ToolLaws(here.scene, here.tool).edges_J(here.call, {}), 0.0);
