@@ -5,7 +5,7 @@
 
 #include "models/rigid/rigid_world.hpp"
 #include "models/rigid_features/near.hpp"
-#include "models/rigid_features/part_box.hpp"
+#include "models/rigid_features/near_faces.hpp"
 #include "models/rigid_features/rigid_features.hpp"
 
 namespace proxarm::models {
@@ -85,126 +85,6 @@ void RigidWorld::pairs_with(const Solid& own, const Bounds& own_box, const Solid
   }
 }
 
-// Which triangles come near a part of the tool, and what of the part comes near them.
-class RigidWorld::NearFaces {
- public:
-  // Of more triangles than `room` it takes none. The tool is on a body's side of its faces, or on either of an open
-  // one.
-  NearFaces(const Solid& solid, const Bounds& box_T, const TriangleFeatures& mesh, double side, const View& at,
-            double near, double turn, std::size_t room) noexcept
-      : solid_(&solid), near_(near), turn_(turn), corners_turn_(turn_of_corners(turn)) {
-    const PartBox around(solid, box_T, at, near);
-    around.each_face(mesh.mesh(), [&](std::uint32_t face, const Bounds& box) {
-      if (count_ == room) return all_ = false;
-      faces_[count_++] = face;
-      // Beyond the tool's own box nothing of it comes near.
-      const Vec3 low = box.low.cwiseMax(around.low_T()), high = box.high.cwiseMin(around.high_T());
-      region_.low = count_ == 1 ? low : region_.low.cwiseMin(low);
-      region_.high = count_ == 1 ? high : region_.high.cwiseMax(high);
-      return true;
-    });
-    if (count_ == 0 || !all_) return;
-    if (side != 0.0 && !(solid.radius > 0.0)) normals_ = cone_around(mesh, side * at.R.transpose());
-    for (std::uint32_t i = 0; i < solid_->faces.size(); ++i) {
-      if (may_hold(i)) facing_[facing_count_++] = static_cast<std::uint16_t>(i);
-    }
-    for (std::uint32_t i = 0; i < solid_->edges.size(); ++i) {
-      const Vec3 &from = solid_->points[solid_->edges[i].from], &to = solid_->points[solid_->edges[i].to];
-      if (!meets(from.cwiseMin(to), from.cwiseMax(to)) || !faces_some(solid_->cones.of_edges[i])) continue;
-      around_[crossing_count_] = {0.5 * (from + to), 0.5 * (to - from).norm()};
-      crossing_[crossing_count_++] = static_cast<std::uint16_t>(i);
-    }
-  }
-
-  [[nodiscard]] double near() const noexcept { return near_; }
-  [[nodiscard]] double turn() const noexcept { return turn_; }  // of poses to come, rad
-  [[nodiscard]] const NormalCone::Angle& corners_turn() const noexcept { return corners_turn_; }
-  [[nodiscard]] bool all() const noexcept { return all_; }  // or there is no room for more
-  [[nodiscard]] std::span<const std::uint32_t> faces() const noexcept { return {faces_.data(), count_}; }
-  // Whether a box of T comes near any of the triangles.
-  [[nodiscard]] bool meets(const Vec3& low, const Vec3& high) const noexcept {
-    return (low.array() <= region_.high.array() + near_).all() && (high.array() >= region_.low.array() - near_).all();
-  }
-  // Whether what of the tool has such normals may rest on any of the triangles.
-  [[nodiscard]] bool faces_some(const NormalCone& cone) const noexcept {
-    return normals_.holds(-cone.axis, cone.half + corners_turn_);
-  }
-  // The tool's faces that a vertex of the triangles may rest on.
-  [[nodiscard]] std::span<const std::uint16_t> facing() const noexcept { return {facing_.data(), facing_count_}; }
-
-  // Calls visit(edge) for the edges whose ball comes near another one.
-  template <typename Visit>
-  void each_crossing(const Vec3& middle, double radius, Visit visit) const noexcept {
-    for (std::size_t i = 0; i < crossing_count_; ++i) {
-      const double most = near_ + radius + around_[i].radius;
-      if ((around_[i].middle - middle).squaredNorm() <= most * most) visit(crossing_[i]);
-    }
-  }
-
-  // Whether two points of T, and so all between them, are further than near before one of the tool's faces. What is
-  // asked next often is so for the same one.
-  [[nodiscard]] bool beyond(const Vec3& y, const Vec3& z) noexcept {
-    const auto out = [&](std::size_t i) {
-      const Solid::Face& face = solid_->faces[facing_[i]];
-      return std::min(face.normal.dot(y), face.normal.dot(z)) - face.offset > near_;
-    };
-    if (witness_ < facing_count_ && out(witness_)) return true;
-    for (std::size_t i = 0; i < facing_count_; ++i) {
-      if (!out(i)) continue;
-      witness_ = i;
-      return true;
-    }
-    return false;
-  }
-
- private:
-  // Whether a vertex of the triangles may rest on a face of the tool, by where the face is and by its normal.
-  [[nodiscard]] bool may_hold(std::uint32_t index) const noexcept {
-    const Solid::Face& face = solid_->faces[index];
-    if (!normals_.holds(-face.normal, solid_->cones.around_faces[index] + corners_turn_)) return false;
-    const auto corners = solid_->corners(face);
-    Vec3 low = solid_->points[corners.front()], high = low;
-    for (const std::uint32_t corner : corners) {
-      low = low.cwiseMin(solid_->points[corner]);
-      high = high.cwiseMax(solid_->points[corner]);
-    }
-    return meets(low, high);
-  }
-  // Around the normals of all triangles and of those that share corners with them.
-  [[nodiscard]] NormalCone cone_around(const TriangleFeatures& mesh, const Mat3& to_T) const noexcept {
-    Vec3 sum = Vec3::Zero();
-    for (const std::uint32_t face : faces()) sum += face_of(mesh, face).normal;
-    const double size = sum.norm();
-    NormalCone cone;
-    if (!(size > 0.0)) return cone;
-    cone.axis = sum / size;
-    NormalCone::Angle widest{1.0, 0.0};
-    for (const std::uint32_t face : faces()) {
-      const NormalCone::Angle half =
-          mesh.around(face) + NormalCone::Angle::between(cone.axis, face_of(mesh, face).normal);
-      if (half.is_any()) return {};
-      if (half.cosine < widest.cosine) widest = half;
-    }
-    cone.half = widest.narrow();
-    return cone.seen_by(to_T);
-  }
-
-  struct Ball {
-    Vec3 middle;
-    double radius;
-  };
-  const Solid* solid_;
-  double near_, turn_;
-  NormalCone::Angle corners_turn_;
-  Bounds region_;  // in T, of the triangles' part within the tool's box
-  std::array<std::uint32_t, most_faces> faces_;
-  NormalCone normals_;  // of the triangles, in T
-  std::array<std::uint16_t, most_edges> facing_, crossing_;
-  std::array<Ball, most_edges> around_;  // those that cross
-  std::size_t count_ = 0, facing_count_ = 0, crossing_count_ = 0, witness_ = 0;
-  bool all_ = true;
-};
-
 // The tool's points.
 template <typename Add>
 void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, double side, const NearFaces& close,
@@ -236,17 +116,19 @@ void RigidWorld::points_with(const Solid& own, const TriangleFeatures& other, do
   }
 }
 
-// A vertex of the mesh, at y in T and with its cone there, with the tool's faces and edges.
+// A vertex of the mesh, at y in T, with the tool's faces and edges.
 template <typename Add>
-void RigidWorld::vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, const NormalCone& cone, NearFaces& close,
-                             Add add) const noexcept {
+void RigidWorld::vertex_with(const Solid& own, const TriangleFeatures& other, std::uint32_t v, const Mat3& to_T,
+                             const Vec3& y, NearFaces& close, Add add) const noexcept {
   const double near = close.near(), near2 = near * near;
   const auto within = [&](double distance2, Kind kind, std::uint32_t i) {
     if (distance2 <= near2) add(kind, i, v, std::sqrt(distance2) - own.radius);
   };
-  if (!close.beyond(y, y)) {
+  if (!close.beyond(y)) {
+    const NormalCone cone = other.cone(v).seen_by(to_T);
     for (const std::uint16_t i : close.facing()) {
       const Solid::Face& face = own.faces[i];
+      if (!(std::abs(face.normal.dot(y) - face.offset) <= near)) continue;
       if (!cone.holds(-face.normal, own.cones.around_faces[i] + close.corners_turn())) continue;
       within(distance2_within(own, face, y, near), Kind::face_point, i);
     }
@@ -256,29 +138,41 @@ void RigidWorld::vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, c
                       [&](std::uint16_t i) { within(distance2_to_segment(y, edge_of(own, i)), Kind::edge_point, i); });
 }
 
-// An edge of the mesh, seen from T, with the tool's edges.
+// An edge of the mesh with the tool's edges.
 template <typename Add>
-void RigidWorld::edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close,
-                           Add add) const noexcept {
-  if (close.beyond(line.from, line.to)) return;
-  const Vec3 middle = 0.5 * (line.from + line.to);
-  const double half = 0.5 * (line.to - line.from).norm();
+void RigidWorld::edge_with(const Solid& own, const TriangleFeatures& other, std::uint32_t e, const View& at,
+                           NearFaces& close, Add add) const noexcept {
+  const TriangleFeatures::Edge& of_mesh = other.edge(e);
+  const Vec3 from = at.to_T(of_mesh.line.from), to = at.to_T(of_mesh.line.to);
+  if (close.beyond_last(from, to)) return;
+  const Vec3 middle = 0.5 * (from + to);
+  const double half = 0.5 * (to - from).norm();
+  std::optional<EdgeLine> line;  // in T; few edges are asked for more than their ends
   close.each_crossing(middle, half, [&](std::uint16_t i) {
+    if (!line) line = edge_in_T(of_mesh.line, at, of_mesh.ridge ? 1.0 : -1.0);
     const EdgeLine edge = edge_of(own, i);
-    const double distance2 = distance2_of_segments(edge, line);
+    const double distance2 = distance2_of_segments(edge, *line);
     if (distance2 > close.near() * close.near()) return;
-    if (!(own.radius > 0.0) && never_hold(edge, line, close.turn())) return;
+    if (!(own.radius > 0.0) && never_hold(edge, *line, close.turn())) return;
     add(Kind::edges, i, e, std::sqrt(distance2) - own.radius);
   });
 }
 
-template <typename Add>
-void RigidWorld::pairs_with(const Solid& own, const Bounds& box, const TriangleFeatures& other, double side,
-                            const View& at, double reach, Add add) noexcept {
-  NearFaces close(own, box, other, side, at, reach + own.radius, reach / shared_->reach, face_room_);
+// Of what stands still. False: no triangle is near, or too many are.
+bool RigidWorld::list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept {
   crowded_ = crowded_ || !close.all();
-  if (!close.all() || close.faces().empty()) return;
+  if (!close.all()) return false;
   near_faces_ += close.faces().size();
+  if (!moves(entry) && near_triangles_.all()) {
+    near_triangles_.begin_with(part, entry);
+    for (const std::uint32_t face : close.faces()) near_triangles_.add(face);
+  }
+  return !close.faces().empty();
+}
+
+template <typename Add>
+void RigidWorld::pairs_with(const Solid& own, const TriangleFeatures& other, double side, const View& at,
+                            NearFaces& close, Add add) noexcept {
   points_with(own, other, side, close, at, add);
   if (own.edges.empty()) return;
   // Inside of a body its normals are the others.
@@ -286,14 +180,14 @@ void RigidWorld::pairs_with(const Solid& own, const Bounds& box, const TriangleF
   for (const std::uint32_t face : close.faces()) {
     if (crowded_) return;
     for (const std::uint32_t v : other.vertices_of(face)) {
-      vertex_with(own, v, at.to_T(other.vertex(v)), other.cone(v).seen_by(to_T), close, add);
+      vertex_with(own, other, v, to_T, at.to_T(other.vertex(v)), close, add);
     }
     for (const std::uint32_t e : other.edges_of(face)) {
       const TriangleFeatures::Edge& edge = other.edge(e);
       // A valley of a closed mesh is touched by nothing sharp.
       const bool is_valley = side != 0.0 && !edge.line.open && edge.ridge != (side > 0.0);
       if (is_valley && !(own.radius > 0.0)) continue;
-      edge_with(own, e, edge_in_T(edge.line, at, edge.ridge ? 1.0 : -1.0), close, add);
+      edge_with(own, other, e, at, close, add);
     }
   }
 }
@@ -333,6 +227,7 @@ RigidWorld::Kind RigidWorld::other_way_round(Kind kind) noexcept {
 void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View& at, double reach) noexcept {
   const Entry& e = shared_->entries[entry];
   const Part& own = shared_->parts[part];
+  const double turn = reach / shared_->reach;
   const auto add = [&](Kind kind, std::uint32_t i, std::uint32_t j, double apart_m) {
     add_pair(kind, part, entry, i, j, apart_m);
   };
@@ -343,12 +238,17 @@ void RigidWorld::gather_part(std::uint16_t part, std::uint16_t entry, const View
   }
   if (mesh != nullptr) {
     if (own.mesh) return gather_meshes(part, entry, at, reach);
-    return pairs_with(own.solid, own.box, **mesh, e.held, at, reach, add);
+    NearFaces close(own.solid, own.box, **mesh, e.held, at, reach, turn, face_room_);
+    if (list_triangles(part, entry, close)) pairs_with(own.solid, **mesh, e.held, at, close, add);
+    return;
   }
   if (solid != nullptr) {
     if (!own.mesh) return pairs_with(own.solid, own.box, *solid, e.box, at, reach, add);
     // Seen from the tool it is a solid near a mesh.
-    return pairs_with(*solid, e.box, *own.mesh, 1.0, inverse(at), reach,
+    const View from_tool = inverse(at);
+    NearFaces close(*solid, e.box, *own.mesh, 1.0, from_tool, reach, turn, face_room_);
+    if (!list_triangles(part, entry, close)) return;
+    return pairs_with(*solid, *own.mesh, 1.0, from_tool, close,
                       [&](Kind kind, std::uint32_t i, std::uint32_t j, double apart_m) {
                         add(other_way_round(kind), j, i, apart_m);
                       });
@@ -417,6 +317,7 @@ bool RigidWorld::look_around(const ToolPose& pose, double reach, std::size_t pai
   pair_count_ = pressed_count_ = near_faces_ = 0;
   crowded_ = false;
   list_leaves(pose, reach);
+  if (near_triangles_.has_room()) near_triangles_.begin(pose, reach);
   for (std::size_t entry = 0; entry < shared_->first_moving; ++entry) {
     gather_entry(static_cast<std::uint16_t>(entry), pose, reach);
   }

@@ -127,7 +127,7 @@ void RigidWorld::gather_meshes(std::uint16_t part, std::uint16_t entry, const Vi
   };
   MeshPairs pairs(flat_mesh(shared_->parts[part]), flat_mesh(e), at, reach);
   if (!moves(entry) && near_leaves_.all()) {
-    pairs.each_of(near_leaves_.of(part, entry), look_at);
+    pairs.each_of(near_leaves_.of(part, entry).value_or(NearLeaves::Items{}), look_at);
   } else {
     pairs.each(look_at);
   }

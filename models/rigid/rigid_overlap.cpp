@@ -53,10 +53,11 @@ double RigidWorld::least_gap_m(const ToolPose& pose) noexcept {
 
 // Features have their gaps on the side on which the tool was. Where it is inside of a solid, or stands in a surface,
 // that says nothing.
-double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noexcept {
+double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) noexcept {
   double deepest = std::numeric_limits<double>::infinity();
   const View tool = view(pose);
   const bool listed = lists_leaves(pose, 0.0);
+  const bool triangles_listed = near_triangles_.all() && motion(pose, near_triangles_.at()) <= near_triangles_.reach();
   for (std::size_t i = 0; i < shared_->entries.size(); ++i) {
     const Entry& e = shared_->entries[i];
     const auto* solid = std::get_if<Solid>(&e.object.shape);
@@ -70,8 +71,13 @@ double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) const noe
     for (std::size_t k = 0; k < shared_->parts.size(); ++k) {
       const auto part = static_cast<std::uint16_t>(k);
       const bool known = listed && mesh != nullptr && shared_->parts[part].mesh && !moves(entry);
-      const double gap = known ? overlap_of_near_leaves(part, entry, at)
-                               : overlap_m(shared_->parts[part], e, at, moves(entry) ? Apart{apart.enough} : apart);
+      Apart here{.enough = apart.enough};
+      if (!moves(entry)) {
+        here.normals = apart.normals;
+        if (apart.enough < 0.0) here.last = &last_planes_.of(part, entry);
+        if (triangles_listed) here.triangles = near_triangles_.of(part, entry);
+      }
+      const double gap = known ? overlap_of_near_leaves(part, entry, at) : overlap_m(shared_->parts[part], e, at, here);
       if (gap < 0.0) deepest = std::min(deepest, gap);
     }
   }
@@ -83,10 +89,11 @@ double RigidWorld::overlap_of_near_leaves(std::uint16_t part, std::uint16_t entr
   const FlatMesh own = flat_mesh(shared_->parts[part]), other = flat_mesh(e);
   MeshPairs pairs(own, other, at, 0.0);
   double deepest = 0.0;
-  pairs.each_of(near_leaves_.of(part, entry), [&](std::uint32_t face, std::uint32_t other_face) {
-    deepest = std::min(deepest, overlap_of_faces(own.mesh, face, other.mesh, other_face, at));
-    return true;
-  });
+  pairs.each_of(near_leaves_.of(part, entry).value_or(NearLeaves::Items{}),
+                [&](std::uint32_t face, std::uint32_t other_face) {
+                  deepest = std::min(deepest, overlap_of_faces(own.mesh, face, other.mesh, other_face, at));
+                  return true;
+                });
   if (deepest < 0.0) return deepest;
   return overlap_of_all(own.mesh, other.mesh, at, should_be_inside(e.object, e.held));
 }
@@ -104,9 +111,9 @@ double RigidWorld::overlap_m(const Part& part, const Entry& entry, const View& a
   if (part.mesh) {
     std::array<Vec3, kMostPlanes> normals;
     const std::size_t count = std::min(apart.normals.size(), normals.size());
-    for (std::size_t i = 0; i < count; ++i) normals[i] = at.R.transpose() * apart.normals[i];
+    for (std::size_t i = 0; i < count; ++i) normals[i] = -(at.R.transpose() * apart.normals[i]);
     return overlap_with_mesh(solid, entry.box, part.mesh->mesh(), inverse(at), false,
-                             {apart.enough, {normals.data(), count}});
+                             {apart.enough, {normals.data(), count}, apart.last, apart.triangles});
   }
   if (part.cylinder && entry.cylinder) {
     return separation_of_cylinders(moved(*part.cylinder, at.R, at.x), *entry.cylinder);
@@ -135,7 +142,7 @@ bool RigidWorld::went_in(const ToolPose& q_old) noexcept {
 
 // Where the tool was, or where that is on something that moves: the first that isn't in anything, or else where it is
 // now.
-ToolPose RigidWorld::out_of_its_way(const ToolPose& q_old) const noexcept {
+ToolPose RigidWorld::out_of_its_way(const ToolPose& q_old) noexcept {
   if (!stands_in(q_old)) return q_old;
   for (const Moving& m : moving_) {
     if (!m.close || m.mover.rests()) continue;
@@ -146,11 +153,11 @@ ToolPose RigidWorld::out_of_its_way(const ToolPose& q_old) const noexcept {
 }
 
 // What the tool touches is mostly on the other side of a plane through a contact, and so is what is next to it.
-bool RigidWorld::stands_in(const ToolPose& pose) const noexcept {
+bool RigidWorld::stands_in(const ToolPose& pose) noexcept {
   std::array<Vec3, kMostPlanes> normals;
   const std::size_t count = std::min(linear_count_, normals.size());
-  for (std::size_t k = 0; k < count; ++k) normals[k] = found_[of_linear_[k]].touch.normal;
-  return overlap_m(pose, {-kGap_m, {normals.data(), count}}) < -kGap_m;
+  for (std::size_t k = 0; k < count; ++k) normals[k] = -found_[of_linear_[k]].touch.normal;
+  return overlap_m(pose, {.enough = -kGap_m, .normals = {normals.data(), count}}) < -kGap_m;
 }
 
 }  // namespace proxarm::models

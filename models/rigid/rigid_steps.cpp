@@ -191,6 +191,7 @@ void RigidWorld::forget() noexcept {
   pair_count_ = pressed_count_ = 0;
   gathered_reach_ = -1.0;
   near_leaves_.forget();
+  near_triangles_.forget();
 }
 
 const ToolPose& RigidWorld::step(const Mat6& K, const ToolPose& p_hat, const ToolPose& q) noexcept {

@@ -150,9 +150,12 @@ RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   const auto is_mesh = [](const Entry& e) {
     return std::holds_alternative<std::shared_ptr<const TriangleFeatures>>(e.object.shape);
   };
+  const std::size_t met = shared->parts.size() * shared->first_moving;
   const bool of_tool = std::any_of(shared->parts.begin(), shared->parts.end(), [](const Part& p) { return p.mesh; });
-  if (of_tool && std::any_of(shared->entries.begin(), shared->entries.end(), is_mesh)) {
-    near_leaves_.make_room(most_leaves, shared->parts.size() * shared->first_moving);
+  const bool of_objects = std::any_of(shared->entries.begin(), shared->entries.end(), is_mesh);
+  if (of_tool || of_objects) near_triangles_.make_room(most_faces, met);
+  if (of_tool && of_objects) {
+    near_leaves_.make_room(most_leaves, met);
     for (Part& part : shared->parts) {
       if (part.mesh) part.discs = NodeDiscs(flat_mesh(part).mesh);
     }

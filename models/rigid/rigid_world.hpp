@@ -34,7 +34,8 @@
 #include "models/local_problem/contact_problem.hpp"
 #include "models/rigid/beside_cylinder.hpp"
 #include "models/rigid_features/mesh_overlap.hpp"
-#include "models/rigid_features/near_leaves.hpp"
+#include "models/rigid_features/near_faces.hpp"
+#include "models/rigid_features/near_lists.hpp"
 #include "models/rigid_features/node_discs.hpp"
 #include "models/rigid_features/rigid_features.hpp"
 #include "models/rigid_features/rigid_mover.hpp"
@@ -169,11 +170,9 @@ class RigidWorld final : public PoseAlgorithm {
   static constexpr int kMostStrides = 1 << 16;  // the same, among objects that move
   static constexpr std::size_t most_pairs = 768;
   static constexpr std::size_t most_found = 512;
-  static constexpr std::size_t most_faces = 4096;   // of a mesh, near a part
+  static constexpr std::size_t most_faces = NearFaces::most_faces, most_edges = NearFaces::most_edges;
   static constexpr std::size_t most_leaves = 4096;  // of two meshes, near each other
-  static constexpr std::size_t most_edges = 6144;   // of a part: a hull of 2000 points has 5994 at most
 
-  class NearFaces;
   // Of an entry that moves.
   struct Moving {
     RigidMover mover;
@@ -237,14 +236,16 @@ class RigidWorld final : public PoseAlgorithm {
   void points_with(const Solid& own, const TriangleFeatures& other, double side, const NearFaces& close, const View& at,
                    Add add) const noexcept;
   template <typename Add>
-  void vertex_with(const Solid& own, std::uint32_t v, const Vec3& y, const NormalCone& cone, NearFaces& close,
-                   Add add) const noexcept;
+  void vertex_with(const Solid& own, const TriangleFeatures& other, std::uint32_t v, const Mat3& to_T, const Vec3& y,
+                   NearFaces& close, Add add) const noexcept;
   template <typename Add>
-  void edge_with(const Solid& own, std::uint32_t e, const EdgeLine& line, NearFaces& close, Add add) const noexcept;
-  // Of a solid with the box of its points, and a mesh. Where more triangles are near than are looked at, it takes none.
+  void edge_with(const Solid& own, const TriangleFeatures& other, std::uint32_t e, const View& at, NearFaces& close,
+                 Add add) const noexcept;
+  // Of a solid and a mesh.
   template <typename Add>
-  void pairs_with(const Solid& own, const Bounds& box, const TriangleFeatures& other, double side, const View& at,
-                  double reach, Add add) noexcept;
+  void pairs_with(const Solid& own, const TriangleFeatures& other, double side, const View& at, NearFaces& close,
+                  Add add) noexcept;
+  bool list_triangles(std::uint16_t part, std::uint16_t entry, const NearFaces& close) noexcept;
   void set_sides(const ToolPose& from, double far) noexcept;
   [[nodiscard]] double side_of_tools_face(const Pair& pair, const View& at, double height, double far) const noexcept;
   [[nodiscard]] double side_of_solids_face(const Pair& pair, const View& at, double height, double far) const noexcept;
@@ -351,9 +352,9 @@ class RigidWorld final : public PoseAlgorithm {
   void judge_slips(const ToolPose& q_old, double rounding) noexcept;
   bool went_in(const ToolPose& q_old) noexcept;
   [[nodiscard]] bool may_be_in() const noexcept { return shared_->dense || let_loose_; }
-  [[nodiscard]] ToolPose out_of_its_way(const ToolPose& q_old) const noexcept;
-  [[nodiscard]] bool stands_in(const ToolPose& pose) const noexcept;
-  [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) const noexcept;
+  [[nodiscard]] ToolPose out_of_its_way(const ToolPose& q_old) noexcept;
+  [[nodiscard]] bool stands_in(const ToolPose& pose) noexcept;
+  [[nodiscard]] double overlap_m(const ToolPose& pose, const Apart& apart = {}) noexcept;
   [[nodiscard]] bool lists_leaves(const ToolPose& pose, double reach) const noexcept;
   [[nodiscard]] double overlap_of_near_leaves(std::uint16_t part, std::uint16_t entry, const View& at) const noexcept;
   [[nodiscard]] static double overlap_m(const Part& part, const Entry& entry, const View& at,
@@ -370,8 +371,10 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;                // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
-  NearLeaves near_leaves_;     // of what stands still; without room where the tool or the objects are no meshes
-  double list_further_ = 2.0;  // leaves are listed so many times as far around as pairs are gathered
+  NearLeaves near_leaves_;        // of what stands still; without room where the tool or the objects are no meshes
+  double list_further_ = 2.0;     // leaves are listed so many times as far around as pairs are gathered
+  NearTriangles near_triangles_;  // likewise, of meshes and of what isn't one; for the pairs of the last gathering
+  LastPlanes last_planes_;
   std::size_t pair_room_ = most_pairs, face_room_ = most_faces, near_faces_ = 0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take

@@ -18,48 +18,65 @@ double to_wrong_side_m(const TriangleMesh& mesh, const Vec3& x, std::optional<bo
   return -mesh.distance(x, std::numeric_limits<double>::infinity(), near);
 }
 
-// Planes that may lie between a solid and triangles: how far the solid reaches along some normals, and against them.
-// What is apart from one triangle is mostly so from those next to it by the same plane.
+// Planes that may lie between a solid and triangles: how far the solid reaches along some normals. What is apart from
+// one triangle is mostly so from those next to it by the same plane.
 class Planes {
  public:
-  Planes(const Solid& solid, const View& at, std::span<const Vec3> normals) noexcept : solid_(&solid), at_(at) {
-    if (solid.rims.empty()) {
-      for (const Vec3& n : normals.first(std::min(normals.size(), kMost))) add(n);
-    }
+  Planes(const Solid& solid, const View& at, const Apart& apart) noexcept : solid_(&solid), at_(at) {
+    if (!solid.rims.empty()) return;
+    for (const Vec3& n : apart.normals.first(std::min(apart.normals.size(), kGiven))) add(n);
+    given_ = added_;
+    if (apart.last == nullptr) return;
+    for (std::size_t i = 0; i < apart.last->count; ++i) add(apart.last->normals[i]);
   }
   // The oldest goes where there is no room.
   void add(const Vec3& normal) noexcept {
-    Plane& plane = planes_[added_++ % kMost];
-    const Vec3 n = at_.R.transpose() * normal;
-    double low = std::numeric_limits<double>::infinity(), high = -low;
-    for (const Vec3& p : solid_->points) {
-      low = std::min(low, n.dot(p));
-      high = std::max(high, n.dot(p));
-    }
-    const double there = normal.dot(at_.x);
-    plane = {normal, low - solid_->radius + there, high + solid_->radius + there};
+    planes_[added_++ % kMost] = {normal, 0.0, false, false};
   }
-  // Whether along one of them more than `gap` is between the two.
-  [[nodiscard]] bool leave(double gap, const std::array<Vec3, 3>& triangle) const noexcept {
+  // Whether a triangle is by more than `gap` beyond one of them.
+  [[nodiscard]] bool leave(double gap, const std::array<Vec3, 3>& triangle) noexcept {
+    if (last_ < added_ && leaves(planes_[last_], gap, triangle)) return true;
     for (std::size_t i = 0; i < std::min(added_, kMost); ++i) {
-      const Plane& plane = planes_[i];
-      const auto [low, high] =
-          std::minmax({plane.normal.dot(triangle[0]), plane.normal.dot(triangle[1]), plane.normal.dot(triangle[2])});
-      if (low - plane.high > gap || plane.low - high > gap) return true;
+      if (i == last_ || !leaves(planes_[i], gap, triangle)) continue;
+      last_ = i;
+      return true;
     }
     return false;
   }
+  // Those that weren't given and that left a triangle.
+  void keep(PlanesBetween& out) const noexcept {
+    out.count = 0;
+    for (std::size_t i = given_; i < std::min(added_, kMost) && out.count < out.normals.size(); ++i) {
+      if (planes_[i].of_use) out.normals[out.count++] = planes_[i].normal;
+    }
+  }
 
  private:
-  static constexpr std::size_t kMost = 16;
+  static constexpr std::size_t kMost = 24, kGiven = 12;
   struct Plane {
     Vec3 normal;
-    double low = 0.0, high = 0.0;  // of the solid
+    double reach = 0.0;  // of the solid, along it
+    bool measured = false, of_use = false;
   };
+  [[nodiscard]] bool leaves(Plane& plane, double gap, const std::array<Vec3, 3>& triangle) const noexcept {
+    if (!plane.measured) measure(plane);
+    for (const Vec3& corner : triangle) {
+      if (!(plane.normal.dot(corner) - plane.reach > gap)) return false;
+    }
+    return plane.of_use = true;
+  }
+  void measure(Plane& plane) const noexcept {
+    const Vec3 n = at_.R.transpose() * plane.normal;
+    double reach = -std::numeric_limits<double>::infinity();
+    for (const Vec3& p : solid_->points) reach = std::max(reach, n.dot(p));
+    plane.reach = reach + solid_->radius + plane.normal.dot(at_.x);
+    plane.measured = true;
+  }
+
   const Solid* solid_;
   View at_;
   std::array<Plane, kMost> planes_;
-  std::size_t added_ = 0;
+  std::size_t added_ = 0, given_ = 0, last_ = 0;  // the one that left a triangle last
 };
 
 }  // namespace
@@ -69,7 +86,7 @@ double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMe
   const Pose X = isometry(at);
   std::optional<Cylinder> cylinder;
   if (!solid.rims.empty()) cylinder = moved(cylinder_of(solid), at.R, at.x);
-  Planes planes(solid, at, apart.normals);
+  Planes planes(solid, at, apart);
   double deepest = 0.0;
   const auto gap_to = [&](const std::array<Vec3, 3>& triangle) {
     if (cylinder) return separation_of_cylinder(*cylinder, triangle);
@@ -80,13 +97,25 @@ double overlap_with_mesh(const Solid& solid, const Bounds& box, const TriangleMe
     if (by.gap > apart.enough) planes.add(by.normal);
     return by.gap;
   };
-  PartBox(solid, box, at, solid.radius).each_face(mesh, [&](std::uint32_t face, const Bounds& /*box*/) {
-    const std::array<Vec3, 3> triangle = {mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
-    if (planes.leave(apart.enough, triangle)) return true;
-    const double gap = gap_to(triangle);
+  const PartBox part_box(solid, box, at, solid.radius);
+  const auto corners = [&](std::uint32_t face) {
+    return std::array<Vec3, 3>{mesh.corner(face, 0), mesh.corner(face, 1), mesh.corner(face, 2)};
+  };
+  const auto judge = [&](std::uint32_t face, const Bounds& /*box*/) {
+    const double gap = gap_to(corners(face));
     if (gap <= apart.enough) deepest = std::min(deepest, gap);
     return true;
-  });
+  };
+  if (apart.triangles) {
+    for (const std::uint32_t face : *apart.triangles) {
+      if (!planes.leave(apart.enough, corners(face))) part_box.look_at(mesh, face, judge);
+    }
+  } else {
+    part_box.each_face(mesh, [&](std::uint32_t face, const Bounds& at_face) {
+      return planes.leave(apart.enough, corners(face)) || judge(face, at_face);
+    });
+  }
+  if (apart.last != nullptr) planes.keep(*apart.last);
   return deepest < 0.0
              ? deepest
              : to_wrong_side_m(mesh, at * (cylinder ? solid.rims[0].centre : solid.points.front()), should_be_inside);

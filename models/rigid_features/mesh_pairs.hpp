@@ -14,9 +14,12 @@ namespace proxarm::models {
 class MeshPairs {
  public:
   MeshPairs(const FlatMesh& own, const FlatMesh& other, const View& at, double near) noexcept
-      : own_(&own.mesh), other_(&other.mesh), own_discs_(&own.discs), other_discs_(&other.discs), at_(at), near_(near) {
-    kept_of_.fill(0xFFFFFFFF);  // no face
-  }
+      : own_(&own.mesh),
+        other_(&other.mesh),
+        own_discs_(&own.discs),
+        other_discs_(&other.discs),
+        at_(at),
+        near_(near) {}
 
   // Leaves of both trees.
   struct Leaves {
@@ -38,7 +41,9 @@ class MeshPairs {
   void each_of(const List& list, Visit visit) noexcept {
     Node own;
     bool any = false;
-    for (const Leaves& leaves : list) {
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const Leaves& leaves = list[i];
+      if (i + kAhead < list.size()) other_discs_->prefetch(list[i + kAhead].other);
       if (!any || own.index != leaves.own) own = own_node(leaves.own);
       any = true;
       const Node other = other_node(leaves.other);
@@ -47,6 +52,7 @@ class MeshPairs {
   }
 
  private:
+  static constexpr std::size_t kAhead = 6;  // most of a large mesh's leaves are in no cache
   // A node of a tree, as of TriangleMesh::NodePair, and its disc in the other mesh's frame.
   struct Node {
     NodeDisc disc;
@@ -94,45 +100,67 @@ class MeshPairs {
     if (!apart(own.disc, other.disc, near_)) stack[top++] = {own, other};
   }
 
-  // A triangle of the own mesh, in the other frame.
+  // In the other frame.
   struct Triangle {
     std::array<Vec3, 3> corners;
     Vec3 low, high, normal;
   };
-  [[nodiscard]] Triangle own_triangle(std::uint32_t i) const noexcept {
-    Triangle out;
-    for (std::size_t k = 0; k < 3; ++k) out.corners[k] = at_ * own_->corner(i, k);
-    out.low = out.corners[0].cwiseMin(out.corners[1]).cwiseMin(out.corners[2]);
-    out.high = out.corners[0].cwiseMax(out.corners[1]).cwiseMax(out.corners[2]);
-    out.normal.noalias() = at_.R * own_->face(i).normal;
-    return out;
+  // The same triangles are asked for again and again, against others.
+  class Kept {
+   public:
+    Kept() noexcept { face_of_.fill(0xFFFFFFFF); }  // no face
+    template <typename Make>
+    [[nodiscard]] const Triangle& of(std::uint32_t face, Make make) noexcept {
+      const std::size_t at = face % triangles_.size();
+      if (face_of_[at] == face) return triangles_[at];
+      Triangle& out = triangles_[at];
+      make(out);
+      out.low = out.corners[0].cwiseMin(out.corners[1]).cwiseMin(out.corners[2]);
+      out.high = out.corners[0].cwiseMax(out.corners[1]).cwiseMax(out.corners[2]);
+      face_of_[at] = face;
+      return out;
+    }
+
+   private:
+    std::array<Triangle, 64> triangles_;
+    std::array<std::uint32_t, 64> face_of_;
+  };
+  [[nodiscard]] const Triangle& own_triangle(std::uint32_t i) noexcept {
+    return kept_own_.of(i, [&](Triangle& out) {
+      for (std::size_t k = 0; k < 3; ++k) out.corners[k] = at_ * own_->corner(i, k);
+      out.normal.noalias() = at_.R * own_->face(i).normal;
+    });
+  }
+  [[nodiscard]] const Triangle& other_triangle(std::uint32_t j) noexcept {
+    return kept_other_.of(j, [&](Triangle& out) {
+      for (std::size_t k = 0; k < 3; ++k) out.corners[k] = other_->corner(j, k);
+      out.normal = other_->face(j).normal;
+    });
+  }
+  [[nodiscard]] bool boxes_apart(const Triangle& own, const Vec3& low, const Vec3& high) const noexcept {
+    return ((own.low - high).array() > near_).any() || ((low - own.high).array() > near_).any();
   }
   // By their boxes and their planes.
-  [[nodiscard]] bool come_near(const Triangle& own, std::uint32_t j) const noexcept {
-    const std::array<Vec3, 3> b = {other_->corner(j, 0), other_->corner(j, 1), other_->corner(j, 2)};
-    const Vec3 low = b[0].cwiseMin(b[1]).cwiseMin(b[2]), high = b[0].cwiseMax(b[1]).cwiseMax(b[2]);
-    if (((own.low - high).array() > near_).any() || ((low - own.high).array() > near_).any()) return false;
-    return !on_one_side(other_->face(j).normal, b[0], own.corners) && !on_one_side(own.normal, own.corners[0], b);
+  [[nodiscard]] bool come_near(const Triangle& own, const Triangle& other) const noexcept {
+    if (boxes_apart(own, other.low, other.high)) return false;
+    return !on_one_side(other.normal, other.corners[0], own.corners) &&
+           !on_one_side(own.normal, own.corners[0], other.corners);
   }
 
   template <typename Visit>
   bool look_at(const Node& own, const Node& other, Visit& visit) noexcept {
+    const TriangleMesh::NodePair& pair = other_->structure().nodes[other.index / 2];
+    const std::size_t which = other.index % 2;
+    const Vec3 low(pair.low(which, 0), pair.low(which, 1), pair.low(which, 2));
+    const Vec3 high(pair.high(which, 0), pair.high(which, 1), pair.high(which, 2));
     for (std::uint32_t i = own.first; i < own.first + own.count; ++i) {
-      const Triangle& triangle = kept(i);
+      const Triangle& triangle = own_triangle(i);
+      if (boxes_apart(triangle, low, high)) continue;
       for (std::uint32_t j = other.first; j < other.first + other.count; ++j) {
-        if (come_near(triangle, j) && !visit(i, j)) return false;
+        if (come_near(triangle, other_triangle(j)) && !visit(i, j)) return false;
       }
     }
     return true;
-  }
-  // The same triangles are asked for again and again, against others.
-  [[nodiscard]] const Triangle& kept(std::uint32_t face) noexcept {
-    const std::size_t at = face % kept_.size();
-    if (kept_of_[at] != face) {
-      kept_[at] = own_triangle(face);
-      kept_of_[at] = face;
-    }
-    return kept_[at];
   }
 
   // Whether a triangle is further from a plane than it may be.
@@ -147,8 +175,7 @@ class MeshPairs {
   const NodeDiscs *own_discs_, *other_discs_;
   View at_;
   double near_;
-  std::array<Triangle, 64> kept_;
-  std::array<std::uint32_t, 64> kept_of_;  // which ones they are
+  Kept kept_own_, kept_other_;
 };
 
 }  // namespace proxarm::models

@@ -53,15 +53,7 @@ class PartBox {
     }
   }
 
- private:
-  // This box and one along the axes of W, by the six axes of both.
-  [[nodiscard]] bool reaches(const Vec3& low, const Vec3& high) const noexcept {
-    const Vec3 way = 0.5 * (low + high) - middle_, half = 0.5 * (high - low);
-    if ((way.cwiseAbs() - half - half_).maxCoeff() > 0.0) return false;
-    if (distance2_to_box(middle_, {low, high}) > ball2_) return false;
-    return ((at_.R.transpose() * way).cwiseAbs() - spread_.transpose() * half - half_T_).maxCoeff() <= 0.0;
-  }
-
+  // The same of one face.
   template <typename Visit>
   bool look_at(const TriangleMesh& mesh, std::uint32_t face, Visit& visit) const noexcept {
     Bounds box;
@@ -75,6 +67,15 @@ class PartBox {
     if (solid_->radius > 0.0 && !near_round(0.5 * (box.low + box.high), 0.5 * (box.high - box.low).norm())) return true;
     if (distance2_to_box(middle_T_, box) > ball2_) return true;
     return visit(face, box);
+  }
+
+ private:
+  // This box and one along the axes of W, by the six axes of both.
+  [[nodiscard]] bool reaches(const Vec3& low, const Vec3& high) const noexcept {
+    const Vec3 way = 0.5 * (low + high) - middle_, half = 0.5 * (high - low);
+    if ((way.cwiseAbs() - half - half_).maxCoeff() > 0.0) return false;
+    if (distance2_to_box(middle_, {low, high}) > ball2_) return false;
+    return ((at_.R.transpose() * way).cwiseAbs() - spread_.transpose() * half - half_T_).maxCoeff() <= 0.0;
   }
 
   // Whether a ball of T may come near a sphere or a capsule.

@@ -1,6 +1,7 @@
 #include "models/rigid_shapes/solid.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -17,6 +18,18 @@ void require(bool fine, const char* what) {
   if (!fine) throw std::invalid_argument(what);
 }
 
+Solid::Around around(const Solid& solid, std::span<const std::uint32_t> points) {
+  Solid::Around out;
+  out.low = out.high = solid.points[points.front()];
+  for (const std::uint32_t i : points) {
+    out.low = out.low.cwiseMin(solid.points[i]);
+    out.high = out.high.cwiseMax(solid.points[i]);
+  }
+  out.middle = 0.5 * (out.low + out.high);
+  out.half = 0.5 * (out.high - out.low).norm();
+  return out;
+}
+
 Solid finished(Solid solid) {
   solid.reach = 0.0;
   for (const Vec3& p : solid.points) solid.reach = std::max(solid.reach, p.norm() + solid.radius);
@@ -25,6 +38,11 @@ Solid finished(Solid solid) {
     for (const Solid::Face& face : solid.faces) visit(face.normal, solid.corners(face));
   });
   for (const Solid::Edge& edge : solid.edges) solid.cones.of_edges.push_back(cone_of_edge(edge.left, edge.right));
+  for (const Solid::Edge& edge : solid.edges) {
+    const std::array<std::uint32_t, 2> ends{edge.from, edge.to};
+    solid.around_edges.push_back(around(solid, ends));
+  }
+  for (const Solid::Face& face : solid.faces) solid.around_faces.push_back(around(solid, solid.corners(face)));
   return solid;
 }
 

@@ -32,6 +32,11 @@ struct Solid {
     Vec3 u = Vec3::UnitX(), v = Vec3::UnitY();  // unit, across the axis
     double radius = 0.0;
   };
+  // A box, and the ball of an edge's length in its middle.
+  struct Around {
+    Vec3 low, high, middle;
+    double half = 0.0;
+  };
 
   std::vector<Vec3> points;
   NormalCones cones;  // of its points and faces
@@ -39,6 +44,7 @@ struct Solid {
   std::vector<Face> faces;
   std::vector<std::uint32_t> ring;
   std::vector<Rim> rims;
+  std::vector<Around> around_edges, around_faces;  // without the radius, for first looks. Of a mesh as a tool, none
   double radius = 0.0;
   double reach = 0.0;  // the largest distance of a point of the solid from the frame's origin
 

@@ -1,0 +1,131 @@
+// Which triangles come near a part of the tool, and what of the part comes near them.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "models/rigid_features/near.hpp"
+#include "models/rigid_features/part_box.hpp"
+#include "models/rigid_features/rigid_features.hpp"
+
+namespace proxarm::models {
+
+class NearFaces {
+ public:
+  static constexpr std::size_t most_faces = 4096;  // of a mesh, near a part
+  static constexpr std::size_t most_edges = 6144;  // of a part: a hull of 2000 points has 5994 at most
+
+  // Of more triangles than `room` it takes none. The tool is on a body's side of its faces, or on either of an open
+  // one.
+  NearFaces(const Solid& solid, const Bounds& box_T, const TriangleFeatures& mesh, double side, const View& at,
+            double reach, double turn, std::size_t room) noexcept
+      : solid_(&solid), near_(reach + solid.radius), turn_(turn), corners_turn_(turn_of_corners(turn)) {
+    const PartBox around(solid, box_T, at, near_);
+    around.each_face(mesh.mesh(), [&](std::uint32_t face, const Bounds& box) {
+      if (count_ == room) return all_ = false;
+      faces_[count_++] = face;
+      // Beyond the tool's own box nothing of it comes near.
+      const Vec3 low = box.low.cwiseMax(around.low_T()), high = box.high.cwiseMin(around.high_T());
+      region_.low = count_ == 1 ? low : region_.low.cwiseMin(low);
+      region_.high = count_ == 1 ? high : region_.high.cwiseMax(high);
+      return true;
+    });
+    if (count_ == 0 || !all_) return;
+    if (side != 0.0 && !(solid.radius > 0.0)) normals_ = cone_around(mesh, side * at.R.transpose());
+    for (std::uint32_t i = 0; i < solid_->faces.size(); ++i) {
+      if (may_hold(i)) facing_[facing_count_++] = static_cast<std::uint16_t>(i);
+    }
+    for (std::uint32_t i = 0; i < solid_->edges.size(); ++i) {
+      const Solid::Around& around_edge = solid_->around_edges[i];
+      if (!meets(around_edge.low, around_edge.high) || !faces_some(solid_->cones.of_edges[i])) continue;
+      crossing_[crossing_count_++] = static_cast<std::uint16_t>(i);
+    }
+  }
+
+  [[nodiscard]] double near() const noexcept { return near_; }
+  [[nodiscard]] double turn() const noexcept { return turn_; }  // of poses to come, rad
+  [[nodiscard]] const NormalCone::Angle& corners_turn() const noexcept { return corners_turn_; }
+  [[nodiscard]] bool all() const noexcept { return all_; }  // or there is no room for more
+  [[nodiscard]] std::span<const std::uint32_t> faces() const noexcept { return {faces_.data(), count_}; }
+  // Whether a box of T comes near any of the triangles.
+  [[nodiscard]] bool meets(const Vec3& low, const Vec3& high) const noexcept {
+    return (low.array() <= region_.high.array() + near_).all() && (high.array() >= region_.low.array() - near_).all();
+  }
+  // Whether what of the tool has such normals may rest on any of the triangles.
+  [[nodiscard]] bool faces_some(const NormalCone& cone) const noexcept {
+    return normals_.holds(-cone.axis, cone.half + corners_turn_);
+  }
+  // The tool's faces that a vertex of the triangles may rest on.
+  [[nodiscard]] std::span<const std::uint16_t> facing() const noexcept { return {facing_.data(), facing_count_}; }
+
+  // Calls visit(edge) for the edges whose ball comes near another one.
+  template <typename Visit>
+  void each_crossing(const Vec3& middle, double radius, Visit visit) const noexcept {
+    for (std::size_t i = 0; i < crossing_count_; ++i) {
+      const Solid::Around& edge = solid_->around_edges[crossing_[i]];
+      const double most = near_ + radius + edge.half;
+      if ((edge.middle - middle).squaredNorm() <= most * most) visit(crossing_[i]);
+    }
+  }
+
+  // Whether a point of T is further than near before one of the tool's faces. What is asked next often is so for the
+  // same one.
+  [[nodiscard]] bool beyond(const Vec3& y) noexcept {
+    if (beyond_last(y, y)) return true;
+    for (std::size_t i = 0; i < facing_count_; ++i) {
+      if (!(height(i, y) > near_)) continue;
+      witness_ = i;
+      return true;
+    }
+    return false;
+  }
+  // Whether two, and so all between them, are before the one that told last.
+  [[nodiscard]] bool beyond_last(const Vec3& y, const Vec3& z) const noexcept {
+    return witness_ < facing_count_ && std::min(height(witness_, y), height(witness_, z)) > near_;
+  }
+
+ private:
+  [[nodiscard]] double height(std::size_t i, const Vec3& y) const noexcept {
+    const Solid::Face& face = solid_->faces[facing_[i]];
+    return face.normal.dot(y) - face.offset;
+  }
+  // Whether a vertex of the triangles may rest on a face of the tool, by where the face is and by its normal.
+  [[nodiscard]] bool may_hold(std::uint32_t index) const noexcept {
+    const Solid::Around& around = solid_->around_faces[index];
+    return meets(around.low, around.high) &&
+           normals_.holds(-solid_->faces[index].normal, solid_->cones.around_faces[index] + corners_turn_);
+  }
+  // Around the normals of all triangles and of those that share corners with them.
+  [[nodiscard]] NormalCone cone_around(const TriangleFeatures& mesh, const Mat3& to_T) const noexcept {
+    Vec3 sum = Vec3::Zero();
+    for (const std::uint32_t face : faces()) sum += face_of(mesh, face).normal;
+    const double size = sum.norm();
+    NormalCone cone;
+    if (!(size > 0.0)) return cone;
+    cone.axis = sum / size;
+    NormalCone::Angle widest{1.0, 0.0};
+    for (const std::uint32_t face : faces()) {
+      const NormalCone::Angle half =
+          mesh.around(face) + NormalCone::Angle::between(cone.axis, face_of(mesh, face).normal);
+      if (half.is_any()) return {};
+      if (half.cosine < widest.cosine) widest = half;
+    }
+    cone.half = widest.narrow();
+    return cone.seen_by(to_T);
+  }
+
+  const Solid* solid_;
+  double near_, turn_;
+  NormalCone::Angle corners_turn_;
+  Bounds region_;  // in T, of the triangles' part within the tool's box
+  std::array<std::uint32_t, most_faces> faces_;
+  NormalCone normals_;  // of the triangles, in T
+  std::array<std::uint16_t, most_edges> facing_, crossing_;
+  std::size_t count_ = 0, facing_count_ = 0, crossing_count_ = 0, witness_ = 0;
+  bool all_ = true;
+};
+
+}  // namespace proxarm::models
