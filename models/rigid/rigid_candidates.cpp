@@ -134,7 +134,7 @@ void RigidWorld::vertex_with(const Solid& own, const TriangleFeatures& other, st
     }
   }
   if (!(own.radius > 0.0)) return;
-  close.each_crossing(y, 0.0,
+  close.each_crossing(y, y,
                       [&](std::uint16_t i) { within(distance2_to_segment(y, edge_of(own, i)), Kind::edge_point, i); });
 }
 
@@ -145,10 +145,8 @@ void RigidWorld::edge_with(const Solid& own, const TriangleFeatures& other, std:
   const TriangleFeatures::Edge& of_mesh = other.edge(e);
   const Vec3 from = at.to_T(of_mesh.line.from), to = at.to_T(of_mesh.line.to);
   if (close.beyond_last(from, to)) return;
-  const Vec3 middle = 0.5 * (from + to);
-  const double half = 0.5 * (to - from).norm();
   std::optional<EdgeLine> line;  // in T; few edges are asked for more than their ends
-  close.each_crossing(middle, half, [&](std::uint16_t i) {
+  close.each_crossing(from.cwiseMin(to), from.cwiseMax(to), [&](std::uint16_t i) {
     if (!line) line = edge_in_T(of_mesh.line, at, of_mesh.ridge ? 1.0 : -1.0);
     const EdgeLine edge = edge_of(own, i);
     const double distance2 = distance2_of_segments(edge, *line);

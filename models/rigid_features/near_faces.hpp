@@ -61,13 +61,13 @@ class NearFaces {
   // The tool's faces that a vertex of the triangles may rest on.
   [[nodiscard]] std::span<const std::uint16_t> facing() const noexcept { return {facing_.data(), facing_count_}; }
 
-  // Calls visit(edge) for the edges whose ball comes near another one.
+  // Calls visit(edge) for the tool's edges whose box comes near another one of T.
   template <typename Visit>
-  void each_crossing(const Vec3& middle, double radius, Visit visit) const noexcept {
+  void each_crossing(const Vec3& low, const Vec3& high, Visit visit) const noexcept {
+    const Vec3 least = low - Vec3::Constant(near_), most = high + Vec3::Constant(near_);
     for (std::size_t i = 0; i < crossing_count_; ++i) {
       const Solid::Around& edge = solid_->around_edges[crossing_[i]];
-      const double most = near_ + radius + edge.half;
-      if ((edge.middle - middle).squaredNorm() <= most * most) visit(crossing_[i]);
+      if ((edge.low.array() <= most.array()).all() && (edge.high.array() >= least.array()).all()) visit(crossing_[i]);
     }
   }
 

@@ -25,8 +25,6 @@ Solid::Around around(const Solid& solid, std::span<const std::uint32_t> points) 
     out.low = out.low.cwiseMin(solid.points[i]);
     out.high = out.high.cwiseMax(solid.points[i]);
   }
-  out.middle = 0.5 * (out.low + out.high);
-  out.half = 0.5 * (out.high - out.low).norm();
   return out;
 }
 

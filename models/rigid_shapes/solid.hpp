@@ -32,10 +32,8 @@ struct Solid {
     Vec3 u = Vec3::UnitX(), v = Vec3::UnitY();  // unit, across the axis
     double radius = 0.0;
   };
-  // A box, and the ball of an edge's length in its middle.
-  struct Around {
-    Vec3 low, high, middle;
-    double half = 0.0;
+  struct Around {  // a box
+    Vec3 low, high;
   };
 
   std::vector<Vec3> points;
