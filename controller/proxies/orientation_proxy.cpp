@@ -44,6 +44,7 @@ void OrientationConfig::validate() const {
   // Less than π by more than a step, so that no step can jump to the other side of the limit.
   require_option(is_not_negative(max_angle_rad) && max_angle_rad <= 3.0, "orientation.max_angle", max_angle_rad,
                  "rad, from 0 to 3");
+  axis_range.validate();
   require_option(is_positive(period_s), "--timestep", period_s, "seconds, above 0");
   require_option(max_speed_rad_per_s * period_s <= 0.1, "orientation.max_speed", max_speed_rad_per_s,
                  "rad/s, at most 0.1 rad in a period");
@@ -147,11 +148,10 @@ ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
   const Vec3 phi = rotation_vector(R * R_start_.conjugate());
   const double before_rad = rotation_vector(R_WT_ * R_start_.conjugate()).norm();
   const double reachable_rad = reachable_angle_rad(before_rad, config_.max_angle_rad, T);
-  const bool too_far = phi.norm() > reachable_rad;
-  if (too_far) {
-    R = (rotation(reachable_rad / phi.norm() * phi) * R_start_).normalized();
-    omega = rotation_vector(R * R_WT_.conjugate()) / T;
-  }
+  bool too_far = phi.norm() > reachable_rad;
+  if (too_far) R = (rotation(reachable_rad / phi.norm() * phi) * R_start_).normalized();
+  if (config_.axis_range.limits()) too_far = config_.axis_range.keep(R_start_, R_WT_, {T, T * fastest}, R) || too_far;
+  if (too_far) omega = rotation_vector(R * R_WT_.conjugate()) / T;
   limit_torque_W_.setZero();
   if (too_fast || too_far) limit_torque_W_ = impedance_W() * (omega - unlimited) / T;
   R_WT_ = R;

@@ -13,10 +13,10 @@
 // beside the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
 // pose_proxy.hpp.)
 //
-// Two limits: the speed, and the angle from the orientation at the first start. They are sets onto which the motion is
-// projected. The projected motion becomes the history, so nothing winds up. The set of angles is reached as a brake
-// reaches a wall, in `braking_s`, since joints can't stop at once; whoever is beyond it (an arm that couldn't brake,
-// and took the proxy along) is led back at `reference_rad_per_s`, not within a step.
+// Limits: the speed, the angle from the orientation at the first start, and tilt and twist of an axis. They are sets
+// onto which the motion is projected. The projected motion becomes the history, so nothing winds up. The set of angles
+// is reached as a brake reaches a wall, in `braking_s`, since joints can't stop at once; whoever is beyond it (an arm
+// that couldn't brake, and took the proxy along) is led back at `reference_rad_per_s`, not within a step.
 //
 // The spring's R_ref is the orientation at the first start, but for a while after the spring has become stiffer and
 // after a hold: then it is where the spring's torque is what it was (zero after a hold), and returns at
@@ -29,6 +29,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "controller/proxies/axis_range.hpp"
 #include "controller/proxies/proxy_step.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
@@ -43,6 +44,7 @@ struct OrientationConfig {
   double spring_Nm_per_rad = 0.0;                       // K ≥ 0
   double max_speed_rad_per_s = 2.0;                     // > 0, at most 0.1 rad in a period
   double max_angle_rad = 0.7;                           // from the orientation at the start; 0..3
+  AxisRange axis_range{};                               // of tilt and twist, likewise
   double period_s = 1e-3;                               // T > 0
 
   // Throws description::SetupError that names the key.

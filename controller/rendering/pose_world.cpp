@@ -116,9 +116,14 @@ void PoseWorld::limit_rotation(ToolPose& p_hat) noexcept {
   const double before_rad = models::rotation_vector(q.orientation * home_.orientation.conjugate()).norm();
   const double reachable_rad =
       OrientationProxy::reachable_angle_rad(before_rad, config_.max_turn_rad, proxy_.config().period_s);
-  if (angle.norm() <= reachable_rad) return;
-  p_hat.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
-  turning_limited_ = true;
+  if (angle.norm() > reachable_rad) {
+    p_hat.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
+    turning_limited_ = true;
+  }
+  if (!config_.axis_range.limits()) return;
+  const AxisRange::Step step{proxy_.config().period_s, most};
+  const bool kept = config_.axis_range.keep(home_.orientation, q.orientation, step, p_hat.orientation);
+  turning_limited_ = kept || turning_limited_;
 }
 
 void PoseWorld::return_reference() noexcept {

@@ -4,14 +4,15 @@
 // a step, orientation() after it, turn_to() before start() and resume().
 //
 // Limits act on p̂, before 𝒢: its place is projected onto the step's sets (step_limits.hpp), and its rotation onto those
-// of speed and of the angle from the orientation at the first start. Contacts come after them. So q keeps the limits as
-// long as contacts lead nearer to q(k−1), as they do with everything that stands still; beyond that the guards of the
-// setpoints have the last word, as always (docs/tool.md).
+// of speed, of the angle from the orientation at the first start and of tilt and twist. Contacts come after them. So q
+// keeps the limits as long as contacts lead nearer to q(k−1), as they do with everything that stands still; beyond that
+// the guards of the setpoints have the last word, as always (docs/tool.md).
 #pragma once
 
 #include <memory>
 
 #include "controller/limits/limited_algorithm.hpp"
+#include "controller/proxies/axis_range.hpp"
 #include "controller/proxies/pose_proxy.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/scene_changes.hpp"
@@ -24,6 +25,7 @@ struct PoseWorldConfig {
   PoseConfig proxy;
   double max_turning_speed_rad_per_s = 2.0;
   double max_turn_rad = 0.7;  // from the orientation at the first start
+  AxisRange axis_range{};
 };
 
 class PoseWorld final : public RenderedWorld {

@@ -166,6 +166,14 @@ double proxy_mass(const description::Cell& cell, const SessionSettings& settings
                     .advice = "ask for more mass, or use a lighter tool"});
 }
 
+AxisRange axis_range(const description::CellLimits& limits) {
+  AxisRange range;
+  range.max_tilt_rad = limits.max_tilt_rad.value_or(AxisRange::everything);
+  range.max_twist_rad = limits.max_twist_rad.value_or(AxisRange::everything);
+  range.axis_T = models::Vec3(limits.tilt_axis[0], limits.tilt_axis[1], limits.tilt_axis[2]);
+  return range;
+}
+
 OrientationConfig orientation_config(const description::Cell& cell, const SessionSettings& settings) {
   OrientationConfig config;
   config.free = settings.orientation == OrientationMode::free;
@@ -178,6 +186,7 @@ OrientationConfig orientation_config(const description::Cell& cell, const Sessio
   config.spring_Nm_per_rad = settings.rotational_spring_Nm_per_rad;
   config.max_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
   config.max_angle_rad = cell.limits.max_turn_rad;
+  config.axis_range = axis_range(cell.limits);
   config.period_s = settings.period_s;
   return config;
 }
@@ -200,6 +209,7 @@ PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings
                   .behind_inertia_T_kg_m2 = behind.about_T_kg_m2};
   config.max_turning_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
   config.max_turn_rad = cell.limits.max_turn_rad;
+  config.axis_range = axis_range(cell.limits);
   return config;
 }
 

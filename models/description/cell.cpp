@@ -304,6 +304,15 @@ BoxDescription read_box(const YamlNode& node) {
   return box;
 }
 
+// Unit.
+std::array<double, 3> read_direction(const YamlNode& node, const char* key, const std::array<double, 3>& otherwise) {
+  std::array<double, 3> way = node.vec3_or(key, otherwise, between(-1e3, 1e3));
+  const double length = std::hypot(way[0], way[1], way[2]);
+  if (!(length >= 1e-3)) throw node.error_at(key, "a direction: three numbers that aren't all next to 0");
+  for (double& part : way) part /= length;
+  return way;
+}
+
 CellLimits read_limits(const YamlNode& node) {
   CellLimits limits;
   limits.max_tool_speed_m_per_s =
@@ -316,6 +325,12 @@ CellLimits read_limits(const YamlNode& node) {
       node.number_or("max_turning_speed_rad_per_s", limits.max_turning_speed_rad_per_s, above(0.0, 20.0));
   // Less than π by more than a step, so that no step can jump to the other side of the limit.
   limits.max_turn_rad = node.number_or("max_turn_rad", limits.max_turn_rad, 0.0, 3.0);
+  if (node.has("max_tilt_rad")) limits.max_tilt_rad = node.number("max_tilt_rad", 0.0, 3.0);
+  if (node.has("max_twist_rad")) limits.max_twist_rad = node.number("max_twist_rad", 0.0, 3.0);
+  limits.tilt_axis = read_direction(node, "tilt_axis", limits.tilt_axis);
+  if (node.has("tilt_axis") && !limits.max_tilt_rad && !limits.max_twist_rad) {
+    throw node.error_at("tilt_axis", "max_tilt_rad or max_twist_rad beside it");
+  }
   limits.max_force_N = node.number_or("max_force_N", limits.max_force_N, above(0.0, 1e5));
   limits.max_power_W = node.number_or("max_power_W", limits.max_power_W, 0.0, 1e5);
   limits.following_error_rad = node.number_or("following_error_rad", limits.following_error_rad, above(0.0, 1.0));

@@ -163,12 +163,14 @@ struct CellLimits {
   double max_tool_speed_m_per_s = 0.5;
   double max_elbow_speed_m_per_s = 0.5;  // of elbow and wrist; a cell that doesn't say has the tool's
   double max_tool_acceleration_m_per_s2 = 20.0;
-  double max_turning_speed_rad_per_s = 2.0;  // of the tool, where the hand may turn it
-  double max_turn_rad = 0.7;                 // of the tool, from its orientation at the start; 0 to 3
-  double max_force_N = 200.0;                // above it the sensor's reading is taken as a fault
-  double max_power_W = 80.0;                 // that the arm gives to the hand or takes from it; 0: no limit
-  double leash_m = 0.02;                     // from the tool, as measured, to the proxy
-  double following_error_rad = 1e-3;         // of a drive that stands still: beyond it, setpoints wait for it
+  double max_turning_speed_rad_per_s = 2.0;               // of the tool, where the hand may turn it
+  double max_turn_rad = 0.7;                              // of the tool, from its orientation at the start; 0 to 3
+  std::optional<double> max_tilt_rad{}, max_twist_rad{};  // 0 to 3: of an axis of the tool, and about it
+  std::array<double, 3> tilt_axis{0.0, 0.0, 1.0};         // in T, unit
+  double max_force_N = 200.0;                             // above it the sensor's reading is taken as a fault
+  double max_power_W = 80.0;          // that the arm gives to the hand or takes from it; 0: no limit
+  double leash_m = 0.02;              // from the tool, as measured, to the proxy
+  double following_error_rad = 1e-3;  // of a drive that stands still: beyond it, setpoints wait for it
   std::array<double, 3> workspace_min_m{-std::numeric_limits<double>::infinity(),
                                         -std::numeric_limits<double>::infinity(),
                                         -std::numeric_limits<double>::infinity()};  // of the rendered point, in W

@@ -45,6 +45,22 @@ def rotation_vector(q, start):
     return [scale * x, scale * y, scale * z]
 
 
+def axis_x(q):
+    """Where the tool's x axis points."""
+    x, y, z, w = q
+    return (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
+
+
+def twist_about_x(q, start):
+    """The angle about the tool's x axis that is left once that axis is led back the shortest way."""
+    a, b = axis_x(q), axis_x(start)
+    across = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+    way = (*across, 1 + sum(p * r for p, r in zip(a, b)))
+    size = math.hypot(*way)
+    left = product(tuple(part / size for part in way), q)
+    return sum(p * r for p, r in zip(rotation_vector(left, start), b))
+
+
 def point_off(row, away_m):
     """A point of the steel that is off the rendered one by so much along each of the tool's axes."""
     place, q = ([float(row[f"true_tool_W_{axis}"]) for axis in axes] for axes in (("x_m", "y_m", "z_m"), ("qx", "qy", "qz", "qw")))
@@ -293,10 +309,7 @@ class Turning(ProgramTest):
                 self.assertLess(turned(row, "proxy", [float(rows[-1][f"proxy_W_q{part}"]) for part in "xyzw"]), 0.02)
 
     def test_limits_of_turning(self):
-        text = (SOURCE / "models/cells/default.yaml").read_text()
-        text = text.replace("../../", f"{SOURCE}/").replace("../", f"{SOURCE}/models/")
-        text = text.replace("limits:\n", "limits:\n  max_turning_speed_rad_per_s: 0.2\n  max_turn_rad: 0.1\n")
-        cell = self.written("slow.yaml", text)
+        cell = self.limited("slow.yaml", "  max_turning_speed_rad_per_s: 0.2\n  max_turn_rad: 0.1\n")
         turn = self.written("turn.yaml", "turning_stiffness_Nm_per_rad: 20\nturning_damping_Nms_per_rad: 0.5\n"
                             "waypoints: [{time_s: 0.5, turn_rad: [0, 0, 0]}, {time_s: 1.5, turn_rad: [0, 0.3, 0.2]}]\n")
         summary = self.summary(cell, *FREE, "--hand", turn, "--inertia", "0.05", "--duration", "4s", "--record", "limits")
@@ -306,6 +319,43 @@ class Turning(ProgramTest):
         self.assertAlmostEqual(max(angles), 0.1, delta=1e-9)
         fastest = max(math.hypot(*rotation_vector(b, a)) for a, b in zip(poses, poses[1:]))
         self.assertAlmostEqual(fastest / PERIOD_S, 0.2, delta=1e-9)
+
+    def limited(self, name, limits):
+        """The default cell with more limits."""
+        text = (SOURCE / "models/cells/default.yaml").read_text()
+        text = text.replace("../../", f"{SOURCE}/").replace("../", f"{SOURCE}/models/")
+        return self.written(name, text.replace("limits:\n", f"limits:\n{limits}"))
+
+    def test_limits_of_tilt_and_twist(self):
+        """Of the steel, by where its axis points: a point and a tool with a shape, about an axis that isn't the tool's z."""
+        cell = self.limited("upright.yaml", "  max_tilt_rad: 0.1\n  max_twist_rad: 0.15\n  tilt_axis: [2, 0, 0]\n")
+        turn = self.written("turn.yaml", "turning_stiffness_Nm_per_rad: 20\nturning_damping_Nms_per_rad: 0.5\n"
+                            "waypoints: [{time_s: 0.5, turn_rad: [0, 0, 0]}, {time_s: 1.5, turn_rad: [0.4, 0.3, 0.1]},\n"
+                            "            {time_s: 3, turn_rad: [-0.4, 0.1, -0.4]}]\n")
+        for shape in ((), ("--tool", SOURCE / "scenes/tools/rod.yaml")):
+            summary = self.summary(cell, *FREE, *shape, "--hand", turn, "--inertia", "0.05", "--duration", "4s",
+                                   "--record", "upright")
+            self.assertIn("orientation", summary["active_limits"])
+            rows = self.rows("upright")
+            for of, more_rad in (("proxy", 1e-9), ("true_tool", 0.01)):  # the steel: the twist of the gears, as above
+                poses = [[float(row[f"{of}_W_q{part}"]) for part in "xyzw"] for row in rows]
+                axes = [axis_x(pose) for pose in poses]
+                tilts = [math.dist(axis, axes[0]) for axis in axes]  # a chord: 0.04 % less than its angle
+                twists = [twist_about_x(pose, poses[0]) for pose in poses]
+                self.assertLess(max(tilts), 2 * math.sin(0.05) + more_rad)
+                self.assertGreater(max(tilts), 0.09)
+                self.assertLess(max(twists), 0.15 + more_rad)
+                self.assertLess(-min(twists), 0.15 + more_rad)
+                self.assertGreater(max(twists) - min(twists), 0.27)
+
+    def test_what_limits_of_tilt_cannot_be(self):
+        for limits, told in (("  max_tilt_rad: 4\n", "max_tilt_rad"), ("  max_twist_rad: -1\n", "max_twist_rad"),
+                             ("  max_tilt_rad: 1\n  tilt_axis: [0, 0, 0]\n", "a direction"),
+                             ("  tilt_axis: [0, 1, 0]\n", "max_tilt_rad or max_twist_rad")):
+            outcome = self.call("run", self.limited("wrong.yaml", limits), *FREE)
+            self.assertEqual(outcome.status, 2, outcome.err)
+            self.assertIn(told, outcome.err)
+            self.assertEqual(outcome.err.count("\n"), 1)
 
 
 if __name__ == "__main__":
