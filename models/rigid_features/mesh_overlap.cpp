@@ -30,9 +30,7 @@ class Planes {
     for (std::size_t i = 0; i < apart.last->count; ++i) add(apart.last->normals[i]);
   }
   // The oldest goes where there is no room.
-  void add(const Vec3& normal) noexcept {
-    planes_[added_++ % kMost] = {normal, 0.0, false, false};
-  }
+  void add(const Vec3& normal) noexcept { planes_[added_++ % kMost] = {normal, 0.0, false, false}; }
   // Whether a triangle is by more than `gap` beyond one of them.
   [[nodiscard]] bool leave(double gap, const std::array<Vec3, 3>& triangle) noexcept {
     if (last_ < added_ && leaves(planes_[last_], gap, triangle)) return true;
