@@ -46,6 +46,7 @@ struct Figures {
   std::int64_t steps = 0, touching = 0, slipping = 0, unresolved = 0, noisy = 0;
   double deepest_m = 0.0;
   double imbalance_N = 0.0, cone_N = 0.0, against_slip_N = 0.0, pull_N = 0.0, apart_N = 0.0;
+  double unresolved_imbalance_N = 0.0;
   std::int64_t over_corners = 0;  // steps of which it had to be asked what they met first
   std::int64_t rises = 0;         // in which contacts gave more energy than rounding and curvature can
   double created_J = 0.0;
@@ -61,17 +62,31 @@ double yields(const Mat6& K, const PoseContact& contact, const ToolPose& q, cons
 // What isn't a number is more than any.
 void raise(double& most, double value) { most = std::max(std::isnan(value) ? 1e300 : value, most); }
 
+// The largest force, of which bounds are for 10 N.
+double scale_of(std::span<const PoseContact> contacts, const Twist& wrench) {
+  double size = std::max(10.0, wrench.head<3>().norm());
+  for (const PoseContact& contact : contacts) size = std::max(size, contact.force_W.norm());
+  return 10.0 / size;
+}
+
+// By how much the contacts' wrenches miss K (q ⊟ p̂), at 10 N.
+double imbalance_N(std::span<const PoseContact> contacts, const Mat6& K, const Twist& wrench, const ToolPose& q) {
+  Twist off = -wrench;
+  for (const PoseContact& contact : contacts) {
+    off.head<3>() += contact.force_W;
+    off.tail<3>() += (contact.point_W - q.position).cross(contact.force_W);
+  }
+  // A coordinate is rounded by half of its last place, which the coupling makes a force of.
+  const double rounding_m = 0.5 * std::numeric_limits<double>::epsilon() * q.position.norm();
+  return std::max(0.0, off.norm() - K(0, 0) * rounding_m) * scale_of(contacts, wrench);
+}
+
 // The law as pose_algorithm.hpp states it.
 void judge(std::span<const PoseContact> contacts, const std::vector<double>& mu, const Mat6& K, const Twist& wrench,
            const ToolPose& before, const ToolPose& q, Figures& out) {
-  Twist sum = Twist::Zero();
-  double size = std::max(10.0, wrench.head<3>().norm());
-  for (const PoseContact& contact : contacts) size = std::max(size, contact.force_W.norm());
-  const double share = 10.0 / size;
+  const double share = scale_of(contacts, wrench);
   for (const PoseContact& contact : contacts) {
     const Vec3 &f = contact.force_W, &n = contact.normal_W, lever = contact.point_W - q.position;
-    sum.head<3>() += f;
-    sum.tail<3>() += lever.cross(f);
     const double f_n = n.dot(f), limit = mu[static_cast<std::size_t>(contact.object)] * f_n;
     const Vec3 f_t = f - f_n * n, way = contact.point_W - before * (q.orientation.conjugate() * lever);
     const Vec3 slip = way - n * n.dot(way);
@@ -87,9 +102,7 @@ void judge(std::span<const PoseContact> contacts, const std::vector<double>& mu,
     }
     out.slipping += contact.slips ? 1 : 0;
   }
-  // A coordinate is rounded by half of its last place, which the coupling makes a force of.
-  const double rounding_m = 0.5 * std::numeric_limits<double>::epsilon() * q.position.norm();
-  const double off = std::max(0.0, (sum - wrench).norm() - K(0, 0) * rounding_m) * share;
+  const double off = imbalance_N(contacts, K, wrench, q);
   raise(out.imbalance_N, off);
   out.noisy += off > 1e-10 ? 1 : 0;
 }
@@ -193,6 +206,9 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
     }
     if (g.unresolved()) {
       ++out.unresolved;
+      // Friction is left out of it, and what is left holds the tool in balance all the same.
+      raise(out.unresolved_imbalance_N,
+            imbalance_N(g.contacts(), held.K, held.K * difference(held.q, p), held.q));
     } else if (!g.contacts().empty()) {
       ++out.touching;
       judge(g.contacts(), world.mu, held.K, held.K * difference(held.q, p), before, held.q, out);
@@ -217,17 +233,20 @@ void hunt(const char* name, std::uint64_t first_seed, double most_unresolved,
   std::cout << "  " << name << ": " << out.steps << " steps, " << out.touching << " touching, " << out.slipping
             << " contacts slipping, " << out.unresolved << " steps unresolved; deepest " << out.deepest_m
             << " m; at 10 N: imbalance " << out.imbalance_N << " N (" << out.noisy
-            << " steps beyond 1e-10), out of the cone " << out.cone_N << ", against slip " << out.against_slip_N
+            << " steps beyond 1e-10), of unresolved steps " << out.unresolved_imbalance_N << ", out of the cone " << out.cone_N << ", against slip " << out.against_slip_N
             << ", pull " << out.pull_N << ", with a gap " << out.apart_N << "; energy created in " << out.rises
             << " steps, at most " << out.created_J << " J (" << out.over_corners << " asked what they met first)\n";
   if (alone != nullptr) return;
   // The last step of the iteration still turns levers: seldom, of contacts that press each other, by more than 1e-10 N.
-  EXPECT_LE(out.imbalance_N, 1e-9);
-  EXPECT_LE(out.noisy, 1 + out.touching / 1000);
+  // None of a key's first 300,000 steps is beyond that, and 763 of 2.55 million are, by 3.1e-10 N at most.
+  const bool few = out.steps <= 75'000;
+  EXPECT_LE(out.imbalance_N, few ? 1e-10 : 1e-9);
+  EXPECT_LE(out.noisy, few ? 0 : out.touching / 1000);
+  EXPECT_LE(out.unresolved_imbalance_N, 1e-10);
   EXPECT_LE(out.cone_N, 1e-10);
   EXPECT_LE(out.against_slip_N, 1e-8);
-  EXPECT_LE(out.pull_N, 1e-9);
-  EXPECT_LE(out.apart_N, 1e-8);
+  EXPECT_LE(out.pull_N, 1e-10);
+  EXPECT_LE(out.apart_N, 1e-10);
   EXPECT_GT(out.touching, out.steps / 10) << "or else this looks at nothing";
   EXPECT_LE(static_cast<double>(out.unresolved), 1.0 + most_unresolved * static_cast<double>(out.steps));
   EXPECT_EQ(out.rises, 0);
