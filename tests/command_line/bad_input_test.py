@@ -174,6 +174,23 @@ class CellFile(ProgramTest):
         self.refuse(START, "start_rad: [0, 5, 0.5, 0, 1, 0]", "default.yaml:9: start_rad[1]: found 5", '"axis_2"',
                     "-1.6 to 2.3 rad")
 
+    def test_a_start_outside_of_the_workspace_or_in_a_keep_out_is_refused(self):
+        """With a point and with a turning tool that has a shape: at (0.7, 0, 0.6) m."""
+        limit = "limits:\n  workspace_m: {min: [0.4, -0.5, 0.3], max: [%s, 0.5, 1]}"
+        zone = "limits:\n  keep_out_m: [{min: [0.6, -0.1, 0.5], max: [%s, 0.1, 0.8]}]"
+        cell = self.copies() / CELL
+        shipped = cell.read_text()
+        for tool in ([], ["--tool", SOURCE / "scenes/tools/rod.yaml", "--inertia", "0.05"]):
+            for text, outside, inside, key, expected in (
+                    (limit, 0.69, 0.71, "limits.workspace_m", "a start inside of it"),
+                    (zone, 0.71, 0.69, "limits.keep_out_m", "a start outside of all of them")):
+                with self.subTest(key=key, tool=tool):
+                    cell.write_text(shipped.replace("limits:", text % outside, 1))
+                    self.assert_refused(self.call("run", cell, *tool), f"default.yaml: {key}: found the start of the tool",
+                                        expected)
+                    cell.write_text(shipped.replace("limits:", text % inside, 1))
+                    self.summary(cell, *tool, "--duration", "100ms")
+
     def test_a_start_in_a_singularity_is_refused(self):
         self.refuse(START, "start_rad: [0, 0, 0, 0, 0, 0]", "start_rad", "singular", "expected a pose")
         self.refuse(START, "start_rad: [0, 0.0675, 0.5008, 0, 0, 0]", "start_rad", "singular")  # wrist stretched

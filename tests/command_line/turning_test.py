@@ -114,6 +114,7 @@ class Turning(ProgramTest):
 
         # 3.25e-4 kg m² of the default cell's handle, and 0.25 kg at 0.04 m from the rendered point.
         refuse("--inertia 0.0007", "--inertia", "0.0007 kg m²", "more than the handle's own 0.000725 kg m²")
+        refuse("--inertia 0.000725", "found 0.000725 kg m²", "more than the handle's own 0.000725 kg m²")  # at it, too
         refuse("--inertia -1", '--inertia: found "-1"', "moment of inertia")
         refuse("--inertia 0.1 --orientation held", "--inertia", "--orientation held", "--orientation free")
         refuse("--turning-spring 10 --orientation held", "--turning-spring")
