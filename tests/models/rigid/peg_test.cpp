@@ -84,6 +84,41 @@ TEST(PegInItsHole, GoesInOrJamsAsWhitneysDiagramSays) {
   RecordProperty("furthest_from_the_formula", std::to_string(worst));
 }
 
+// Touched along its side, on one side alone: f_A and f_B are on that side, F_x = f_A + f_B and F_z = μ (f_A + f_B), so that
+// it goes in between the borders F_x/F_z = ±1/μ, wherever along the side they press.
+TEST(PegInItsHole, GoesInBetweenTheBordersOfOneSide) {
+  const Mat6 K = stiffness(4.0, 0.05, 1e-4);
+  const double r = kHole_m, F_z = 10.0;
+  double worst = 0.0;
+  for (const double mu : {0.1, 0.3}) {
+    for (const double length : {0.012, 0.03}) {
+      RigidWorld g = peg_in_tube(length, mu);
+      for (const double sign : {-1.0, 1.0}) {
+        ToolPose q;
+        q.position = Vec3(sign * kClearance_m, 0.0, -0.5 * length);
+        ASSERT_NEAR(g.clearance_m(q), 0.0, 1e-16);
+        for (const double along : {0.1, 0.3, 0.5, 0.7, 0.9}) {
+          const auto goes_in = [&](double share) {
+            const double F_x = share * F_z / mu;
+            Twist w;
+            w << sign * F_x, 0.0, -F_z, 0.0, sign * (along * length * F_x + r * F_z), 0.0;
+            const ToolPose next = g.step(K, moved(q, K.inverse() * w), q);
+            EXPECT_FALSE(g.unresolved()) << "mu " << mu << " length " << length << " along " << along;
+            return next.position.z() < q.position.z() - 1e-6 * F_z / K(0, 0);
+          };
+          double low = 0.5, high = 1.5;
+          ASSERT_TRUE(goes_in(low)) << along;
+          ASSERT_FALSE(goes_in(high)) << along;
+          for (int i = 0; i < 20; ++i) (goes_in(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
+          EXPECT_NEAR(low, 1.0, 1e-5) << "mu " << mu << " length " << length << " along " << along;  // 2⁻¹⁹ of bisection
+          worst = std::max(worst, std::abs(low - 1.0));
+        }
+      }
+    }
+  }
+  RecordProperty("furthest_from_the_formula", std::to_string(worst));
+}
+
 // -- random pushes ----------------------------------------------------------------------------------------------------
 
 using Real = long double;
