@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "models/base/random.hpp"
+
 namespace proxarm::studies {
 namespace {
 
@@ -12,6 +14,23 @@ constexpr double kLeast = 1e-12;  // of the way, or of a wait, a part
 constexpr std::size_t kMost = 400;
 // A foot may lie so far beside its feature and count (touch.hpp, beside_m): before an edge by that, and behind it.
 constexpr double kBeside_m = 1e-10;
+// Off a point: ten times that. Contacts that are nearer to each other than so are at one.
+constexpr double kAside_m = 10.0 * kBeside_m;
+// Directions to put a tool aside. (Of replay 5693172070329278 a fifth leads away from its vertex: those that lead out
+// of the object, and to the other side of it.)
+constexpr int kAsides = 32;
+
+// Whether several contacts with an object press at one place.
+bool lies_on_point(const std::vector<models::PoseContact>& contacts) {
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const models::PoseContact &a = contacts[i], &b = contacts[j];
+      if (a.object != b.object || a.force_W.isZero(0.0) || b.force_W.isZero(0.0)) continue;
+      if ((a.point_W - b.point_W).norm() <= kAside_m) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -39,20 +58,30 @@ std::optional<ToolParts::Mark> ToolParts::divide(const std::vector<Mark>& marks,
   return out;
 }
 
-void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, std::vector<Pose>& way) const {
+models::ToolPose ToolParts::from(const Pose& pose, Aside& aside) const {
+  const models::ToolPose& r = pose.call.r;
+  if (!lies_on_point(pose.call.contacts)) return r;
+  aside.lay = true;
+  const models::ToolPose out = models::moved(r, aside.by);
+  return laws_.depth_m(out, pose.call.time_s) <= 0.0 ? out : r;
+}
+
+void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, Aside& aside,
+                       std::vector<Pose>& way) const {
   const Mark reached = way.back().mark;
   for (auto mark = std::upper_bound(marks.begin(), marks.end(), reached); mark != marks.end(); ++mark) {
     Pose next{*mark, call, 0.0};
     const Pose& last = way.back();
+    const models::ToolPose start = from(last, aside);
     const auto g = fresh_.clone();
     next.call.p = models::moved(call.q, mark->share * models::difference(call.p, call.q));
     const double since = last.mark.share == mark->share ? last.mark.waited : 0.0, waited = mark->waited;
     // h/(1 + h)
     const double drawn = waited == 1.0 ? 1.0 : (waited - since) / (waited - since + (1.0 - since) * (1.0 - waited));
-    if (drawn < 1.0) next.call.p = models::moved(last.call.r, drawn * models::difference(next.call.p, last.call.r));
+    if (drawn < 1.0) next.call.p = models::moved(start, drawn * models::difference(next.call.p, start));
     next.call.time_s = time_of(call, *mark);
     g->set_time({.time_s = next.call.time_s, .period_s = next.call.time_s - time_of(call, last.mark)});
-    next.call.r = g->step(call.K, next.call.p, last.call.r);
+    next.call.r = g->step(call.K, next.call.p, start);
     if (g->unresolved()) continue;
     next.call.contacts.assign(g->contacts().begin(), g->contacts().end());
     for (models::PoseContact& contact : next.call.contacts) contact.force_W /= drawn;
@@ -94,13 +123,21 @@ ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector
 bool ToolParts::keep(const ToolCall& call, double short_m, double rest_J,
                      std::vector<models::PoseContact>& touched) const {
   const std::size_t before = touched.size();
-  return std::any_of(kFirst.begin(), kFirst.end(), [&](int parts) {
+  Aside aside;
+  const auto keeps = [&](int parts) {
     touched.resize(before);
-    return keep_from(parts, call, short_m, rest_J, touched);
-  });
+    return keep_from(parts, aside, call, short_m, rest_J, touched);
+  };
+  if (std::any_of(kFirst.begin(), kFirst.end(), keeps)) return true;
+  models::Random random(std::uint64_t{1});
+  for (int k = 0; k < kAsides && aside.lay; ++k) {
+    aside.by << kAside_m * random.direction(), kAside_m / ToolLaws::lever_m * random.direction();
+    if (keeps(kFirst.front())) return true;
+  }
+  return false;
 }
 
-bool ToolParts::keep_from(int parts, const ToolCall& call, double short_m, double rest_J,
+bool ToolParts::keep_from(int parts, Aside& aside, const ToolCall& call, double short_m, double rest_J,
                           std::vector<models::PoseContact>& touched) const {
   std::vector<Mark> marks;
   for (int k = 0; k <= parts; ++k) marks.push_back({static_cast<double>(k) / parts, 1.0});
@@ -110,7 +147,7 @@ bool ToolParts::keep_from(int parts, const ToolCall& call, double short_m, doubl
   const double allowed_J = laws_.curvature_J(call);
   const std::size_t before = touched.size();
   while (true) {
-    follow(call, marks, way);
+    follow(call, marks, aside, way);
     touched.resize(before);
     for (std::size_t k = 1; k < way.size(); ++k) {
       if (way[k].mark.share == 1.0) continue;

@@ -44,6 +44,11 @@
 // it does. None leads to where a fault does: 5459542357847018, step 719, was by a wedge, held by two vertices beyond
 // it, and of ways of 1 to 64 parts all came to lie in the wedge.
 //
+// All of a step's ways may lead through such a place, onto the needle, and the step beyond it (5693172070329278, step
+// 17: an edge of the tool slides along a mesh's edge to its end, and over the vertex there on one of its sides). As on
+// a needle it doesn't stay there: put a nanometre aside it falls. In a wedge it does. So a way may go on from next to
+// where it lies on a point; that it was put there, and what pushes it on from the point itself, counts as any part's.
+//
 // Friction is against the slip, by which it takes energy; what part of it a place comes back in a jump says nothing.
 // Nor does a pose for which no forces are found: parts are those between the others.
 #pragma once
@@ -64,7 +69,7 @@ class ToolParts {
   // Whether what is pushed forward in the parts is no more than curvature may give, and edges that it goes over account
   // for `rest_J`, by what touched before the step, to be given, and on the way, added: at each eighth at least where
   // forces were found, and closer where the parts push while something isn't accounted for. If that isn't so of a way
-  // that is divided in eighths first, of one that is divided otherwise. `short_m`: of gaps at q.
+  // that is divided in eighths first, of one that is divided otherwise, or put aside. `short_m`: of gaps at q.
   [[nodiscard]] bool keep(const ToolCall& call, double short_m, double rest_J,
                           std::vector<models::PoseContact>& touched) const;
 
@@ -82,6 +87,11 @@ class ToolParts {
   [[nodiscard]] static double time_of(const ToolCall& call, const Mark& mark) {
     return call.since_s + mark.share * (call.time_s - call.since_s);
   }
+  // By what a way is put aside where it lies on a point, and whether it has lain on one.
+  struct Aside {
+    models::Twist by = models::Twist::Zero();
+    bool lay = false;
+  };
   struct Sum {
     double all_J = 0.0, undivided_J = 0.0;  // of what can't be divided any more
     double most_J = 0.0;                    // the part that pushes most,
@@ -90,10 +100,12 @@ class ToolParts {
   };
   static std::optional<Mark> between(const Mark& a, const Mark& b);
   static std::optional<Mark> divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to);
-  [[nodiscard]] bool keep_from(int parts, const ToolCall& call, double short_m, double rest_J,
+  [[nodiscard]] bool keep_from(int parts, Aside& aside, const ToolCall& call, double short_m, double rest_J,
                                std::vector<models::PoseContact>& touched) const;
   // From the last of the poses on, to p̂.
-  void follow(const ToolCall& call, const std::vector<Mark>& marks, std::vector<Pose>& way) const;
+  void follow(const ToolCall& call, const std::vector<Mark>& marks, Aside& aside, std::vector<Pose>& way) const;
+  // Where a way goes on from.
+  [[nodiscard]] models::ToolPose from(const Pose& pose, Aside& aside) const;
   [[nodiscard]] double pushed_J(const Pose& from, const Pose& to) const;
   // Of a way's parts, the last of which leads to the step's end, or to the way's where that one pushes since q by as
   // much or more.

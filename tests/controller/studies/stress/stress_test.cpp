@@ -168,6 +168,11 @@ TEST(Stress, AToolMayComeOverAnEdgeToASolutionToWhichItsPartsDontLead) { expect_
 // near, and the push of the other one at the end for 334 J out of nowhere.
 TEST(Stress, AToolThatIsHeldAcrossForAMomentOnItsWayOverEdgesIsCountedAsAtAnEdge) { expect_edges({8841141407056297}); }
 
+// Step 17: an edge of the tool slides along a mesh's edge to its end, and by the vertex there, over which a face of the
+// tool comes and the next one. All ways in parts come to lie on the vertex instead, as on a needle's point, by both
+// faces beside the tool's edge. From a nanometre beside it they fall, and come to where the step does.
+TEST(Stress, AToolThatGoesByAVertexOnWhichItsPartsComeToLieIsCountedAsAtAnEdge) { expect_edges({5693172070329278}); }
+
 // Of the first, step 42: a mesh's edge jumps over others, pressed by 700 kN, and all smaller parts lead nowhere. What
 // the step had found gave 7.5 J more than those edges may, and stood unflagged; so it was with 67 µJ in the second,
 // step 621. The step of the last three, 12, 523 and 20, found a place some edges on with p̂ as good as at rest.
