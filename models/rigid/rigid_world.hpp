@@ -371,10 +371,8 @@ class RigidWorld final : public PoseAlgorithm {
   ToolPose from_;                // where the sides were taken
   ToolPose gathered_at_;
   double gathered_reach_ = -1.0;
-  NearLeaves near_leaves_;        // of what stands still; without room where the tool or the objects are no meshes
-  double list_further_ = 2.0;     // leaves are listed so many times as far around as pairs are gathered
-  NearTriangles near_triangles_;  // likewise, of meshes and of what isn't one; for the pairs of the last gathering
-  LastPlanes last_planes_;
+  NearLeaves near_leaves_;     // of what stands still; without room where the tool or the objects are no meshes
+  double list_further_ = 2.0;  // leaves are listed so many times as far around as pairs are gathered
   std::size_t pair_room_ = most_pairs, face_room_ = most_faces, near_faces_ = 0;
   bool crowded_ = false;  // more pairs than there is room for, when they were gathered
   int budget_ = 0;        // poses that this step may still take
@@ -415,6 +413,9 @@ class RigidWorld final : public PoseAlgorithm {
   bool held_ = false;              // the last local problem by the forces of the one before
   double beside_ = beside_m;       // how far beside a feature a foot may lie, in the present attempt
   double over_m_ = beside_m;       // and how far beyond a valley or an edge's end, of what pressed in the last solution
+  // Of what a mesh and what isn't one may stand in each other by (they are looked at once a step).
+  NearTriangles near_triangles_;  // of the last gathering
+  LastPlanes last_planes_;
 };
 
 }  // namespace proxarm::models
