@@ -1,6 +1,6 @@
 // The local problem against solvers that share no code with it: all combinations of contact states in long double, and
-// the Siconos library. Counts at scale 1; PROXARM_TEST_SCALE=17 makes them 1,700, 10,200 and 2,550 (of conditions up to a
-// million), as does .ci/nightly property twice.
+// the Siconos library. Counts at scale 1; PROXARM_TEST_SCALE=17 makes them 1,700, 10,200 and 2,550 (of conditions up to
+// a million), as does .ci/nightly property twice.
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -44,8 +44,8 @@ TEST(ContactProblem, FindsASolutionWheneverBruteForceDoesAndTheSame) {
   EXPECT_LE(brute_missed, cases / 100) << "or else the judge is blind";
 }
 
-// With stiffnesses up to a condition. The law is met to 1e-10 in the norms of K, up to √condition less in those of force and
-// way (2.5e-9 in 2,550 problems up to a million); and Siconos comes to its end of fewer.
+// With stiffnesses up to a condition. The law is met to 1e-10 in the norms of K, up to √condition less in those of
+// force and way (2.5e-9 in 2,550 problems up to a million); and Siconos comes to its end of fewer.
 struct Siconos {
   double condition, law, least_judged;
 };
@@ -86,7 +86,8 @@ void agree_with_siconos(std::int64_t cases, std::uint64_t seed, const Siconos& b
   // Where contacts hold each other the law is met to 1e-10 only, and δ to some hundred times that.
   EXPECT_LE(worst, 1e-8);
   EXPECT_LE(loose, cases / 1000);
-  EXPECT_GE(static_cast<double>(judged), bounds.least_judged * static_cast<double>(cases)) << "or else this looks at nothing";
+  EXPECT_GE(static_cast<double>(judged), bounds.least_judged * static_cast<double>(cases))
+      << "or else this looks at nothing";
   EXPECT_LE(unsolved, 1 + cases / 1000);
 }
 

@@ -112,8 +112,9 @@ TEST(RigidWorld, APartsOwnFrictionCountsAsTheGeometricMean) {
   EXPECT_NEAR(r.position.x(), (F - std::sqrt(mu_tool * mu) * N) / K(0, 0), 1e-9 * F / K(0, 0));
 }
 
-// A rod of length L and radius ρ between floor (z = 0) and wall (x = 0), loaded with W at its middle. With normal forces
-// N_f and N_w and friction at its limit: N_w = μ_f N_f, N_f + μ_w N_w = W, and the moments about the middle vanish:
+// A rod of length L and radius ρ between floor (z = 0) and wall (x = 0), loaded with W at its middle. With normal
+// forces N_f and N_w and friction at its limit: N_w = μ_f N_f, N_f + μ_w N_w = W, and the moments about the middle
+// vanish:
 //   (L/2)(N_f cos θ − μ_f N_f sin θ − N_w sin θ − μ_w N_w cos θ) … with the arms ρ of friction.
 struct Ladder {
   double L, rho, mu_floor, mu_wall;
@@ -215,8 +216,8 @@ Twist sum_of(const std::vector<std::pair<Vec3, Vec3>>& points_and_forces, const 
   return sum;
 }
 
-// A prism on the three corners of a triangle: what each bears is a matter of statics alone, however it is pressed. (Of four
-// corners it isn't, and with the shares of friction several poses may keep the law.)
+// A prism on the three corners of a triangle: what each bears is a matter of statics alone, however it is pressed. (Of
+// four corners it isn't, and with the shares of friction several poses may keep the law.)
 TEST(RigidWorld, ThreeUnequalCornersHoldByTheSumOfTheirFrictions) {
   Random random(30);
   const Mat6 K = stiffness();
@@ -279,7 +280,8 @@ TEST(RigidWorld, ARodSpinsInACornerAgainstTheFrictionOfItsEnd) {
   };
   for (const double share : {0.1, 0.5, 0.9, 0.98}) {
     const double torque = share * spinning;
-    EXPECT_LE(std::abs(spun(torque)), 1e-7 * torque / rod.K(5, 5)) << share << ": it holds, by friction within its cones";
+    EXPECT_LE(std::abs(spun(torque)), 1e-7 * torque / rod.K(5, 5))
+        << share << ": it holds, by friction within its cones";
   }
   // Friction is against the chord of a slip, which is φ/2 off its tangent: so much less exact is the first order.
   const double J = rod.K(5, 5);
@@ -290,8 +292,8 @@ TEST(RigidWorld, ARodSpinsInACornerAgainstTheFrictionOfItsEnd) {
 }
 
 TEST(RigidWorld, ARodPivotsInACornerAgainstTheFrictionOfItsEnd) {
-  // About any axis: the faces' points have slipped by ρ (1 − R⁻¹) n over the ball, which says where friction points. With
-  // what the faces bear, p̂ follows from the rod's pose.
+  // About any axis: the faces' points have slipped by ρ (1 − R⁻¹) n over the ball, which says where friction points.
+  // With what the faces bear, p̂ follows from the rod's pose.
   CorneredRod rod;
   Random random(31);
   for (int k = 0; k < 200; ++k) {

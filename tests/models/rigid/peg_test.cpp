@@ -84,8 +84,8 @@ TEST(PegInItsHole, GoesInOrJamsAsWhitneysDiagramSays) {
   RecordProperty("furthest_from_the_formula", std::to_string(worst));
 }
 
-// Touched along its side, on one side alone: f_A and f_B are on that side, F_x = f_A + f_B and F_z = μ (f_A + f_B), so that
-// it goes in between the borders F_x/F_z = ±1/μ, wherever along the side they press.
+// Touched along its side, on one side alone: f_A and f_B are on that side, F_x = f_A + f_B and F_z = μ (f_A + f_B), so
+// that it goes in between the borders F_x/F_z = ±1/μ, wherever along the side they press.
 TEST(PegInItsHole, GoesInBetweenTheBordersOfOneSide) {
   const Mat6 K = stiffness(4.0, 0.05, 1e-4);
   const double r = kHole_m, F_z = 10.0;
@@ -110,7 +110,8 @@ TEST(PegInItsHole, GoesInBetweenTheBordersOfOneSide) {
           ASSERT_TRUE(goes_in(low)) << along;
           ASSERT_FALSE(goes_in(high)) << along;
           for (int i = 0; i < 20; ++i) (goes_in(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
-          EXPECT_NEAR(low, 1.0, 1e-5) << "mu " << mu << " length " << length << " along " << along;  // 2⁻¹⁹ of bisection
+          EXPECT_NEAR(low, 1.0, 1e-5) << "mu " << mu << " length " << length << " along "
+                                      << along;  // 2⁻¹⁹ of bisection
           worst = std::max(worst, std::abs(low - 1.0));
         }
       }

@@ -207,8 +207,7 @@ void run(Hunted& world, std::uint64_t seed, std::int64_t steps, Figures& out) {
     if (g.unresolved()) {
       ++out.unresolved;
       // Friction is left out of it, and what is left holds the tool in balance all the same.
-      raise(out.unresolved_imbalance_N,
-            imbalance_N(g.contacts(), held.K, held.K * difference(held.q, p), held.q));
+      raise(out.unresolved_imbalance_N, imbalance_N(g.contacts(), held.K, held.K * difference(held.q, p), held.q));
     } else if (!g.contacts().empty()) {
       ++out.touching;
       judge(g.contacts(), world.mu, held.K, held.K * difference(held.q, p), before, held.q, out);
@@ -233,9 +232,10 @@ void hunt(const char* name, std::uint64_t first_seed, double most_unresolved,
   std::cout << "  " << name << ": " << out.steps << " steps, " << out.touching << " touching, " << out.slipping
             << " contacts slipping, " << out.unresolved << " steps unresolved; deepest " << out.deepest_m
             << " m; at 10 N: imbalance " << out.imbalance_N << " N (" << out.noisy
-            << " steps beyond 1e-10), of unresolved steps " << out.unresolved_imbalance_N << ", out of the cone " << out.cone_N << ", against slip " << out.against_slip_N
-            << ", pull " << out.pull_N << ", with a gap " << out.apart_N << "; energy created in " << out.rises
-            << " steps, at most " << out.created_J << " J (" << out.over_corners << " asked what they met first)\n";
+            << " steps beyond 1e-10), of unresolved steps " << out.unresolved_imbalance_N << ", out of the cone "
+            << out.cone_N << ", against slip " << out.against_slip_N << ", pull " << out.pull_N << ", with a gap "
+            << out.apart_N << "; energy created in " << out.rises << " steps, at most " << out.created_J << " J ("
+            << out.over_corners << " asked what they met first)\n";
   if (alone != nullptr) return;
   // The last step of the iteration still turns levers: seldom, of contacts that press each other, by more than 1e-10 N.
   // None of a key's first 300,000 steps is beyond that, and 763 of 2.55 million are, by 3.1e-10 N at most.
