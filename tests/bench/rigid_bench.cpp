@@ -13,7 +13,7 @@
 
 #include "tests/bench/rigid_runs.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
-#include "tests/models/rigid/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
 
 namespace proxarm::bench {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/held_tool.hpp"
+#include "tests/models/rigid_judges/held_tool.hpp"
 
 #if __has_include(<btBulletDynamicsCommon.h>)  // only the program that this is for has it among its folders
 #include <btBulletDynamicsCommon.h>

@@ -10,7 +10,7 @@
 
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/held_tool.hpp"
+#include "tests/models/rigid_judges/held_tool.hpp"
 
 namespace proxarm::bench {
 

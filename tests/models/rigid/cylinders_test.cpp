@@ -6,8 +6,8 @@
 
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/cylinder_bodies.hpp"
-#include "tests/models/rigid/rigid_meshes.hpp"
+#include "tests/models/rigid_judges/cylinder_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_meshes.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {

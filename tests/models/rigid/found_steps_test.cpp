@@ -4,7 +4,7 @@
 
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
-#include "tests/models/rigid/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
 
 namespace proxarm::models {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/rigid_hollows.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_hollows.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
 
 namespace proxarm::models {
 namespace {

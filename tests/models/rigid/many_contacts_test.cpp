@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/held_tool.hpp"
+#include "tests/models/rigid_judges/held_tool.hpp"
 
 namespace proxarm::models {
 namespace {

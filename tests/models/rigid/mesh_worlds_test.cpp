@@ -8,9 +8,9 @@
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
-#include "tests/models/rigid/held_tool.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
-#include "tests/models/rigid/rigid_meshes.hpp"
+#include "tests/models/rigid_judges/held_tool.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_meshes.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {

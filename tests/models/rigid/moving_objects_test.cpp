@@ -7,9 +7,9 @@
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
-#include "tests/models/rigid/held_tool.hpp"
-#include "tests/models/rigid/moving_judge.hpp"
-#include "tests/models/rigid/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/held_tool.hpp"
+#include "tests/models/rigid_judges/moving_judge.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
 
 namespace proxarm::models {
 namespace {

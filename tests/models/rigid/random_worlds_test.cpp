@@ -6,7 +6,7 @@
 
 #include "models/base/random.hpp"
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
 
 namespace proxarm::models {
 namespace {

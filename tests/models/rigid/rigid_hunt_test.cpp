@@ -11,9 +11,9 @@
 #include <optional>
 
 #include "models/rigid/rigid_world.hpp"
-#include "tests/models/rigid/held_tool.hpp"
-#include "tests/models/rigid/rigid_bodies.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid_judges/held_tool.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {

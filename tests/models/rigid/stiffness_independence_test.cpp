@@ -15,10 +15,10 @@
 
 #include "models/rigid/rigid_world.hpp"
 #include "tests/models/mesh/mesh_shapes.hpp"
-#include "tests/models/rigid/rigid_bodies.hpp"
-#include "tests/models/rigid/rigid_hollows.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
-#include "tests/models/rigid/rigid_meshes.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_hollows.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_meshes.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
 namespace proxarm::models {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "models/rigid_features/rigid_object.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
 
 namespace proxarm::models {
 

@@ -11,7 +11,7 @@
 #include "models/geometry/tool_pose.hpp"
 #include "models/rigid_features/rigid_object.hpp"
 #include "models/rigid_shapes/tool.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
 
 namespace proxarm::models {
 

@@ -10,7 +10,7 @@
 #include "models/base/random.hpp"
 #include "models/mesh/mesh.hpp"
 #include "models/rigid_shapes/tool.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
 
 namespace proxarm::models {
 

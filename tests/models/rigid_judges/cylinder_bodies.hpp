@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "tests/models/rigid/rigid_bodies.hpp"
+#include "tests/models/rigid_judges/rigid_bodies.hpp"
 
 namespace proxarm::models {
 

@@ -5,7 +5,7 @@
 #include "models/base/random.hpp"
 #include "models/rigid_features/rigid_object.hpp"
 #include "models/rigid_shapes/solid.hpp"
-#include "tests/models/rigid/rigid_judge.hpp"
+#include "tests/models/rigid_judges/rigid_judge.hpp"
 
 namespace proxarm::models {
 
