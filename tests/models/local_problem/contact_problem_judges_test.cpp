@@ -98,7 +98,7 @@ TEST(ContactProblem, AgreesWithSiconosOnUpToTwelveContacts) {
 
 TEST(ContactProblem, AgreesWithSiconosAtConditionsUpToAMillion) {
   if (!siconos_is_there()) GTEST_SKIP() << "built without libsiconos-numerics-dev";
-  agree_with_siconos(tests::scaled(150), 24, {.condition = 1e6, .law = 1e-7, .least_judged = 0.75});
+  agree_with_siconos(tests::scaled(150, 150), 24, {.condition = 1e6, .law = 1e-7, .least_judged = 0.75});
 }
 
 }  // namespace
