@@ -72,9 +72,10 @@ double RigidWorld::overlap_m(const ToolPose& pose, const Apart& apart) noexcept 
       const auto part = static_cast<std::uint16_t>(k);
       const bool known = listed && mesh != nullptr && shared_->parts[part].mesh && !moves(entry);
       Apart here{.enough = apart.enough};
-      if (!moves(entry)) {
-        here.normals = apart.normals;
-        if (apart.enough < 0.0) here.last = &last_planes_.of(part, entry);
+      if (!moves(entry)) here.normals = apart.normals;
+      const bool one_is_mesh = (mesh != nullptr) != (shared_->parts[part].mesh != nullptr);
+      if (one_is_mesh && !moves(entry)) {
+        here.last = &last_planes_.of(part, entry);
         if (triangles_listed) here.triangles = near_triangles_.of(part, entry);
       }
       const double gap = known ? overlap_of_near_leaves(part, entry, at) : overlap_m(shared_->parts[part], e, at, here);

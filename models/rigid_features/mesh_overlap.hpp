@@ -1,4 +1,4 @@
-// Whether what should be apart stands in a mesh, for setting up.
+// Whether what should be apart stands in a mesh: for setting up, and after a step.
 #pragma once
 
 #include <array>

@@ -310,7 +310,7 @@ class Turning(ProgramTest):
                 self.assertLess(turned(row, "proxy", [float(rows[-1][f"proxy_W_q{part}"]) for part in "xyzw"]), 0.02)
 
     def test_limits_of_turning(self):
-        cell = self.limited("slow.yaml", "  max_turning_speed_rad_per_s: 0.2\n  max_turn_rad: 0.1\n")
+        cell = self.limited("  max_turning_speed_rad_per_s: 0.2\n  max_turn_rad: 0.1\n")
         turn = self.written("turn.yaml", "turning_stiffness_Nm_per_rad: 20\nturning_damping_Nms_per_rad: 0.5\n"
                             "waypoints: [{time_s: 0.5, turn_rad: [0, 0, 0]}, {time_s: 1.5, turn_rad: [0, 0.3, 0.2]}]\n")
         summary = self.summary(cell, *FREE, "--hand", turn, "--inertia", "0.05", "--duration", "4s", "--record", "limits")
@@ -321,15 +321,15 @@ class Turning(ProgramTest):
         fastest = max(math.hypot(*rotation_vector(b, a)) for a, b in zip(poses, poses[1:]))
         self.assertAlmostEqual(fastest / PERIOD_S, 0.2, delta=1e-9)
 
-    def limited(self, name, limits):
-        """The default cell with more limits."""
-        text = (SOURCE / "models/cells/default.yaml").read_text()
-        text = text.replace("../../", f"{SOURCE}/").replace("../", f"{SOURCE}/models/")
-        return self.written(name, text.replace("limits:\n", f"limits:\n{limits}"))
+    def limited(self, limits):
+        """The default cell with more limits, and no others than these."""
+        path = "models/cells/default.yaml"
+        (self.copies() / path).write_text((SOURCE / path).read_text())
+        return self.changed(path, ("limits:\n", f"limits:\n{limits}"))
 
     def test_limits_of_tilt_and_twist(self):
         """Of the steel, by where its axis points: a point and a tool with a shape, about an axis that isn't the tool's z."""
-        cell = self.limited("upright.yaml", "  max_tilt_rad: 0.1\n  max_twist_rad: 0.15\n  tilt_axis: [2, 0, 0]\n")
+        cell = self.limited("  max_tilt_rad: 0.1\n  max_twist_rad: 0.15\n  tilt_axis: [2, 0, 0]\n")
         turn = self.written("turn.yaml", "turning_stiffness_Nm_per_rad: 20\nturning_damping_Nms_per_rad: 0.5\n"
                             "waypoints: [{time_s: 0.5, turn_rad: [0, 0, 0]}, {time_s: 1.5, turn_rad: [0.4, 0.3, 0.1]},\n"
                             "            {time_s: 3, turn_rad: [-0.4, 0.1, -0.4]}]\n")
@@ -353,7 +353,7 @@ class Turning(ProgramTest):
         for limits, told in (("  max_tilt_rad: 4\n", "max_tilt_rad"), ("  max_twist_rad: -1\n", "max_twist_rad"),
                              ("  max_tilt_rad: 1\n  tilt_axis: [0, 0, 0]\n", "a direction"),
                              ("  tilt_axis: [0, 1, 0]\n", "max_tilt_rad or max_twist_rad")):
-            outcome = self.call("run", self.limited("wrong.yaml", limits), *FREE)
+            outcome = self.call("run", self.limited(limits), *FREE)
             self.assertEqual(outcome.status, 2, outcome.err)
             self.assertIn(told, outcome.err)
             self.assertEqual(outcome.err.count("\n"), 1)

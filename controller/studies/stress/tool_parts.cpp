@@ -62,6 +62,7 @@ models::ToolPose ToolParts::from(const Pose& pose, Aside& aside) const {
   const models::ToolPose& r = pose.call.r;
   if (!lies_on_point(pose.call.contacts)) return r;
   aside.lay = true;
+  if (aside.by.isZero(0.0)) return r;
   const models::ToolPose out = models::moved(r, aside.by);
   return laws_.depth_m(out, pose.call.time_s) <= 0.0 ? out : r;
 }

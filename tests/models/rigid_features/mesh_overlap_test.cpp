@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <numeric>
+#include <memory>
 #include <vector>
 
 #include "models/base/random.hpp"
