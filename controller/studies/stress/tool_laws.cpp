@@ -18,7 +18,8 @@ using models::ToolPose;
 using models::Twist;
 using models::Vec3;
 
-constexpr double kSlips_m = 1e-9;  // a million roundings of a way
+constexpr double kSlips_m = 1e-9;   // a million roundings of a way
+constexpr double kShort_m = 1e-12;  // of a gap
 constexpr double beyond_all_m = std::numeric_limits<double>::infinity();
 
 // The least of a distance along a segment, by the golden section; where it is `enough` or more, some bound of that. (It
@@ -532,6 +533,11 @@ double ToolLaws::slack_m(const ToolCall& call, double short_m) const {
   const Twist step = models::difference(call.p, call.q);
   const double step_m = std::hypot(step.head<3>().norm(), lever_m * step.tail<3>().norm());
   return std::max(short_m, 0.0) + rounding_of_ways_m(call) + 1e-10 * step_m;
+}
+
+double ToolLaws::short_m(double depth_m, const std::vector<PoseContact>& contacts) {
+  for (const PoseContact& contact : contacts) depth_m = std::max(depth_m, -contact.gap_m);
+  return std::clamp(depth_m, 0.0, kShort_m);
 }
 
 double ToolLaws::left_J(const ToolCall& call, double rise_J, double short_m) const {

@@ -76,9 +76,12 @@ class ToolLaws {
   // material point at q, s = y − x leads from one edge's line to the other's, and −n₀ᵀs was the edges' gap. So
   // n₀ᵀs ≤ 0 but for rounding, and nᵀs = (n − n₀ cos α)ᵀs + cos α n₀ᵀs ≤ sin α ‖s‖.
   [[nodiscard]] double curvature_J(const ToolCall& call) const;
-  // What neither that nor rounding accounts for of a rise of the tool's energy; below 0 if all is. What a gap was short
-  // of by rounding at q, `short_m` (1e-12 m at most, else it counts as inside), the contacts' forces push back; and
-  // where contacts hold each other, by thousands of newtons, a local problem is solved to 1e-10 of the step.
+  // What gaps at a pose are short of. A place may lie beside its feature, by up to 1e-10 m, and so below the feature's
+  // plane while it is inside of nothing; by 1e-12 m at most, as deep as it may be inside.
+  [[nodiscard]] static double short_m(double depth_m, const std::vector<models::PoseContact>& contacts);
+  // What neither that nor rounding accounts for of a rise of the tool's energy; below 0 if all is. What gaps were short
+  // of at q, `short_m`, the contacts' forces push back; and where contacts hold each other, by thousands of newtons, a
+  // local problem is solved to 1e-10 of the step.
   [[nodiscard]] double left_J(const ToolCall& call, double rise_J, double short_m) const;
   // The same of what the contacts' forces at r do along those normals that places have come forward along. (The bend of
   // a place's way by its lever isn't in that: ways are those of places.)

@@ -129,7 +129,7 @@ class Judge {
       judge_energy(call, rise_J);
     }
     before_ = call.contacts;
-    depth_before_m_ = depth;
+    short_before_m_ = ToolLaws::short_m(depth, call.contacts);
     if (call.unresolved) return;
     if (const std::string missed = laws_.missed(call); !missed.empty()) note(law, call, missed, call.wrench().norm());
     if (!call.contacts.empty() && random_.chance(0.2)) judge_stiffness(call);
@@ -160,10 +160,10 @@ class Judge {
 
   void judge_energy(const ToolCall& call, double rise_J) {
     if (call.contacts.empty()) return;
-    const double rest_J = laws_.left_J(call, rise_J, depth_before_m_);
+    const double rest_J = laws_.left_J(call, rise_J, short_before_m_);
     if (!(rest_J > 0.0)) return;
     std::vector<PoseContact> touched = laws_.carried(before_, call.since_s, call.time_s);
-    if (parts_.keep(call, depth_before_m_, rest_J, touched)) {
+    if (parts_.keep(call, short_before_m_, rest_J, touched)) {
       ++tally_.edge;
     } else {
       note(work, call, "J", rest_J);
@@ -224,7 +224,7 @@ class Judge {
   Tally& tally_;
   std::string* report_;
   std::vector<PoseContact> before_;  // of the step before
-  double depth_before_m_ = 0.0;
+  double short_before_m_ = 0.0;
   std::int64_t step_ = 0;
 };
 

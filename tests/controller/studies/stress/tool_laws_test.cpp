@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -79,6 +80,18 @@ TEST(ToolLaws, NeitherFrictionNorWhatComesDownPushes) {
   EXPECT_NEAR(pushed_J(), work_J, 1e-9 * work_J);
   here.call.contacts.push_back(here.contact(-Vec3::UnitX()));
   EXPECT_NEAR(pushed_J(), work_J, 1e-9 * work_J);
+}
+
+// (Beside its feature a place may be below the feature's plane, and yet inside of nothing.)
+TEST(ToolLaws, AGapIsShortByWhatItsContactSaysAndByNoMoreThanAPicometre) {
+  PoseContact open, short_by;
+  open.gap_m = 1e-10;
+  EXPECT_EQ(ToolLaws::short_m(-1e-10, {}), 0.0);
+  EXPECT_EQ(ToolLaws::short_m(3e-13, {open}), 3e-13);
+  for (const double gap_m : {-7e-14, -1e-12, -1.1e-12}) {
+    short_by.gap_m = gap_m;
+    EXPECT_EQ(ToolLaws::short_m(-1e-10, {open, short_by, open}), std::min(-gap_m, 1e-12));
+  }
 }
 
 // By what the tool turns about a place far from its middle, that place comes along no normal; and what a place came
