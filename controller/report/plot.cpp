@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <sstream>
 
 #include "controller/report/gnuplot.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -15,25 +17,39 @@ namespace fs = std::filesystem;
 using models::Vec3;
 
 constexpr std::size_t most_samples = 4000;
+constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
 
-// The next panel is drawn in this row.
-void place(std::ostream& gp, int row) {
-  constexpr double top = 0.915, height = 0.205;
-  gp << "set tmargin at screen " << top - height * row << "\nset bmargin at screen " << top - height * (row + 1) + 0.018
-     << "\n";
-}
+// Of the picture, in pixels.
+constexpr double head = 98.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
+
+models::Quaternion quaternion(const std::array<double, 4>& xyzw) { return {xyzw[3], xyzw[0], xyzw[1], xyzw[2]}; }
 
 }  // namespace
+
+double PlotBuilder::height_px() const noexcept { return head + row_height * rows() + foot; }
+
+// The next panel is drawn in this row.
+void PlotBuilder::place(std::ostream& gp, int row) const {
+  const double top = head + row_height * row, bottom = top + row_height - between_rows;
+  gp << "set tmargin at screen " << 1.0 - top / height_px() << "\nset bmargin at screen " << 1.0 - bottom / height_px()
+     << "\n";
+}
 
 // What the position panels show: coordinates along `directions` from `origin`.
 struct PlotBuilder::Axes {
   bool wall = false;  // directions[0] is the normal, directions[1] along the slide
   Vec3 origin = Vec3::Zero();
   std::array<Vec3, 3> directions{Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
+  Vec3 turn = Vec3::UnitZ();  // what turns and torques are about
+};
+
+struct PlotBuilder::Range {
+  double low, high;
 };
 
 struct PlotBuilder::Ranges {
-  double force_low_N, force_high_N, near_mm;
+  Range force_N, torque_Nm;
+  double near_mm;
 };
 
 struct PlotBuilder::Band {
@@ -63,11 +79,17 @@ void PlotBuilder::add(const CycleRecord& record) {
   sample.hand = record.force_W_N;
   sample.contact_force = record.contact_force_W_N;
   sample.normal = record.normal_W;
+  sample.proxy_q = record.proxy_q_W;
+  sample.tool_q = truth ? record.true_tool_q_W : record.proxy_q_W;
+  sample.torque = record.torque_W_Nm;
+  sample.contact_torque = record.contact_torque_W_Nm;
+  turns_ = turns_ || record.proxy_inertia_kg_m2 > 0.0;
   samples_.push_back(sample);
 }
 
 PlotBuilder::Axes PlotBuilder::axes() const {
   Axes axes;
+  axes.turn = turning_axis(turns(&Sample::proxy_q));
   const auto first = std::find_if(samples_.begin(), samples_.end(), [](const Sample& s) {
     return s.contact != ContactPhase::free && vec3(s.normal).norm() > 0.5;
   });
@@ -84,6 +106,35 @@ PlotBuilder::Axes PlotBuilder::axes() const {
   axes.origin = vec3(first->proxy);
   axes.directions = {n, farthest.normalized(), n.cross(farthest.normalized())};
   return axes;
+}
+
+// Since the first sample, as rotation vectors in W; of those that say the same the one nearest to the one before.
+std::vector<Vec3> PlotBuilder::turns(std::array<double, 4> Sample::*orientation) const {
+  std::vector<Vec3> turns;
+  const models::Quaternion first = quaternion(samples_.front().*orientation);
+  Vec3 before = Vec3::Zero();
+  for (const Sample& s : samples_) {
+    Vec3 turn = models::rotation_vector(quaternion(s.*orientation) * first.conjugate());
+    const bool whole = turn.norm() < nothing_rad && before.norm() > 1.0;  // a revolution, and its axis is rounding
+    const Vec3 revolution = 2.0 * std::numbers::pi * (whole ? before : turn).stableNormalized();
+    if (!turn.isZero(0.0) || whole)
+      turn += std::round((before - turn).dot(revolution) / revolution.squaredNorm()) * revolution;
+    turns.push_back(before = turn);
+  }
+  return turns;
+}
+
+// Of the widest turn; where there is none, of the largest torque. Its largest coordinate is above 0.
+Vec3 PlotBuilder::turning_axis(const std::vector<Vec3>& turns) const {
+  const auto less = [](const Vec3& a, const Vec3& b) { return a.squaredNorm() < b.squaredNorm(); };
+  Vec3 most = *std::max_element(turns.begin(), turns.end(), less);
+  if (!(most.norm() > nothing_rad)) {
+    for (const Sample& s : samples_) most = std::max({most, vec3(s.torque), vec3(s.contact_torque)}, less);
+  }
+  if (most.isZero(0.0)) return Vec3::UnitZ();
+  Eigen::Index largest = 0;
+  most.cwiseAbs().maxCoeff(&largest);
+  return most[largest] < 0.0 ? Vec3(-most.normalized()) : Vec3(most.normalized());
 }
 
 // Contact phases as intervals; one that is too short to be seen is added to the one before it.
@@ -110,11 +161,15 @@ std::vector<PlotBuilder::Band> PlotBuilder::bands() const {
   return bands;
 }
 
-// Columns: time, tool ×3, proxy ×3 (mm), push of the hand, contact force, friction (N).
+// Columns: time, tool ×3, proxy ×3 (mm), push of the hand, contact force, friction (N), turn of tool and proxy (°),
+// torque of hand and contact (Nm).
 std::string PlotBuilder::data(const Axes& axes) const {
+  const std::vector<Vec3> tool_turns = turns(&Sample::tool_q), proxy_turns = turns(&Sample::proxy_q);
+  constexpr double degrees = 180.0 / std::numbers::pi;
   std::string text;
-  char line[320];
-  for (const Sample& s : samples_) {
+  char line[400];
+  for (std::size_t k = 0; k < samples_.size(); ++k) {
+    const Sample& s = samples_[k];
     std::array<double, 6> x{};
     for (std::size_t i = 0; i < 3; ++i) {
       x[i] = 1e3 * axes.directions[i].dot(vec3(s.tool) - axes.origin);
@@ -126,20 +181,35 @@ std::string PlotBuilder::data(const Axes& axes) const {
       const Vec3 n = axes.directions[0];
       forces = {-n.dot(h), n.dot(f), -axes.directions[1].dot(f)};
     }
-    std::snprintf(line, sizeof line, "%.6f %.6g %.6g %.6g %.6g %.6g %.6g %.5g %.5g %.5g\n", s.time_s, x[0], x[1], x[2],
-                  x[3], x[4], x[5], forces[0], forces[1], forces[2]);
+    const Vec3& a = axes.turn;
+    std::snprintf(line, sizeof line, "%.6f %.6g %.6g %.6g %.6g %.6g %.6g %.5g %.5g %.5g %.6g %.6g %.5g %.5g\n",
+                  s.time_s, x[0], x[1], x[2], x[3], x[4], x[5], forces[0], forces[1], forces[2],
+                  degrees * a.dot(tool_turns[k]), degrees * a.dot(proxy_turns[k]), a.dot(vec3(s.torque)),
+                  a.dot(vec3(s.contact_torque)));
     text += line;
   }
   return text;
 }
 
-// The force panel leaves out single peaks (the impulse of an impact is M v/T, hundreds of newtons in one step), the
-// near panel shows the tool's depth in the wall.
+// Of a panel that leaves out single peaks (the impulse of an impact is M v/T, hundreds of newtons in one step).
+// `least`: by how much it is made wider where little happened.
+PlotBuilder::Range PlotBuilder::without_peaks(std::vector<double> values, double least) {
+  std::sort(values.begin(), values.end());
+  const auto rank = [&values](double part) {
+    return values[static_cast<std::size_t>(part * (static_cast<double>(values.size()) - 1.0))];
+  };
+  const double low = std::min(0.0, rank(0.005)), high = std::max(0.0, rank(0.995));
+  const double margin = 0.1 * std::max(high - low, least);
+  return {low - margin, high + margin};
+}
+
+// The near panel shows the tool's depth in the wall.
 PlotBuilder::Ranges PlotBuilder::ranges(const Axes& axes) const {
   const Vec3 n = axes.directions[0];
-  std::vector<double> forces;
+  std::vector<double> forces, torques;
   double deepest_mm = 0.0;
   for (const Sample& s : samples_) {
+    torques.insert(torques.end(), {axes.turn.dot(vec3(s.torque)), axes.turn.dot(vec3(s.contact_torque))});
     if (axes.wall) {
       forces.insert(forces.end(), {-n.dot(vec3(s.hand)), n.dot(vec3(s.contact_force))});
       if (s.contact != ContactPhase::free) {
@@ -149,19 +219,13 @@ PlotBuilder::Ranges PlotBuilder::ranges(const Axes& axes) const {
       forces.insert(forces.end(), s.hand.begin(), s.hand.end());
     }
   }
-  std::sort(forces.begin(), forces.end());
-  const auto rank = [&forces](double part) {
-    return forces[static_cast<std::size_t>(part * (static_cast<double>(forces.size()) - 1.0))];
-  };
-  const double low = std::min(0.0, rank(0.005)), high = std::max(0.0, rank(0.995));
-  const double margin = 0.1 * std::max(high - low, 1.0);
-  return {low - margin, high + margin, std::clamp(1.3 * deepest_mm, 0.2, 20.0)};
+  return {without_peaks(forces, 1.0), without_peaks(torques, 0.01), std::clamp(1.3 * deepest_mm, 0.2, 20.0)};
 }
 
 std::string PlotBuilder::script(const Axes& axes) const {
   std::ostringstream gp;
   const double from = samples_.front().time_s, to = std::max(samples_.back().time_s, from + 1e-3);
-  gp << "set terminal svg size 1200,1150 font 'sans,21' background 'white' noenhanced\n"
+  gp << "set terminal svg size 1200," << height_px() << " font 'sans,21' background 'white' noenhanced\n"
      << "set output 'plot.svg'\nset encoding utf8\n"
      << "set style line 1 lc rgb '#0072b2' lw 3.2\n"           // tool: solid, wide, blue
      << "set style line 2 lc rgb '#000000' lw 1.8 dt (8,6)\n"  // proxy: dashed, thin, black
@@ -169,11 +233,13 @@ std::string PlotBuilder::script(const Axes& axes) const {
      << "set style line 4 lc rgb '#009e73' lw 2.8 dt (2,4)\n"
      << "set xrange [" << from << ":" << to << "]\nset grid lc rgb '#b0b0b0' lw 0.6\n"
      << "set lmargin 11\nset rmargin 3\nset format x ''\n";
+  const double top = 1.0 - 23.0 / height_px();
   const std::string labels = shade_contacts(gp, 0.04 * (to - from));
-  gp << "set multiplot\nset label 100000 " << gnuplot_string(title_) << " at screen 0.02, screen 0.98 left\n"
-     << labels << "set key at screen 0.97, screen 0.98 horizontal maxrows 1 samplen 3\n";
+  gp << "set multiplot\nset label 100000 " << gnuplot_string(title_) << " at screen 0.02, screen " << top << " left\n"
+     << labels << "set key at screen 0.97, screen " << top << " horizontal maxrows 1 samplen 3\n";
   const Ranges range = ranges(axes);
   draw_positions(gp, axes.wall, range);
+  if (turns_) draw_turn(gp, axes.turn, range.torque_Nm);
   draw_forces(gp, axes.wall, range);
   return gp.str();
 }
@@ -196,7 +262,7 @@ std::string PlotBuilder::shade_contacts(std::ostream& gp, double shortest_labell
 
 void PlotBuilder::draw_positions(std::ostream& gp, bool wall, const Ranges& range) const {
   const char* const tool = truth_ ? "tool" : "tool (by encoders)";
-  const auto panel = [&gp, tool](int row, const char* ylabel, int tool_column) {
+  const auto panel = [this, &gp, tool](int row, const char* ylabel, int tool_column) {
     place(gp, row);
     gp << "set ylabel '" << ylabel << "' offset 1\n"
        << "plot 'data' using 1:" << tool_column << " with lines ls 1 title '" << tool
@@ -216,14 +282,31 @@ void PlotBuilder::draw_positions(std::ostream& gp, bool wall, const Ranges& rang
   }
 }
 
-void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) {
+// The orientation is told of a proxy, and of a simulated tool.
+void PlotBuilder::draw_turn(std::ostream& gp, const Vec3& axis, const Range& torque_Nm) const {
+  char about[80];
+  const auto hundredths = [](double x) { return 0.01 * std::round(100.0 * x) + 0.0; };  // (and no −0)
+  std::snprintf(about, sizeof about, "about (%.2f, %.2f, %.2f)", hundredths(axis.x()), hundredths(axis.y()),
+                hundredths(axis.z()));
+  place(gp, 3);
+  gp << "set ylabel 'turn (°)' offset 1\nset label 1 '" << about
+     << "' at graph 0.01, graph 0.92 left front\nplot 'data' ";
+  if (truth_) gp << "using 1:11 with lines ls 1 notitle, '' ";
+  gp << "using 1:12 with lines ls 2 notitle\nunset label 1\n";
+  place(gp, 4);
+  gp << "set ylabel 'torque (Nm)' offset 1\nset key inside top right horizontal maxrows 1 samplen 3\n"
+     << "set yrange [" << torque_Nm.low << ":" << torque_Nm.high << "]\n"
+     << "plot 'data' using 1:13 with lines ls 1 title 'hand', '' using 1:14 with lines ls 3 title 'contact'\n";
+}
+
+void PlotBuilder::draw_forces(std::ostream& gp, bool wall, const Ranges& range) const {
   const std::array<const char*, 3> at_wall{"hand, into wall", "contact, normal", "friction"};
   const std::array<const char*, 3> anywhere{"hand, x", "hand, y", "hand, z"};
   const auto& names = wall ? at_wall : anywhere;
-  place(gp, 3);
+  place(gp, rows() - 1);
   gp << "set format x\nset label 1 'time (s)' at graph 0.5, graph -0.27 center\n"
-     << "set yrange [" << range.force_low_N << ":" << range.force_high_N << "]\nset ylabel 'force (N)' offset 1\n"
-     << "set key at screen 0.97, screen 0.035 horizontal maxrows 1 samplen 3\n"
+     << "set yrange [" << range.force_N.low << ":" << range.force_N.high << "]\nset ylabel 'force (N)' offset 1\n"
+     << "set key at screen 0.97, screen " << 40.0 / height_px() << " horizontal maxrows 1 samplen 3\n"
      << "plot 'data' using 1:8 with lines ls 1 title '" << names[0] << "', '' using 1:9 with lines ls 3 title '"
      << names[1] << "', '' using 1:10 with lines ls 4 title '" << names[2] << "'\nunset multiplot\n";
 }

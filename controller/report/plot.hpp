@@ -2,15 +2,17 @@
 // bands.
 //
 // With a contact, positions are split along the first contact's normal and along the direction in which the proxy then
-// slid farthest; the surface is at 0. Without one, the panels show x, y and z. Only Phase::rendering is drawn. Long
-// sessions are thinned out to some thousand points; memory is bounded. Curves differ in dash and width as well as in
-// colour, stick and slip in shade and by name.
+// slid farthest; the surface is at 0. Without one, the panels show x, y and z. Where the tool turns, two more show the
+// turn since the start and the torques about the rendered point, both about the axis of the proxy's widest turn. Only
+// Phase::rendering is drawn. Long sessions are thinned out to some thousand points; memory is bounded. Curves differ in
+// dash and width as well as in colour, stick and slip in shade and by name.
 //
 // gnuplot is a program of its own and may be absent: then there is no picture but a warning, and nothing else changes.
 // It is started without a shell, in a temporary folder, and no path or name from outside gets into its script unquoted.
 // Not for the cycle.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -39,24 +41,34 @@ class PlotBuilder {
     double time_s = 0.0;
     ContactPhase contact = ContactPhase::free;
     Triple tool{}, proxy{}, hand{}, contact_force{}, normal{};
+    std::array<double, 4> tool_q{}, proxy_q{};  // x y z w
+    Triple torque{}, contact_torque{};
   };
   struct Axes;
+  struct Range;
   struct Ranges;
   struct Band;
 
   [[nodiscard]] Axes axes() const;
+  [[nodiscard]] std::vector<models::Vec3> turns(std::array<double, 4> Sample::*orientation) const;
+  [[nodiscard]] models::Vec3 turning_axis(const std::vector<models::Vec3>& turns) const;
   [[nodiscard]] std::vector<Band> bands() const;
   [[nodiscard]] std::string data(const Axes& axes) const;
+  [[nodiscard]] static Range without_peaks(std::vector<double> values, double least);
   [[nodiscard]] Ranges ranges(const Axes& axes) const;
   [[nodiscard]] std::string script(const Axes& axes) const;
   std::string shade_contacts(std::ostream& gp, double shortest_labelled_s) const;
   void draw_positions(std::ostream& gp, bool wall, const Ranges& range) const;
-  static void draw_forces(std::ostream& gp, bool wall, const Ranges& range);
+  void draw_turn(std::ostream& gp, const models::Vec3& axis, const Range& torque_Nm) const;
+  void draw_forces(std::ostream& gp, bool wall, const Ranges& range) const;
+  void place(std::ostream& gp, int row) const;
+  [[nodiscard]] int rows() const noexcept { return turns_ ? 6 : 4; }
+  [[nodiscard]] double height_px() const noexcept;
 
   std::string title_, gnuplot_;
   std::vector<Sample> samples_;
   std::uint64_t stride_ = 1, seen_ = 0;
-  bool truth_ = false;
+  bool truth_ = false, turns_ = false;
 };
 
 }  // namespace proxarm::controller

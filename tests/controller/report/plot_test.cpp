@@ -2,11 +2,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
+#include <numbers>
 #include <sstream>
+#include <string>
+#include <vector>
 
+#include "models/geometry/tool_pose.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace proxarm::controller {
@@ -69,6 +76,73 @@ TEST(Plot, DrawsCoordinatesWhereNothingWasTouched) {
   fill(plot, 3000, false);
   EXPECT_EQ(plot.write(folder / "plot.svg"), "");
   EXPECT_NE(tests::text_of(folder / "plot.svg").find("z (mm)"), std::string::npos);
+}
+
+// Three revolutions about an axis, `lag_rad` of them behind.
+constexpr double revolutions = 3.0, lag_rad = 0.02;
+const models::Vec3 spun_about(-0.6, -0.8, 0.0);
+
+void spin(PlotBuilder& plot, int cycles) {
+  for (int k = 0; k < cycles; ++k) {
+    const double angle = -2.0 * std::numbers::pi * revolutions * k / (cycles - 1.0);
+    const auto turned = [&](double by) {
+      const models::Quaternion q(models::rotation_by(by * spun_about) *
+                                 models::rotation_by(models::Vec3(1.0, 2.0, 0.5)));
+      return std::array{q.x(), q.y(), q.z(), q.w()};
+    };
+    CycleRecord r;
+    r.time_ns = 1'000'000LL * k;
+    r.phase = Phase::rendering;
+    r.set(RecordFlag::truth);
+    r.proxy_inertia_kg_m2 = 0.1;
+    r.proxy_q_W = turned(angle);
+    r.true_tool_q_W = turned(k == 0 ? 0.0 : angle + lag_rad);
+    r.torque_W_Nm = triple(-0.5 * spun_about + models::Vec3(0.0, 0.0, 7.0));
+    r.contact_torque_W_Nm = triple(0.25 * spun_about);
+    plot.add(r);
+  }
+}
+
+TEST(Plot, DrawsTurnAndTorquesOfAToolThatTurns) {
+  if (!have_gnuplot()) GTEST_SKIP() << "gnuplot isn't installed";
+  const tests::ScratchFolder folder;
+  PlotBuilder turning("turning"), held("held");
+  spin(turning, 3000);
+  fill(held, 3000);
+  EXPECT_EQ(turning.write(folder / "turning.svg"), "");
+  EXPECT_EQ(held.write(folder / "held.svg"), "");
+  for (const char* text : {"turn (°)", "torque (Nm)", "about (0.60, 0.80, 0.00)", "hand", "contact"}) {
+    EXPECT_NE(tests::text_of(folder / "turning.svg").find(text), std::string::npos) << text;
+  }
+  EXPECT_EQ(tests::text_of(folder / "held.svg").find("turn (°)"), std::string::npos);
+}
+
+// Judged by what gnuplot is given.
+TEST(Plot, FollowsATurnBeyondARevolutionAboutItsAxis) {
+  const tests::ScratchFolder folder;
+  const fs::path copies = folder / "copies";
+  std::ofstream(copies) << "#!/bin/sh\nf=${1%/*}\ncp \"$f/data\" \"$f/plot.svg\"\n";
+  fs::permissions(copies, fs::perms::owner_all);
+  PlotBuilder plot("spinning", copies.string());
+  spin(plot, 9000);  // thinned out twice
+  ASSERT_EQ(plot.write(folder / "data"), "");
+  std::istringstream lines(tests::text_of(folder / "data"));
+  std::string line;
+  std::vector<double> before, x;
+  double widest = 0.0;
+  while (std::getline(lines, line)) {
+    std::istringstream numbers(line);
+    x.assign(std::istream_iterator<double>(numbers), {});
+    ASSERT_EQ(x.size(), 14U);
+    if (!before.empty()) widest = std::max(widest, std::abs(x[11] - before[11]));
+    before = x;
+  }
+  const double degrees = 180.0 / std::numbers::pi, step = 360.0 * revolutions / 9000.0;
+  EXPECT_LT(widest, 8.1 * step);
+  EXPECT_NEAR(x[11], 360.0 * revolutions, 8.0 * step);   // of the last that was kept
+  EXPECT_NEAR(x[10] - x[11], -degrees * lag_rad, 1e-2);  // of numbers to six digits
+  EXPECT_NEAR(x[12], 0.5, 1e-4);
+  EXPECT_NEAR(x[13], -0.25, 1e-4);
 }
 
 TEST(Plot, IsTheSameTwice) {
