@@ -31,6 +31,13 @@ std::vector<ArmSine> sines(bool wall) {
   return list;
 }
 
+// No more than a wrist takes, above 0.1 rad/s each.
+std::vector<ArmSine> turning_sines() {
+  std::vector<ArmSine> list;
+  for (const double f : frequencies_Hz) list.push_back({f, std::min(0.05, 0.1 / (2.0 * std::numbers::pi * f))});
+  return list;
+}
+
 std::vector<ArmSetup> setups(bool quick) {
   std::vector<ArmSetup> list;
   // The transient of the start fades with the time constant 2M/D, D = 13 Ns/m (a hand's 20 Ns/m without what the loop's
@@ -50,7 +57,20 @@ std::vector<ArmSetup> setups(bool quick) {
   add(4.0, 1e-3, 1.0, true);
   add(10.0, 1e-3, 1.0, false);
   add(10.0, 1e-3, 1.0, false, true);
+  // The time constant is 2J/D again, below 2 s by the wrist's 0.5 Nms/rad.
+  const auto turn = [&](double inertia, double period, double drive) {
+    list.push_back({.inertia_kg_m2 = inertia,
+                    .period_s = period,
+                    .drive_factor = drive,
+                    .settling_s = quick ? 3.0 : 24.0,
+                    .duration_s = quick ? 10.0 : 30.0,
+                    .sines = turning_sines()});
+  };
+  turn(0.1, 1e-3, 1.0);
   if (quick) return list;
+  for (const double inertia : {0.05, 0.2, 0.3}) turn(inertia, 1e-3, 1.0);
+  turn(0.1, 2e-3, 1.0);
+  turn(0.1, 1e-3, 0.5);
   add(2.0, 1e-3, 1.0, false);
   add(20.0, 1e-3, 1.0, false);
   add(4.0, 2e-3, 1.0, false);
@@ -99,19 +119,39 @@ double band_Hz(const std::map<double, double>& error_of_Hz, double limit) {
   return before_Hz;
 }
 
+bool is_turning(const Table& table, std::size_t row) { return table.number(row, table.column("inertia_kg_m2")) != 0.0; }
+
 std::string label(const Table& table, std::size_t row) {
   const auto value = [&](const char* name) { return table.number(row, table.column(name)); };
+  const bool turning = is_turning(table, row);
   char text[100];
-  std::snprintf(text, sizeof text, "%g kg, T = %g ms%s%s", value("mass_kg"), 1e3 * value("period_s"),
-                value("drive_factor") < 1.0 ? ", slow drives" : "", value("lookahead") != 0.0 ? ", lookahead" : "");
+  std::snprintf(text, sizeof text, "%g %s, T = %g ms%s%s", value(turning ? "inertia_kg_m2" : "mass_kg"),
+                turning ? "kg m²" : "kg", 1e3 * value("period_s"), value("drive_factor") < 1.0 ? ", slow drives" : "",
+                value("lookahead") != 0.0 ? ", lookahead" : "");
   return text;
 }
 
 }  // namespace
 
 std::vector<Column> Fidelity::columns() const {
-  return {{"wall"},    {"mass_kg"},  {"period_s"},     {"drive_factor"}, {"lookahead"},  {"frequency_Hz"},
-          {"force_N"}, {"travel_m"}, {"mass_real_kg"}, {"mass_imag_kg"}, {"mass_error"}, {"stiffness_N_per_m"}};
+  return {{"wall"},
+          {"mass_kg"},
+          {"inertia_kg_m2"},
+          {"period_s"},
+          {"drive_factor"},
+          {"lookahead"},
+          {"frequency_Hz"},
+          {"force_N"},
+          {"travel_m"},
+          {"mass_real_kg"},
+          {"mass_imag_kg"},
+          {"mass_error"},
+          {"stiffness_N_per_m"},
+          {"torque_Nm"},
+          {"turn_rad"},
+          {"inertia_real_kg_m2"},
+          {"inertia_imag_kg_m2"},
+          {"inertia_error"}};
 }
 
 std::size_t Fidelity::jobs(const Options& options) const { return setups(options.quick).size(); }
@@ -120,41 +160,53 @@ std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
   const ArmSetup setup = setups(options.quick)[job];
   const std::vector<ArmSample> samples = arm_(setup);
   const auto wanted = static_cast<std::size_t>(std::lround(setup.duration_s / setup.period_s));
-  const bool whole = samples.size() >= wanted;
+  const bool whole = samples.size() >= wanted, turning = setup.inertia_kg_m2 > 0.0;
   std::vector<double> F, x;
   for (const ArmSample& sample : samples) {
     if (F.size() == wanted) break;
-    F.push_back(sample.hand_force_N.x());
-    x.push_back(sample.tool_m.x());
+    F.push_back(turning ? sample.hand_torque_Nm.z() : sample.hand_force_N.x());
+    x.push_back(turning ? sample.turn_rad.z() : sample.tool_m.x());
   }
+  const double asked = turning ? setup.inertia_kg_m2 : setup.mass_kg;
   std::vector<Row> rows;
   for (const double f : frequencies_Hz) {
     const double omega = 2.0 * std::numbers::pi * f;
     const Complex force = coefficient(F, f, setup.period_s), travel = coefficient(x, f, setup.period_s);
     const Complex mass = force / (-omega * omega * travel);
-    const double nan_value = std::nan("");
-    rows.push_back({setup.wall ? 1.0 : 0.0, setup.mass_kg, setup.period_s, setup.drive_factor,
-                    setup.looks_ahead ? 1.0 : 0.0, f, whole ? std::abs(force) : nan_value,
-                    whole ? std::abs(travel) : nan_value, whole ? mass.real() : nan_value,
-                    whole ? mass.imag() : nan_value, whole ? std::abs(mass - setup.mass_kg) / setup.mass_kg : nan_value,
-                    whole ? std::abs(force / travel) : nan_value});
+    const std::array felt{
+        std::abs(force),         std::abs(travel), mass.real(), mass.imag(), std::abs(mass - asked) / asked,
+        std::abs(force / travel)};
+    Row row{setup.wall ? 1.0 : 0.0,
+            setup.mass_kg,
+            setup.inertia_kg_m2,
+            setup.period_s,
+            setup.drive_factor,
+            setup.looks_ahead ? 1.0 : 0.0,
+            f};
+    for (const double value : felt) row.emplace_back(whole && !turning ? value : std::nan(""));
+    for (std::size_t k = 0; k < 5; ++k) row.emplace_back(whole && turning ? felt[k] : std::nan(""));
+    rows.push_back(row);
   }
   return rows;
 }
 
 json Fidelity::headline(const Table& table, const Options& /*options*/) const {
   const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  json of_default, by_setup, bands, width;
+  json of_default, by_setup, turning, shares, bands, width;
   std::map<std::string, std::map<double, double>> errors;
   std::int64_t ended = 0;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     char frequency[20];
     std::snprintf(frequency, sizeof frequency, "%g", value(row, "frequency_Hz"));
-    if (!std::isfinite(value(row, "force_N"))) {
+    if (!std::isfinite(value(row, is_turning(table, row) ? "torque_Nm" : "force_N"))) {
       ++ended;
       continue;
     }
-    if (value(row, "wall") == 0.0) {
+    if (is_turning(table, row)) {
+      turning[label(table, row)][frequency] = value(row, "inertia_error");
+      shares[label(table, row)][frequency] = value(row, "inertia_real_kg_m2") / value(row, "inertia_kg_m2");
+      errors[label(table, row)][value(row, "frequency_Hz")] = value(row, "inertia_error");
+    } else if (value(row, "wall") == 0.0) {
       by_setup[label(table, row)][frequency] = value(row, "mass_error");
       errors[label(table, row)][value(row, "frequency_Hz")] = value(row, "mass_error");
       if (table.job(row) == 0) of_default[frequency] = value(row, "mass_error");
@@ -168,6 +220,8 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
   return {
       {"apparent_mass_error", of_default},
       {"apparent_mass_error_by_setup", by_setup},
+      {"apparent_inertia_error_by_setup", turning},
+      {"apparent_inertia_over_wanted", shares},
       {"band_Hz", bands},
       {"wall_stiffness_N_per_m", width},
       {"ended_by_fault", ended},
@@ -175,88 +229,115 @@ json Fidelity::headline(const Table& table, const Options& /*options*/) const {
        {{"apparent_mass_error", "by frequency in Hz: |F/a - M|/M at 4 kg, T = 1 ms in free motion of the default cell"},
         {"apparent_mass_error_by_setup",
          "the same for other masses, timesteps and drives (slow drives: half as fast), and with --lookahead auto"},
-        {"band_Hz", "up to which frequency, from 0.3 Hz on, |F/a - M|/M is at most so much"},
+        {"apparent_inertia_error_by_setup", "|tau/alpha - J|/J of a tool that is turned about z, with 4 kg"},
+        {"apparent_inertia_over_wanted", "Re(tau/alpha)/J of the same"},
+        {"band_Hz", "up to which frequency, from 0.3 Hz on, |F/a - M|/M, or that of the inertia, is at most so much"},
         {"wall_stiffness_N_per_m", "by frequency: |F/x| of the handle while the hand leans on the wall"},
         {"ended_by_fault", "rows without a figure because a fault ended their session"}}}};
 }
 
-std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*options*/,
-                                        const std::filesystem::path& out) const {
+namespace {
+
+// One for each job whose rows are `drawn`, of what `y` says of a row. Drives of half the speed feel the same, to some
+// tenths of a per cent: they aren't drawn. `styles`: of each label.
+template <typename Drawn, typename Value>
+std::vector<Curve> curves(const Table& table, Drawn drawn, Value y, std::map<std::string, int>& styles) {
+  std::vector<Curve> list;
+  std::map<std::size_t, std::size_t> of_job;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double value = y(row);
+    if (!drawn(row) || !std::isfinite(value) || table.number(row, table.column("drive_factor")) != 1.0) continue;
+    const auto [at, is_new] = of_job.emplace(table.job(row), list.size());
+    if (is_new) {
+      const std::string name = label(table, row);
+      list.push_back(
+          {.name = name, .style = styles.emplace(name, static_cast<int>(styles.size())).first->second, .marks = true});
+    }
+    Curve& curve = list[at->second];
+    curve.x.push_back(table.number(row, table.column("frequency_Hz")));
+    curve.y.push_back(value);
+  }
+  return list;
+}
+
+// Error, size and phase of F/a, or of torque and angular acceleration.
+template <typename Drawn>
+std::vector<Panel> free_panels(const Table& table, Drawn drawn, bool turning, std::map<std::string, int>& styles) {
   const auto value = [&](std::size_t row, const char* name) { return table.number(row, table.column(name)); };
-  Chart chart{.title = "What the hand feels at the simulated arm",
-              .columns = 2,
-              .panel_width = 640,
-              .panel_height = 460,
-              .common_key = true};
-  Panel mass{.title = "Free motion: mass felt over wanted (below 0 it pulls)",
-             .x_label = "frequency (Hz)",
-             .y_label = "Re(F/a)/M",
-             .log_x = true,
-             .y_low = -2.0,
-             .y_high = 3.0};
-  Panel phase{.title = "Free motion: phase (above 0 the arm does work on the hand)",
+  const char* const ratio = turning ? "τ/α" : "F/a";
+  const std::string asked = turning ? "J" : "M",
+                    where = turning ? "Turning: " : "Free motion: ", what = turning ? "inertia" : "mass";
+  const char *const real = turning ? "inertia_real_kg_m2" : "mass_real_kg", *const imaginary =
+                                                                                turning ? "inertia_imag_kg_m2"
+                                                                                        : "mass_imag_kg";
+  Panel error{.title = where + "error against the wanted " + what,
               .x_label = "frequency (Hz)",
-              .y_label = "arg(F/a) (degrees)",
-              .log_x = true,
-              .y_low = -180.0,
-              .y_high = 180.0};
-  Panel error{.title = "Free motion: error against the wanted mass",
-              .x_label = "frequency (Hz)",
-              .y_label = "|F/a − M|/M",
+              .y_label = std::string("|") + ratio + " − " + asked + "|/" + asked,
               .log_x = true,
               .log_y = true,
               .y_low = 1e-3,
               .y_high = 10.0};
+  Panel size{.title = where + what + " felt over wanted (below 0 it pulls)",
+             .x_label = "frequency (Hz)",
+             .y_label = std::string("Re(") + ratio + ")/" + asked,
+             .log_x = true,
+             .y_low = -2.0,
+             .y_high = 3.0};
+  Panel phase{.title = where + "phase (above 0 the arm does work on the hand)",
+              .x_label = "frequency (Hz)",
+              .y_label = std::string("arg(") + ratio + ") (degrees)",
+              .log_x = true,
+              .y_low = -180.0,
+              .y_high = 180.0};
+  const auto of_rows = [&](auto y) { return curves(table, drawn, y, styles); };
+  error.curves = of_rows([&](std::size_t row) { return value(row, turning ? "inertia_error" : "mass_error"); });
+  size.curves =
+      of_rows([&](std::size_t row) { return value(row, real) / value(row, turning ? "inertia_kg_m2" : "mass_kg"); });
+  phase.curves = of_rows(
+      [&](std::size_t row) { return 180.0 / std::numbers::pi * std::atan2(value(row, imaginary), value(row, real)); });
+  return {error, size, phase};
+}
+
+}  // namespace
+
+std::vector<std::string> Fidelity::plot(const Table& table, const Options& /*options*/,
+                                        const std::filesystem::path& out) const {
+  const auto at_wall = [&](std::size_t row) { return table.number(row, table.column("wall")) != 0.0; };
+  const auto turns = [&](std::size_t row) { return is_turning(table, row); };
+  const auto is_free = [&](std::size_t row) { return !at_wall(row) && !turns(row); };
+  Chart place{.title = "What the hand feels at the simulated arm",
+              .columns = 2,
+              .panel_width = 640,
+              .panel_height = 460,
+              .common_key = true};
+  Chart turning = place;
+  turning.title = "What the hand feels at the simulated arm, turning it (4 kg)";
   Panel wall{.title = "Against a wall: stiffness felt",
              .x_label = "frequency (Hz)",
              .y_label = "|F/x| (N/m)",
              .log_x = true,
              .log_y = true};
-  std::map<std::size_t, std::array<Curve, 3>> curves;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    if (!std::isfinite(value(row, "force_N"))) continue;
-    std::array<Curve, 3>& of_job = curves[table.job(row)];
-    for (Curve& curve : of_job) {
-      curve.name = label(table, row);
-      curve.marks = true;
-      curve.x.push_back(value(row, "frequency_Hz"));
-    }
-    const bool at_wall = value(row, "wall") != 0.0;
-    of_job[0].y.push_back(at_wall ? value(row, "stiffness_N_per_m")
-                                  : value(row, "mass_real_kg") / value(row, "mass_kg"));
-    of_job[1].y.push_back(value(row, "mass_error"));
-    of_job[2].y.push_back(180.0 / std::numbers::pi *
-                          std::atan2(value(row, "mass_imag_kg"), value(row, "mass_real_kg")));
+  std::map<std::string, int> place_styles, turning_styles;
+  place.panels = free_panels(table, is_free, false, place_styles);
+  wall.curves = curves(
+      table, at_wall, [&](std::size_t row) { return table.number(row, table.column("stiffness_N_per_m")); },
+      place_styles);
+  place.panels.push_back(wall);
+  turning.panels = free_panels(table, turns, true, turning_styles);
+  std::vector<std::string> warnings;
+  for (const auto& [chart, file] : {std::pair{&place, "fidelity.svg"}, std::pair{&turning, "fidelity_turning.svg"}}) {
+    const std::string warning = draw(*chart, out / file);
+    if (!warning.empty()) warnings.push_back(warning);
   }
-  std::map<std::string, int> styles;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const auto found = curves.find(table.job(row));
-    if (found == curves.end()) continue;
-    // Drives of half the speed feel the same, to some tenths of a per cent: they aren't drawn.
-    if (value(row, "drive_factor") == 1.0) {
-      auto& [felt, of_error, of_phase] = found->second;
-      const int style = styles.emplace(felt.name, static_cast<int>(styles.size())).first->second;
-      felt.style = of_error.style = of_phase.style = style;
-      if (value(row, "wall") != 0.0) {
-        wall.curves.push_back(felt);
-      } else {
-        mass.curves.push_back(felt);
-        error.curves.push_back(of_error);
-        phase.curves.push_back(of_phase);
-      }
-    }
-    curves.erase(found);
-  }
-  chart.panels = {error, mass, phase, wall};
-  const std::string warning = draw(chart, out / "fidelity.svg");
-  return warning.empty() ? std::vector<std::string>{} : std::vector<std::string>{warning};
+  return warnings;
 }
 
-std::string Fidelity::text(const json& headline) const {
-  std::ostringstream text;
-  for (const auto& item : headline.at("apparent_mass_error_by_setup").items()) {
+namespace {
+
+void add_errors(std::ostringstream& text, const json& headline, const char* of, const char* what) {
+  for (const auto& item : headline.at(of).items()) {
     std::array<char, 60> word{};
-    text << "error of the mass felt, " << item.key() << ":";
+    text << "error of the " << what << " felt, " << item.key() << ":";
     for (const double limit : limits) {
       const double band = headline.at("band_Hz").at(item.key()).at(percent(limit)).get<double>();
       std::snprintf(word.data(), word.size(), "%s at most %s up to %.2g Hz", limit == limits[0] ? "" : ",",
@@ -273,6 +354,14 @@ std::string Fidelity::text(const json& headline) const {
     }
     text << "\n";
   }
+}
+
+}  // namespace
+
+std::string Fidelity::text(const json& headline) const {
+  std::ostringstream text;
+  add_errors(text, headline, "apparent_mass_error_by_setup", "mass");
+  add_errors(text, headline, "apparent_inertia_error_by_setup", "inertia");
   return text.str();
 }
 

@@ -1,11 +1,11 @@
 // What a hand feels at the handle of the simulated arm, by frequency: the impedance F/v in free motion and against a
-// wall, from 0.1 to 30 Hz.
+// wall, and of a tool that turns τ/ω, from 0.1 to 30 Hz.
 //
 // The hand's intention is a sum of sines; force of the hand on the handle and the tool's true position are sampled once
 // a cycle, over whole periods of all sines, so that one Fourier coefficient per sine is exact. In free motion
 //   F/a = M_apparent(f) complex: its real part is the mass that is felt, its imaginary part −B/ω;
-// apparent_mass_error is |F/a − M|/M. Against a wall F/x is the stiffness that is felt; The two span the impedances
-// that can be rendered at this frequency (the Z-width).
+// apparent_mass_error is |F/a − M|/M. Against a wall F/x is the stiffness that is felt. The two span the impedances
+// that can be rendered at this frequency (the Z-width). Turning, about z, it is the same of torque, turn and inertia.
 //
 // The caller provides the arm: the studies know no bus and no drive.
 #pragma once
@@ -19,23 +19,25 @@
 namespace proxarm::studies {
 
 struct ArmSine {
-  double frequency_Hz = 1.0, amplitude_m = 0.0;
+  double frequency_Hz = 1.0, amplitude = 0.0;  // m, or where the hand turns rad
 };
 
 // A session of the default cell, as the fidelity study wants it.
 struct ArmSetup {
   double mass_kg = 4.0;
+  double inertia_kg_m2 = 0.0;  // 0: the orientation is held
   double period_s = 1e-3;
   double drive_factor = 1.0;     // on the drives' position bandwidth
   bool wall = false;             // 0.2 m in front, and the hand leans on it
   bool looks_ahead = false;      // --lookahead auto
   double settling_s = 2.0;       // before what is returned
   double duration_s = 10.0;      // of what is returned
-  std::vector<ArmSine> sines{};  // of the hand's intention, along x
+  std::vector<ArmSine> sines{};  // of the hand's intention, along x, or about z
 };
 
 struct ArmSample {
   models::Vec3 hand_force_N = models::Vec3::Zero(), tool_m = models::Vec3::Zero();
+  models::Vec3 hand_torque_Nm = models::Vec3::Zero(), turn_rad = models::Vec3::Zero();  // since the first sample
 };
 
 // One sample per cycle; fewer than asked for if a fault ended the session.

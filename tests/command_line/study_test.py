@@ -47,6 +47,19 @@ class Study(ProgramTest):
         self.assertGreater(by_setup["10 kg, T = 1 ms"]["2"], 0.1)
         self.assertLess(by_setup["10 kg, T = 1 ms"]["2"], 0.21)
 
+    def test_what_the_hand_feels_of_a_tool_that_it_turns(self):
+        outcome = self.call("study", "fidelity", "--quick", "--out", "out")
+        self.assertEqual(outcome.status, 0)
+        figures = self.figures("fidelity", "out")
+        setup = "0.1 kg m², T = 1 ms"
+        # What is in phase is the inertia, within 5 % below 2 Hz; what isn't comes by the loop's delay, as with a mass.
+        for frequency in ("0.1", "0.2", "0.3", "0.5", "1"):
+            self.assertAlmostEqual(figures["apparent_inertia_over_wanted"][setup][frequency], 1.0, delta=0.05)
+        self.assertGreater(figures["apparent_inertia_error_by_setup"][setup]["2"], 0.1)
+        self.assertLess(figures["apparent_inertia_error_by_setup"][setup]["2"], 0.21)
+        self.assertIn(f"error of the inertia felt, {setup}: at most 5 % up to 0.", outcome.out)
+        self.assertIn("<svg", (self.folder / "out/fidelity_turning.svg").read_text()[:1000])
+
     def test_mistakes_are_named(self):
         for arguments, words in ((("figur5", "--out", "x"), ("'figur5'", "figure5")),
                                  (("figure5",), ("--out",)),

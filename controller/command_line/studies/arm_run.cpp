@@ -1,11 +1,13 @@
 #include "controller/command_line/studies/arm_run.hpp"
 
 #include <numbers>
+#include <optional>
 
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/trials/cycle_work.hpp"
 #include "controller/library/simulated_loop.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -16,6 +18,12 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   options.period_s = setup.period_s;
   options.duration_s = setup.settling_s + setup.duration_s;
   if (setup.looks_ahead) options.lookahead = LookaheadChoice{.kind = LookaheadChoice::Kind::automatic};
+  if (setup.inertia_kg_m2 > 0.0) {
+    options.inertia_kg_m2 = setup.inertia_kg_m2;
+    options.hand = shipped_file("sim/hands/wobble.yaml");
+    // A wrist swings at 3 Hz on such a tool, above the band in which hands move by will, and this one means to.
+    options.passivity = controller::Passivity::off;
+  }
   options.scene = shipped_file(setup.wall ? "scenes/frictionless_wall.yaml" : "scenes/free.yaml");
   PreparedSession session = prepare(options);
   session.hand.waypoints.clear();
@@ -26,10 +34,12 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   }
   for (std::size_t i = 0; i < setup.sines.size(); ++i) {
     // By turns with and against each other: at first the hand rests where the tool is.
+    const bool turns = setup.inertia_kg_m2 > 0.0;
     session.hand.multisine.push_back({.frequency_Hz = setup.sines[i].frequency_Hz,
-                                      .amplitude_m = setup.sines[i].amplitude_m,
+                                      .amplitude_m = turns ? 0.0 : setup.sines[i].amplitude,
+                                      .amplitude_rad = turns ? setup.sines[i].amplitude : 0.0,
                                       .phase_rad = i % 2 == 0 ? 0.0 : std::numbers::pi,
-                                      .direction = {1.0, 0.0, 0.0}});
+                                      .direction = {turns ? 0.0 : 1.0, 0.0, turns ? 1.0 : 0.0}});
   }
   for (description::DriveDescription& drive : session.cell.drives) {
     drive.position_bandwidth_Hz *= setup.drive_factor;
@@ -43,10 +53,15 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
 std::vector<studies::ArmSample> run_arm(const studies::ArmSetup& setup) {
   std::vector<studies::ArmSample> samples;
   double rendered_s = 0.0;
+  std::optional<models::Quaternion> first;
   controller::run_quietly(session_of(setup), [&](const controller::CycleRecord& record, const sim::Truth& truth) {
     if (record.phase != controller::Phase::rendering) return;
     rendered_s += setup.period_s;
-    if (rendered_s > setup.settling_s) samples.push_back({truth.hand_force_W, truth.X_WT.translation()});
+    if (!(rendered_s > setup.settling_s)) return;
+    const models::Quaternion now(truth.X_WT.linear());
+    if (!first) first = now;
+    samples.push_back({truth.hand_force_W, truth.X_WT.translation(), truth.hand_torque_W,
+                       models::rotation_vector(now * first->conjugate())});
   });
   return samples;
 }
