@@ -58,36 +58,43 @@ std::optional<ToolParts::Mark> ToolParts::divide(const std::vector<Mark>& marks,
   return out;
 }
 
-models::ToolPose ToolParts::from(const Pose& pose, Aside& aside) const {
+models::ToolPose ToolParts::from(const Pose& pose, Going& going) const {
   const models::ToolPose& r = pose.call.r;
   if (!lies_on_point(pose.call.contacts)) return r;
-  aside.lay = true;
-  if (aside.by.isZero(0.0)) return r;
-  const models::ToolPose out = models::moved(r, aside.by);
+  going.lay = true;
+  if (going.aside.isZero(0.0)) return r;
+  const models::ToolPose out = models::moved(r, going.aside);
   return laws_.depth_m(out, pose.call.time_s) <= 0.0 ? out : r;
 }
 
-void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, Aside& aside,
+bool ToolParts::find(Pose& pose, const Pose& last, const models::ToolPose& start, double drawn) const {
+  const auto g = fresh_.clone();
+  ToolCall& call = pose.call;
+  g->set_time({.time_s = call.time_s, .period_s = call.time_s - last.call.time_s});
+  call.r = g->step(call.K, call.p, start);
+  if (g->unresolved()) return false;
+  call.contacts.assign(g->contacts().begin(), g->contacts().end());
+  for (models::PoseContact& contact : call.contacts) contact.force_W /= drawn;
+  pose.short_m = laws_.depth_m(call.r, call.time_s);
+  return true;
+}
+
+void ToolParts::follow(const ToolCall& call, const std::vector<Mark>& marks, Going& going,
                        std::vector<Pose>& way) const {
   const Mark reached = way.back().mark;
   for (auto mark = std::upper_bound(marks.begin(), marks.end(), reached); mark != marks.end(); ++mark) {
     Pose next{*mark, call, 0.0};
     const Pose& last = way.back();
-    const models::ToolPose start = from(last, aside);
-    const auto g = fresh_.clone();
+    const models::ToolPose start = from(last, going);
     next.call.p = models::moved(call.q, mark->share * models::difference(call.p, call.q));
     const double since = last.mark.share == mark->share ? last.mark.waited : 0.0, waited = mark->waited;
     // h/(1 + h)
     const double drawn = waited == 1.0 ? 1.0 : (waited - since) / (waited - since + (1.0 - since) * (1.0 - waited));
     if (drawn < 1.0) next.call.p = models::moved(start, drawn * models::difference(next.call.p, start));
     next.call.time_s = time_of(call, *mark);
-    g->set_time({.time_s = next.call.time_s, .period_s = next.call.time_s - time_of(call, last.mark)});
-    next.call.r = g->step(call.K, next.call.p, start);
-    if (g->unresolved()) continue;
-    next.call.contacts.assign(g->contacts().begin(), g->contacts().end());
-    for (models::PoseContact& contact : next.call.contacts) contact.force_W /= drawn;
-    next.short_m = laws_.depth_m(next.call.r, next.call.time_s);
-    way.push_back(next);
+    const bool found =
+        find(next, last, start, drawn) || (going.from_q && drawn == 1.0 && find(next, way.front(), call.q, 1.0));
+    if (found) way.push_back(next);
   }
 }
 
@@ -124,21 +131,22 @@ ToolParts::Sum ToolParts::sum_of(const std::vector<Pose>& way, const std::vector
 bool ToolParts::keep(const ToolCall& call, double short_m, double rest_J,
                      std::vector<models::PoseContact>& touched) const {
   const std::size_t before = touched.size();
-  Aside aside;
+  Going going;
   const auto keeps = [&](int parts) {
     touched.resize(before);
-    return keep_from(parts, aside, call, short_m, rest_J, touched);
+    return keep_from(parts, going, call, short_m, rest_J, touched);
   };
   if (std::any_of(kFirst.begin(), kFirst.end(), keeps)) return true;
   models::Random random(std::uint64_t{1});
-  for (int k = 0; k < kAsides && aside.lay; ++k) {
-    aside.by << kAside_m * random.direction(), kAside_m / ToolLaws::lever_m * random.direction();
+  for (int k = 0; k < kAsides && going.lay; ++k) {
+    going.aside << kAside_m * random.direction(), kAside_m / ToolLaws::lever_m * random.direction();
     if (keeps(kFirst.front())) return true;
   }
-  return false;
+  going = {.from_q = true};
+  return std::any_of(kFirst.begin(), kFirst.end(), keeps);
 }
 
-bool ToolParts::keep_from(int parts, Aside& aside, const ToolCall& call, double short_m, double rest_J,
+bool ToolParts::keep_from(int parts, Going& going, const ToolCall& call, double short_m, double rest_J,
                           std::vector<models::PoseContact>& touched) const {
   std::vector<Mark> marks;
   for (int k = 0; k <= parts; ++k) marks.push_back({static_cast<double>(k) / parts, 1.0});
@@ -148,7 +156,7 @@ bool ToolParts::keep_from(int parts, Aside& aside, const ToolCall& call, double 
   const double allowed_J = laws_.curvature_J(call);
   const std::size_t before = touched.size();
   while (true) {
-    follow(call, marks, aside, way);
+    follow(call, marks, going, way);
     touched.resize(before);
     for (std::size_t k = 1; k < way.size(); ++k) {
       if (way[k].mark.share == 1.0) continue;

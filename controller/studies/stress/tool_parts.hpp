@@ -49,6 +49,12 @@
 // a needle it doesn't stay there: put a nanometre aside it falls. In a wedge it does. So a way may go on from next to
 // where it lies on a point; that it was put there, and what pushes it on from the point itself, counts as any part's.
 //
+// Along an edge that crosses another one at a small angle the normal turns fast, and 𝒢 allows for what the tool turns
+// by, no more: such parts may be unresolved, however small (replay 5930090148271672, step 429: from 0.9102 of the way
+// on, on along the object's edge, until from 0.92 to 0.95 a vertex holds the tool). What is found from q at 0.92 is a
+// step of 𝒢, too, by the same p̂. So where no way keeps the bound, one may have such poses, if none are found from the
+// one before: what pushes on to them from there counts as any part's.
+//
 // Friction is against the slip, by which it takes energy; what part of it a place comes back in a jump says nothing.
 // Nor does a pose for which no forces are found: parts are those between the others.
 #pragma once
@@ -69,7 +75,8 @@ class ToolParts {
   // Whether what is pushed forward in the parts is no more than curvature may give, and edges that it goes over account
   // for `rest_J`, by what touched before the step, to be given, and on the way, added: at each eighth at least where
   // forces were found, and closer where the parts push while something isn't accounted for. If that isn't so of a way
-  // that is divided in eighths first, of one that is divided otherwise, or put aside. `short_m`: of gaps at q.
+  // that is divided in eighths first, of one that is divided otherwise, put aside, or goes on from q. `short_m`: of
+  // gaps at q.
   [[nodiscard]] bool keep(const ToolCall& call, double short_m, double rest_J,
                           std::vector<models::PoseContact>& touched) const;
 
@@ -87,10 +94,12 @@ class ToolParts {
   [[nodiscard]] static double time_of(const ToolCall& call, const Mark& mark) {
     return call.since_s + mark.share * (call.time_s - call.since_s);
   }
-  // By what a way is put aside where it lies on a point, and whether it has lain on one.
-  struct Aside {
-    models::Twist by = models::Twist::Zero();
+  // How a way goes on: put aside where it lies on a point (and whether it has lain on one), and from q where nothing is
+  // found from the pose before.
+  struct Going {
+    models::Twist aside = models::Twist::Zero();
     bool lay = false;
+    bool from_q = false;
   };
   struct Sum {
     double all_J = 0.0, undivided_J = 0.0;  // of what can't be divided any more
@@ -100,12 +109,14 @@ class ToolParts {
   };
   static std::optional<Mark> between(const Mark& a, const Mark& b);
   static std::optional<Mark> divide(const std::vector<Mark>& marks, const Mark& from, const Mark& to);
-  [[nodiscard]] bool keep_from(int parts, Aside& aside, const ToolCall& call, double short_m, double rest_J,
+  [[nodiscard]] bool keep_from(int parts, Going& going, const ToolCall& call, double short_m, double rest_J,
                                std::vector<models::PoseContact>& touched) const;
   // From the last of the poses on, to p̂.
-  void follow(const ToolCall& call, const std::vector<Mark>& marks, Aside& aside, std::vector<Pose>& way) const;
+  void follow(const ToolCall& call, const std::vector<Mark>& marks, Going& going, std::vector<Pose>& way) const;
+  // Whether forces are found for a pose of the way: a step to its p̂. `drawn`: its share of K (p̂ − r).
+  [[nodiscard]] bool find(Pose& pose, const Pose& last, const models::ToolPose& start, double drawn) const;
   // Where a way goes on from.
-  [[nodiscard]] models::ToolPose from(const Pose& pose, Aside& aside) const;
+  [[nodiscard]] models::ToolPose from(const Pose& pose, Going& going) const;
   [[nodiscard]] double pushed_J(const Pose& from, const Pose& to) const;
   // Of a way's parts, the last of which leads to the step's end, or to the way's where that one pushes since q by as
   // much or more.

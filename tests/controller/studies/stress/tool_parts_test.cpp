@@ -73,12 +73,14 @@ struct BrokenEdge final : PointWorld {
   double springs_m = 0.0;                  // off the side, and is held there
   double early_m = 0.0;                    // before the bevel's end, where it jumps onto the side
   double needle_m = -1.0;                  // where p̂ comes here from over the table, it comes to lie on the edge
+  double hidden_m = 0.0;                   // from nearer than this no forces are found on the bevel
 
   // What it lies on, or the first after it that its foot is on.
   const ToolPose& step(const models::Mat6& /*K*/, const ToolPose& p_hat, const ToolPose& q) noexcept override {
     const double diagonal = std::sqrt(0.5);
     const Vec3 &p = p_hat.position, bevel(diagonal, 0.0, diagonal);
     const Vec3 foot = p - bevel.dot(p) * bevel;
+    unresolved_ = false;
     contact_.normal_W = Vec3::UnitX();
     double off_m = bevel_m + springs_m - p.x();
     if (q.position.x() <= 0.0 && p.x() <= 0.0) {
@@ -93,11 +95,16 @@ struct BrokenEdge final : PointWorld {
     } else if (q.position.x() < bevel_m && foot.x() < bevel_m - early_m) {
       contact_.normal_W = bevel;
       off_m = -bevel.dot(p);
+      unresolved_ = (p - q.position).norm() < hidden_m;
     }
     lie(p_hat, off_m);
     return q_;
   }
+  [[nodiscard]] bool unresolved() const noexcept override { return unresolved_; }
   [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<BrokenEdge>(*this); }
+
+ private:
+  bool unresolved_ = false;
 };
 
 // On the broken edge there is a needle's point, onto which every way over it leads that comes from over the table, and
@@ -328,6 +335,26 @@ TEST(ToolParts, APoseOfTheWayIsFoundFromTheOneBefore) {
   EXPECT_TRUE(here.keeps(Table(), otherwise_from_far));
   stuck_from_far.stuck_far = true;
   EXPECT_TRUE(here.keeps(Table(), stuck_from_far));
+}
+
+// As where edges cross that nearly lie along each other: on the bevel, by whatever steps it comes. Without it the side
+// pushes by the bevel's width. (p̂ is over the bevel from 0.69 to 0.82 of the way.)
+TEST(ToolParts, WhereNothingIsFoundFromThePoseBeforeAWayMayHaveOneThatIsFoundFromWhereTheStepBegan) {
+  OverABrokenEdge here;
+  here.call.p.position = Vec3(9e-5, 0.0, -2e-4);
+  ASSERT_EQ(here.step_of(BrokenEdge()).contacts[0].normal_W, Vec3::UnitX());
+  BrokenEdge way, never;
+  way.hidden_m = 1.5e-4;  // from the step's beginning it is 0.2 mm
+  EXPECT_TRUE(here.keeps(BrokenEdge(), way));
+  never.hidden_m = 1e-3;
+  EXPECT_FALSE(here.keeps(BrokenEdge(), never));
+  // What springs there does so on that way, too.
+  way.springs_m = 2.1e-10;
+  EXPECT_FALSE(here.keeps(way));
+  BrokenEdge springs;
+  springs.springs_m = 2.1e-10;
+  way.springs_m = 0.0;
+  EXPECT_FALSE(here.keeps(springs, way));
 }
 
 // The step ends on another slope than its parts lead to, which both keep the law: it may if it is pushed by no more.
