@@ -86,7 +86,7 @@ void PoseProxy::tell_time() noexcept {
 void PoseProxy::resume(const ToolPose& q, const Twist& velocity_W) noexcept {
   q_k1_ = q;
   move_ = config_.period_s * velocity_W;
-  if (config_.held) move_.tail<3>().setZero();
+  if (config_.held) reference_.orientation = q.orientation;
   make_K();
 }
 
@@ -105,7 +105,7 @@ void PoseProxy::make_K() noexcept {
   K_ = mass_W_ / (T * T);
   K_.diagonal().head<3>().array() += config_.damping_Ns_per_m / T + config_.spring_N_per_m;
   if (config_.held) {
-    K_.diagonal().tail<3>().setConstant(held_Nm_per_rad);
+    K_.diagonal().tail<3>().setConstant(held_share * held_lever_m * held_lever_m * K_(0, 0));
   } else {
     K_.diagonal().tail<3>().array() += config_.turning_damping_Nms_per_rad / T + config_.turning_spring_Nm_per_rad;
   }
@@ -128,7 +128,7 @@ ToolPose PoseProxy::predict(const models::Wrench& h_W) noexcept {
     pull.tail<3>() -= config_.turning_spring_Nm_per_rad * e.tail<3>();
   }
   Twist xi = models::solve_square<6>(K_, pull);
-  if (config_.held) xi.tail<3>().setZero();
+  if (config_.held) return {q_k1_.position + xi.head<3>(), reference_.orientation};
   const double turn = xi.tail<3>().norm();
   if (turn > kMostTurn_rad) xi.tail<3>() *= kMostTurn_rad / turn;
   return models::moved(q_k1_, xi);
@@ -140,7 +140,6 @@ ProxyFault PoseProxy::step(const ToolPose& p_hat) noexcept {
   if (g_->wants_time()) g_->set_time({time_s, config_.period_s});
   ToolPose q = g_->step(K_, p_hat, q_k1_);
   const Twist wrench = K_ * models::difference(q, p_hat);
-  if (config_.held) q.orientation = q_k1_.orientation;
   const Twist move = models::difference(q, q_k1_);
   if (!wrench.allFinite() || !move.allFinite()) return ProxyFault::result_not_finite;
   wrench_W_ = wrench;

@@ -13,8 +13,11 @@
 // spins. So what the hand feels is M in all directions and J about all axes, without coupling. This K isn't diagonal;
 // Assumption 1 is what makes contacts indifferent to it.
 //
-// An orientation that is held is J → ∞: 𝒢 gets `held_Nm_per_rad` for turning, and what a contact's torque turns the
-// tool by in a step (1e-11 rad for 10 Nm) is taken back after it.
+// An orientation that is held is J → ∞, in a 𝒢 of six dimensions: p̂ keeps the orientation that is held, and K holds it
+// ten thousand times as stiffly as the place, at 5 cm. With 4 kg at 1 kHz that is 1e8 Nm/rad: contacts turn the tool by
+// 1e-7 rad for 10 Nm, a tenth of what joints' encoders resolve, and as long as they press. (Much stiffer, and the local
+// problem can't tell how contacts on one face share their load: with 1e12 Nm/rad a tenth to four tenths of the steps of
+// a box that lies flat found no forces.)
 //
 // Scheme: admittance of order 1. Neither allocates, locks, throws nor prints after construction.
 #pragma once
@@ -48,14 +51,15 @@ struct PoseConfig {
 
 class PoseProxy {
  public:
-  static constexpr double held_Nm_per_rad = 1e12;
+  static constexpr double held_share = 1e4, held_lever_m = 0.05;
 
   // Precondition: `g` outlives this object.
   PoseProxy(const PoseConfig& config, models::PoseAlgorithm& g);  // validates
 
   // At rest at this pose, at this time; the spring's reference is there, too.
   void start(const models::ToolPose& q, double time_s) noexcept;
-  // The motion goes on from here with this velocity (m/s, rad/s). The reference stays.
+  // The motion goes on from here with this velocity (m/s, rad/s). The reference stays; an orientation that is held is
+  // held as it is here.
   void resume(const models::ToolPose& q, const models::Twist& velocity_W) noexcept;
 
   // p̂ of the next step under the hand's wrench; the caller may bring it nearer to q (limits) before step().

@@ -76,6 +76,41 @@ TEST(PoseProxy, MovesItsPlaceAsThePointsProxyDoes) {
   EXPECT_EQ(pose.q().orientation.coeffs(), start.orientation.coeffs());
 }
 
+// What presses on the tool by a wrench, whatever it does.
+class Pressed final : public models::PoseAlgorithm {
+ public:
+  Twist wrench = Twist::Zero();
+
+  const ToolPose& step(const models::Mat6& K, const ToolPose& p_hat, const ToolPose& /*q*/) noexcept override {
+    return q_ = models::moved(p_hat, K.ldlt().solve(wrench));
+  }
+  [[nodiscard]] double clearance_m(const ToolPose& /*pose*/) const noexcept override { return 0.0; }
+  [[nodiscard]] std::unique_ptr<models::PoseAlgorithm> clone() const override {
+    return std::make_unique<Pressed>(*this);
+  }
+  void copy_state(const models::PoseAlgorithm& /*other*/) noexcept override {}
+
+ private:
+  ToolPose q_;
+};
+
+// By 1e-7 rad for 10 Nm, with 4 kg at 1 kHz, however long it lasts, and not at all when it is over.
+TEST(PoseProxy, AnOrientationThatIsHeldYieldsByATenthOfWhatEncodersResolveAndComesBack) {
+  Pressed g;
+  PoseProxy proxy({.mass_kg = 4.0, .held = true, .period_s = 1e-3}, g);
+  proxy.start(start, 0.0);
+  const auto turned = [&] { return models::difference(proxy.q(), start).tail<3>().eval(); };
+  g.wrench[4] = 10.0;
+  for (int k = 0; k < 1000; ++k) {
+    ASSERT_EQ(proxy.step(proxy.predict({})), ProxyFault::none);
+    ASSERT_LT((turned() - 1e-7 * Vec3::UnitY()).norm(), 1e-14);  // 1e-7 of it, and rounding
+    ASSERT_NEAR(proxy.wrench_W()[4], 10.0, 1e-6);                // rounding of an angle, by 1e8 Nm/rad
+  }
+  g.wrench.setZero();
+  ASSERT_EQ(proxy.step(proxy.predict({})), ProxyFault::none);
+  EXPECT_LT(turned().norm(), 1e-15);
+}
+
 TEST(PoseProxy, RestsOnItsSpringsWhereTheWrenchIsMet) {
   FreePose g;
   PoseProxy proxy({.damping_Ns_per_m = 50.0,
