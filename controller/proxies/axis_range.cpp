@@ -50,14 +50,18 @@ bool AxisRange::keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& 
   if (!tilted && !twisted) return false;
   if (tilted) now.tilt *= most_tilt / tilt;
   if (twisted) now.twist = std::clamp(now.twist, -most_twist, most_twist);
+  // Tilt and twist bend: the step to a border may be longer than the one that was asked for, and would be a push.
+  const double asked = models::rotation_vector(to * from.conjugate()).norm();
+  const double most_rad =
+      std::min(step.most_rad, std::max(asked, OrientationProxy::reference_rad_per_s * step.period_s));
   double share = 1.0;
   for (int k = 0; k < kShorter; ++k) {
     const Vec3 tilt_now = before.tilt + share * (now.tilt - before.tilt);
     const double twist_now = before.twist + share * (now.twist - before.twist);
     to = (start * models::rotation_by(tilt_now) * about(axis_T, twist_now)).normalized();
     const double length = models::rotation_vector(to * from.conjugate()).norm();
-    if (length <= step.most_rad) break;
-    share *= step.most_rad / length;
+    if (length <= most_rad) break;
+    share *= most_rad / length;
   }
   return true;
 }

@@ -24,7 +24,8 @@ struct AxisRange {
     double period_s = 1e-3, most_rad = 0.1;  // that it may turn the tool by
   };
   // Brings the orientation that a step leads to into what can be reached from `from` within a period, as the angle from
-  // the start (orientation_proxy.hpp). Whether it was beyond. Preconditions: all unit; `to` within 3 rad of the start
+  // the start (orientation_proxy.hpp), by a step that is no longer, but for the way back of what is outside. Whether it
+  // was beyond. Preconditions: all unit; `to` within 3 rad of the start
   // and no further from `from` than a step may lead.
   bool keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& from, const Step& step,
             Eigen::Quaterniond& to) const noexcept;

@@ -70,7 +70,7 @@ PoseProxy::PoseProxy(const PoseConfig& config, models::PoseAlgorithm& g) : confi
 }
 
 void PoseProxy::start(const ToolPose& q, double time_s) noexcept {
-  q_k1_ = reference_ = q;
+  q_k1_ = q_k2_ = reference_ = q;
   move_.setZero();
   wrench_W_.setZero();
   time_s_ = time_s;
@@ -84,7 +84,7 @@ void PoseProxy::tell_time() noexcept {
 }
 
 void PoseProxy::resume(const ToolPose& q, const Twist& velocity_W) noexcept {
-  q_k1_ = q;
+  q_k1_ = q_k2_ = q;
   move_ = config_.period_s * velocity_W;
   if (config_.held) reference_.orientation = q.orientation;
   make_K();
@@ -138,14 +138,23 @@ ProxyFault PoseProxy::step(const ToolPose& p_hat) noexcept {
   if (!p_hat.position.allFinite() || !p_hat.orientation.coeffs().allFinite()) return ProxyFault::result_not_finite;
   const double time_s = time_s_ + config_.period_s;
   if (g_->wants_time()) g_->set_time({time_s, config_.period_s});
-  ToolPose q = g_->step(K_, p_hat, q_k1_);
-  const Twist wrench = K_ * models::difference(q, p_hat);
-  const Twist move = models::difference(q, q_k1_);
+  const ToolPose from = q_k1_;
+  const ProxyFault fault = go(K_, p_hat, from);
+  if (fault != ProxyFault::none) return fault;
+  q_k2_ = from;
+  time_s_ = time_s;
+  return ProxyFault::none;
+}
+
+ProxyFault PoseProxy::again(const Mat6& K, const ToolPose& p_hat) noexcept { return go(K, p_hat, q_k2_); }
+
+ProxyFault PoseProxy::go(const Mat6& K, const ToolPose& p_hat, const ToolPose& from) noexcept {
+  const ToolPose q = g_->step(K, p_hat, from);
+  const Twist wrench = K * models::difference(q, p_hat), move = models::difference(q, from);
   if (!wrench.allFinite() || !move.allFinite()) return ProxyFault::result_not_finite;
   wrench_W_ = wrench;
   move_ = move;
   q_k1_ = q;
-  time_s_ = time_s;
   return ProxyFault::none;
 }
 

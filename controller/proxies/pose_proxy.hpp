@@ -66,9 +66,12 @@ class PoseProxy {
   [[nodiscard]] models::ToolPose predict(const models::Wrench& h_W) noexcept;
   // One period. After a fault nothing has changed.
   [[nodiscard]] ProxyFault step(const models::ToolPose& p_hat) noexcept;
+  // The last step once more, from where it began, by another K and p̂. Precondition: nothing in the world moves.
+  [[nodiscard]] ProxyFault again(const models::Mat6& K, const models::ToolPose& p_hat) noexcept;
 
   [[nodiscard]] const models::ToolPose& q() const noexcept { return q_k1_; }
-  [[nodiscard]] const models::Twist& move() const noexcept { return move_; }  // of the last step, q₁ ⊟ q₂
+  [[nodiscard]] const models::ToolPose& q_before() const noexcept { return q_k2_; }  // where the last step began
+  [[nodiscard]] const models::Twist& move() const noexcept { return move_; }         // of the last step, q₁ ⊟ q₂
   // The world's wrench in the last step, about the reference point.
   [[nodiscard]] const models::Twist& wrench_W() const noexcept { return wrench_W_; }
   [[nodiscard]] const models::Mat6& K() const noexcept { return K_; }
@@ -91,10 +94,11 @@ class PoseProxy {
  private:
   void make_K() noexcept;
   void tell_time() noexcept;
+  ProxyFault go(const models::Mat6& K, const models::ToolPose& p_hat, const models::ToolPose& from) noexcept;
 
   PoseConfig config_;
   models::PoseAlgorithm* g_;
-  models::ToolPose q_k1_, reference_;
+  models::ToolPose q_k1_, q_k2_, reference_;
   models::Twist move_ = models::Twist::Zero(), wrench_W_ = models::Twist::Zero();
   models::Mat6 mass_W_ = models::Mat6::Identity(), K_ = models::Mat6::Identity();
   models::Vec3 centre_W_ = models::Vec3::Zero();

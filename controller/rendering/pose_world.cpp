@@ -4,11 +4,13 @@
 #include <cmath>
 
 #include "controller/proxies/orientation_proxy.hpp"
+#include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::controller {
 namespace {
 
 using models::Mat3;
+using models::Mat6;
 using models::ToolPose;
 using models::Twist;
 using models::Vec3;
@@ -21,6 +23,9 @@ constexpr double rounding_m = 1e-12;
 // After a hold in contact the arm stands some micrometres inside of what the tool touches, by the twist of its gears;
 // so much is led out of it.
 constexpr double settled_m = 1e-3, settled_rad = 0.01;
+// Of the limits of rotation, which a wall holds to 1e-7 rad against 10 Nm.
+constexpr double yields_rad = 1e-6;
+constexpr int most_walls = 3;
 
 Vec3 shortened(const Vec3& v, double most) noexcept {
   const double length = v.norm();
@@ -92,8 +97,10 @@ WorldStep PoseWorld::step(const Vec3& h_W, const StepLimits& limits) noexcept {
   const ToolPose p_hat = proxy_.predict({h_W, torque_W_});
   ToolPose limited = p_hat;
   if (p_hat.position.allFinite()) limit_place(limits, limited);
-  limit_rotation(limited);
+  limit_rotation(proxy_.q(), limited);
+  walls_.setZero();
   last_.fault = proxy_.step(limited);
+  if (last_.fault == ProxyFault::none && !proxy_.config().held && !g_->wants_time()) hold_rotation(limited);
   if (last_.fault == ProxyFault::none && g_->squeezed()) last_.fault = ProxyFault::squeezed;
   if (last_.fault == ProxyFault::none) report(p_hat, limited);
   return last_;
@@ -104,26 +111,51 @@ void PoseWorld::limit_place(const StepLimits& limits, ToolPose& p_hat) noexcept 
   p_hat.position = limits_(proxy_.K()(0, 0), p_hat.position, proxy_.q().position);
 }
 
-void PoseWorld::limit_rotation(ToolPose& p_hat) noexcept {
-  const ToolPose& q = proxy_.q();
-  const Vec3 turn = models::rotation_vector(p_hat.orientation * q.orientation.conjugate());
+// Leads the orientation of a step back into what may be reached from where it begins.
+void PoseWorld::limit_rotation(const ToolPose& from, ToolPose& to) noexcept {
+  const Vec3 turn = models::rotation_vector(to.orientation * from.orientation.conjugate());
   const double most = speed_share_ * config_.max_turning_speed_rad_per_s * proxy_.config().period_s;
   if (turn.norm() > most) {
-    p_hat.orientation = (models::rotation_by(shortened(turn, most)) * q.orientation).normalized();
+    to.orientation = (models::rotation_by(shortened(turn, most)) * from.orientation).normalized();
     turning_limited_ = true;
   }
-  const Vec3 angle = models::rotation_vector(p_hat.orientation * home_.orientation.conjugate());
-  const double before_rad = models::rotation_vector(q.orientation * home_.orientation.conjugate()).norm();
+  const Vec3 angle = models::rotation_vector(to.orientation * home_.orientation.conjugate());
+  const double before_rad = models::rotation_vector(from.orientation * home_.orientation.conjugate()).norm();
   const double reachable_rad =
       OrientationProxy::reachable_angle_rad(before_rad, config_.max_turn_rad, proxy_.config().period_s);
   if (angle.norm() > reachable_rad) {
-    p_hat.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
+    to.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
     turning_limited_ = true;
   }
   if (!config_.axis_range.limits()) return;
   const AxisRange::Step step{proxy_.config().period_s, most};
-  const bool kept = config_.axis_range.keep(home_.orientation, q.orientation, step, p_hat.orientation);
+  const bool kept = config_.axis_range.keep(home_.orientation, from.orientation, step, to.orientation);
   turning_limited_ = kept || turning_limited_;
+}
+
+void PoseWorld::hold_rotation(const ToolPose& p_hat) noexcept {
+  const double s = PoseProxy::held_share * PoseProxy::held_lever_m * PoseProxy::held_lever_m * proxy_.K()(0, 0);
+  Mat6 K = proxy_.K();
+  Twist pull = Twist::Zero();
+  int walls = 0;
+  for (; walls < most_walls; ++walls) {
+    const bool limited = turning_limited_;
+    ToolPose within = proxy_.q();
+    limit_rotation(proxy_.q_before(), within);
+    const Vec3 beyond = models::rotation_vector(proxy_.q().orientation * within.orientation.conjugate());
+    if (!(beyond.norm() > yields_rad)) {
+      turning_limited_ = limited;
+      break;
+    }
+    const Vec3 n = beyond.normalized();
+    const double c = n.dot(models::rotation_vector(within.orientation * p_hat.orientation.conjugate()));
+    K.bottomRightCorner<3, 3>() += s * n * n.transpose();
+    pull.tail<3>() += s * c * n;
+    last_.fault = proxy_.again(K, models::moved(p_hat, models::solve_square<6>(K, pull)));
+    if (last_.fault != ProxyFault::none) return;
+  }
+  // K (q ⊟ p̂) is what contacts and walls exert together.
+  if (walls > 0) walls_ = proxy_.K() * models::difference(proxy_.q(), p_hat) - proxy_.wrench_W();
 }
 
 void PoseWorld::return_reference() noexcept {
@@ -142,7 +174,7 @@ void PoseWorld::report(const ToolPose& p_hat, const ToolPose& limited) noexcept 
   last_.p_hat_W = p_hat.position;
   last_.f_W = proxy_.wrench_W().head<3>();
   last_.torque_W = proxy_.wrench_W().tail<3>();
-  const Twist held_back = proxy_.K() * models::difference(limited, p_hat);
+  const Twist held_back = walls_ + proxy_.K() * models::difference(limited, p_hat);
   last_.limit_force_W = held_back.head<3>();
   last_.limit_torque_W = held_back.tail<3>();
   last_.limits = limits_.active();

@@ -4,9 +4,15 @@
 // a step, orientation() after it, turn_to() before start() and resume().
 //
 // Limits act on p̂, before 𝒢: its place is projected onto the step's sets (step_limits.hpp), and its rotation onto those
-// of speed, of the angle from the orientation at the first start and of tilt and twist. Contacts come after them. So q
-// keeps the limits as long as contacts lead nearer to q(k−1), as they do with everything that stands still; beyond that
-// the guards of the setpoints have the last word, as always (docs/tool.md).
+// of speed, of the angle from the orientation at the first start and of tilt and twist. A contact may turn the tool on,
+// as a lever does that something pushes at its end. Where q comes to be beyond those sets of rotation by more than 1
+// µrad the step is taken again with them as walls: with n the axis about which q is turned back into them,
+//   ½‖q ⊟ p̂‖²_K + ½ s (nᵀ(q ⊟ p̂)_θ − c)²,   c of the set's border, s = 1e4 (5 cm)² K_xx, as of an orientation that is
+//   held,
+// which is 𝒢 with K + s n nᵀ for p̂ ⊞ (K + s n nᵀ)⁻¹ s c n: the wall yields by 1e-7 rad to 10 Nm. Up to three walls, as
+// each step may come to be beyond others. Among objects that move a step can't be taken again: there, and for the
+// place, q keeps the limits as long as contacts lead nearer to q(k−1); the guards of the setpoints have the last word,
+// as always (docs/tool.md).
 #pragma once
 
 #include <memory>
@@ -69,7 +75,8 @@ class PoseWorld final : public RenderedWorld {
  private:
   [[nodiscard]] models::ToolPose outside(const models::ToolPose& wanted) noexcept;
   void limit_place(const StepLimits& limits, models::ToolPose& p_hat) noexcept;
-  void limit_rotation(models::ToolPose& p_hat) noexcept;
+  void limit_rotation(const models::ToolPose& from, models::ToolPose& to) noexcept;
+  void hold_rotation(const models::ToolPose& p_hat) noexcept;
   void return_reference() noexcept;
   void report(const models::ToolPose& p_hat, const models::ToolPose& limited) noexcept;
   void report_contacts() noexcept;
@@ -82,6 +89,7 @@ class PoseWorld final : public RenderedWorld {
   LimitedAlgorithm<3> limits_;
   PoseProxy proxy_;
   WorldStep last_;
+  models::Twist walls_ = models::Twist::Zero();  // what the limits of rotation exerted in the last step, beside p̂
   models::Vec3 torque_W_ = models::Vec3::Zero(), omega_W_ = models::Vec3::Zero();
   Eigen::Quaterniond R_WT_ = Eigen::Quaterniond::Identity();  // for start() and resume()
   models::ToolPose home_;                                     // of the first start

@@ -51,6 +51,11 @@ def axis_x(q):
     return (1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y))
 
 
+def axis_z(q):
+    x, y, z, w = q
+    return (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y))
+
+
 def twist_about_x(q, start):
     """The angle about the tool's x axis that is left once that axis is led back the shortest way."""
     a, b = axis_x(q), axis_x(start)
@@ -348,6 +353,35 @@ class Turning(ProgramTest):
                 self.assertLess(max(twists), 0.15 + more_rad)
                 self.assertLess(-min(twists), 0.15 + more_rad)
                 self.assertGreater(max(twists) - min(twists), 0.27)
+
+    def test_limits_of_turning_hold_against_what_the_tool_leans_on(self):
+        """A hand leads a rod against a ledge 0.12 m below the handle and pushes on: the tool tilted by 0.6 rad."""
+        ledge = self.written("ledge.yaml", "name: ledge\nobjects:\n"
+                             "  - box: {centre_m: [0.80, 0, 0.48], size_m: [0.1, 0.4, 0.02], friction: 0.3}\n"
+                             "tool:\n  capsule: {length_m: 0.2, radius_m: 0.005, position_m: [0, 0, 0.1]}\n")
+        for lead_m, limits, most_rad in ((0.3, "max_tilt_rad: 0.1", 0.1), (0.3, "max_turn_rad: 0.1", 0.1),
+                                         (0.1, "max_tilt_rad: 0.02", 0.02), (0.15, "max_tilt_rad: 0", 0.0)):
+            push = self.written("push.yaml", "inertia_kg_m2: 0.003\nturning_stiffness_Nm_per_rad: 20\n"
+                                "turning_damping_Nms_per_rad: 0.5\nwaypoints:\n  - {time_s: 0.5, turn_rad: [0, 0, 0]}\n"
+                                f"  - {{time_s: 1.5, offset_m: [{lead_m}, 0, 0], turn_rad: [0, 0, 0]}}\n")
+            summary = self.summary(self.limited(f"  {limits}\n"), "--scene", ledge, "--hand", push, "--inertia", "0.05",
+                                   "--duration", "4s", "--record", "ledge")
+            self.assertIn("orientation", summary["active_limits"])
+            rows = self.rows("ledge")
+            self.assertGreater(sum(row["contact"] != "free" for row in rows), 1000)
+
+            def beyond(row, of="proxy"):
+                pose, start = ([float(r[f"{of}_W_q{part}"]) for part in "xyzw"] for r in (row, rows[0]))
+                turn = math.hypot(*rotation_vector(pose, start))
+                if "tilt" in limits:  # not what it twists by
+                    turn = 2 * math.asin(0.5 * math.dist(axis_z(pose), axis_z(start)))
+                return turn - most_rad
+
+            # Where the arm is held back at the touch the proxy goes on from where that is, by some milliradians.
+            for of, more_rad in (("proxy", 0.003), ("true_tool", 0.006)):
+                self.assertLess(max(beyond(row, of) for row in rows), more_rad, (limits, of))
+            # At rest by what a wall yields: 1 µrad.
+            self.assertLess(max(beyond(row) for row in rows[-1000:]), 2e-6, limits)
 
     def test_what_limits_of_tilt_cannot_be(self):
         for limits, told in (("  max_tilt_rad: 4\n", "max_tilt_rad"), ("  max_twist_rad: -1\n", "max_twist_rad"),

@@ -68,6 +68,26 @@ TEST(AxisRange, NoTorqueTiltsOrTwistsTheToolFurther) {
   }
 }
 
+// A tool that turns freely, by 0.1 to 20 mrad a step, gets no energy from a border. (Far from the start a small step of
+// the axis may be a large one of tilt and twist: up to 3 rad it was longer by 40 times.)
+TEST(AxisRange, AStepAtABorderIsNoLongerThanTheOneThatWasAskedFor) {
+  Random random(6);
+  const double back_rad = OrientationProxy::reference_rad_per_s * 1e-3;
+  int limited = 0;
+  for (int k = 0; k < 100'000; ++k) {
+    const AxisRange range{random.uniform(0.0, 3.0), random.uniform(0.0, 3.0), random.direction()};
+    const Vec3 across = range.axis_T.cross(random.direction()).normalized();
+    const double tilt = std::max(0.0, range.max_tilt_rad - random.log_uniform(1e-6, 1.0)),
+                 twist = std::max(0.0, range.max_twist_rad - random.log_uniform(1e-6, 1.0));
+    const Quaterniond from = begun * AngleAxisd(tilt, across) * AngleAxisd(twist, range.axis_T);
+    const double asked_rad = random.log_uniform(back_rad, 0.02);
+    Quaterniond to = AngleAxisd(asked_rad, random.direction()) * from;
+    limited += range.keep(begun, from, {1e-3, 0.1}, to) ? 1 : 0;
+    ASSERT_LE(AngleAxisd(to * from.conjugate()).angle(), asked_rad * (1.0 + 1e-3) + 1e-12) << k;
+  }
+  EXPECT_GT(limited, 20'000);
+}
+
 TEST(AxisRange, ATiltThatIsHeldLetsTheToolTwistOn) {
   OrientationProxy proxy(turning({.max_tilt_rad = 0.0}));
   ASSERT_TRUE(proxy.start(begun));
