@@ -141,8 +141,8 @@ bool RigidWorld::went_in(const ToolPose& q_old) noexcept {
   return true;
 }
 
-// Where the tool was, or where that is on something that moves: the first that isn't in anything, or else where it is
-// now.
+// Where the tool was, or where that is on something that moves: the first that isn't in anything. If there is none, it
+// stays where it is, and has no room there.
 ToolPose RigidWorld::out_of_its_way(const ToolPose& q_old) noexcept {
   if (!stands_in(q_old)) return q_old;
   for (const Moving& m : moving_) {
@@ -150,6 +150,7 @@ ToolPose RigidWorld::out_of_its_way(const ToolPose& q_old) noexcept {
     const ToolPose with = m.mover.at() * m.mover.was().back(q_old);
     if (!stands_in(with)) return with;
   }
+  squeezed_ = true;
   return q_;
 }
 

@@ -119,6 +119,7 @@ Separation separation_from_triangle(const Solid& a, const Pose& X, const std::ar
   const Vec3 normal = sides[0].cross(sides[1]).normalized();
   Separation largest{-std::numeric_limits<double>::infinity(), normal};  // (its normal is the solid's until the end)
   const auto is_enough = [&](const Vec3& n, double own) {
+    if (!(n.squaredNorm() > 1.0 - 1e-6)) return false;  // of a needle that rounding leaves no plane
     const double gap = gap_beyond(own, n, b);
     if (gap > largest.gap) largest = {gap, n};
     return gap > enough;

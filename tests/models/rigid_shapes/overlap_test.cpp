@@ -166,6 +166,24 @@ TEST(Overlap, WhatIsEnoughEndsTheSearchAndNothingElseDoes) {
   }
 }
 
+// A corner that lies on the opposite side: of one in a thousand the sides' cross product is zero, which is no plane.
+TEST(Overlap, ANeedleOfATriangleThatIsInABoxIsNotToldApart) {
+  Random random(8);
+  const Solid box = solid_of(BoxTool{Vec3(0.02, 0.03, 0.04)}, Pose::Identity());
+  int without_a_plane = 0;
+  for (int k = 0; k < 100'000; ++k) {
+    const Vec3 along = random.log_uniform(0.01, 0.1) * random.direction();
+    const Vec3 from = random.in_box(0.005) - random.uniform(0.1, 0.9) * along, to = from + along,
+               between = from + random.uniform(0.1, 0.9) * along;
+    Pose X = random_pose(random, 0.0);
+    const Separation told = separation_from_triangle(box, X, {from, to, between}, -1e-12);
+    without_a_plane += (to - from).normalized().cross((between - to).normalized()).isZero(0.0) ? 1 : 0;
+    ASSERT_LT(told.gap, -1e-3) << k;  // its middle is 5 mm inside or more
+    ASSERT_NEAR(told.normal.norm(), 1.0, 1e-6);
+  }
+  EXPECT_GT(without_a_plane, 20);
+}
+
 TEST(Overlap, APointInsideOfABoxIsAsDeepAsItsNearestFace) {
   const Solid point = solid_of(SphereTool{0.01}, Pose::Identity());
   const Solid box = solid_of(BoxTool{Vec3(0.1, 0.2, 0.3)}, Pose::Identity());
