@@ -9,7 +9,7 @@ const std::vector<FlagWords>& flag_words() {
       {RecordFlag::limit_workspace, "the border of the workspace holds the tool", true},
       {RecordFlag::limit_joint, "a joint is at the end of its range", true},
       {RecordFlag::limit_leash, "the proxy waits for the tool: the leash is tight", true},
-      {RecordFlag::limit_orientation, "the tool's turning is limited", true},
+      {RecordFlag::limit_orientation, "the tool's turning is at a limit: max_turning_speed_rad_per_s, max_turn_rad, max_tilt_rad or max_twist_rad", true},
       {RecordFlag::limit_power, "the power that hand and arm exchange is at its limit", true},
       {RecordFlag::limit_keep_out, "a keep-out zone holds the tool", true},
       {RecordFlag::limit_joint_speed, "a joint is at its speed limit", true},

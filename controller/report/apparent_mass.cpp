@@ -122,7 +122,7 @@ void ApparentMass::add_to_normal_equations(const Spectrum& s, std::size_t axis) 
 
 std::optional<ApparentMass::Estimate> ApparentMass::estimate() const {
   const Eigen::Vector3d size = regressors_.diagonal().cwiseSqrt();
-  if (!(size.minCoeff() > 0.0)) return std::nullopt;
+  if (!(size.minCoeff() > 0.0) || with_force_.isZero(0.0)) return std::nullopt;  // nothing moves, or nobody moves it
   // Scaled to ones on the diagonal. Below a part in a million, a and v can't be told apart (a single exponential, say).
   const Eigen::Matrix3d scaled = size.cwiseInverse().asDiagonal() * regressors_ * size.cwiseInverse().asDiagonal();
   const Eigen::Vector3d force = with_force_.cwiseQuotient(size);

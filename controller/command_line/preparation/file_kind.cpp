@@ -66,7 +66,7 @@ const char* advice_for(FileKind kind) {
     case FileKind::scene:
       return "give it as --scene FILE";
     case FileKind::tool:
-      return "give it as --tool FILE";
+      return "give it to proxarm run as --tool FILE";
     case FileKind::hand:
       return "give it as --hand FILE";
     case FileKind::mesh:

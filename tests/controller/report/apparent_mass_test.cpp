@@ -173,6 +173,14 @@ TEST(FeltMassCurve, SeesADelayGrowWithFrequency) {
   EXPECT_EQ(band_within_Hz(points, 8.0, 0.25), 0.0);
 }
 
+// As where a tool hangs loose in a hand that leads its place: nothing was felt, not nothing.
+TEST(ApparentMass, SaysNothingOfWhatMovesWithoutAHand) {
+  ApparentMass estimator(period_s);
+  feed(estimator, multisine(), {.mass_kg = 0.0}, 0.0, 8.0);
+  estimator.end_segment();
+  EXPECT_FALSE(estimator.estimate());
+}
+
 TEST(FeltMassCurve, SaysNothingOfWhatWasNotExcited) {
   FeltMassCurve of_noise(period_s), of_a_sine(period_s);
   std::mt19937_64 generator(7);
