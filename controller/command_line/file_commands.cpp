@@ -57,7 +57,12 @@ const char* check_laws(const scenes::Scene& scene, const scenes::CheckOptions& o
 
 // The laws are those of a point's 𝒢. With a tool, what it can't be rendered in is refused beside that.
 const char* check_scene_file(const scenes::Scene& scene, const scenes::CheckOptions& options) {
-  if (scene.tool) scenes::compile_rigid(scene, scene.tool->shape);
+  if (scene.tool) {
+    scenes::compile_rigid(scene, scene.tool->shape);
+    std::fputs(
+        "the laws of its objects, tried with a point; whether its tool fits is told by `proxarm check CELL --scene`\n",
+        stdout);
+  }
   return check_laws(scene, options);
 }
 

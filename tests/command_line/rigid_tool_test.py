@@ -342,7 +342,17 @@ class RigidTool(ProgramTest):
         outcome = self.call("check", SCENES / "tools/rod.yaml", SCENES / "box_on_table.yaml")
         self.assertEqual(outcome.status, 0, outcome.err)
         self.assertIn("a tool", outcome.out)
+        self.assertIn("tried with a point", outcome.out)  # the scene has a tool
         self.assertIn("a rigid tool", self.call("explain", SCENES / "box_on_table.yaml").out)
+
+    def test_a_key_that_is_no_shape_is_named(self):
+        for text, words in (("cone: {radius_m: 1}\n", ("cone: unknown key", "convex")),
+                            ("tool:\n  capsule: {length_m: 0.1, radius_m: 0.01}\n", ("tool: unknown key", "capsule")),
+                            ("name: nothing\n", ("expected a tool's shape",))):
+            outcome = self.call("run", "--tool", self.written("odd.yaml", text))
+            self.assertEqual((outcome.status, outcome.err.count("\n")), (2, 1), outcome.err)
+            for word in words:
+                self.assertIn(word, outcome.err)
 
 
 if __name__ == "__main__":
