@@ -1,6 +1,7 @@
 #include "controller/studies/studies.hpp"
 
 #include "controller/studies/error/error.hpp"
+#include "controller/studies/error/tool_error.hpp"
 #include "controller/studies/figure5.hpp"
 #include "controller/studies/stability_map.hpp"
 #include "controller/studies/stress/stress.hpp"
@@ -19,6 +20,7 @@ StudyList all_studies(const ArmRun& arm, const CycleRun& cycles) {
   list.push_back(std::make_unique<Stress>(Stress::Worlds::tools));
   list.push_back(std::make_unique<Stress>(Stress::Worlds::moving_tools));
   list.push_back(std::make_unique<ErrorStudy>());
+  list.push_back(std::make_unique<ToolErrorStudy>());
   list.push_back(std::make_unique<StabilityMap>());
   list.push_back(std::make_unique<Fidelity>(arm));
   list.push_back(std::make_unique<Skip>(cycles));

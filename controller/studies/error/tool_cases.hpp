@@ -1,0 +1,36 @@
+// Motions of a rigid tool whose exact solution is known: what the study of its errors compares with.
+//
+// All of them lie in the plane y = 0 of W, with rotations about y; a step of 𝒢 isn't told so. Metres, kilograms,
+// newtons, seconds. The tool's reference point is its centre of mass.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "models/geometry/tool_pose.hpp"
+#include "models/rigid_features/rigid_object.hpp"
+#include "models/rigid_shapes/tool.hpp"
+
+namespace proxarm::studies {
+
+struct ToolState {
+  models::ToolPose pose;
+  models::Twist velocity = models::Twist::Zero(), acceleration = models::Twist::Zero();
+};
+
+struct ToolCase {
+  std::string name{}, title{};
+  double mass_kg = 4.0, inertia_kg_m2 = 0.01;
+  models::Tool tool{};
+  std::vector<models::RigidObject> objects{};
+  std::function<models::Wrench(double)> hand{};  // at the centre, at a time
+  std::function<ToolState(double)> exact{};
+};
+
+// Each lasts so long.
+inline constexpr double tool_case_s = 0.96;
+
+std::vector<ToolCase> tool_cases();
+
+}  // namespace proxarm::studies
