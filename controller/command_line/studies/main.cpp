@@ -21,7 +21,7 @@ using command_line::whole_number;
 void add_study_options(CLI::App& app, StudyOptions& options) {
   app.add_option("study", options.words,
                  "figure5, stress, stress_meshes, stress_layers, stress_order2, stress_tools, stress_moving, error, "
-                 "stability, fidelity or skip; or merge and the folders of its parts")
+                 "error_tools, stability, fidelity or skip; or merge and the folders of its parts")
       ->type_name("NAME")
       ->required();
   app.add_option("--out", options.out, "folder for CSV, JSON and plots")->type_name("DIR");
