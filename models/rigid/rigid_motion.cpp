@@ -115,6 +115,22 @@ ToolPose RigidWorld::let_go_with(const ToolPose& q, double share) noexcept {
   return at * on;
 }
 
+// Where a part of the step begins to look for the tool: where it was on what held it most, as far as that has gone on.
+// There gaps are what they were, and feet on their features. Seen from where the tool stays in W, what held it has gone
+// on by the object's way: its foot may be beyond an edge by that, so that nothing holds the tool, or what is behind the
+// edge does. Precondition: the sides are those of where the tool was.
+ToolPose RigidWorld::along_with_holder(const ToolPose& q) const noexcept {
+  if (riding_ != nobody) return q;
+  const Pair* holder = nullptr;
+  for (std::size_t i = 0; i < pair_count_; ++i) {
+    if (!pairs_[i].pressed) continue;
+    if (holder == nullptr || pairs_[i].force_W.squaredNorm() > holder->force_W.squaredNorm()) holder = &pairs_[i];
+  }
+  if (holder == nullptr || !goes(holder->entry)) return q;
+  const Moving& m = moving(holder->entry);
+  return m.mover.at() * ToolPose{m.from.x, Quaternion(m.from.R)};
+}
+
 // How the tool has moved since q(k−1), seen from what moves.
 void RigidWorld::see_slip(const ToolPose& pose, const ToolPose& q_old) noexcept {
   for (Moving& m : moving_) {

@@ -152,7 +152,7 @@ bool RigidWorld::go_on(const ToolPose& p_hat, const ToolPose& q_old, double far,
     q = let_go_with(q, share);
     const ToolPose p = k == parts ? p_hat : on_the_way(p_hat, q_old, share), from = q;
     if (comes || (k == parts && parts > 1)) share_out(k == parts);
-    ToolPose next = q;
+    ToolPose next = comes ? along_with_holder(q) : q;
     if (settle(p, q_old, next)) {
       left_out = 0;
       let_loose_ = let_loose_ || motion(next, q) > 2.0 * far;  // past the sides' reach

@@ -213,7 +213,7 @@ RigidWorld::Strode RigidWorld::go_held(Strides& s) noexcept {
   if (ahead > most) p = moved(start, difference(p, start) * (most / ahead));
   share_out(last);
   const int before = budget_;
-  ToolPose next = start;
+  ToolPose next = along_with_holder(start);
   const bool solved = settle(p, s.q_old, next);
   looks_ -= kOfPose * (before - budget_);
   const double strode = strode_m(next);

@@ -199,6 +199,7 @@ class RigidWorld final : public PoseAlgorithm {
   [[nodiscard]] double came_m(const ToolPose& q) const noexcept;
   void let_go(double share) noexcept;
   ToolPose let_go_with(const ToolPose& q, double share) noexcept;
+  [[nodiscard]] ToolPose along_with_holder(const ToolPose& q) const noexcept;
   [[nodiscard]] bool something_comes() const noexcept;
   [[nodiscard]] bool has_room(const ToolPose& pose) noexcept;
   bool give_way(ToolPose& q) noexcept;
