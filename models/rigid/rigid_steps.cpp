@@ -85,7 +85,8 @@ bool RigidWorld::settle(const ToolPose& p_hat, const ToolPose& q_old, ToolPose& 
     const bool roughly = shared_->bends && k > 0 && last > kNear_m;
     const double rough = roughly ? kRoughShare * std::min(last / motion(q, p_hat), 1.0) : 0.0;
     const double still_m = shared_->bends && !roughly && last < kNear_m ? rounding : 0.0;
-    const bool pressed = k > 0 && pressed_count_ > 0;
+    // (What moves may have gone on from under the tool since the part before.)
+    const bool pressed = (k > 0 || something_comes()) && pressed_count_ > 0;
     const bool solved = solve_linear(q, e, q_old, rough, still_m, delta);
     let_loose_ = let_loose_ || (pressed && linear_count_ == 0);
     over_m_ = beside_m;
