@@ -253,10 +253,12 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     problem_.allow(kWork);
     without_friction_ = true;
     const ToolPose reached = q_;
+    const bool without_room = squeezed_;
     // The iteration may have gone by far in a part: in the dent of a mesh past a face that holds only over itself.
     fine = in_parts(goal, q, to_goal, parts, q_) && !(may_be_in() && stands_in(q_));
     without_friction_ = false;
     if (!fine) q_ = reached;
+    if (!fine && something_comes()) squeezed_ = without_room;
   }
   if (!fine) went_in(q);  // in a part, of those that led nowhere
   beside_ = beside_m;

@@ -216,6 +216,12 @@ TEST(Stress, WhatGoesOnOverTheEndOfAnEdgeLeavesNoToolInIt) {
   for (const std::uint64_t seed : {2566803400511599ULL, 1421315221824741ULL}) clean_run(seed, true);
 }
 
+// Step 916: two objects close on the tool, and it is squeezed. Without friction nothing was found either, within what
+// may be looked at; the tool stayed as squeezed as it was, half a millimetre in, and nothing told.
+TEST(Stress, AToolThatIsLeftWithoutRoomIsSqueezedThoughAnotherTryGivesUp) {
+  EXPECT_EQ(clean_run(7713479948121437, true).squeezed, 1);
+}
+
 // Step 829: an edge of the tool comes to a vertex of a mesh and goes by, onto the next edge. Of the judge's way a pose
 // came to lie on the vertex with a vertex of its own, and those after it stayed there: 0.01 J out of nowhere.
 TEST(Stress, AStepThatGoesByAPlaceWhereItMayLieIsCountedAsAtAnEdge) { expect_edges({1958603531041721}); }
