@@ -63,7 +63,6 @@ void JointLimits::begin(const JointVector& joint_rad, const JointVector& twist_r
   clear_m_ = clear_m();
 }
 
-// By how much the joint may turn towards the end of its range (sign 1: the upper one), so that it can brake before it.
 double JointLimits::room_rad(std::size_t i, double sign) const noexcept {
   const auto k = static_cast<Eigen::Index>(i);
   const double to_end = sign > 0.0 ? joints_[i].upper_rad - joint_rad_[k] - std::max(0.0, twist_rad_[k])

@@ -42,6 +42,8 @@ class JointLimits {
   [[nodiscard]] bool out_of_reach(double step_m, double way_m = 0.0) const noexcept {
     return step_m <= clear_m_ - share_ * way_m;
   }
+  // By how much joint i may turn towards the end of its range (sign 1: the upper one), so that it can brake before it.
+  [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
   // The half-spaces; made when they are first asked for in a step.
   [[nodiscard]] std::span<const LimitPlane<3>> planes() noexcept;
 
@@ -56,7 +58,6 @@ class JointLimits {
     double lower_rad, upper_rad, speed_rad_per_s, acceleration_rad_per_s2;
     double per_step_rad, share;  // of the period: what it may turn, and what share of the way to its range's end
   };
-  [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
   [[nodiscard]] double bent() const noexcept;
   [[nodiscard]] double clear_m() const noexcept;
   void bound_from_here(const models::SmallColumns3& G) noexcept;

@@ -19,6 +19,11 @@ constexpr double speed_limit_m_per_s2 = 1.0;
 constexpr double pinning_force_N = 5.0;
 // The largest share of the tool's speed limit that is commanded: the same as for the proxy (step_limits.cpp).
 constexpr double commanded_share = 0.9;
+// A joint that is nearer to its limit than this share of what it may move in a step is told to be at it.
+constexpr double at_limit = 1e-3;
+// Joints that turn the tool less than its proxy use this share of their accelerations. The rest is for the twist of the
+// gears.
+constexpr double turning_share = 0.75;
 // 2⁻⁸ of a step that is shortened is some micrometres.
 constexpr int bisections = 8;
 // A torque that turns the tool counts as the force that makes it at this lever, the length of a handle.
@@ -458,7 +463,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 // ---- from the proxy to the setpoints
 
 // If the arm can't reach the proxy's pose (because of a singularity, or at the end of its reach), the proxy is set back
-// to where the arm gets.
+// to where the arm gets. Turning gives way first.
 void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   models::Pose X_WT = models::Pose::Identity();
   X_WT.translation() = sent_W();
@@ -472,8 +477,18 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   const JointVector link_k1_rad = state_.link_rad;
   parts_.inverse.solve(state_.link_rad, X_WT, solution_);
   if (solution_.status == models::InverseKinematicsResult::Status::invalid) return cycle.alarm.raise(Fault::singular);
+  const bool turned_less = turn_less(link_k1_rad, X_WT);
   state_.link_rad = solution_.q;
-  if (solution_.status != models::InverseKinematicsResult::Status::converged) {
+  if (turned_less) {
+    cycle.record.set(RecordFlag::limit_orientation, true);
+    turn_on_from(reached_k1_rotation);
+    if (pose() != nullptr) {
+      const Vec3& reached_W = solution_.kinematics.X_WT.translation();
+      const Vec3 velocity_W = (reached_W - reached_k1_W) / period_s_;
+      go_on_from(reached_W, velocity_W);
+      state_.q_k2_W = state_.q_k1_W - period_s_ * velocity_W;
+    }
+  } else if (solution_.status != models::InverseKinematicsResult::Status::converged) {
     active_.set(Limit::singularity);
     tool_guard_.strain();
     shorten_step(link_k1_rad, reached_k1_W);
@@ -483,6 +498,77 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   }
   state_.link_step_rad = state_.link_rad - link_k1_rad;
   move_motors(parts_.elastic.step(state_.link_rad), cycle.measured);
+}
+
+// Joints that can't turn the tool as its proxy turns lead it to its place all the same. Once they have, or where a
+// joint's setpoint lags, they keep to the lower share of their accelerations until the proxy asks for no more than
+// that.
+bool AdmittanceMotion::turn_less(const JointVector& link_k1_rad, const models::Pose& X_WT) noexcept {
+  if (!parts_.orientation.config().free) return false;
+  const bool converged = solution_.status == models::InverseKinematicsResult::Status::converged;
+  const double share = state_.turns_less || guard_.lags() ? turning_share : 1.0;
+  state_.turns_less = false;
+  if (converged && step_room(share).allows(solution_.q - link_k1_rad)) return false;
+  const models::StepRoom room = step_room(turning_share);
+  if (!parts_.inverse.reach_place(link_k1_rad, room, X_WT, solution_)) return false;
+  state_.turns_less = true;
+  tell_limits(room, solution_.q - link_k1_rad);
+  return true;
+}
+
+// The bounds of the links' next step. As those of the tool, accelerations are those of what is commanded, behind the
+// filter of the setpoints with the state x, v: |ω²(q − x) − 2ωv| ≤ a.
+models::StepRoom AdmittanceMotion::step_room(double acceleration_share) const noexcept {
+  const double T = period_s_, lead_s = parts_.elastic.lead_s();
+  const JointVector coasts =
+      lead_s > 0.0 ? JointVector(parts_.elastic.link_rad() + lead_s * parts_.elastic.link_rad_per_s() - state_.link_rad)
+                   : state_.link_step_rad;
+  const double squared = lead_s > 0.0 ? 0.25 * lead_s * lead_s : T * T;  // 1/ω²
+  const JointVector most = most_change();
+  models::StepRoom room{.brakes_rad = braking_step(most),
+                        .most_rad = coasts,
+                        .low_rad = coasts,
+                        .high_rad = coasts,
+                        .eased_low_rad = coasts,
+                        .eased_high_rad = coasts};
+  for (Eigen::Index i = 0; i < coasts.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double change = acceleration_share * drives_[k].max_acceleration_rad_per_s2 * squared;
+    room.most_rad[i] = drives_[k].max_speed_rad_per_s * T;
+    room.low_rad[i] = -std::min(room.most_rad[i], joint_limits_.room_rad(k, -1.0));
+    room.high_rad[i] = std::min(room.most_rad[i], joint_limits_.room_rad(k, 1.0));
+    room.eased_low_rad[i] -= change;
+    room.eased_high_rad[i] += change;
+  }
+  return room;
+}
+
+// By how much each joint may change its step: by half of its acceleration; the rest is left for the twist of the gears.
+JointVector AdmittanceMotion::most_change() const noexcept {
+  JointVector change(state_.link_step_rad.size());
+  for (Eigen::Index i = 0; i < change.size(); ++i) {
+    change[i] = 0.5 * drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2 * period_s_ * period_s_;
+  }
+  return change;
+}
+
+// The next step if all joints brake together, in the time that the slowest of them needs.
+JointVector AdmittanceMotion::braking_step(const JointVector& most_change) const noexcept {
+  const JointVector& step_k1 = state_.link_step_rad;
+  const double cycles = step_k1.cwiseAbs().cwiseQuotient(most_change).maxCoeff();
+  return cycles > 1.0 ? JointVector((1.0 - 1.0 / cycles) * step_k1) : JointVector::Zero(step_k1.size());
+}
+
+void AdmittanceMotion::tell_limits(const models::StepRoom& room, const JointVector& step_rad) noexcept {
+  for (Eigen::Index i = 0; i < step_rad.size(); ++i) {
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    const double slack = at_limit * room.most_rad[i];
+    if (step_rad[i] <= room.low_rad[i] + slack || step_rad[i] >= room.high_rad[i] - slack) {
+      active_.set(std::abs(step_rad[i]) >= room.most_rad[i] - slack ? Limit::joint_speed : Limit::joint_range, bit);
+    } else if (step_rad[i] <= room.eased_low_rad[i] + slack || step_rad[i] >= room.eased_high_rad[i] - slack) {
+      active_.set(Limit::joint_acceleration, bit);
+    }
+  }
 }
 
 // How fast the tool turns on where the arm couldn't follow: as fast as the proxy did, or, where that was slow, up to a
@@ -502,18 +588,13 @@ void AdmittanceMotion::turn_on_from(const models::Mat3& reached_k1) noexcept {
 
 // If inverse kinematics doesn't converge, its step may be as large as the joints' speeds allow and may change direction
 // from cycle to cycle, so the tool would jump by millimetres. The step is therefore interpolated towards the one that
-// brakes all joints together, until two bounds hold. Each joint uses at most half of its acceleration (the rest is left
-// for the twist of the gears). The tool goes no further than to the point that the arm is sent to, plus what the tool's
-// acceleration allows in a period.
+// brakes all joints together, until two bounds hold. Each joint uses at most half of its acceleration. The tool goes no
+// further than to the point that the arm is sent to, plus what the tool's acceleration allows in a period.
 void AdmittanceMotion::shorten_step(const JointVector& link_k1_rad, const Vec3& reached_k1_W) noexcept {
   const double T = period_s_;
   const JointVector& step_k1 = state_.link_step_rad;
-  JointVector most_change(step_k1.size());
-  for (Eigen::Index i = 0; i < most_change.size(); ++i) {
-    most_change[i] = 0.5 * drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2 * T * T;
-  }
-  const double cycles = step_k1.cwiseAbs().cwiseQuotient(most_change).maxCoeff();  // periods until all joints rest
-  const JointVector brakes = cycles > 1.0 ? JointVector(link_k1_rad + (1.0 - 1.0 / cycles) * step_k1) : link_k1_rad;
+  const JointVector most_change = this->most_change();
+  const JointVector brakes = link_k1_rad + braking_step(most_change);
   const JointVector way = solution_.q - brakes;
   double too_far = 1.0;
   for (Eigen::Index i = 0; i < way.size(); ++i) {

@@ -87,6 +87,7 @@ class AdmittanceMotion final : public Motion {
     models::Vec3 last_normal_W = models::Vec3::Zero();  // the normal of the last contact; zero: there was none
     double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // those of the proxy's last step
     bool touches = false;                               // the proxy's last step ended in contact
+    bool turns_less = false;                            // joints couldn't turn the tool as its proxy turns
     bool freeing = false;                               // the tool is being freed: it moves without the scene
   };
 
@@ -102,6 +103,11 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
   [[nodiscard]] double most_turning_rad_per_s() const noexcept;
   [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
+  [[nodiscard]] bool turn_less(const models::JointVector& link_k1_rad, const models::Pose& X_WT) noexcept;
+  [[nodiscard]] models::JointVector braking_step(const models::JointVector& most_change) const noexcept;
+  [[nodiscard]] models::StepRoom step_room(double acceleration_share) const noexcept;
+  [[nodiscard]] models::JointVector most_change() const noexcept;
+  void tell_limits(const models::StepRoom& room, const models::JointVector& step_rad) noexcept;
   void turn_on_from(const models::Mat3& reached_k1) noexcept;
   void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
