@@ -517,13 +517,13 @@ bool AdmittanceMotion::turn_less(const JointVector& link_k1_rad, const models::P
 }
 
 // The bounds of the links' next step. As those of the tool, accelerations are those of what is commanded, behind the
-// filter of the setpoints with the state x, v: |ω²(q − x) − 2ωv| ≤ a.
+// filter of the setpoints.
 models::StepRoom AdmittanceMotion::step_room(double acceleration_share) const noexcept {
-  const double T = period_s_, lead_s = parts_.elastic.lead_s();
+  const double T = period_s_;
+  const bool filters = parts_.elastic.lead_s() > 0.0;
   const JointVector coasts =
-      lead_s > 0.0 ? JointVector(parts_.elastic.link_rad() + lead_s * parts_.elastic.link_rad_per_s() - state_.link_rad)
-                   : state_.link_step_rad;
-  const double squared = lead_s > 0.0 ? 0.25 * lead_s * lead_s : T * T;  // 1/ω²
+      filters ? JointVector(parts_.elastic.coasting_rad() - state_.link_rad) : state_.link_step_rad;
+  const double squared = filters ? parts_.elastic.input_s2() : T * T;
   const JointVector most = most_change();
   models::StepRoom room{.brakes_rad = braking_step(most),
                         .most_rad = coasts,

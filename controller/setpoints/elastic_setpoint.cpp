@@ -38,6 +38,13 @@ void ElasticSetpoint::archive(fieldbus::StateArchive& state) noexcept {
   if (state.reading()) arm_->kinematics(angle_rad_, kinematics_);
 }
 
+// From ė(T) of step(), whose c is v − ωd for the input q_f + d: (ė(T) − v)/T = a where
+//   d = (v (exp(ωT) − 1 + ωT) + aT exp(ωT)) / (ω²T)
+JointVector ElasticSetpoint::coasting_rad() const noexcept {
+  const double omega = omega_rad_per_s_, T = period_s_;
+  return angle_rad_ + (1.0 / decay_ - 1.0 + omega * T) / (omega * omega * T) * speed_rad_per_s_;
+}
+
 JointVector ElasticSetpoint::step(const JointVector& link_rad) noexcept {
   if (omega_rad_per_s_ <= 0.0) {
     angle_rad_ = link_rad;

@@ -41,6 +41,10 @@ class ElasticSetpoint {
   [[nodiscard]] const models::JointVector& link_rad_per_s() const noexcept { return speed_rad_per_s_; }
   // How far the filter's input is ahead of its output at a constant speed: 2/ω, in seconds; 0 without a filter.
   [[nodiscard]] double lead_s() const noexcept { return omega_rad_per_s_ > 0.0 ? 2.0 / omega_rad_per_s_ : 0.0; }
+  // The input for which the output keeps its speed over the next period, and by how much another input is off from that
+  // for each rad/s² of mean acceleration. Precondition: there is a filter.
+  [[nodiscard]] models::JointVector coasting_rad() const noexcept;
+  [[nodiscard]] double input_s2() const noexcept { return 1.0 / (decay_ * omega_rad_per_s_ * omega_rad_per_s_); }
   // Of the tool, at these angles.
   [[nodiscard]] const models::ToolKinematics& kinematics() const noexcept { return kinematics_; }
   void archive(fieldbus::StateArchive& state) noexcept;
