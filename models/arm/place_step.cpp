@@ -25,7 +25,7 @@ class Turning {
     y0_ = inverse * Vec3(e.head<3>() - J_W.topRows<3>() * room.brakes_rad);
     C_ = Bt - inverse * Mat3(At.transpose() * Bt);
     left_ = e.tail<3>() - J_W.bottomRows<3>() * room.brakes_rad - Bt.transpose() * y0_;
-    CtC_ = C_.transpose() * C_;
+    squared_ = C_.transpose() * C_;
     place_ = step(y0_);
     low_ = room.eased_low_rad.cwiseMin(place_).cwiseMax(room.low_rad);
     high_ = room.eased_high_rad.cwiseMax(place_).cwiseMin(room.high_rad);
@@ -33,9 +33,9 @@ class Turning {
 
   [[nodiscard]] const JointVector& place() const noexcept { return place_; }
   [[nodiscard]] bool allows(const JointVector& d) const noexcept { return between(d, low_, high_); }
-  [[nodiscard]] double scale() const noexcept { return CtC_.trace(); }
+  [[nodiscard]] double scale() const noexcept { return squared_.trace(); }
   [[nodiscard]] JointVector damped(double lambda2) const noexcept {
-    return step(y0_ + C_ * Vec3(Mat3(CtC_ + lambda2 * Mat3::Identity()).inverse() * left_));
+    return step(y0_ + C_ * Vec3(Mat3(squared_ + lambda2 * Mat3::Identity()).inverse() * left_));
   }
 
  private:
@@ -46,7 +46,7 @@ class Turning {
   const StepRoom& room_;
   JointVector y0_, place_, low_, high_;
   SmallColumns3 C_;
-  Mat3 CtC_;
+  Mat3 squared_;
   Vec3 left_;
 };
 
