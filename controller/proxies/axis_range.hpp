@@ -25,8 +25,8 @@ struct AxisRange {
   };
   // Brings the orientation that a step leads to into what can be reached from `from` within a period, as the angle from
   // the start (orientation_proxy.hpp), by a step that is no longer, but for the way back of what is outside. Whether it
-  // was beyond. Preconditions: all unit; `to` within 3 rad of the start
-  // and no further from `from` than a step may lead.
+  // was beyond. Preconditions: all unit; `to` within 3 rad of the start and no further from `from` than a step may
+  // lead.
   bool keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& from, const Step& step,
             Eigen::Quaterniond& to) const noexcept;
 };

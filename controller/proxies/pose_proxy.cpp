@@ -86,7 +86,10 @@ void PoseProxy::tell_time() noexcept {
 void PoseProxy::resume(const ToolPose& q, const Twist& velocity_W) noexcept {
   q_k1_ = q_k2_ = q;
   move_ = config_.period_s * velocity_W;
-  if (config_.held) reference_.orientation = q.orientation;
+  if (config_.held) {
+    move_.tail<3>().setZero();
+    reference_.orientation = q.orientation;
+  }
   make_K();
 }
 

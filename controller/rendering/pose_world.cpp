@@ -148,7 +148,10 @@ void PoseWorld::hold_rotation(const ToolPose& p_hat) noexcept {
       break;
     }
     const Vec3 n = beyond.normalized();
-    const double c = n.dot(models::rotation_vector(within.orientation * p_hat.orientation.conjugate()));
+    const auto from_p_hat = [&](const ToolPose& at) {
+      return n.dot(models::rotation_vector(at.orientation * p_hat.orientation.conjugate()));
+    };
+    const double c = std::max(from_p_hat(within), from_p_hat(proxy_.q_before()) - yields_rad);
     K.bottomRightCorner<3, 3>() += s * n * n.transpose();
     pull.tail<3>() += s * c * n;
     last_.fault = proxy_.again(K, models::moved(p_hat, models::solve_square<6>(K, pull)));

@@ -6,13 +6,15 @@
 // Limits act on p̂, before 𝒢: its place is projected onto the step's sets (step_limits.hpp), and its rotation onto those
 // of speed, of the angle from the orientation at the first start and of tilt and twist. A contact may turn the tool on,
 // as a lever does that something pushes at its end. Where q comes to be beyond those sets of rotation by more than 1
-// µrad the step is taken again with them as walls: with n the axis about which q is turned back into them,
-//   ½‖q ⊟ p̂‖²_K + ½ s (nᵀ(q ⊟ p̂)_θ − c)²,   c of the set's border, s = 1e4 (5 cm)² K_xx, as of an orientation that is
-//   held,
-// which is 𝒢 with K + s n nᵀ for p̂ ⊞ (K + s n nᵀ)⁻¹ s c n: the wall yields by 1e-7 rad to 10 Nm. Up to three walls, as
-// each step may come to be beyond others. Among objects that move a step can't be taken again: there, and for the
-// place, q keeps the limits as long as contacts lead nearer to q(k−1); the guards of the setpoints have the last word,
-// as always (docs/tool.md).
+// µrad the step is taken again with them as walls. With n the axis about which q is turned back into them,
+//   ½‖q ⊟ p̂‖²_K + ½ s (nᵀ(q ⊟ p̂)_θ − c)²
+// has c of the set's border, and s as stiff as an orientation is held, 1e4 (5 cm)² K_xx: it yields by 1e-7 rad to 10
+// Nm. That is 𝒢 with K + s n nᵀ, for p̂ ⊞ (K + s n nᵀ)⁻¹ s c n. Up to three walls, as each step may come to be beyond
+// others. Where q(k−1) is beyond already, as after a hold, a wall leads back by 1 µrad a step, which is 100 Nm against
+// what holds the tool there; what leads back faster is p̂.
+//
+// Among objects that move a step can't be taken again: there, and for the place, q keeps the limits as long as contacts
+// lead nearer to q(k−1). The guards of the setpoints have the last word, as always (docs/tool.md).
 #pragma once
 
 #include <memory>

@@ -101,7 +101,7 @@ class Help(ProgramTest):
     def test_each_study_has_its_own_help(self):
         listed = re.search(r"figure5, .*?skip", self.call("study", "--help").out, re.DOTALL)[0]
         names = re.findall(r"[a-z_0-9]{4,}", listed)
-        self.assertEqual(len(names), 11)
+        self.assertEqual(len(names), 12)
         texts = {name: self.call("study", name, "--help").out for name in names}
         self.assertEqual(len({text.split("Usage:")[0] for text in texts.values()}), len(names))
         self.assertIn("by (1), (5) and (23)", " ".join(texts["figure5"].split()))
