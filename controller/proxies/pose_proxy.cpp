@@ -108,7 +108,7 @@ void PoseProxy::make_K() noexcept {
   K_ = mass_W_ / (T * T);
   K_.diagonal().head<3>().array() += config_.damping_Ns_per_m / T + config_.spring_N_per_m;
   if (config_.held) {
-    K_.diagonal().tail<3>().setConstant(held_share * held_lever_m * held_lever_m * K_(0, 0));
+    K_.diagonal().tail<3>().setConstant(holds_Nm_per_rad());
   } else {
     K_.diagonal().tail<3>().array() += config_.turning_damping_Nms_per_rad / T + config_.turning_spring_Nm_per_rad;
   }

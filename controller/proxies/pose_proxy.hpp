@@ -51,8 +51,6 @@ struct PoseConfig {
 
 class PoseProxy {
  public:
-  static constexpr double held_share = 1e4, held_lever_m = 0.05;
-
   // Precondition: `g` outlives this object.
   PoseProxy(const PoseConfig& config, models::PoseAlgorithm& g);  // validates
 
@@ -75,6 +73,8 @@ class PoseProxy {
   // The world's wrench in the last step, about the reference point.
   [[nodiscard]] const models::Twist& wrench_W() const noexcept { return wrench_W_; }
   [[nodiscard]] const models::Mat6& K() const noexcept { return K_; }
+  // How stiffly an orientation is held.
+  [[nodiscard]] double holds_Nm_per_rad() const noexcept { return held_share * held_lever_m * held_lever_m * K_(0, 0); }
   [[nodiscard]] double time_s() const noexcept { return time_s_; }
   [[nodiscard]] const PoseConfig& config() const noexcept { return config_; }
   // ½ of the last step's velocity times M₆ times it.
@@ -92,6 +92,8 @@ class PoseProxy {
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
+  static constexpr double held_share = 1e4, held_lever_m = 0.05;
+
   void make_K() noexcept;
   void tell_time() noexcept;
   ProxyFault go(const models::Mat6& K, const models::ToolPose& p_hat, const models::ToolPose& from) noexcept;

@@ -97,7 +97,7 @@ WorldStep PoseWorld::step(const Vec3& h_W, const StepLimits& limits) noexcept {
   const ToolPose p_hat = proxy_.predict({h_W, torque_W_});
   ToolPose limited = p_hat;
   if (p_hat.position.allFinite()) limit_place(limits, limited);
-  limit_rotation(proxy_.q(), limited);
+  turning_limited_ = limit_rotation(proxy_.q(), limited);
   walls_.setZero();
   last_.fault = proxy_.step(limited);
   if (last_.fault == ProxyFault::none && !proxy_.config().held && !g_->wants_time()) hold_rotation(limited);
@@ -111,13 +111,14 @@ void PoseWorld::limit_place(const StepLimits& limits, ToolPose& p_hat) noexcept 
   p_hat.position = limits_(proxy_.K()(0, 0), p_hat.position, proxy_.q().position);
 }
 
-// Leads the orientation of a step back into what may be reached from where it begins.
-void PoseWorld::limit_rotation(const ToolPose& from, ToolPose& to) noexcept {
+// Leads the orientation of a step back into what may be reached from where it begins. Whether it was beyond.
+bool PoseWorld::limit_rotation(const ToolPose& from, ToolPose& to) const noexcept {
+  bool beyond = false;
   const Vec3 turn = models::rotation_vector(to.orientation * from.orientation.conjugate());
   const double most = speed_share_ * config_.max_turning_speed_rad_per_s * proxy_.config().period_s;
   if (turn.norm() > most) {
     to.orientation = (models::rotation_by(shortened(turn, most)) * from.orientation).normalized();
-    turning_limited_ = true;
+    beyond = true;
   }
   const Vec3 angle = models::rotation_vector(to.orientation * home_.orientation.conjugate());
   const double before_rad = models::rotation_vector(from.orientation * home_.orientation.conjugate()).norm();
@@ -125,28 +126,24 @@ void PoseWorld::limit_rotation(const ToolPose& from, ToolPose& to) noexcept {
       OrientationProxy::reachable_angle_rad(before_rad, config_.max_turn_rad, proxy_.config().period_s);
   if (angle.norm() > reachable_rad) {
     to.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
-    turning_limited_ = true;
+    beyond = true;
   }
-  if (!config_.axis_range.limits()) return;
+  if (!config_.axis_range.limits()) return beyond;
   const AxisRange::Step step{proxy_.config().period_s, most};
-  const bool kept = config_.axis_range.keep(home_.orientation, from.orientation, step, to.orientation);
-  turning_limited_ = kept || turning_limited_;
+  return config_.axis_range.keep(home_.orientation, from.orientation, step, to.orientation) || beyond;
 }
 
 void PoseWorld::hold_rotation(const ToolPose& p_hat) noexcept {
-  const double s = PoseProxy::held_share * PoseProxy::held_lever_m * PoseProxy::held_lever_m * proxy_.K()(0, 0);
+  const double s = proxy_.holds_Nm_per_rad();
   Mat6 K = proxy_.K();
   Twist pull = Twist::Zero();
   int walls = 0;
   for (; walls < most_walls; ++walls) {
-    const bool limited = turning_limited_;
     ToolPose within = proxy_.q();
-    limit_rotation(proxy_.q_before(), within);
+    if (!limit_rotation(proxy_.q_before(), within)) break;
     const Vec3 beyond = models::rotation_vector(proxy_.q().orientation * within.orientation.conjugate());
-    if (!(beyond.norm() > yields_rad)) {
-      turning_limited_ = limited;
-      break;
-    }
+    if (!(beyond.norm() > yields_rad)) break;
+    turning_limited_ = true;
     const Vec3 n = beyond.normalized();
     const auto from_p_hat = [&](const ToolPose& at) {
       return n.dot(models::rotation_vector(at.orientation * p_hat.orientation.conjugate()));

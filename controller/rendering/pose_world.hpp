@@ -77,7 +77,7 @@ class PoseWorld final : public RenderedWorld {
  private:
   [[nodiscard]] models::ToolPose outside(const models::ToolPose& wanted) noexcept;
   void limit_place(const StepLimits& limits, models::ToolPose& p_hat) noexcept;
-  void limit_rotation(const models::ToolPose& from, models::ToolPose& to) noexcept;
+  [[nodiscard]] bool limit_rotation(const models::ToolPose& from, models::ToolPose& to) const noexcept;
   void hold_rotation(const models::ToolPose& p_hat) noexcept;
   void return_reference() noexcept;
   void report(const models::ToolPose& p_hat, const models::ToolPose& limited) noexcept;

@@ -22,8 +22,6 @@ constexpr double nothing_rad = 1e-6;  // its axis is known to 1e-9
 // Of the picture, in pixels.
 constexpr double head = 98.0, row_height = 236.0, between_rows = 21.0, foot = 108.0;
 
-models::Quaternion quaternion(const std::array<double, 4>& xyzw) { return {xyzw[3], xyzw[0], xyzw[1], xyzw[2]}; }
-
 }  // namespace
 
 double PlotBuilder::height_px() const noexcept { return head + row_height * rows() + foot; }
@@ -111,10 +109,10 @@ PlotBuilder::Axes PlotBuilder::axes() const {
 // Since the first sample, as rotation vectors in W; of those that say the same the one nearest to the one before.
 std::vector<Vec3> PlotBuilder::turns(std::array<double, 4> Sample::*orientation) const {
   std::vector<Vec3> turns;
-  const models::Quaternion first = quaternion(samples_.front().*orientation);
+  const models::Quaternion first = models::Quaternion((samples_.front().*orientation).data());
   Vec3 before = Vec3::Zero();
   for (const Sample& s : samples_) {
-    Vec3 turn = models::rotation_vector(quaternion(s.*orientation) * first.conjugate());
+    Vec3 turn = models::rotation_vector(models::Quaternion((s.*orientation).data()) * first.conjugate());
     const bool whole = turn.norm() < nothing_rad && before.norm() > 1.0;  // a revolution, and its axis is rounding
     const Vec3 revolution = 2.0 * std::numbers::pi * (whole ? before : turn).stableNormalized();
     if (!turn.isZero(0.0) || whole)

@@ -160,7 +160,7 @@ std::vector<Row> Fidelity::run(std::size_t job, const Options& options) const {
   const ArmSetup setup = setups(options.quick)[job];
   const std::vector<ArmSample> samples = arm_(setup);
   const auto wanted = static_cast<std::size_t>(std::lround(setup.duration_s / setup.period_s));
-  const bool whole = samples.size() >= wanted, turning = setup.inertia_kg_m2 > 0.0;
+  const bool whole = samples.size() >= wanted, turning = setup.turns();
   std::vector<double> F, x;
   for (const ArmSample& sample : samples) {
     if (F.size() == wanted) break;

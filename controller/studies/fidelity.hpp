@@ -33,6 +33,8 @@ struct ArmSetup {
   double settling_s = 2.0;       // before what is returned
   double duration_s = 10.0;      // of what is returned
   std::vector<ArmSine> sines{};  // of the hand's intention, along x, or about z
+
+  [[nodiscard]] bool turns() const noexcept { return inertia_kg_m2 > 0.0; }
 };
 
 struct ArmSample {

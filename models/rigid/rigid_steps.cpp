@@ -257,8 +257,10 @@ void RigidWorld::advance(const Mat6& K, const ToolPose& p_hat, const ToolPose& q
     // The iteration may have gone by far in a part: in the dent of a mesh past a face that holds only over itself.
     fine = in_parts(goal, q, to_goal, parts, q_) && !(may_be_in() && stands_in(q_));
     without_friction_ = false;
-    if (!fine) q_ = reached;
-    if (!fine && something_comes()) squeezed_ = without_room;
+    if (!fine) {
+      q_ = reached;
+      squeezed_ = without_room;
+    }
   }
   if (!fine) went_in(q);  // in a part, of those that led nowhere
   beside_ = beside_m;

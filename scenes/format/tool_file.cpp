@@ -128,7 +128,7 @@ void read_parts(const YamlNode& node, RigidTool& tool) {
   const std::vector<std::string>& kinds = tool_kinds();
   std::vector<std::string> keys = kinds;
   keys.emplace_back("parts");
-  if (std::none_of(keys.begin(), keys.end(), [&](const std::string& k) { return node.has(k.c_str()); })) node.finish();
+  if (std::none_of(keys.begin(), keys.end(), [&](const std::string& k) { return node.has(k); })) node.finish();
   const std::string key =
       description::exactly_one(node, keys, "a tool's shape: " + description::one_of(kinds) + "; several under parts");
   if (key != "parts") {

@@ -51,7 +51,8 @@ def furthest_of_circle(x, y, u, v, radius):
 
 class RigidTool(ProgramTest):
     def session(self, scene, hand, *options, folder="session", inertia="0.05"):
-        summary = self.summary("--scene", SCENES / scene, "--hand", HANDS / hand, "--inertia", inertia, "--duration", "8s",
+        turning = ("--inertia", inertia) if inertia else ()
+        summary = self.summary("--scene", SCENES / scene, "--hand", HANDS / hand, *turning, "--duration", "8s",
                                "--record", folder, *options)
         with open(self.folder / folder / "signals.csv", newline="") as file:
             rows = [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
@@ -101,10 +102,7 @@ class RigidTool(ProgramTest):
     def test_a_tool_whose_orientation_is_held_finds_its_forces_where_it_lies_flat(self):
         """A tenth to four tenths of these steps found none, and took a millisecond each."""
         for scene, hand in (("box_on_belt", "tip"), ("box_on_table", "tip"), ("key_in_slot", "wiggle"), ("valve_key", "wrench")):
-            summary = self.summary("--scene", SCENES / f"{scene}.yaml", "--hand", HANDS / f"{hand}.yaml", "--duration", "8s",
-                                   "--record", "held")
-            with open(self.folder / "held/signals.csv", newline="") as file:
-                rows = [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
+            summary, rows = self.session(f"{scene}.yaml", f"{hand}.yaml", inertia=None)
             self.assertGreater(sum(row["contact"] != "free" for row in rows), 300, scene)
             self.assertLessEqual(summary["unresolved_steps"], 4, scene)
             # 1e8 Nm/rad hold it; where it is hit, by a tenth of a metre a second in one step, with some hundred Nm.

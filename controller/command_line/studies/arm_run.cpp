@@ -18,7 +18,8 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   options.period_s = setup.period_s;
   options.duration_s = setup.settling_s + setup.duration_s;
   if (setup.looks_ahead) options.lookahead = LookaheadChoice{.kind = LookaheadChoice::Kind::automatic};
-  if (setup.inertia_kg_m2 > 0.0) {
+  const bool turns = setup.turns();
+  if (turns) {
     options.inertia_kg_m2 = setup.inertia_kg_m2;
     options.hand = shipped_file("sim/hands/wobble.yaml");
     // A wrist swings at 3 Hz on such a tool, above the band in which hands move by will, and this one means to.
@@ -34,7 +35,6 @@ PreparedSession session_of(const studies::ArmSetup& setup) {
   }
   for (std::size_t i = 0; i < setup.sines.size(); ++i) {
     // By turns with and against each other: at first the hand rests where the tool is.
-    const bool turns = setup.inertia_kg_m2 > 0.0;
     session.hand.multisine.push_back({.frequency_Hz = setup.sines[i].frequency_Hz,
                                       .amplitude_m = turns ? 0.0 : setup.sines[i].amplitude,
                                       .amplitude_rad = turns ? setup.sines[i].amplitude : 0.0,

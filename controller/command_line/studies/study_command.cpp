@@ -30,8 +30,7 @@ constexpr StudyText study_texts[] = {
     {"error",
      "Error against run time of ten motions with exact solutions: (26), order 2, penalty contact and the rule of "
      "common admittance controllers. Writes error.csv (every run), error.json (orders of convergence) and plots. It "
-     "measures "
-     "time: leave the machine alone meanwhile. Nothing in it is random."},
+     "measures time: leave the machine alone meanwhile. Nothing in it is random."},
     {"error_tools",
      "Errors of (26) of a rigid tool by timestep, on six motions with exact solutions, and what a step takes. Writes "
      "error_tools.csv, error_tools.json (orders of convergence) and a plot. It measures time: leave the machine alone "
@@ -41,8 +40,7 @@ constexpr StudyText study_texts[] = {
      "stability.csv, stability.json (how far they agree) and plots. Nothing in it is random."},
     {"fidelity",
      "What the hand feels at the simulated arm from 0.1 to 30 Hz, in free motion, on a wall and of a tool that it "
-     "turns. "
-     "Writes fidelity.csv, fidelity.json and plots. Nothing in it is random."},
+     "turns. Writes fidelity.csv, fidelity.json and plots. Nothing in it is random."},
     {"skip",
      "The cost of a step and of start-up against the size of a world, and how often cycles can leave something out. "
      "Writes skip.csv, skip.json and a plot. It "
