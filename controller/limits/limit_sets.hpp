@@ -19,7 +19,7 @@
 #include <cstddef>
 #include <span>
 
-#include "controller/limits/joint_limits.hpp"
+#include "controller/limits/followable_step.hpp"
 #include "controller/limits/step_limits.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -33,7 +33,7 @@ class LimitSets {
 
   void clear() noexcept {
     soft_count_ = plane_count_ = flat_count_ = hard_count_ = 0;
-    joints_ = nullptr;
+    arm_ = nullptr;
   }
 
   // The intersection of sets in W with a scene's space (basis: 3×N, orthonormal).
@@ -42,18 +42,19 @@ class LimitSets {
     for (std::size_t i = 0; i < limits.soft_count; ++i) soft_[soft_count_++] = cut(limits.soft[i], basis);
     for (std::size_t i = 0; i < limits.hard_count; ++i) hard_[hard_count_++] = cut(limits.hard[i], basis);
     add({limits.planes.data(), limits.plane_count}, basis);
-    joints_ = limits.joints;
+    arm_ = limits.arm;
+    q_k1_W_ = limits.q_k1_W;
     basis_ = basis;
   }
 
-  // Takes in the joints' limits, for a step of this length only if it may reach one. Precondition: before walls.
-  void take_joints_for(double step_m) noexcept {
-    if (joints_ != nullptr && !joints_->out_of_reach(step_m)) take_joints();
-  }
-  void take_joints() noexcept {
-    if (joints_ == nullptr) return;
-    add(joints_->planes(), basis_);
-    joints_ = nullptr;
+  // Whether the arm can follow a step to x, by its exact kinematics. `scene_x`: the same point in the scene's
+  // coordinates; where these are W's own, the arm is asked for the very place that it will be sent to.
+  [[nodiscard]] bool followed(const V& x, const V& scene_x) const noexcept {
+    if (arm_ == nullptr) return true;
+    if constexpr (N == 3) {
+      if (basis_ == models::Mat3::Identity()) return arm_->contains(scene_x);
+    }
+    return arm_->contains(to_W(x));
   }
 
   // Walls, which nearest() treats as half-spaces, too: −n·x ≤ −n·point, n out of the wall. At most `most_walls`.
@@ -100,14 +101,17 @@ class LimitSets {
 
   // The sets' point nearest to y. If no choice of active sets is found, because the sets have no point in common or
   // nearly none, Dykstra's algorithm computes the point in at most `sweeps` sweeps; those made are subtracted.
-  [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) const noexcept {
+  [[nodiscard]] Nearest nearest(const V& y, bool with_soft, int& sweeps) noexcept {
     Nearest result;
-    result.exact = decide(y, with_soft, result);
-    if (!result.exact) {
+    for (int cuts = 0;; ++cuts) {
       result = {};
-      result.x = project(y, with_soft, result.active, sweeps);
+      result.exact = decide(y, with_soft, result);
+      if (!result.exact) {
+        result = {};
+        result.x = project(y, with_soft, result.active, sweeps);
+      }
+      if (arm_ == nullptr || cuts == most_cuts || !take_in_cut(result.x)) return result;
     }
-    return result;
   }
 
   // Moves x back into the sets along the straight line to the point that braking leads to (or to q₁, if that is in the
@@ -133,6 +137,22 @@ class LimitSets {
   static constexpr double sweep_tolerance_m = 1e-13;
   static constexpr int most_exchanges = 60;  // of active sets; about 3 are usual
   static constexpr double parallel = 1e-12;  // sine of the angle below which normals count as parallel
+  static constexpr int most_cuts = 8;        // in a search for the nearest point; one or two are usual
+
+  [[nodiscard]] models::Vec3 to_W(const V& x) const noexcept { return q_k1_W_ + basis_ * x; }
+
+  // Takes in the half-space that separates x from what the arm can follow; false if it can follow x. Walls stay last.
+  bool take_in_cut(const V& x) noexcept {
+    LimitPlane<3> plane;
+    if (plane_count_ == StepLimits::max_planes || !arm_->cut(to_W(x), q_k1_W_, plane)) return false;
+    const V normal = basis_.transpose() * plane.normal;
+    const double length = normal.norm();
+    if (!(length > 1e-9)) return false;
+    for (std::size_t i = flat_count_; i > plane_count_; --i) planes_[i] = planes_[i - 1];
+    planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limit, plane.axis_bits};
+    ++flat_count_;
+    return true;
+  }
 
   void add(std::span<const LimitPlane<3>> planes, const Eigen::Matrix<double, 3, N>& basis) noexcept {
     for (const LimitPlane<3>& plane : planes) {
@@ -372,7 +392,8 @@ class LimitSets {
   std::array<LimitBall<N>, 2> soft_{}, hard_{};
   std::array<LimitPlane<N>, StepLimits::max_planes + most_walls> planes_{};  // walls last
   std::size_t soft_count_ = 0, plane_count_ = 0, flat_count_ = 0, hard_count_ = 0;
-  JointLimits* joints_ = nullptr;  // those that weren't taken in yet
+  FollowableStep* arm_ = nullptr;
+  models::Vec3 q_k1_W_ = models::Vec3::Zero();
   Eigen::Matrix<double, 3, N> basis_ = Eigen::Matrix<double, 3, N>::Zero();
 };
 

@@ -20,11 +20,7 @@ auto LimitedAlgorithm<N>::operator()(double K, const V& p, const V& q) noexcept 
   active_ = {};
   soft_met_ = true;
   limit_shift_ = V::Zero();
-  sets_.take_joints_for((r - q_k1_).norm());
-  if (!sets_.contains(r - q_k1_, tolerance_m, true)) {
-    sets_.take_joints();
-    r = solve(K, p, q, r);
-  }
+  if (!sets_.contains(r - q_k1_, tolerance_m, true) || !sets_.followed(r - q_k1_, r)) r = solve(K, p, q, r);
   gather_contacts();
   return r;
 }

@@ -80,7 +80,7 @@ class LimitedAlgorithm final : public models::GeometricAlgorithm<N> {
     V gap;                             // r − l
   };
 
-  Try at(Step& step, const V& shift, const V& r) const noexcept {
+  Try at(Step& step, const V& shift, const V& r) noexcept {
     const V relative = r - q_k1_;
     Try result{shift, r, sets_.nearest(relative - shift, step.with_soft, step.sweeps), {}};
     result.gap = relative - result.l.x;

@@ -62,9 +62,7 @@ void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits&
   Vec3 way = predicted_W + state_.beside_W - state_.c_k1_W;
   sets_.set(limits, models::Mat3::Identity());
   active_ = {};
-  sets_.take_joints_for(way.norm());
-  if (!sets_.contains(way, tolerance_m, true)) {
-    sets_.take_joints();
+  if (!sets_.contains(way, tolerance_m, true) || !sets_.followed(way, state_.c_k1_W + way)) {
     int sweeps = most_sweeps;
     auto nearest = sets_.nearest(way, true, sweeps);
     if (!sets_.contains(nearest.x, 1e-9, true)) {  // leash and power give way
@@ -73,6 +71,7 @@ void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits&
     }
     active_ = nearest.active;
     way = sets_.contains(nearest.x, 1e-9, false) ? nearest.x : sets_.draw_back(nearest.x, false);
+    state_.beside_W = state_.c_k1_W + way - predicted_W;
   }
   state_.c_k2_W = state_.c_k1_W;
   state_.c_k1_W += way;

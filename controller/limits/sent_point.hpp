@@ -9,7 +9,8 @@
 //   - Damping and spring act within H, so p would jump when one of them, or the mass, changes. The offset o compensates
 //     for this: in the cycle of the change c goes on with its last velocity, and its offset from p then fades with
 //     `fading_s`.
-//   - c follows p as fast as the sets allow. p is computed anew in each cycle, so nothing winds up.
+//   - Where the sets hold c back, o is what it is held back by, so c goes on with p when they let it go, and o fades
+//   then.
 // The proxy keeps the same limits as without lookahead. The limit of acceleration is one of a commanded point behind
 // the setpoints' filter, so the proxy has such a filter of its own here (x, v of step_limits.hpp), as if the arm were
 // sent to the proxy.
@@ -50,6 +51,12 @@ class SentPoint {
   void advance_horizon() noexcept;
   // The proxy has stepped to q_W, and the scene leads it to predicted_W. `limits`: the sets around c(k−1).
   void step(const models::Vec3& q_W, const models::Vec3& predicted_W, const StepLimits& limits) noexcept;
+
+  // The arm was sent to this place instead of the last c, by less than what its kinematics are curved within a step.
+  void correct(const models::Vec3& c_W) noexcept {
+    state_.beside_W += c_W - state_.c_k1_W;
+    state_.c_k1_W = c_W;
+  }
 
   [[nodiscard]] double horizon_s() const noexcept { return state_.horizon_s; }
   [[nodiscard]] const models::Vec3& c_k1_W() const noexcept { return state_.c_k1_W; }

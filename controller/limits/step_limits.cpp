@@ -58,8 +58,6 @@ const char* limit_parameter(Limit limit) noexcept {
       return "guard of the setpoints: limits.max_elbow_speed_m_per_s";
     case Limit::guard_border:
       return "guard of the setpoints: limits.workspace_m, limits.keep_out_m";
-    case Limit::guard_acceleration:
-      return "guard of the setpoints: limits.max_tool_acceleration_m_per_s2";
   }
   return "?";
 }
@@ -72,9 +70,10 @@ StepLimiter::StepLimiter(const std::vector<description::DriveDescription>& drive
   }
 }
 
-void StepLimiter::make(const StepStart& start, JointLimits* joints, StepLimits& out) const noexcept {
+void StepLimiter::make(const StepStart& start, FollowableStep* arm, StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
-  out.joints = joints;
+  out.arm = arm;
+  out.q_k1_W = start.q_k1_W;
   add_balls(start, out);
   add_borders(start.q_k1_W, Borders::slow_down, out);
 }
@@ -82,6 +81,8 @@ void StepLimiter::make(const StepStart& start, JointLimits* joints, StepLimits& 
 void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, const models::Jacobian& J_W,
                              StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
+  out.arm = nullptr;
+  out.q_k1_W = q_W;
   add_borders(q_W, Borders::walls, out);
   add_joint_walls(joint_rad, J_W, out);
 }

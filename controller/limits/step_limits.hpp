@@ -2,7 +2,7 @@
 //
 //   ball        ‖q − c‖ ≤ r       speed, acceleration, power, leash
 //   half-space  n·(q − q₁) ≤ b    workspace, keep-out zones, joint ranges, joint speeds
-// (those of the joints in joint_limits.hpp)
+// and the steps that the joints can follow (followable_step.hpp)
 //
 // The proxy's next position is the point of contacts ∩ sets that is nearest to p̂, found in one solve
 // (limited_algorithm.hpp). If not all can be satisfied, they give way in this order: friction, contact, leash and
@@ -20,8 +20,6 @@
 //   convex borders, too.
 // - A keep-out box acts as the half-space of the face that is furthest from being crossed. The commanded point lags by
 //   2v/ω (some millimetres) and may cut the box's corners by that much, so boxes need that much room around them.
-// - Joints: with G = ∂(joint angles)/∂(tool position), orientation held, joint i moves by G_i·(q − q₁). Near a
-//   singularity G_i grows along the direction that is being lost, and the tool slows down in that direction alone.
 #pragma once
 
 #include <array>
@@ -52,17 +50,16 @@ enum class Limit : std::uint16_t {
   following_error = 1u << 10,  // a drive doesn't follow, and its setpoint waits for it
   joint_torque = 1u << 11,     // impedance type: the rendered force is reduced
   // Changes that the last guard has made to setpoints (controller/setpoints/tool_guard.hpp):
-  guard_speed = 1u << 12,         // of the tool
-  guard_elbow = 1u << 13,         // speed of elbow or wrist
-  guard_border = 1u << 14,        // workspace or keep-out zones
-  guard_acceleration = 1u << 15,  // of tool or elbow, while they get faster
+  guard_speed = 1u << 12,   // of the tool
+  guard_elbow = 1u << 13,   // speed of elbow or wrist
+  guard_border = 1u << 14,  // workspace or keep-out zones
 };
 
 inline constexpr std::array all_limits{
     Limit::leash,        Limit::power,       Limit::workspace,          Limit::keep_out,
     Limit::joint_range,  Limit::joint_speed, Limit::joint_acceleration, Limit::speed,
     Limit::acceleration, Limit::singularity, Limit::following_error,    Limit::joint_torque,
-    Limit::guard_speed,  Limit::guard_elbow, Limit::guard_border,       Limit::guard_acceleration};
+    Limit::guard_speed,  Limit::guard_elbow, Limit::guard_border};
 
 // The parameter that sets a limit: "limits.leash_m", "drives[].range_rad".
 const char* limit_parameter(Limit limit) noexcept;
@@ -99,7 +96,7 @@ struct LimitPlane {
   double share = 0.0;  // share of a step towards it by which its bound shrinks for the next step; 0 for a speed
 };
 
-class JointLimits;
+class FollowableStep;
 
 struct StepLimits {
   static constexpr std::size_t max_planes = 40;
@@ -109,7 +106,8 @@ struct StepLimits {
   std::size_t plane_count = 0;
   std::array<LimitBall<3>, 2> hard{};  // speed, acceleration
   std::size_t hard_count = 0;
-  JointLimits* joints = nullptr;  // further planes, which are made where a step may reach them; null: none
+  FollowableStep* arm = nullptr;               // the steps that the arm can follow; null: all
+  models::Vec3 q_k1_W = models::Vec3::Zero();  // the place that all sets are relative to
 };
 
 // The state that a step begins with, in W.
@@ -128,9 +126,8 @@ class StepLimiter {
 
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Makes the sets of one step, around the proxy or around another point that the arm is sent to (sent_point.hpp);
-  // `start` holds it as q_k1_W and q_k2_W. `joints`: the joints' limits where the links are. Neither allocates nor
-  // throws.
-  void make(const StepStart& start, JointLimits* joints, StepLimits& out) const noexcept;
+  // `start` holds it as q_k1_W and q_k2_W. Neither allocates nor throws.
+  void make(const StepStart& start, FollowableStep* arm, StepLimits& out) const noexcept;
   // Impedance type: makes only the borders, as walls for a proxy whose tool is at q_W. They don't slow the tool before
   // them, but push it back if it is pushed through.
   void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,

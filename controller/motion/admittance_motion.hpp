@@ -1,14 +1,17 @@
 // Motion of the admittance type: the hand's force moves a proxy, and the arm's motors follow it.
 //
-//   force ─▶ proxy (26) in the scene, within limits ─▶ inverse kinematics ─▶ elastic gears ─▶ guards ─▶ setpoints
-//             ▲                                                                                  │
-//             └────────── wind_back(): from what was commanded, where it couldn't be followed ───┘
+//   hand's wrench ─▶ proxy (26) in the scene, within what the arm can follow ─▶ step of the arm ─▶ elastic gears ─▶
+//   (hand_judge.hpp)  (rendering/)            (arm_step/)                       (arm_step.hpp)   (elastic_setpoint.hpp)
+//   ─▶ final setpoints
+//   (final_setpoints.hpp)
 //
-// With lookahead, inverse kinematics gets a predicted position of the proxy instead of the present one
-// (sent_point.hpp). Records and reports still tell of the proxy itself.
+// The proxy's next place is one that the arm can go to, so the proxy is always where the arm is being sent. With
+// lookahead, the arm is sent to a predicted position of the proxy (sent_point.hpp), and the proxy keeps to what an arm
+// could follow that was sent to the proxy itself: there are two steps of the arm then. Records and reports tell of the
+// proxy.
 //
-// Each of these stages has a history of its own. Only this class starts them, winds them back and changes their T, and
-// it does so to all of them together. make_final() is the one place where setpoints become final.
+// Where a drive doesn't follow, or a guard has held a setpoint back, the motion goes on from what was commanded
+// (go_on_from_setpoints()): nothing is caught up later.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +19,15 @@
 #include <optional>
 #include <vector>
 
-#include "controller/handle/empty_handle.hpp"
-#include "controller/handle/force_plausibility.hpp"
-#include "controller/limits/joint_limits.hpp"
+#include "controller/arm_step/arm_step.hpp"
 #include "controller/limits/sent_point.hpp"
 #include "controller/limits/step_limits.hpp"
+#include "controller/motion/final_setpoints.hpp"
+#include "controller/motion/hand_judge.hpp"
 #include "controller/motion/motion.hpp"
 #include "controller/rendering/session_settings.hpp"
-#include "controller/setpoints/joint_guard.hpp"
-#include "controller/setpoints/setpoint_envelope.hpp"
-#include "controller/setpoints/tool_guard.hpp"
+#include "controller/setpoints/link_filter.hpp"
 #include "controller/stability/passivity.hpp"
-#include "models/arm/inverse_kinematics.hpp"
 #include "models/base/archive_fields.hpp"
 
 namespace proxarm::controller {
@@ -39,31 +39,27 @@ class AdmittanceMotion final : public Motion {
                    const description::CellLimits& limits, const description::SupervisionDescription& supervision,
                    const SessionSettings& settings, double tool_mass_kg = 0.0);
 
-  void wait_for_drives(const Measured& measured) noexcept override { start_guards(measured.drive_target_rad); }
+  void wait_for_drives(const Measured& measured) noexcept override { final_.start(measured.drive_target_rad); }
   void stand(const Measured& /*measured*/) noexcept override {}
   bool render(const MotionCycle& cycle) noexcept override;
   bool free(const MotionCycle& cycle) noexcept override;
-  void run_out() noexcept override;
+  void run_out() noexcept override { active_.add(final_.run_out()); }
 
   void start(const Measured& measured, Beginning beginning) noexcept override;
-  void start_run_out() noexcept override;
+  void start_run_out() noexcept override { final_.start_run_out(); }
   bool prepare_freeing(const Command& command, const Measured& measured) noexcept override;
   bool start_yielding(const Measured& measured) noexcept override;
   void set(const Change& change) noexcept override;
   void set_period(double period_s) noexcept override;
 
   [[nodiscard]] Setpoints setpoints() const noexcept override {
-    return {Setpoints::Kind::angles_rad, guard_.target_rad()};
+    return {Setpoints::Kind::angles_rad, final_.target_rad()};
   }
   [[nodiscard]] bool can_hold() const noexcept override { return true; }
-  [[nodiscard]] bool stands() const noexcept override { return state_.run_out_share <= 0.0 && guard_.at_rest(); }
+  [[nodiscard]] bool stands() const noexcept override { return final_.has_run_out(); }
   [[nodiscard]] bool backs_off() const noexcept override { return parts_.release->backs_off(); }
-  [[nodiscard]] const models::Wrench* resting_wrench_W() const noexcept override {
-    return empty_handle_ && empty_handle_->rests() ? &empty_handle_->wrench_W() : nullptr;
-  }
-  [[nodiscard]] bool wants_hold() const noexcept override {
-    return supervision_.let_go == description::LetGo::hold && empty_handle_ && empty_handle_->empty();
-  }
+  [[nodiscard]] const models::Wrench* resting_wrench_W() const noexcept override { return hand_.resting_wrench_W(); }
+  [[nodiscard]] bool wants_hold() const noexcept override { return hand_.wants_hold(); }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
   [[nodiscard]] Eigen::Quaterniond proxy_R_WT() const noexcept override {
     return parts_.pose != nullptr ? parts_.pose->orientation() : parts_.orientation.R_WT();
@@ -73,88 +69,65 @@ class AdmittanceMotion final : public Motion {
   void archive(fieldbus::StateArchive& state) noexcept override;
 
  private:
-  // What lasts from cycle to cycle. The histories of proxy, filter and guards are in their own objects.
+  // What lasts from cycle to cycle. The histories of proxy, arm, filter and setpoints are in their own objects.
   struct State {
     models::Vec3 q_k1_W = models::Vec3::Zero();         // the proxy of the last cycle
     models::Vec3 q_k2_W = models::Vec3::Zero();         // and of the one before
-    models::JointVector link_rad;                       // of the links, for q_k1; inverse kinematics starts from here
-    models::JointVector link_step_rad;                  // the links' last step
-    models::JointVector run_out_rad_per_s;              // each joint's speed when the run-out began
-    double run_out_share = 1.0;                         // the share of that speed that is left
-    double run_out_per_cycle = 1.0;                     // by which the share shrinks in each cycle
-    double force_share = 1.0;                           // the share of the hand's force that is let in
     double speed_limit_m_per_s = 0.0;                   // the tool's present speed limit
     models::Vec3 last_normal_W = models::Vec3::Zero();  // the normal of the last contact; zero: there was none
     double mass_kg = 0.0, damping_Ns_per_m = 0.0;       // those of the proxy's last step
     bool touches = false;                               // the proxy's last step ended in contact
-    bool turns_less = false;                            // joints couldn't turn the tool as its proxy turns
     bool freeing = false;                               // the tool is being freed: it moves without the scene
+  };
+  // With lookahead: the point that the arm is sent to, and the arm as if it were sent to the proxy.
+  struct Ahead {
+    SentPoint point;
+    ArmStep proxy_step;
+    LinkFilter proxy_filter;
+    StepLimits limits;  // around the point
   };
 
   // Null while the tool is freed, which is without the scene.
   [[nodiscard]] PoseWorld* pose() noexcept { return state_.freeing ? nullptr : parts_.pose; }
-  [[nodiscard]] ProxyFault turn(const models::Vec3& torque_W) noexcept;
   [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
+  [[nodiscard]] const Eigen::Quaterniond& R_WT() const noexcept { return parts_.orientation.R_WT(); }
+  [[nodiscard]] ProxyMotion proxy_motion() const noexcept;
   void make_limits(const MotionCycle& cycle) noexcept;
-  void make_sent_limits(StepStart start) noexcept;
-  void send_ahead() noexcept;
-  [[nodiscard]] const models::Vec3& sent_W() const noexcept { return sent_ ? sent_->c_k1_W() : state_.q_k1_W; }
-  // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
-  [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : sent_->horizon_s(); }
+  [[nodiscard]] ArmStepStart arm_start(const LinkFilter& filter, const models::JointVector& twist_rad) noexcept;
+  void limit_speed(const MotionCycle& cycle) noexcept;
+  [[nodiscard]] bool take(const WorldStep& step, const MotionCycle& cycle) noexcept;
+  void follow_proxy(const MotionCycle& cycle) noexcept;
+  bool go(ArmStep& step, const models::Vec3& q_W, const MotionCycle& cycle) noexcept;
+  void put_proxy_to(const models::Vec3& q_W, const models::Vec3& velocity_W) noexcept;
+  void turn_on_from(const ArmStep& step, const Eigen::Quaterniond& from) noexcept;
+  void send(const models::JointVector& motor_rad, const Measured& measured) noexcept;
+  void go_on_from_setpoints(std::uint8_t blocked) noexcept;
   [[nodiscard]] double most_turning_rad_per_s() const noexcept;
   [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
-  [[nodiscard]] bool turn_less(const models::JointVector& link_k1_rad, const models::Pose& X_WT) noexcept;
-  [[nodiscard]] models::JointVector braking_step(const models::JointVector& most_change) const noexcept;
-  [[nodiscard]] models::StepRoom step_room(double acceleration_share) const noexcept;
-  [[nodiscard]] models::JointVector most_change() const noexcept;
-  void tell_limits(const models::StepRoom& room, const models::JointVector& step_rad) noexcept;
-  void turn_on_from(const models::Mat3& reached_k1) noexcept;
-  void go_on_from(const models::Vec3& c_W, const models::Vec3& velocity_W) noexcept;
-  void limit_speed(const MotionCycle& cycle) noexcept;
-  void let_force_in(CycleRecord& record) noexcept;
-  [[nodiscard]] models::Wrench acting_wrench_W(const MotionCycle& cycle) noexcept;
-  void judge_force(const MotionCycle& cycle, const models::Vec3& v_W, bool empty) noexcept;
   [[nodiscard]] models::Vec3 moving_force_W(const models::Vec3& force_W) const noexcept;
-  void advance_proxy(const models::Vec3& q_W) noexcept;
+  // The horizon that is looked ahead; zero while the arm is freed, since nobody feels a mass then.
+  [[nodiscard]] double ahead_s() const noexcept { return state_.freeing ? 0.0 : ahead_->point.horizon_s(); }
   void count_work(const WorldStep& step) noexcept;
   void observe_hand(const Measured& measured) noexcept;
   [[nodiscard]] double gyration_m2() const noexcept;
   void observe_proxy(const WorldStep& step) noexcept;
   void record_passivity(const WorldStep& step, CycleRecord& record) noexcept;
-  void follow_proxy(const MotionCycle& cycle) noexcept;
-  void shorten_step(const models::JointVector& link_k1_rad, const models::Vec3& reached_k1_W) noexcept;
-  void move_motors(const models::JointVector& motor_rad, const Measured& measured) noexcept;
-  std::uint8_t find_blocked(const models::JointVector& motor_rad, const Measured& measured,
-                            models::JointVector& wanted_rad) noexcept;
-  bool make_final(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;
-  void follow_setpoints(const Measured& measured, std::uint8_t blocked) noexcept;
-  void start_guards(const models::JointVector& target_rad) noexcept;
-  void wind_back(std::uint8_t blocked) noexcept;
 
   AdmittanceParts parts_;
   const models::Arm& arm_;
-  std::vector<description::DriveDescription> drives_;
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
   double period_s_, tool_mass_kg_;
   models::Mat3 R_TS_;                           // of the sensor in the tool
   std::optional<PassivityObserver> passivity_;  // nullopt: not wanted
-  std::optional<EmptyHandle> empty_handle_;     // nullopt: the proxy coasts
-  ReversedForce reversed_;
-  StraightForce straight_;
+  HandJudge hand_;
   StepLimiter limiter_;
-  JointLimits joint_limits_;
-  std::optional<SentPoint> sent_;  // nullopt: the arm is sent to the proxy itself
-  JointGuard guard_;
-  ToolGuard tool_guard_;
-  SetpointEnvelope envelope_;  // of the setpoints; a blocked joint's is frozen
+  ArmStep arm_step_;  // of the arm as it is sent
+  std::unique_ptr<Ahead> ahead_;
+  FinalSetpoints final_;
+  StepLimits step_limits_;  // of this cycle, around the proxy
   State state_;
   MotionWork work_;
-
-  // The values of this cycle:
-  StepLimits step_limits_;
-  StepLimits sent_limits_;                    // around the point that the arm is sent to (with lookahead)
-  models::InverseKinematicsResult solution_;  // for the pose that the arm is sent to
 };
 
 }  // namespace proxarm::controller

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/proxies/orientation_proxy.hpp"
+#include "controller/proxies/turn_sets.hpp"
 #include "models/base/option_check.hpp"
 #include "models/geometry/tool_pose.hpp"
 
@@ -43,8 +43,9 @@ bool AxisRange::keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& 
   const Turned before = parts_of(start.conjugate() * from, axis_T);
   Turned now = parts_of(start.conjugate() * to, axis_T);
   const double tilt = now.tilt.norm();
-  const double most_tilt = OrientationProxy::reachable_angle_rad(before.tilt.norm(), max_tilt_rad, step.period_s);
-  const double most_twist = OrientationProxy::reachable_angle_rad(std::abs(before.twist), max_twist_rad, step.period_s);
+  const double most_tilt = TurnSets::reachable_rad(before.tilt.norm(), max_tilt_rad, step.period_s, step.brakes_s);
+  const double most_twist =
+      TurnSets::reachable_rad(std::abs(before.twist), max_twist_rad, step.period_s, step.brakes_s);
   const bool tilted = max_tilt_rad < everything && tilt > most_tilt;
   const bool twisted = max_twist_rad < everything && std::abs(now.twist) > most_twist;
   if (!tilted && !twisted) return false;
@@ -52,8 +53,7 @@ bool AxisRange::keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& 
   if (twisted) now.twist = std::clamp(now.twist, -most_twist, most_twist);
   // Tilt and twist bend: the step to a border may be longer than the one that was asked for, and would be a push.
   const double asked = models::rotation_vector(to * from.conjugate()).norm();
-  const double most_rad =
-      std::min(step.most_rad, std::max(asked, OrientationProxy::reference_rad_per_s * step.period_s));
+  const double most_rad = std::min(step.most_rad, std::max(asked, TurnSets::returning_rad_per_s * step.period_s));
   double share = 1.0;
   for (int k = 0; k < kShorter; ++k) {
     const Vec3 tilt_now = before.tilt + share * (now.tilt - before.tilt);

@@ -22,6 +22,7 @@ struct AxisRange {
   [[nodiscard]] bool limits() const noexcept { return max_tilt_rad < everything || max_twist_rad < everything; }
   struct Step {
     double period_s = 1e-3, most_rad = 0.1;  // that it may turn the tool by
+    double brakes_s = 0.1;                   // in which the border is approached
   };
   // Brings the orientation that a step leads to into what can be reached from `from` within a period, as the angle from
   // the start (orientation_proxy.hpp), by a step that is no longer, but for the way back of what is outside. Whether it

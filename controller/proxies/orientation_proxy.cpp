@@ -98,16 +98,16 @@ void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
   R_ref_ = (rotation(-before / spring_Nm_per_rad * phi) * R_WT_).normalized();
 }
 
-// With the default damping, J/D is `braking_s` already, and nothing is added.
+// With the default damping, J/D is TurnSets::braking_s already, and nothing is added.
 Vec3 OrientationProxy::braking_torque_W() const noexcept {
-  const double wanted = config_.inertia_kg_m2 / braking_s;
+  const double wanted = config_.inertia_kg_m2 / TurnSets::braking_s;
   if (!(wanted > damping_Nms_per_rad())) return Vec3::Zero();
   return -(wanted - damping_Nms_per_rad()) * omega_W_;
 }
 
 void OrientationProxy::return_reference() noexcept {
   const Vec3 way = rotation_vector(R_start_ * R_ref_.conjugate());
-  const double left = way.norm(), step = reference_rad_per_s * config_.period_s;
+  const double left = way.norm(), step = TurnSets::returning_rad_per_s * config_.period_s;
   if (left == 0.0) return;
   R_ref_ = left <= step ? R_start_ : (rotation(step / left * way) * R_ref_).normalized();
 }
@@ -138,26 +138,15 @@ ProxyFault OrientationProxy::step(const Vec3& torque_W_Nm) noexcept {
   if (!std::isfinite(omega.norm())) return ProxyFault::result_not_finite;
   const Vec3 unlimited = omega;
 
-  const double fastest = speed_share_ * config_.max_speed_rad_per_s;
-  const bool too_fast = omega.norm() > fastest;
-  if (too_fast) omega *= fastest / omega.norm();
   Eigen::Quaterniond R = (rotation(T * omega) * R_WT_).normalized();
-
-  // With R = exp([φ]ₓ) R_start, ‖φ‖ ≤ the reachable angle. A step that leaves this set is projected onto its border
-  // (the nearest orientation with the same axis), and the velocity is that of the actual rotation.
-  const Vec3 phi = rotation_vector(R * R_start_.conjugate());
-  const double before_rad = rotation_vector(R_WT_ * R_start_.conjugate()).norm();
-  const double reachable_rad = reachable_angle_rad(before_rad, config_.max_angle_rad, T);
-  bool too_far = phi.norm() > reachable_rad;
-  if (too_far) R = (rotation(reachable_rad / phi.norm() * phi) * R_start_).normalized();
-  if (config_.axis_range.limits()) too_far = config_.axis_range.keep(R_start_, R_WT_, {T, T * fastest}, R) || too_far;
-  if (too_far) omega = rotation_vector(R * R_WT_.conjugate()) / T;
+  const TurnSets::Held held = sets().keep(R_WT_, R);
+  if (held.any()) omega = rotation_vector(R * R_WT_.conjugate()) / T;
   limit_torque_W_.setZero();
-  if (too_fast || too_far) limit_torque_W_ = impedance_W() * (omega - unlimited) / T;
+  if (held.any()) limit_torque_W_ = impedance_W() * (omega - unlimited) / T;
   R_WT_ = R;
   omega_W_ = omega;
-  speed_limited_ = too_fast;
-  angle_limited_ = too_far;
+  speed_limited_ = held.speed;
+  angle_limited_ = held.angle;
   return ProxyFault::none;
 }
 

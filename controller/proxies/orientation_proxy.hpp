@@ -13,24 +13,21 @@
 // beside the rendered point also couples turning with moving. A point tool neglects this; a rigid tool doesn't:
 // pose_proxy.hpp.)
 //
-// Limits: the speed, the angle from the orientation at the first start, and tilt and twist of an axis. They are sets
-// onto which the motion is projected. The projected motion becomes the history, so nothing winds up. The set of angles
-// is reached as a brake reaches a wall, in `braking_s`, since joints can't stop at once; whoever is beyond it (an arm
-// that couldn't brake, and took the proxy along) is led back at `reference_rad_per_s`, not within a step.
+// Limits: the motion is projected onto the sets of turning (turn_sets.hpp), counted from the orientation at the first
+// start. The projected motion becomes the history, so nothing winds up.
 //
 // The spring's R_ref is the orientation at the first start, but for a while after the spring has become stiffer and
 // after a hold: then it is where the spring's torque is what it was (zero after a hold), and returns at
-// `reference_rad_per_s`. So nothing jumps.
+// TurnSets::returning_rad_per_s. So nothing jumps.
 //
 // τ is the torque about the rendered point, in W; R_WT is a quaternion that is kept unit. One caller at a time. step()
 // is for the cycle: it neither allocates, locks, throws nor prints.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
-#include "controller/proxies/axis_range.hpp"
 #include "controller/proxies/proxy_step.hpp"
+#include "controller/proxies/turn_sets.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
 
@@ -68,8 +65,8 @@ class OrientationProxy {
   void set_spring(double spring_Nm_per_rad) noexcept;
   // Damping beside D from the next step on (passivity.hpp).
   void add_damping(double damping_Nms_per_rad) noexcept;
-  // The torque of a damping that brings the tool to rest within `braking_s`, for the next step: beyond its own D.
-  // Precondition: nobody holds the handle.
+  // The torque of a damping that brings the tool to rest within TurnSets::braking_s, for the next step: beyond its own
+  // D. Precondition: nobody holds the handle.
   [[nodiscard]] models::Vec3 braking_torque_W() const noexcept;
   // A share of the speed limit, from 0 to 1, while the tool is slowed.
   void limit_speed(double share) noexcept { speed_share_ = share; }
@@ -91,15 +88,11 @@ class OrientationProxy {
           config_.damping_Nms_per_rad, config_.spring_Nm_per_rad, added_);
   }
 
-  // How far from the start the next step may lead, from `angle_rad` away.
-  [[nodiscard]] static double reachable_angle_rad(double angle_rad, double max_angle_rad, double period_s) noexcept {
-    const double left = max_angle_rad - angle_rad;
-    if (left >= 0.0) return angle_rad + std::min(1.0, period_s / braking_s) * left;
-    return std::max(max_angle_rad, angle_rad - reference_rad_per_s * period_s);
+  // The sets of turning in the next step.
+  [[nodiscard]] TurnSets sets() const noexcept {
+    return {R_start_, config_.max_angle_rad, config_.axis_range, speed_share_ * config_.max_speed_rad_per_s,
+            config_.period_s};
   }
-
-  static constexpr double reference_rad_per_s = 0.1;  // of R_ref on its way back
-  static constexpr double braking_s = 0.1;            // J/D with the default inertia and damping
 
  private:
   // J + T D + T² K, less what hangs behind the sensor.

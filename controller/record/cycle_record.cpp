@@ -66,8 +66,6 @@ const char* flag_name(RecordFlag flag) noexcept {
       return "guard_elbow";
     case RecordFlag::guard_border:
       return "guard_border";
-    case RecordFlag::guard_acceleration:
-      return "guard_acceleration";
     case RecordFlag::ramp_in:
       return "ramp_in";
     case RecordFlag::slowed:

@@ -44,7 +44,6 @@ enum class RecordFlag : std::uint32_t {
   guard_speed = 1u << 20,            // the last guard changed the setpoints (tool_guard.hpp)
   guard_elbow = 1u << 21,
   guard_border = 1u << 22,
-  guard_acceleration = 1u << 23,
   ramp_in = 1u << 24,  // only a share of the hand's force was let in
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
   oscillation_lasts = 1u << 26,
@@ -74,8 +73,7 @@ inline constexpr std::array limit_flags{LimitFlag{RecordFlag::limit_speed, Limit
                                         LimitFlag{RecordFlag::limit_joint_torque, Limit::joint_torque},
                                         LimitFlag{RecordFlag::guard_speed, Limit::guard_speed},
                                         LimitFlag{RecordFlag::guard_elbow, Limit::guard_elbow},
-                                        LimitFlag{RecordFlag::guard_border, Limit::guard_border},
-                                        LimitFlag{RecordFlag::guard_acceleration, Limit::guard_acceleration}};
+                                        LimitFlag{RecordFlag::guard_border, Limit::guard_border}};
 
 // Three numbers that stay trivially copyable (Eigen's types aren't).
 using Triple = std::array<double, 3>;

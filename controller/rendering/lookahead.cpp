@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 namespace proxarm::controller {
 
@@ -61,15 +60,12 @@ void Lookahead<N>::gather_limits(const StepLimits& limits, double reach_m) noexc
   for (std::size_t i = 0; i < limits.soft_count; ++i) {
     if (limits.soft[i].limit == Limit::power) ahead_.soft[ahead_.soft_count++] = limits.soft[i];
   }
-  const auto gather = [&](std::span<const LimitPlane<3>> planes) {
-    for (const LimitPlane<3>& plane : planes) {
-      if (plane.bound_m - plane.share * reach_m > most_m || ahead_.plane_count == StepLimits::max_planes) continue;
-      bounds_m_[ahead_.plane_count] = plane.bound_m;
-      ahead_.planes[ahead_.plane_count++] = plane;
-    }
-  };
-  gather({limits.planes.data(), limits.plane_count});
-  if (limits.joints != nullptr && !limits.joints->out_of_reach(most_m, reach_m)) gather(limits.joints->planes());
+  for (std::size_t i = 0; i < limits.plane_count; ++i) {
+    const LimitPlane<3>& plane = limits.planes[i];
+    if (plane.bound_m - plane.share * reach_m > most_m) continue;
+    bounds_m_[ahead_.plane_count] = plane.bound_m;
+    ahead_.planes[ahead_.plane_count++] = plane;
+  }
 }
 
 template <int N>

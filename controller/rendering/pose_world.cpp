@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/proxies/orientation_proxy.hpp"
 #include "models/geometry/linear_systems.hpp"
 
 namespace proxarm::controller {
@@ -17,7 +16,7 @@ using models::Vec3;
 
 // How fast the spring's reference returns to where the tool started, after the spring has become stiffer and after a
 // hold: slowly enough to be led by hand.
-constexpr double reference_m_per_s = 0.05, reference_rad_per_s = OrientationProxy::reference_rad_per_s;
+constexpr double reference_m_per_s = 0.05, reference_rad_per_s = TurnSets::returning_rad_per_s;
 // A tool that starts in touch with something is outside to rounding: some metres in double precision.
 constexpr double rounding_m = 1e-12;
 // After a hold in contact the arm stands some micrometres inside of what the tool touches, by the twist of its gears;
@@ -97,7 +96,7 @@ WorldStep PoseWorld::step(const Vec3& h_W, const StepLimits& limits) noexcept {
   const ToolPose p_hat = proxy_.predict({h_W, torque_W_});
   ToolPose limited = p_hat;
   if (p_hat.position.allFinite()) limit_place(limits, limited);
-  turning_limited_ = limit_rotation(proxy_.q(), limited);
+  turning_limited_ = sets().keep(proxy_.q().orientation, limited.orientation).any();
   walls_.setZero();
   last_.fault = proxy_.step(limited);
   if (last_.fault == ProxyFault::none && !proxy_.config().held && !g_->wants_time()) hold_rotation(limited);
@@ -111,26 +110,12 @@ void PoseWorld::limit_place(const StepLimits& limits, ToolPose& p_hat) noexcept 
   p_hat.position = limits_(proxy_.K()(0, 0), p_hat.position, proxy_.q().position);
 }
 
-// Leads the orientation of a step back into what may be reached from where it begins. Whether it was beyond.
-bool PoseWorld::limit_rotation(const ToolPose& from, ToolPose& to) const noexcept {
-  bool beyond = false;
-  const Vec3 turn = models::rotation_vector(to.orientation * from.orientation.conjugate());
-  const double most = speed_share_ * config_.max_turning_speed_rad_per_s * proxy_.config().period_s;
-  if (turn.norm() > most) {
-    to.orientation = (models::rotation_by(shortened(turn, most)) * from.orientation).normalized();
-    beyond = true;
-  }
-  const Vec3 angle = models::rotation_vector(to.orientation * home_.orientation.conjugate());
-  const double before_rad = models::rotation_vector(from.orientation * home_.orientation.conjugate()).norm();
-  const double reachable_rad =
-      OrientationProxy::reachable_angle_rad(before_rad, config_.max_turn_rad, proxy_.config().period_s);
-  if (angle.norm() > reachable_rad) {
-    to.orientation = (models::rotation_by(shortened(angle, reachable_rad)) * home_.orientation).normalized();
-    beyond = true;
-  }
-  if (!config_.axis_range.limits()) return beyond;
-  const AxisRange::Step step{proxy_.config().period_s, most};
-  return config_.axis_range.keep(home_.orientation, from.orientation, step, to.orientation) || beyond;
+TurnSets PoseWorld::sets() const noexcept {
+  TurnSets sets = config_.turn;
+  sets.home = home_.orientation;
+  sets.max_speed_rad_per_s *= speed_share_;
+  sets.period_s = proxy_.config().period_s;
+  return sets;
 }
 
 void PoseWorld::hold_rotation(const ToolPose& p_hat) noexcept {
@@ -140,7 +125,7 @@ void PoseWorld::hold_rotation(const ToolPose& p_hat) noexcept {
   int walls = 0;
   for (; walls < most_walls; ++walls) {
     ToolPose within = proxy_.q();
-    if (!limit_rotation(proxy_.q_before(), within)) break;
+    if (!sets().keep(proxy_.q_before().orientation, within.orientation).any()) break;
     const Vec3 beyond = models::rotation_vector(proxy_.q().orientation * within.orientation.conjugate());
     if (!(beyond.norm() > yields_rad)) break;
     turning_limited_ = true;

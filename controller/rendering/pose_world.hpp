@@ -20,8 +20,8 @@
 #include <memory>
 
 #include "controller/limits/limited_algorithm.hpp"
-#include "controller/proxies/axis_range.hpp"
 #include "controller/proxies/pose_proxy.hpp"
+#include "controller/proxies/turn_sets.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/scene_changes.hpp"
 #include "models/geometry/pose_algorithm.hpp"
@@ -31,9 +31,7 @@ namespace proxarm::controller {
 
 struct PoseWorldConfig {
   PoseConfig proxy;
-  double max_turning_speed_rad_per_s = 2.0;
-  double max_turn_rad = 0.7;  // from the orientation at the first start
-  AxisRange axis_range{};
+  TurnSets turn{};  // counted from the orientation at the first start
 };
 
 class PoseWorld final : public RenderedWorld {
@@ -58,6 +56,8 @@ class PoseWorld final : public RenderedWorld {
     return proxy_.move().tail<3>() / proxy_.config().period_s;
   }
   [[nodiscard]] bool turning_limited() const noexcept { return turning_limited_; }  // in the last step
+  // The sets of turning in the next step.
+  [[nodiscard]] TurnSets sets() const noexcept;
 
   void start(const models::Vec3& q_W) noexcept override;
   WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept override;
@@ -77,7 +77,6 @@ class PoseWorld final : public RenderedWorld {
  private:
   [[nodiscard]] models::ToolPose outside(const models::ToolPose& wanted) noexcept;
   void limit_place(const StepLimits& limits, models::ToolPose& p_hat) noexcept;
-  [[nodiscard]] bool limit_rotation(const models::ToolPose& from, models::ToolPose& to) const noexcept;
   void hold_rotation(const models::ToolPose& p_hat) noexcept;
   void return_reference() noexcept;
   void report(const models::ToolPose& p_hat, const models::ToolPose& limited) noexcept;

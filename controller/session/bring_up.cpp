@@ -207,9 +207,9 @@ PoseWorldConfig pose_config(const description::Cell& cell, const SessionSettings
                   .behind_mass_kg = behind.mass_kg,
                   .behind_centre_T_m = behind.centre_T_m,
                   .behind_inertia_T_kg_m2 = behind.about_T_kg_m2};
-  config.max_turning_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
-  config.max_turn_rad = cell.limits.max_turn_rad;
-  config.axis_range = axis_range(cell.limits);
+  config.turn.max_speed_rad_per_s = cell.limits.max_turning_speed_rad_per_s;
+  config.turn.max_turn_rad = cell.limits.max_turn_rad;
+  config.turn.axis_range = axis_range(cell.limits);
   return config;
 }
 

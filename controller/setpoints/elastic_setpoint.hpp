@@ -11,12 +11,13 @@
 // Links that obey the model follow q_f without oscillation and, at a wall, without overshoot. The price is a delay of
 // 2/ω, which the stability check includes. Coriolis torques are left out: at 0.5 m/s they bend the gears by some
 // micrometres. The hand's wrench isn't compensated either. Its reaction on the wrist, where the hand's mass is as large
-// as the links', would come back too late, and made contact with a wall chatter. The filter is exact if q is constant
-// over the period. bandwidth_Hz = 0 disables it; then only gravity is compensated.
+// as the links', would come back too late, and made contact with a wall chatter. bandwidth_Hz = 0 disables it; then
+// only gravity is compensated.
 //
 // Neither allocates, locks nor throws after construction.
 #pragma once
 
+#include "controller/setpoints/link_filter.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/state_archive.hpp"
 
@@ -27,7 +28,7 @@ class ElasticSetpoint {
   // Precondition: `arm` outlives this object.
   ElasticSetpoint(const models::Arm& arm, double bandwidth_Hz, double period_s);
 
-  void set_period(double period_s) noexcept;
+  void set_period(double period_s) noexcept { filter_.set_period(period_s); }
   // Starts at rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
   // Goes on from the motors' angles and speeds, and discards what the filter had accumulated. The links are taken to be
@@ -36,26 +37,16 @@ class ElasticSetpoint {
   // One period towards these angles of the links. Returns the motors' setpoints.
   models::JointVector step(const models::JointVector& link_rad) noexcept;
 
-  // The links' angles and speeds as they are commanded now.
-  [[nodiscard]] const models::JointVector& link_rad() const noexcept { return angle_rad_; }
-  [[nodiscard]] const models::JointVector& link_rad_per_s() const noexcept { return speed_rad_per_s_; }
-  // How far the filter's input is ahead of its output at a constant speed: 2/ω, in seconds; 0 without a filter.
-  [[nodiscard]] double lead_s() const noexcept { return omega_rad_per_s_ > 0.0 ? 2.0 / omega_rad_per_s_ : 0.0; }
-  // The input for which the output keeps its speed over the next period, and by how much another input is off from that
-  // for each rad/s² of mean acceleration. Precondition: there is a filter.
-  [[nodiscard]] models::JointVector coasting_rad() const noexcept;
-  [[nodiscard]] double input_s2() const noexcept { return 1.0 / (decay_ * omega_rad_per_s_ * omega_rad_per_s_); }
+  // Its output is the links' angles and speeds as they are commanded now.
+  [[nodiscard]] const LinkFilter& filter() const noexcept { return filter_; }
   // Of the tool, at these angles.
   [[nodiscard]] const models::ToolKinematics& kinematics() const noexcept { return kinematics_; }
   void archive(fieldbus::StateArchive& state) noexcept;
 
  private:
   const models::Arm* arm_;
-  double omega_rad_per_s_;
-  double decay_ = 1.0;  // exp(−ωT)
-  double period_s_ = 0.0;
-  models::JointVector angle_rad_, speed_rad_per_s_;
-  models::ToolKinematics kinematics_;  // at angle_rad_
+  LinkFilter filter_;
+  models::ToolKinematics kinematics_;  // at the filter's output
 };
 
 }  // namespace proxarm::controller

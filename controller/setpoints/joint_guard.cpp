@@ -13,13 +13,12 @@ namespace {
 // kHz.
 constexpr double lag_tolerance_rad = 1e-13;
 
-// c(d) of the header; 0 if the bound is crossed already.
+}  // namespace
+
 double approach_speed(double distance, double a, double T) noexcept {
   if (!(distance > 0.0)) return 0.0;
   return 2.0 * distance / (T + std::sqrt(T * T + 2.0 * distance / a));
 }
-
-}  // namespace
 
 JointGuard::JointGuard(const std::vector<description::DriveDescription>& drives, double period_s)
     : period_s_(period_s) {

@@ -20,6 +20,10 @@
 
 namespace proxarm::controller {
 
+// c(d) above: the highest speed at this distance from which a joint that brakes by a is at rest before the end. 0 if
+// the end has been passed already.
+[[nodiscard]] double approach_speed(double distance, double a, double T) noexcept;
+
 class JointGuard {
  public:
   JointGuard(const std::vector<description::DriveDescription>& drives, double period_s);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "controller/setpoints/joint_guard.hpp"
+
 namespace proxarm::controller {
 
 using models::ArmPoints;
@@ -27,6 +29,9 @@ constexpr double touching_m = 1e-10;
 // border. The guard tolerates this much, so that it doesn't act where the proxy's limits do. It is a fifth of the 0.1
 // mm that are promised. With more, the border would feel soft; with less, it would be felt twice.
 constexpr double twist_m = 2e-5;
+// By how much motors may lead the links, at most: what 20 m/s², the default acceleration limit, is at the 10 Hz of full
+// stretch, half as much again for a hand's reaction.
+constexpr double most_lead_m = 8e-3;
 // The path between two points on the right side of a border may bulge beyond it by half of the 0.1 mm that are
 // promised.
 constexpr double bulge_m = 5e-5;
@@ -39,8 +44,6 @@ constexpr std::size_t wrist = 4;
 // falls below the second. Around the start pose of the default cell, where hands lead the tool and scenes stand, the
 // first quantity is below 2 and the second above 0.58.
 constexpr double folding = 2.5, flat = 0.5;
-// Times the cell's acceleration limit; the header says why.
-constexpr double acceleration_share = 2.0;
 
 // The bound of the header for the speed on the way to rest: V is the speed of the last period, B its growth.
 double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
@@ -108,12 +111,13 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
   points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer joints, and all are archived
   arm_->points(arm_->link_from_motor(target_rad), points_);
   twist_k2_rad_ = points_.twist_rad;
-  steps_.fill(Vec3::Zero());
+  step_m_ = 0.0;
+  lead_W_ = lead_k1_W_ = Vec3::Zero();
   brakes_for_s_ = 0.0;
   torques_.start(target_rad_ - points_.twist_rad);
 }
 
-ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s) noexcept {
+ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s, const Vec3* links_W) noexcept {
   ActiveLimits active;
   // If the tool is slowed down, the elbow is, too.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
@@ -122,6 +126,8 @@ ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_p
                      share * limits_.max_elbow_speed_m_per_s};
   ArmPoints at;
   evaluate(wanted_rad, quick_rounds, at);
+  if (links_W != nullptr) lead_W_ = at.tool_W - *links_W;
+  if (!(lead_W_.norm() <= most_lead_m)) lead_W_.setZero();
   if (broken(wanted_rad, at, limit, Care::quick).kinds == 0) {
     accept(wanted_rad, at);
   } else {
@@ -163,12 +169,11 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
   const double t = stop_s(u), curvature = bend(u);  // the path's second derivative in time, m/s²
   const JointVector way = braking_way(u, t);
   torques_.judge(u, speed_rad_per_s_, out);
-  judge_ranges(theta + way, out);
   judge_motion(at, t * curvature, limit, care, out);
   if (!has_borders_) return out;
   const double step_m = (at.tool_W - points_.tool_W).norm();
   const double way_m = fastest(step_m / T, t * curvature) * t;
-  if (far_from_borders(at.tool_W, step_m + way_m + quick_way_m)) return out;
+  if (far_from_borders(at.tool_W - lead_W_, step_m + way_m + quick_way_m)) return out;
   if (care == Care::quick) {
     out.set(Limit::guard_border);
     return out;
@@ -179,27 +184,15 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
   return out;
 }
 
-void ToolGuard::judge_ranges(const JointVector& rest, ActiveLimits& out) const noexcept {
-  for (Eigen::Index i = 0; i < rest.size(); ++i) {
-    if (rest[i] > std::max(upper_rad_[i], target_rad_[i]) + touching_m ||
-        rest[i] < std::min(lower_rad_[i], target_rad_[i]) - touching_m) {
-      out.set(Limit::joint_range, static_cast<std::uint8_t>(1u << i));
-    }
-  }
-}
-
 void ToolGuard::judge_motion(const ArmPoints& at, double growth, const Speeds& limit, Care care,
                              ActiveLimits& out) const noexcept {
   const double T = period_s_, share = care == Care::quick ? quick_share : exact_share;
-  const double most_change = share * acceleration_share * limits_.max_tool_acceleration_m_per_s2 * T * T;
-  const auto judge = [&](const Vec3& step, const Vec3& step_k1, double most_m_per_s, Limit kind) {
-    const double step_m = step.norm();
-    if (fastest(step_m / T, growth) > share * most_m_per_s) out.set(kind);
-    if (step_m > step_k1.norm() && (step - step_k1).norm() > most_change) out.set(Limit::guard_acceleration);
+  const auto judge = [&](const Vec3& step, double most_m_per_s, Limit kind) {
+    if (fastest(step.norm() / T, growth) > share * most_m_per_s) out.set(kind);
   };
-  judge(at.tool_W - points_.tool_W, steps_[0], limit.tool_m_per_s, Limit::guard_speed);
+  judge(at.tool_W - points_.tool_W, limit.tool_m_per_s, Limit::guard_speed);
   for (std::size_t i = first_joint; i < static_cast<std::size_t>(target_rad_.size()); ++i) {
-    judge(at.joint_W[i] - points_.joint_W[i], steps_[i + 1], limit.elbow_m_per_s, Limit::guard_elbow);
+    judge(at.joint_W[i] - points_.joint_W[i], limit.elbow_m_per_s, Limit::guard_elbow);
   }
 }
 
@@ -212,9 +205,9 @@ bool ToolGuard::far_from_borders(const Vec3& p, double way_m) const noexcept {
                      [&](const description::BoxDescription& zone) { return depth_in(p, zone) < -way_m; });
 }
 
-void ToolGuard::judge_borders(const Vec3& p, const Vec3& rest_p, double step_bend, double rest_bend,
+void ToolGuard::judge_borders(const Vec3& at, const Vec3& rest, double step_bend, double rest_bend,
                               ActiveLimits& out) const noexcept {
-  const Vec3& p_k1 = points_.tool_W;
+  const Vec3 p_k1 = links_W(points_, lead_k1_W_), p = at - lead_W_, rest_p = rest - lead_W_;
   const double step_more = std::max(0.0, step_bend - bulge_m), rest_more = std::max(0.0, rest_bend - bulge_m);
   const double more = std::max(step_more, rest_more);
   for (int i = 0; i < 3; ++i) {
@@ -235,6 +228,17 @@ void ToolGuard::judge_borders(const Vec3& p, const Vec3& rest_p, double step_ben
   }
 }
 
+// Braking together is slower than a joint brakes by itself before the end of its range.
+JointVector ToolGuard::within_ranges(JointVector theta) const noexcept {
+  const double T = period_s_;
+  for (Eigen::Index i = 0; i < theta.size(); ++i) {
+    const double low = T * approach_speed(target_rad_[i] - lower_rad_[i], acceleration_[i], T);
+    const double high = T * approach_speed(upper_rad_[i] - target_rad_[i], acceleration_[i], T);
+    theta[i] = std::clamp(theta[i], target_rad_[i] - low, target_rad_[i] + high);
+  }
+  return theta;
+}
+
 void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept {
   ++judged_exactly_;
   ArmPoints at;
@@ -248,7 +252,8 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   if (torques_.strained() || folds() || stretched()) torques_.strain();
   // With rated torques, the braking time depends on the pose. Braking goes on as it was judged.
   const double T = period_s_, t = torques_.rated() ? brakes_for_s_ : stop_s(speed_rad_per_s_);
-  const JointVector brakes = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
+  const JointVector slower = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
+  const JointVector brakes = within_ranges(slower);
   JointVector best = brakes;
   ArmPoints best_at;
   evaluate(brakes, exact_rounds, best_at);
@@ -267,7 +272,7 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   }
   accept(best, best_at);
   if (kept == 0.0) brakes_for_s_ = std::max(0.0, t - T);
-  if (out.has(Limit::joint_torque)) torques_.ease_from(steps_[0].norm() / T / exact_share);
+  if (out.has(Limit::joint_torque)) torques_.ease_from(step_m_ / T / exact_share);
 }
 
 // Whether the arm folds: the joints that carry it turn faster than the tool's speed explains.
@@ -276,7 +281,7 @@ bool ToolGuard::folds() const noexcept {
   const double reach_m = (points_.tool_W - points_.joint_W[base]).norm();
   const Eigen::Index carrying = std::min<Eigen::Index>(3, speed_rad_per_s_.size());
   const double fastest = speed_rad_per_s_.head(carrying).cwiseAbs().maxCoeff();
-  return reach_m * fastest * period_s_ > folding * steps_[0].norm();
+  return reach_m * fastest * period_s_ > folding * step_m_;
 }
 
 // Whether the arm is stretched: these joints move the wrist in nearly one plane. Then the determinant of the unit
@@ -296,10 +301,7 @@ bool ToolGuard::stretched() const noexcept {
 }
 
 void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
-  steps_[0] = at.tool_W - points_.tool_W;
-  for (std::size_t i = first_joint; i < static_cast<std::size_t>(theta.size()); ++i) {
-    steps_[i + 1] = at.joint_W[i] - points_.joint_W[i];
-  }
+  step_m_ = (at.tool_W - points_.tool_W).norm();
   const JointVector u = (theta - target_rad_) / period_s_;
   brakes_for_s_ = stop_s(u);
   torques_.accept(theta - at.twist_rad);
@@ -307,13 +309,13 @@ void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
   target_rad_ = theta;
   twist_k2_rad_ = points_.twist_rad;
   points_ = at;
+  lead_k1_W_ = lead_W_;
 }
 
 void ToolGuard::archive(fieldbus::StateArchive& state) noexcept {
   state(target_rad_, speed_rad_per_s_, twist_k2_rad_, points_.twist_rad, points_.tool_W);
   for (Vec3& joint_W : points_.joint_W) state(joint_W);
-  for (Vec3& step : steps_) state(step);
-  state(brakes_for_s_);
+  state(step_m_, brakes_for_s_, lead_k1_W_);
   torques_.archive(state, target_rad_ - points_.twist_rad);
 }
 

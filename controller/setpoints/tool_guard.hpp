@@ -6,11 +6,14 @@
 // not by a Jacobian. The bounds are
 //   speed         |p(θ) − p(θ₁)| ≤ vT, with v = limits.max_tool_speed_m_per_s for T and max_elbow_speed_m_per_s for
 //                 joints
-//   acceleration  |p(θ) − 2p(θ₁) + p(θ₂)| ≤ 2aT² while p gets faster, with a = limits.max_tool_acceleration_m_per_s2
 //   borders       T within limits.workspace_m and outside of limits.keep_out_m, also between two setpoints
-//   ranges        of the joints
+//   ranges        of the joints, which the joints' guard keeps: here only braking keeps them
 //
-// Except for the acceleration, these bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T,
+// For borders T is where the links go: motors that accelerate them lead by K⁻¹Mq̈_f
+// (elastic_setpoint.hpp), a millimetre at 10 m/s², and may be beyond a border while the tool isn't. What is taken off
+// p(θ) for that is its difference to the filter's own place, up to `most_lead_m`.
+//
+// These bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T,
 // all joints brake together along u, in the time t that the slowest needs at its own deceleration:
 //   θ_b = θ + (1 − T/t)uT and so on,   t = max_i |u_i|/a_i
 // If the cell rates the drives' torques (torque_guard.hpp), braking may take longer, and the step from θ₁ to θ is
@@ -25,8 +28,7 @@
 // way to rest in joint space.
 //
 // A wanted setpoint that touches no bound is passed on to the bit. An arm that starts outside of a border may move, but
-// not further out. The bound of the acceleration is twice its limit, because motors must accelerate more than the links
-// while they bend their gears: by up to a quarter in ordinary contact. Neither allocates, locks nor throws.
+// not further out. Neither allocates, locks nor throws.
 #pragma once
 
 #include <array>
@@ -55,9 +57,11 @@ class ToolGuard {
   // Starts at rest at these angles.
   void start(const models::JointVector& target_rad) noexcept;
   // One period. Precondition: `wanted_rad` is finite and within each joint's own limits (JointGuard).
-  // `max_speed_m_per_s`: the tool's present speed limit, if it is lower than the cell's. Returns the limits that were
+  // `max_speed_m_per_s`: the tool's present speed limit, if it is lower than the cell's. `links_W`: where the
+  // setpoints' filter leads the links' tool with them; null: motors lead as they did. Returns the limits that were
   // active.
-  ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s) noexcept;
+  ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s,
+                    const models::Vec3* links_W) noexcept;
 
   // Precondition: the arm is at the end of its reach, where setpoints may be held back from cycle to cycle
   // (torque_guard.hpp).
@@ -75,7 +79,10 @@ class ToolGuard {
 
  private:
   static constexpr std::size_t first_joint = 2;  // the first whose speed is limited; the two before it hardly move
-  using Steps = std::array<models::Vec3, 1 + models::max_axes>;
+
+  [[nodiscard]] static models::Vec3 links_W(const models::ArmPoints& at, const models::Vec3& lead_W) noexcept {
+    return at.tool_W - lead_W;
+  }
 
   enum class Care : std::uint8_t { quick, exact };
   struct Speeds {
@@ -88,11 +95,11 @@ class ToolGuard {
   [[nodiscard]] models::JointVector braking_way(const models::JointVector& u, double t) const noexcept;
   [[nodiscard]] ActiveLimits broken(const models::JointVector& theta, const models::ArmPoints& at, const Speeds& limit,
                                     Care care) const noexcept;
-  void judge_ranges(const models::JointVector& rest, ActiveLimits& out) const noexcept;
+  [[nodiscard]] models::JointVector within_ranges(models::JointVector theta) const noexcept;
   void judge_motion(const models::ArmPoints& at, double growth, const Speeds& limit, Care care,
                     ActiveLimits& out) const noexcept;
   [[nodiscard]] bool far_from_borders(const models::Vec3& p, double way_m) const noexcept;
-  void judge_borders(const models::Vec3& p, const models::Vec3& rest_p, double step_bend, double rest_bend,
+  void judge_borders(const models::Vec3& at, const models::Vec3& rest, double step_bend, double rest_bend,
                      ActiveLimits& out) const noexcept;
   void hold_back(const models::JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept;
   [[nodiscard]] bool folds() const noexcept;
@@ -108,8 +115,9 @@ class ToolGuard {
   TorqueGuard torques_;
 
   models::JointVector target_rad_, speed_rad_per_s_, twist_k2_rad_;
-  models::ArmPoints points_;   // at target_rad_
-  Steps steps_{};              // of the points, in the last period
+  models::ArmPoints points_;                                                       // at target_rad_
+  double step_m_ = 0.0;                                                            // of T, in the last period
+  models::Vec3 lead_W_ = models::Vec3::Zero(), lead_k1_W_ = models::Vec3::Zero();  // of motors before links, as above
   double brakes_for_s_ = 0.0;  // the duration of the braking that was judged with target_rad_
   std::uint64_t judged_exactly_ = 0;
 };

@@ -154,8 +154,8 @@ std::vector<std::size_t> triangle_counts(bool quick) {
 }  // namespace
 
 std::vector<Column> Skip::columns() const {
-  return {{"kind", true},  {"name", true},   {"count"},        {"far_ns"},  {"near_ns"},     {"contact_ns"}, {"all_ns"},
-          {"start_up_us"}, {"joint_limits"}, {"joint_bounds"}, {"limited"}, {"joint_steps"}, {"guarded"}};
+  return {{"kind", true}, {"name", true},  {"count"},    {"far_ns"},  {"near_ns"},     {"contact_ns"},
+          {"all_ns"},     {"start_up_us"}, {"programs"}, {"limited"}, {"joint_steps"}, {"guarded"}};
 }
 
 std::size_t Skip::jobs(const Options& options) const {
@@ -170,8 +170,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
     const CycleCounts c = cycles_(setup);
     const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
     return {{"cycle", setup.name, number(c.steps), nan_value, nan_value, nan_value, nan_value, nan_value,
-             number(c.joint_limits), number(c.joint_bounds), number(c.limited), number(c.joint_steps),
-             number(c.guarded)}};
+             number(c.programs), number(c.limited), number(c.joint_steps), number(c.guarded)}};
   }
   const int steps = options.quick ? 500 : 2'000;
   std::string kind = "option", name;
@@ -225,7 +224,7 @@ json Skip::headline(const Table& table, const Options& /*options*/) const {
     } else if (kind == "cycle") {
       json& one = cycles[table.text(row, table.column("name"))];
       one["steps"] = value("count");
-      for (const char* name : {"joint_limits", "joint_bounds", "limited", "joint_steps", "guarded"}) {
+      for (const char* name : {"programs", "limited", "joint_steps", "guarded"}) {
         one[name] = value(name);
       }
     } else if (kind == "objects") {
@@ -329,9 +328,9 @@ std::string Skip::text(const json& headline) const {
   for (const auto& item : headline.at("cycles").items()) {
     const auto n = [&](const char* key) { return item.value().at(key).get<double>(); };
     std::snprintf(line, sizeof line,
-                  "%s: of %.0f steps %.0f made the joints' limits (%.0f their bound), in %.0f a limit acted, %.0f "
+                  "%s: of %.0f steps %.0f asked a quadratic program for the joints' step, in %.0f a limit acted, %.0f "
                   "setpoints were judged exactly; %.2f steps of inverse kinematics each\n",
-                  item.key().c_str(), n("steps"), n("joint_limits"), n("joint_bounds"), n("limited"), n("guarded"),
+                  item.key().c_str(), n("steps"), n("programs"), n("limited"), n("guarded"),
                   n("joint_steps") / std::max(1.0, n("steps")));
     text << line;
   }

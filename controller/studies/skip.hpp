@@ -24,7 +24,7 @@ struct CycleSetup {
 };
 // Counts over its steps of rendering; controller/motion/motion_work.hpp says what they are.
 struct CycleCounts {
-  std::uint64_t steps = 0, joint_limits = 0, joint_bounds = 0, limited = 0, joint_steps = 0, guarded = 0;
+  std::uint64_t steps = 0, programs = 0, limited = 0, joint_steps = 0, guarded = 0;
 };
 using CycleRun = std::function<CycleCounts(const CycleSetup&)>;
 

@@ -64,6 +64,8 @@ class Arm {
   [[nodiscard]] const JointVector& start_rad() const noexcept { return start_rad_; }
   [[nodiscard]] const JointVector& gear_stiffness_Nm_per_rad() const noexcept { return gear_stiffness_; }  // 0: rigid
 
+  // The drive of the k-th joint of the chain, outwards from the base.
+  [[nodiscard]] int drive_along_chain(std::size_t k) const noexcept { return links_[k].drive; }
   // Whether the axis is prismatic; its "angle" is then in m.
   [[nodiscard]] bool slides(int drive) const noexcept { return slides_[static_cast<std::size_t>(drive)]; }
 

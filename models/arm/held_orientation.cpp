@@ -44,14 +44,6 @@ SmallColumns3 columns_of_inverse(const Jacobian& J_W, Eigen::Index first) noexce
 
 }  // namespace
 
-double least_singular_value(const Jacobian& J_W) noexcept {
-  const Jacobian J = weighted(J_W);
-  FactoredMatrix squared;
-  squared.factor(J.lazyProduct(J.transpose()));
-  const double trace = squared.inverse().trace();
-  return trace > 0.0 ? 1.0 / std::sqrt(trace) : 0.0;
-}
-
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept {
   return J_W.cols() < 6 ? joints_of_few_axes(J_W) : columns_of_inverse(J_W, 0);
 }

@@ -14,9 +14,6 @@ constexpr double turning_length_m = 0.5;
 // allocate.
 SmallColumns3 joints_per_m(const Jacobian& J_W) noexcept;
 
-// A bound from below of the smallest singular value of J, with its rotations weighted: (tr (J Jᵀ)⁻¹)^−½, which is at
-// least 1/√6 of it. Precondition: six axes or more.
-double least_singular_value(const Jacobian& J_W) noexcept;
 // The same with the place held: ∂(joint angles)/∂(tool rotation), per radian. Precondition: six axes or more.
 SmallColumns3 joints_per_rad(const Jacobian& J_W) noexcept;
 

@@ -340,29 +340,6 @@ void InverseKinematics::solve_for(const JointVector& q, const Pose& X_WT,
                                                                                           : Status::not_converged;
 }
 
-// Each round asks for the whole step from q, with J where the last one ended: what that left of the place is of second
-// order in how the round changed the step.
-bool InverseKinematics::reach_place(const JointVector& q, const StepRoom& room, const Pose& X_WT,
-                                    InverseKinematicsResult& result) const noexcept {
-  InverseKinematicsResult tried = result;
-  tried.q = q;
-  JointVector step = JointVector::Zero(q.size());
-  for (int i = 0; i < config_.max_iterations; ++i) {
-    Vec6 e = error(X_WT, tried);
-    if (i > 0 && tried.position_residual_m <= config_.position_tolerance_m) {
-      result = tried;
-      finish(result);
-      return true;
-    }
-    e.tail<3>() /= config_.length_m;
-    e += tried.kinematics.J_W * step;
-    if (!place_step(tried.kinematics.J_W, e, room, step)) return false;
-    tried.q = q + step;
-    ++tried.iterations;
-  }
-  return false;
-}
-
 std::optional<JointVector> InverseKinematics::solve_anywhere(const Pose& X_WT, const JointVector& q_near) const {
   if (q_near.size() != arm_.axes() || !q_near.allFinite() || !is_pose(X_WT)) return std::nullopt;
   constexpr int starts = 200, iterations = 60;

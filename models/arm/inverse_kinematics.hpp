@@ -29,7 +29,6 @@
 #include <optional>
 
 #include "models/arm/arm.hpp"
-#include "models/arm/place_step.hpp"
 #include "models/arm/prioritized_step.hpp"
 #include "models/arm/tool_space.hpp"
 
@@ -80,12 +79,6 @@ class InverseKinematics {
   // For the cycle: no allocation, no exception, bounded work. Precondition: `q` are the angles that were commanded
   // last. Where result.kinematics are at q already, they aren't computed again.
   void solve(const JointVector& q, const Pose& X_WT, InverseKinematicsResult& result) const noexcept;
-
-  // Where solve() didn't converge: the place of X_WT exactly, and what turning the joints have left for
-  // (place_step.hpp). `room` is of this step, from `q`. If it finds none, returns false and changes nothing.
-  // Preconditions: reaches_orientation(); q and X_WT are as for solve(), which didn't call them invalid.
-  bool reach_place(const JointVector& q, const StepRoom& room, const Pose& X_WT,
-                   InverseKinematicsResult& result) const noexcept;
 
   // How near result.q is to a singularity. Precondition: result.kinematics are at it.
   void measure_singularity(InverseKinematicsResult& result) const noexcept;

@@ -74,7 +74,7 @@ studies::CycleCounts count_cycles(const studies::CycleSetup& setup) {
   options.hand = file(setup.hand);
   if (setup.looks_ahead) options.lookahead = LookaheadChoice{.kind = LookaheadChoice::Kind::automatic};
   const controller::MotionWork work = count_work(prepare(options));
-  return {work.steps, work.joint_limits, work.joint_bounds, work.limited, work.joint_steps, work.guarded};
+  return {work.steps, work.programs, work.limited, work.joint_steps, work.guarded};
 }
 
 }  // namespace proxarm::command_line

@@ -33,9 +33,7 @@ std::string work_text(const PreparedSession& session, const controller::MotionWo
   const auto seldom = [&](const char* what, std::uint64_t done, const char* why) {
     line(what, "in ", work.steps - std::min(work.steps, done), " of these steps, ", why);
   };
-  seldom("limits of the joints", work.joint_limits, "which are too short to reach one");
-  line("how joints go where the tool goes", "computed anew in ", work.joint_bounds,
-       " steps, where the bound that tells how far that is had become too wide");
+  line("the joints' step by a quadratic program", work.programs, " times, where joints can't follow the pose exactly");
   seldom("the nearest point of all limits", work.limited, "in which none acts");
   seldom("the last guard's exact test", work.guarded, "which keep well within its bounds");
   if (!session.settings.looks_ahead) line("lookahead", "without --lookahead");

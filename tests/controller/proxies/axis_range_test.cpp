@@ -72,7 +72,7 @@ TEST(AxisRange, NoTorqueTiltsOrTwistsTheToolFurther) {
 // the axis may be a large one of tilt and twist: up to 3 rad it was longer by 40 times.)
 TEST(AxisRange, AStepAtABorderIsNoLongerThanTheOneThatWasAskedFor) {
   Random random(6);
-  const double back_rad = OrientationProxy::reference_rad_per_s * 1e-3;
+  const double back_rad = TurnSets::returning_rad_per_s * 1e-3;
   int limited = 0;
   for (int k = 0; k < 100'000; ++k) {
     const AxisRange range{random.uniform(0.0, 3.0), random.uniform(0.0, 3.0), random.direction()};
@@ -105,7 +105,7 @@ TEST(AxisRange, FromBeyondItTheToolIsLedBackSlowly) {
   for (int k = 0; k < 2500; ++k) {
     const Quaterniond before = proxy.R_WT();
     ASSERT_EQ(proxy.step(begun * Vec3(5.0, 0.0, -2.0)), ProxyFault::none);
-    const double step = OrientationProxy::reference_rad_per_s * 1e-3 + 1e-12;
+    const double step = TurnSets::returning_rad_per_s * 1e-3 + 1e-12;
     ASSERT_LE(tilt_of(begun, before, Vec3::UnitZ()) - tilt_of(begun, proxy.R_WT(), Vec3::UnitZ()), step);
     ASSERT_LE(twist_of(begun, before, Vec3::UnitZ()) - twist_of(begun, proxy.R_WT(), Vec3::UnitZ()), step);
   }

@@ -40,7 +40,7 @@ TEST_F(ElasticSetpointTest, AtRestTheMotorsCarryGravityAndNothingElse) {
   elastic.start(link);
   for (int k = 0; k < 100; ++k) {
     const JointVector motor = elastic.step(link);
-    ASSERT_EQ(elastic.link_rad(), link);
+    ASSERT_EQ(elastic.filter().rad(), link);
     ASSERT_EQ(motor, arm.motor_from_link(link));
   }
 }
@@ -57,9 +57,9 @@ TEST_F(ElasticSetpointTest, AnswersAStepAsACriticallyDampedFilterDoes) {
     const double t = k * T, decay = std::exp(-omega * t);
     const JointVector e = (1.0 + omega * t) * decay * (from - to);
     const JointVector e_dot = -omega * omega * t * decay * (from - to);
-    ASSERT_LT((elastic.link_rad() - (to + e)).norm(), 1e-13) << k;
-    ASSERT_LT((elastic.link_rad_per_s() - e_dot).norm(), 1e-11) << k;
-    nearest = std::min(nearest, (to - elastic.link_rad())[0] / (to - from)[0]);
+    ASSERT_LT((elastic.filter().rad() - (to + e)).norm(), 1e-13) << k;
+    ASSERT_LT((elastic.filter().rad_per_s() - e_dot).norm(), 1e-11) << k;
+    nearest = std::min(nearest, (to - elastic.filter().rad())[0] / (to - from)[0]);
   }
   EXPECT_GE(nearest, -1e-12) << "it overshoots";
 }
@@ -74,15 +74,15 @@ TEST_F(ElasticSetpointTest, TenShortPeriodsLeadWhereOneLongOneDoes) {
   coarse.set_period(10.0 * T);
   for (int k = 0; k < 10; ++k) fine.step(place(-0.01));
   coarse.step(place(-0.01));
-  EXPECT_LT((fine.link_rad() - coarse.link_rad()).norm(), 1e-14);
-  EXPECT_LT((fine.link_rad_per_s() - coarse.link_rad_per_s()).norm(), 1e-12);
+  EXPECT_LT((fine.filter().rad() - coarse.filter().rad()).norm(), 1e-14);
+  EXPECT_LT((fine.filter().rad_per_s() - coarse.filter().rad_per_s()).norm(), 1e-12);
 }
 
 // What the stability check counts as the filter's delay. The input stands still within a period, so that its mean is
 // T/2 ahead of the value that the period began with.
 TEST_F(ElasticSetpointTest, FollowsAConstantSpeedByItsLead) {
   ElasticSetpoint elastic(arm, bandwidth_Hz, T);
-  EXPECT_DOUBLE_EQ(elastic.lead_s(), 2.0 / omega);
+  EXPECT_DOUBLE_EQ(elastic.filter().lead_s(), 2.0 / omega);
   elastic.start(arm.start_rad());
   const double speed_rad_per_s = 0.3;
   JointVector link = arm.start_rad();
@@ -91,7 +91,7 @@ TEST_F(ElasticSetpointTest, FollowsAConstantSpeedByItsLead) {
     elastic.step(link);
   }
   for (int i = 0; i < arm.axes(); ++i) {
-    EXPECT_NEAR((link - elastic.link_rad())[i] / speed_rad_per_s, elastic.lead_s() - 0.5 * T, 0.02 * T);
+    EXPECT_NEAR((link - elastic.filter().rad())[i] / speed_rad_per_s, elastic.filter().lead_s() - 0.5 * T, 0.02 * T);
   }
 }
 
@@ -112,12 +112,12 @@ TEST_F(ElasticSetpointTest, TheGearsTwistByWhatAccelerationAndGravityAsk) {
     before.set_period(-moment_s);
     later.step(to);
     before.step(to);
-    const JointVector acceleration = (later.link_rad_per_s() - before.link_rad_per_s()) / (2.0 * moment_s);
-    const JointVector inertial = arm.link_mass_matrix(elastic.link_rad()) * acceleration;
-    const JointVector twist = motor - elastic.link_rad();
+    const JointVector acceleration = (later.filter().rad_per_s() - before.filter().rad_per_s()) / (2.0 * moment_s);
+    const JointVector inertial = arm.link_mass_matrix(elastic.filter().rad()) * acceleration;
+    const JointVector twist = motor - elastic.filter().rad();
     const JointVector carried = arm.gear_stiffness_Nm_per_rad().cwiseProduct(twist);
     // Rounding of the speed (1e-13 rad/s over 0.1 µs), times the inertia; and of θ, times the stiffness (1e6 Nm).
-    ASSERT_LT((carried - arm.gravity_torque(elastic.link_rad()) - inertial).norm(), 1e-6 * (1.0 + inertial.norm()));
+    ASSERT_LT((carried - arm.gravity_torque(elastic.filter().rad()) - inertial).norm(), 1e-6 * (1.0 + inertial.norm()));
     largest_Nm = std::max(largest_Nm, inertial.norm());
   }
   EXPECT_GT(largest_Nm, 10.0) << "there was nothing to carry";
@@ -131,19 +131,19 @@ TEST_F(ElasticSetpointTest, ARigidGearIsNotTwisted) {
   elastic.start(place(0.0));
   for (int k = 0; k < 20; ++k) {
     const JointVector motor = elastic.step(place(0.02));
-    ASSERT_EQ(motor[1], elastic.link_rad()[1]);
-    ASSERT_NE(motor[2], elastic.link_rad()[2]);
+    ASSERT_EQ(motor[1], elastic.filter().rad()[1]);
+    ASSERT_NE(motor[2], elastic.filter().rad()[2]);
   }
 }
 
 TEST_F(ElasticSetpointTest, WithoutABandwidthOnlyGravityIsCompensated) {
   ElasticSetpoint elastic(arm, 0.0, T);
-  EXPECT_EQ(elastic.lead_s(), 0.0);
+  EXPECT_EQ(elastic.filter().lead_s(), 0.0);
   elastic.start(place(0.0));
   for (const double size_rad : {0.02, -0.05, 0.0}) {
     const JointVector link = place(size_rad);
     EXPECT_EQ(elastic.step(link), arm.motor_from_link(link));
-    EXPECT_EQ(elastic.link_rad(), link);
+    EXPECT_EQ(elastic.filter().rad(), link);
   }
 }
 
@@ -153,15 +153,15 @@ TEST_F(ElasticSetpointTest, ResumesWhereTheMotorsAreAndForgetsWhatItWasTold) {
   for (int k = 0; k < 20; ++k) elastic.step(place(0.5));
   const JointVector motor = arm.motor_from_link(place(0.01)), still = JointVector::Zero(arm.axes());
   elastic.resume(motor, still);
-  const JointVector link = elastic.link_rad();
+  const JointVector link = elastic.filter().rad();
   EXPECT_LT((link - place(0.01)).norm(), 1e-12) << "fixed-point iteration of link_from_motor()";
   EXPECT_LT((elastic.step(link) - motor).norm(), 1e-12) << "the drives feel no step";
 
   const JointVector speed = JointVector::Constant(arm.axes(), 0.2);
   elastic.resume(motor, speed);
-  EXPECT_EQ(elastic.link_rad_per_s(), speed);
+  EXPECT_EQ(elastic.filter().rad_per_s(), speed);
   elastic.step(link);
-  EXPECT_GT((elastic.link_rad() - link).minCoeff(), 0.8 * 0.2 * T) << "it goes on at that speed";
+  EXPECT_GT((elastic.filter().rad() - link).minCoeff(), 0.8 * 0.2 * T) << "it goes on at that speed";
 }
 
 TEST_F(ElasticSetpointTest, GoesOnFromItsArchiveToTheBit) {
@@ -183,7 +183,7 @@ TEST_F(ElasticSetpointTest, KnowsWhereTheToolIsAtItsAngles) {
     ElasticSetpoint elastic(arm, bandwidth, T);
     const auto expect_there = [&] {
       models::ToolKinematics there;
-      arm.kinematics(elastic.link_rad(), there);
+      arm.kinematics(elastic.filter().rad(), there);
       EXPECT_EQ(elastic.kinematics().X_WT.matrix(), there.X_WT.matrix());
       EXPECT_EQ(elastic.kinematics().J_W, there.J_W);
     };

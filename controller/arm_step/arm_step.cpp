@@ -1,0 +1,457 @@
+#include "controller/arm_step/arm_step.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/geometry/tool_pose.hpp"
+
+namespace proxarm::controller {
+
+using models::JointMatrix;
+using models::JointVector;
+using models::Mat3;
+using models::Vec3;
+
+namespace {
+
+// The share of a joint's speed that the proxy's step may use; the rest is for the gears' twist.
+constexpr double speed_share = 0.95;
+// The share of a joint's acceleration, behind the filter, that the step may use, and of that of braking, likewise.
+constexpr double acceleration_share = 0.9, braking_share = 0.5;
+// The share of the elbow's speed limit; gears add some 7 % where a hand pulls the arm along at the limit.
+constexpr double elbow_share = 0.9;
+// The cost of a joint's step beside that of turning, as (joint speed / its limit)² of (rad/s)²: damps turning where the
+// wrist is nearly singular, to σ = 0.03 rad/rad.
+constexpr double joint_cost = 1e-3;
+// Arms with fewer than six axes turn the tool as little as they can: a radian of it counts ten of a joint, as in
+// prioritized_step.hpp.
+constexpr double few_axes_turning = 100.0;
+// What turning and joints' steps cost where the nearest place is looked for, in m²/rad²: it is off by 1e-10 m where
+// turning lags by a milliradian.
+constexpr double beside_place = 1e-7;
+// A place within this counts as reached: a tenth of what encoders resolve at a metre.
+constexpr double reached_m = 1e-9;
+constexpr double place_tolerance_m = 1e-12, turn_tolerance_rad = 1e-9;
+// The time in which borders of turning and of the place's margin are approached, or that of braking if it is longer.
+constexpr double approach_s = 0.1;
+// How a held orientation that lags catches up: with this time constant at the end, and this acceleration and share of
+// the turning speed's limit before. A handle's end, 0.1 m away, is accelerated by 0.5 m/s² then.
+constexpr double catching_s = 0.1, catching_rad_per_s2 = 5.0, catching_share = 0.25;
+// A lag that is caught up in one step: 1 µm at a metre.
+constexpr double caught_up_rad = 1e-6;
+constexpr int most_rounds = 8;
+constexpr double rounding_rad = 1e-12;
+constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
+
+}  // namespace
+
+ArmStep::ArmStep(const models::Arm& arm, const models::InverseKinematics& inverse,
+                 const std::vector<description::DriveDescription>& drives, double period_s)
+    : arm_(&arm),
+      inverse_(&inverse),
+      curvature_(arm.path_curvature()),
+      cost_(arm.axes()),
+      margin_(arm, inverse.space()) {
+  for (Eigen::Index i = 0; i < cost_.size(); ++i) {
+    const description::DriveDescription& drive = drives[static_cast<std::size_t>(i)];
+    joints_.push_back({drive.range_rad[0], drive.range_rad[1], drive.max_speed_rad_per_s,
+                       drive.max_acceleration_rad_per_s2, 0.0, 0.0});
+    cost_[i] = joint_cost / (drive.max_speed_rad_per_s * drive.max_speed_rad_per_s);
+  }
+  set_period(period_s);
+  start(arm.start_rad());
+}
+
+void ArmStep::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  for (Joint& joint : joints_) {
+    joint.per_step_rad = speed_share * joint.speed_rad_per_s * period_s;
+    joint.share = period_s / (period_s + joint.speed_rad_per_s / joint.acceleration_rad_per_s2);
+  }
+}
+
+void ArmStep::start(const JointVector& link_rad) noexcept { resume(link_rad, JointVector::Zero(link_rad.size())); }
+
+void ArmStep::resume(const JointVector& link_rad, const JointVector& step_rad) noexcept {
+  link_rad_ = link_rad;
+  step_rad_ = step_rad;
+  lags_ = false;
+  solution_.q = link_rad;
+  arm_->kinematics(link_rad, solution_.kinematics);
+}
+
+Eigen::Quaterniond ArmStep::R_WT() const noexcept {
+  return Eigen::Quaterniond(solution_.kinematics.X_WT.linear()).normalized();
+}
+
+// ---- the sets
+
+void ArmStep::begin(const ArmStepStart& start) noexcept {
+  start_ = start;
+  active_ = {};
+  asked_ = linearised_ = false;
+  row_count_ = 0;
+  from_ = solution_.kinematics;
+  aim(start.R_WT);
+  margin_.go_to(link_rad_, from_);
+  make_boxes(start);
+  eased_ = lags_;
+}
+
+// A held orientation that lags is caught up as a brake reaches a wall, and no faster at once than joints take it up.
+void ArmStep::aim(const Eigen::Quaterniond& R_WT) noexcept {
+  start_.R_WT = aim_ = R_WT;
+  asked_ = catches_up_ = false;
+  if (!lags_ || !start_.held) {
+    catching_rad_per_s_ = 0.0;
+    return;
+  }
+  const Eigen::Quaterniond here = Eigen::Quaterniond(from_.X_WT.linear()).normalized();
+  const Vec3 lag = models::rotation_vector(R_WT * here.conjugate());
+  const double angle = lag.norm(), T = period_s_;
+  if (!(angle > caught_up_rad)) return;
+  catches_up_ = true;
+  catching_rad_per_s_ = std::min({catching_rad_per_s_ + catching_rad_per_s2 * T, angle / catching_s,
+                                  catching_share * start_.turn.max_speed_rad_per_s});
+  aim_ = (models::rotation_by(std::min(1.0, T * catching_rad_per_s_ / angle) * lag) * here).normalized();
+}
+
+double ArmStep::room_rad(std::size_t i, double sign) const noexcept {
+  const auto k = static_cast<Eigen::Index>(i);
+  const double to_end = sign > 0.0 ? joints_[i].upper_rad - link_rad_[k] - std::max(0.0, start_.twist_rad[k])
+                                   : link_rad_[k] - joints_[i].lower_rad - std::max(0.0, -start_.twist_rad[k]);
+  return std::max(0.0, joints_[i].share * to_end);
+}
+
+// Accelerations bound the step where it doesn't brake; ranges and speeds bound braking, too.
+void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
+  const double T = period_s_;
+  double cycles = 0.0;  // that the slowest joint needs to brake
+  for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
+    const double a = joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
+    cycles = std::max(cycles, std::abs(step_rad_[i]) / (braking_share * a * T * T));
+  }
+  brakes_s_ = std::max(approach_s, cycles * T);
+  start_.turn.brakes_s = brakes_s_;
+  brakes_ = cycles > 1.0 ? JointVector((1.0 - 1.0 / cycles) * step_rad_) : JointVector::Zero(step_rad_.size());
+  box_ = ease_ = {brakes_, brakes_};
+  for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Joint& joint = joints_[k];
+    const double low = -std::min(joint.per_step_rad, room_rad(k, -1.0));
+    const double high = std::min(joint.per_step_rad, room_rad(k, 1.0));
+    const double coasts = start.coasting_rad[i] - link_rad_[i];
+    const double change = acceleration_share * joint.acceleration_rad_per_s2 * start.input_s2;
+    brakes_[i] = std::clamp(brakes_[i], low, high);
+    box_.low[i] = std::clamp(coasts - change, low, brakes_[i]);
+    box_.high[i] = std::clamp(coasts + change, brakes_[i], high);
+    const double eased = braking_share * joint.acceleration_rad_per_s2 * T * T;
+    ease_.low[i] = std::clamp(step_rad_[i] - eased, box_.low[i], brakes_[i]);
+    ease_.high[i] = std::clamp(step_rad_[i] + eased, brakes_[i], box_.high[i]);
+  }
+}
+
+bool ArmStep::Box::contains(const JointVector& u) const noexcept {
+  return (u.array() >= low.array() - rounding_rad).all() && (u.array() <= high.array() + rounding_rad).all();
+}
+
+// How far σ may fall in this step: towards its border as towards any other, and never below what braking makes of it.
+double ArmStep::place_bound() const noexcept {
+  const double share = period_s_ / (period_s_ + brakes_s_);
+  return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), -margin_.gradient().dot(brakes_));
+}
+
+bool ArmStep::allows(const JointVector& u) const noexcept {
+  if (!box().contains(u)) return false;
+  if (margin_.near() && -margin_.gradient().dot(u) > place_bound() + rounding_rad) return false;
+  return !points_too_fast(u);
+}
+
+// How far a point may go within a step at these speeds of the joints. On the way to rest, all joints braking together,
+// it gets no faster than (V + B)²/4B, with B = t |u̇|ᵀC|u̇| and t the time that this takes (tool_guard.hpp has the
+// derivation).
+double ArmStep::most_way_m(const JointVector& u, double limit_m_per_s) const noexcept {
+  const double T = period_s_;
+  const JointVector rate = u.cwiseAbs() / T;
+  double brakes_s = 0.0;
+  for (Eigen::Index i = 0; i < rate.size(); ++i) {
+    brakes_s = std::max(brakes_s, rate[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2);
+  }
+  const double B = brakes_s * rate.dot(curvature_ * rate), most = elbow_share * limit_m_per_s;
+  return T * (B <= most ? most : std::max(0.0, 2.0 * std::sqrt(B * most) - B));
+}
+
+// A point moves by at most Σ R_i |u_i|, R_i being the distance of T from axis i at most: most steps are below that.
+bool ArmStep::points_too_fast(const JointVector& u) const noexcept {
+  const double tool_m = most_way_m(u, start_.tool_m_per_s), elbow_m = most_way_m(u, start_.elbow_m_per_s);
+  if (curvature_.diagonal().dot(u.cwiseAbs()) <= std::min(tool_m, elbow_m)) return false;
+  models::ArmPoints before, after;
+  arm_->points(link_rad_, before);
+  arm_->points(link_rad_ + u, after);
+  // Where braking makes T no faster, its own set bounds it (step_limits.hpp).
+  if (tool_m < elbow_share * start_.tool_m_per_s * period_s_ &&
+      (after.tool_W - before.tool_W).norm() > tool_m + rounding_rad) {
+    return true;
+  }
+  for (auto k = first_point; k < static_cast<std::size_t>(u.size()); ++k) {
+    if ((after.joint_W[k] - before.joint_W[k]).norm() > elbow_m + rounding_rad) return true;
+  }
+  return false;
+}
+
+// ---- the proxy asks
+
+bool ArmStep::contains(const Vec3& q_W) noexcept {
+  models::Pose X_WT = models::Pose::Identity();
+  X_WT.translation() = q_W;
+  X_WT.linear() = aim_.toRotationMatrix();
+  if (asked_) solution_.kinematics = from_;
+  eased_ = lags_;
+  inverse_->solve(link_rad_, X_WT, solution_);
+  asked_W_ = q_W;
+  asked_ = true;
+  allowed_ = solution_.status == models::InverseKinematicsResult::Status::converged && allows(solution_.q - link_rad_);
+  return allowed_;
+}
+
+bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexcept {
+  if (!linearised_) start_model();
+  eased_ = false;
+  // J_w u = `wanted` carries the wrist to where the tool at q_W has it.
+  const Vec3 here_W = model_.at.X_WT.translation() + wrist_.from_T_W;
+  const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
+  Vec3 wanted = wanted_for(wrist_wanted_W_);
+  if (can_carry_wrist(wanted)) return false;
+  if (!start_.held) {
+    wanted = wanted_for(wrist_.from_T_W);
+    if (can_carry_wrist(wanted)) return false;
+  }
+  solve_near(model_, wrist_.J_W, wanted);
+  const Vec3 beyond = wanted - wrist_.J_W * program_.u();
+  const double length = beyond.norm();
+  if (!(length > reached_m)) return false;
+  const ActiveLimits limits = pressing();
+  out.normal = beyond / length;
+  out.bound_m = out.normal.dot(q_W - q_k1_W) - length;
+  out.limit = static_cast<Limit>(limits.kinds);
+  out.axis_bits = limits.axes;
+  out.share = 0.0;
+  return true;
+}
+
+bool ArmStep::can_carry_wrist(const Vec3& wanted) noexcept {
+  for (int round = 0; round < most_rounds && solve_at(model_, wrist_.J_W, wanted); ++round) {
+    if (!leave_curved_sets(model_, program_.u())) return true;
+  }
+  return false;
+}
+
+// ---- the quadratic programs
+
+void ArmStep::linearise(const JointVector& u, Model& model) const noexcept {
+  model.u = u;
+  arm_->kinematics(link_rad_ + u, model.at);
+}
+
+void ArmStep::start_model() noexcept {
+  linearise(brakes_, model_);
+  wrist_ = margin_.wrist(link_rad_ + brakes_, model_.at);
+  wrist_wanted_W_ = aim_ * (model_.at.X_WT.linear().transpose() * wrist_.from_T_W);
+  linearised_ = true;
+}
+
+// The rotation vector from the model's orientation to R.
+Vec3 ArmStep::turn_from(const Model& model, const Eigen::Quaterniond& R) const noexcept {
+  const Eigen::Quaterniond here = Eigen::Quaterniond(model.at.X_WT.linear()).normalized();
+  return models::rotation_vector(R * here.conjugate());
+}
+
+// ½ w |J_R (u' − u) − e_R|² + ½ Σ c_i (u'_i − u_b,i)²
+void ArmStep::objective(const Model& model, JointMatrix& H, JointVector& g) const noexcept {
+  const auto J_R = model.at.J_W.bottomRows<3>();
+  const double w = inverse_->reaches_orientation() ? 1.0 : few_axes_turning;
+  const JointVector cost = inverse_->reaches_orientation() ? cost_ : JointVector::Ones(cost_.size());
+  const Vec3 wanted = turn_from(model, aim_) + J_R * model.u;
+  H = w * J_R.transpose() * J_R;
+  H.diagonal() += cost;
+  g = w * (J_R.transpose() * wanted) + cost.cwiseProduct(brakes_);
+}
+
+void ArmStep::add_sets() noexcept {
+  const auto tell = [&](std::size_t before, Limit limit, int joint) {
+    if (program_.rows() == before) return;
+    kind_[before] = limit;
+    joint_[before] = static_cast<std::int8_t>(joint);
+  };
+  first_set_ = program_.rows();
+  for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
+    JointVector a = JointVector::Zero(brakes_.size());
+    a[i] = 1.0;
+    std::size_t row = program_.rows();
+    program_.at_most(a, box().high[i]);
+    tell(row, Limit::joint_range, static_cast<int>(2 * i));
+    row = program_.rows();
+    program_.at_most(-a, -box().low[i]);
+    tell(row, Limit::joint_range, static_cast<int>(2 * i + 1));
+  }
+  if (margin_.near()) {
+    const std::size_t row = program_.rows();
+    program_.at_most(-margin_.gradient(), place_bound());
+    tell(row, Limit::singularity, -1);
+  }
+  for (std::size_t k = 0; k < row_count_; ++k) {
+    const std::size_t row = program_.rows();
+    program_.at_most(rows_[k].a, rows_[k].b);
+    tell(row, rows_[k].limit, -1);
+  }
+}
+
+void ArmStep::add_row(const JointVector& a, double b, Limit limit) noexcept {
+  if (row_count_ < rows_.size()) rows_[row_count_++] = {a, std::max(b, a.dot(brakes_)), limit};
+}
+
+// The step with J u = `wanted` that turns the tool as far as U allows. False if U doesn't contain one.
+bool ArmStep::solve_at(const Model& model, const Rows& J, const Vec3& wanted) noexcept {
+  JointMatrix H;
+  JointVector g;
+  objective(model, H, g);
+  ++programs_;
+  program_.start(H, g);
+  const models::ToolSpace& space = inverse_->space();
+  for (int k = 0; k < space.dimensions; ++k) {
+    const Vec3 e = space.axes.col(k);
+    program_.equal(J.transpose() * e, e.dot(wanted));
+  }
+  add_sets();
+  return program_.solve();
+}
+
+// The step with J u nearest to `wanted`.
+bool ArmStep::solve_near(const Model& model, const Rows& J, const Vec3& wanted) noexcept {
+  JointMatrix H;
+  JointVector g;
+  objective(model, H, g);
+  ++programs_;
+  program_.start(J.transpose() * J + beside_place * H, J.transpose() * wanted + beside_place * g);
+  add_sets();
+  return program_.solve();
+}
+
+// Takes in the half-spaces of curved sets that u has left. Whether there was one.
+bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexcept {
+  const std::size_t before = row_count_;
+  if (inverse_->reaches_orientation()) {
+    const auto J_R = model.at.J_W.bottomRows<3>();
+    const Eigen::Quaterniond from = Eigen::Quaterniond(from_.X_WT.linear()).normalized();
+    const Eigen::Quaterniond to =
+        (models::rotation_by(J_R * (u - model.u)) * Eigen::Quaterniond(model.at.X_WT.linear())).normalized();
+    Eigen::Quaterniond within = to;
+    start_.turn.keep(from, within);
+    const Vec3 beyond = models::rotation_vector(to * within.conjugate());
+    if (const double angle = beyond.norm(); angle > turn_tolerance_rad) {
+      const Vec3 n = beyond / angle;
+      add_row(J_R.transpose() * n, n.dot(J_R * u) - angle, Limit{});
+    }
+  }
+  if (points_too_fast(u)) limit_points(model, u);
+  return row_count_ > before;
+}
+
+void ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
+  models::ArmPoints was, at;
+  arm_->points(link_rad_, was);
+  arm_->points(link_rad_ + u, at);
+  const auto axes = static_cast<std::size_t>(u.size());
+  // A joint's origin moves by the joints before it alone.
+  const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m) {
+    const Vec3 way = to_W - from_W;
+    const double length = way.norm();
+    if (!(length > most_m)) return;
+    JointVector a(u.size());
+    for (Eigen::Index i = 0; i < a.size(); ++i) {
+      const Vec3 turning = model.at.J_W.col(i).tail<3>();
+      a[i] = way.dot(model.at.J_W.col(i).head<3>() + turning.cross(to_W - at.tool_W)) / length;
+    }
+    for (std::size_t j = joints; j < axes; ++j) a[arm_->drive_along_chain(j)] = 0.0;
+    add_row(a, a.dot(u) - (length - most_m), Limit::speed);
+  };
+  limit(was.tool_W, at.tool_W, axes, most_way_m(u, start_.tool_m_per_s));
+  const double elbow_m = most_way_m(u, start_.elbow_m_per_s);
+  for (std::size_t k = first_point; k < axes; ++k) limit(was.joint_W[k], at.joint_W[k], k, elbow_m);
+}
+
+void ArmStep::note_joint(std::size_t i, double sign, ActiveLimits& out) const noexcept {
+  const auto k = static_cast<Eigen::Index>(i);
+  const double at = sign > 0.0 ? box().high[k] : -box().low[k];
+  const auto bit = static_cast<std::uint8_t>(1u << i);
+  if (at >= joints_[i].per_step_rad) return out.set(Limit::joint_speed, bit);
+  if (at >= room_rad(i, sign)) return out.set(Limit::joint_range, bit);
+  out.set(Limit::joint_acceleration, bit);
+}
+
+ActiveLimits ArmStep::pressing() const noexcept {
+  ActiveLimits out;
+  for (std::size_t row = first_set_; row < program_.rows(); ++row) {
+    if (!(program_.multiplier(row) > 0.0)) continue;
+    if (joint_[row] >= 0) {
+      note_joint(static_cast<std::size_t>(joint_[row] / 2), joint_[row] % 2 == 0 ? 1.0 : -1.0, out);
+    } else {
+      out.set(kind_[row]);
+    }
+  }
+  return out;
+}
+
+// ---- the step
+
+ArmStep::Outcome ArmStep::go(const Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept {
+  if (!q_W.allFinite() || !R_WT.coeffs().allFinite()) return Outcome::invalid;
+  if (R_WT.coeffs() != start_.R_WT.coeffs()) aim(R_WT);
+  if (!asked_ || asked_W_ != q_W) static_cast<void>(contains(q_W));
+  if (solution_.status == models::InverseKinematicsResult::Status::invalid) return Outcome::invalid;
+  if (!allowed_) return go_limited(q_W);
+  lags_ = catches_up_;
+  accept(solution_.q);
+  return catches_up_ ? Outcome::lags : Outcome::reached;
+}
+
+// Newton's method on the place, each time by the program of the tool linearised where the last one ended.
+ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
+  if (!linearised_) start_model();
+  eased_ = true;
+  bool reached = false;
+  for (int round = 0; round < most_rounds; ++round) {
+    const Rows J_p = model_.at.J_W.topRows<3>();
+    const Vec3 wanted = x_W - model_.at.X_WT.translation() + J_p * model_.u;
+    reached = solve_at(model_, J_p, wanted);
+    if (!reached && eased_) {
+      eased_ = false;
+      reached = solve_at(model_, J_p, wanted);
+    }
+    if (!reached) solve_near(model_, J_p, wanted);
+    const JointVector u = program_.u().cwiseMax(box().low).cwiseMin(box().high);
+    const ActiveLimits limits = pressing();
+    if (leave_curved_sets(model_, u)) continue;
+    active_ = limits;
+    const double change = (u - model_.u).cwiseAbs().maxCoeff();
+    linearise(u, model_);
+    const Vec3 left = inverse_->space().projection() * (x_W - model_.at.X_WT.translation());
+    if (reached ? left.norm() <= place_tolerance_m : change <= rounding_rad) break;
+  }
+  lags_ = true;
+  solution_.kinematics = model_.at;
+  accept(link_rad_ + model_.u);
+  return reached ? Outcome::lags : Outcome::held;
+}
+
+void ArmStep::accept(const JointVector& link_rad) noexcept {
+  step_rad_ = link_rad - link_rad_;
+  link_rad_ = solution_.q = link_rad;
+}
+
+void ArmStep::archive(fieldbus::StateArchive& state) noexcept {
+  state(link_rad_, step_rad_, lags_, catching_rad_per_s_);
+  if (state.reading()) arm_->kinematics(link_rad_, solution_.kinematics);
+}
+
+}  // namespace proxarm::controller

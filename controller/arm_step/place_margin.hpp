@@ -1,0 +1,68 @@
+// How far the arm is from the poses in which its place is lost: stretched or folded (elbow), or with its wrist above
+// its first axis (shoulder).
+//
+//   σ(c) = the smallest singular value of J_w(c), in m/rad
+// J_w: the Jacobian of the wrist's place, by the joints that carry it. With the orientation held, T goes where the
+// wrist goes, so σ is what the slowest direction of the tool has of a joint's turn. The wrist is the origin of the last
+// joint but one, and the last three joints turn the tool about it. An arm with fewer than six axes has no such wrist:
+// there J_w is that of T in the directions in which T can go (tool_space.hpp).
+//
+// A wrist's own singularity doesn't show in σ: there, turning lags and the place is kept (arm_step.hpp).
+//
+// σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()), so far from the border it
+// isn't computed in every step. Neither allocates, locks nor throws after construction.
+#pragma once
+
+#include <array>
+
+#include "models/arm/arm.hpp"
+#include "models/arm/tool_space.hpp"
+
+namespace proxarm::controller {
+
+class PlaceMargin {
+ public:
+  // Precondition: `arm` outlives this object.
+  PlaceMargin(const models::Arm& arm, const models::ToolSpace& space);
+
+  // The least σ that a step may lead to: 0.05 m/rad (an elbow of the default cell 8° from straight, which is 4 mm of
+  // its reach), and half of σ at the start's pose where that is less.
+  [[nodiscard]] double least() const noexcept { return least_; }
+
+  // The links have gone on from the last angles that were told to c_rad. Precondition: `at` is the kinematics at c_rad.
+  void go_to(const models::JointVector& c_rad, const models::ToolKinematics& at) noexcept;
+  // Whether σ is near enough to its border that a step might matter; only then are the next two known.
+  [[nodiscard]] bool near() const noexcept { return near_; }
+  [[nodiscard]] double value() const noexcept { return value_; }
+  [[nodiscard]] const models::JointVector& gradient() const noexcept { return gradient_; }
+
+  // J_w, and the wrist's place. `at` is the kinematics at c_rad.
+  using Columns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, models::max_axes>;
+  struct Wrist {
+    Columns J_W;
+    models::Vec3 from_T_W;  // from T to the wrist
+  };
+  [[nodiscard]] Wrist wrist(const models::JointVector& c_rad, const models::ToolKinematics& at) const noexcept;
+
+ private:
+  struct Smallest {
+    double value;
+    models::Vec3 left;  // singular vectors
+    models::JointVector right;
+  };
+
+  [[nodiscard]] Smallest smallest(const Columns& J) const noexcept;
+  void measure(const models::JointVector& c_rad, const models::ToolKinematics& at) noexcept;
+
+  const models::Arm* arm_;
+  models::ToolSpace space_;
+  models::JointVector weights_;  // w
+  std::array<bool, models::max_axes> carries_{};
+  std::size_t wrist_ = 0;  // index of the joint whose origin is the wrist; axes(): T itself
+  double least_ = 0.0, near_below_ = 0.0;
+  models::JointVector from_rad_, gradient_;
+  double value_ = 0.0, clear_ = -1.0;
+  bool near_ = false;
+};
+
+}  // namespace proxarm::controller

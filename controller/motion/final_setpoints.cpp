@@ -1,0 +1,132 @@
+#include "controller/motion/final_setpoints.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "models/base/archive_fields.hpp"
+
+namespace proxarm::controller {
+
+using models::JointVector;
+
+FinalSetpoints::FinalSetpoints(const models::Arm& arm, const std::vector<description::DriveDescription>& drives,
+                               const description::CellLimits& limits, double period_s)
+    : drives_(drives),
+      limits_(limits),
+      period_s_(period_s),
+      guard_(drives_, period_s),
+      tool_guard_(arm, drives_, limits, period_s) {
+  state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
+  start(arm.start_rad());
+}
+
+void FinalSetpoints::set_period(double period_s) noexcept {
+  period_s_ = period_s;
+  guard_.set_period(period_s);
+  tool_guard_.set_period(period_s);
+}
+
+void FinalSetpoints::start(const JointVector& target_rad) noexcept {
+  guard_.start(target_rad);
+  tool_guard_.start(target_rad);
+  envelope_.start(target_rad);
+}
+
+FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const models::Vec3& links_W,
+                                            const Measured& measured, double max_speed_m_per_s) noexcept {
+  Result result;
+  JointVector wanted_rad = motor_rad;
+  result.blocked = find_blocked(motor_rad, measured, wanted_rad);
+  if (result.blocked != 0) result.limits.set(Limit::following_error, result.blocked);
+  result.limits.add(guard(wanted_rad, &links_W, max_speed_m_per_s, result.guarded));
+  if (result.blocked != 0) tool_guard_.relax();
+  follow(measured, result.blocked);
+  result.differs = result.guarded || result.blocked != 0 || guard_.lag_rad() > limits_.following_error_rad;
+  return result;
+}
+
+JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
+  guard_.follow_from_here(blocked);
+  return guard_.speed_rad_per_s();
+}
+
+ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const models::Vec3* links_W, double max_speed_m_per_s,
+                                   bool& held_back) noexcept {
+  ActiveLimits active = guard_.step(wanted_rad);
+  const ActiveLimits by_tool = tool_guard_.step(guard_.target_rad(), max_speed_m_per_s, links_W);
+  held_back = by_tool.kinds != 0;
+  if (!held_back) return active;
+  active.add(by_tool);
+  guard_.settle(tool_guard_.target_rad(), tool_guard_.speed_rad_per_s());
+  return active;
+}
+
+// The time is the longest that any joint needs at its own deceleration.
+void FinalSetpoints::start_run_out() noexcept {
+  double stop_s = period_s_;
+  for (Eigen::Index i = 0; i < guard_.speed_rad_per_s().size(); ++i) {
+    const double deceleration = drives_[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2;
+    stop_s = std::max(stop_s, std::abs(guard_.speed_rad_per_s()[i]) / deceleration);
+  }
+  guard_.follow_from_here();
+  state_ = {guard_.speed_rad_per_s(), 1.0, period_s_ / stop_s};
+}
+
+ActiveLimits FinalSetpoints::run_out() noexcept {
+  state_.run_out_share = std::max(0.0, state_.run_out_share - state_.run_out_per_cycle);
+  bool held_back = false;
+  return guard(guard_.target_rad() + state_.run_out_share * period_s_ * state_.run_out_rad_per_s, nullptr,
+               limits_.max_tool_speed_m_per_s, held_back);
+}
+
+// Returns the joints whose drives are blocked, as bits. A blocked drive is commanded at most a little ahead of its
+// reported position, and all other joints wait. The gears are thus wound up so little that nothing snaps when the drive
+// comes free. The room around the report grows with speed, because a drive that follows its setpoint reports it with a
+// lag: the setpoint on its way to the drive, and the answer on its way back.
+//
+// A false report must not lead the setpoint anywhere. Let θ be the report, r the room around it, w the wanted setpoint
+// and [l, h] the envelope of the setpoints sent before the joint was blocked (setpoint_envelope.hpp). The command is
+//     c = clamp(clamp(w, θ − r, θ + r), min(l, w), max(h, w))
+// If the joint has jammed, θ is between l and h, so c = θ ± r: the setpoint brakes and comes back to the joint. If θ is
+// outside, the encoder or the drive reports a false position, and c is w or a place to which the joint was sent before.
+// If nobody is at the handle, proxy and filter go on from the last setpoint, which is therefore w; so l = h = w = c
+// stays constant, whatever θ does. If somebody is, c goes no further than w, which the hand has made. No sequence of
+// reports therefore moves the arm by more than it has moved within the lag, and without a hand none moves it at all.
+std::uint8_t FinalSetpoints::find_blocked(const JointVector& motor_rad, const Measured& measured,
+                                          JointVector& wanted_rad) const noexcept {
+  std::uint8_t blocked = 0;
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    const auto bit = static_cast<std::uint8_t>(1u << i);
+    if ((measured.fresh & bit) == 0) continue;
+    const double lag_s =
+        following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.feedback_period_s[i]);
+    const double room_rad = limits_.following_error_rad + lag_s / period_s_ * std::abs(measured.moved_rad[i]);
+    const double actual_rad = measured.motor_rad[i];
+    if (std::abs(motor_rad[i] - actual_rad) <= room_rad) continue;
+    blocked |= bit;
+    wanted_rad[i] =
+        std::clamp(std::clamp(motor_rad[i], actual_rad - room_rad, actual_rad + room_rad),
+                   std::min(envelope_.low_rad(i), motor_rad[i]), std::max(envelope_.high_rad(i), motor_rad[i]));
+  }
+  if (blocked == 0) return 0;
+  for (Eigen::Index i = 0; i < motor_rad.size(); ++i) {
+    if ((blocked & 1u << i) == 0) wanted_rad[i] = guard_.target_rad()[i];
+  }
+  return blocked;
+}
+
+// The envelope of a blocked joint isn't updated.
+void FinalSetpoints::follow(const Measured& measured, std::uint8_t blocked) noexcept {
+  for (Eigen::Index i = 0; i < measured.axes(); ++i) {
+    if ((blocked & 1u << i) != 0) continue;
+    envelope_.step(i, guard_.target_rad()[i], period_s_,
+                   following_lag_s(drives_[static_cast<std::size_t>(i)], period_s_, measured.feedback_period_s[i]));
+  }
+}
+
+void FinalSetpoints::archive(fieldbus::StateArchive& state) noexcept {
+  state(guard_, tool_guard_, envelope_);
+  archive_fields(state, state_);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,38 @@
+// Where a step may turn the tool: its speed, the angle from the orientation at the start, and tilt and twist of an
+// axis.
+//
+// A set of angles is reached as a brake reaches a wall, in `brakes_s`, since joints can't stop at once. An orientation
+// beyond a set is led back at `returning_rad_per_s`, not within a step.
+#pragma once
+
+#include "controller/proxies/axis_range.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+struct TurnSets {
+  static constexpr double braking_s = 0.1;            // J/D with the default inertia and damping
+  static constexpr double returning_rad_per_s = 0.1;  // slowly enough to be led by hand
+
+  Eigen::Quaterniond home = Eigen::Quaterniond::Identity();  // the orientation at the start
+  double max_turn_rad = 0.7;                                 // from there, 0 to 3
+  AxisRange axis_range{};
+  double max_speed_rad_per_s = 2.0;
+  double period_s = 1e-3;
+  double brakes_s = braking_s;
+
+  // Results of keep(): which sets held the step back.
+  struct Held {
+    bool speed = false, angle = false;
+    [[nodiscard]] bool any() const noexcept { return speed || angle; }
+  };
+  // Brings the orientation `to` of a step from `from` into the sets: the nearest orientation about the same axis. An
+  // orientation within them isn't changed. Precondition: both are unit.
+  Held keep(const Eigen::Quaterniond& from, Eigen::Quaterniond& to) const noexcept;
+
+  // How far from the start the next step may lead, from `angle_rad` away.
+  [[nodiscard]] static double reachable_rad(double angle_rad, double most_rad, double period_s,
+                                            double brakes_s = braking_s) noexcept;
+};
+
+}  // namespace proxarm::controller

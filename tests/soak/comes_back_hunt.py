@@ -1,0 +1,204 @@
+#!/usr/bin/python3
+"""Random hands that lead the tool out and back, mostly further than the arm reaches: does it come back, and never go
+against the hand?
+
+    PROXARM_PROGRAM=build/release/controller/proxarm tests/soak/comes_back_hunt.py --sessions 10000 --seed 1
+
+Judged by the records alone, with what a person holding the handle would notice:
+  comes back         1 s after the hand's way has ended at the start, the steel is within 1 mm of it, beside what the
+                     hand's spring leaves under the force that the hand feels
+  never against it   the hand's work and the change of the proxy's kinetic energy, over any time from the start on, never
+                     fall below −1 mJ − 0.1 % of the work done, but for what the loop's delay L gives: M L ∫|a|² dt
+  nothing else       no fault, and nothing that the last guard held back
+Sessions whose mass isn't stable with their hand, at the start or where it leads to, aren't judged. Nor is where the tool
+ends, if a joint is at the end of its range then: the straight way back may lead through the arm's base. Status 1, and the
+session's files in `--keep DIR`, where it isn't so.
+"""
+import argparse
+import csv
+import json
+import math
+import os
+import pathlib
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+CELLS = ("default", "cobot", "seven", "rail", "scara", "gantry", "linear")
+NEAR_M = 1e-3
+LEAST_J, SHARE = 1e-3, 1e-3
+
+
+def log_uniform(chance, low, high):
+    return math.exp(chance.uniform(math.log(low), math.log(high)))
+
+
+def direction(chance):
+    way = [chance.gauss(0, 1) for _ in range(3)]
+    return [x / math.hypot(*way) for x in way]
+
+
+def made_hand(chance):
+    """The text of a hand, and when its way has ended."""
+    stiffness, most_N = log_uniform(chance, 100, 3000), log_uniform(chance, 5, 150)
+    way = direction(chance)
+    reach = min(1.5, 0.3 + log_uniform(chance, 0.05, 1.2))
+    # Slower than the tool's limit of 0.5 m/s.
+    out_s, stay_s, back_s = (reach / chance.uniform(0.1, 0.4), chance.uniform(0.0, 1.5),
+                             reach / chance.uniform(0.1, 0.35))
+    points = [(0.5, 0.0), (0.5 + out_s, 1.0), (0.5 + out_s + stay_s, 1.0), (0.5 + out_s + stay_s + back_s, 0.0)]
+    lines = ["name: out and back", f"mass_kg: {chance.uniform(0.3, 1.5):.3g}", f"stiffness_N_per_m: {stiffness:.4g}",
+             f"damping_Ns_per_m: {2 * math.sqrt(stiffness) * chance.uniform(0.6, 1.2) * 2:.4g}", f"max_force_N: {most_N:.4g}",
+             "waypoints:"]
+    aside = direction(chance)
+    for time_s, share in points:
+        bent = 0.05 * math.sin(math.pi * share) if 0 < share < 1 else (0.1 if share == 1.0 else 0.0)
+        at = [share * reach * x + bent * y for x, y in zip(way, aside)]
+        lines.append(f"  - {{time_s: {time_s:.4g}, offset_m: [{', '.join(f'{x:.5g}' for x in at)}]}}")
+    return "\n".join(lines) + "\n", points[-1][0], most_N
+
+
+def made_arguments(chance, cell, most_N):
+    arguments = ["--timestep", f"{chance.choice((1, 1, 2, 4))}ms", "--mass", f"{log_uniform(chance, 4, max(4.1, min(20, most_N / 2))):.4g}"]  # led by 2 m/s² at least
+    if cell in ("default", "cobot", "seven"):
+        arguments += ["--orientation", chance.choice(("held", "held", "free"))]
+    if chance.random() < 0.4:
+        arguments += ["--lookahead", "auto"]
+    return arguments
+
+
+def delay_s(cell, period_s):
+    """Of the loop: the setpoints' filter, 2/omega, and four cycles of bus, sensor and drives."""
+    for line in (SOURCE / f"models/cells/{cell}.yaml").read_text().splitlines():
+        if line.strip().startswith("setpoint_bandwidth_Hz:"):
+            return 1.0 / (math.pi * float(line.split(":")[1].split("#")[0])) + 4 * period_s
+    return 1.0 / (math.pi * 25.0) + 4 * period_s
+
+
+def column_of(header):
+    return {name: i for i, name in enumerate(header)}
+
+
+class Record:
+    def __init__(self, file):
+        with open(file, newline="") as text:
+            rows = csv.reader(text)
+            at = column_of(next(rows))
+            self.time, self.proxy, self.steel, self.hand, self.flags = [], [], [], [], []
+            for row in rows:
+                if row[at["phase"]] != "rendering":
+                    continue
+                three = lambda name, unit: tuple(float(row[at[f"{name}_W_{x}_{unit}"]]) for x in "xyz")
+                self.time.append(float(row[at["time_s"]]))
+                self.proxy.append(three("proxy", "m"))
+                self.steel.append(three("true_tool", "m"))
+                self.hand.append(three("hand_force", "N"))
+                self.flags.append(row[at["flags"]])
+
+
+def minus(a, b):
+    return [x - y for x, y in zip(a, b)]
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def against_the_hand(record, mass_kg, delay_s):
+    """By how many joules the hand was led beyond what is allowed, at most."""
+    work = done = ripple = 0.0
+    worst = 0.0
+    for k in range(2, len(record.time)):
+        T = record.time[k] - record.time[k - 1]
+        moved = minus(record.steel[k], record.steel[k - 1])
+        step = dot([0.5 * (x + y) for x, y in zip(record.hand[k], record.hand[k - 1])], moved)
+        work += step
+        done += abs(step)
+        v, v1 = ([x / T for x in minus(record.steel[j], record.steel[j - 1])] for j in (k, k - 1))
+        a = [x / T for x in minus(v, v1)]
+        ripple += mass_kg * delay_s * dot(a, a) * T
+        kinetic = 0.5 * mass_kg * dot(v, v)
+        worst = max(worst, -(work - kinetic) - LEAST_J - SHARE * done - ripple)
+    return worst
+
+
+def session(seed, folder, keep):
+    chance = random.Random(seed)
+    folder.mkdir()
+    cell = chance.choice(CELLS)
+    hand, ended_s, most_N = made_hand(chance)
+    (folder / "hand.yaml").write_text(hand)
+    arguments = made_arguments(chance, cell, most_N)
+    command = [os.environ["PROXARM_PROGRAM"], "run", str(SOURCE / f"models/cells/{cell}.yaml"), "--scene",
+               str(SOURCE / "scenes/free.yaml"), "--hand", str(folder / "hand.yaml"), *arguments, "--duration",
+               f"{ended_s + 1.2:.4g}s", "--no-plot", "--json", "--record", str(folder / "record")]
+    (folder / "command").write_text(" ".join(command) + "\n")
+    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    if "isn't stable with this hand" in done.stderr:
+        return {"refused": "not stable where it is led"}
+    if done.returncode == 2:
+        return {"refused": done.stderr.strip().splitlines()[-1][:120] if done.stderr.strip() else "no reason"}
+    summary = json.loads(done.stdout)
+    record = Record(folder / "record/signals.csv")
+    wrong = [fault["fault"] for fault in summary["faults"]]
+    figures = {"cell": cell}
+    if not wrong:
+        stiffness = float(hand.split("stiffness_N_per_m: ")[1].split()[0])
+        start = record.steel[0]
+        off = math.hypot(*minus(record.steel[-1], start))
+        figures["off mm"] = 1e3 * max(0.0, off - math.hypot(*record.hand[-1]) / stiffness)
+        figures["against mJ"] = 1e3 * against_the_hand(record, float(arguments[3]), delay_s(cell, float(arguments[1][:-2]) / 1e3))
+        figures["far m"] = max(math.hypot(*minus(x, start)) for x in record.steel)
+        figures["cornered"] = any("limit_joint" in flags.split("|") for flags in record.flags[-100:])
+        if figures["off mm"] > 1e3 * NEAR_M and not figures["cornered"]:
+            wrong.append(f"{figures['off mm']:.3g} mm off")
+        if figures["against mJ"] > 0.0 and not summary["oscillation"]["lasts"]:
+            wrong.append(f"{figures['against mJ']:.3g} mJ against the hand")
+        guarded = sorted({str(limit["limit"]) for limit in summary["limits"] if "guard" in str(limit["limit"])})
+        if guarded:
+            wrong.append(", ".join(guarded))
+        if summary["oscillation"]["lasts"]:
+            figures["oscillates"] = 1.0
+    figures["wrong"] = wrong
+    if wrong and keep:
+        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
+    return figures
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sessions", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", type=pathlib.Path)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
+        def run(n):
+            folder = pathlib.Path(scratch) / str(n)
+            try:
+                return n, session(f"{options.seed}/{n}", folder, options.keep)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+        results = list(pool.map(run, range(options.sessions)))
+    refused = [r for _, r in results if "refused" in r]
+    ran = [(n, r) for n, r in results if "refused" not in r]
+    wrong = [(n, r) for n, r in ran if r["wrong"]]
+    print(f"{len(ran)} sessions, {len(refused)} refused (a mass that isn't stable with that hand)")
+    for what in ("off mm", "against mJ", "far m"):
+        values = sorted((r[what], n) for n, r in ran if what in r)
+        if values:
+            print(f"  {what:12s} median {values[len(values) // 2][0]:.4g}, most {values[-1][0]:.4g} in session {values[-1][1]}")
+    print(f"  oscillating for long: {sum(1 for _, r in ran if r.get('oscillates'))}; at the end of a joint's range at last: "
+          f"{sum(1 for _, r in ran if r.get('cornered'))}")
+    print(f"something was wrong in {len(wrong)} sessions")
+    for n, r in wrong[:40]:
+        print(f"  {n} ({r['cell']}): {'; '.join(r['wrong'])}")
+    return 1 if wrong or not ran else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
