@@ -1,6 +1,5 @@
 #include "controller/stability/elastic_loop.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "models/arm/inverse_kinematics.hpp"
 #include "models/arm/tool_space.hpp"
 #include "models/geometry/eigenvalues.hpp"
+#include "models/geometry/large_matrices.hpp"
 
 namespace proxarm::controller {
 namespace {
@@ -19,6 +19,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using models::product;
+using models::transposed_product;
 using Place = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 6, 1>;  // in the tool's space
 
 // exp(A) by scaling and squaring: Taylor's series of A/2ˢ, whose norm is below 1/2 so that 18 terms leave 1e-22,
@@ -29,10 +31,10 @@ MatrixXd exponential(MatrixXd A) {
   A /= std::exp2(squarings);
   MatrixXd term = MatrixXd::Identity(A.rows(), A.rows()), sum = term;
   for (int n = 1; n <= 18; ++n) {
-    term = (term * A / n).eval();
+    term = product(term, A) / n;
     sum += term;
   }
-  for (int i = 0; i < squarings; ++i) sum = (sum * sum).eval();
+  for (int i = 0; i < squarings; ++i) sum = product(sum, sum);
   return sum;
 }
 
@@ -114,7 +116,7 @@ ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector
   models::ToolKinematics kinematics;
   arm.kinematics(pose_rad, kinematics);
   const MatrixXd moved = kinematics.J_W.topRows<3>();
-  out.mass += hand_mass_kg * moved.transpose() * moved;
+  out.mass += hand_mass_kg * transposed_product(moved, moved);
   out.jacobian = kinematics.J_W.bottomRows<3>();
   out.joints_per_m = models::joints_per_rad(kinematics.J_W);
   return out;
@@ -247,20 +249,20 @@ ElasticLoop::ElasticLoop(const ElasticArm& arm, const Grip& grip, const LoopMode
   // A quotient of decimal numbers, hence the 1e-9. Besides the newest force: one older for the interpolation, and two
   // for Störmer's correction at order 2.
   ages_ = static_cast<Index>(std::floor(force_age_periods_ + 1e-9)) + (order_ == 2 ? 3 : 2);
-  twist_ = arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass * arm_.joints_per_m;
+  twist_ = product(arm_.stiffness.cwiseInverse().asDiagonal() * arm_.mass, arm_.joints_per_m);
   make_plant(grip, loop.gear_stiffness_ratio);
   // h = −K_h Jφ − D_h Jφ̇ − (m_h + m_t) Jφ̈, with φ̈ the plant's second block of rows.
   const MatrixXd& J = arm_.jacobian;
-  force_ = -(grip.hand_mass + grip.handle_mass) * J * force_;
-  force_.leftCols(joints_) -= grip.stiffness * J;
-  force_.middleCols(joints_, joints_) -= grip.damping * J;
+  force_ = product(product(-(grip.hand_mass + grip.handle_mass), J), force_);
+  force_.leftCols(joints_) -= product(grip.stiffness, J);
+  force_.middleCols(joints_, joints_) -= product(grip.damping, J);
 }
 
 // ż = A z for z = [φ, φ̇, θ, r, ṙ, δ, δ̇, ∫δ, θ̇, f, ḟ] with ṙ and ḟ constant. Leaves the rows of φ̈ in force_.
 void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   const Index n = joints_;
   const MatrixXd& J = arm_.jacobian;
-  const MatrixXd mass = arm_.mass + J.transpose() * grip.hand_mass * J;
+  const MatrixXd mass = arm_.mass + product(transposed_product(J, grip.hand_mass), J);
   MatrixXd k = (gear_stiffness_ratio * arm_.stiffness).asDiagonal(), d = arm_.damping.asDiagonal();
   const Index states = plant_size();
   MatrixXd A = MatrixXd::Zero(states, states);
@@ -289,7 +291,7 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
   gear.leftCols(n) = -k;
   gear.middleCols(n, n) = -d;
   gear.middleCols(2 * n, n) = k;
-  gear += d * A.middleRows(2 * n, n);
+  gear += product(d, A.middleRows(2 * n, n));
   if (drives_ > 0) {
     gear.middleCols(5 * n, n) = k;
     gear.middleCols(6 * n, n) = d;
@@ -303,9 +305,9 @@ void ElasticLoop::make_plant(const Grip& grip, double gear_stiffness_ratio) {
     A.middleRows(6 * n, n) -= rotor.asDiagonal() * gear;
   }
   MatrixXd torque = gear;
-  torque.leftCols(n) -= J.transpose() * grip.stiffness * J;
-  torque.middleCols(n, n) -= J.transpose() * grip.damping * J;
-  A.middleRows(n, n) = mass.llt().solve(torque);
+  torque.leftCols(n) -= product(transposed_product(J, grip.stiffness), J);
+  torque.middleCols(n, n) -= product(transposed_product(J, grip.damping), J);
+  A.middleRows(n, n) = models::solve_positive_definite(mass, torque);
   force_ = A.middleRows(n, n);
   plant_ = exponential(A * period_s_);
 }
@@ -317,13 +319,14 @@ ElasticLoop::Step ElasticLoop::step_of(const ProxyMatrices& proxy, const MatrixX
   const auto coefficient = [&](std::size_t i) -> MatrixXd {
     return A.mass[i] * proxy.mass + A.damping[i] * T * proxy.damping + A.spring[i] * T * T * proxy.spring;
   };
-  MatrixXd X = coefficient(0).inverse();
+  MatrixXd X = models::inverse(coefficient(0));
   if (N.cols() > 0) {
-    const MatrixXd along = X * N;
-    X -= along * (N.transpose() * along).inverse() * along.transpose();
+    const MatrixXd along = product(X, N);
+    X -= product(product(along, models::inverse(transposed_product(N, along))), along.transpose());
   }
   Step step{.of_force = T * T * X, .of_proxies = {}};
-  for (Index i = 1; i <= proxies_; ++i) step.of_proxies.emplace_back(-X * coefficient(static_cast<std::size_t>(i)));
+  for (Index i = 1; i <= proxies_; ++i)
+    step.of_proxies.emplace_back(-product(X, coefficient(static_cast<std::size_t>(i))));
   return step;
 }
 

@@ -80,6 +80,14 @@ Bounds bounds_of(const RigidObject& object) {
 
 }  // namespace
 
+RigidWorld::RigidWorld(const RigidWorld&) = default;
+RigidWorld& RigidWorld::operator=(const RigidWorld&) noexcept = default;
+RigidWorld::~RigidWorld() = default;
+
+std::unique_ptr<PoseAlgorithm> RigidWorld::clone() const { return std::make_unique<RigidWorld>(*this); }
+
+void RigidWorld::copy_state(const PoseAlgorithm& other) noexcept { *this = dynamic_cast<const RigidWorld&>(other); }
+
 RigidWorld::RigidWorld(const Tool& tool, std::vector<RigidObject> objects) {
   auto shared = std::make_shared<Shared>();
   shared->thinness = std::numeric_limits<double>::infinity();

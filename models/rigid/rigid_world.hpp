@@ -64,11 +64,12 @@ class RigidWorld final : public PoseAlgorithm {
   // holds another one, more than their distance.
   [[nodiscard]] double clearance_m(const ToolPose& pose) const noexcept override;
   [[nodiscard]] double clearance_at_m(const ToolPose& pose, double time_s) const noexcept override;
-  [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override { return std::make_unique<RigidWorld>(*this); }
-  void copy_state(const PoseAlgorithm& other) noexcept override { *this = dynamic_cast<const RigidWorld&>(other); }
+  [[nodiscard]] std::unique_ptr<PoseAlgorithm> clone() const override;
+  void copy_state(const PoseAlgorithm& other) noexcept override;
 
-  RigidWorld(const RigidWorld&) = default;
-  RigidWorld& operator=(const RigidWorld&) noexcept = default;
+  RigidWorld(const RigidWorld&);
+  RigidWorld& operator=(const RigidWorld&) noexcept;
+  ~RigidWorld() override;
 
  private:
   enum class Kind : std::uint8_t {

@@ -24,7 +24,7 @@ bool has_cylinder(const std::vector<models::ToolPart>& parts) {
 
 Pose at(const Vec3& place, const Vec3& axis) {
   Pose X = Pose::Identity();
-  X.linear() = models::Quaternion::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix();
+  X.linear() = models::rotation_from_z(axis).toRotationMatrix();
   X.translation() = place;
   return X;
 }

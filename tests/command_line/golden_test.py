@@ -67,9 +67,10 @@ class GoldenSetpoints(harness.ProgramTest):
     def test_every_session_sends_the_setpoints_that_it_always_sent(self):
         golden = json.loads(FILE.read_text())
         self.assertEqual(sorted(golden), sorted(SESSIONS), "sessions and their golden list differ")
-        for name, arguments in SESSIONS.items():
+        chosen = os.environ.get("PROXARM_GOLDEN")  # where sanitizers slow all down: some of them, "default|seven axes"
+        for name in chosen.split("|") if chosen else SESSIONS:
             with self.subTest(name):
-                self.assertEqual(self.digest(arguments), golden[name])
+                self.assertEqual(self.digest(SESSIONS[name]), golden[name])
 
 
 def write():

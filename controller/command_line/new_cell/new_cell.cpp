@@ -24,6 +24,7 @@
 #include "models/base/text.hpp"
 #include "models/description/hand.hpp"
 #include "models/description/sensor.hpp"
+#include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -170,8 +171,7 @@ class NewCell {
 
   void aim_sensor() {
     const models::Arm arm(cell_);
-    const models::Mat3 R =
-        Eigen::Quaterniond::FromTwoVectors(models::Vec3::UnitZ(), outwards_in_sensor(arm)).toRotationMatrix();
+    const models::Mat3 R = models::rotation_from_z(outwards_in_sensor(arm)).toRotationMatrix();
     const models::Vec3 ypr = R.eulerAngles(2, 1, 0);
     const auto rounded = [](double x) { return std::round(1e6 * x) / 1e6 + 0.0; };
     cell_.sensor.pose_link.rpy_rad = {rounded(ypr[2]), rounded(ypr[1]), rounded(ypr[0])};

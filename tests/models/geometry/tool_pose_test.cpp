@@ -39,6 +39,30 @@ TEST(ToolPose, HalfATurnIsFoundFromEitherQuaternion) {
   EXPECT_NEAR(rotation_vector(Quaternion(-half.coeffs())).norm(), std::numbers::pi, 1e-15);
 }
 
+TEST(ToolPose, TurnsUnitZIntoADirectionAsEigenDoes) {
+  Random random(2);
+  for (int i = 0; i < 10'000; ++i) {
+    const Vec3 to(random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0));
+    ASSERT_EQ(rotation_from_z(to).coeffs(), Quaternion::FromTwoVectors(Vec3::UnitZ(), to).coeffs());
+  }
+  for (const double sign : {1.0, -1.0}) {
+    const Vec3 to = sign * 0.3 * Vec3::UnitZ();
+    EXPECT_EQ(rotation_from_z(to).coeffs(), Quaternion::FromTwoVectors(Vec3::UnitZ(), to).coeffs());
+  }
+}
+
+TEST(ToolPose, TurnsUnitZIntoNearlyItsOpposite) {
+  Random random(3);
+  for (int i = 0; i < 10'000; ++i) {
+    const double near = std::pow(10.0, random.uniform(-20.0, -6.0));
+    const Vec3 to = Vec3(near * random.uniform(-1.0, 1.0), near * random.uniform(-1.0, 1.0), -1.0).normalized();
+    const Quaternion turn = rotation_from_z(to);
+    EXPECT_NEAR(turn.norm(), 1.0, 1e-15);
+    // c is rounded three times by up to 5.6e-17: w² = (1 + c)/2 by 8.3e-17, w by 9.1e-9, the direction by twice that.
+    EXPECT_LE((turn * Vec3::UnitZ() - to).norm(), 1.9e-8) << to.transpose();
+  }
+}
+
 TEST(FreePose, GoesWhereItIsSent) {
   FreePose g;
   const ToolPose p = moved({}, Twist::Constant(0.3));
