@@ -17,7 +17,7 @@ namespace {
 // The share of a joint's speed that the proxy's step may use; the rest is for the gears' twist.
 constexpr double speed_share = 0.95;
 // The share of a joint's acceleration, behind the filter, that the step may use, and of that of braking, likewise.
-constexpr double acceleration_share = 0.9, braking_share = 0.5;
+constexpr double acceleration_share = 1.0, braking_share = 0.5, eased_share = 0.9;
 // The share of the elbow's speed limit; gears add some 7 % where a hand pulls the arm along at the limit.
 constexpr double elbow_share = 0.9;
 // The cost of a joint's step beside that of turning, as (joint speed / its limit)² of (rad/s)²: damps turning where the
@@ -39,6 +39,8 @@ constexpr double approach_s = 0.1;
 constexpr double catching_s = 0.1, catching_rad_per_s2 = 5.0, catching_share = 0.25;
 // A lag that is caught up in one step: 1 µm at a metre.
 constexpr double caught_up_rad = 1e-6;
+// How the change of a joint's step that is tried grows, and from where on it is U's whole box.
+constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
 constexpr int most_rounds = 8;
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
@@ -95,7 +97,7 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   aim(start.R_WT);
   margin_.go_to(link_rad_, from_);
   make_boxes(start);
-  eased_ = lags_;
+  use_box(lags_ || !start_.held ? first_ease : whole_box);
 }
 
 // A held orientation that lags is caught up as a brake reaches a wall, and no faster at once than joints take it up.
@@ -134,7 +136,7 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
   brakes_s_ = std::max(approach_s, cycles * T);
   start_.turn.brakes_s = brakes_s_;
   brakes_ = cycles > 1.0 ? JointVector((1.0 - 1.0 / cycles) * step_rad_) : JointVector::Zero(step_rad_.size());
-  box_ = ease_ = {brakes_, brakes_};
+  whole_ = box_ = {brakes_, brakes_};
   for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Joint& joint = joints_[k];
@@ -143,11 +145,26 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
     const double coasts = start.coasting_rad[i] - link_rad_[i];
     const double change = acceleration_share * joint.acceleration_rad_per_s2 * start.input_s2;
     brakes_[i] = std::clamp(brakes_[i], low, high);
-    box_.low[i] = std::clamp(coasts - change, low, brakes_[i]);
-    box_.high[i] = std::clamp(coasts + change, brakes_[i], high);
-    const double eased = braking_share * joint.acceleration_rad_per_s2 * T * T;
-    ease_.low[i] = std::clamp(step_rad_[i] - eased, box_.low[i], brakes_[i]);
-    ease_.high[i] = std::clamp(step_rad_[i] + eased, brakes_[i], box_.high[i]);
+    whole_.low[i] = std::clamp(coasts - change, low, brakes_[i]);
+    whole_.high[i] = std::clamp(coasts + change, brakes_[i], high);
+  }
+}
+
+// The part of the box in which no joint's step changes by more than `ease` times half of its acceleration.
+void ArmStep::use_box(double ease) noexcept {
+  ease_ = ease;
+  if (!(ease < whole_box)) {
+    box_ = whole_;
+    return;
+  }
+  for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
+    const double a = joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
+    const double change = ease * braking_share * a * period_s_ * period_s_;
+    const double coasts = start_.coasting_rad[i] - link_rad_[i], filtered = eased_share * a * start_.input_s2;
+    const double low = std::max(step_rad_[i] - change, coasts - filtered);
+    const double high = std::min(step_rad_[i] + change, coasts + filtered);
+    box_.low[i] = std::clamp(low, whole_.low[i], brakes_[i]);
+    box_.high[i] = std::clamp(high, brakes_[i], whole_.high[i]);
   }
 }
 
@@ -162,7 +179,7 @@ double ArmStep::place_bound() const noexcept {
 }
 
 bool ArmStep::allows(const JointVector& u) const noexcept {
-  if (!box().contains(u)) return false;
+  if (!box_.contains(u)) return false;
   if (margin_.near() && -margin_.gradient().dot(u) > place_bound() + rounding_rad) return false;
   return !points_too_fast(u);
 }
@@ -206,7 +223,7 @@ bool ArmStep::contains(const Vec3& q_W) noexcept {
   X_WT.translation() = q_W;
   X_WT.linear() = aim_.toRotationMatrix();
   if (asked_) solution_.kinematics = from_;
-  eased_ = lags_;
+  use_box(lags_ || !start_.held ? first_ease : whole_box);
   inverse_->solve(link_rad_, X_WT, solution_);
   asked_W_ = q_W;
   asked_ = true;
@@ -216,7 +233,7 @@ bool ArmStep::contains(const Vec3& q_W) noexcept {
 
 bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexcept {
   if (!linearised_) start_model();
-  eased_ = false;
+  use_box(whole_box);
   // J_w u = `wanted` carries the wrist to where the tool at q_W has it.
   const Vec3 here_W = model_.at.X_WT.translation() + wrist_.from_T_W;
   const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
@@ -288,10 +305,10 @@ void ArmStep::add_sets() noexcept {
     JointVector a = JointVector::Zero(brakes_.size());
     a[i] = 1.0;
     std::size_t row = program_.rows();
-    program_.at_most(a, box().high[i]);
+    program_.at_most(a, box_.high[i]);
     tell(row, Limit::joint_range, static_cast<int>(2 * i));
     row = program_.rows();
-    program_.at_most(-a, -box().low[i]);
+    program_.at_most(-a, -box_.low[i]);
     tell(row, Limit::joint_range, static_cast<int>(2 * i + 1));
   }
   if (margin_.near()) {
@@ -382,7 +399,7 @@ void ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
 
 void ArmStep::note_joint(std::size_t i, double sign, ActiveLimits& out) const noexcept {
   const auto k = static_cast<Eigen::Index>(i);
-  const double at = sign > 0.0 ? box().high[k] : -box().low[k];
+  const double at = sign > 0.0 ? box_.high[k] : -box_.low[k];
   const auto bit = static_cast<std::uint8_t>(1u << i);
   if (at >= joints_[i].per_step_rad) return out.set(Limit::joint_speed, bit);
   if (at >= room_rad(i, sign)) return out.set(Limit::joint_range, bit);
@@ -418,18 +435,18 @@ ArmStep::Outcome ArmStep::go(const Vec3& q_W, const Eigen::Quaterniond& R_WT) no
 // Newton's method on the place, each time by the program of the tool linearised where the last one ended.
 ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
   if (!linearised_) start_model();
-  eased_ = true;
+  use_box(first_ease);
   bool reached = false;
   for (int round = 0; round < most_rounds; ++round) {
     const Rows J_p = model_.at.J_W.topRows<3>();
     const Vec3 wanted = x_W - model_.at.X_WT.translation() + J_p * model_.u;
     reached = solve_at(model_, J_p, wanted);
-    if (!reached && eased_) {
-      eased_ = false;
+    while (!reached && ease_ < whole_box) {
+      use_box(ease_ * next_ease);
       reached = solve_at(model_, J_p, wanted);
     }
     if (!reached) solve_near(model_, J_p, wanted);
-    const JointVector u = program_.u().cwiseMax(box().low).cwiseMin(box().high);
+    const JointVector u = program_.u().cwiseMax(box_.low).cwiseMin(box_.high);
     const ActiveLimits limits = pressing();
     if (leave_curved_sets(model_, u)) continue;
     active_ = limits;

@@ -117,7 +117,7 @@ class ArmStep final : public FollowableStep {
   [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
   [[nodiscard]] double place_bound() const noexcept;
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
-  [[nodiscard]] const Box& box() const noexcept { return eased_ ? ease_ : box_; }
+  void use_box(double ease) noexcept;
   [[nodiscard]] double most_way_m(const models::JointVector& u, double limit_m_per_s) const noexcept;
   [[nodiscard]] bool points_too_fast(const models::JointVector& u) const noexcept;
   void limit_points(const Model& model, const models::JointVector& u) noexcept;
@@ -155,8 +155,8 @@ class ArmStep final : public FollowableStep {
   ArmStepStart start_;
   models::JointVector brakes_;   // u_b
   double brakes_s_ = 0.0;        // in which the borders of curved sets are approached
-  Box box_, ease_;               // U's, and the part of it that joints take up without a jump of their setpoints
-  bool eased_ = false;           // the latter is used
+  Box whole_, box_;   // U's, and the part of it that is used
+  double ease_ = 0.0;  // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)
   models::InverseKinematicsResult solution_;  // of the pose last asked for; after the step, of where it led
   models::Vec3 asked_W_ = models::Vec3::Zero();

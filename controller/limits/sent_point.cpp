@@ -11,6 +11,10 @@ using models::Vec3;
 namespace {
 
 constexpr double tolerance_m = 1e-11;  // 10 nm/s at 1 kHz, as in limited_algorithm.hpp
+// Limits after which c follows p as fast as they allow: those that bound its own motion, and not where it may go.
+constexpr auto catches_up =
+    static_cast<std::uint16_t>(static_cast<unsigned>(Limit::speed) | static_cast<unsigned>(Limit::acceleration) |
+                               static_cast<unsigned>(Limit::power) | static_cast<unsigned>(Limit::leash));
 constexpr int most_sweeps = 300;       // of Dykstra's algorithm, if the sets have hardly a point in common
 
 }  // namespace
@@ -71,7 +75,7 @@ void SentPoint::step(const Vec3& q_W, const Vec3& predicted_W, const StepLimits&
     }
     active_ = nearest.active;
     way = sets_.contains(nearest.x, 1e-9, false) ? nearest.x : sets_.draw_back(nearest.x, false);
-    state_.beside_W = state_.c_k1_W + way - predicted_W;
+    if ((active_.kinds & catches_up) != active_.kinds) state_.beside_W = state_.c_k1_W + way - predicted_W;
   }
   state_.c_k2_W = state_.c_k1_W;
   state_.c_k1_W += way;

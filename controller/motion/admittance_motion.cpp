@@ -72,6 +72,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
                                               ArmStep(arm, parts_.inverse, drives, settings.period_s),
                                               LinkFilter(limits.setpoint_bandwidth_Hz, settings.period_s),
                                               {}});
+    ahead_->proxy_filter.start(arm.start_rad());
   }
   if (settings.passivity != Passivity::off) {
     passivity_.emplace(PassivityConfig{.force_age_s = settings.force_age_s}, settings.period_s,

@@ -41,7 +41,7 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   result.limits.add(guard(wanted_rad, &links_W, max_speed_m_per_s, result.guarded));
   if (result.blocked != 0) tool_guard_.relax();
   follow(measured, result.blocked);
-  result.differs = result.guarded || result.blocked != 0 || guard_.lag_rad() > limits_.following_error_rad;
+  result.differs = result.blocked != 0 || guard_.lag_rad() > limits_.following_error_rad;
   return result;
 }
 

@@ -32,7 +32,10 @@ class FinalSetpoints {
     ActiveLimits limits;       // that held something back
     std::uint8_t blocked = 0;  // joints whose drives don't follow, as bits
     bool guarded = false;      // the tool's guard, which is the last one, held something back
-    bool differs = false;      // what was wanted can't be caught up: the motion has to go on from what was commanded
+    // What was wanted can't be caught up: the motion has to go on from what was commanded. A guard that holds back a
+    // little is caught up with, as joints that lag are: going on from setpoints takes the motors' lead for the links'
+    // place, and would shake the tool.
+    bool differs = false;
   };
   // One period towards these angles of the motors, which lead the links' tool to links_W.
   Result step(const models::JointVector& motor_rad, const models::Vec3& links_W, const Measured& measured,

@@ -81,17 +81,18 @@ struct Slide {
   double tangential = 0.0, limit = 0.0, length_s = 0.0;
 };
 
-// "limits.leash_m"; joints' own limits with the joints' names: "axis_2, axis_3: max_speed_rad_per_s".
-std::string parameter_name(Limit limit, std::uint8_t axes, const std::vector<std::string>& names) {
+// "limits.leash_m"; a joint's own limit with its name: "axis_2: max_speed_rad_per_s", one for each of `axes`.
+std::vector<std::string> parameter_names(Limit limit, std::uint8_t axes, const std::vector<std::string>& names) {
   const std::string parameter = limit_parameter(limit);
   constexpr std::string_view of_joints = "drives[].";
-  if (parameter.compare(0, of_joints.size(), of_joints) != 0) return parameter;
-  std::string joints;
+  if (parameter.compare(0, of_joints.size(), of_joints) != 0) return {parameter};
+  std::vector<std::string> out;
   for (std::size_t i = 0; i < 8; ++i) {
     if ((axes & (1u << i)) == 0) continue;
-    joints += (joints.empty() ? "" : ", ") + (i < names.size() ? names[i] : "axis " + std::to_string(i + 1));
+    const std::string joint = i < names.size() ? names[i] : "axis " + std::to_string(i + 1);
+    out.push_back(joint + ": " + parameter.substr(of_joints.size()));
   }
-  return joints + ": " + parameter.substr(of_joints.size());
+  return out;
 }
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
@@ -198,8 +199,9 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (limited(record)) ++summary.limited_cycles;
   if (record.has(RecordFlag::limit_orientation)) count_limit("orientation", RecordFlag::limit_orientation, record);
   for (const LimitFlag& flag : limit_flags) {
-    if (record.has(flag.flag)) {
-      count_limit(parameter_name(flag.limit, record.limited_axes, config.axis_names), flag.flag, record);
+    if (!record.has(flag.flag)) continue;
+    for (const std::string& name : parameter_names(flag.limit, record.limited_axes, config.axis_names)) {
+      count_limit(name, flag.flag, record);
     }
   }
   if (record.has(RecordFlag::truth)) summary.from_truth = true;

@@ -29,9 +29,9 @@ constexpr double touching_m = 1e-10;
 // border. The guard tolerates this much, so that it doesn't act where the proxy's limits do. It is a fifth of the 0.1
 // mm that are promised. With more, the border would feel soft; with less, it would be felt twice.
 constexpr double twist_m = 2e-5;
-// By how much motors may lead the links, at most: what 20 m/s², the default acceleration limit, is at the 10 Hz of full
-// stretch, half as much again for a hand's reaction.
-constexpr double most_lead_m = 8e-3;
+// What of the motors' lead is taken off where borders are judged, along each axis: with twist_m this keeps setpoints
+// within the 0.1 mm that are promised.
+constexpr double most_lead_m = 6e-5;
 // The path between two points on the right side of a border may bulge beyond it by half of the 0.1 mm that are
 // promised.
 constexpr double bulge_m = 5e-5;
@@ -112,7 +112,7 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
   arm_->points(arm_->link_from_motor(target_rad), points_);
   twist_k2_rad_ = points_.twist_rad;
   step_m_ = 0.0;
-  lead_W_ = lead_k1_W_ = Vec3::Zero();
+  lead_W_.setZero();
   brakes_for_s_ = 0.0;
   torques_.start(target_rad_ - points_.twist_rad);
 }
@@ -126,8 +126,7 @@ ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_p
                      share * limits_.max_elbow_speed_m_per_s};
   ArmPoints at;
   evaluate(wanted_rad, quick_rounds, at);
-  if (links_W != nullptr) lead_W_ = at.tool_W - *links_W;
-  if (!(lead_W_.norm() <= most_lead_m)) lead_W_.setZero();
+  if (links_W != nullptr) lead_W_ = (at.tool_W - *links_W).cwiseMax(-most_lead_m).cwiseMin(most_lead_m);
   if (broken(wanted_rad, at, limit, Care::quick).kinds == 0) {
     accept(wanted_rad, at);
   } else {
@@ -207,7 +206,7 @@ bool ToolGuard::far_from_borders(const Vec3& p, double way_m) const noexcept {
 
 void ToolGuard::judge_borders(const Vec3& at, const Vec3& rest, double step_bend, double rest_bend,
                               ActiveLimits& out) const noexcept {
-  const Vec3 p_k1 = links_W(points_, lead_k1_W_), p = at - lead_W_, rest_p = rest - lead_W_;
+  const Vec3 p_k1 = points_.tool_W - lead_W_, p = at - lead_W_, rest_p = rest - lead_W_;
   const double step_more = std::max(0.0, step_bend - bulge_m), rest_more = std::max(0.0, rest_bend - bulge_m);
   const double more = std::max(step_more, rest_more);
   for (int i = 0; i < 3; ++i) {
@@ -309,13 +308,12 @@ void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
   target_rad_ = theta;
   twist_k2_rad_ = points_.twist_rad;
   points_ = at;
-  lead_k1_W_ = lead_W_;
 }
 
 void ToolGuard::archive(fieldbus::StateArchive& state) noexcept {
   state(target_rad_, speed_rad_per_s_, twist_k2_rad_, points_.twist_rad, points_.tool_W);
   for (Vec3& joint_W : points_.joint_W) state(joint_W);
-  state(step_m_, brakes_for_s_, lead_k1_W_);
+  state(step_m_, brakes_for_s_, lead_W_);
   torques_.archive(state, target_rad_ - points_.twist_rad);
 }
 

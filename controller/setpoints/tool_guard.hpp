@@ -11,7 +11,7 @@
 //
 // For borders T is where the links go: motors that accelerate them lead by K⁻¹Mq̈_f
 // (elastic_setpoint.hpp), a millimetre at 10 m/s², and may be beyond a border while the tool isn't. What is taken off
-// p(θ) for that is its difference to the filter's own place, up to `most_lead_m`.
+// p(θ) for that is its difference to the filter's own place, up to `most_lead_m` along each axis.
 //
 // These bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T,
 // all joints brake together along u, in the time t that the slowest needs at its own deceleration:
@@ -80,10 +80,6 @@ class ToolGuard {
  private:
   static constexpr std::size_t first_joint = 2;  // the first whose speed is limited; the two before it hardly move
 
-  [[nodiscard]] static models::Vec3 links_W(const models::ArmPoints& at, const models::Vec3& lead_W) noexcept {
-    return at.tool_W - lead_W;
-  }
-
   enum class Care : std::uint8_t { quick, exact };
   struct Speeds {
     double tool_m_per_s, elbow_m_per_s;
@@ -117,7 +113,7 @@ class ToolGuard {
   models::JointVector target_rad_, speed_rad_per_s_, twist_k2_rad_;
   models::ArmPoints points_;                                                       // at target_rad_
   double step_m_ = 0.0;                                                            // of T, in the last period
-  models::Vec3 lead_W_ = models::Vec3::Zero(), lead_k1_W_ = models::Vec3::Zero();  // of motors before links, as above
+  models::Vec3 lead_W_ = models::Vec3::Zero();  // of motors before links, as above
   double brakes_for_s_ = 0.0;  // the duration of the braking that was judged with target_rad_
   std::uint64_t judged_exactly_ = 0;
 };

@@ -208,7 +208,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const double contact = empty ? nan_value : step_ns(g, down, into, steps);
   const double all = kind == "option" ? nan_value : all_ns(scene, surface);
   return {
-      {kind, name, count, far, near, contact, all, start_up_us, nan_value, nan_value, nan_value, nan_value, nan_value}};
+      {kind, name, count, far, near, contact, all, start_up_us, nan_value, nan_value, nan_value, nan_value}};
 }
 
 json Skip::headline(const Table& table, const Options& /*options*/) const {

@@ -33,7 +33,7 @@ std::string work_text(const PreparedSession& session, const controller::MotionWo
   const auto seldom = [&](const char* what, std::uint64_t done, const char* why) {
     line(what, "in ", work.steps - std::min(work.steps, done), " of these steps, ", why);
   };
-  line("the joints' step by a quadratic program", work.programs, " times, where joints can't follow the pose exactly");
+  seldom("limits of the joints", work.programs, "which joints can follow to the pose that is wanted");
   seldom("the nearest point of all limits", work.limited, "in which none acts");
   seldom("the last guard's exact test", work.guarded, "which keep well within its bounds");
   if (!session.settings.looks_ahead) line("lookahead", "without --lookahead");

@@ -37,7 +37,7 @@ struct Guards {
   }
   ActiveLimits step(const JointVector& wanted) {
     joints.step(wanted);
-    const ActiveLimits active = tool.step(joints.target_rad(), 1e9);
+    const ActiveLimits active = tool.step(joints.target_rad(), 1e9, nullptr);
     if (active.kinds == 0) return active;
     joints.settle(tool.target_rad(), tool.speed_rad_per_s());
     joints.follow_from_here();

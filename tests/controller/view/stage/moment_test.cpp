@@ -78,7 +78,7 @@ TEST(Moment, AHistorySaysHowManyRowsItHas) {
 
 TEST(Words, ThereAreSomeForEveryFlagAndPhase) {
   for (std::uint32_t bit = 0; bit <= 26; ++bit) {
-    if (bit == 9) continue;  // `truth`: not of the session
+    if (bit == 9 || bit == 23) continue;  // `truth`: not of the session; 23 is free
     EXPECT_EQ(std::count_if(flag_words().begin(), flag_words().end(),
                             [&](const FlagWords& f) { return static_cast<std::uint32_t>(f.flag) == 1u << bit; }),
               1)

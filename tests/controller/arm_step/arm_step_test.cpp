@@ -1,0 +1,217 @@
+// One step of the arm: does it keep its sets, and does an arm come back that was led where it can't go?
+#include "controller/arm_step/arm_step.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "controller/limits/limit_sets.hpp"
+#include "controller/setpoints/link_filter.hpp"
+#include "tests/models/arm/few_axes.hpp"
+#include "tests/models/surfaces/random_states.hpp"
+
+namespace proxarm::controller {
+namespace {
+
+using models::JointVector;
+using models::Vec3;
+using tests::Random;
+using tests::scaled;
+
+constexpr double T = 1e-3;
+
+// An arm that is led by a mass of 4 kg on a spring, through no more than its step and its filter.
+class LedArm {
+ public:
+  explicit LedArm(const std::string& cell_name)
+      : cell_(tests::shipped_cell(cell_name)),
+        arm_(cell_),
+        inverse_(arm_),
+        step_(arm_, inverse_, cell_.drives, T),
+        filter_(cell_.limits.setpoint_bandwidth_Hz, T) {
+    filter_.start(arm_.start_rad());
+    start_W_ = q_k1_W_ = q_k2_W_ = step_.kinematics().X_WT.translation();
+    R_WT_ = step_.R_WT();
+  }
+
+  // One cycle under this force.
+  void cycle(const Vec3& force_W) {
+    step_.begin({.coasting_rad = filter_.coasting_rad(),
+                 .input_s2 = filter_.input_s2(),
+                 .twist_rad = JointVector::Zero(arm_.axes()),
+                 .tool_m_per_s = cell_.limits.max_tool_speed_m_per_s,
+                 .elbow_m_per_s = cell_.limits.max_elbow_speed_m_per_s,
+                 .R_WT = R_WT_,
+                 .held = true,
+                 .turn = {R_WT_, 0.1, {}, 2.0, T}});
+    const Vec3 p_hat_W = 2.0 * q_k1_W_ - q_k2_W_ + T * T / mass_kg * force_W;
+    StepLimits limits;
+    limits.arm = &step_;
+    limits.q_k1_W = q_k1_W_;
+    limits.hard[limits.hard_count++] = {Vec3::Zero(), 0.45 * T, Limit::speed};
+    LimitSets<3> sets;
+    sets.set(limits, models::Mat3::Identity());
+    Vec3 way = p_hat_W - q_k1_W_;
+    if (!sets.contains(way, 1e-12, true) || !sets.followed(way, p_hat_W)) {
+      int sweeps = 100;
+      way = sets.nearest(way, true, sweeps).x;
+    }
+    const JointVector before = step_.link_rad();
+    EXPECT_NE(step_.go(q_k1_W_ + way, R_WT_), ArmStep::Outcome::invalid);
+    worst_step_ = std::max(worst_step_, share_of_speed(step_.link_rad() - before));
+    filter_.step(step_.link_rad());
+    q_k2_W_ = q_k1_W_;
+    q_k1_W_ = step_.kinematics().X_WT.translation();
+  }
+
+  [[nodiscard]] double share_of_speed(const JointVector& step) const {
+    double most = 0.0;
+    for (Eigen::Index i = 0; i < step.size(); ++i) {
+      most = std::max(most, std::abs(step[i]) / T / cell_.drives[static_cast<std::size_t>(i)].max_speed_rad_per_s);
+    }
+    return most;
+  }
+  [[nodiscard]] bool within_ranges() const {
+    return (step_.link_rad().array() >= arm_.lower_rad().array() - 1e-12).all() &&
+           (step_.link_rad().array() <= arm_.upper_rad().array() + 1e-12).all();
+  }
+  [[nodiscard]] const Vec3& start_W() const { return start_W_; }
+  [[nodiscard]] const Vec3& q_W() const { return q_k1_W_; }
+  [[nodiscard]] Vec3 v_W() const { return (q_k1_W_ - q_k2_W_) / T; }
+  [[nodiscard]] double worst_step() const { return worst_step_; }
+  [[nodiscard]] double turned_rad() const { return step_.R_WT().angularDistance(R_WT_); }
+  [[nodiscard]] const ArmStep& step() const { return step_; }
+
+ private:
+  static constexpr double mass_kg = 4.0;
+  description::Cell cell_;
+  models::Arm arm_;
+  models::InverseKinematics inverse_;
+  ArmStep step_;
+  LinkFilter filter_;
+  Vec3 start_W_, q_k1_W_, q_k2_W_;
+  Eigen::Quaterniond R_WT_;
+  double worst_step_ = 0.0;
+};
+
+// A hand of 300 N/m and 40 Ns/m goes 1.5 m out along a random direction, which is beyond every arm's reach, and comes
+// back; it has 2 s more to come to rest. The tool is then where the hand is, to what is left of its swing.
+void expect_comes_back(const std::string& cell, std::uint64_t seed) {
+  Random random(seed);
+  for (std::int64_t k = 0; k < scaled(6, 2); ++k) {
+    LedArm arm(cell);
+    Vec3 way(random.uniform(-1.0, 1.0), random.uniform(-1.0, 1.0), random.uniform(-0.6, 1.0));
+    way = 1.0 / way.norm() * way;
+    if (way.x() < 0.0) way.x() = -way.x();  // not through the base
+    double furthest_m = 0.0;
+    for (int cycle = 0; cycle < 11000; ++cycle) {
+      const double t = cycle * T, share = t < 4.0 ? t / 4.0 : t < 5.0 ? 1.0 : t < 9.0 ? (9.0 - t) / 4.0 : 0.0;
+      const Vec3 force_W = 300.0 * (arm.start_W() + 1.5 * share * way - arm.q_W()) - 40.0 * arm.v_W();
+      arm.cycle(force_W);
+      ASSERT_TRUE(arm.q_W().allFinite() && arm.within_ranges()) << cell << " " << k << " " << t;
+      furthest_m = std::max(furthest_m, (arm.q_W() - arm.start_W()).norm());
+    }
+    EXPECT_GT(arm.step().programs(), 0u) << cell << " " << k;
+    EXPECT_GT(furthest_m, 0.1) << cell << " " << k;
+    EXPECT_LT((arm.q_W() - arm.start_W()).norm(), 1e-4) << cell << " " << k << " " << way.transpose();
+    EXPECT_LE(arm.worst_step(), 1.0) << cell << " " << k;
+    EXPECT_LT(arm.turned_rad(), 1e-6) << cell << " " << k;
+  }
+}
+
+TEST(ArmStep, AnArmThatIsLedBeyondItsReachComesBack) { expect_comes_back("default", 61); }
+TEST(ArmStep, ACobotThatIsLedBeyondItsReachComesBack) { expect_comes_back("cobot", 62); }
+TEST(ArmStep, SevenAxesThatAreLedBeyondTheirReachComeBack) { expect_comes_back("seven", 63); }
+
+// Leaned on with 40 N the border keeps still: no more than rounding of the program moves it.
+TEST(ArmStep, ABorderOfTheReachStandsUnderASteadyForce) {
+  LedArm arm("default");
+  const auto lean = [&] { arm.cycle(Vec3(40.0, 0.0, 0.0) - 40.0 * arm.v_W()); };
+  for (int cycle = 0; cycle < 20000; ++cycle) lean();
+  const Vec3 there = arm.q_W();
+  double most_m = 0.0;
+  for (int cycle = 0; cycle < 2000; ++cycle) {
+    lean();
+    most_m = std::max(most_m, arm.v_W().norm() * T);
+  }
+  EXPECT_GT((there - arm.start_W()).norm(), 0.4);
+  EXPECT_LT(most_m, 1e-7);
+}
+
+// Where no limit acts the step is that of the inverse kinematics, to the bit.
+TEST(ArmStep, AStepThatNoSetTouchesIsTheInverseKinematics) {
+  const description::Cell cell = tests::shipped_cell("default");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  ArmStep step(arm, inverse, cell.drives, T);
+  Random random(64);
+  models::InverseKinematicsResult result;
+  JointVector link = arm.start_rad();
+  arm.kinematics(link, result.kinematics);
+  const Eigen::Quaterniond R = step.R_WT();
+  Vec3 at = step.kinematics().X_WT.translation();
+  for (int cycle = 0; cycle < 200; ++cycle) {
+    LinkFilter filter(25.0, T);
+    filter.start(link);
+    step.begin({.coasting_rad = filter.coasting_rad(),
+                .input_s2 = filter.input_s2(),
+                .twist_rad = JointVector::Zero(6),
+                .R_WT = R,
+                .turn = {R, 0.1, {}, 2.0, T}});
+    at += Vec3(random.uniform(-1e-5, 1e-5), random.uniform(-1e-5, 1e-5), random.uniform(-1e-5, 1e-5));
+    models::Pose X_WT = models::Pose::Identity();
+    X_WT.translation() = at;
+    X_WT.linear() = R.toRotationMatrix();
+    inverse.solve(link, X_WT, result);
+    link = result.q;
+    ASSERT_EQ(step.go(at, R), ArmStep::Outcome::reached);
+    ASSERT_EQ(step.link_rad(), link) << cycle;
+  }
+  EXPECT_EQ(step.programs(), 0u);
+}
+
+TEST(ArmStep, RefusesAPlaceThatIsNone) {
+  const description::Cell cell = tests::shipped_cell("default");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  ArmStep step(arm, inverse, cell.drives, T);
+  const JointVector before = step.link_rad();
+  step.begin({.coasting_rad = before, .input_s2 = 1e-6, .twist_rad = JointVector::Zero(6), .R_WT = step.R_WT()});
+  EXPECT_EQ(step.go(Vec3(NAN, 0.0, 0.0), step.R_WT()), ArmStep::Outcome::invalid);
+  EXPECT_EQ(step.link_rad(), before);
+}
+
+// σ falls to nearly nothing as the elbow stretches, and its gradient is that of finite differences of the whole.
+TEST(PlaceMargin, SeesAnElbowThatStretchesAndAWristAboveTheBase) {
+  const description::Cell cell = tests::shipped_cell("default");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  models::ToolKinematics at;
+  const auto margin_at = [&](const JointVector& c) {
+    PlaceMargin margin(arm, inverse.space());
+    arm.kinematics(c, at);
+    margin.go_to(c, at);
+    return margin;
+  };
+  JointVector stretched = arm.start_rad();
+  stretched[2] = -1.3;  // nearly straight
+  const PlaceMargin margin = margin_at(stretched);
+  ASSERT_TRUE(margin.near());
+  EXPECT_LT(margin.value(), 0.15);
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    JointVector more = stretched, less = stretched;
+    more[i] += 1e-4;
+    less[i] -= 1e-4;
+    const double slope = (margin_at(more).value() - margin_at(less).value()) / 2e-4;
+    EXPECT_NEAR(margin.gradient()[i], slope, 1e-4) << i;
+  }
+  // The wrist's own singularity is none of the place.
+  JointVector wrist = arm.start_rad();
+  wrist[4] = 0.0;
+  EXPECT_FALSE(margin_at(wrist).near());
+}
+
+}  // namespace
+}  // namespace proxarm::controller
