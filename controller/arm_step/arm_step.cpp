@@ -97,7 +97,7 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   aim(start.R_WT);
   margin_.go_to(link_rad_, from_);
   make_boxes(start);
-  use_box(lags_ || !start_.held ? first_ease : whole_box);
+  use_first_box();
 }
 
 // A held orientation that lags is caught up as a brake reaches a wall, and no faster at once than joints take it up.
@@ -148,6 +148,13 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
     whole_.low[i] = std::clamp(coasts - change, low, brakes_[i]);
     whole_.high[i] = std::clamp(coasts + change, brakes_[i], high);
   }
+}
+
+// A hand that turns a point changes its turning no faster than joints take it up. One box for entering and for leaving
+// that limit: with a smaller one for leaving, the tool swung between the two at 16 Hz.
+void ArmStep::use_first_box() noexcept {
+  const bool eases = lags_ || (!start_.held && !start_.touches_turning);
+  use_box(eases ? first_ease : whole_box);
 }
 
 // The part of the box in which no joint's step changes by more than `ease` times half of its acceleration.
@@ -223,7 +230,7 @@ bool ArmStep::contains(const Vec3& q_W) noexcept {
   X_WT.translation() = q_W;
   X_WT.linear() = aim_.toRotationMatrix();
   if (asked_) solution_.kinematics = from_;
-  use_box(lags_ || !start_.held ? first_ease : whole_box);
+  use_first_box();
   inverse_->solve(link_rad_, X_WT, solution_);
   asked_W_ = q_W;
   asked_ = true;

@@ -51,6 +51,7 @@ struct ArmStepStart {
   double tool_m_per_s = 0.5, elbow_m_per_s = 0.5;  // speed limits of T, and of elbow and wrist
   Eigen::Quaterniond R_WT = Eigen::Quaterniond::Identity();  // the orientation that is wanted
   bool held = true;                                          // it stays the same: what lags is caught up slowly
+  bool touches_turning = false;  // contacts turn the tool, so its turning may change at once (a tool with a shape)
   TurnSets turn{};
 };
 
@@ -118,6 +119,7 @@ class ArmStep final : public FollowableStep {
   [[nodiscard]] double place_bound() const noexcept;
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
   void use_box(double ease) noexcept;
+  void use_first_box() noexcept;
   [[nodiscard]] double most_way_m(const models::JointVector& u, double limit_m_per_s) const noexcept;
   [[nodiscard]] bool points_too_fast(const models::JointVector& u) const noexcept;
   void limit_points(const Model& model, const models::JointVector& u) noexcept;
@@ -155,8 +157,8 @@ class ArmStep final : public FollowableStep {
   ArmStepStart start_;
   models::JointVector brakes_;   // u_b
   double brakes_s_ = 0.0;        // in which the borders of curved sets are approached
-  Box whole_, box_;   // U's, and the part of it that is used
-  double ease_ = 0.0;  // of that part: by how many times half of its acceleration a joint's step may change
+  Box whole_, box_;              // U's, and the part of it that is used
+  double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)
   models::InverseKinematicsResult solution_;  // of the pose last asked for; after the step, of where it led
   models::Vec3 asked_W_ = models::Vec3::Zero();

@@ -15,7 +15,7 @@ constexpr double tolerance_m = 1e-11;  // 10 nm/s at 1 kHz, as in limited_algori
 constexpr auto catches_up =
     static_cast<std::uint16_t>(static_cast<unsigned>(Limit::speed) | static_cast<unsigned>(Limit::acceleration) |
                                static_cast<unsigned>(Limit::power) | static_cast<unsigned>(Limit::leash));
-constexpr int most_sweeps = 300;       // of Dykstra's algorithm, if the sets have hardly a point in common
+constexpr int most_sweeps = 300;  // of Dykstra's algorithm, if the sets have hardly a point in common
 
 }  // namespace
 

@@ -133,8 +133,8 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
   }
 }
 
-// The ends of the joints' ranges as planes for the tool's translation, as torques render it. Joint i moves by G_i·Δq with
-// G = Jᵀ(J Jᵀ + λ²E)⁻¹, by the Jacobian of the place alone.
+// The ends of the joints' ranges as planes for the tool's translation, as torques render it. Joint i moves by G_i·Δq
+// with G = Jᵀ(J Jᵀ + λ²E)⁻¹, by the Jacobian of the place alone.
 void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
                                   StepLimits& out) const noexcept {
   models::Mat3 A = J_W.topRows<3>().lazyProduct(J_W.topRows<3>().transpose());

@@ -267,6 +267,7 @@ ArmStepStart AdmittanceMotion::arm_start(const LinkFilter& filter, const JointVe
                      .elbow_m_per_s = share * limits_.max_elbow_speed_m_per_s,
                      .R_WT = R_WT(),
                      .held = !parts_.orientation.config().free,
+                     .touches_turning = parts_.pose != nullptr,
                      .turn = parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets()};
   if (!start.held) return start;
   start.turn = {R_WT(), held_lag_rad, {}, limits_.max_turning_speed_rad_per_s, period_s_};

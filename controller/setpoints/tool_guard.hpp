@@ -111,10 +111,10 @@ class ToolGuard {
   TorqueGuard torques_;
 
   models::JointVector target_rad_, speed_rad_per_s_, twist_k2_rad_;
-  models::ArmPoints points_;                                                       // at target_rad_
-  double step_m_ = 0.0;                                                            // of T, in the last period
+  models::ArmPoints points_;                    // at target_rad_
+  double step_m_ = 0.0;                         // of T, in the last period
   models::Vec3 lead_W_ = models::Vec3::Zero();  // of motors before links, as above
-  double brakes_for_s_ = 0.0;  // the duration of the braking that was judged with target_rad_
+  double brakes_for_s_ = 0.0;                   // the duration of the braking that was judged with target_rad_
   std::uint64_t judged_exactly_ = 0;
 };
 

@@ -207,8 +207,7 @@ std::vector<Row> Skip::run(std::size_t job, const Options& options) const {
   const Vec3 down = empty ? surface : g(K, surface - depth * Vec3::UnitZ(), surface + 1e-3 * Vec3::UnitZ());
   const double contact = empty ? nan_value : step_ns(g, down, into, steps);
   const double all = kind == "option" ? nan_value : all_ns(scene, surface);
-  return {
-      {kind, name, count, far, near, contact, all, start_up_us, nan_value, nan_value, nan_value, nan_value}};
+  return {{kind, name, count, far, near, contact, all, start_up_us, nan_value, nan_value, nan_value, nan_value}};
 }
 
 json Skip::headline(const Table& table, const Options& /*options*/) const {

@@ -146,7 +146,8 @@ TEST(NearestInPolyhedron, KeepsRowsThatRepeatOrContradictEachOther) {
 }
 
 TEST(NearestInPolyhedron, LeavesAPointThatKeepsAllRowsWhereItIs) {
-  Program p{2.0 * Eigen::MatrixXd::Identity(2, 2), Eigen::Vector2d(1.0, -1.0), {}, {Eigen::Vector2d(1.0, 1.0)}, {}, {0.1}};
+  Program p{
+      2.0 * Eigen::MatrixXd::Identity(2, 2), Eigen::Vector2d(1.0, -1.0), {}, {Eigen::Vector2d(1.0, 1.0)}, {}, {0.1}};
   NearestInPolyhedron program = prepared(p);
   ASSERT_TRUE(program.solve());
   EXPECT_DOUBLE_EQ(program.u()[0], 0.5);
