@@ -12,7 +12,8 @@ using models::Vec3;
 namespace {
 
 // Relative to the largest ⟨x̃²⟩: the least for an oscillation that lasts, and the bound below which it is over.
-constexpr double kept_share = 0.5, died_away = 1.0 / 16.0;
+// Between the first two, the oscillation decays, and must go on for some periods.
+constexpr double steady_share = 0.8, kept_share = 0.5, died_away = 1.0 / 16.0;
 
 }  // namespace
 
@@ -173,7 +174,7 @@ void PassivityObserver::follow_spell() noexcept {
 
 bool PassivityObserver::lasts() const noexcept {
   if (!oscillates_ || spell_.lasted_s < config_.lasting_s || seen_.square < kept_share * spell_.most) return false;
-  if (gyration_m2_ > 0.0) {
+  if (gyration_m2_ > 0.0 || seen_.square < steady_share * spell_.most) {
     const double periods = spell_.lasted_s / (2.0 * std::numbers::pi) * std::sqrt(seen_.band / seen_.square);
     if (!(periods >= config_.lasting_periods)) return false;
   }

@@ -59,9 +59,10 @@
 // high-pass. ⟨x̃²⟩ must be at least half of its largest value. If it falls to a sixteenth, the oscillation is over;
 // what is left counts as a new one once it no longer halves within pause_s. Below the amplitude felt_m, an oscillation
 // must go on for small_lasting_s. If an oscillation lasts, the loop isn't stable with this grip. Damping::what_lasts
-// begins then, and acts at once for remembered_s after each oscillation. A tool that turns must also have swung
-// lasting_periods: a hand of 20 Nm/rad on 0.05 kg m² swings at 3 to 4.5 Hz after a jerk, within this band, of which 0.5
-// s are two periods, and dies away in the next three.
+// begins then, and acts at once for remembered_s after each oscillation. A tool that turns, and a swing below four
+// fifths of its largest ⟨x̃²⟩, must also have swung lasting_periods. After a jerk a hand of 20 Nm/rad on 0.05 kg m²
+// swings at 3 to 4.5 Hz, and so do 4 kg on a layer of 2.5 kN/m: within this band. 0.5 s are two of these periods, and
+// the swing dies away in the next three.
 //
 // Vectors in W. Neither allocates, locks nor throws. A session without passivity doesn't have this object.
 #pragma once
@@ -99,7 +100,7 @@ struct PassivityConfig {
   double grip_m = 0.1;
   // A blow oscillates for 0.1 to 0.3 s. Gears ring for up to 1.4 s after it, with a decreasing amplitude.
   double lasting_s = 0.5, small_lasting_s = 3.0, felt_m = 0.5e-3;
-  double lasting_periods = 4.0;  // of a tool that turns
+  double lasting_periods = 4.0;
   double pause_s = 0.25;
   double remembered_s = 60.0;
   double force_age_s = 0.0;  // τ, the age of a reading when it is used; below half a period it counts as 0
