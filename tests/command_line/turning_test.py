@@ -149,11 +149,13 @@ class Turning(ProgramTest):
         calm = self.summary_of_unstable_places(*few, "--inertia", smallest, "--duration", "4s", "--record", "calm")
         self.assertFalse(calm["oscillation"] and calm["oscillation"]["lasts"])
         self.assertLess(self.fastest("calm"), 0.02)  # nobody leads the place; a swing of 2.5 mm at 13 Hz has 0.2 m/s
-        # Nor is much more said than it takes.
+        self.assertEqual(calm["limited_cycles"], 0)
+        # Nor is much more said than it takes: with a little less that mode grows until the joints' accelerations hold it.
+        # They are sets of the arm's step, so it stays small; with guards behind the step the steel did 0.43 m/s.
         swings = self.call("run", "--json", *few, "--inertia", f"{0.88 * float(smallest):.5f}", "--force-unstable",
                            "--duration", "4s", "--record", "swings")
-        self.assertTrue(swings.summary["oscillation"]["lasts"])
-        self.assertGreater(self.fastest("swings"), 0.1)
+        self.assertGreater(swings.summary["active_limits"]["axis_5: max_acceleration_rad_per_s2"], 1000)
+        self.assertLess(self.fastest("swings"), 0.05)
 
     def summary_of_unstable_places(self, *arguments):
         """Of a hand whose way makes the arm ask for a little more than at the start, which is told and no more."""
