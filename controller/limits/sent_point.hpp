@@ -9,8 +9,9 @@
 //   - Damping and spring act within H, so p would jump when one of them, or the mass, changes. The offset o compensates
 //     for this: in the cycle of the change c goes on with its last velocity, and its offset from p then fades with
 //     `fading_s`.
-//   - Where the sets hold c back, o is what it is held back by, so c goes on with p when they let it go, and o fades
-//   then.
+//   - c follows p as fast as the sets of its own motion allow (speed, acceleration, power, leash). Where borders or
+//   joints
+//     hold c back, o is the distance from p: c goes on with p when they let it go, and o fades.
 // The proxy keeps the same limits as without lookahead. The limit of acceleration is one of a commanded point behind
 // the setpoints' filter, so the proxy has such a filter of its own here (x, v of step_limits.hpp), as if the arm were
 // sent to the proxy.

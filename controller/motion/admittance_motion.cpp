@@ -381,10 +381,6 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
   const Vec3 h_W = parts_.release->force_W(state_.q_k1_W, v_W, hand_W);
   const WorldStep step = world().step(h_W, step_limits_);
-  if (step.fault != ProxyFault::none) {
-    cycle.alarm.raise(Fault::proxy_not_finite);
-    return false;
-  }
   if (!take(step, cycle)) return false;
   cycle.record.p_hat_W_m = triple(step.p_hat_W);
   follow_proxy(cycle);
@@ -406,8 +402,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   if (ahead_) {
     if (!go(ahead_->proxy_step, state_.q_k1_W, cycle)) return;
     ahead_->proxy_filter.step(ahead_->proxy_step.link_rad());
-    const Vec3& q_W = ahead_->proxy_step.kinematics().X_WT.translation();
-    if ((q_W - state_.q_k1_W).norm() > same_place_m) put_proxy_to(q_W, (q_W - state_.q_k2_W) / period_s_);
+    put_proxy_where(ahead_->proxy_step);
     SentPoint& point = ahead_->point;
     point.advance_horizon();
     point.step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), ahead_->limits);
@@ -416,8 +411,7 @@ void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     point.correct(arm_step_.kinematics().X_WT.translation());
   } else {
     if (!go(arm_step_, state_.q_k1_W, cycle)) return;
-    const Vec3& q_W = arm_step_.kinematics().X_WT.translation();
-    if ((q_W - state_.q_k1_W).norm() > same_place_m) put_proxy_to(q_W, (q_W - state_.q_k2_W) / period_s_);
+    put_proxy_where(arm_step_);
   }
   if (parts_.inverse.reaches_orientation() && arm_step_.R_WT().angularDistance(R_WT()) > same_turn_rad) {
     cycle.record.set(RecordFlag::limit_orientation, true);
@@ -434,6 +428,12 @@ bool AdmittanceMotion::go(ArmStep& step, const Vec3& q_W, const MotionCycle& cyc
   }
   active_.add(step.active());
   return true;
+}
+
+// Puts the proxy to where this step has led, if that isn't where the proxy stepped to.
+void AdmittanceMotion::put_proxy_where(const ArmStep& step) noexcept {
+  const Vec3& q_W = step.kinematics().X_WT.translation();
+  if ((q_W - state_.q_k1_W).norm() > same_place_m) put_proxy_to(q_W, (q_W - state_.q_k2_W) / period_s_);
 }
 
 // The proxy is at q_W instead of where it stepped to, with this velocity.

@@ -98,6 +98,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] bool take(const WorldStep& step, const MotionCycle& cycle) noexcept;
   void follow_proxy(const MotionCycle& cycle) noexcept;
   bool go(ArmStep& step, const models::Vec3& q_W, const MotionCycle& cycle) noexcept;
+  void put_proxy_where(const ArmStep& step) noexcept;
   void put_proxy_to(const models::Vec3& q_W, const models::Vec3& velocity_W) noexcept;
   void turn_on_from(const ArmStep& step, const Eigen::Quaterniond& from) noexcept;
   void send(const models::JointVector& motor_rad, const Measured& measured) noexcept;
