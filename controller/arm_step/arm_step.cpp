@@ -32,7 +32,8 @@ constexpr double beside_place = 1e-7;
 // A place within this counts as reached: a tenth of what encoders resolve at a metre.
 constexpr double reached_m = 1e-9;
 constexpr double place_tolerance_m = 1e-12, turn_tolerance_rad = 1e-9;
-// The time in which borders of turning and of the place's margin are approached, or that of braking if it is longer.
+// The least time in which borders of turning and of the place's margin are approached. It is that of the longest
+// braking otherwise: a border that is approached by the present braking time is passed if joints get faster before it.
 constexpr double approach_s = 0.1;
 // How a held orientation that lags catches up: with this time constant at the end, and this acceleration and share of
 // the turning speed's limit before. A handle's end, 0.1 m away, is accelerated by 0.5 m/s² then.
@@ -44,6 +45,12 @@ constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
 constexpr int most_rounds = 8;
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
+
+// The speed on the way to rest, and the speed to start with so that it stays within `most` (growth_m_per_s()).
+double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
+double fastest_start(double B, double most) noexcept {
+  return B <= most ? most : std::max(0.0, 2.0 * std::sqrt(B * most) - B);
+}
 
 }  // namespace
 
@@ -66,7 +73,10 @@ ArmStep::ArmStep(const models::Arm& arm, const models::InverseKinematics& invers
 
 void ArmStep::set_period(double period_s) noexcept {
   period_s_ = period_s;
+  brakes_s_ = approach_s;
   for (Joint& joint : joints_) {
+    const double slowest_s = speed_share * joint.speed_rad_per_s / (braking_share * joint.acceleration_rad_per_s2);
+    brakes_s_ = std::max(brakes_s_, slowest_s);
     joint.per_step_rad = speed_share * joint.speed_rad_per_s * period_s;
     joint.share = period_s / (period_s + joint.speed_rad_per_s / joint.acceleration_rad_per_s2);
   }
@@ -133,7 +143,6 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
     const double a = joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
     cycles = std::max(cycles, std::abs(step_rad_[i]) / (braking_share * a * T * T));
   }
-  brakes_s_ = std::max(approach_s, cycles * T);
   start_.turn.brakes_s = brakes_s_;
   brakes_ = cycles > 1.0 ? JointVector((1.0 - 1.0 / cycles) * step_rad_) : JointVector::Zero(step_rad_.size());
   whole_ = box_ = {brakes_, brakes_};
@@ -191,32 +200,44 @@ bool ArmStep::allows(const JointVector& u) const noexcept {
   return !points_too_fast(u);
 }
 
-// How far a point may go within a step at these speeds of the joints. On the way to rest, all joints braking together,
-// it gets no faster than (V + B)²/4B, with B = t |u̇|ᵀC|u̇| and t the time that this takes (tool_guard.hpp has the
-// derivation).
-double ArmStep::most_way_m(const JointVector& u, double limit_m_per_s) const noexcept {
-  const double T = period_s_;
-  const JointVector rate = u.cwiseAbs() / T;
+// On the way to rest, all joints braking together, a point of speed V gets no faster than (V + B)²/4B, with
+// B = t |u̇|ᵀC|u̇| and t the time that this takes; V if B ≤ V (tool_guard.hpp has the derivation). This is B.
+double ArmStep::growth_m_per_s(const JointVector& u) const noexcept {
+  const JointVector rate = u.cwiseAbs() / period_s_;
   double brakes_s = 0.0;
   for (Eigen::Index i = 0; i < rate.size(); ++i) {
     brakes_s = std::max(brakes_s, rate[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2);
   }
-  const double B = brakes_s * rate.dot(curvature_ * rate), most = elbow_share * limit_m_per_s;
-  return T * (B <= most ? most : std::max(0.0, 2.0 * std::sqrt(B * most) - B));
+  return brakes_s * rate.dot(curvature_ * rate);
+}
+
+// Of growth_m_per_s(), by u: m/s per rad.
+JointVector ArmStep::growth_gradient(const JointVector& u) const noexcept {
+  const JointVector rate = u.cwiseAbs() / period_s_, bent = curvature_ * rate;
+  double brakes_s = 0.0;
+  Eigen::Index slowest = 0;
+  for (Eigen::Index i = 0; i < rate.size(); ++i) {
+    const double own_s = rate[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
+    if (own_s > brakes_s) slowest = i;
+    brakes_s = std::max(brakes_s, own_s);
+  }
+  JointVector out = 2.0 * brakes_s * bent;
+  out[slowest] += rate.dot(bent) / joints_[static_cast<std::size_t>(slowest)].acceleration_rad_per_s2;
+  for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = std::copysign(out[i] / period_s_, u[i]);
+  return out;
 }
 
 // A point moves by at most Σ R_i |u_i|, R_i being the distance of T from axis i at most: most steps are below that.
 bool ArmStep::points_too_fast(const JointVector& u) const noexcept {
-  const double tool_m = most_way_m(u, start_.tool_m_per_s), elbow_m = most_way_m(u, start_.elbow_m_per_s);
+  const double B = growth_m_per_s(u), T = period_s_;
+  const double tool_m_per_s = elbow_share * start_.tool_m_per_s, elbow_m_per_s = elbow_share * start_.elbow_m_per_s;
+  const double tool_m = T * fastest_start(B, tool_m_per_s), elbow_m = T * fastest_start(B, elbow_m_per_s);
   if (curvature_.diagonal().dot(u.cwiseAbs()) <= std::min(tool_m, elbow_m)) return false;
   models::ArmPoints before, after;
   arm_->points(link_rad_, before);
   arm_->points(link_rad_ + u, after);
   // Where braking makes T no faster, its own set bounds it (step_limits.hpp).
-  if (tool_m < elbow_share * start_.tool_m_per_s * period_s_ &&
-      (after.tool_W - before.tool_W).norm() > tool_m + rounding_rad) {
-    return true;
-  }
+  if (B > tool_m_per_s && (after.tool_W - before.tool_W).norm() > tool_m + rounding_rad) return true;
   for (auto k = first_point; k < static_cast<std::size_t>(u.size()); ++k) {
     if ((after.joint_W[k] - before.joint_W[k]).norm() > elbow_m + rounding_rad) return true;
   }
@@ -301,37 +322,34 @@ void ArmStep::objective(const Model& model, JointMatrix& H, JointVector& g) cons
   g = w * (J_R.transpose() * wanted) + cost.cwiseProduct(brakes_);
 }
 
+void ArmStep::add_set(const JointVector& a, double b, Limit limit, int joint) noexcept {
+  const std::size_t row = program_.rows();
+  program_.at_most(a, b);
+  if (program_.rows() == row) return;
+  kind_[row] = limit;
+  joint_[row] = static_cast<std::int8_t>(joint);
+}
+
 void ArmStep::add_sets() noexcept {
-  const auto tell = [&](std::size_t before, Limit limit, int joint) {
-    if (program_.rows() == before) return;
-    kind_[before] = limit;
-    joint_[before] = static_cast<std::int8_t>(joint);
-  };
   first_set_ = program_.rows();
   for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
     JointVector a = JointVector::Zero(brakes_.size());
     a[i] = 1.0;
-    std::size_t row = program_.rows();
-    program_.at_most(a, box_.high[i]);
-    tell(row, Limit::joint_range, static_cast<int>(2 * i));
-    row = program_.rows();
-    program_.at_most(-a, -box_.low[i]);
-    tell(row, Limit::joint_range, static_cast<int>(2 * i + 1));
+    add_set(a, box_.high[i], Limit::joint_range, static_cast<int>(2 * i));
+    add_set(-a, -box_.low[i], Limit::joint_range, static_cast<int>(2 * i + 1));
   }
-  if (margin_.near()) {
-    const std::size_t row = program_.rows();
-    program_.at_most(-margin_.gradient(), place_bound());
-    tell(row, Limit::singularity, -1);
-  }
-  for (std::size_t k = 0; k < row_count_; ++k) {
-    const std::size_t row = program_.rows();
-    program_.at_most(rows_[k].a, rows_[k].b);
-    tell(row, rows_[k].limit, -1);
-  }
+  if (margin_.near()) add_set(-margin_.gradient(), place_bound(), Limit::singularity, -1);
+  for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit, -1);
 }
 
-void ArmStep::add_row(const JointVector& a, double b, Limit limit) noexcept {
-  if (row_count_ < rows_.size()) rows_[row_count_++] = {a, std::max(b, a.dot(brakes_)), limit};
+// Takes in a·u ≤ b, widened to contain braking. Whether that excludes this step: a set that is left by braking, too, or
+// by the curvature of a way along its border, holds nothing back.
+bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
+  if (row_count_ == rows_.size()) return false;
+  const Row row{a, std::max(b, a.dot(brakes_)), limit};
+  if (a.dot(step) <= row.b + rounding_rad) return false;
+  rows_[row_count_++] = row;
+  return true;
 }
 
 // The step with J u = `wanted` that turns the tool as far as U allows. False if U doesn't contain one.
@@ -363,7 +381,7 @@ bool ArmStep::solve_near(const Model& model, const Rows& J, const Vec3& wanted) 
 
 // Takes in the half-spaces of curved sets that u has left. Whether there was one.
 bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexcept {
-  const std::size_t before = row_count_;
+  bool leaves = false;
   if (inverse_->reaches_orientation()) {
     const auto J_R = model.at.J_W.bottomRows<3>();
     const Eigen::Quaterniond from = Eigen::Quaterniond(from_.X_WT.linear()).normalized();
@@ -374,34 +392,41 @@ bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexce
     const Vec3 beyond = models::rotation_vector(to * within.conjugate());
     if (const double angle = beyond.norm(); angle > turn_tolerance_rad) {
       const Vec3 n = beyond / angle;
-      add_row(J_R.transpose() * n, n.dot(J_R * u) - angle, Limit{});
+      leaves = add_row(J_R.transpose() * n, n.dot(J_R * u) - angle, Limit{}, u);
     }
   }
-  if (points_too_fast(u)) limit_points(model, u);
-  return row_count_ > before;
+  return (points_too_fast(u) && limit_points(model, u)) || leaves;
 }
 
-void ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
+// B changes with u, too, so the half-space is that of the linearised (V + B)²/4B, with
+//   ∂/∂V = (V + B)/2B,   ∂/∂B = (B² − V²)/4B²,   ∂B/∂u̇ = 2t C|u̇| sgn u̇ + |u̇|ᵀC|u̇| ∂t/∂u̇
+bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   models::ArmPoints was, at;
   arm_->points(link_rad_, was);
   arm_->points(link_rad_ + u, at);
   const auto axes = static_cast<std::size_t>(u.size());
+  const double B = growth_m_per_s(u), T = period_s_;
+  const JointVector B_u = growth_gradient(u);
+  bool leaves = false;
   // A joint's origin moves by the joints before it alone.
-  const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m) {
+  const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m_per_s) {
     const Vec3 way = to_W - from_W;
-    const double length = way.norm();
-    if (!(length > most_m)) return;
+    const double length = way.norm(), V = length / T, beyond = fastest(V, B) - most_m_per_s;
+    if (!(beyond > 0.0)) return;
     JointVector a(u.size());
     for (Eigen::Index i = 0; i < a.size(); ++i) {
       const Vec3 turning = model.at.J_W.col(i).tail<3>();
       a[i] = way.dot(model.at.J_W.col(i).head<3>() + turning.cross(to_W - at.tool_W)) / length;
     }
     for (std::size_t j = joints; j < axes; ++j) a[arm_->drive_along_chain(j)] = 0.0;
-    add_row(a, a.dot(u) - (length - most_m), Limit::speed);
+    if (B > V) a = (V + B) / (2.0 * B) * a + T * (B * B - V * V) / (4.0 * B * B) * B_u;
+    leaves = add_row(a, a.dot(u) - T * beyond, Limit::speed, u) || leaves;
   };
-  limit(was.tool_W, at.tool_W, axes, most_way_m(u, start_.tool_m_per_s));
-  const double elbow_m = most_way_m(u, start_.elbow_m_per_s);
-  for (std::size_t k = first_point; k < axes; ++k) limit(was.joint_W[k], at.joint_W[k], k, elbow_m);
+  limit(was.tool_W, at.tool_W, axes, elbow_share * start_.tool_m_per_s);
+  for (std::size_t k = first_point; k < axes; ++k) {
+    limit(was.joint_W[k], at.joint_W[k], k, elbow_share * start_.elbow_m_per_s);
+  }
+  return leaves;
 }
 
 void ArmStep::note_joint(std::size_t i, double sign, ActiveLimits& out) const noexcept {

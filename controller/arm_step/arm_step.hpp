@@ -120,15 +120,17 @@ class ArmStep final : public FollowableStep {
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
   void use_box(double ease) noexcept;
   void use_first_box() noexcept;
-  [[nodiscard]] double most_way_m(const models::JointVector& u, double limit_m_per_s) const noexcept;
+  [[nodiscard]] double growth_m_per_s(const models::JointVector& u) const noexcept;
+  [[nodiscard]] models::JointVector growth_gradient(const models::JointVector& u) const noexcept;
   [[nodiscard]] bool points_too_fast(const models::JointVector& u) const noexcept;
-  void limit_points(const Model& model, const models::JointVector& u) noexcept;
+  bool limit_points(const Model& model, const models::JointVector& u) noexcept;
   void linearise(const models::JointVector& u, Model& model) const noexcept;
   void start_model() noexcept;
   [[nodiscard]] models::Vec3 turn_from(const Model& model, const Eigen::Quaterniond& R) const noexcept;
   void objective(const Model& model, models::JointMatrix& H, models::JointVector& g) const noexcept;
   void add_sets() noexcept;
-  void add_row(const models::JointVector& a, double b, Limit limit) noexcept;
+  void add_set(const models::JointVector& a, double b, Limit limit, int joint) noexcept;
+  bool add_row(const models::JointVector& a, double b, Limit limit, const models::JointVector& step) noexcept;
   using Rows = PlaceMargin::Columns;
   bool can_carry_wrist(const models::Vec3& wanted) noexcept;
   bool solve_at(const Model& model, const Rows& J, const models::Vec3& wanted) noexcept;
@@ -147,6 +149,8 @@ class ArmStep final : public FollowableStep {
   models::JointVector cost_;  // of a joint's step, beside turning
   PlaceMargin margin_;
   double period_s_ = 0.0;
+  // In which all joints together brake from any speed, and in which the borders of curved sets are approached.
+  double brakes_s_ = 0.0;
 
   // Its history.
   models::JointVector link_rad_, step_rad_;
@@ -156,7 +160,6 @@ class ArmStep final : public FollowableStep {
   // Of this step.
   ArmStepStart start_;
   models::JointVector brakes_;   // u_b
-  double brakes_s_ = 0.0;        // in which the borders of curved sets are approached
   Box whole_, box_;              // U's, and the part of it that is used
   double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)
@@ -167,7 +170,7 @@ class ArmStep final : public FollowableStep {
   Model model_;
   PlaceMargin::Wrist wrist_;                            // by the model
   models::Vec3 wrist_wanted_W_ = models::Vec3::Zero();  // from T, with the tool turned as wanted
-  std::array<Row, 8> rows_;
+  std::array<Row, 16> rows_;
   std::size_t row_count_ = 0;
   models::NearestInPolyhedron program_;
   std::size_t first_set_ = 0;  // the first row of the program that is a set of U

@@ -39,7 +39,6 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   result.blocked = find_blocked(motor_rad, measured, wanted_rad);
   if (result.blocked != 0) result.limits.set(Limit::following_error, result.blocked);
   result.limits.add(guard(wanted_rad, &links_W, max_speed_m_per_s, result.guarded));
-  if (result.blocked != 0) tool_guard_.relax();
   follow(measured, result.blocked);
   result.differs = result.blocked != 0 || guard_.lag_rad() > limits_.following_error_rad;
   return result;

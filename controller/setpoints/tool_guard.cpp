@@ -22,7 +22,7 @@ constexpr int bisections = 10;
 constexpr int quick_rounds = 1, exact_rounds = 3;
 // The share of the speed limits that passes. Drives overshoot by up to 7 % where the guard acts, and the arm must stay
 // within 5 % of its limit. The quick test is stricter and leaves cases close to the limit to the exact one.
-constexpr double exact_share = 0.97, quick_share = 0.968, quick_way_m = 1e-4;
+constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
 // Rounding of positions.
 constexpr double touching_m = 1e-10;
 // While the proxy's limits stop the tool at a border, its gears twist, and setpoints reach some micrometres beyond the
@@ -38,12 +38,6 @@ constexpr double bulge_m = 5e-5;
 // Applies while the tool is slowed down temporarily. Motors whose gears are bent may then be faster for a moment: up to
 // 1.42 times when an arm that was released in contact begins to move, and more at order 2.
 constexpr double slowed_share = 1.8;
-// The index of the fifth joint, where an arm's wrist has its centre.
-constexpr std::size_t wrist = 4;
-// Thresholds of folds() and of stretched(): near the end of its reach or above its base, an arm exceeds the first or
-// falls below the second. Around the start pose of the default cell, where hands lead the tool and scenes stand, the
-// first quantity is below 2 and the second above 0.58.
-constexpr double folding = 2.5, flat = 0.5;
 
 // The bound of the header for the speed on the way to rest: V is the speed of the last period, B its growth.
 double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
@@ -94,8 +88,7 @@ ToolGuard::ToolGuard(const models::Arm& arm, const std::vector<description::Driv
       curvature_(arm.path_curvature()),
       limits_(limits),
       has_borders_(!limits.keep_out.empty()),
-      period_s_(period_s),
-      torques_(arm, drives, limits.max_tool_speed_m_per_s, period_s) {
+      period_s_(period_s) {
   for (Eigen::Index i = 0; i < acceleration_.size(); ++i) {
     acceleration_[i] = drives[static_cast<std::size_t>(i)].max_acceleration_rad_per_s2;
   }
@@ -111,19 +104,14 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
   points_.joint_W.fill(Vec3::Zero());  // an arm may have fewer joints, and all are archived
   arm_->points(arm_->link_from_motor(target_rad), points_);
   twist_k2_rad_ = points_.twist_rad;
-  step_m_ = 0.0;
   lead_W_.setZero();
-  brakes_for_s_ = 0.0;
-  torques_.start(target_rad_ - points_.twist_rad);
 }
 
 ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s, const Vec3* links_W) noexcept {
   ActiveLimits active;
   // If the tool is slowed down, the elbow is, too.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
-  torques_.step();
-  const Speeds limit{std::min(share * limits_.max_tool_speed_m_per_s, torques_.eased_m_per_s()),
-                     share * limits_.max_elbow_speed_m_per_s};
+  const Speeds limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s};
   ArmPoints at;
   evaluate(wanted_rad, quick_rounds, at);
   if (links_W != nullptr) lead_W_ = (at.tool_W - *links_W).cwiseMax(-most_lead_m).cwiseMin(most_lead_m);
@@ -145,7 +133,7 @@ void ToolGuard::evaluate(const JointVector& theta, int rounds, ArmPoints& out) c
 }
 
 double ToolGuard::stop_s(const JointVector& u) const noexcept {
-  return std::max(u.cwiseAbs().cwiseQuotient(acceleration_).maxCoeff(), torques_.stop_s(u));
+  return u.cwiseAbs().cwiseQuotient(acceleration_).maxCoeff();
 }
 
 double ToolGuard::bend(const JointVector& d) const noexcept {
@@ -167,7 +155,6 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
   const JointVector u = (theta - target_rad_) / T;
   const double t = stop_s(u), curvature = bend(u);  // the path's second derivative in time, m/s²
   const JointVector way = braking_way(u, t);
-  torques_.judge(u, speed_rad_per_s_, out);
   judge_motion(at, t * curvature, limit, care, out);
   if (!has_borders_) return out;
   const double step_m = (at.tool_W - points_.tool_W).norm();
@@ -247,10 +234,7 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
   evaluate(wanted, exact_rounds, at);
   out = broken(wanted, at, limit, Care::exact);
   if (out.kinds == 0) return accept(wanted, at);
-  // Only in these poses is a setpoint that is held back followed by others that are.
-  if (torques_.strained() || folds() || stretched()) torques_.strain();
-  // With rated torques, the braking time depends on the pose. Braking goes on as it was judged.
-  const double T = period_s_, t = torques_.rated() ? brakes_for_s_ : stop_s(speed_rad_per_s_);
+  const double T = period_s_, t = stop_s(speed_rad_per_s_);
   const JointVector slower = t > T ? JointVector(target_rad_ + (1.0 - T / t) * T * speed_rad_per_s_) : target_rad_;
   const JointVector brakes = within_ranges(slower);
   JointVector best = brakes;
@@ -270,41 +254,10 @@ void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, Active
     best_at = at;
   }
   accept(best, best_at);
-  if (kept == 0.0) brakes_for_s_ = std::max(0.0, t - T);
-  if (out.has(Limit::joint_torque)) torques_.ease_from(step_m_ / T / exact_share);
-}
-
-// Whether the arm folds: the joints that carry it turn faster than the tool's speed explains.
-bool ToolGuard::folds() const noexcept {
-  const auto base = std::min(first_joint, static_cast<std::size_t>(speed_rad_per_s_.size())) - 1;
-  const double reach_m = (points_.tool_W - points_.joint_W[base]).norm();
-  const Eigen::Index carrying = std::min<Eigen::Index>(3, speed_rad_per_s_.size());
-  const double fastest = speed_rad_per_s_.head(carrying).cwiseAbs().maxCoeff();
-  return reach_m * fastest * period_s_ > folding * step_m_;
-}
-
-// Whether the arm is stretched: these joints move the wrist in nearly one plane. Then the determinant of the unit
-// directions of their motions, whose size is 1 for right angles, is small.
-bool ToolGuard::stretched() const noexcept {
-  const auto axes = static_cast<std::size_t>(target_rad_.size());
-  if (axes < 3) return true;
-  models::ToolKinematics at;
-  arm_->kinematics(target_rad_ - points_.twist_rad, at);
-  const Vec3 wrist_T = points_.joint_W[std::min(wrist, axes - 1)] - points_.tool_W;
-  models::Mat3 moves;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    moves.col(i) = at.J_W.col(i).head<3>() + Vec3(at.J_W.col(i).tail<3>()).cross(wrist_T);
-    moves.col(i).stableNormalize();
-  }
-  return std::abs(moves.determinant()) < flat;
 }
 
 void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
-  step_m_ = (at.tool_W - points_.tool_W).norm();
-  const JointVector u = (theta - target_rad_) / period_s_;
-  brakes_for_s_ = stop_s(u);
-  torques_.accept(theta - at.twist_rad);
-  speed_rad_per_s_ = u;
+  speed_rad_per_s_ = (theta - target_rad_) / period_s_;
   target_rad_ = theta;
   twist_k2_rad_ = points_.twist_rad;
   points_ = at;
@@ -313,8 +266,7 @@ void ToolGuard::accept(const JointVector& theta, const ArmPoints& at) noexcept {
 void ToolGuard::archive(fieldbus::StateArchive& state) noexcept {
   state(target_rad_, speed_rad_per_s_, twist_k2_rad_, points_.twist_rad, points_.tool_W);
   for (Vec3& joint_W : points_.joint_W) state(joint_W);
-  state(step_m_, brakes_for_s_, lead_W_);
-  torques_.archive(state, target_rad_ - points_.twist_rad);
+  state(lead_W_);
 }
 
 }  // namespace proxarm::controller

@@ -16,9 +16,8 @@
 // These bounds must also hold on the way to rest. From θ, with the speed u = (θ − θ₁)/T,
 // all joints brake together along u, in the time t that the slowest needs at its own deceleration:
 //   θ_b = θ + (1 − T/t)uT and so on,   t = max_i |u_i|/a_i
-// If the cell rates the drives' torques (torque_guard.hpp), braking may take longer, and the step from θ₁ to θ is
-// bounded, too. When such a braking is needed it doesn't have to be judged, because this was done when the setpoint
-// before it was accepted. So if a wanted setpoint breaks a bound, bisection finds the setpoint furthest along the
+// When such a braking is needed it doesn't have to be judged, because this was done when the setpoint before it was
+// accepted. So if a wanted setpoint breaks a bound, bisection finds the setpoint furthest along the
 // straight line (in joint space) from θ_b to the wanted one that keeps all bounds. θ_b itself always keeps them, by
 // induction from rest.
 //
@@ -36,7 +35,6 @@
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
-#include "controller/setpoints/torque_guard.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/description/cell.hpp"
@@ -50,10 +48,7 @@ class ToolGuard {
             const description::CellLimits& limits, double period_s);
 
   // Precondition: the arm is at rest.
-  void set_period(double period_s) noexcept {
-    period_s_ = period_s;
-    torques_.set_period(period_s);
-  }
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Starts at rest at these angles.
   void start(const models::JointVector& target_rad) noexcept;
   // One period. Precondition: `wanted_rad` is finite and within each joint's own limits (JointGuard).
@@ -62,12 +57,6 @@ class ToolGuard {
   // active.
   ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s,
                     const models::Vec3* links_W) noexcept;
-
-  // Precondition: the arm is at the end of its reach, where setpoints may be held back from cycle to cycle
-  // (torque_guard.hpp).
-  void strain() noexcept { torques_.strain(); }
-  // A drive is blocked, so the torques of its setpoints aren't those that move the arm.
-  void relax() noexcept { torques_.relax(); }
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
@@ -98,8 +87,6 @@ class ToolGuard {
   void judge_borders(const models::Vec3& at, const models::Vec3& rest, double step_bend, double rest_bend,
                      ActiveLimits& out) const noexcept;
   void hold_back(const models::JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept;
-  [[nodiscard]] bool folds() const noexcept;
-  [[nodiscard]] bool stretched() const noexcept;
   void accept(const models::JointVector& theta, const models::ArmPoints& at) noexcept;
 
   const models::Arm* arm_;
@@ -108,13 +95,10 @@ class ToolGuard {
   description::CellLimits limits_;
   bool has_borders_;
   double period_s_;
-  TorqueGuard torques_;
 
   models::JointVector target_rad_, speed_rad_per_s_, twist_k2_rad_;
   models::ArmPoints points_;                    // at target_rad_
-  double step_m_ = 0.0;                         // of T, in the last period
   models::Vec3 lead_W_ = models::Vec3::Zero();  // of motors before links, as above
-  double brakes_for_s_ = 0.0;                   // the duration of the braking that was judged with target_rad_
   std::uint64_t judged_exactly_ = 0;
 };
 
