@@ -31,7 +31,9 @@ constexpr double few_axes_turning = 100.0;
 constexpr double beside_place = 1e-7;
 // A place within this counts as reached: a tenth of what encoders resolve at a metre.
 constexpr double reached_m = 1e-9;
-constexpr double place_tolerance_m = 1e-12, turn_tolerance_rad = 1e-9;
+constexpr double place_tolerance_m = 1e-12;
+// A step that leaves a curved set by less, in m or rad, is within it: 1 µm/s at 1 ms.
+constexpr double set_tolerance = 1e-9;
 // The least time in which borders of turning and of the place's margin are approached. It is that of the longest
 // braking otherwise: a border that is approached by the present braking time is passed if joints get faster before it.
 constexpr double approach_s = 0.1;
@@ -157,6 +159,17 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
     whole_.low[i] = std::clamp(coasts - change, low, brakes_[i]);
     whole_.high[i] = std::clamp(coasts + change, brakes_[i], high);
   }
+  make_stop();
+}
+
+// The step along the last one that brakes as hard as the box allows: often to rest at once, since the filter follows.
+void ArmStep::make_stop() noexcept {
+  double share = 0.0;
+  for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
+    const double u = step_rad_[i], least = u > 0.0 ? whole_.low[i] : whole_.high[i];
+    if (u != 0.0) share = std::max(share, least / u);
+  }
+  stop_ = (std::min(1.0, share) * step_rad_).cwiseMax(whole_.low).cwiseMin(whole_.high);
 }
 
 // A hand that turns a point changes its turning no faster than joints take it up. One box for entering and for leaving
@@ -191,7 +204,7 @@ bool ArmStep::Box::contains(const JointVector& u) const noexcept {
 // How far σ may fall in this step: towards its border as towards any other, and never below what braking makes of it.
 double ArmStep::place_bound() const noexcept {
   const double share = period_s_ / (period_s_ + brakes_s_);
-  return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), -margin_.gradient().dot(brakes_));
+  return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), -margin_.gradient().dot(stop_));
 }
 
 bool ArmStep::allows(const JointVector& u) const noexcept {
@@ -237,9 +250,9 @@ bool ArmStep::points_too_fast(const JointVector& u) const noexcept {
   arm_->points(link_rad_, before);
   arm_->points(link_rad_ + u, after);
   // Where braking makes T no faster, its own set bounds it (step_limits.hpp).
-  if (B > tool_m_per_s && (after.tool_W - before.tool_W).norm() > tool_m + rounding_rad) return true;
+  if (B > tool_m_per_s && (after.tool_W - before.tool_W).norm() > tool_m + set_tolerance) return true;
   for (auto k = first_point; k < static_cast<std::size_t>(u.size()); ++k) {
-    if ((after.joint_W[k] - before.joint_W[k]).norm() > elbow_m + rounding_rad) return true;
+    if ((after.joint_W[k] - before.joint_W[k]).norm() > elbow_m + set_tolerance) return true;
   }
   return false;
 }
@@ -346,8 +359,8 @@ void ArmStep::add_sets() noexcept {
 // by the curvature of a way along its border, holds nothing back.
 bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
   if (row_count_ == rows_.size()) return false;
-  const Row row{a, std::max(b, a.dot(brakes_)), limit};
-  if (a.dot(step) <= row.b + rounding_rad) return false;
+  const Row row{a, std::max(b, a.dot(stop_)), limit};
+  if (a.dot(step) <= row.b + set_tolerance) return false;
   rows_[row_count_++] = row;
   return true;
 }
@@ -390,7 +403,7 @@ bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexce
     Eigen::Quaterniond within = to;
     start_.turn.keep(from, within);
     const Vec3 beyond = models::rotation_vector(to * within.conjugate());
-    if (const double angle = beyond.norm(); angle > turn_tolerance_rad) {
+    if (const double angle = beyond.norm(); angle > set_tolerance) {
       const Vec3 n = beyond / angle;
       leaves = add_row(J_R.transpose() * n, n.dot(J_R * u) - angle, Limit{}, u);
     }

@@ -19,7 +19,8 @@
 // where it turns freely, as braking turns it: turning gives way first. The proxy's next place is one of them: q(k) is
 // where the arm is sent.
 //
-// U contains the step u_b by which all joints brake together, and each half-space is widened to contain it. A force of
+// U contains the step u_b by which all joints brake together as hard as they can, and each half-space is widened to
+// contain it. A force of
 // U's normal cone therefore has f·(u − u_b) ≤ 0: a limit never drives the arm beyond what braking would. That is what
 // lets an arm come back that was led where it can't go.
 //
@@ -115,6 +116,7 @@ class ArmStep final : public FollowableStep {
   };
 
   void make_boxes(const ArmStepStart& start) noexcept;
+  void make_stop() noexcept;
   [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
   [[nodiscard]] double place_bound() const noexcept;
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
@@ -159,7 +161,8 @@ class ArmStep final : public FollowableStep {
 
   // Of this step.
   ArmStepStart start_;
-  models::JointVector brakes_;   // u_b
+  models::JointVector brakes_;   // all joints brake together, by half of their acceleration
+  models::JointVector stop_;     // u_b
   Box whole_, box_;              // U's, and the part of it that is used
   double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)
