@@ -204,7 +204,7 @@ bool ArmStep::Box::contains(const JointVector& u) const noexcept {
 // How far σ may fall in this step: towards its border as towards any other, and never below what braking makes of it.
 double ArmStep::place_bound() const noexcept {
   const double share = period_s_ / (period_s_ + brakes_s_);
-  return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), -margin_.gradient().dot(stop_));
+  return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), least(-margin_.gradient()));
 }
 
 bool ArmStep::allows(const JointVector& u) const noexcept {
@@ -355,11 +355,16 @@ void ArmStep::add_sets() noexcept {
   for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit, -1);
 }
 
-// Takes in a·u ≤ b, widened to contain braking. Whether that excludes this step: a set that is left by braking, too, or
-// by the curvature of a way along its border, holds nothing back.
+// The least of a·u in the box.
+double ArmStep::least(const JointVector& a) const noexcept {
+  return (a.array() * (a.array() > 0.0).select(whole_.low, whole_.high).array()).sum();
+}
+
+// Takes in a·u ≤ b, widened to contain what the joints can still do. Whether that excludes this step: a set that is
+// left by braking, too, or by the curvature of a way along its border, holds nothing back.
 bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
   if (row_count_ == rows_.size()) return false;
-  const Row row{a, std::max(b, a.dot(stop_)), limit};
+  const Row row{a, std::max(b, least(a)), limit};
   if (a.dot(step) <= row.b + set_tolerance) return false;
   rows_[row_count_++] = row;
   return true;
@@ -490,8 +495,8 @@ ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
       use_box(ease_ * next_ease);
       reached = solve_at(model_, J_p, wanted);
     }
-    if (!reached) solve_near(model_, J_p, wanted);
-    const JointVector u = program_.u().cwiseMax(box_.low).cwiseMin(box_.high);
+    const bool solved = reached || solve_near(model_, J_p, wanted);
+    const JointVector u = solved ? JointVector(program_.u().cwiseMax(box_.low).cwiseMin(box_.high)) : stop_;
     const ActiveLimits limits = pressing();
     if (leave_curved_sets(model_, u)) continue;
     active_ = limits;

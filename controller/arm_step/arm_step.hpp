@@ -117,6 +117,7 @@ class ArmStep final : public FollowableStep {
 
   void make_boxes(const ArmStepStart& start) noexcept;
   void make_stop() noexcept;
+  [[nodiscard]] double least(const models::JointVector& a) const noexcept;
   [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
   [[nodiscard]] double place_bound() const noexcept;
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
