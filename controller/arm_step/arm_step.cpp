@@ -45,6 +45,7 @@ constexpr double caught_up_rad = 1e-6;
 // How the change of a joint's step that is tried grows, and from where on it is U's whole box.
 constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
 constexpr int most_rounds = 8;
+constexpr double alike = 1e-3;  // of half-spaces' normals: the sine of the angle between them
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
 
@@ -62,7 +63,8 @@ ArmStep::ArmStep(const models::Arm& arm, const models::InverseKinematics& invers
       inverse_(&inverse),
       curvature_(arm.path_curvature()),
       cost_(arm.axes()),
-      margin_(arm, inverse.space()) {
+      margin_(arm, inverse.space()),
+      brakes_s_(braking_s(drives)) {
   for (Eigen::Index i = 0; i < cost_.size(); ++i) {
     const description::DriveDescription& drive = drives[static_cast<std::size_t>(i)];
     joints_.push_back({drive.range_rad[0], drive.range_rad[1], drive.max_speed_rad_per_s,
@@ -73,12 +75,18 @@ ArmStep::ArmStep(const models::Arm& arm, const models::InverseKinematics& invers
   start(arm.start_rad());
 }
 
+double ArmStep::braking_s(const std::vector<description::DriveDescription>& drives) noexcept {
+  double longest_s = approach_s;
+  for (const description::DriveDescription& drive : drives) {
+    const double deceleration = braking_share * drive.max_acceleration_rad_per_s2;
+    longest_s = std::max(longest_s, speed_share * drive.max_speed_rad_per_s / deceleration);
+  }
+  return longest_s;
+}
+
 void ArmStep::set_period(double period_s) noexcept {
   period_s_ = period_s;
-  brakes_s_ = approach_s;
   for (Joint& joint : joints_) {
-    const double slowest_s = speed_share * joint.speed_rad_per_s / (braking_share * joint.acceleration_rad_per_s2);
-    brakes_s_ = std::max(brakes_s_, slowest_s);
     joint.per_step_rad = speed_share * joint.speed_rad_per_s * period_s;
     joint.share = period_s / (period_s + joint.speed_rad_per_s / joint.acceleration_rad_per_s2);
   }
@@ -288,11 +296,9 @@ bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexc
   const Vec3 beyond = wanted - wrist_.J_W * program_.u();
   const double length = beyond.norm();
   if (!(length > reached_m)) return false;
-  const ActiveLimits limits = pressing();
+  out.limits = pressing();
   out.normal = beyond / length;
   out.bound_m = out.normal.dot(q_W - q_k1_W) - length;
-  out.limit = static_cast<Limit>(limits.kinds);
-  out.axis_bits = limits.axes;
   out.share = 0.0;
   return true;
 }
@@ -363,9 +369,15 @@ double ArmStep::least(const JointVector& a) const noexcept {
 // Takes in a·u ≤ b, widened to contain what the joints can still do. Whether that excludes this step: a set that is
 // left by braking, too, or by the curvature of a way along its border, holds nothing back.
 bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVector& step) noexcept {
-  if (row_count_ == rows_.size()) return false;
   const Row row{a, std::max(b, least(a)), limit};
   if (a.dot(step) <= row.b + set_tolerance) return false;
+  // Linearised anew: two rows that are nearly parallel would lose the program's digits.
+  for (std::size_t k = 0; k < row_count_; ++k) {
+    if (rows_[k].limit != limit || (rows_[k].a - a).norm() > alike * a.norm()) continue;
+    rows_[k] = row;
+    return true;
+  }
+  if (row_count_ == rows_.size()) return false;
   rows_[row_count_++] = row;
   return true;
 }

@@ -62,6 +62,9 @@ class ArmStep final : public FollowableStep {
   ArmStep(const models::Arm& arm, const models::InverseKinematics& inverse,
           const std::vector<description::DriveDescription>& drives, double period_s);
 
+  // In which all joints together brake from any speed, and in which the borders of curved sets are approached.
+  [[nodiscard]] static double braking_s(const std::vector<description::DriveDescription>& drives) noexcept;
+
   void set_period(double period_s) noexcept;
   // At rest at these angles of the links.
   void start(const models::JointVector& link_rad) noexcept;
@@ -152,8 +155,7 @@ class ArmStep final : public FollowableStep {
   models::JointVector cost_;  // of a joint's step, beside turning
   PlaceMargin margin_;
   double period_s_ = 0.0;
-  // In which all joints together brake from any speed, and in which the borders of curved sets are approached.
-  double brakes_s_ = 0.0;
+  double brakes_s_;  // braking_s()
 
   // Its history.
   models::JointVector link_rad_, step_rad_;

@@ -151,7 +151,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record.set(RecordFlag::timestep, timestep_.under_way());
   record.set(RecordFlag::power_cut, supervisor_.cuts_power());
   for (const LimitFlag& flag : limit_flags) record.set(flag.flag, motion_->active().has(flag.limit));
-  record.limited_axes = motion_->active().axes;
+  record.limited_joints = motion_->active().joints;
   record.fault = supervisor_.report().fault;
   if (state_.entered_phase == Phase::holding) record.held_for = supervisor_.held_for().fault;
   const FaultReport& report = record.fault != Fault::none ? supervisor_.report() : supervisor_.held_for();

@@ -149,7 +149,7 @@ class LimitSets {
     const double length = normal.norm();
     if (!(length > 1e-9)) return false;
     for (std::size_t i = flat_count_; i > plane_count_; --i) planes_[i] = planes_[i - 1];
-    planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limit, plane.axis_bits};
+    planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limits};
     ++flat_count_;
     return true;
   }
@@ -160,7 +160,7 @@ class LimitSets {
       const V normal = basis.transpose() * plane.normal;
       const double length = normal.norm();
       if (!(length > 1e-9)) continue;  // parallel to the scene's space: no motion in it comes nearer
-      planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limit, plane.axis_bits};
+      planes_[plane_count_++] = {normal / length, plane.bound_m / length, plane.limits};
     }
     flat_count_ = plane_count_;
   }
@@ -324,7 +324,7 @@ class LimitSets {
     if (is_ball(i)) {
       active.set(ball(i).limit);
     } else if (!is_wall(i)) {
-      active.set(planes_[i].limit, planes_[i].axis_bits);
+      active.add(planes_[i].limits);
     }
   }
 
@@ -362,7 +362,7 @@ class LimitSets {
     for (std::size_t i = 0; with_soft && i < soft_count_; ++i) note(soft_[i], soft[i], active);
     for (std::size_t i = 0; i < hard_count_; ++i) note(hard_[i], hard[i], active);
     for (std::size_t i = 0; i < plane_count_; ++i) {
-      if (pushed[i] > 0.0) active.set(planes_[i].limit, planes_[i].axis_bits);
+      if (pushed[i] > 0.0) active.add(planes_[i].limits);
     }
     return x;
   }

@@ -58,6 +58,8 @@ const char* limit_parameter(Limit limit) noexcept {
       return "guard of the setpoints: limits.max_elbow_speed_m_per_s";
     case Limit::guard_border:
       return "guard of the setpoints: limits.workspace_m, limits.keep_out_m";
+    case Limit::guard_turning:
+      return "guard of the setpoints: limits.max_turn_rad, max_tilt_rad, max_twist_rad, max_turning_speed_rad_per_s";
   }
   return "?";
 }
@@ -113,19 +115,20 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
     const auto k = static_cast<std::size_t>(i);
     const double to_upper = limits_.workspace_max_m[k] - q_W[i], to_lower = q_W[i] - limits_.workspace_min_m[k];
     if (std::isfinite(to_upper)) {
-      add_plane(out, {Vec3::Unit(i), room(to_upper), Limit::workspace, 0, share});
+      add_plane(out, {Vec3::Unit(i), room(to_upper), ActiveLimits::of(Limit::workspace), share});
     }
     if (std::isfinite(to_lower)) {
-      add_plane(out, {-Vec3::Unit(i), room(to_lower), Limit::workspace, 0, share});
+      add_plane(out, {-Vec3::Unit(i), room(to_lower), ActiveLimits::of(Limit::workspace), share});
     }
   }
   for (const description::BoxDescription& zone : limits_.keep_out) {
-    LimitPlane<3> nearest{Vec3::UnitX(), -std::numeric_limits<double>::infinity(), Limit::keep_out, 0};
+    const ActiveLimits limits = ActiveLimits::of(Limit::keep_out);
+    LimitPlane<3> nearest{Vec3::UnitX(), -std::numeric_limits<double>::infinity(), limits};
     for (int i = 0; i < 3; ++i) {
       const auto k = static_cast<std::size_t>(i);
       const double below = zone.min_m[k] - q_W[i], above = q_W[i] - zone.max_m[k];
-      if (below > nearest.bound_m) nearest = {Vec3::Unit(i), below, Limit::keep_out, 0};
-      if (above > nearest.bound_m) nearest = {-Vec3::Unit(i), above, Limit::keep_out, 0};
+      if (below > nearest.bound_m) nearest = {Vec3::Unit(i), below, limits};
+      if (above > nearest.bound_m) nearest = {-Vec3::Unit(i), above, limits};
     }
     nearest.bound_m = room(nearest.bound_m);
     nearest.share = share;
@@ -145,9 +148,10 @@ void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Ja
     const Vec3 row = factors.solve(J_W.col(k).head<3>());
     const double length = row.norm();
     if (!(length > 1e-9)) continue;
-    const auto bit = static_cast<std::uint8_t>(1u << i);
-    add_plane(out, {row / length, (joints_[i].upper_rad - joint_rad[k]) / length, Limit::joint_range, bit});
-    add_plane(out, {-row / length, (joint_rad[k] - joints_[i].lower_rad) / length, Limit::joint_range, bit});
+    ActiveLimits limits;
+    limits.set(Limit::joint_range, static_cast<std::uint8_t>(1u << i));
+    add_plane(out, {row / length, (joints_[i].upper_rad - joint_rad[k]) / length, limits});
+    add_plane(out, {-row / length, (joint_rad[k] - joints_[i].lower_rad) / length, limits});
   }
 }
 

@@ -50,33 +50,48 @@ enum class Limit : std::uint16_t {
   following_error = 1u << 10,  // a drive doesn't follow, and its setpoint waits for it
   joint_torque = 1u << 11,     // impedance type: the rendered force is reduced
   // Changes that the last guard has made to setpoints (controller/setpoints/tool_guard.hpp):
-  guard_speed = 1u << 12,   // of the tool
-  guard_elbow = 1u << 13,   // speed of elbow or wrist
-  guard_border = 1u << 14,  // workspace or keep-out zones
+  guard_speed = 1u << 12,    // of the tool
+  guard_elbow = 1u << 13,    // speed of elbow or wrist
+  guard_border = 1u << 14,   // workspace or keep-out zones
+  guard_turning = 1u << 15,  // angle, tilt, twist or speed
 };
 
 inline constexpr std::array all_limits{
     Limit::leash,        Limit::power,       Limit::workspace,          Limit::keep_out,
     Limit::joint_range,  Limit::joint_speed, Limit::joint_acceleration, Limit::speed,
     Limit::acceleration, Limit::singularity, Limit::following_error,    Limit::joint_torque,
-    Limit::guard_speed,  Limit::guard_elbow, Limit::guard_border};
+    Limit::guard_speed,  Limit::guard_elbow, Limit::guard_border,       Limit::guard_turning};
+
+// Those that hold single joints.
+inline constexpr std::array limits_of_joints{Limit::joint_range, Limit::joint_speed, Limit::joint_acceleration,
+                                             Limit::following_error, Limit::joint_torque};
 
 // The parameter that sets a limit: "limits.leash_m", "drives[].range_rad".
 const char* limit_parameter(Limit limit) noexcept;
 
 // The limits that were active in a cycle.
 struct ActiveLimits {
-  std::uint16_t kinds = 0;  // bits of Limit
-  std::uint8_t axes = 0;    // joints whose own limits were active, as bits
+  // The joints that each of limits_of_joints held, as bits.
+  using Joints = std::array<std::uint8_t, limits_of_joints.size()>;
 
-  void set(Limit limit, std::uint8_t axis_bits = 0) noexcept {
+  std::uint16_t kinds = 0;  // bits of Limit
+  Joints joints{};
+
+  static ActiveLimits of(Limit limit) noexcept {
+    ActiveLimits out;
+    out.set(limit);
+    return out;
+  }
+  void set(Limit limit, std::uint8_t joint_bits = 0) noexcept {
     kinds = static_cast<std::uint16_t>(kinds | static_cast<std::uint16_t>(limit));
-    axes = static_cast<std::uint8_t>(axes | axis_bits);
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      if (limits_of_joints[i] == limit) joints[i] = static_cast<std::uint8_t>(joints[i] | joint_bits);
+    }
   }
   [[nodiscard]] bool has(Limit limit) const noexcept { return (kinds & static_cast<std::uint16_t>(limit)) != 0; }
   void add(const ActiveLimits& other) noexcept {
     kinds = static_cast<std::uint16_t>(kinds | other.kinds);
-    axes = static_cast<std::uint8_t>(axes | other.axes);
+    for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = static_cast<std::uint8_t>(joints[i] | other.joints[i]);
   }
 };
 
@@ -91,9 +106,8 @@ template <int N>
 struct LimitPlane {
   models::Vec<N> normal = models::Vec<N>::Zero();  // unit, outwards
   double bound_m = 0.0;
-  Limit limit = Limit::workspace;
-  std::uint8_t axis_bits = 0;
-  double share = 0.0;  // share of a step towards it by which its bound shrinks for the next step; 0 for a speed
+  ActiveLimits limits{};  // that form it
+  double share = 0.0;     // share of a step towards it by which its bound shrinks for the next step; 0 for a speed
 };
 
 class FollowableStep;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "models/base/archive_fields.hpp"
 #include "models/geometry/tool_pose.hpp"
@@ -41,6 +42,16 @@ Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
+// The longest time in which the tool comes to rest: joints brake, the tool's acceleration is limited, and setpoints
+// come late by the filter's 2/ω.
+double longest_braking_s(const std::vector<description::DriveDescription>& drives,
+                         const description::CellLimits& limits) noexcept {
+  const double filter_s =
+      limits.setpoint_bandwidth_Hz > 0.0 ? 1.0 / (std::numbers::pi * limits.setpoint_bandwidth_Hz) : 0.0;
+  return filter_s +
+         std::max(ArmStep::braking_s(drives), limits.max_tool_speed_m_per_s / limits.max_tool_acceleration_m_per_s2);
+}
+
 Damping damping_by(Passivity passivity) noexcept {
   if (passivity == Passivity::on) return Damping::at_once;
   return passivity == Passivity::automatic ? Damping::what_lasts : Damping::never;
@@ -65,6 +76,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       arm_step_(arm, parts_.inverse, drives, settings.period_s),
       final_(arm, drives, limits, settings.period_s) {
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
+  limits_work_.set_braking(longest_braking_s(drives, limits));
   const models::ToolKinematics& at = arm_step_.kinematics();
   R_TS_ = at.X_WT.linear().transpose() * at.X_WS.linear();
   if (settings.looks_ahead) {
@@ -99,6 +111,7 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
     ahead_->proxy_step.start(arm_step_.link_rad());
     ahead_->proxy_filter.start(arm_step_.link_rad());
   }
+  limits_work_.start();
   if (passivity_) passivity_->start(measured.tool_W);
   if (parts_.links) parts_.links->start(measured.link_rad);
   hand_.start();
@@ -157,7 +170,7 @@ void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
   if (passivity_) passivity_->archive(state);
   if (parts_.links) parts_.links->archive(state);
   if (ahead_) state(ahead_->point, ahead_->proxy_step, ahead_->proxy_filter);
-  state(parts_.elastic, parts_.orientation, hand_, arm_step_, final_, parts_.inverse.posture());
+  state(parts_.elastic, parts_.orientation, hand_, arm_step_, final_, limits_work_, parts_.inverse.posture());
   archive_fields(state, state_);
 }
 
@@ -185,6 +198,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
     turned = parts_.orientation.step(h_W.torque);
   }
   make_limits(cycle);
+  const Vec3 from_W = state_.q_k1_W;
   const WorldStep step = parts_.world->step(h_W.force, step_limits_);
   if (step.fault == ProxyFault::none && turned != ProxyFault::none) {
     cycle.alarm.raise(Fault::proxy_not_finite);
@@ -205,7 +219,10 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
                                    ? parts_.pose->turning_limited()
                                    : parts_.orientation.speed_limited() || parts_.orientation.angle_limited();
   cycle.record.set(RecordFlag::limit_orientation, turning_limited);
-  follow_proxy(cycle);
+  if (follow_proxy(cycle)) {
+    judge_limits(step, from_W, cycle);
+    send(measured);
+  }
   count_work(step);
   const double distance_m = std::max((measured.tool_W - state_.q_k1_W).norm(), turned_away_m(measured));
   if (!(distance_m <= limits_.leash_m + leash_tolerance_m)) {
@@ -383,7 +400,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   const WorldStep step = world().step(h_W, step_limits_);
   if (!take(step, cycle)) return false;
   cycle.record.p_hat_W_m = triple(step.p_hat_W);
-  follow_proxy(cycle);
+  if (follow_proxy(cycle)) send(cycle.measured);
   return parts_.release->over(state_.q_k1_W, hand_W);
 }
 
@@ -393,31 +410,49 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 // held meanwhile, the proxy would be ½H²h/M further. That term is left out, because the sensor at the handle also
 // measures the inertia of the hand's own mass, which the term would feed back: the arm's elastic modes would then stay
 // calm only up to half as long a horizon (docs/design.md has the figures).
-void AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
+bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   if (const OrientationConfig& turning = parts_.orientation.config(); turning.free) {
     cycle.record.proxy_inertia_kg_m2 = turning.inertia_kg_m2;
     cycle.record.proxy_turning_damping_Nms_per_rad = turning.damping_Nms_per_rad;
   }
   const Eigen::Quaterniond R_k1_WT = arm_step_.R_WT();
   if (ahead_) {
-    if (!go(ahead_->proxy_step, state_.q_k1_W, cycle)) return;
+    if (!go(ahead_->proxy_step, state_.q_k1_W, cycle)) return false;
     ahead_->proxy_filter.step(ahead_->proxy_step.link_rad());
     put_proxy_where(ahead_->proxy_step);
     SentPoint& point = ahead_->point;
     point.advance_horizon();
     point.step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), ahead_->limits);
     active_.add(point.active());
-    if (!go(arm_step_, point.c_k1_W(), cycle)) return;
+    if (!go(arm_step_, point.c_k1_W(), cycle)) return false;
     point.correct(arm_step_.kinematics().X_WT.translation());
   } else {
-    if (!go(arm_step_, state_.q_k1_W, cycle)) return;
+    if (!go(arm_step_, state_.q_k1_W, cycle)) return false;
     put_proxy_where(arm_step_);
   }
   if (parts_.inverse.reaches_orientation() && arm_step_.R_WT().angularDistance(R_WT()) > same_turn_rad) {
     cycle.record.set(RecordFlag::limit_orientation, true);
     if (parts_.orientation.config().free) turn_on_from(arm_step_, R_k1_WT);
   }
-  send(parts_.elastic.step(arm_step_.link_rad()), cycle.measured);
+  return true;
+}
+
+// f_l is what the limits did in the proxy's step, and what the arm's step moved the proxy by beside it.
+void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, const MotionCycle& cycle) noexcept {
+  if (step.settled) return;
+  const double T = period_s_, kappa = step.mass_kg / (T * T) + step.damping_Ns_per_m / T;
+  const Vec3 way = state_.q_k1_W - from_W, omega_W = parts_.orientation.velocity_W();
+  const Vec3 limits_W = step.limit_force_W + kappa * (state_.q_k1_W - step.q_W);
+  const Vec3 torque_W = parts_.pose != nullptr ? step.limit_torque_W : parts_.orientation.limit_torque_W();
+  const models::Wrench& h_W = cycle.measured.hand_W;
+  const double v = way.norm() / T, omega = omega_W.norm();
+  limits_work_.step(
+      {.work_J = limits_W.dot(way) + T * torque_W.dot(omega_W),
+       .power_W = (h_W.force.norm() + step.f_W.norm()) * v + (h_W.torque.norm() + step.torque_W.norm()) * omega,
+       .kinetic_J = 0.5 * step.mass_kg * v * v});
+  cycle.record.limits_work_J = limits_work_.total_J();
+  if (!limits_work_.against_the_hand()) return;
+  cycle.alarm.raise(Fault::works_against_hand, -1, limits_work_.push_J(), limits_work_.allowed_J());
 }
 
 // Takes a step of the arm to q_W, turned as the proxy is. False if that isn't a pose.
@@ -457,9 +492,24 @@ void AdmittanceMotion::turn_on_from(const ArmStep& step, const Eigen::Quaternion
   put_proxy_to(state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
 }
 
-void AdmittanceMotion::send(const JointVector& motor_rad, const Measured& measured) noexcept {
-  const FinalSetpoints::Result result =
-      final_.step(motor_rad, parts_.elastic.kinematics().X_WT.translation(), measured, state_.speed_limit_m_per_s);
+// What setpoints are judged by where the hand turns the tool: all that the cell allows.
+TurnSets AdmittanceMotion::turn_limits() const noexcept {
+  TurnSets sets = parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets();
+  sets.max_turn_rad = limits_.max_turn_rad;
+  sets.axis_range.max_tilt_rad = limits_.max_tilt_rad.value_or(AxisRange::everything);
+  sets.axis_range.max_twist_rad = limits_.max_twist_rad.value_or(AxisRange::everything);
+  sets.max_speed_rad_per_s = limits_.max_turning_speed_rad_per_s;
+  return sets;
+}
+
+void AdmittanceMotion::send(const Measured& measured) noexcept {
+  const bool turns = parts_.orientation.config().free;
+  const TurnSets turn = turns ? turn_limits() : TurnSets{};
+  const JointVector motor_rad = parts_.elastic.step(arm_step_.link_rad());
+  const FinalSetpoints::Result result = final_.step(motor_rad, measured,
+                                                    {.max_speed_m_per_s = state_.speed_limit_m_per_s,
+                                                     .links_W = parts_.elastic.kinematics().X_WT.translation(),
+                                                     .turn = turns ? &turn : nullptr});
   active_.add(result.limits);
   made_setpoints_ = true;
   if (result.guarded) ++work_.held_back;

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "controller/arm_step/arm_step.hpp"
+#include "controller/limits/limits_work.hpp"
 #include "controller/limits/sent_point.hpp"
 #include "controller/limits/step_limits.hpp"
 #include "controller/motion/final_setpoints.hpp"
@@ -96,12 +97,14 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] ArmStepStart arm_start(const LinkFilter& filter, const models::JointVector& twist_rad) noexcept;
   void limit_speed(const MotionCycle& cycle) noexcept;
   [[nodiscard]] bool take(const WorldStep& step, const MotionCycle& cycle) noexcept;
-  void follow_proxy(const MotionCycle& cycle) noexcept;
+  [[nodiscard]] bool follow_proxy(const MotionCycle& cycle) noexcept;
+  void judge_limits(const WorldStep& step, const models::Vec3& from_W, const MotionCycle& cycle) noexcept;
   bool go(ArmStep& step, const models::Vec3& q_W, const MotionCycle& cycle) noexcept;
   void put_proxy_where(const ArmStep& step) noexcept;
   void put_proxy_to(const models::Vec3& q_W, const models::Vec3& velocity_W) noexcept;
   void turn_on_from(const ArmStep& step, const Eigen::Quaterniond& from) noexcept;
-  void send(const models::JointVector& motor_rad, const Measured& measured) noexcept;
+  [[nodiscard]] TurnSets turn_limits() const noexcept;
+  void send(const Measured& measured) noexcept;
   void go_on_from_setpoints(std::uint8_t blocked) noexcept;
   [[nodiscard]] double most_turning_rad_per_s() const noexcept;
   [[nodiscard]] double turned_away_m(const Measured& measured) const noexcept;
@@ -126,6 +129,7 @@ class AdmittanceMotion final : public Motion {
   ArmStep arm_step_;  // of the arm as it is sent
   std::unique_ptr<Ahead> ahead_;
   FinalSetpoints final_;
+  LimitsWork limits_work_;
   StepLimits step_limits_;  // of this cycle, around the proxy
   State state_;
   MotionWork work_;

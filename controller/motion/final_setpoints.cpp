@@ -32,13 +32,13 @@ void FinalSetpoints::start(const JointVector& target_rad) noexcept {
   envelope_.start(target_rad);
 }
 
-FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const models::Vec3& links_W,
-                                            const Measured& measured, double max_speed_m_per_s) noexcept {
+FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const Measured& measured,
+                                            const Bounds& bounds) noexcept {
   Result result;
   JointVector wanted_rad = motor_rad;
   result.blocked = find_blocked(motor_rad, measured, wanted_rad);
   if (result.blocked != 0) result.limits.set(Limit::following_error, result.blocked);
-  result.limits.add(guard(wanted_rad, &links_W, max_speed_m_per_s, result.guarded));
+  result.limits.add(guard(wanted_rad, &bounds, result.guarded));
   follow(measured, result.blocked);
   result.differs = result.blocked != 0 || guard_.lag_rad() > limits_.following_error_rad;
   return result;
@@ -49,10 +49,13 @@ JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
   return guard_.speed_rad_per_s();
 }
 
-ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const models::Vec3* links_W, double max_speed_m_per_s,
-                                   bool& held_back) noexcept {
+// Without bounds: braking, which was judged before.
+ActiveLimits FinalSetpoints::guard(const JointVector& wanted_rad, const Bounds* bounds, bool& held_back) noexcept {
   ActiveLimits active = guard_.step(wanted_rad);
-  const ActiveLimits by_tool = tool_guard_.step(guard_.target_rad(), max_speed_m_per_s, links_W);
+  const ActiveLimits by_tool =
+      bounds != nullptr
+          ? tool_guard_.step(guard_.target_rad(), bounds->max_speed_m_per_s, &bounds->links_W, bounds->turn)
+          : tool_guard_.step(guard_.target_rad(), limits_.max_tool_speed_m_per_s, nullptr, nullptr);
   held_back = by_tool.kinds != 0;
   if (!held_back) return active;
   active.add(by_tool);
@@ -74,8 +77,7 @@ void FinalSetpoints::start_run_out() noexcept {
 ActiveLimits FinalSetpoints::run_out() noexcept {
   state_.run_out_share = std::max(0.0, state_.run_out_share - state_.run_out_per_cycle);
   bool held_back = false;
-  return guard(guard_.target_rad() + state_.run_out_share * period_s_ * state_.run_out_rad_per_s, nullptr,
-               limits_.max_tool_speed_m_per_s, held_back);
+  return guard(guard_.target_rad() + state_.run_out_share * period_s_ * state_.run_out_rad_per_s, nullptr, held_back);
 }
 
 // Returns the joints whose drives are blocked, as bits. A blocked drive is commanded at most a little ahead of its

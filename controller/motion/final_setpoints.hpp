@@ -37,9 +37,14 @@ class FinalSetpoints {
     // place, and would shake the tool.
     bool differs = false;
   };
-  // One period towards these angles of the motors, which lead the links' tool to links_W.
-  Result step(const models::JointVector& motor_rad, const models::Vec3& links_W, const Measured& measured,
-              double max_speed_m_per_s) noexcept;
+  // What the setpoints of one period are judged by.
+  struct Bounds {
+    double max_speed_m_per_s;  // the tool's present speed limit
+    models::Vec3 links_W;      // where the motors lead the links' tool
+    const TurnSets* turn;      // limits of turning; null: they aren't judged
+  };
+  // One period towards these angles of the motors.
+  Result step(const models::JointVector& motor_rad, const Measured& measured, const Bounds& bounds) noexcept;
   // After a step that differs: what is wanted next counts from here. Returns the motors' speeds, rad/s.
   models::JointVector go_on_from_here(std::uint8_t blocked) noexcept;
 
@@ -65,8 +70,7 @@ class FinalSetpoints {
     double run_out_per_cycle = 1.0;         // by which the share shrinks in each cycle
   };
 
-  ActiveLimits guard(const models::JointVector& wanted_rad, const models::Vec3* links_W, double max_speed_m_per_s,
-                     bool& held_back) noexcept;
+  ActiveLimits guard(const models::JointVector& wanted_rad, const Bounds* bounds, bool& held_back) noexcept;
   [[nodiscard]] std::uint8_t find_blocked(const models::JointVector& motor_rad, const Measured& measured,
                                           models::JointVector& wanted_rad) const noexcept;
   void follow(const Measured& measured, std::uint8_t blocked) noexcept;

@@ -38,6 +38,11 @@ void AxisRange::validate() const {
   require_option(is_range(max_twist_rad), "limits.max_twist_rad", max_twist_rad, "rad, from 0 to 3");
 }
 
+double AxisRange::beyond_rad(const Eigen::Quaterniond& start, const Eigen::Quaterniond& R) const noexcept {
+  const Turned now = parts_of(start.conjugate() * R, axis_T);
+  return std::max(now.tilt.norm() - max_tilt_rad, std::abs(now.twist) - max_twist_rad);
+}
+
 bool AxisRange::keep(const Eigen::Quaterniond& start, const Eigen::Quaterniond& from, const Step& step,
                      Eigen::Quaterniond& to) const noexcept {
   const Turned before = parts_of(start.conjugate() * from, axis_T);

@@ -20,6 +20,8 @@ struct AxisRange {
   // Throws description::SetupError that names the key.
   void validate() const;
   [[nodiscard]] bool limits() const noexcept { return max_tilt_rad < everything || max_twist_rad < everything; }
+  // How far this orientation is beyond, rad; negative within.
+  [[nodiscard]] double beyond_rad(const Eigen::Quaterniond& start, const Eigen::Quaterniond& R) const noexcept;
   struct Step {
     double period_s = 1e-3, most_rad = 0.1;  // that it may turn the tool by
     double brakes_s = 0.1;                   // in which the border is approached

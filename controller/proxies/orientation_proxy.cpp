@@ -40,13 +40,14 @@ void OrientationConfig::validate() const {
   require_option(is_not_negative(spring_Nm_per_rad), "orientation.spring", spring_Nm_per_rad, "Nm/rad, 0 or more");
   require_option(is_not_negative(damping_Nms_per_rad), "orientation.damping", damping_Nms_per_rad,
                  "Nm s/rad, 0 or more");
-  require_option(is_positive(max_speed_rad_per_s), "orientation.max_speed", max_speed_rad_per_s, "rad/s, above 0");
+  require_option(is_positive(turn.max_speed_rad_per_s), "orientation.max_speed", turn.max_speed_rad_per_s,
+                 "rad/s, above 0");
   // Less than π by more than a step, so that no step can jump to the other side of the limit.
-  require_option(is_not_negative(max_angle_rad) && max_angle_rad <= 3.0, "orientation.max_angle", max_angle_rad,
-                 "rad, from 0 to 3");
-  axis_range.validate();
+  require_option(is_not_negative(turn.max_turn_rad) && turn.max_turn_rad <= 3.0, "orientation.max_angle",
+                 turn.max_turn_rad, "rad, from 0 to 3");
+  turn.axis_range.validate();
   require_option(is_positive(period_s), "--timestep", period_s, "seconds, above 0");
-  require_option(max_speed_rad_per_s * period_s <= 0.1, "orientation.max_speed", max_speed_rad_per_s,
+  require_option(turn.max_speed_rad_per_s * period_s <= 0.1, "orientation.max_speed", turn.max_speed_rad_per_s,
                  "rad/s, at most 0.1 rad in a period");
 }
 

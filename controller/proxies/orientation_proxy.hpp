@@ -39,10 +39,8 @@ struct OrientationConfig {
   models::Mat3 behind_sensor_T = models::Mat3::Zero();  // I, about the rendered point, along T's axes; kg m²
   double damping_Nms_per_rad = 0.5;                     // D ≥ 0
   double spring_Nm_per_rad = 0.0;                       // K ≥ 0
-  double max_speed_rad_per_s = 2.0;                     // > 0, at most 0.1 rad in a period
-  double max_angle_rad = 0.7;                           // from the orientation at the start; 0..3
-  AxisRange axis_range{};                               // of tilt and twist, likewise
-  double period_s = 1e-3;                               // T > 0
+  TurnSets turn{};         // speed > 0, at most 0.1 rad in a period; counted from the orientation at the first start
+  double period_s = 1e-3;  // T > 0
 
   // Throws description::SetupError that names the key.
   void validate() const;
@@ -90,8 +88,11 @@ class OrientationProxy {
 
   // The sets of turning in the next step.
   [[nodiscard]] TurnSets sets() const noexcept {
-    return {R_start_, config_.max_angle_rad, config_.axis_range, speed_share_ * config_.max_speed_rad_per_s,
-            config_.period_s};
+    TurnSets sets = config_.turn;
+    sets.home = R_start_;
+    sets.max_speed_rad_per_s *= speed_share_;
+    sets.period_s = config_.period_s;
+    return sets;
   }
 
  private:

@@ -15,6 +15,11 @@ double TurnSets::reachable_rad(double angle_rad, double most_rad, double period_
   return std::max(most_rad, angle_rad - returning_rad_per_s * period_s);
 }
 
+double TurnSets::beyond_rad(const Eigen::Quaterniond& R) const noexcept {
+  const double beyond = models::rotation_vector(R * home.conjugate()).norm() - max_turn_rad;
+  return axis_range.limits() ? std::max(beyond, axis_range.beyond_rad(home, R)) : beyond;
+}
+
 TurnSets::Held TurnSets::keep(const Eigen::Quaterniond& from, Eigen::Quaterniond& to) const noexcept {
   Held held;
   const Vec3 turn = models::rotation_vector(to * from.conjugate());

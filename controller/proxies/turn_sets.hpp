@@ -30,6 +30,9 @@ struct TurnSets {
   // orientation within them isn't changed. Precondition: both are unit.
   Held keep(const Eigen::Quaterniond& from, Eigen::Quaterniond& to) const noexcept;
 
+  // How far this orientation is beyond the sets of angles, rad; negative within.
+  [[nodiscard]] double beyond_rad(const Eigen::Quaterniond& R) const noexcept;
+
   // How far from the start the next step may lead, from `angle_rad` away.
   [[nodiscard]] static double reachable_rad(double angle_rad, double most_rad, double period_s,
                                             double brakes_s = braking_s) noexcept;

@@ -66,6 +66,8 @@ const char* flag_name(RecordFlag flag) noexcept {
       return "guard_elbow";
     case RecordFlag::guard_border:
       return "guard_border";
+    case RecordFlag::guard_turning:
+      return "guard_turning";
     case RecordFlag::ramp_in:
       return "ramp_in";
     case RecordFlag::slowed:

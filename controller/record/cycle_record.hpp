@@ -44,6 +44,7 @@ enum class RecordFlag : std::uint32_t {
   guard_speed = 1u << 20,            // the last guard changed the setpoints (tool_guard.hpp)
   guard_elbow = 1u << 21,
   guard_border = 1u << 22,
+  guard_turning = 1u << 23,
   ramp_in = 1u << 24,  // only a share of the hand's force was let in
   slowed = 1u << 25,   // the tool's speed limit is below the cell's, because of a fault
   oscillation_lasts = 1u << 26,
@@ -73,7 +74,8 @@ inline constexpr std::array limit_flags{LimitFlag{RecordFlag::limit_speed, Limit
                                         LimitFlag{RecordFlag::limit_joint_torque, Limit::joint_torque},
                                         LimitFlag{RecordFlag::guard_speed, Limit::guard_speed},
                                         LimitFlag{RecordFlag::guard_elbow, Limit::guard_elbow},
-                                        LimitFlag{RecordFlag::guard_border, Limit::guard_border}};
+                                        LimitFlag{RecordFlag::guard_border, Limit::guard_border},
+                                        LimitFlag{RecordFlag::guard_turning, Limit::guard_turning}};
 
 // Three numbers that stay trivially copyable (Eigen's types aren't).
 using Triple = std::array<double, 3>;
@@ -100,8 +102,8 @@ struct CycleRecord {
   ContactPhase contact = ContactPhase::free;
   std::uint8_t contact_count = 0;  // how many things press at once
   std::uint8_t axes = 0;
-  std::uint8_t limited_axes = 0;  // joints whose own limits were active, as bits
-  std::uint32_t flags = 0;        // RecordFlag
+  ActiveLimits::Joints limited_joints{};  // held by limits of their own, as bits
+  std::uint32_t flags = 0;                // RecordFlag
 
   // What the supervisor says: the fault that stopped the arm, and the one that it is held for; none where there is
   // none, or where somebody asked for the hold.
@@ -135,6 +137,7 @@ struct CycleRecord {
   // Of PassivityObserver, where it is wanted.
   PortEnergies energies_J{};
   Triple links_W_m{}, links_W_rad{};  // of a tool that turns: by its links, since rendering began
+  double limits_work_J = 0.0;         // of the limits on the proxy since rendering began (limits_work.hpp)
   double added_damping_Ns_per_m = 0.0, felt_damping_Ns_per_m = 0.0, oscillation_m_per_s = 0.0;
 
   std::int64_t refused_period_ns = 0;          // a timestep that was given up in this cycle; 0: none

@@ -22,6 +22,7 @@ const std::vector<FlagWords>& flag_words() {
       {RecordFlag::guard_speed, "the last guard slows the tool down", true},
       {RecordFlag::guard_elbow, "the last guard slows the elbow down", true},
       {RecordFlag::guard_border, "the last guard keeps the tool within its borders", true},
+      {RecordFlag::guard_turning, "the last guard keeps the tool within its limits of turning", true},
       {RecordFlag::unresolved, "a step that keeps not all laws of contact", false},
       {RecordFlag::power_cut, "the drives' power is cut: stop category 0", false},
       {RecordFlag::slowed, "a fault keeps the tool slow", true},

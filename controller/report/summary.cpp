@@ -82,13 +82,16 @@ struct Slide {
 };
 
 // "limits.leash_m"; a joint's own limit with its name: "axis_2: max_speed_rad_per_s", one for each of `axes`.
-std::vector<std::string> parameter_names(Limit limit, std::uint8_t axes, const std::vector<std::string>& names) {
+std::vector<std::string> parameter_names(Limit limit, const ActiveLimits::Joints& joints,
+                                         const std::vector<std::string>& names) {
   const std::string parameter = limit_parameter(limit);
   constexpr std::string_view of_joints = "drives[].";
-  if (parameter.compare(0, of_joints.size(), of_joints) != 0) return {parameter};
+  const auto kind = std::find(limits_of_joints.begin(), limits_of_joints.end(), limit);
+  if (kind == limits_of_joints.end() || parameter.compare(0, of_joints.size(), of_joints) != 0) return {parameter};
+  const unsigned held = joints[static_cast<std::size_t>(kind - limits_of_joints.begin())];
   std::vector<std::string> out;
-  for (std::size_t i = 0; i < 8; ++i) {
-    if ((axes & (1u << i)) == 0) continue;
+  for (std::size_t i = 0; i < max_axes; ++i) {
+    if ((held & (1u << i)) == 0) continue;
     const std::string joint = i < names.size() ? names[i] : "axis " + std::to_string(i + 1);
     out.push_back(joint + ": " + parameter.substr(of_joints.size()));
   }
@@ -96,6 +99,11 @@ std::vector<std::string> parameter_names(Limit limit, std::uint8_t axes, const s
 }
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) / 1e9; }
+
+bool guarded(const CycleRecord& record) {
+  return record.has(RecordFlag::guard_speed) || record.has(RecordFlag::guard_elbow) ||
+         record.has(RecordFlag::guard_border) || record.has(RecordFlag::guard_turning);
+}
 
 bool limited(const CycleRecord& record) {
   return record.has(RecordFlag::limit_orientation) ||
@@ -127,6 +135,7 @@ struct SummaryBuilder::State {
   void slide(const CycleRecord& now, const Vec3& resistance);
 
   SummaryConfig config;
+  double limits_push_J = 0.0;  // that limits have put into the proxy and not taken back
   Summary summary;
   SetpointHash hash;
   Durations durations;
@@ -197,10 +206,14 @@ void SummaryBuilder::State::count(const CycleRecord& record) {
   if (record.has(RecordFlag::unresolved)) ++summary.unresolved_steps;
   if (record.has(RecordFlag::hands_off)) summary.hands_off_s += 1e-9 * static_cast<double>(record.period_ns);
   if (limited(record)) ++summary.limited_cycles;
+  if (guarded(record)) ++summary.guarded_cycles;
+  limits_push_J = std::max(0.0, limits_push_J + record.limits_work_J - summary.limits_work_J);
+  summary.limits_push_J = std::max(summary.limits_push_J, limits_push_J);
+  summary.limits_work_J = record.limits_work_J;
   if (record.has(RecordFlag::limit_orientation)) count_limit("orientation", RecordFlag::limit_orientation, record);
   for (const LimitFlag& flag : limit_flags) {
     if (!record.has(flag.flag)) continue;
-    for (const std::string& name : parameter_names(flag.limit, record.limited_axes, config.axis_names)) {
+    for (const std::string& name : parameter_names(flag.limit, record.limited_joints, config.axis_names)) {
       count_limit(name, flag.flag, record);
     }
   }

@@ -192,15 +192,18 @@ struct Summary {
   std::optional<PosesSummary> poses;       // set by the caller; absent: impedance type
   double lookahead_s = 0.0;                // horizon at the start; 0: none
   double hands_off_s = 0.0;                // nobody held the handle
-  std::uint64_t held_samples = 0;          // cycles without a new sample of the sensor
-  std::size_t unresolved_steps = 0;        // of a rigid tool: steps of 𝒢 that keep not all laws
-  EndSummary end;                          // set by the caller
-  std::vector<OrderSummary> idle_orders;   // set by the caller
-  std::vector<std::string> drives_lack;    // what drives haven't got, and what is lost by it; set by the caller
-  std::vector<FaultSummary> faults;        // set by the caller
-  std::string black_box;                   // its folder, after a fault; set by the caller
-  std::optional<ViewSummary> view;         // set by the caller; absent: there was none
-  std::vector<NoticeSummary> notices;      // set by the caller
+  std::uint64_t guarded_cycles = 0;  // in which the last guard held a setpoint back: none without a fault
+  // What limits have put into the proxy, and the most without taking it back; negative: they took it.
+  double limits_work_J = 0.0, limits_push_J = 0.0;
+  std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor
+  std::size_t unresolved_steps = 0;       // of a rigid tool: steps of 𝒢 that keep not all laws
+  EndSummary end;                         // set by the caller
+  std::vector<OrderSummary> idle_orders;  // set by the caller
+  std::vector<std::string> drives_lack;   // what drives haven't got, and what is lost by it; set by the caller
+  std::vector<FaultSummary> faults;       // set by the caller
+  std::string black_box;                  // its folder, after a fault; set by the caller
+  std::optional<ViewSummary> view;        // set by the caller; absent: there was none
+  std::vector<NoticeSummary> notices;     // set by the caller
   std::vector<TimestepSummary> timesteps;
   bool from_truth = false;
   std::string setpoint_sha256;

@@ -190,6 +190,9 @@ void add_repeatable(Json& json, const Summary& s) {
   json["poses"] = poses(s.poses);
   json["passivity"] = passivity(s.passivity);
   json["hands_off_s"] = s.hands_off_s;
+  json["guarded_cycles"] = s.guarded_cycles;
+  json["limits_work_J"] = s.limits_work_J;
+  json["limits_push_J"] = s.limits_push_J;
   json["held_samples"] = s.held_samples;
   json["source"] = s.from_truth ? "simulation" : "sensor and encoders";
   json["end"] = {{"reason", s.end.reason}, {"text", s.end.text}};

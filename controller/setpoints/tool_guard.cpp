@@ -25,6 +25,8 @@ constexpr int quick_rounds = 1, exact_rounds = 3;
 constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
 // Rounding of positions.
 constexpr double touching_m = 1e-10;
+// Of orientations: setpoints are rounded to counts of some 1e-7 rad.
+constexpr double turned_rad = 1e-6;
 // While the proxy's limits stop the tool at a border, its gears twist, and setpoints reach some micrometres beyond the
 // border. The guard tolerates this much, so that it doesn't act where the proxy's limits do. It is a fifth of the 0.1
 // mm that are promised. With more, the border would feel soft; with less, it would be felt twice.
@@ -107,11 +109,12 @@ void ToolGuard::start(const JointVector& target_rad) noexcept {
   lead_W_.setZero();
 }
 
-ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s, const Vec3* links_W) noexcept {
+ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_per_s, const Vec3* links_W,
+                             const TurnSets* turn) noexcept {
   ActiveLimits active;
   // If the tool is slowed down, the elbow is, too.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
-  const Speeds limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s};
+  const Limits limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s, turn};
   ArmPoints at;
   evaluate(wanted_rad, quick_rounds, at);
   if (links_W != nullptr) lead_W_ = (at.tool_W - *links_W).cwiseMax(-most_lead_m).cwiseMin(most_lead_m);
@@ -141,21 +144,21 @@ double ToolGuard::bend(const JointVector& d) const noexcept {
   return size.dot(curvature_ * size);
 }
 
-// The braking distance: the sum of (1 − kT/t)uT over the periods k = 1 … t/T.
-JointVector ToolGuard::braking_way(const JointVector& u, double t) const noexcept {
+// How many steps as this one the braking distance is: the sum of 1 − kT/t over the periods k = 1 … t/T.
+double ToolGuard::braking_steps(double t) const noexcept {
   const double T = period_s_, steps = std::floor(t / T);
-  if (steps < 1.0) return JointVector::Zero(u.size());
-  return T * (steps - 0.5 * steps * (steps + 1.0) * T / t) * u;
+  return steps < 1.0 ? 0.0 : steps - 0.5 * steps * (steps + 1.0) * T / t;
 }
 
-ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, const Speeds& limit,
+ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, const Limits& limit,
                                Care care) const noexcept {
   ActiveLimits out;
   const double T = period_s_;
   const JointVector u = (theta - target_rad_) / T;
   const double t = stop_s(u), curvature = bend(u);  // the path's second derivative in time, m/s²
-  const JointVector way = braking_way(u, t);
+  const double more_steps = braking_steps(t);
   judge_motion(at, t * curvature, limit, care, out);
+  if (limit.turn != nullptr) judge_turning(theta, at, limit, more_steps, out);
   if (!has_borders_) return out;
   const double step_m = (at.tool_W - points_.tool_W).norm();
   const double way_m = fastest(step_m / T, t * curvature) * t;
@@ -164,13 +167,14 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
     out.set(Limit::guard_border);
     return out;
   }
+  const JointVector way = more_steps * T * u;
   ArmPoints rest;
   evaluate(theta + way, exact_rounds, rest);
   judge_borders(at.tool_W, rest.tool_W, 0.125 * T * T * curvature, 0.125 * bend(way), out);
   return out;
 }
 
-void ToolGuard::judge_motion(const ArmPoints& at, double growth, const Speeds& limit, Care care,
+void ToolGuard::judge_motion(const ArmPoints& at, double growth, const Limits& limit, Care care,
                              ActiveLimits& out) const noexcept {
   const double T = period_s_, share = care == Care::quick ? quick_share : exact_share;
   const auto judge = [&](const Vec3& step, double most_m_per_s, Limit kind) {
@@ -179,6 +183,24 @@ void ToolGuard::judge_motion(const ArmPoints& at, double growth, const Speeds& l
   judge(at.tool_W - points_.tool_W, limit.tool_m_per_s, Limit::guard_speed);
   for (std::size_t i = first_joint; i < static_cast<std::size_t>(target_rad_.size()); ++i) {
     judge(at.joint_W[i] - points_.joint_W[i], limit.elbow_m_per_s, Limit::guard_elbow);
+  }
+}
+
+Eigen::Quaterniond ToolGuard::orientation(const JointVector& link_rad) const noexcept {
+  return Eigen::Quaterniond(arm_->tool_pose(link_rad).linear()).normalized();
+}
+
+// On the way to rest the tool comes on towards a limit as in this step. While it turns along one, braking in a straight
+// line of the joints leaves it by a few milliradians, which only a stop does.
+void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, const Limits& limit, double more_steps,
+                              ActiveLimits& out) const noexcept {
+  const TurnSets& turn = *limit.turn;
+  const Eigen::Quaterniond from = orientation(target_rad_ - points_.twist_rad), to = orientation(theta - at.twist_rad);
+  const double before = turn.beyond_rad(from), beyond = turn.beyond_rad(to);
+  const double rest = beyond + std::max(0.0, more_steps * (beyond - before));
+  if (from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turned_rad ||
+      rest > std::max(0.0, before) + turned_rad) {
+    out.set(Limit::guard_turning);
   }
 }
 
@@ -225,7 +247,7 @@ JointVector ToolGuard::within_ranges(JointVector theta) const noexcept {
   return theta;
 }
 
-void ToolGuard::hold_back(const JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept {
+void ToolGuard::hold_back(const JointVector& wanted, const Limits& limit, ActiveLimits& out) noexcept {
   ++judged_exactly_;
   ArmPoints at;
   evaluate(target_rad_, exact_rounds, at);

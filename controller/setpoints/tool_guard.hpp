@@ -7,6 +7,7 @@
 //   speed         |p(θ) − p(θ₁)| ≤ vT, with v = limits.max_tool_speed_m_per_s for T and max_elbow_speed_m_per_s for
 //                 joints
 //   borders       T within limits.workspace_m and outside of limits.keep_out_m, also between two setpoints
+//   turning       the tool's angle from the start, tilt, twist and turning speed, where it turns
 //   ranges        of the joints, which the joints' guard keeps: here only braking keeps them
 //
 // For borders T is where the links go: motors that accelerate them lead by K⁻¹Mq̈_f
@@ -35,6 +36,7 @@
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
+#include "controller/proxies/turn_sets.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/description/cell.hpp"
@@ -53,10 +55,10 @@ class ToolGuard {
   void start(const models::JointVector& target_rad) noexcept;
   // One period. Precondition: `wanted_rad` is finite and within each joint's own limits (JointGuard).
   // `max_speed_m_per_s`: the tool's present speed limit, if it is lower than the cell's. `links_W`: where the
-  // setpoints' filter leads the links' tool with them; null: motors lead as they did. Returns the limits that were
-  // active.
-  ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s,
-                    const models::Vec3* links_W) noexcept;
+  // setpoints' filter leads the links' tool with them; null: motors lead as they did. `turn`: the limits of turning;
+  // null: they aren't judged. Returns the limits that were active.
+  ActiveLimits step(const models::JointVector& wanted_rad, double max_speed_m_per_s, const models::Vec3* links_W,
+                    const TurnSets* turn) noexcept;
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
@@ -70,23 +72,27 @@ class ToolGuard {
   static constexpr std::size_t first_joint = 2;  // the first whose speed is limited; the two before it hardly move
 
   enum class Care : std::uint8_t { quick, exact };
-  struct Speeds {
+  struct Limits {
     double tool_m_per_s, elbow_m_per_s;
+    const TurnSets* turn;  // null: not judged
   };
 
   void evaluate(const models::JointVector& theta, int rounds, models::ArmPoints& out) const noexcept;
   [[nodiscard]] double stop_s(const models::JointVector& u) const noexcept;
   [[nodiscard]] double bend(const models::JointVector& d) const noexcept;
-  [[nodiscard]] models::JointVector braking_way(const models::JointVector& u, double t) const noexcept;
-  [[nodiscard]] ActiveLimits broken(const models::JointVector& theta, const models::ArmPoints& at, const Speeds& limit,
+  [[nodiscard]] double braking_steps(double t) const noexcept;
+  [[nodiscard]] ActiveLimits broken(const models::JointVector& theta, const models::ArmPoints& at, const Limits& limit,
                                     Care care) const noexcept;
   [[nodiscard]] models::JointVector within_ranges(models::JointVector theta) const noexcept;
-  void judge_motion(const models::ArmPoints& at, double growth, const Speeds& limit, Care care,
+  void judge_motion(const models::ArmPoints& at, double growth, const Limits& limit, Care care,
                     ActiveLimits& out) const noexcept;
+  void judge_turning(const models::JointVector& theta, const models::ArmPoints& at, const Limits& limit,
+                     double more_steps, ActiveLimits& out) const noexcept;
+  [[nodiscard]] Eigen::Quaterniond orientation(const models::JointVector& link_rad) const noexcept;
   [[nodiscard]] bool far_from_borders(const models::Vec3& p, double way_m) const noexcept;
   void judge_borders(const models::Vec3& at, const models::Vec3& rest, double step_bend, double rest_bend,
                      ActiveLimits& out) const noexcept;
-  void hold_back(const models::JointVector& wanted, const Speeds& limit, ActiveLimits& out) noexcept;
+  void hold_back(const models::JointVector& wanted, const Limits& limit, ActiveLimits& out) noexcept;
   void accept(const models::JointVector& theta, const models::ArmPoints& at) noexcept;
 
   const models::Arm* arm_;

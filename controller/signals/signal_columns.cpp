@@ -44,6 +44,7 @@ constexpr std::array written_flags{RecordFlag::sample_held,
                                    RecordFlag::guard_speed,
                                    RecordFlag::guard_elbow,
                                    RecordFlag::guard_border,
+                                   RecordFlag::guard_turning,
                                    RecordFlag::limit_leash,
                                    RecordFlag::limit_orientation,
                                    RecordFlag::oscillation,
@@ -188,6 +189,7 @@ void put_row(auto& row, const CycleRecord& r, std::size_t axes, bool with_truth,
   put_first(row, r, axes, with_truth);
   put_more(row, r, axes, with_truth, derived);
   put_turning(row, r, with_truth);
+  row.number(r.limits_work_J);
 }
 
 std::vector<std::string> fault_words() {
@@ -313,6 +315,7 @@ std::vector<SignalColumn> signal_columns(const std::vector<std::string>& axis_na
   add_first(columns, axis_names, with_truth);
   add_more(columns, axis_names, with_truth);
   add_turning(columns, with_truth);
+  columns.add("limits_work_J", "J", "", "that limits have put into the proxy since rendering began; negative: taken");
   return std::move(columns.all);
 }
 

@@ -44,6 +44,7 @@ enum class Fault : std::uint8_t {
   tool_too_fast,         // by the encoders the tool exceeds its speed limit, though no setpoint does
   tool_off_limits,       // by the encoders the tool is out of the workspace or in a keep-out zone; no setpoint is
   elbow_too_fast,        // by the encoders the elbow or the wrist is faster than its limit, though no setpoint is
+  works_against_hand,    // limits push the tool against the hand for longer than the arm brakes
   proxy_not_finite,      // the integrator refused a step
   proxy_squeezed,        // objects that move leave the proxy no room
   bus_off,               // a CAN controller is bus-off: nothing can be commanded there

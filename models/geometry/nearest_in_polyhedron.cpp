@@ -11,6 +11,9 @@ namespace {
 constexpr double dependent = 1e-10;
 // By which a row may be missed, relative to the size of what is multiplied in it: some dozen roundings.
 constexpr double rounding = 1e-14;
+// By which a solution may miss a row, relative to its bound: what is left of the digits where active rows are nearly
+// parallel.
+constexpr double held = 1e-6;
 constexpr int most_exchanges = 100;  // about three are usual; the method is finite, rounding isn't
 
 }  // namespace
@@ -155,7 +158,17 @@ bool NearestInPolyhedron::solve() noexcept {
   }
   u_ = u0_ + backward(v_);
   for (std::size_t i = 0; i < count_; ++i) lambda_[i] /= length_[i];
-  return feasible;
+  return feasible && holds();
+}
+
+// Rows that are nearly parallel lose digits, and exchanges may not have ended.
+bool NearestInPolyhedron::holds() const noexcept {
+  for (std::size_t i = 0; i < count_; ++i) {
+    const double along = normal_[i].dot(v_), beyond = along - bound_[i];
+    const double tolerance = held * (std::abs(along) + std::abs(bound_[i])) + rounding;
+    if (!(beyond <= tolerance) || (i < equalities_ && !(beyond >= -tolerance))) return false;
+  }
+  return true;
 }
 
 }  // namespace proxarm::models

@@ -51,6 +51,7 @@ class NearestInPolyhedron {
   // The part of row p's normal outside of the active ones' span, and its coefficients in them.
   void split(std::size_t p, SmallVector& outside, std::array<double, most_rows>& coefficients) const noexcept;
   void orthogonalise() noexcept;
+  [[nodiscard]] bool holds() const noexcept;
 
   SmallMatrix L_;
   SmallVector u0_, u_, v_;

@@ -30,7 +30,6 @@ constexpr std::array fields{
     Field{"friction", [](const Moment& m) { return m.record.friction; }},
     Field{"flags", [](const Moment& m) { return static_cast<double>(m.record.flags); }},
     Field{"flags_since", [](const Moment& m) { return static_cast<double>(m.flags_since); }},
-    Field{"limited_axes", [](const Moment& m) { return static_cast<double>(m.record.limited_axes); }},
     Field{"fault", [](const Moment& m) { return static_cast<double>(m.record.fault); }},
     Field{"held_for", [](const Moment& m) { return static_cast<double>(m.record.held_for); }},
     Field{"compute_us", [](const Moment& m) { return 1e-3 * static_cast<double>(m.record.compute_ns); }},

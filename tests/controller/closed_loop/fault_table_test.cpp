@@ -268,10 +268,17 @@ RigOptions runaway_world() {
   RigOptions options = wrong_world([extra_m](WorldStep& step) { step.q_W.x() += * extra_m += 4e-4; });
   options.edit_cell = [](description::Cell& cell) {
     cell.limits.leash_m = 0.004;
-    // Where drives are rated, the guard of their torque winds the proxy back before the leash sees it.
-    for (description::DriveDescription& drive : cell.drives) drive.max_torque_Nm = 0.0;
   };
   return options;
+}
+
+// A world whose limits push the proxy on, however it moves: 1 J for each 0.3 mm in a step.
+RigOptions pushing_world() {
+  auto last_W = std::make_shared<models::Vec3>(models::Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
+  return wrong_world([last_W](WorldStep& step) {
+    if (last_W->allFinite()) step.limit_force_W = 1e7 * (step.q_W - *last_W);
+    *last_W = step.q_W;
+  });
 }
 
 // Axis 1 goes where it likes: 0.7 m from it the tool is as many m/s fast.
@@ -480,6 +487,7 @@ std::vector<Row> rows() {
        world_is_wrong},
       // 0.4 m/s more than the arm does, for some 10 ms of lag until 4 mm are between them.
       {leash_exceeded, Reaction::stop_1, 20, 0.015, runaway_world, world_is_wrong},
+      {works_against_hand, Reaction::stop_1, 20, way_m, pushing_world, world_is_wrong},
       // At 1.4 m/s, after 10 ms of lag, 13.6 mm; then only brakes and the gears' friction stop it.
       {tool_too_fast, Reaction::stop_0, 35, 0.15, [] { return running_off(2.0); }},
       {tool_off_limits, Reaction::stop_1, 1, 0.01, creeping_out, tool_is_out},

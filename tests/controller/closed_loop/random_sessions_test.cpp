@@ -309,7 +309,7 @@ TEST(RandomSessions, CommandNothingBeyondAJointsLimits) {
       refused += rig.records[k].refused_period_ns > 0 ? 1 : 0;
     }
     for (const CycleRecord& r : rig.records) {
-      limited += r.limited_axes != 0 ? 1 : 0;
+      limited += r.limited_joints != ActiveLimits::Joints{} ? 1 : 0;
       singular += r.has(RecordFlag::limit_singularity) ? 1 : 0;
     }
   }

@@ -35,9 +35,7 @@ OrientationConfig turning(const AxisRange& range) {
   return {.free = true,
           .inertia_kg_m2 = 0.02,
           .damping_Nms_per_rad = 0.1,
-          .max_speed_rad_per_s = 2.0,
-          .max_angle_rad = 1.5,
-          .axis_range = range};
+          .turn = {.max_turn_rad = 1.5, .axis_range = range, .max_speed_rad_per_s = 2.0}};
 }
 
 TEST(AxisRange, NoTorqueTiltsOrTwistsTheToolFurther) {

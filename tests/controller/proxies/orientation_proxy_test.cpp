@@ -48,8 +48,11 @@ TEST(OrientationProxy, TurnsUnderATorqueAsItsInertiaSays) {
 // τ/D, whatever T.
 TEST(OrientationProxy, SettlesAtTheSameSpeedForEveryPeriod) {
   for (const double period : {2.5e-4, 1e-3, 4e-3, 1e-2}) {
-    OrientationProxy proxy(
-        {.free = true, .inertia_kg_m2 = 0.01, .damping_Nms_per_rad = 1.0, .max_angle_rad = 3.0, .period_s = period});
+    OrientationProxy proxy({.free = true,
+                            .inertia_kg_m2 = 0.01,
+                            .damping_Nms_per_rad = 1.0,
+                            .turn = {.max_turn_rad = 3.0},
+                            .period_s = period});
     ASSERT_TRUE(proxy.start(Quaterniond::Identity()));
     for (double t = 0.0; t < 0.4; t += period) ASSERT_EQ(proxy.step(Vec3(0.0, 0.0, 0.7)), ProxyFault::none);
     EXPECT_NEAR(proxy.velocity_W().z(), 0.7, 1e-9);
@@ -75,8 +78,7 @@ TEST(OrientationProxy, StaysUnitAndWithinItsLimitsUnderAnyTorque) {
     OrientationProxy proxy({.free = true,
                             .inertia_kg_m2 = 0.02,
                             .damping_Nms_per_rad = 0.1,
-                            .max_speed_rad_per_s = 5.0,
-                            .max_angle_rad = max_angle,
+                            .turn = {.max_turn_rad = max_angle, .max_speed_rad_per_s = 5.0},
                             .period_s = 4e-3});
     ASSERT_TRUE(proxy.start(tilted));
     Vec3 load = Vec3::Zero();
@@ -98,7 +100,7 @@ TEST(OrientationProxy, StaysUnitAndWithinItsLimitsUnderAnyTorque) {
 // An arm that couldn't stop takes its proxy along beyond the limit. From there nothing leads further out, and nothing
 // leads back faster than the joints can follow.
 TEST(OrientationProxy, FromBeyondItsLimitItIsLedBackSlowly) {
-  OrientationProxy proxy({.free = true, .max_angle_rad = 0.5, .period_s = 1e-3});
+  OrientationProxy proxy({.free = true, .turn = {.max_turn_rad = 0.5}, .period_s = 1e-3});
   ASSERT_TRUE(proxy.start(Quaterniond::Identity()));
   const Quaterniond beyond(Eigen::AngleAxisd(0.6, Vec3::UnitX()));
   ASSERT_TRUE(proxy.resume(beyond, Vec3(2.0, 0.0, 0.0)));
@@ -139,8 +141,7 @@ TEST(OrientationProxy, FeelsLikeABallWhateverHangsBehindTheSensor) {
                           .inertia_kg_m2 = J,
                           .behind_sensor_T = I,
                           .damping_Nms_per_rad = 0.0,
-                          .max_speed_rad_per_s = 100.0,
-                          .max_angle_rad = 3.0,
+                          .turn = {.max_turn_rad = 3.0, .max_speed_rad_per_s = 100.0},
                           .period_s = T});
   ASSERT_TRUE(proxy.start(tilted));
   for (int k = 0; k < 100'000; ++k) {
@@ -198,8 +199,8 @@ TEST(OrientationProxy, NamesTheKeyThatIsOutOfRange) {
     EXPECT_EQ(error.key(), "orientation.inertia");
   }
   EXPECT_THROW(OrientationProxy({.damping_Nms_per_rad = -1.0}), description::SetupError);
-  EXPECT_THROW(OrientationProxy({.max_angle_rad = 3.1}), description::SetupError);
-  EXPECT_THROW(OrientationProxy({.max_speed_rad_per_s = 50.0, .period_s = 1e-2}), description::SetupError);
+  EXPECT_THROW(OrientationProxy({.turn = {.max_turn_rad = 3.1}}), description::SetupError);
+  EXPECT_THROW(OrientationProxy({.turn = {.max_speed_rad_per_s = 50.0}, .period_s = 1e-2}), description::SetupError);
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ class Guarded {
   // The share of the wanted setpoint's changes is up to them; what comes out is judged.
   ActiveLimits step(const JointVector& wanted) {
     joints.step(wanted);
-    const ActiveLimits active = tool.step(joints.target_rad(), max_speed, nullptr);
+    const ActiveLimits active = tool.step(joints.target_rad(), max_speed, nullptr, nullptr);
     if (active.kinds != 0) {
       joints.settle(tool.target_rad(), tool.speed_rad_per_s());
       joints.follow_from_here();
@@ -298,7 +298,7 @@ TEST(ToolGuard, AllocatesNothing) {
     wanted = guarded.tool.target_rad();
     wanted[1] += 1e-3;
     guarded.joints.step(wanted);
-    const ActiveLimits active = guarded.tool.step(guarded.joints.target_rad(), 0.5, nullptr);
+    const ActiveLimits active = guarded.tool.step(guarded.joints.target_rad(), 0.5, nullptr, nullptr);
     if (active.kinds != 0) guarded.joints.settle(guarded.tool.target_rad(), guarded.tool.speed_rad_per_s());
   }
   EXPECT_EQ(tests::allocation_count(), before);

@@ -52,7 +52,8 @@ TEST(Passivity, TheBalanceOfAProxyThatTurnsIsExact) {
   models::FrictionPlane<3> wall(Vec3(0.01, 0.0, 0.0), Vec3(-1.0, 0.0, 0.0), 0.3);
   const AdmittanceConfig config{.mass_kg = 2.5, .damping_Ns_per_m = 7.0};
   AdmittanceProxy<3> proxy(config, wall);
-  OrientationProxy turns({.free = true, .inertia_kg_m2 = 0.02, .damping_Nms_per_rad = 0.1, .max_angle_rad = 0.3});
+  OrientationProxy turns(
+      {.free = true, .inertia_kg_m2 = 0.02, .damping_Nms_per_rad = 0.1, .turn = {.max_turn_rad = 0.3}});
   ASSERT_TRUE(turns.start(Eigen::Quaterniond::Identity()));
   turns.add_damping(0.03);
   PassivityObserver observer({}, config.period_s, Damping::never);

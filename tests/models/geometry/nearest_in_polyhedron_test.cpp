@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 #include <optional>
@@ -143,6 +144,32 @@ TEST(NearestInPolyhedron, KeepsRowsThatRepeatOrContradictEachOther) {
   NearestInPolyhedron touching = prepared(p);
   ASSERT_TRUE(touching.solve());
   EXPECT_NEAR(touching.u()[2], 1.0, 1e-14);
+}
+
+// The story: rows that differed in their tenth digit lost the program's digits, and a corner of the box was taken for a
+// solution; the arm jumped by 2 mm.
+TEST(NearestInPolyhedron, NeverTakesForASolutionWhatLeavesARow) {
+  Random random(52);
+  int solved = 0;
+  for (std::int64_t k = 0; k < scaled(3000); ++k) {
+    Program p = random_program(random);
+    p.H *= random.log_uniform(1e-7, 1.0);
+    const std::size_t different = p.rows.size();
+    for (std::size_t i = 0; i < different; ++i) {
+      for (int copy = 0; copy < 3; ++copy) {
+        const double apart = random.log_uniform(1e-14, 1e-4);
+        p.rows.emplace_back(p.rows[i] + apart * random_vector(random, p.g.size()));
+        p.bounds.push_back(p.bounds[i] + apart * random.uniform(-1.0, 1.0));
+      }
+    }
+    NearestInPolyhedron program = prepared(p);
+    if (!program.solve()) continue;
+    ++solved;
+    // Relative to what is multiplied in a row: u, and the point u0 that the program begins at.
+    const double size = 1.0 + program.u().norm() + p.H.ldlt().solve(p.g).norm();
+    ASSERT_TRUE(within(p, program.u(), 1e-5 * size)) << k;
+  }
+  EXPECT_GT(solved, scaled(500));
 }
 
 TEST(NearestInPolyhedron, LeavesAPointThatKeepsAllRowsWhereItIs) {
