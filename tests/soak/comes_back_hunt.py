@@ -5,13 +5,15 @@ against the hand?
     PROXARM_PROGRAM=build/release/controller/proxarm tests/soak/comes_back_hunt.py --sessions 10000 --seed 1
 
 Judged by the records alone, with what a person holding the handle would notice:
-  comes back         1 s after the hand's way has ended at the start, the steel is within 1 mm of it, beside what the
-                     hand's spring leaves under the force that the hand feels
+  comes back         1 s after the hand's way has ended at the start (later where a heavy proxy swings on the hand's
+                     spring), the steel is within 1 mm of it, beside what the hand's spring leaves under the force that
+                     the hand feels
   never against it   the hand's work and the change of the proxy's kinetic energy, over any time from the start on, never
                      fall below −1 mJ − 0.1 % of the work done, but for what the loop's delay L gives: M L ∫|a|² dt
   nothing else       no fault, and nothing that the last guard held back
 Sessions whose mass isn't stable with their hand, at the start or where it leads to, aren't judged. Nor is where the tool
-ends, if a joint is at the end of its range then: the straight way back may lead through the arm's base. Status 1, and the
+ends, if a joint is at the end of its range then, since the straight way back may lead through the arm's base; or if the
+arm oscillated for long, since the damping that ends a swing slows the way back. Both are counted. Status 1, and the
 session's files in `--keep DIR`, where it isn't so.
 """
 import argparse
@@ -161,14 +163,14 @@ def session(seed, folder, keep):
         figures["far m"] = max(math.hypot(*minus(x, start)) for x in record.steel)
         figures["push J"] = summary["limits_push_J"]
         figures["cornered"] = any("limit_joint" in flags.split("|") for flags in record.flags[-100:])
-        if figures["off mm"] > 1e3 * NEAR_M and not figures["cornered"]:
+        slowed = summary["oscillation"]["lasts"]
+        if figures["off mm"] > 1e3 * NEAR_M and not figures["cornered"] and not slowed:
             wrong.append(f"{figures['off mm']:.3g} mm off")
-        if figures["against mJ"] > 0.0 and not summary["oscillation"]["lasts"]:
+        if figures["against mJ"] > 0.0 and not slowed:
             wrong.append(f"{figures['against mJ']:.3g} mJ against the hand")
-        guarded = sorted({str(limit["limit"]) for limit in summary["limits"] if "guard" in str(limit["limit"])})
-        if guarded:
-            wrong.append(", ".join(guarded))
-        if summary["oscillation"]["lasts"]:
+        if summary["guarded_cycles"] > 0:
+            wrong.append(f"the last guard acted in {summary['guarded_cycles']} cycles")
+        if slowed:
             figures["oscillates"] = 1.0
     figures["wrong"] = wrong
     if wrong and keep:

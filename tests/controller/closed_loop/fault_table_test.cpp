@@ -266,9 +266,7 @@ RigOptions never_disabled() {
 RigOptions runaway_world() {
   auto extra_m = std::make_shared<double>(0.0);
   RigOptions options = wrong_world([extra_m](WorldStep& step) { step.q_W.x() += * extra_m += 4e-4; });
-  options.edit_cell = [](description::Cell& cell) {
-    cell.limits.leash_m = 0.004;
-  };
+  options.edit_cell = [](description::Cell& cell) { cell.limits.leash_m = 0.004; };
   return options;
 }
 

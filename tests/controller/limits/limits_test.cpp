@@ -135,7 +135,8 @@ RandomStep random_step(Random& random, double friction) {
   limits.hard[limits.hard_count++] = {Vec3::Zero(), random.uniform(1e-5, 3e-4), Limit::speed};
   limits.hard[limits.hard_count++] = {random.in_box<3>(1e-5), random.uniform(5e-5, 3e-4), Limit::acceleration};
   for (int i = random.below(4); i > 0; --i) {
-    limits.planes[limits.plane_count++] = {random.direction<3>(), random.uniform(0.0, 2e-4), Limit::joint_speed, 1};
+    limits.planes[limits.plane_count++] = {random.direction<3>(), random.uniform(0.0, 2e-4),
+                                           ActiveLimits::of(Limit::joint_speed)};
   }
   return step;
 }
@@ -190,7 +191,7 @@ void project_at_random(std::uint64_t seed, int most_planes, std::int64_t count) 
     for (int j = 0; j < planes; ++j) {
       const models::Vec<N> normal = random.direction<N>();
       const double bound_m = random.uniform(-1e-5, 2e-4);
-      limits.planes[limits.plane_count++] = {lifted(normal), bound_m, Limit::joint_speed, 1};
+      limits.planes[limits.plane_count++] = {lifted(normal), bound_m, ActiveLimits::of(Limit::joint_speed)};
       reference.plane(normal, bound_m);
     }
     for (int j = 0; j < balls; ++j) {
@@ -238,7 +239,7 @@ TEST(LimitSets, GiveTheirNearestPoint) {
 TEST(LimitSets, KeepToAPointWhereABallHasNoRadius) {
   StepLimits limits;
   limits.hard[limits.hard_count++] = {Vec3(1e-4, 0.0, 0.0), 0.0, Limit::acceleration};
-  limits.planes[limits.plane_count++] = {Vec3::UnitX(), 2e-4, Limit::workspace};
+  limits.planes[limits.plane_count++] = {Vec3::UnitX(), 2e-4, ActiveLimits::of(Limit::workspace)};
   LimitSets<3> sets;
   sets.set(limits, Eigen::Matrix3d::Identity());
   int sweeps = 3000;

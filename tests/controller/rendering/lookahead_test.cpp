@@ -182,7 +182,7 @@ TEST(Lookahead, NeverCrossesABorder) {
   for (int k = 0; k < 3000; ++k) {
     world.limits.hard[0] = {Vec3::Zero(), 0.5 * T, Limit::speed};
     world.limits.hard_count = 1;
-    world.limits.planes[0] = {Vec3::UnitX(), share * (border_m - q.x()), Limit::workspace, 0, share};
+    world.limits.planes[0] = {Vec3::UnitX(), share * (border_m - q.x()), ActiveLimits::of(Limit::workspace), share};
     world.limits.plane_count = 1;
     q = world.step(h);
     ASSERT_LE(world.ahead(h).x(), border_m);
