@@ -17,7 +17,7 @@ using models::Vec3;
 namespace {
 
 // v_r: how fast a coupling may give back what it holds. A hand that leaves a wall faster finds it softer, nothing else.
-constexpr double release_m_per_s = 0.1;
+constexpr double release_m_per_s = 0.07;
 
 JointVector largest_torques(const std::vector<description::DriveDescription>& drives) {
   JointVector most(static_cast<Eigen::Index>(drives.size()));
@@ -39,7 +39,7 @@ class TorquesOfDimension final : public TorqueRendering {
         limiter_(limits, config.period_s),
         coupling_(arm, drives, limits, config.period_s),
         most_Nm_(largest_torques(drives)) {
-    none_ = missing_Nm_ = last_.torque_Nm = last_.held_Nm = JointVector::Zero(most_Nm_.size());
+    none_ = missing_Nm_ = carried_Nm_ = limits_Nm_ = last_.torque_Nm = last_.held_Nm = JointVector::Zero(most_Nm_.size());
   }
 
   void anchor(const JointVector& link_rad) noexcept override {
@@ -54,7 +54,8 @@ class TorquesOfDimension final : public TorqueRendering {
     last_.world = {};
     last_.world.q_W = p_k1_W_;
     last_.limits = {};
-    turn_into_torques(link_rad, 0.0, Vec3::Zero());
+    keep_device(link_rad, Vec3::Zero(), Vec3::Zero(), 0.0);
+    turn_into_torques(Vec3::Zero());
     return last_;
   }
 
@@ -77,9 +78,8 @@ class TorquesOfDimension final : public TorqueRendering {
     world.fault = proxy_.step(p);
     last_.limits = limited_.active();
     if (world.fault != ProxyFault::none) return last_;
-    const Vec3 leaves_W = p_W - p_k1_W_ - space_.basis() * (proxy_.q() - q_k1);
     Vec3 f_W = space_.basis() * proxy_.f();
-    const double e = given_back(link_rad, f_W, leaves_W);
+    const double e = keep_device(link_rad, f_W, space_.basis() * (proxy_.q() - q_k1), max_tool_speed_m_per_s);
     f_W *= e;
     world.q_W = space_.to_W(proxy_.q());
     world.p_hat_W = space_.to_W(proxy_.p_hat());
@@ -90,7 +90,7 @@ class TorquesOfDimension final : public TorqueRendering {
       const Vec3 held = spring_to(space_.start_W(), p_W);
       f_W += held - space_.basis() * (space_.basis().transpose() * held);
     }
-    turn_into_torques(link_rad, max_tool_speed_m_per_s, f_W);
+    turn_into_torques(f_W);
     world.limits = last_.limits;
     p_k1_W_ = p_W;
     return last_;
@@ -106,27 +106,33 @@ class TorquesOfDimension final : public TorqueRendering {
     return c.stiffness_N_per_m * (rest_W - p_W) - c.damping_Ns_per_m / c.period_s * (p_W - p_k1_W_);
   }
 
-  // e, see the header. `leaves_W`: ∇p − ∇q.
-  [[nodiscard]] double given_back(const JointVector& link_rad, const Vec3& f_W, const Vec3& leaves_W) const noexcept {
-    const double force_N = f_W.norm(), T = proxy_.config().period_s;
-    if (!(force_N > 0.0)) return 1.0;
-    const Vec3 n = f_W / force_N;
-    const double excess = n.dot(leaves_W) / T - release_m_per_s;
-    if (!(excess > 0.0)) return 1.0;
-    const double mass_kg = arm_->effective_mass(link_rad, n);
-    return std::max(0.0, 1.0 - JointCoupling::damping_share * mass_kg / T * excess / force_N);
+  // Steps the device's own limits, for a world that renders f while its proxy goes by `q_step_W`. Returns e.
+  double keep_device(const JointVector& link_rad, const Vec3& f_W, const Vec3& q_step_W,
+                     double max_tool_speed_m_per_s) noexcept {
+    carried_Nm_ = arm_->gravity_torque(link_rad) + missing_Nm_;
+    const double wanted_N = f_W.norm();
+    JointCoupling::Bounds bounds{.tool_speed_m_per_s = max_tool_speed_m_per_s};
+    if (wanted_N > 0.0) {
+      std::uint8_t cut = 0;
+      const JointVector rendered_Nm = tool_.J_W.topRows<3>().transpose() * f_W;
+      bounds.n_W = f_W / wanted_N;
+      bounds.step_m = std::max(0.0, bounds.n_W.dot(q_step_W) + release_m_per_s * proxy_.config().period_s);
+      bounds.force_N = torque_share(rendered_Nm, carried_Nm_, none_, most_Nm_, cut) * wanted_N;
+    }
+    limits_Nm_ = coupling_.step(link_rad, tool_.J_W, bounds);
+    return wanted_N > 0.0 ? std::max(0.0, 1.0 - coupling_.released_N() / wanted_N) : 1.0;
   }
 
-  void turn_into_torques(const JointVector& link_rad, double max_tool_speed_m_per_s, const Vec3& f_W) noexcept {
-    const JointVector carried_Nm = arm_->gravity_torque(link_rad) + missing_Nm_;
-    const JointVector& limits_Nm = coupling_.step(link_rad, tool_.J_W, max_tool_speed_m_per_s);
+  void turn_into_torques(const Vec3& f_W) noexcept {
     const JointVector rendered_Nm = tool_.J_W.topRows<3>().transpose() * f_W;
     std::uint8_t cut = 0;
-    last_.held_Nm = torque_share(limits_Nm, carried_Nm, none_, most_Nm_, cut) * limits_Nm;
-    const double share = torque_share(rendered_Nm, carried_Nm, last_.held_Nm, most_Nm_, cut);
+    const double held = torque_share(limits_Nm_, carried_Nm_, none_, most_Nm_, cut);
+    coupling_.yield(held);
+    last_.held_Nm = held * limits_Nm_;
+    const double share = torque_share(rendered_Nm, carried_Nm_, last_.held_Nm, most_Nm_, cut);
     if (cut != 0) last_.limits.set(Limit::joint_torque, cut);
     last_.limits.add(coupling_.active());
-    last_.torque_Nm = carried_Nm + last_.held_Nm + share * rendered_Nm;
+    last_.torque_Nm = carried_Nm_ + last_.held_Nm + share * rendered_Nm;
   }
 
   scenes::CompiledScene* scene_;
@@ -137,6 +143,7 @@ class TorquesOfDimension final : public TorqueRendering {
   StepLimiter limiter_;
   JointCoupling coupling_;
   JointVector most_Nm_, missing_Nm_, none_;
+  JointVector carried_Nm_, limits_Nm_;  // τ_g + τ_0 and τ_U of this step
   StepLimits walls_;
   models::ToolKinematics tool_;
   Vec3 p_k1_W_ = Vec3::Zero();

@@ -10,12 +10,9 @@
 // So a rendered force neither takes a wall's torque away nor, at an end that the drive can just hold, pushes through it:
 // each keeps its direction, is scaled down, and τ_g + τ_0 is never reduced.
 //
-// A coupling that is let go under load would throw the device: 25 N in 750 N/m are 0.4 J, 1.3 m/s of 0.5 kg. In
-// direction n = f/|f| the tool may leave the proxy by v_r; what it is faster by is damped, out of the force itself:
-//   e |f| = max(0, |f| − β m/T max(0, n·(∇p − ∇q)/T − v_r)),   m = 1/(nᵀ J M⁻¹ Jᵀ n)
-// p, q: tool and proxy of (23). The force is never turned around, so it can't suck, and it takes energy only. β m/T is
-// the damping that JointCoupling bears on this mass.
-//
+// A coupling that is let go under load would throw the device. In direction n = f/|f| the tool may leave the proxy of
+// (23), that is n·(∇p − ∇q)/T, by 0.07 m/s; what keeps it to that is taken from the force itself, so e ≥ 0: it can't suck.
+
 // The tool is rendered as a point: joint motion that only turns it is free, apart from the compensation of gravity. In
 // a scene of one or two dimensions, a spring of K and B holds the tool on the line or plane through the start.
 //
@@ -58,7 +55,7 @@ class TorqueRendering {
   virtual const TorqueStep& hold(const models::JointVector& link_rad) noexcept = 0;
   // Starts rendering here, at rest. `missing_Nm`: τ_0.
   virtual void start(const models::JointVector& link_rad, const models::JointVector& missing_Nm) noexcept = 0;
-  // `max_tool_speed_m_per_s`: of the tool, if lower than what JointCoupling keeps to; 0 holds the joints.
+  // `max_tool_speed_m_per_s`: of the tool, if lower than what JointCoupling keeps to by itself; 0 holds the joints.
   virtual const TorqueStep& step(const models::JointVector& link_rad, double max_tool_speed_m_per_s) noexcept = 0;
 
   virtual void archive(fieldbus::StateArchive& state) noexcept = 0;
