@@ -34,14 +34,13 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
     : rendering_(std::move(rendering)),
       max_speed_rad_per_s_(arm.axes()),
       max_torque_Nm_(arm.axes()),
-      let_go_(supervision.let_go),
       period_s_(period_s) {
   for (Eigen::Index i = 0; i < max_speed_rad_per_s_.size(); ++i) {
     max_speed_rad_per_s_[i] = drives[static_cast<std::size_t>(i)].max_speed_rad_per_s;
     max_torque_Nm_[i] = drives[static_cast<std::size_t>(i)].max_torque_Nm;
   }
   state_.torque_Nm = state_.missing_Nm = JointVector::Zero(arm.axes());
-  if (let_go_ == description::LetGo::coast) return;
+  if (supervision.let_go == description::LetGo::coast) return;
   empty_.emplace(EmptyHandleConfig{.band_N = supervision.empty_handle_N,
                                    .tool_mass_kg = tool_mass_kg + left_kg,
                                    .way_share = way_share},

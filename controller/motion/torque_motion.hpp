@@ -7,8 +7,8 @@
 // carried from the start on. So an empty device stands still where it starts, and elsewhere it is moved by what the
 // model's mistake differs there, and its friction.
 //
-// A handle that nobody holds (handle/empty_handle.hpp) is braked at 4 m/s², then the joints are held where they are. The
-// sensor's bias leads such a device nowhere, so no force is taken for one.
+// A handle that nobody holds (handle/empty_handle.hpp) is braked at 4 m/s², then the joints are held where they are, with
+// `let_go: hold` as with `rest`: the device goes on rendering, since it can't hold otherwise. The sensor's bias leads such a device nowhere, so no force is taken for one.
 #pragma once
 
 #include <memory>
@@ -48,9 +48,6 @@ class TorqueMotion final : public Motion {
   [[nodiscard]] bool stands() const noexcept override { return true; }
   [[nodiscard]] bool backs_off() const noexcept override { return false; }
   [[nodiscard]] std::optional<MissingWeight> missing_weight() const noexcept override;
-  [[nodiscard]] bool wants_hold() const noexcept override {
-    return let_go_ == description::LetGo::hold && empty_ && empty_->empty();
-  }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.proxy_W; }
 
   void archive(fieldbus::StateArchive& state) noexcept override {
@@ -74,7 +71,6 @@ class TorqueMotion final : public Motion {
 
   std::unique_ptr<TorqueRendering> rendering_;
   models::JointVector max_speed_rad_per_s_, max_torque_Nm_;
-  description::LetGo let_go_;
   std::optional<EmptyHandle> empty_;  // none where a handle that is let go coasts
   double period_s_;
   State state_;

@@ -10,11 +10,13 @@
 // t: the longer of T and 1 ms. U, with a share of each limit, since a hand leads the steel beyond the proxy at first:
 //   −T min(v, C(c₁ − c_min)) ≤ c − c₁ ≤ T min(v, C(c_max − c₁))   v = 3/4 max_speed_rad_per_s
 //   |J (c − c₁)| ≤ T v_tool                                       v_tool = 2/5 max_tool_speed_m_per_s, or less
-// C(d): the approach from which braking by half of max_acceleration_rad_per_s2 ends within d (joint_guard.hpp). c_min,
+// C(d): the approach from which braking by a fifth of max_acceleration_rad_per_s2 ends within d (joint_guard.hpp). c_min,
 // c_max: short of range_rad by what the drive's whole torque presses a joint into its end, τ_max t²/(γ m_i), with
 // m_i = 1/(M⁻¹)_ii. A joint that starts beyond isn't driven back; it moves inwards only. With v_tool = 0 the joints are
 // held where c is.
 //
+// - At rest a torque τ_h presses a joint by τ_h t²/(γ m_i) into its end: 14 mrad for 15 Nm on the elbow of
+//   models/cells/light.yaml, within its range.
 // - Inside of the sets c = φ̂, and the torque is 0, not small.
 // - A wall's torque acts on its own joint: M(c − φ̂) = −Σ λ_i n_i with the rows n_i of U that are active.
 // - U is convex and contains 0, so (c − c₁)ᵀτ ≤ 0 before the mean: no torque of U drives the joints' proxy.
@@ -31,8 +33,9 @@
 // (torque_rendering.hpp), late by the mean; fewer active rows make K and B smaller in that order of matrices. But a gear
 // swings: above its resonance the rotor alone answers, and a torque that is late by 1.5 T feeds what swings faster than
 // 120 Hz. The mean over 5 ms has its zero at 200 Hz and turns the sign beyond. joint_coupling_test.cpp has the spectral
-// radii: below 1 for rigid gears, r from 0.7 to infinity, and for gears that swing from 180 to 480 Hz against 0.06 kg m²
-// of rotor, as those of models/cells/light.yaml do in simulation.
+// radii: below 1 for rigid gears, r from 0.7 on and periods of 0.5 to 4 ms, and at 1 ms for the gears of
+// models/cells/light.yaml in simulation: 200 Hz against links of 0.034 kg m² and more, on rotors of 0.06. A gear that
+// swings between 70 and 180 Hz isn't borne.
 #pragma once
 
 #include <array>

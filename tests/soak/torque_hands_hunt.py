@@ -54,8 +54,9 @@ def direction(chance):
 def made_hand(chance):
     """The text of a hand, what it is, and how long it takes."""
     stiffness, most_N = log_uniform(chance, 100, 3000), log_uniform(chance, 1, 50)
-    mass = chance.choice((0.0, log_uniform(chance, 0.1, 1.5)))
     kind = chance.choice(("slow", "slow", "quick", "quick", "step"))
+    # A force of 50 N within 2 ms is a hand's only if the hand's mass comes with it.
+    mass = chance.choice((0.0, log_uniform(chance, 0.1, 1.5))) if kind != "step" else log_uniform(chance, 0.3, 1.5)
     speed = {"slow": log_uniform(chance, 0.03, 0.3), "quick": log_uniform(chance, 0.3, 2.0), "step": 20.0}[kind]
     damping = 2 * math.sqrt(stiffness * max(mass, 0.2)) * chance.uniform(0.3, 1.0)
     lines = [f"name: {kind}", f"mass_kg: {mass:.3g}", f"stiffness_N_per_m: {stiffness:.4g}",

@@ -1,5 +1,5 @@
-// The story: the ends of the joints were walls at the tool, where a stretched arm has no lever, so a pull of 1 N led the
-// elbow 51 mrad past its range and onto its steel stop.
+// The story: the ends of the joints were walls at the tool, where a stretched arm has no lever, so a pull of 1 N led
+// the elbow 51 mrad past its range and onto its steel stop.
 #include "controller/rendering/joint_coupling.hpp"
 
 #include <gtest/gtest.h>
@@ -28,8 +28,8 @@ Eigen::MatrixXd exponential(const Eigen::MatrixXd& A) {
   return sum;
 }
 
-// A rotor J that u drives, a gear k, c, and a link I with a hand behind it. u(k+1) is the mean over n of −K x − B ∇x/T of
-// the rotor's angle x, and acts for a period.
+// A rotor J that u drives, a gear k, c, and a link I with a hand behind it. u(k+1) is the mean over n of −K x − B ∇x/T
+// of the rotor's angle x, and acts for a period.
 struct ElasticJoint {
   double rotor, link, frequency_Hz, hand = 0.0;
   double model = 1.0;  // the model's mass over the true one
@@ -39,9 +39,9 @@ struct ElasticJoint {
     const double K = gamma * m / (t * t), B = beta * m / t;
     const double w = 2.0 * M_PI * frequency_Hz, k = link * w * w, c = 0.1 * link * w, I = link + hand;
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(5, 5);
-    A.topRows(4) << 0.0, 1.0, 0.0, 0.0, 0.0,                              //
-        -k / rotor, -c / rotor, k / rotor, c / rotor, 1.0 / rotor,        //
-        0.0, 0.0, 0.0, 1.0, 0.0,                                          //
+    A.topRows(4) << 0.0, 1.0, 0.0, 0.0, 0.0,                        //
+        -k / rotor, -c / rotor, k / rotor, c / rotor, 1.0 / rotor,  //
+        0.0, 0.0, 0.0, 1.0, 0.0,                                    //
         k / I, c / I, -k / I, -c / I, 0.0;
     const auto n = static_cast<Eigen::Index>(JointCoupling::mean_steps(T));
     Eigen::MatrixXd S = Eigen::MatrixXd::Zero(5 + n, 5 + n);  // rotor and link, u, the last n angles

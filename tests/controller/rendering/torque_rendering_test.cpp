@@ -121,7 +121,8 @@ TEST_F(TorqueRenderingTest, PushesBackIntoAJointsRange) {
   torques->start(at_end, nothing_Nm);
   const TorqueStep& step = lead(at_end, beyond);
   EXPECT_TRUE(step.limits.has(Limit::joint_range));
-  EXPECT_LT(step.torque_Nm[0], -0.9 * cell.drives[0].max_torque_Nm) << "all that the drive has, at the end of its range";
+  EXPECT_LT(step.torque_Nm[0], -0.9 * cell.drives[0].max_torque_Nm)
+      << "all that the drive has, at the end of its range";
 }
 
 TEST_F(TorqueRenderingTest, CarriesWhatTheModelOfItsWeightLacked) {
