@@ -11,8 +11,8 @@ using models::Vec3;
 
 namespace {
 
-// Of max_torque_Nm: what a weight may be off. 0.36 Nm of models/cells/light.yaml, 0.7 N at its handle; a drive's friction
-// is some tenths of that.
+// Of max_torque_Nm: what a weight may be off. 0.36 Nm of models/cells/light.yaml, 0.7 N at its handle; a drive's
+// friction is some tenths of that.
 constexpr double missing_share = 0.02;
 // The hold settles within 50 ms; the sensor is tared for 0.2 s.
 constexpr double missing_filter_s = 0.05;
@@ -20,8 +20,8 @@ constexpr double missing_filter_s = 0.05;
 constexpr double speed_filter_s = 0.01;
 // As EmptyHandle brakes.
 constexpr double braking_m_per_s2 = 4.0;
-// What may stay at the handle when a hand is gone: of a limp hand, a strap. While the device is braked, its inertia isn't
-// taken for a hand's force.
+// What may stay at the handle when a hand is gone: of a limp hand, a strap. While the device is braked, its inertia
+// isn't taken for a hand's force.
 constexpr double left_kg = 0.5;
 // A proxy with a mass coasts; a light device is slow where it is let go, and its friction, not its mass, ends its way.
 constexpr double way_share = 0.5;
@@ -41,10 +41,10 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
   }
   state_.torque_Nm = state_.missing_Nm = JointVector::Zero(arm.axes());
   if (supervision.let_go == description::LetGo::coast) return;
-  empty_.emplace(EmptyHandleConfig{.band_N = supervision.empty_handle_N,
-                                   .tool_mass_kg = tool_mass_kg + left_kg,
-                                   .way_share = way_share},
-                 period_s);
+  empty_.emplace(
+      EmptyHandleConfig{
+          .band_N = supervision.empty_handle_N, .tool_mass_kg = tool_mass_kg + left_kg, .way_share = way_share},
+      period_s);
 }
 
 // Anchors the device where it stands until its first drive is enabled and its brake opens.

@@ -1,14 +1,15 @@
 // Motion of the impedance type: joint torques that follow from the tool's position (torque_rendering.hpp). Until
-// rendering begins, the torques hold the joints where they stand. A stop is left to the drives, which bring any torque to
-// zero on their slow-down ramp (6084h). This class therefore has no run-out and no hold.
+// rendering begins, the torques hold the joints where they stand. A stop is left to the drives, which bring any torque
+// to zero on their slow-down ramp (6084h). This class therefore has no run-out and no hold.
 //
 // What the hold takes beyond the weight of the model is weight that the model lacks, seen behind a low-pass of 50 ms
 // while the sensor is tared. More than 2 % of a joint's max_torque_Nm is a fault before anything moves; less is τ_0 and
 // carried from the start on. So an empty device stands still where it starts, and elsewhere it is moved by what the
 // model's mistake differs there, and its friction.
 //
-// A handle that nobody holds (handle/empty_handle.hpp) is braked at 4 m/s², then the joints are held where they are, with
-// `let_go: hold` as with `rest`: the device goes on rendering, since it can't hold otherwise. The sensor's bias leads such a device nowhere, so no force is taken for one.
+// A handle that nobody holds (handle/empty_handle.hpp) is braked at 4 m/s², then the joints are held where they are,
+// with `let_go: hold` as with `rest`: the device goes on rendering, since it can't hold otherwise. The sensor's bias
+// leads such a device nowhere, so no force is taken for one.
 #pragma once
 
 #include <memory>
@@ -62,7 +63,7 @@ class TorqueMotion final : public Motion {
     models::JointVector missing_Nm;  // τ_0, as the hold has shown it so far
     models::Vec3 proxy_W = models::Vec3::Zero();
     models::Vec3 tool_k1_W = models::Vec3::Zero(), v_W = models::Vec3::Zero();  // v: behind a low-pass
-    double braked_m_per_s = 0.0;                                               // the tool's bound while nobody holds it
+    double braked_m_per_s = 0.0;  // the tool's bound while nobody holds it
     bool braked = false;
   };
 

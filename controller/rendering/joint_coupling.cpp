@@ -15,11 +15,11 @@ using models::Vec3;
 
 namespace {
 
-// The shares of the speed limits that the proxy keeps to. A hand that pushes 50 N at once on the 0.5 kg of a light device
-// is faster than the proxy by some tenths of m/s for 20 ms, until K and B have answered.
+// The shares of the speed limits that the proxy keeps to. A hand that pushes 50 N at once on the 0.5 kg of a light
+// device is faster than the proxy by some tenths of m/s for 20 ms, until K and B have answered.
 constexpr double joint_speed_share = 0.75, tool_speed_share = 0.4;
-// The share of a joint's acceleration by which the proxy brakes. A hand's mass of 1 kg triples what the elbow of a light
-// device brakes, and the hand may go on pushing with most of what the drive has.
+// The share of a joint's acceleration by which the proxy brakes. A hand's mass of 1 kg triples what the elbow of a
+// light device brakes, and the hand may go on pushing with most of what the drive has.
 constexpr double braking_share = 0.2;
 // The ball |J u| ≤ vT is cut by tangent planes, each at the point that the ones before led to. Each cut leaves the
 // square of the angle of the one before: after six, rounding. What is left is taken off by scaling.

@@ -10,10 +10,10 @@
 // t: the longer of T and 1 ms. U, with a share of each limit, since a hand leads the steel beyond the proxy at first:
 //   −T min(v, C(c₁ − c_min)) ≤ c − c₁ ≤ T min(v, C(c_max − c₁))   v = 3/4 max_speed_rad_per_s
 //   |J (c − c₁)| ≤ T v_tool                                       v_tool = 2/5 max_tool_speed_m_per_s, or less
-// C(d): the approach from which braking by a fifth of max_acceleration_rad_per_s2 ends within d (joint_guard.hpp). c_min,
-// c_max: short of range_rad by what the drive's whole torque presses a joint into its end, τ_max t²/(γ m_i), with
-// m_i = 1/(M⁻¹)_ii. A joint that starts beyond isn't driven back; it moves inwards only. With v_tool = 0 the joints are
-// held where c is.
+// C(d): the approach from which braking by a fifth of max_acceleration_rad_per_s2 ends within d (joint_guard.hpp).
+// c_min, c_max: short of range_rad by what the drive's whole torque presses a joint into its end, τ_max t²/(γ m_i),
+// with m_i = 1/(M⁻¹)_ii. A joint that starts beyond isn't driven back; it moves inwards only. With v_tool = 0 the
+// joints are held where c is.
 //
 // - At rest a torque τ_h presses a joint by τ_h t²/(γ m_i) into its end: 14 mrad for 15 Nm on the elbow of
 //   models/cells/light.yaml, within its range.
@@ -30,10 +30,10 @@
 //
 // Stability. M is the metric, so the loop with rigid gears has no pose in it. With the true mass matrix M_t, and
 // M_t x = r M x in each mode x (M_t is M and what the hand adds, so r ≥ 1), it is that of K = γ/t², B = β/t on a mass r
-// (torque_rendering.hpp), late by the mean; fewer active rows make K and B smaller in that order of matrices. But a gear
-// swings: above its resonance the rotor alone answers, and a torque that is late by 1.5 T feeds what swings faster than
-// 120 Hz. The mean over 5 ms has its zero at 200 Hz and turns the sign beyond. joint_coupling_test.cpp has the spectral
-// radii: below 1 for rigid gears, r from 0.7 on and periods of 0.5 to 4 ms, and at 1 ms for the gears of
+// (torque_rendering.hpp), late by the mean; fewer active rows make K and B smaller in that order of matrices. But a
+// gear swings: above its resonance the rotor alone answers, and a torque that is late by 1.5 T feeds what swings faster
+// than 120 Hz. The mean over 5 ms has its zero at 200 Hz and turns the sign beyond. joint_coupling_test.cpp has the
+// spectral radii: below 1 for rigid gears, r from 0.7 on and periods of 0.5 to 4 ms, and at 1 ms for the gears of
 // models/cells/light.yaml in simulation: 200 Hz against links of 0.034 kg m² and more, on rotors of 0.06. A gear that
 // swings between 70 and 180 Hz isn't borne.
 #pragma once

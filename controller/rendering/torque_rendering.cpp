@@ -39,7 +39,8 @@ class TorquesOfDimension final : public TorqueRendering {
         limiter_(limits, config.period_s),
         coupling_(arm, drives, limits, config.period_s),
         most_Nm_(largest_torques(drives)) {
-    none_ = missing_Nm_ = carried_Nm_ = limits_Nm_ = last_.torque_Nm = last_.held_Nm = JointVector::Zero(most_Nm_.size());
+    none_ = missing_Nm_ = carried_Nm_ = limits_Nm_ = last_.torque_Nm = last_.held_Nm =
+        JointVector::Zero(most_Nm_.size());
   }
 
   void anchor(const JointVector& link_rad) noexcept override {
