@@ -1,6 +1,7 @@
 // What each phase of a session does, and what it does when it begins.
 #include <algorithm>
 #include <bit>
+#include <optional>
 
 #include "controller/cycle/cycle.hpp"
 
@@ -103,6 +104,10 @@ void Cycle::tare(std::int64_t t_k_ns) noexcept {
   if (spread_N > settings_.tare_spread_N) {
     alarm_.raise(Fault::force_at_start, -1, spread_N, settings_.tare_spread_N);
   } else if (in_phase_s(t_k_ns) >= settings_.tare_s) {
+    if (const std::optional<MissingWeight> missing = motion_->missing_weight()) {
+      alarm_.raise(Fault::weight_unknown, missing->joint, missing->torque_Nm, missing->limit_Nm);
+      return;
+    }
     measurement_.finish_tare();
     state_.tared = true;
     supervisor_.handle(Event::tared);

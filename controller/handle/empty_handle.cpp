@@ -89,8 +89,9 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
     const double noise_N = signs.noise_is_white ? signs.noise_N : 0.0;
     s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, noise_N, T});
     if (s.led) s.bias_W = way_.line_W();
-    s.empty = s.led || s.calm_s >= std::clamp(calm_way_m / speed, shortest_calm_s, longest_s) ||
-              s.quiet_s >= std::clamp(quiet_way_m / speed, shortest_quiet_s, longest_s);
+    const double ways = config_.way_share / speed;
+    s.empty = s.led || s.calm_s >= std::clamp(calm_way_m * ways, shortest_calm_s, longest_s) ||
+              s.quiet_s >= std::clamp(quiet_way_m * ways, shortest_quiet_s, longest_s);
   }
   s.braking_m_per_s2 = s.empty ? std::min(braking_m_per_s2, s.braking_m_per_s2 + braking_rise_m_per_s3 * T) : 0.0;
   s.rest_s = s.empty && speed <= rest_m_per_s ? s.rest_s + T : 0.0;

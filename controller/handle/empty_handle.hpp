@@ -30,6 +30,7 @@ struct EmptyHandleConfig {
   double band_N = 0.1;
   double tool_mass_kg = 0.0;  // what moves behind the sensor; felt as inertia
   double lever_m = 0.0;       // a torque counts as its force at this lever; 0: torques don't count
+  double way_share = 1.0;     // of the 20 and 40 mm
 };
 
 // What one cycle shows of the hand.

@@ -1,6 +1,5 @@
 #include "controller/limits/step_limits.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,14 +7,10 @@
 
 namespace proxarm::controller {
 
-using models::JointVector;
 using models::Vec3;
 
 namespace {
 
-// The damping of joints_per_m() (held_orientation.hpp). Near a singularity it bounds the joints' motion; what they
-// would turn beyond, the inverse kinematics limits.
-constexpr double damping_m_per_rad = 1e-3;
 // The share of the tool's speed limit that is commanded. Elastic gears add some 7 % when the hand pulls the arm along
 // at the limit.
 constexpr double commanded_share = 0.9;
@@ -64,13 +59,8 @@ const char* limit_parameter(Limit limit) noexcept {
   return "?";
 }
 
-StepLimiter::StepLimiter(const std::vector<description::DriveDescription>& drives,
-                         const description::CellLimits& limits, double period_s)
-    : limits_(limits), period_s_(period_s), omega_rad_per_s_(2.0 * std::numbers::pi * limits.setpoint_bandwidth_Hz) {
-  for (const description::DriveDescription& drive : drives) {
-    joints_.push_back({drive.range_rad[0], drive.range_rad[1]});
-  }
-}
+StepLimiter::StepLimiter(const description::CellLimits& limits, double period_s)
+    : limits_(limits), period_s_(period_s), omega_rad_per_s_(2.0 * std::numbers::pi * limits.setpoint_bandwidth_Hz) {}
 
 void StepLimiter::make(const StepStart& start, FollowableStep* arm, StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
@@ -80,13 +70,11 @@ void StepLimiter::make(const StepStart& start, FollowableStep* arm, StepLimits& 
   add_borders(start.q_k1_W, Borders::slow_down, out);
 }
 
-void StepLimiter::make_walls(const Vec3& q_W, const JointVector& joint_rad, const models::Jacobian& J_W,
-                             StepLimits& out) const noexcept {
+void StepLimiter::make_walls(const Vec3& q_W, StepLimits& out) const noexcept {
   out.soft_count = out.plane_count = out.hard_count = 0;
   out.arm = nullptr;
   out.q_k1_W = q_W;
   add_borders(q_W, Borders::walls, out);
-  add_joint_walls(joint_rad, J_W, out);
 }
 
 void StepLimiter::add_balls(const StepStart& start, StepLimits& out) const noexcept {
@@ -133,25 +121,6 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
     nearest.bound_m = room(nearest.bound_m);
     nearest.share = share;
     add_plane(out, nearest);
-  }
-}
-
-// The ends of the joints' ranges as planes for the tool's translation, as torques render it. Joint i moves by G_i·Δq
-// with G = Jᵀ(J Jᵀ + λ²E)⁻¹, by the Jacobian of the place alone.
-void StepLimiter::add_joint_walls(const JointVector& joint_rad, const models::Jacobian& J_W,
-                                  StepLimits& out) const noexcept {
-  models::Mat3 A = J_W.topRows<3>().lazyProduct(J_W.topRows<3>().transpose());
-  A.diagonal().array() += damping_m_per_rad * damping_m_per_rad;
-  const Eigen::LLT<models::Mat3> factors(A);
-  for (std::size_t i = 0; i < joints_.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    const Vec3 row = factors.solve(J_W.col(k).head<3>());
-    const double length = row.norm();
-    if (!(length > 1e-9)) continue;
-    ActiveLimits limits;
-    limits.set(Limit::joint_range, static_cast<std::uint8_t>(1u << i));
-    add_plane(out, {row / length, (joints_[i].upper_rad - joint_rad[k]) / length, limits});
-    add_plane(out, {-row / length, (joint_rad[k] - joints_[i].lower_rad) / length, limits});
   }
 }
 

@@ -135,29 +135,21 @@ struct StepStart {
 
 class StepLimiter {
  public:
-  StepLimiter(const std::vector<description::DriveDescription>& drives, const description::CellLimits& limits,
-              double period_s);
+  StepLimiter(const description::CellLimits& limits, double period_s);
 
   void set_period(double period_s) noexcept { period_s_ = period_s; }
   // Makes the sets of one step, around the proxy or around another point that the arm is sent to (sent_point.hpp);
   // `start` holds it as q_k1_W and q_k2_W. Neither allocates nor throws.
   void make(const StepStart& start, FollowableStep* arm, StepLimits& out) const noexcept;
-  // Impedance type: makes only the borders, as walls for a proxy whose tool is at q_W. They don't slow the tool before
-  // them, but push it back if it is pushed through.
-  void make_walls(const models::Vec3& q_W, const models::JointVector& joint_rad, const models::Jacobian& J_W,
-                  StepLimits& out) const noexcept;
+  // Impedance type: makes only workspace and keep-out zones, as walls for a proxy whose tool is at q_W. They don't slow
+  // the tool before them, but push it back if it is pushed through. The joints' ends: rendering/joint_coupling.hpp.
+  void make_walls(const models::Vec3& q_W, StepLimits& out) const noexcept;
 
  private:
   enum class Borders : std::uint8_t { slow_down, walls };
-  struct Joint {
-    double lower_rad, upper_rad;
-  };
   void add_borders(const models::Vec3& q_W, Borders borders, StepLimits& out) const noexcept;
-  void add_joint_walls(const models::JointVector& joint_rad, const models::Jacobian& J_W,
-                       StepLimits& out) const noexcept;
   void add_balls(const StepStart& start, StepLimits& out) const noexcept;
 
-  std::vector<Joint> joints_;
   description::CellLimits limits_;
   double period_s_;
   double omega_rad_per_s_;

@@ -72,7 +72,7 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       tool_mass_kg_(tool_mass_kg),
       hand_(supervision, tool_mass_kg, settings.orientation == OrientationMode::free ? torque_lever_m : 0.0,
             settings.period_s),
-      limiter_(drives, limits, settings.period_s),
+      limiter_(limits, settings.period_s),
       arm_step_(arm, parts_.inverse, drives, settings.period_s),
       final_(arm, drives, limits, settings.period_s) {
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "controller/limits/step_limits.hpp"
@@ -39,6 +40,12 @@ enum class Beginning : std::uint8_t {
   first,     // the sensor has been tared
   resuming,  // from a hold; if somebody moved the tool into an object meanwhile, it leaves it slowly
   freeing,   // from a hold, without the scene
+};
+
+// A joint whose hold takes more torque than the weight of the model.
+struct MissingWeight {
+  std::int32_t joint;
+  double torque_Nm, limit_Nm;
 };
 
 class Motion {
@@ -87,6 +94,9 @@ class Motion {
   // The hand's wrench as it is read while nobody holds the handle and the proxy has come to rest: all of it is the
   // sensor's bias. Null if somebody may be holding the handle.
   [[nodiscard]] virtual const models::Wrench* resting_wrench_W() const noexcept { return nullptr; }
+  // What the model of the device's weight lacks, where that is more than may be carried. Precondition: the hold before
+  // the first start is over.
+  [[nodiscard]] virtual std::optional<MissingWeight> missing_weight() const noexcept { return {}; }
   // Nobody holds the handle, and the cell asks for a hold in this case.
   [[nodiscard]] virtual bool wants_hold() const noexcept { return false; }
   [[nodiscard]] virtual const models::Vec3& proxy_W() const noexcept = 0;

@@ -1,28 +1,84 @@
 #include "controller/motion/torque_motion.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace proxarm::controller {
 
 using models::JointVector;
+using models::Vec3;
+
+namespace {
+
+// Of max_torque_Nm: what a weight may be off. 0.36 Nm of models/cells/light.yaml, 0.7 N at its handle; a drive's
+// friction is some tenths of that.
+constexpr double missing_share = 0.02;
+// The hold settles within 50 ms; the sensor is tared for 0.2 s.
+constexpr double missing_filter_s = 0.05;
+// An encoder's step of 8 µrad is 7 mm/s at 0.9 m and 1 kHz. Behind this it is 0.7.
+constexpr double speed_filter_s = 0.01;
+// As EmptyHandle brakes.
+constexpr double braking_m_per_s2 = 4.0;
+// What may stay at the handle when a hand is gone: of a limp hand, a strap. While the device is braked, its inertia
+// isn't taken for a hand's force.
+constexpr double left_kg = 0.5;
+// A proxy with a mass coasts; a light device is slow where it is let go, and its friction, not its mass, ends its way.
+constexpr double way_share = 0.5;
+
+}  // namespace
 
 TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const models::Arm& arm,
-                           const std::vector<description::DriveDescription>& drives, double period_s)
-    : rendering_(std::move(rendering)), max_speed_rad_per_s_(arm.axes()), period_s_(period_s) {
+                           const std::vector<description::DriveDescription>& drives,
+                           const description::SupervisionDescription& supervision, double tool_mass_kg, double period_s)
+    : rendering_(std::move(rendering)),
+      max_speed_rad_per_s_(arm.axes()),
+      max_torque_Nm_(arm.axes()),
+      period_s_(period_s) {
   for (Eigen::Index i = 0; i < max_speed_rad_per_s_.size(); ++i) {
     max_speed_rad_per_s_[i] = drives[static_cast<std::size_t>(i)].max_speed_rad_per_s;
+    max_torque_Nm_[i] = drives[static_cast<std::size_t>(i)].max_torque_Nm;
   }
-  state_.torque_Nm = JointVector::Zero(arm.axes());
+  state_.torque_Nm = state_.missing_Nm = JointVector::Zero(arm.axes());
+  if (supervision.let_go == description::LetGo::coast) return;
+  empty_.emplace(
+      EmptyHandleConfig{
+          .band_N = supervision.empty_handle_N, .tool_mass_kg = tool_mass_kg + left_kg, .way_share = way_share},
+      period_s);
 }
 
 // Anchors the device where it stands until its first drive is enabled and its brake opens.
-void TorqueMotion::hold(const Measured& measured) noexcept {
+void TorqueMotion::wait_for_drives(const Measured& measured) noexcept {
   if (measured.following == 0) rendering_->anchor(measured.link_rad);
-  state_.torque_Nm = rendering_->hold(measured.link_rad).torque_Nm;
+  hold(measured, 1.0);
+}
+
+void TorqueMotion::stand(const Measured& measured) noexcept {
+  hold(measured, period_s_ / (period_s_ + missing_filter_s));
+}
+
+void TorqueMotion::hold(const Measured& measured, double share) noexcept {
+  const TorqueStep& step = rendering_->hold(measured.link_rad);
+  state_.torque_Nm = step.torque_Nm;
+  state_.missing_Nm += share * (step.held_Nm - state_.missing_Nm);
+}
+
+std::optional<MissingWeight> TorqueMotion::missing_weight() const noexcept {
+  for (Eigen::Index i = 0; i < max_torque_Nm_.size(); ++i) {
+    const double limit_Nm = missing_share * max_torque_Nm_[i];
+    if (std::abs(state_.missing_Nm[i]) > limit_Nm) {
+      return MissingWeight{static_cast<std::int32_t>(i), state_.missing_Nm[i], limit_Nm};
+    }
+  }
+  return {};
 }
 
 void TorqueMotion::start(const Measured& measured, Beginning /*beginning*/) noexcept {
-  rendering_->start(measured.link_rad);
+  rendering_->start(measured.link_rad, state_.missing_Nm);
+  state_.tool_k1_W = measured.tool_W;
+  state_.v_W.setZero();
+  state_.braked = false;
+  if (empty_) empty_->start();
 }
 
 // A device that a hand drives back must not run away; it may be as fast as its joints may.
@@ -35,7 +91,7 @@ bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
       return false;
     }
   }
-  const TorqueStep& step = rendering_->step(measured.link_rad);
+  const TorqueStep& step = rendering_->step(measured.link_rad, largest_tool_speed(cycle));
   if (step.world.fault != ProxyFault::none) {
     cycle.alarm.raise(Fault::proxy_not_finite);
     return false;
@@ -45,6 +101,29 @@ bool TorqueMotion::render(const MotionCycle& cycle) noexcept {
   state_.torque_Nm = step.torque_Nm;
   record_world(step.world, cycle.record);
   return true;
+}
+
+// From the tool's own speed to rest while nobody holds the handle.
+double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
+  const Measured& measured = cycle.measured;
+  State& s = state_;
+  const double share = period_s_ / (period_s_ + speed_filter_s);
+  s.v_W += share * ((measured.tool_W - s.tool_k1_W) / period_s_ - s.v_W);
+  s.tool_k1_W = measured.tool_W;
+  constexpr double unbounded = std::numeric_limits<double>::infinity();
+  if (!empty_) return unbounded;
+  const bool empty = empty_->step({.hand_W = measured.hand_W,
+                                   .noise_N = measured.bias.noise_N,
+                                   .noise_is_white = measured.bias.noise_is_white,
+                                   .tare_samples = measured.bias.samples,
+                                   .sample_cycles = measured.bias.sample_cycles,
+                                   .v_W = s.v_W,
+                                   .mass_kg = 0.0});
+  cycle.record.set(RecordFlag::hands_off, empty);
+  const double before_m_per_s = s.braked ? s.braked_m_per_s : s.v_W.norm();
+  s.braked = empty;
+  s.braked_m_per_s = std::max(0.0, before_m_per_s - braking_m_per_s2 * period_s_);
+  return empty ? s.braked_m_per_s : unbounded;
 }
 
 }  // namespace proxarm::controller

@@ -147,6 +147,11 @@ constexpr std::array texts{
               "a joint moved while the arm was to stand, by its encoder", "rad away",
               "look for a drive that runs off, an encoder that is off, or a load that the drive can't hold, before "
               "anybody comes near"},
+    FaultText{Fault::weight_unknown, "weight_unknown", Reaction::stop_1,
+              "to hold the device still, this drive adds a torque to what the weight of its model asks for", "Nm",
+              "are the masses of the URDF or of `tool` wrong, does somebody lean on the device, or is more mounted on "
+              "it? Correct them; what is left over would move it with nobody there",
+              still},
     FaultText{
         Fault::elbow_too_fast, "elbow_too_fast", Reaction::stop_0,
         "the elbow or the wrist is faster than it was told to be, by the encoders", "m/s",

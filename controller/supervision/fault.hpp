@@ -58,8 +58,9 @@ enum class Fault : std::uint8_t {
   enabling_not_pressed,  // it wasn't released and pressed within enabling_timeout_s of the start: nothing moves
   enabling_squeezed,     // a switch with three positions was squeezed through
   standstill_left,       // a joint moves, by its encoder, where the arm is to stand
+  weight_unknown,        // impedance type: to hold the device takes another torque than its weight: nothing moves
 };
-inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::standstill_left) + 1;
+inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::weight_unknown) + 1;
 
 // What the arm does. Each reaction does more than the one before.
 enum class Reaction : std::uint8_t {

@@ -327,8 +327,21 @@ RigOptions thrown_device() {
     hand.waypoints = {{1.0, {0, 0, 0}}, {1.25, {-0.15, 0.25, 0}}};
   };
   options.edit_cell = [](description::Cell& cell) {
-    for (description::DriveDescription& drive : cell.drives) drive.max_speed_rad_per_s *= 0.2;
+    for (description::DriveDescription& drive : cell.drives) {
+      drive.max_speed_rad_per_s *= 0.2;
+      drive.max_torque_Nm = 3.0;  // which the hand overpowers
+    }
   };
+  return options;
+}
+
+// The tool is 0.2 kg heavier than the controller's model has it.
+RigOptions heavier_device() {
+  RigOptions options;
+  options.cell = "models/cells/light.yaml";
+  options.settings.scheme = Scheme::impedance;
+  options.edit_cell = [](description::Cell& cell) { cell.tool.mass_kg += 0.2; };
+  options.edit_belief = [](description::Cell& cell) { cell.tool.mass_kg -= 0.2; };
   return options;
 }
 
@@ -542,6 +555,7 @@ std::vector<Row> rows() {
          options.commands = {{1'000'000'000, {Order::hold}}};
          return options;
        }},
+      {weight_unknown, Reaction::stop_1, 400, 2e-3, heavier_device, at_start},
   };
 }
 

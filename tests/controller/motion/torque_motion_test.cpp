@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "controller/rendering/joint_coupling.hpp"
 #include "scenes/compiler/compile.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "tests/controller/motion/fake_devices.hpp"
@@ -28,7 +29,12 @@ struct TorqueMotionTest : ::testing::Test {
   models::Arm arm{cell};
   scenes::CompiledScene scene = scenes::compile(scenes::Scene{});
   ImpedanceConfig config{.stiffness_N_per_m = 750.0, .damping_Ns_per_m = 8.0, .period_s = 1e-3};
-  TorqueMotion motion{make_torque_rendering(scene, arm, cell.drives, cell.limits, config), arm, cell.drives, 1e-3};
+  TorqueMotion motion{make_torque_rendering(scene, arm, cell.drives, cell.limits, config),
+                      arm,
+                      cell.drives,
+                      cell.supervision,
+                      cell.tool.mass_kg,
+                      1e-3};
   Measured measured;
   Watched watched;
   CycleRecord record;
@@ -58,6 +64,44 @@ TEST_F(TorqueMotionTest, StopsADeviceThatRunsAway) {
   EXPECT_FALSE(motion.render(cycle()));
   EXPECT_EQ(watched.times(Fault::target_too_fast), 1u);
   EXPECT_EQ(watched.supervisor.report().where, 2);
+}
+
+// 0.2 Nm that the model lacks hold the elbow, and are carried on; 0.5 Nm are a fault, with the joint and the torque.
+TEST_F(TorqueMotionTest, JudgesWhatTheHoldTakes) {
+  const auto hold_with = [&](double torque_Nm) {
+    measured.link_rad = arm.start_rad();
+    measured.following = 0;
+    motion.wait_for_drives(measured);
+    measured.following = 7;
+    const double m = 1.0 / arm.mass_matrix(arm.start_rad()).inverse()(2, 2);
+    measured.link_rad[2] -= torque_Nm * 1e-6 / (JointCoupling::stiffness_share * m);
+    for (int i = 0; i < 400; ++i) motion.stand(measured);
+  };
+  hold_with(0.2);
+  EXPECT_FALSE(motion.missing_weight());
+  motion.start(measured, Beginning::first);
+  ASSERT_TRUE(motion.render(cycle()));
+  EXPECT_NEAR(motion.setpoints().values[2] - arm.gravity_torque(measured.link_rad)[2], 0.2, 0.02);
+  hold_with(0.5);
+  const std::optional<MissingWeight> missing = motion.missing_weight();
+  ASSERT_TRUE(missing);
+  EXPECT_EQ(missing->joint, 2);
+  EXPECT_NEAR(missing->torque_Nm, 0.5, 0.05);
+  EXPECT_NEAR(missing->limit_Nm, 0.36, 1e-12);
+}
+
+// A reading of nothing for 2 s: the handle is empty, and the joints are held.
+TEST_F(TorqueMotionTest, HoldsTheJointsWhileNobodyHoldsTheHandle) {
+  motion.start(measured, Beginning::first);
+  for (int i = 0; i < 2000; ++i) ASSERT_TRUE(motion.render(cycle()));
+  EXPECT_TRUE(record.has(RecordFlag::hands_off));
+  measured.link_rad[0] += 1e-3;
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(motion.render(cycle()));
+  EXPECT_LT(motion.setpoints().values[0], -0.5);
+  measured.hand_W.force = {0.0, 1.0, 0.0};  // somebody takes it
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(motion.render(cycle()));
+  EXPECT_FALSE(record.has(RecordFlag::hands_off));
+  EXPECT_NEAR(motion.setpoints().values[0], 0.0, 1e-3);
 }
 
 TEST_F(TorqueMotionTest, NeverHolds) {

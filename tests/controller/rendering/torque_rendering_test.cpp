@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
+
 #include "tests/controller/closed_loop/closed_loop_rig.hpp"
 
 namespace proxarm::controller {
@@ -41,18 +43,37 @@ struct TorqueRenderingTest : ::testing::Test {
   ImpedanceConfig config{.stiffness_N_per_m = 750.0, .damping_Ns_per_m = 8.0, .period_s = 1e-3};
   std::unique_ptr<TorqueRendering> torques = make_torque_rendering(compiled, arm, cell.drives, cell.limits, config);
   models::JointVector start_rad = arm.start_rad();
+  const models::JointVector nothing_Nm = models::JointVector::Zero(3);
+  static constexpr double unbounded = std::numeric_limits<double>::infinity();
 
+  // From `from` to `to` at less than the speed that the tool is slowed at.
+  const TorqueStep& lead(const models::JointVector& from, const models::JointVector& to) {
+    constexpr int steps = 4000;
+    for (int i = 1; i < steps; ++i) torques->step(from + (to - from) * (i / static_cast<double>(steps)), unbounded);
+    return torques->step(to, unbounded);
+  }
   [[nodiscard]] Vec3 force_of(const models::JointVector& q, const models::JointVector& torque_Nm) const {
     models::ToolKinematics tool;
     arm.kinematics(q, tool);
     const models::Mat3 J = tool.J_W.topRows<3>();
     return J.transpose().lu().solve(Vec3(torque_Nm - arm.gravity_torque(q)));
   }
+  // The angles at which the tool is beyond the wall at x = 0.9.
+  [[nodiscard]] models::JointVector beyond_wall(double depth_m) const {
+    models::JointVector q = start_rad;
+    models::ToolKinematics tool;
+    for (int i = 0; i < 60; ++i) {
+      arm.kinematics(q, tool);
+      const models::Mat3 J = tool.J_W.topRows<3>();
+      q += Vec3(J.lu().solve(Vec3(0.9 + depth_m, 0.0, 0.6) - tool.X_WT.translation())) * 0.5;
+    }
+    return q;
+  }
 };
 
 TEST_F(TorqueRenderingTest, CarriesTheDeviceAndNothingElseInFreeSpace) {
-  torques->start(start_rad);
-  const TorqueStep& step = torques->step(start_rad);
+  torques->start(start_rad, nothing_Nm);
+  const TorqueStep& step = torques->step(start_rad, unbounded);
   EXPECT_LT((step.torque_Nm - arm.gravity_torque(start_rad)).norm(), 1e-12);
   EXPECT_GT(step.torque_Nm.cwiseAbs().maxCoeff(), 1.0) << "it isn't weightless";
   EXPECT_EQ(step.limits.kinds, 0);
@@ -60,16 +81,11 @@ TEST_F(TorqueRenderingTest, CarriesTheDeviceAndNothingElseInFreeSpace) {
 
 // 10 mm beyond the wall at x = 0.9, at rest: 750 N/m · 10 mm, out of it.
 TEST_F(TorqueRenderingTest, PushesOutOfAWallWithK) {
-  models::JointVector inside = start_rad;
-  models::ToolKinematics tool;
-  for (int i = 0; i < 30; ++i) {
-    arm.kinematics(inside, tool);
-    const models::Mat3 J = tool.J_W.topRows<3>();
-    inside += Vec3(J.lu().solve(Vec3(0.91, 0.0, 0.6) - tool.X_WT.translation())) * 0.5;
-  }
-  torques->start(start_rad);
-  for (int i = 0; i < 1000; ++i) torques->step(inside);
-  const TorqueStep& step = torques->step(inside);
+  const models::JointVector inside = beyond_wall(0.01);
+  torques->start(start_rad, nothing_Nm);
+  lead(start_rad, inside);
+  for (int i = 0; i < 1000; ++i) torques->step(inside, unbounded);
+  const TorqueStep& step = torques->step(inside, unbounded);
   // Friction holds what K and B of the way in left along the wall; across it the force is K times the depth.
   EXPECT_NEAR(force_of(inside, step.torque_Nm).x(), -7.5, 1e-3);
   EXPECT_EQ(step.world.contacts, 1);
@@ -78,32 +94,43 @@ TEST_F(TorqueRenderingTest, PushesOutOfAWallWithK) {
 
 // A force that is too large for one joint is weaker, not elsewhere; what holds the device up isn't cut.
 TEST_F(TorqueRenderingTest, CutsWhatIsRenderedAndKeepsItsDirection) {
-  models::JointVector away = start_rad;
-  away[1] += 0.1;
-  const auto held = [&]() -> const TorqueStep& {
-    torques->anchor(start_rad);
-    torques->hold(away);  // on the way there B pushes, too
-    return torques->hold(away);
+  const models::JointVector inside = beyond_wall(0.03);
+  const auto pushed = [&]() -> const TorqueStep& {
+    torques->start(start_rad, nothing_Nm);
+    lead(start_rad, inside);
+    for (int i = 0; i < 1000; ++i) torques->step(inside, unbounded);
+    return torques->step(inside, unbounded);
   };
-  const Vec3 wanted = force_of(away, held().torque_Nm);
-  ASSERT_EQ(held().limits.kinds, 0);
-  for (description::DriveDescription& drive : cell.drives) drive.max_torque_Nm = 6.0;
+  const Vec3 wanted = force_of(inside, pushed().torque_Nm);
+  ASSERT_EQ(pushed().limits.kinds, 0);
+  const double most_Nm = 0.7 * pushed().torque_Nm.cwiseAbs().maxCoeff();
+  for (description::DriveDescription& drive : cell.drives) drive.max_torque_Nm = most_Nm;
   torques = make_torque_rendering(compiled, arm, cell.drives, cell.limits, config);
-  const TorqueStep& step = held();
+  const TorqueStep& step = pushed();
   EXPECT_TRUE(step.limits.has(Limit::joint_torque));
-  EXPECT_NEAR(step.torque_Nm.cwiseAbs().maxCoeff(), 6.0, 1e-9);
-  const Vec3 given = force_of(away, step.torque_Nm);
+  EXPECT_NEAR(step.torque_Nm.cwiseAbs().maxCoeff(), most_Nm, 1e-9);
+  const Vec3 given = force_of(inside, step.torque_Nm);
   EXPECT_LT(given.norm(), wanted.norm());
-  EXPECT_NEAR(given.normalized().dot(wanted.normalized()), 1.0, 1e-12);
+  EXPECT_NEAR(given.normalized().dot(wanted.normalized()), 1.0, 1e-9);
 }
 
 TEST_F(TorqueRenderingTest, PushesBackIntoAJointsRange) {
-  models::JointVector beyond = start_rad;
-  beyond[0] = cell.drives[0].range_rad[1] + 0.01;
-  torques->start(beyond);
-  const TorqueStep& step = torques->step(beyond);
+  models::JointVector at_end = start_rad, beyond = start_rad;
+  at_end[0] = cell.drives[0].range_rad[1] - 0.05;
+  beyond[0] = cell.drives[0].range_rad[1];
+  torques->start(at_end, nothing_Nm);
+  const TorqueStep& step = lead(at_end, beyond);
   EXPECT_TRUE(step.limits.has(Limit::joint_range));
-  EXPECT_LT(step.torque_Nm[0], -0.5);
+  EXPECT_LT(step.torque_Nm[0], -0.9 * cell.drives[0].max_torque_Nm)
+      << "all that the drive has, at the end of its range";
+}
+
+TEST_F(TorqueRenderingTest, CarriesWhatTheModelOfItsWeightLacked) {
+  models::JointVector missing_Nm = nothing_Nm;
+  missing_Nm << 0.0, -0.2, 0.1;
+  torques->start(start_rad, missing_Nm);
+  const TorqueStep& step = torques->step(start_rad, unbounded);
+  EXPECT_LT((step.torque_Nm - arm.gravity_torque(start_rad) - missing_Nm).norm(), 1e-12);
 }
 
 TEST(TorqueRendering, RendersTheWallOverTheBus) {
