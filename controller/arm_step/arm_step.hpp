@@ -2,15 +2,16 @@
 // the arm can't do as sets of it.
 //
 //   minimise |x(u) − x_d|², and then |R(u) ⊟ R_d|²,   where u ∈ U
-// x, R: the tool's pose by exact kinematics at c(k−1) + u, with c the links' angles before the setpoints' filter. U:
-//   box          low ≤ u ≤ high: each joint's range with room to brake, its speed, and its acceleration behind the
-//   filter.
-//                That lets the filter's input jump, as it does at a wall. A step that only turns the tool otherwise
-//                than was wanted keeps to half of the acceleration before the filter, too, if the place allows it
-//   place        −∇σ·u ≤ b: distance from the poses in which the place is lost (place_margin.hpp), reached as a border
-//   points       |p(u) − p(0)| ≤ vT for elbow and wrist, and less where braking would make a point faster
-//   (most_way_m()) turn         the sets of turning (turn_sets.hpp); where the orientation is held, how far it may lag
-// All but the box are curved: they are taken in as half-spaces where a solution has left them.
+// x, R: the tool's pose by exact kinematics at c(k−1) + u, with c the links' angles before the setpoints' filter. The
+// sets of U:
+//   box      low ≤ u ≤ high: each joint's range with room to brake, its speed, and its acceleration behind the filter.
+//            The filter's input may therefore jump, as it does at a wall. A step that turns the tool otherwise than was
+//            wanted keeps to half of the acceleration before the filter, too, if the place allows it
+//   place    −∇σ·u ≤ b: distance from the poses in which the place is lost (place_margin.hpp)
+//   points   |p(u) − p(0)| ≤ vT for elbow and wrist, also while all joints brake from there (growth_m_per_s())
+//   turn     the sets of turning (turn_sets.hpp); of an orientation that is held, how far it may lag
+// Place and turn are borders: they are approached no faster than joints can brake. All but the box are curved, and
+// taken in as half-spaces where a solution has left them.
 //
 // Place comes before orientation. Where the wrist's joints have not enough left to turn the tool (a wrist's
 // singularity), it turns later, and what it lags by is bounded by the sets of turning. But a tool isn't tilted to reach
@@ -19,10 +20,10 @@
 // where it turns freely, as braking turns it: turning gives way first. The proxy's next place is one of them: q(k) is
 // where the arm is sent.
 //
-// U contains the step u_b by which all joints brake together as hard as they can, and each half-space is widened to
-// contain it. A force of
-// U's normal cone therefore has f·(u − u_b) ≤ 0: a limit never drives the arm beyond what braking would. That is what
-// lets an arm come back that was led where it can't go.
+// Each half-space is widened to what the joints can still do, so U is never empty for one of them alone; where several
+// exclude each other, the joints brake together as hard as they can. A force of U's normal cone has f·(u − u_b) ≤ 0 for
+// any step u_b of U: a limit never drives the arm beyond what braking would. That is what lets an arm come back that
+// was led where it can't go.
 //
 // A step that no set touches is that of the inverse kinematics, to the bit. Neither allocates, locks nor throws after
 // construction.
@@ -165,7 +166,7 @@ class ArmStep final : public FollowableStep {
   // Of this step.
   ArmStepStart start_;
   models::JointVector brakes_;   // all joints brake together, by half of their acceleration
-  models::JointVector stop_;     // u_b
+  models::JointVector stop_;     // all joints brake together, as hard as the box allows
   Box whole_, box_;              // U's, and the part of it that is used
   double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)
