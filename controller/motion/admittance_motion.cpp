@@ -492,13 +492,10 @@ void AdmittanceMotion::turn_on_from(const ArmStep& step, const Eigen::Quaternion
   put_proxy_to(state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
 }
 
-// What setpoints are judged by where the hand turns the tool: all that the cell allows.
+// What setpoints are judged by where the hand turns the tool; while the tool is slowed, as well.
 TurnSets AdmittanceMotion::turn_limits() const noexcept {
-  TurnSets sets = parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets();
-  sets.max_turn_rad = limits_.max_turn_rad;
-  sets.axis_range.max_tilt_rad = limits_.max_tilt_rad.value_or(AxisRange::everything);
-  sets.axis_range.max_twist_rad = limits_.max_twist_rad.value_or(AxisRange::everything);
-  sets.max_speed_rad_per_s = limits_.max_turning_speed_rad_per_s;
+  TurnSets sets = (parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets()).sent();
+  sets.max_speed_rad_per_s = std::max(sets.max_speed_rad_per_s, limits_.max_turning_speed_rad_per_s);
   return sets;
 }
 

@@ -15,6 +15,15 @@ double TurnSets::reachable_rad(double angle_rad, double most_rad, double period_
   return std::max(most_rad, angle_rad - returning_rad_per_s * period_s);
 }
 
+TurnSets TurnSets::sent() const noexcept {
+  TurnSets out = *this;
+  out.max_turn_rad += lead_rad;
+  if (axis_range.max_tilt_rad < AxisRange::everything) out.axis_range.max_tilt_rad += lead_rad;
+  if (axis_range.max_twist_rad < AxisRange::everything) out.axis_range.max_twist_rad += lead_rad;
+  out.max_speed_rad_per_s += lead_rad_per_s;
+  return out;
+}
+
 double TurnSets::beyond_rad(const Eigen::Quaterniond& R) const noexcept {
   const double beyond = models::rotation_vector(R * home.conjugate()).norm() - max_turn_rad;
   return axis_range.limits() ? std::max(beyond, axis_range.beyond_rad(home, R)) : beyond;

@@ -175,20 +175,16 @@ AxisRange axis_range(const description::CellLimits& limits) {
   return range;
 }
 
-// What the limits promise is what is sent, and motors lead the links by up to this while they accelerate them: 0.8 mrad
-// and 3 % of the speed in random sessions of three cells. Small ranges keep a twentieth.
-constexpr double turning_lead_rad = 1.5e-3, lead_share = 0.05, turning_speed_share = 0.95;
-
-double before_rad(double limit_rad) { return limit_rad - std::min(turning_lead_rad, lead_share * limit_rad); }
-
-// Counted from the orientation at the first start.
+// Counted from the orientation at the first start, and what is sent leads up to the limits.
 TurnSets turn_sets(const description::Cell& cell) {
   TurnSets sets;
-  sets.max_turn_rad = before_rad(cell.limits.max_turn_rad);
+  sets.max_turn_rad = TurnSets::before(cell.limits.max_turn_rad, TurnSets::lead_rad);
   sets.axis_range = axis_range(cell.limits);
-  if (cell.limits.max_tilt_rad) sets.axis_range.max_tilt_rad = before_rad(*cell.limits.max_tilt_rad);
-  if (cell.limits.max_twist_rad) sets.axis_range.max_twist_rad = before_rad(*cell.limits.max_twist_rad);
-  sets.max_speed_rad_per_s = turning_speed_share * cell.limits.max_turning_speed_rad_per_s;
+  double& tilt = sets.axis_range.max_tilt_rad;
+  double& twist = sets.axis_range.max_twist_rad;
+  if (tilt < AxisRange::everything) tilt = TurnSets::before(tilt, TurnSets::lead_rad);
+  if (twist < AxisRange::everything) twist = TurnSets::before(twist, TurnSets::lead_rad);
+  sets.max_speed_rad_per_s = TurnSets::before(cell.limits.max_turning_speed_rad_per_s, TurnSets::lead_rad_per_s);
   sets.brakes_s = ArmStep::braking_s(cell.drives);
   return sets;
 }

@@ -190,16 +190,17 @@ Eigen::Quaterniond ToolGuard::orientation(const JointVector& link_rad) const noe
   return Eigen::Quaterniond(arm_->tool_pose(link_rad).linear()).normalized();
 }
 
-// On the way to rest the tool comes on towards a limit as in this step. While it turns along one, braking in a straight
-// line of the joints leaves it by a few milliradians, which only a stop does.
+// On the way to rest the tool comes on towards a limit as in this step; what motors lead the links by then comes back.
+// While the tool turns along a limit, braking in a straight line of the joints leaves it by a few milliradians, which
+// only a stop does.
 void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, const Limits& limit, double more_steps,
                               ActiveLimits& out) const noexcept {
   const TurnSets& turn = *limit.turn;
   const Eigen::Quaterniond from = orientation(target_rad_ - points_.twist_rad), to = orientation(theta - at.twist_rad);
   const double before = turn.beyond_rad(from), beyond = turn.beyond_rad(to);
-  const double rest = beyond + std::max(0.0, more_steps * (beyond - before));
-  if (from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turned_rad ||
-      rest > std::max(0.0, before) + turned_rad) {
+  const double rest = beyond + more_steps * (beyond - before), most = std::max(0.0, before) + turned_rad;
+  if (from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turned_rad || beyond > most ||
+      rest > most + TurnSets::lead_rad) {
     out.set(Limit::guard_turning);
   }
 }
