@@ -192,7 +192,7 @@ struct Summary {
   std::optional<PosesSummary> poses;       // set by the caller; absent: impedance type
   double lookahead_s = 0.0;                // horizon at the start; 0: none
   double hands_off_s = 0.0;                // nobody held the handle
-  std::uint64_t guarded_cycles = 0;  // in which the last guard held a setpoint back: none without a fault
+  std::uint64_t guarded_cycles = 0;        // in which the last guard held a setpoint back: none without a fault
   // What limits have put into the proxy, and the most without taking it back; negative: they took it.
   double limits_work_J = 0.0, limits_push_J = 0.0;
   std::uint64_t held_samples = 0;         // cycles without a new sample of the sensor

@@ -1,7 +1,7 @@
 // How much of its drives' torque (drives[].max_torque_Nm) the arm's own weight takes.
 //
-// Where that is more than a step near full stretch may ask for (drive_torques.hpp), next to nothing is left to accelerate
-// and brake with: the arm is slow there. A session can say so before it begins.
+// Where that is more than a step near full stretch may ask for (drive_torques.hpp), next to nothing is left to
+// accelerate and brake with: the arm is slow there. A session can say so before it begins.
 #pragma once
 
 #include "models/arm/arm.hpp"
