@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/limits/braking.hpp"
 #include "models/geometry/tool_pose.hpp"
 
 namespace proxarm::controller {
@@ -49,8 +50,7 @@ constexpr double alike = 1e-3;  // of half-spaces' normals: the sine of the angl
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
 
-// The speed on the way to rest, and the speed to start with so that it stays within `most` (growth_m_per_s()).
-double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
+// The inverse of fastest_to_rest(): the speed to start with so that it stays within `most`.
 double fastest_start(double B, double most) noexcept {
   return B <= most ? most : std::max(0.0, 2.0 * std::sqrt(B * most) - B);
 }
@@ -167,17 +167,16 @@ void ArmStep::make_boxes(const ArmStepStart& start) noexcept {
     whole_.low[i] = std::clamp(coasts - change, low, brakes_[i]);
     whole_.high[i] = std::clamp(coasts + change, brakes_[i], high);
   }
-  make_stop();
 }
 
 // The step along the last one that brakes as hard as the box allows: often to rest at once, since the filter follows.
-void ArmStep::make_stop() noexcept {
+JointVector ArmStep::hardest_braking() const noexcept {
   double share = 0.0;
   for (Eigen::Index i = 0; i < step_rad_.size(); ++i) {
     const double u = step_rad_[i], least = u > 0.0 ? whole_.low[i] : whole_.high[i];
     if (u != 0.0) share = std::max(share, least / u);
   }
-  stop_ = (std::min(1.0, share) * step_rad_).cwiseMax(whole_.low).cwiseMin(whole_.high);
+  return (std::min(1.0, share) * step_rad_).cwiseMax(whole_.low).cwiseMin(whole_.high);
 }
 
 // A hand that turns a point changes its turning no faster than joints take it up. One box for entering and for leaving
@@ -225,27 +224,30 @@ bool ArmStep::allows(const JointVector& u) const noexcept {
 // B = t |u̇|ᵀC|u̇| and t the time that this takes; V if B ≤ V (tool_guard.hpp has the derivation). This is B.
 double ArmStep::growth_m_per_s(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_;
-  double brakes_s = 0.0;
-  for (Eigen::Index i = 0; i < rate.size(); ++i) {
-    brakes_s = std::max(brakes_s, rate[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2);
-  }
-  return brakes_s * rate.dot(curvature_ * rate);
+  return braking_of(slowest_to_brake(rate), rate) * rate.dot(curvature_ * rate);
 }
 
-// Of growth_m_per_s(), by u: m/s per rad.
+// The gradient of growth_m_per_s() by u, m/s per rad.
 JointVector ArmStep::growth_gradient(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_, bent = curvature_ * rate;
-  double brakes_s = 0.0;
-  Eigen::Index slowest = 0;
-  for (Eigen::Index i = 0; i < rate.size(); ++i) {
-    const double own_s = rate[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
-    if (own_s > brakes_s) slowest = i;
-    brakes_s = std::max(brakes_s, own_s);
-  }
-  JointVector out = 2.0 * brakes_s * bent;
+  const Eigen::Index slowest = slowest_to_brake(rate);
+  JointVector out = 2.0 * braking_of(slowest, rate) * bent;
   out[slowest] += rate.dot(bent) / joints_[static_cast<std::size_t>(slowest)].acceleration_rad_per_s2;
   for (Eigen::Index i = 0; i < out.size(); ++i) out[i] = std::copysign(out[i] / period_s_, u[i]);
   return out;
+}
+
+// The time that this joint needs to brake from its speed, and the joint that needs the longest.
+double ArmStep::braking_of(Eigen::Index i, const JointVector& rad_per_s) const noexcept {
+  return rad_per_s[i] / joints_[static_cast<std::size_t>(i)].acceleration_rad_per_s2;
+}
+
+Eigen::Index ArmStep::slowest_to_brake(const JointVector& rad_per_s) const noexcept {
+  Eigen::Index slowest = 0;
+  for (Eigen::Index i = 1; i < rad_per_s.size(); ++i) {
+    if (braking_of(i, rad_per_s) > braking_of(slowest, rad_per_s)) slowest = i;
+  }
+  return slowest;
 }
 
 // A point moves by at most Σ R_i |u_i|, R_i being the distance of T from axis i at most: most steps are below that.
@@ -441,7 +443,7 @@ bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
   // A joint's origin moves by the joints before it alone.
   const auto limit = [&](const Vec3& from_W, const Vec3& to_W, std::size_t joints, double most_m_per_s) {
     const Vec3 way = to_W - from_W;
-    const double length = way.norm(), V = length / T, beyond = fastest(V, B) - most_m_per_s;
+    const double length = way.norm(), V = length / T, beyond = fastest_to_rest(V, B) - most_m_per_s;
     if (!(beyond > 0.0)) return;
     JointVector a(u.size());
     for (Eigen::Index i = 0; i < a.size(); ++i) {
@@ -508,7 +510,7 @@ ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
       reached = solve_at(model_, J_p, wanted);
     }
     const bool solved = reached || solve_near(model_, J_p, wanted);
-    const JointVector u = solved ? JointVector(program_.u().cwiseMax(box_.low).cwiseMin(box_.high)) : stop_;
+    const JointVector u = solved ? JointVector(program_.u().cwiseMax(box_.low).cwiseMin(box_.high)) : hardest_braking();
     const ActiveLimits limits = pressing();
     if (leave_curved_sets(model_, u)) continue;
     active_ = limits;

@@ -120,7 +120,7 @@ class ArmStep final : public FollowableStep {
   };
 
   void make_boxes(const ArmStepStart& start) noexcept;
-  void make_stop() noexcept;
+  [[nodiscard]] models::JointVector hardest_braking() const noexcept;
   [[nodiscard]] double least(const models::JointVector& a) const noexcept;
   [[nodiscard]] double room_rad(std::size_t i, double sign) const noexcept;
   [[nodiscard]] double place_bound() const noexcept;
@@ -129,6 +129,8 @@ class ArmStep final : public FollowableStep {
   void use_first_box() noexcept;
   [[nodiscard]] double growth_m_per_s(const models::JointVector& u) const noexcept;
   [[nodiscard]] models::JointVector growth_gradient(const models::JointVector& u) const noexcept;
+  [[nodiscard]] double braking_of(Eigen::Index i, const models::JointVector& rad_per_s) const noexcept;
+  [[nodiscard]] Eigen::Index slowest_to_brake(const models::JointVector& rad_per_s) const noexcept;
   [[nodiscard]] bool points_too_fast(const models::JointVector& u) const noexcept;
   bool limit_points(const Model& model, const models::JointVector& u) noexcept;
   void linearise(const models::JointVector& u, Model& model) const noexcept;
@@ -166,7 +168,6 @@ class ArmStep final : public FollowableStep {
   // Of this step.
   ArmStepStart start_;
   models::JointVector brakes_;   // all joints brake together, by half of their acceleration
-  models::JointVector stop_;     // all joints brake together, as hard as the box allows
   Box whole_, box_;              // U's, and the part of it that is used
   double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)

@@ -18,9 +18,8 @@ constexpr double longest_s = 1.5;
 constexpr double leaving = 1.5;
 // After an acceleration of the arm the handle may oscillate for two periods of its first mode (15 Hz).
 constexpr double ringing_s = 0.1;
-// At 4 m/s² the proxy stops from 0.45 m/s within 5 cm, and a handle of 0.25 kg reads 1 N. The braking force rises
-// within 0.05 s, so that a hand which was taken for absent feels a pull, not a jerk.
-constexpr double braking_m_per_s2 = 4.0, braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
+// The braking force rises within 0.05 s, so that a hand which was taken for absent feels a pull, not a jerk.
+constexpr double braking_rise_m_per_s3 = 80.0, braking_s = 0.07;
 // As a share of the force that led the handle: what the tool behind the sensor adds while the arm is braked and its
 // gears oscillate.
 constexpr double led_share = 0.2;

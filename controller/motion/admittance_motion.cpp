@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "models/base/archive_fields.hpp"
 #include "models/geometry/tool_pose.hpp"
@@ -42,16 +41,6 @@ Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
-// The longest time in which the tool comes to rest: joints brake, the tool's acceleration is limited, and setpoints
-// come late by the filter's 2/ω.
-double longest_braking_s(const std::vector<description::DriveDescription>& drives,
-                         const description::CellLimits& limits) noexcept {
-  const double filter_s =
-      limits.setpoint_bandwidth_Hz > 0.0 ? 1.0 / (std::numbers::pi * limits.setpoint_bandwidth_Hz) : 0.0;
-  return filter_s +
-         std::max(ArmStep::braking_s(drives), limits.max_tool_speed_m_per_s / limits.max_tool_acceleration_m_per_s2);
-}
-
 Damping damping_by(Passivity passivity) noexcept {
   if (passivity == Passivity::on) return Damping::at_once;
   return passivity == Passivity::automatic ? Damping::what_lasts : Damping::never;
@@ -76,7 +65,11 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       arm_step_(arm, parts_.inverse, drives, settings.period_s),
       final_(arm, drives, limits, settings.period_s) {
   state_.speed_limit_m_per_s = limits.max_tool_speed_m_per_s;
-  limits_work_.set_braking(longest_braking_s(drives, limits));
+  // The longest time in which the tool comes to rest: joints brake, the tool's acceleration is limited, and setpoints
+  // come late by the filter.
+  limits_work_.set_braking(
+      parts_.elastic.filter().lead_s() +
+      std::max(ArmStep::braking_s(drives), limits.max_tool_speed_m_per_s / limits.max_tool_acceleration_m_per_s2));
   const models::ToolKinematics& at = arm_step_.kinematics();
   R_TS_ = at.X_WT.linear().transpose() * at.X_WS.linear();
   if (settings.looks_ahead) {
@@ -492,7 +485,7 @@ void AdmittanceMotion::turn_on_from(const ArmStep& step, const Eigen::Quaternion
   put_proxy_to(state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
 }
 
-// What setpoints are judged by where the hand turns the tool; while the tool is slowed, as well.
+// The limits of turning that setpoints are judged by. While the tool is slowed they stay as they are.
 TurnSets AdmittanceMotion::turn_limits() const noexcept {
   TurnSets sets = (parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets()).sent();
   sets.max_speed_rad_per_s = std::max(sets.max_speed_rad_per_s, limits_.max_turning_speed_rad_per_s);

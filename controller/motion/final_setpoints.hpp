@@ -37,7 +37,7 @@ class FinalSetpoints {
     // place, and would shake the tool.
     bool differs = false;
   };
-  // What the setpoints of one period are judged by.
+  // Bounds on the setpoints of one period.
   struct Bounds {
     double max_speed_m_per_s;  // the tool's present speed limit
     models::Vec3 links_W;      // where the motors lead the links' tool

@@ -4,6 +4,16 @@
 
 namespace proxarm::controller {
 
+HandSigns hand_signs(const Measured& measured, const models::Vec3& v_W, double mass_kg) noexcept {
+  return {.hand_W = measured.hand_W,
+          .noise_N = measured.bias.noise_N,
+          .noise_is_white = measured.bias.noise_is_white,
+          .tare_samples = measured.bias.samples,
+          .sample_cycles = measured.bias.sample_cycles,
+          .v_W = v_W,
+          .mass_kg = mass_kg};
+}
+
 HandJudge::HandJudge(const description::SupervisionDescription& supervision, double tool_mass_kg, double lever_m,
                      double period_s)
     : supervision_(supervision), period_s_(period_s) {
@@ -33,13 +43,7 @@ models::Wrench HandJudge::step(const MotionCycle& cycle, const ProxyMotion& prox
     judge(cycle, proxy, false);
     return hand_W;
   }
-  const bool empty = empty_->step({.hand_W = measured.hand_W,
-                                   .noise_N = measured.bias.noise_N,
-                                   .noise_is_white = measured.bias.noise_is_white,
-                                   .tare_samples = measured.bias.samples,
-                                   .sample_cycles = measured.bias.sample_cycles,
-                                   .v_W = proxy.v_W,
-                                   .mass_kg = proxy.mass_kg});
+  const bool empty = empty_->step(hand_signs(measured, proxy.v_W, proxy.mass_kg));
   cycle.record.set(RecordFlag::hands_off, empty);
   judge(cycle, proxy, empty && !empty_->led());
   if (!empty) return hand_W;

@@ -24,6 +24,10 @@ struct ProxyMotion {
   models::Vec3 braking_torque_W = models::Vec3::Zero();  // that would bring its turning to rest
 };
 
+// What this cycle's measurement shows of the hand, beside a proxy or a device of this velocity and mass. Precondition:
+// `measured` and `v_W` outlive the result.
+[[nodiscard]] HandSigns hand_signs(const Measured& measured, const models::Vec3& v_W, double mass_kg) noexcept;
+
 class HandJudge {
  public:
   // `lever_m`: a torque counts as the force that makes it at this lever; 0: the orientation is held.

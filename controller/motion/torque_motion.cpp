@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "controller/motion/hand_judge.hpp"
+
 namespace proxarm::controller {
 
 using models::JointVector;
@@ -11,15 +13,13 @@ using models::Vec3;
 
 namespace {
 
-// Of max_torque_Nm: what a weight may be off. 0.36 Nm of models/cells/light.yaml, 0.7 N at its handle; a drive's
-// friction is some tenths of that.
+// The share of max_torque_Nm by which a weight may be off: 0.36 Nm of models/cells/light.yaml, 0.7 N at its handle; a
+// drive's friction is some tenths of that.
 constexpr double missing_share = 0.02;
 // The hold settles within 50 ms; the sensor is tared for 0.2 s.
 constexpr double missing_filter_s = 0.05;
 // An encoder's step of 8 µrad is 7 mm/s at 0.9 m and 1 kHz. Behind this it is 0.7.
 constexpr double speed_filter_s = 0.01;
-// As EmptyHandle brakes.
-constexpr double braking_m_per_s2 = 4.0;
 // What may stay at the handle when a hand is gone: of a limp hand, a strap. While the device is braked, its inertia
 // isn't taken for a hand's force.
 constexpr double left_kg = 0.5;
@@ -112,17 +112,11 @@ double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
   s.tool_k1_W = measured.tool_W;
   constexpr double unbounded = std::numeric_limits<double>::infinity();
   if (!empty_) return unbounded;
-  const bool empty = empty_->step({.hand_W = measured.hand_W,
-                                   .noise_N = measured.bias.noise_N,
-                                   .noise_is_white = measured.bias.noise_is_white,
-                                   .tare_samples = measured.bias.samples,
-                                   .sample_cycles = measured.bias.sample_cycles,
-                                   .v_W = s.v_W,
-                                   .mass_kg = 0.0});
+  const bool empty = empty_->step(hand_signs(measured, s.v_W, 0.0));
   cycle.record.set(RecordFlag::hands_off, empty);
   const double before_m_per_s = s.braked ? s.braked_m_per_s : s.v_W.norm();
   s.braked = empty;
-  s.braked_m_per_s = std::max(0.0, before_m_per_s - braking_m_per_s2 * period_s_);
+  s.braked_m_per_s = std::max(0.0, before_m_per_s - EmptyHandle::braking_m_per_s2 * period_s_);
   return empty ? s.braked_m_per_s : unbounded;
 }
 

@@ -25,7 +25,7 @@ namespace proxarm::controller {
 
 class TorqueMotion final : public Motion {
  public:
-  // `tool_mass_kg`: of what hangs behind the sensor.
+  // `tool_mass_kg`: the mass of what hangs behind the sensor.
   TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const models::Arm& arm,
                const std::vector<description::DriveDescription>& drives,
                const description::SupervisionDescription& supervision, double tool_mass_kg, double period_s);

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/setpoints/joint_guard.hpp"
+#include "controller/limits/braking.hpp"
 
 namespace proxarm::controller {
 

@@ -10,7 +10,7 @@
 // t: the longer of T and 1 ms. U, with a share of each limit, since a hand leads the steel beyond the proxy at first:
 //   −T min(v, C(c₁ − c_min)) ≤ c − c₁ ≤ T min(v, C(c_max − c₁))   v = 3/4 max_speed_rad_per_s
 //   |J (c − c₁)| ≤ T v_tool                                       v_tool = 2/5 max_tool_speed_m_per_s, or less
-// C(d): the approach from which braking by a fifth of max_acceleration_rad_per_s2 ends within d (joint_guard.hpp).
+// C(d): the approach from which braking by a fifth of max_acceleration_rad_per_s2 ends within d (limits/braking.hpp).
 // c_min, c_max: short of range_rad by what the drive's whole torque presses a joint into its end, τ_max t²/(γ m_i),
 // with m_i = 1/(M⁻¹)_ii. A joint that starts beyond isn't driven back; it moves inwards only. With v_tool = 0 the
 // joints are held where c is.

@@ -13,7 +13,7 @@
 // A coupling that is let go under load would throw the device. In direction n = f/|f| the tool may leave the proxy of
 // (23), that is n·(∇p − ∇q)/T, by 0.07 m/s; what keeps it to that is taken from the force itself, so e ≥ 0: it can't
 // suck.
-
+//
 // The tool is rendered as a point: joint motion that only turns it is free, apart from the compensation of gravity. In
 // a scene of one or two dimensions, a spring of K and B holds the tool on the line or plane through the start.
 //

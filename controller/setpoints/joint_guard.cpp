@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/limits/braking.hpp"
+
 namespace proxarm::controller {
 
 using models::JointVector;
@@ -14,11 +16,6 @@ namespace {
 constexpr double lag_tolerance_rad = 1e-13;
 
 }  // namespace
-
-double approach_speed(double distance, double a, double T) noexcept {
-  if (!(distance > 0.0)) return 0.0;
-  return 2.0 * distance / (T + std::sqrt(T * T + 2.0 * distance / a));
-}
 
 JointGuard::JointGuard(const std::vector<description::DriveDescription>& drives, double period_s)
     : period_s_(period_s) {

@@ -3,7 +3,7 @@
 //
 // Per joint, with θ₁ and u₁ the last setpoint and its speed, T the period, a and v the joint's limits:
 //   |u − u₁| ≤ aT,   |u| ≤ v,   u ≤ c(θ_max − θ₁),   −u ≤ c(θ₁ − θ_min),   θ = θ₁ + uT
-//   c(d) = −aT + √(a²T² + 2ad): the fastest approach from which braking at a ends within d
+//   c(d) = −aT + √(a²T² + 2ad): the fastest approach from which braking at a ends within d (limits/braking.hpp)
 // These bounds never contradict each other: if Tu + u²/(2a) ≤ d, braking (u' = u − aT) keeps Tu' + u'²/(2a) ≤ d − Tu.
 //
 // A wanted setpoint within all of these bounds passes unchanged. Otherwise the setpoint lags and catches up
@@ -19,10 +19,6 @@
 #include "models/description/cell.hpp"
 
 namespace proxarm::controller {
-
-// c(d) above: the highest speed at this distance from which a joint that brakes by a is at rest before the end. 0 if
-// the end has been passed already.
-[[nodiscard]] double approach_speed(double distance, double a, double T) noexcept;
 
 class JointGuard {
  public:

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/setpoints/joint_guard.hpp"
+#include "controller/limits/braking.hpp"
 
 namespace proxarm::controller {
 
@@ -40,9 +40,6 @@ constexpr double bulge_m = 5e-5;
 // Applies while the tool is slowed down temporarily. Motors whose gears are bent may then be faster for a moment: up to
 // 1.42 times when an arm that was released in contact begins to move, and more at order 2.
 constexpr double slowed_share = 1.8;
-
-// The bound of the header for the speed on the way to rest: V is the speed of the last period, B its growth.
-double fastest(double V, double B) noexcept { return B <= V ? V : (V + B) * (V + B) / (4.0 * B); }
 
 double depth_in(const Vec3& p, const description::BoxDescription& box) noexcept {
   double depth = std::numeric_limits<double>::infinity();
@@ -114,7 +111,8 @@ ActiveLimits ToolGuard::step(const JointVector& wanted_rad, double max_speed_m_p
   ActiveLimits active;
   // If the tool is slowed down, the elbow is, too.
   const double share = std::min(1.0, slowed_share * max_speed_m_per_s / limits_.max_tool_speed_m_per_s);
-  const Limits limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s, turn};
+  Limits limit{share * limits_.max_tool_speed_m_per_s, share * limits_.max_elbow_speed_m_per_s, turn};
+  if (turn != nullptr) limit.from = orientation(target_rad_ - points_.twist_rad);
   ArmPoints at;
   evaluate(wanted_rad, quick_rounds, at);
   if (links_W != nullptr) lead_W_ = (at.tool_W - *links_W).cwiseMax(-most_lead_m).cwiseMin(most_lead_m);
@@ -161,7 +159,7 @@ ActiveLimits ToolGuard::broken(const JointVector& theta, const ArmPoints& at, co
   if (limit.turn != nullptr) judge_turning(theta, at, limit, more_steps, out);
   if (!has_borders_) return out;
   const double step_m = (at.tool_W - points_.tool_W).norm();
-  const double way_m = fastest(step_m / T, t * curvature) * t;
+  const double way_m = fastest_to_rest(step_m / T, t * curvature) * t;
   if (far_from_borders(at.tool_W - lead_W_, step_m + way_m + quick_way_m)) return out;
   if (care == Care::quick) {
     out.set(Limit::guard_border);
@@ -178,7 +176,7 @@ void ToolGuard::judge_motion(const ArmPoints& at, double growth, const Limits& l
                              ActiveLimits& out) const noexcept {
   const double T = period_s_, share = care == Care::quick ? quick_share : exact_share;
   const auto judge = [&](const Vec3& step, double most_m_per_s, Limit kind) {
-    if (fastest(step.norm() / T, growth) > share * most_m_per_s) out.set(kind);
+    if (fastest_to_rest(step.norm() / T, growth) > share * most_m_per_s) out.set(kind);
   };
   judge(at.tool_W - points_.tool_W, limit.tool_m_per_s, Limit::guard_speed);
   for (std::size_t i = first_joint; i < static_cast<std::size_t>(target_rad_.size()); ++i) {
@@ -196,10 +194,10 @@ Eigen::Quaterniond ToolGuard::orientation(const JointVector& link_rad) const noe
 void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, const Limits& limit, double more_steps,
                               ActiveLimits& out) const noexcept {
   const TurnSets& turn = *limit.turn;
-  const Eigen::Quaterniond from = orientation(target_rad_ - points_.twist_rad), to = orientation(theta - at.twist_rad);
-  const double before = turn.beyond_rad(from), beyond = turn.beyond_rad(to);
+  const Eigen::Quaterniond to = orientation(theta - at.twist_rad);
+  const double before = turn.beyond_rad(limit.from), beyond = turn.beyond_rad(to);
   const double rest = beyond + more_steps * (beyond - before), most = std::max(0.0, before) + turned_rad;
-  if (from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turned_rad || beyond > most ||
+  if (limit.from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turned_rad || beyond > most ||
       rest > most + TurnSets::lead_rad) {
     out.set(Limit::guard_turning);
   }

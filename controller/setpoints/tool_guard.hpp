@@ -74,7 +74,8 @@ class ToolGuard {
   enum class Care : std::uint8_t { quick, exact };
   struct Limits {
     double tool_m_per_s, elbow_m_per_s;
-    const TurnSets* turn;  // null: not judged
+    const TurnSets* turn;                                      // null: not judged
+    Eigen::Quaterniond from = Eigen::Quaterniond::Identity();  // the tool at the last setpoint, where it is judged
   };
 
   void evaluate(const models::JointVector& theta, int rounds, models::ArmPoints& out) const noexcept;

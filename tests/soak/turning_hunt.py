@@ -132,7 +132,7 @@ def session(seed, folder, keep):
     sent, steel = figures(turned_tool(cell, motors), time_s), figures(steel_turns(rows, at), time_s)
     wrong = [fault["fault"] for fault in summary["faults"]]
     for key, limit in limits.items():
-        more = COUNTS_RAD_PER_S * 1e-3 / period_ms * 1e3 if "speed" in key else ANGLE_RAD
+        more = COUNTS_RAD_PER_S / period_ms if "speed" in key else ANGLE_RAD
         if sent[key] > limit + more:
             wrong.append(f"sent {key} {sent[key]:.6g} of {limit:.6g}")
     out = {"cell": name, "cycles": len(rows), "wrong": wrong, "guarded": summary["guarded_cycles"],

@@ -232,7 +232,7 @@ void require_weight_held(const PreparedSession& session, const models::Arm& arm)
                     .advice = "start nearer to the base, or correct max_torque_Nm or the masses of the URDF"});
 }
 
-// Where the weight leaves a drive less than it needs to accelerate and brake with.
+// Warns of a weight that leaves a drive too little torque to accelerate and brake with.
 std::vector<std::string> weight_surprises(const PreparedSession& session, const models::Arm& arm) {
   if (session.impedance()) return {};  // renders torques, beside the weight's
   const controller::HeldWeight most = controller::heaviest_weight(arm, session.cell);
