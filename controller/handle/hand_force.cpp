@@ -1,0 +1,36 @@
+#include "controller/handle/hand_force.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Mat3;
+using models::Vec3;
+using models::Wrench;
+
+constexpr double filter_s = 0.015;
+// Below this force, its line of action isn't known well enough: half of it would be the uncertainty of its lever.
+constexpr double least_N = 0.3, least_noises = 20.0;
+
+}  // namespace
+
+void HandForce::step(const Wrench& reading_W, const Mat3& R_WS, const Vec3& v_W, double noise_N) noexcept {
+  State& s = state_;
+  const double T = period_s_, lag = T / (T + lag_s_ / 3.0), share = T / (T + filter_s);
+  s.a1_W += lag * ((v_W - s.v_k1_W) / T - s.a1_W);
+  s.a2_W += lag * (s.a1_W - s.a2_W);
+  s.a3_W += lag * (s.a2_W - s.a3_W);
+  s.v_k1_W = v_W;
+  const Vec3 inertia_W = tool_.mass_kg * s.a3_W;
+  s.wrench_W.force = reading_W.force + inertia_W;
+  s.wrench_W.torque = reading_W.torque + (R_WS * (tool_.centre_S - tool_.handle_S)).cross(inertia_W);
+  s.calm_W.force += share * (s.wrench_W.force - s.calm_W.force);
+  s.calm_W.torque += share * (s.wrench_W.torque - s.calm_W.torque);
+  const double calm_noise_N = noise_N * std::sqrt(T / (2.0 * filter_s));
+  s.at_handle = s.calm_W.force.norm() >= std::max(least_N, least_noises * calm_noise_N) &&
+                acts_at_handle(s.calm_W, R_WS * tool_.handle_S, calm_noise_N);
+}
+
+}  // namespace proxarm::controller

@@ -1,0 +1,79 @@
+// What of the sensor's reading a hand can have made, and where it acts.
+//
+// The sensor reads  hand's wrench + weight and inertia of the tool behind it + zero. Weight and zero are off before
+// (motion/wrench_compensation.hpp). Here the tool's inertia is taken off: whatever the arm does with the tool, nobody
+// at the handle reads as nothing. The proxy renders the reading as it is, for it feels the tool's mass as its own; all
+// that asks "is that a hand?" (empty_handle.hpp, force_plausibility.hpp) asks it of this wrench.
+//
+// The tool's acceleration is the proxy's behind three equal first-order lags, which together are as long as the way
+// from the proxy to the steel: filter of the setpoints, drives, two periods. Encoders would tell it as well, but their
+// counts, differentiated twice, may read as more than the hand of a child. What is left is the gears' ringing.
+//
+// A force acts at the handle if its line passes the handle's point: |τ| <= r |F|. A load or a hand may do so; an offset
+// of the sensor does so by chance alone, since it has no lever: τ = −p × F, p being the handle from the sensor. It can
+// be told where |p × F| >= 3 r |F|.
+//
+// Neither allocates, locks nor throws.
+#pragma once
+
+#include "models/base/archive_fields.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+// What moves behind the sensor.
+struct HeldTool {
+  double mass_kg = 0.0;
+  models::Vec3 centre_S = models::Vec3::Zero();  // of mass, from S's origin
+  models::Vec3 handle_S = models::Vec3::Zero();  // the handle's point T, from S's origin
+};
+
+// How far beside the handle's point a load's line of action may pass. A hand's is a few millimetres to centimetres off;
+// an offset's is as far off as the handle is from the sensor.
+inline constexpr double beside_handle_m = 0.02;
+// A sensor's noise of torque is at most this times that of its force.
+inline constexpr double noise_lever_m = 0.1;
+
+// Whether a wrench about T's origin acts at the handle, and not as an offset of the sensor would. `handle` is from the
+// sensor, in the wrench's frame; `noise_N` is the standard deviation of the force.
+inline bool acts_at_handle(const models::Wrench& wrench, const models::Vec3& handle, double noise_N) noexcept {
+  constexpr double deviations = 4.0, telling = 3.0;
+  const double force_N = wrench.force.norm();
+  if (!(handle.cross(wrench.force).norm() >= telling * beside_handle_m * force_N)) return false;
+  return force_N > 0.0 && wrench.torque.norm() <= beside_handle_m * force_N + deviations * noise_lever_m * noise_N;
+}
+
+class HandForce {
+ public:
+  // `lag_s`: from the proxy to the steel.
+  HandForce(const HeldTool& tool, double lag_s, double period_s) noexcept
+      : tool_(tool), lag_s_(lag_s), period_s_(period_s) {}
+
+  void start() noexcept { state_ = {}; }
+  void set_period(double period_s) noexcept { period_s_ = period_s; }
+  // Once in each cycle. reading_W: about T's origin, without bias and tool weight; v_W: the proxy's, in its last step.
+  void step(const models::Wrench& reading_W, const models::Mat3& R_WS, const models::Vec3& v_W,
+            double noise_N) noexcept;
+
+  // Without the tool's inertia.
+  [[nodiscard]] const models::Wrench& wrench_W() const noexcept { return state_.wrench_W; }
+  // What moves it acts at the handle, as a load or a hand does, and is large enough to tell.
+  [[nodiscard]] bool at_handle() const noexcept { return state_.at_handle; }
+  [[nodiscard]] double tool_mass_kg() const noexcept { return tool_.mass_kg; }
+
+  void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }
+
+ private:
+  struct State {
+    models::Wrench wrench_W, calm_W;  // calm_W: behind a low-pass
+    models::Vec3 v_k1_W = models::Vec3::Zero();
+    models::Vec3 a1_W = models::Vec3::Zero(), a2_W = models::Vec3::Zero(), a3_W = models::Vec3::Zero();
+    bool at_handle = false;
+  };
+
+  HeldTool tool_;
+  double lag_s_, period_s_;
+  State state_;
+};
+
+}  // namespace proxarm::controller

@@ -1,0 +1,66 @@
+// The story: the tool behind the sensor, braked by damping, read as a hand, so an arm that was let go ran on.
+#include "controller/handle/hand_force.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace proxarm::controller {
+namespace {
+
+using models::Mat3;
+using models::Vec3;
+using models::Wrench;
+
+constexpr double T = 1e-3, lag_s = 0.017, noise_N = 0.02;
+const HeldTool tool{.mass_kg = 1.0, .centre_S = Vec3(0, 0, 0.06), .handle_S = Vec3(0, 0, 0.1)};
+
+// A tool that nobody holds, led to and fro behind three lags: what it reads is its inertia, and nothing is left of it.
+TEST(HandForce, NothingIsLeftOfAToolThatNobodyHolds) {
+  HandForce hand(tool, lag_s, T);
+  const Mat3 R_WS = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  Vec3 v = Vec3::Zero(), a1 = Vec3::Zero(), a2 = Vec3::Zero(), a3 = Vec3::Zero();
+  double most_N = 0.0, most_Nm = 0.0, read_N = 0.0;
+  for (int k = 0; k < 3'000; ++k) {
+    const Vec3 v_next(0.2 * std::sin(2.0 * M_PI * 1.5 * k * T), 0.1 * std::cos(2.0 * M_PI * k * T) - 0.1, 0.0);
+    const double share = T / (T + lag_s / 3.0);
+    a1 += share * ((v_next - v) / T - a1);
+    a2 += share * (a1 - a2);
+    a3 += share * (a2 - a3);
+    v = v_next;
+    const Vec3 inertia_W = -tool.mass_kg * a3;
+    hand.step({inertia_W, (R_WS * (tool.centre_S - tool.handle_S)).cross(inertia_W)}, R_WS, v, noise_N);
+    most_N = std::max(most_N, hand.wrench_W().force.norm());
+    most_Nm = std::max(most_Nm, hand.wrench_W().torque.norm());
+    read_N = std::max(read_N, inertia_W.norm());
+    EXPECT_FALSE(hand.at_handle());
+  }
+  EXPECT_GT(read_N, 1.0);
+  EXPECT_LT(most_N, 1e-12);  // rounding
+  EXPECT_LT(most_Nm, 1e-12);
+}
+
+TEST(HandForce, ALoadActsAtTheHandleAndAnOffsetOfTheSensorDoesnt) {
+  const Mat3 R_WS = Mat3::Identity();
+  for (const double force_N : {0.5, 2.0, 50.0}) {
+    const Vec3 force(force_N, 0.0, 0.0);
+    HandForce load(tool, lag_s, T), offset(tool, lag_s, T), along(tool, lag_s, T);
+    for (int k = 0; k < 100; ++k) {
+      load.step({force, Vec3::Zero()}, R_WS, Vec3::Zero(), noise_N);
+      offset.step({force, -tool.handle_S.cross(force)}, R_WS, Vec3::Zero(), noise_N);
+      along.step({Vec3(0, 0, force_N), Vec3::Zero()}, R_WS, Vec3::Zero(), noise_N);
+    }
+    EXPECT_TRUE(load.at_handle()) << force_N;
+    EXPECT_FALSE(offset.at_handle()) << force_N;
+    EXPECT_FALSE(along.at_handle()) << force_N << ": an offset would read the same";
+  }
+}
+
+TEST(HandForce, WithoutALeverNothingCanBeTold) {
+  HandForce hand({.mass_kg = 1.0}, lag_s, T);
+  for (int k = 0; k < 100; ++k) hand.step({Vec3(2, 0, 0), Vec3::Zero()}, Mat3::Identity(), Vec3::Zero(), noise_N);
+  EXPECT_FALSE(hand.at_handle());
+}
+
+}  // namespace
+}  // namespace proxarm::controller
