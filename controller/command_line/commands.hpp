@@ -55,6 +55,12 @@ struct ProveOptions {
   bool bus_loss = false;      // what the drives do when the controller falls silent, and nothing else
 };
 
+struct ZeroOptions {
+  RunOptions run;
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the same
+  std::filesystem::path out;  // empty: beside the cell
+};
+
 struct AssessOptions {
   RunOptions run;
   std::filesystem::path thresholds;  // empty: the shipped ones
@@ -79,6 +85,7 @@ int explain_command(const FileOptions& options);
 int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);          // 1: not proven
+int zero_command(const ZeroOptions& options);            // 1: somebody was there
 int calibrate_command(const CalibrateOptions& options);  // 1: poses that don't fit one another
 int assess_command(const AssessOptions& options);        // 1: a threshold is exceeded
 

@@ -81,16 +81,24 @@ void add_supervision_options(CLI::App& app, RunOptions& options) {
       ->type_name("ORDER@TIME")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option(
+         "--handle",
+         choice<bool>("--handle", {{"auto", false}, {"held", true}},
+                      [&](bool is) { options.settings.always_held = is; }),
+         "held: a hand or a load always acts on the handle, and no force is taken for the sensor's bias; the arm "
+         "coasts when it is let go. auto (default): a handle that nobody holds is found out")
+      ->type_name("auto|held");
   app.add_option("--wait-after-fault",
                  quantity([](const std::string& w) { return description::parse_duration(w, "--wait-after-fault"); },
                           [&](double value) { options.settings.wait_after_fault_s = value; }),
                  "after a stop by a fault, how long to wait for `proxarm reset` (default: the session ends)")
       ->type_name("TIME");
-  app.add_option("--accept-force",
-                 quantity([](const std::string& w) { return description::parse_force(w, "--accept-force"); },
-                          [&](double value) { options.settings.tare_spread_N = value; }),
-                 "start with a hand on the handle whose force varies by up to this while the sensor is tared (default "
-                 "5N); its mean is taken as zero")
+  app.add_option(
+         "--accept-force",
+         quantity([](const std::string& w) { return description::parse_force(w, "--accept-force"); },
+                  [&](double value) { options.settings.tare_spread_N = options.settings.zero_drift_N = value; }),
+         "start with a force of up to this on the handle while the sensor is tared (default: it may vary by 5 N, "
+         "and its mean by the cell's sensor.zero_drift_N); its mean is taken as zero")
       ->type_name("N");
   app.add_flag("--without-enabling-input", options.settings.without_enabling_input,
                "leave out the cell's enabling input; needed on real interfaces for a cell that has none");
@@ -547,6 +555,21 @@ class Commands {
                return prove_command(prove_);
              }),
         prove_);
+    CLI::App* zero = add("zero",
+                         "what the sensor reads with nobody at the handle: tared, and kept beside the cell for the "
+                         "sessions to come, whose tare is held against it. Nothing moves. Status 1: somebody was there",
+                         [this] {
+                           zero_.run.without_proof = true;
+                           return zero_command(zero_);
+                         });
+    add_session_options(*zero, zero_.run);
+    leave_out(*zero, {"--scene", "--hand", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
+                      "--extra-delay", "--lookahead"});
+    add_fault_option(*zero, zero_.run);
+    add_enabling_option(*zero, zero_.run);
+    add_hardware_option(*zero, zero_.run);
+    add_arm_option(*zero, zero_.arm);
+    zero->add_option("--out", zero_.out, "file of the zero (default: beside the cell, CELL.zero)")->type_name("FILE");
     add_calibrate_options(
         *add(
             "calibrate",
@@ -574,6 +597,7 @@ class Commands {
   command_line::FileOptions explain_;
   command_line::SchemaOptions schema_;
   command_line::ProveOptions prove_;
+  command_line::ZeroOptions zero_;
   command_line::CalibrateOptions calibrate_;
   command_line::AssessOptions assess_;
 };

@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <limits>
 #include <numbers>
 
 #include "controller/command_line/commands.hpp"
@@ -25,6 +26,8 @@ PreparedSession prepared(const RunOptions& options) {
   RunOptions run = options;
   run.scene = shipped_file("scenes/free.yaml");
   PreparedSession session = prepare(run);
+  // Where the sensor is mounted and what it reads is what is to be proven: it isn't taken for known.
+  session.settings.zero_drift_N = std::numeric_limits<double>::infinity();
   if (!session.impedance()) return session;
   throw description::SetupError({.file = session.cell.file.string(),
                                  .key = "prove",
@@ -51,7 +54,7 @@ std::string failure_of(const PreparedSession& session, const ProofOutcome& outco
     const bool of_joint = outcome.fault.where >= 0;
     const std::string where =
         of_joint ? session.cell.drives[static_cast<std::size_t>(outcome.fault.where) % session.cell.drives.size()].joint
-                 : "";
+                 : controller::standing_force_text(outcome.fault, session.cell.gravity_W_m_per_s2);
     return controller::describe(outcome.fault, where);
   }
   if (outcome.not_pushed) return "nobody pushed, or took the hand off again, within a minute";

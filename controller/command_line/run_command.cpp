@@ -8,6 +8,7 @@
 #include "controller/command_line/sessions/interface_run.hpp"
 #include "controller/command_line/sessions/simulated_run.hpp"
 #include "controller/command_line/sessions/view_process.hpp"
+#include "controller/command_line/sessions/zero_run.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
@@ -85,7 +86,8 @@ int run_command(const RunOptions& given) {
   RunOptions options = with_view(given);
   require_interface_for_hardware(options);
   if (!options.bus.simulated()) refuse_for_interfaces(options);
-  const PreparedSession session = prepare(options);
+  PreparedSession session = prepare(options);
+  know_zero(session, options);
   require_runnable(session, options);
   for (const std::string& line : surprises(session)) std::fprintf(stderr, "proxarm: warning: %s\n", line.c_str());
   refuse_view(session, options);

@@ -15,7 +15,9 @@ bool renders_torques(const CycleParts& parts) noexcept {
 ReadingBounds reading_bounds(const CycleParts& parts, const description::CellLimits& limits) noexcept {
   return {.max_force_N = limits.max_force_N,
           .max_bias_drift_N = parts.supervision.max_bias_drift_N,
-          .beyond_range_rad = away_at_once * limits.following_error_rad};
+          .beyond_range_rad = away_at_once * limits.following_error_rad,
+          .max_force_step_N = parts.supervision.max_force_step_N,
+          .handle_S = parts.compensation.tool().handle_S};
 }
 
 // A device that takes torques is driven back by a hand as fast as the hand likes, so the tool's speed isn't monitored.
@@ -114,7 +116,8 @@ void Cycle::judge(std::int64_t t_k_ns) noexcept {
                  .telling = timestep_.telling(),
                  .tared = state_.tared,
                  .stands = stands_in_hold() || state_.entered_phase == Phase::taring,
-                 .backs_off = motion_->backs_off()});
+                 .backs_off = motion_->backs_off(),
+                 .load_S = measurement_.compensation().load_S(measurement_.now().reading_S)});
   take_command(t_k_ns);
   take_timestep();
   change_timestep(t_k_ns);

@@ -78,6 +78,8 @@ class Cycle {
   void shut_down() noexcept { bus_.shut_down(period_ns()); }
 
   [[nodiscard]] const Supervisor& supervisor() const noexcept { return supervisor_; }
+  // What taring has shown, and the bias as it was followed since.
+  [[nodiscard]] const Measurement& measurement() const noexcept { return measurement_; }
   // Null: nothing is counted.
   [[nodiscard]] const MotionWork* work() const noexcept { return motion_->work(); }
   [[nodiscard]] std::span<const ScheduledCommand> scheduled_commands() const noexcept {

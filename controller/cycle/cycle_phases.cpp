@@ -31,6 +31,8 @@ void Cycle::enter(Phase phase, std::int64_t t_k_ns) noexcept {
       return motion_->start(measurement_.now(), from == Phase::holding ? Beginning::resuming : Beginning::first);
     case Phase::freeing:
       return motion_->start(measurement_.now(), Beginning::freeing);
+    case Phase::taring:
+      return measurement_.start_tare();
     case Phase::holding:
     case Phase::stopping:
       state_.wants_resume = false;
@@ -99,19 +101,13 @@ void Cycle::await_enabled(std::int64_t t_k_ns) noexcept {
 
 void Cycle::tare(std::int64_t t_k_ns) noexcept {
   motion_->stand(measurement_.now());
-  measurement_.add_tare_sample();
-  const double spread_N = measurement_.tare_spread_N();
-  if (spread_N > settings_.tare_spread_N) {
-    alarm_.raise(Fault::force_at_start, -1, spread_N, settings_.tare_spread_N);
-  } else if (in_phase_s(t_k_ns) >= settings_.tare_s) {
-    if (const std::optional<MissingWeight> missing = motion_->missing_weight()) {
-      alarm_.raise(Fault::weight_unknown, missing->joint, missing->torque_Nm, missing->limit_Nm);
-      return;
-    }
-    measurement_.finish_tare();
-    state_.tared = true;
-    supervisor_.handle(Event::tared);
+  if (!measurement_.tare(settings_, in_phase_s(t_k_ns), alarm_)) return;
+  if (const std::optional<MissingWeight> missing = motion_->missing_weight()) {
+    alarm_.raise(Fault::weight_unknown, missing->joint, missing->torque_Nm, missing->limit_Nm);
+    return;
   }
+  state_.tared = true;
+  supervisor_.handle(settings_.only_tares ? Event::stop : Event::tared);
 }
 
 MotionCycle Cycle::motion_cycle() noexcept {

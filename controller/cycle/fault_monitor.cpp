@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace proxarm::controller {
 namespace {
@@ -195,6 +196,24 @@ void FaultMonitor::judge_sensor(const JudgedCycle& cycle) noexcept {
     alarm_.raise(frozen ? Fault::sensor_frozen : Fault::sensor_lost, -1, state_.missed_samples, most);
   }
   if (cycle.measured.sample_is_new) judge_sample(cycle);
+  judge_jump(cycle);
+}
+
+// Wherever the hand's force moves the arm.
+void FaultMonitor::judge_jump(const JudgedCycle& cycle) noexcept {
+  const Measured& measured = cycle.measured;
+  state_.since_sample_s += settings_.period_s;
+  if (!measured.sample_is_new) return;
+  const double since_s = std::exchange(state_.since_sample_s, 0.0);
+  const Phase phase = supervisor_.phase();
+  const bool follows = phase == Phase::rendering || (phase == Phase::freeing && !cycle.backs_off);
+  if (!cycle.load_S || !follows) return jump_.start();
+  const LoadSample sample{.load_S = *cycle.load_S,
+                          .hand_S = measured.R_WS.transpose() * measured.hand_W.force,
+                          .noise_N = measured.bias.noise_N,
+                          .since_s = since_s,
+                          .usual_s = measured.bias.sample_cycles * settings_.period_s};
+  if (jump_.step(sample)) alarm_.raise(Fault::force_jumped, -1, jump_.jump_N(), jump_.limit_N());
 }
 
 void FaultMonitor::judge_sample(const JudgedCycle& cycle) noexcept {

@@ -12,10 +12,12 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
 
+#include "controller/handle/force_jump.hpp"
 #include "controller/motion/measurement.hpp"
 #include "controller/record/black_box.hpp"
 #include "controller/rendering/session_settings.hpp"
@@ -39,10 +41,11 @@ struct JudgedCycle {
   const EnablingInput* enabling = nullptr;       // null if there is none
   std::span<const fieldbus::BusStatus> buses{};  // by their index in the network
   std::uint32_t overruns_in_a_row = 0;
-  bool telling = false;    // SDO answers are on the buses and may delay a drive's TPDO by one frame
-  bool tared = false;      // the sensor has been tared, so this is no first enabling
-  bool stands = false;     // the arm is meant to stand still
-  bool backs_off = false;  // while it is freed, the arm moves in a direction that is set
+  bool telling = false;                    // SDO answers are on the buses and may delay a drive's TPDO by one frame
+  bool tared = false;                      // the sensor has been tared, so this is no first enabling
+  bool stands = false;                     // the arm is meant to stand still
+  bool backs_off = false;                  // while it is freed, the arm moves in a direction that is set
+  std::optional<models::Wrench> load_S{};  // what the sensor reads without its bias; nullopt: no hand moves the arm
 };
 
 // What is read beyond these bounds is a fault.
@@ -50,6 +53,8 @@ struct ReadingBounds {
   double max_force_N = 0.0;
   double max_bias_drift_N = 0.0;
   double beyond_range_rad = 0.0;  // by which a joint may stand out of its range at the start
+  double max_force_step_N = std::numeric_limits<double>::infinity();  // force_jump.hpp
+  models::Vec3 handle_S = models::Vec3::Zero();                       // the handle's point, from the sensor's origin
 };
 
 class FaultMonitor {
@@ -66,6 +71,7 @@ class FaultMonitor {
         bounds_(bounds),
         supervisor_(supervisor),
         alarm_(alarm),
+        jump_({.max_step_N = bounds.max_force_step_N, .least_N = bounds.max_bias_drift_N, .handle_S = bounds.handle_S}),
         tool_(std::move(tool)),
         drives_follow_(std::move(drives_follow)),
         standstill_(std::move(standstill)) {}
@@ -80,6 +86,7 @@ class FaultMonitor {
   void forget(std::span<const fieldbus::BusStatus> buses) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
     archive_fields(state, state_);
+    jump_.archive(state);
     if (tool_) tool_->archive(state);
     if (drives_follow_) drives_follow_->archive(state);
     if (standstill_) standstill_->archive(state);
@@ -89,6 +96,7 @@ class FaultMonitor {
   struct State {
     std::uint32_t missed_samples = 0;                         // in a row
     std::uint32_t late_score = 0;                             // see the file's head
+    double since_sample_s = 0.0;                              // up to the last cycle
     std::uint8_t faulty = 0;                                  // drives that report a fault, and have been judged for it
     std::array<std::uint64_t, max_buses> overflows_before{};  // frames lost by each bus that no longer count as a fault
   };
@@ -105,6 +113,7 @@ class FaultMonitor {
   void judge_drive_fault(std::int32_t where, fieldbus::DriveFault fault) noexcept;
   void judge_sensor(const JudgedCycle& cycle) noexcept;
   void judge_sample(const JudgedCycle& cycle) noexcept;
+  void judge_jump(const JudgedCycle& cycle) noexcept;
   void judge_lateness(bool late) noexcept;
   [[nodiscard]] bool any_has_power() const noexcept;
   [[nodiscard]] bool needs_force(const JudgedCycle& cycle) const noexcept;
@@ -114,6 +123,7 @@ class FaultMonitor {
   ReadingBounds bounds_;
   const Supervisor& supervisor_;
   Alarm& alarm_;
+  ForceJump jump_;
   std::optional<ToolMonitor> tool_;
   std::optional<DriveMonitor> drives_follow_;
   std::optional<StandstillMonitor> standstill_;

@@ -36,10 +36,10 @@ EmptyHandle::EmptyHandle(const EmptyHandleConfig& config, double period_s) noexc
 void EmptyHandle::set_period(double period_s) noexcept { period_s_ = period_s; }
 
 // The size of the hand's wrench. A torque counts as the force that would make it at the lever.
-double EmptyHandle::size_N() const noexcept {
-  const double force_N = (state_.wrench_W.force - state_.bias_W).norm();
+double EmptyHandle::size_N(const models::Wrench& wrench_W) const noexcept {
+  const double force_N = (wrench_W.force - state_.bias_W).norm();
   if (!(config_.lever_m > 0.0)) return force_N;
-  return std::max(force_N, state_.wrench_W.torque.norm() / config_.lever_m);
+  return std::max(force_N, wrench_W.torque.norm() / config_.lever_m);
 }
 
 // A bias that led the handle is still there and keeps drifting, so it is followed here until the sensor's bias, which
@@ -71,12 +71,13 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   if (!signs.noise_is_white) noise_band = std::min(noise_band, config_.band_N);
   const double band = std::max(config_.band_N, noise_band);
   follow();
-  const double size = size_N();
+  const double size = size_N(s.wrench_W);
   s.calm_s = size <= noise_band ? s.calm_s + T : 0.0;
   s.quiet_s = size <= band ? s.quiet_s + T : 0.0;
   if (s.empty) {
-    s.empty =
-        size <= leaving * band + leaving * config_.tool_mass_kg * s.acceleration_m_per_s2 + led_share * s.bias_W.norm();
+    const double held_N =
+        leaving * band + leaving * config_.tool_mass_kg * s.acceleration_m_per_s2 + led_share * s.bias_W.norm();
+    s.empty = size <= held_N && size_N(signs.hand_W) <= held_N + noise_deviations * signs.noise_N;
     if (!s.empty) {
       s.calm_s = s.quiet_s = 0.0;
       s.led = false;
@@ -86,6 +87,7 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   } else {
     // What looked like noise during the tare may have been a hand's motion, so nothing is known of the noise.
     const double noise_N = signs.noise_is_white ? signs.noise_N : 0.0;
+    if (signs.at_handle) way_.start();
     s.led = way_.step({signs.hand_W.force, signs.v_W, signs.mass_kg, noise_N, T});
     if (s.led) s.bias_W = way_.line_W();
     const double ways = config_.way_share / speed;

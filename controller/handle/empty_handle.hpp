@@ -13,8 +13,12 @@
 // narrow band only for milliseconds. A hand at rest can't be told from none, and loses nothing if it is taken for
 // absent.
 //
-// The handle counts as held again when the force leaves 1.5 times the band. To that band, 1.5 times the inertial force
-// of the tool behind the sensor is added: its mass times the largest acceleration of the last tenth of a second.
+// The handle counts as held again when the force leaves 1.5 times the band, or at once when a single sample leaves it
+// by 8 σ more. To that band, 1.5 times the inertial force of the tool behind the sensor is added: its mass times the
+// largest acceleration of the last tenth of a second, with which its gears ring.
+//
+// A force that acts at the handle (hand_force.hpp) is a hand's or a load's, however straight: it never leads an empty
+// one.
 //
 // While the handle is empty, a braking force −M v/τ_b, at most M a_b, replaces the hand's force. It is a force as any
 // other: contacts, friction, springs and moving objects act as always, and nothing jumps.
@@ -28,20 +32,21 @@ namespace proxarm::controller {
 
 struct EmptyHandleConfig {
   double band_N = 0.1;
-  double tool_mass_kg = 0.0;  // what moves behind the sensor; felt as inertia
+  double tool_mass_kg = 0.0;  // what moves behind the sensor; rings as the arm is braked
   double lever_m = 0.0;       // a torque counts as its force at this lever; 0: torques don't count
   double way_share = 1.0;     // of the 20 and 40 mm
 };
 
 // What one cycle shows of the hand.
 struct HandSigns {
-  const models::Wrench& hand_W;  // without bias and tool weight
+  const models::Wrench& hand_W;  // without bias, tool weight and the tool's inertia
   double noise_N = 0.0;          // σ; 0: not known
   bool noise_is_white = true;    // σ is the sensor's noise, not a hand's motion
   double tare_samples = 0.0;     // n
   double sample_cycles = 1.0;    // cycles from one sample to the next
   const models::Vec3& v_W;       // of the proxy, in its last step
   double mass_kg = 0.0;          // of the proxy
+  bool at_handle = false;        // the force acts at the handle
 };
 
 class EmptyHandle {
@@ -89,7 +94,7 @@ class EmptyHandle {
     bool led = false;  // see led()
   };
 
-  [[nodiscard]] double size_N() const noexcept;
+  [[nodiscard]] double size_N(const models::Wrench& wrench_W) const noexcept;
   void follow() noexcept;
 
   EmptyHandleConfig config_;

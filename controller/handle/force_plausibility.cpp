@@ -95,7 +95,8 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
     s.rest_W = now.q_W;
     s.judged = now.free;
   }
-  s.judged = s.judged && now.free;
+  s.judged = s.judged && now.free && !now.at_handle;
+  s.keeps = s.keeps && !now.at_handle;
   if (jumped(now, empty, noise_N)) return true;
   // While the handle is empty, the bias is followed, which bends the line.
   if (!s.judged || empty) {

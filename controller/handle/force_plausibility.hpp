@@ -27,6 +27,7 @@
 //              half.)
 //   a jump     The force is there 30 ms after the handle was empty, and stays the same to a fifth for 10 mm. A hand
 //              needs 50 ms or more to build up its force, and it yields.
+// A load that acts at the handle may be as straight: it isn't judged.
 #pragma once
 
 #include <array>
@@ -37,14 +38,16 @@
 
 namespace proxarm::controller {
 
-// The hand's force as it is measured, and the proxy after the last step.
+// The hand's force without the tool's inertia, and the proxy after the last step. The mass is the whole one that the
+// force moves, the tool's included.
 struct ForceAndMotion {
   const models::Vec3& force_W;
   const models::Vec3& q_W;
   const models::Vec3& v_W;
   double mass_kg = 0.0, damping_Ns_per_m = 0.0;
   double period_s = 0.0;
-  bool free = true;  // the proxy touches nothing
+  bool free = true;        // the proxy touches nothing
+  bool at_handle = false;  // the force acts at the handle (hand_force.hpp), so it is no sensor's bias
 };
 
 class ReversedForce {

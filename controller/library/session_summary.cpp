@@ -63,11 +63,12 @@ std::string sensor_text(const FaultReport& report, const fieldbus::ForceSensor& 
 bool is_of_sensor(Fault fault) noexcept {
   return fault == Fault::sensor_lost || fault == Fault::sensor_late || fault == Fault::sensor_status ||
          fault == Fault::sensor_saturated || fault == Fault::sensor_frozen || fault == Fault::sensor_drifts ||
-         fault == Fault::force_reversed;
+         fault == Fault::force_reversed || fault == Fault::force_jumped;
 }
 
 std::string place_of(const FaultReport& report, const CycleParts& parts, const description::Cell& cell) {
   if (is_of_sensor(report.fault)) return sensor_text(report, *parts.sensor, cell.sensor.bus);
+  if (report.fault == Fault::force_at_start) return standing_force_text(report, cell.gravity_W_m_per_s2);
   if (report.where < 0) return "";
   const auto where = static_cast<std::size_t>(report.where);
   if (report.fault == Fault::bus_off || report.fault == Fault::error_passive || report.fault == Fault::interface_down ||

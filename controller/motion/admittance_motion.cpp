@@ -41,6 +41,18 @@ Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
+// From the proxy to the steel: the setpoints' filter, the slowest drive, and two periods, less what is looked ahead.
+double steel_lag_s(const std::vector<description::DriveDescription>& drives, const description::CellLimits& limits,
+                   const SessionSettings& settings) noexcept {
+  double drive_s = 0.0;
+  for (const description::DriveDescription& drive : drives) {
+    drive_s = std::max(drive_s, 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz));
+  }
+  const double filter_s =
+      limits.setpoint_bandwidth_Hz > 0.0 ? 1.0 / (std::numbers::pi * limits.setpoint_bandwidth_Hz) : 0.0;
+  return std::max(0.0, filter_s + drive_s + 2.0 * settings.period_s - settings.horizon_s);
+}
+
 Damping damping_by(Passivity passivity) noexcept {
   if (passivity == Passivity::on) return Damping::at_once;
   return passivity == Passivity::automatic ? Damping::what_lasts : Damping::never;
@@ -52,14 +64,18 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
                                    std::vector<description::DriveDescription> drives,
                                    const description::CellLimits& limits,
                                    const description::SupervisionDescription& supervision,
-                                   const SessionSettings& settings, double tool_mass_kg)
+                                   const SessionSettings& settings, const HeldTool& tool)
     : parts_(std::move(parts)),
       arm_(arm),
       limits_(limits),
       supervision_(supervision),
       period_s_(settings.period_s),
-      tool_mass_kg_(tool_mass_kg),
-      hand_(supervision, tool_mass_kg, settings.orientation == OrientationMode::free ? torque_lever_m : 0.0,
+      tool_mass_kg_(tool.mass_kg),
+      hand_(supervision,
+            {.tool = tool,
+             .lever_m = settings.orientation == OrientationMode::free ? torque_lever_m : 0.0,
+             .lag_s = steel_lag_s(drives, limits, settings),
+             .always_held = settings.always_held},
             settings.period_s),
       limiter_(limits, settings.period_s),
       arm_step_(arm, parts_.inverse, drives, settings.period_s),

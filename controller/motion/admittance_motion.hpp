@@ -38,7 +38,7 @@ class AdmittanceMotion final : public Motion {
   // `arm` must outlive this.
   AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm, std::vector<description::DriveDescription> drives,
                    const description::CellLimits& limits, const description::SupervisionDescription& supervision,
-                   const SessionSettings& settings, double tool_mass_kg = 0.0);
+                   const SessionSettings& settings, const HeldTool& tool = {});
 
   void wait_for_drives(const Measured& measured) noexcept override { final_.start(measured.drive_target_rad); }
   void stand(const Measured& /*measured*/) noexcept override {}

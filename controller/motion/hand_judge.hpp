@@ -1,5 +1,7 @@
 // The hand's wrench as it acts on the proxy, and whether a hand can have made it.
 //
+// Whether it is a hand's is asked of the wrench without the tool's inertia (handle/hand_force.hpp).
+//
 // After a start the wrench is let in over `ramp_in_s`. If nobody holds the handle, a braking force acts instead
 // (handle/empty_handle.hpp). Forces that don't fit the motion that followed raise faults
 // (handle/force_plausibility.hpp). Neither allocates, locks nor throws after construction.
@@ -9,6 +11,7 @@
 
 #include "controller/handle/empty_handle.hpp"
 #include "controller/handle/force_plausibility.hpp"
+#include "controller/handle/hand_force.hpp"
 #include "controller/motion/motion.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/description/supervision.hpp"
@@ -24,15 +27,21 @@ struct ProxyMotion {
   models::Vec3 braking_torque_W = models::Vec3::Zero();  // that would bring its turning to rest
 };
 
-// What this cycle's measurement shows of the hand, beside a proxy or a device of this velocity and mass. Precondition:
-// `measured` and `v_W` outlive the result.
-[[nodiscard]] HandSigns hand_signs(const Measured& measured, const models::Vec3& v_W, double mass_kg) noexcept;
+// The hand's wrench beside the noise that the tare found, for a proxy or a device of this velocity and mass.
+// Precondition: `hand_W` and `v_W` outlive the result.
+[[nodiscard]] HandSigns hand_signs(const models::Wrench& hand_W, const SensorBias& bias, const models::Vec3& v_W,
+                                   double mass_kg, bool at_handle) noexcept;
+
+struct HandJudgeConfig {
+  HeldTool tool;
+  double lever_m = 0.0;      // a torque counts as the force that makes it at this lever; 0: the orientation is held
+  double lag_s = 0.0;        // from the proxy to the steel
+  bool always_held = false;  // by a hand or a load: no force is taken for a bias
+};
 
 class HandJudge {
  public:
-  // `lever_m`: a torque counts as the force that makes it at this lever; 0: the orientation is held.
-  HandJudge(const description::SupervisionDescription& supervision, double tool_mass_kg, double lever_m,
-            double period_s);
+  HandJudge(const description::SupervisionDescription& supervision, const HandJudgeConfig& config, double period_s);
 
   void set_period(double period_s) noexcept;
   void start() noexcept;
@@ -54,7 +63,9 @@ class HandJudge {
 
   description::SupervisionDescription supervision_;
   double period_s_;
-  double share_ = 1.0;                // of the hand's wrench that is let in
+  bool always_held_;
+  double share_ = 1.0;  // of the hand's wrench that is let in
+  HandForce hand_;
   std::optional<EmptyHandle> empty_;  // nullopt: the proxy coasts
   ReversedForce reversed_;
   StraightForce straight_;

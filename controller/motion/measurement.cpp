@@ -1,6 +1,7 @@
 #include "controller/motion/measurement.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace proxarm::controller {
 namespace {
@@ -11,6 +12,8 @@ namespace {
 constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
 // A torque's bias counts as the force that makes it at this lever: about a handle's length.
 constexpr double bias_lever_m = 0.1;
+// The tare's mean is known to this many of its standard deviations.
+constexpr double tare_deviations = 4.0;
 
 }  // namespace
 
@@ -99,6 +102,28 @@ void Measurement::finish_tare() noexcept {
               .sample_cycles = state_.tare_cycles / samples,
               .drift_N = 0.0};
   now.hand_W = compensation_.hand_wrench_W(now.reading_S, now.R_WS);
+}
+
+bool Measurement::tare(const SessionSettings& settings, double tared_for_s, Alarm& alarm) noexcept {
+  add_tare_sample();
+  const double spread_N = tare_spread_N();
+  if (spread_N > settings.tare_spread_N) {
+    alarm.raise(Fault::force_at_start, -1, spread_N, settings.tare_spread_N);
+    return false;
+  }
+  if (tared_for_s < settings.tare_s || compensation_.tare_samples() == 0.0) return false;
+  finish_tare();
+  const Vec3 standing_S = compensation_.bias_S().force - Vec3(settings.zero_S_N.data());
+  const SensorBias& bias = state_.measured.bias;
+  const double limit_N = settings.zero_drift_N + tare_deviations * bias.noise_N / std::sqrt(bias.samples);
+  if (standing_S.norm() <= limit_N) return true;
+  alarm.raise_standing(state_.measured.R_WS * standing_S, limit_N);
+  return false;
+}
+
+void Measurement::start_tare() noexcept {
+  compensation_.start_tare();
+  state_.tare_cycles = 0.0;
 }
 
 void Measurement::follow_bias(const models::Wrench& rest_W) noexcept {

@@ -14,6 +14,8 @@
 
 #include "controller/motion/cycle_parts.hpp"
 #include "controller/motion/wrench_compensation.hpp"
+#include "controller/rendering/session_settings.hpp"
+#include "controller/supervision/alarm.hpp"
 #include "fieldbus/sensors/force_sensor.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/archive_fields.hpp"
@@ -69,6 +71,12 @@ class Measurement {
   [[nodiscard]] double tare_spread_N() const noexcept { return compensation_.tare_spread_N(); }
   // Takes the average as the bias, from this cycle on.
   void finish_tare() noexcept;
+  // One cycle of taring. Returns true once it is over and nothing was wrong with it; what was, a handle that moved or
+  // a mean that the sensor's drift doesn't explain, raises force_at_start.
+  [[nodiscard]] bool tare(const SessionSettings& settings, double tared_for_s, Alarm& alarm) noexcept;
+  void start_tare() noexcept;
+  // The bias as it is followed, and of what the tare has shown.
+  [[nodiscard]] const WrenchCompensation& compensation() const noexcept { return compensation_; }
 
   // Precondition: nobody holds the handle. The hand's wrench as it is read, rest_W, is then bias, and is added to it
   // gradually.

@@ -36,12 +36,14 @@ std::unique_ptr<Motion> make_motion(CycleParts& parts, const SessionSettings& se
                                     const description::CellLimits& limits) {
   std::vector<description::DriveDescription> drives = descriptions(parts.drives);
   if (auto* const torque = std::get_if<std::unique_ptr<TorqueRendering>>(&parts.rendering)) {
-    return std::make_unique<TorqueMotion>(std::move(*torque), *parts.arm, drives, parts.supervision,
-                                          parts.compensation.tool_mass_kg(), settings.period_s);
+    description::SupervisionDescription supervision = parts.supervision;
+    if (settings.always_held) supervision.let_go = description::LetGo::coast;
+    return std::make_unique<TorqueMotion>(std::move(*torque), *parts.arm, drives, supervision,
+                                          parts.compensation.tool().mass_kg, settings.period_s);
   }
   return std::make_unique<AdmittanceMotion>(std::move(std::get<AdmittanceParts>(parts.rendering)), *parts.arm,
                                             std::move(drives), limits, parts.supervision, settings,
-                                            parts.compensation.tool_mass_kg());
+                                            parts.compensation.tool());
 }
 
 }  // namespace proxarm::controller

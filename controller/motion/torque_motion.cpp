@@ -112,7 +112,7 @@ double TorqueMotion::largest_tool_speed(const MotionCycle& cycle) noexcept {
   s.tool_k1_W = measured.tool_W;
   constexpr double unbounded = std::numeric_limits<double>::infinity();
   if (!empty_) return unbounded;
-  const bool empty = empty_->step(hand_signs(measured, s.v_W, 0.0));
+  const bool empty = empty_->step(hand_signs(measured.hand_W, measured.bias, s.v_W, 0.0, false));
   cycle.record.set(RecordFlag::hands_off, empty);
   const double before_m_per_s = s.braked ? s.braked_m_per_s : s.v_W.norm();
   s.braked = empty;

@@ -20,6 +20,14 @@ Wrench WrenchCompensation::tool_weight_S(const Mat3& R_WS) const noexcept {
   return {weight_S, centre_of_mass_S_.cross(weight_S)};
 }
 
+void WrenchCompensation::start_tare() noexcept {
+  tare_sum_S_ = {};
+  tare_count_ = 0;
+  tare_spread_N_ = 0.0;
+  tare_squares_S_.setZero();
+  tare_steps_S_.setZero();
+}
+
 void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_WS) noexcept {
   const Wrench weight_S = tool_weight_S(R_WS);
   const Vec3 force = reading_S.force - weight_S.force;

@@ -12,6 +12,7 @@
 
 #include <cstdint>
 
+#include "controller/handle/hand_force.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/description/cell.hpp"
 #include "models/geometry/geometry.hpp"
@@ -25,6 +26,8 @@ class WrenchCompensation {
   // Weight of the tool about S's origin, in S, with the sensor held at R_WS.
   [[nodiscard]] models::Wrench tool_weight_S(const models::Mat3& R_WS) const noexcept;
 
+  // Forgets what was averaged.
+  void start_tare() noexcept;
   // Adds one reading at rest to the average that becomes the bias.
   void add_tare_sample(const models::Wrench& reading_S, const models::Mat3& R_WS) noexcept;
   // Takes the average so far as the bias. Precondition: at least one sample was added.
@@ -37,14 +40,18 @@ class WrenchCompensation {
   // False if successive samples are correlated, as a hand's motion or the sensor's own filter makes them.
   [[nodiscard]] bool noise_is_white() const noexcept;
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
-  // The mass of the tool behind the sensor.
-  [[nodiscard]] double tool_mass_kg() const noexcept { return mass_kg_; }
+  // The tool behind the sensor.
+  [[nodiscard]] HeldTool tool() const noexcept { return {mass_kg_, centre_of_mass_S_, handle_S_}; }
   // Adds rest_S to the bias, at most most_N and most_Nm in each axis of S. Precondition: nobody holds the handle, so
   // what is left of the reading is bias.
   void follow_bias(const models::Wrench& rest_S, double most_N, double most_Nm) noexcept;
   // How far the force's bias has drifted since the tare, in N.
   [[nodiscard]] double drift_N() const noexcept { return drift_S_.force.norm(); }
   [[nodiscard]] const models::Wrench& bias_S() const noexcept { return bias_S_; }
+  // The reading without its bias: the hand's wrench and the tool's weight.
+  [[nodiscard]] models::Wrench load_S(const models::Wrench& reading_S) const noexcept {
+    return {reading_S.force - bias_S_.force, reading_S.torque - bias_S_.torque};
+  }
 
   // The hand's wrench about T's origin, in W.
   [[nodiscard]] models::Wrench hand_wrench_W(const models::Wrench& reading_S, const models::Mat3& R_WS) const noexcept;

@@ -145,13 +145,7 @@ void ProofSession::wait_for_drives(double in_phase_s) noexcept {
 }
 
 void ProofSession::tare(double in_phase_s) noexcept {
-  measurement_.add_tare_sample();
-  if (measurement_.tare_spread_N() > settings_.tare_spread_N) {
-    alarm_.raise(Fault::force_at_start, -1, measurement_.tare_spread_N(), settings_.tare_spread_N);
-  } else if (in_phase_s >= settings_.tare_s) {
-    measurement_.finish_tare();
-    supervisor_.handle(Event::tared);
-  }
+  if (measurement_.tare(settings_, in_phase_s, alarm_)) supervisor_.handle(Event::tared);
 }
 
 bool ProofSession::needs_plan() const noexcept { return entered_ == Phase::rendering && stations_.empty(); }

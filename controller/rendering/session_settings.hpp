@@ -1,7 +1,9 @@
 // What a session renders, as far as the command line sets it, apart from the cell and the scene.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <limits>
 
 namespace proxarm::controller {
 
@@ -47,6 +49,13 @@ struct SessionSettings {
 
   double tare_s = 0.2;         // how long readings at rest are averaged before rendering
   double tare_spread_N = 5.0;  // a reading that differs from the mean by this much means that a hand is on the handle
+  // What the sensor reads without a load, in S: remembered, or the simulated one's own. While it is tared, the mean of
+  // what it reads beyond the tool's weight may differ from that by zero_drift_N. Infinite: it isn't known, and whatever
+  // is read counts as zero.
+  std::array<double, 3> zero_S_N{};
+  double zero_drift_N = std::numeric_limits<double>::infinity();
+  bool only_tares = false;   // the session ends once the sensor is tared: nothing moves
+  bool always_held = false;  // a hand or a load always acts on the handle: no force is taken for a bias
   double enable_timeout_s = 5.0;
   double enabling_timeout_s = 60.0;      // for the enabling input to be released and pressed
   double wait_after_fault_s = 0.0;       // how long a stop by a fault waits for a reset before the session ends

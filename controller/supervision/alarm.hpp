@@ -5,6 +5,7 @@
 
 #include "controller/supervision/supervisor.hpp"
 #include "models/base/archive_fields.hpp"
+#include "models/geometry/geometry.hpp"
 
 namespace proxarm::controller {
 
@@ -17,6 +18,14 @@ class Alarm {
   void raise(Fault fault, std::int32_t where = -1, double value = 0.0, double limit = 0.0) noexcept {
     if (supervisor_.reaction(fault) == Reaction::hold) state_.hold_raised = true;
     supervisor_.raise({fault, where, cycle_, value, limit});
+  }
+  // A force that stands on the handle at the start.
+  void raise_standing(const models::Vec3& force_W, double limit_N) noexcept {
+    supervisor_.raise({.fault = Fault::force_at_start,
+                       .cycle = cycle_,
+                       .value = force_W.norm(),
+                       .limit = limit_N,
+                       .force_W_N = {force_W.x(), force_W.y(), force_W.z()}});
   }
   // Whether a fault with the reaction `hold` was raised since the last call.
   [[nodiscard]] bool take_hold() noexcept {

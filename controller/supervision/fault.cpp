@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 namespace proxarm::controller {
@@ -57,7 +58,9 @@ constexpr std::array texts{
               "check the sensor's sign and how it is mounted (sensor.pose_link), and each drive's direction"},
     FaultText{Fault::force_at_start, "force_at_start", Reaction::stop_1,
               "the handle was touched while the sensor was tared", "N",
-              "take the hand off the handle until rendering starts", still},
+              "take the hand off the handle until rendering starts; with nobody there, `proxarm zero CELL` takes what "
+              "the sensor reads for its zero, and --accept-force starts all the same",
+              still},
     FaultText{Fault::feedback_late, "feedback_late", Reaction::carry_on, "a drive's feedback was missing", "cycles",
               "check the drive's cable and the load of its bus: `proxarm plan`"},
     FaultText{Fault::drive_silent, "drive_silent", Reaction::stop_1, "no feedback from a drive", "cycles",
@@ -152,6 +155,10 @@ constexpr std::array texts{
               "are the masses of the URDF or of `tool` wrong, does somebody lean on the device, or is more mounted on "
               "it? Correct them; what is left over would move it with nobody there",
               still},
+    FaultText{Fault::force_jumped, "force_jumped", Reaction::stop_1,
+              "the force has changed within a sample by more than hand and handle can make", "N",
+              "look for a loose plug or cable of the sensor, and for another program that sets its zero or its axes; "
+              "supervision.max_force_step_N holds the limit"},
     FaultText{
         Fault::elbow_too_fast, "elbow_too_fast", Reaction::stop_0,
         "the elbow or the wrist is faster than it was told to be, by the encoders", "m/s",
@@ -185,6 +192,24 @@ std::string seen(const FaultReport& report, const std::string& where) {
   return line + " at cycle " + std::to_string(report.cycle);
 }
 
+constexpr double mostly = 0.9;  // of a direction: within 26 degrees of an axis, or of gravity
+
+// To two digits, and to the whole number from 10 on.
+std::string two_digits(double number) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), number < 10.0 ? "%.2g" : "%.0f", number);
+  return text.data();
+}
+
+// "+x", or the unit vector where none of the axes is near.
+std::string direction_text(const std::array<double, 3>& v) {
+  const double length = std::hypot(v[0], v[1], v[2]);
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (std::abs(v[i]) >= mostly * length) return std::string(v[i] > 0.0 ? "+" : "-") + "xyz"[i];
+  }
+  return "(" + two_digits(v[0] / length) + ", " + two_digits(v[1] / length) + ", " + two_digits(v[2] / length) + ")";
+}
+
 constexpr std::array reaction_names{"continue", "slow", "hold", "stop_1", "stop_0"};
 
 }  // namespace
@@ -206,6 +231,19 @@ Reactions reactions_of(const description::SupervisionDescription& supervision) {
     if (found != reaction_names.end()) reactions[i] = static_cast<Reaction>(found - reaction_names.begin());
   }
   return reactions;
+}
+
+std::string standing_force_text(const FaultReport& report, const std::array<double, 3>& gravity_W_m_per_s2) {
+  const auto& f = report.force_W_N;
+  const double force_N = std::hypot(f[0], f[1], f[2]);
+  if (!(force_N > 0.0)) return "";
+  const auto& g = gravity_W_m_per_s2;
+  const double gravity = std::hypot(g[0], g[1], g[2]);
+  const double along = gravity > 0.0 ? (f[0] * g[0] + f[1] * g[1] + f[2] * g[2]) / gravity : 0.0;
+  const std::string what = two_digits(force_N) + " N towards " + direction_text(f) + " of W: is somebody holding it, ";
+  if (std::abs(along) < mostly * force_N) return what + "or has the sensor's zero moved?";
+  return what + "or is the tool " + (along > 0.0 ? "heavier" : "lighter") + " by " +
+         two_digits(std::abs(along) / gravity) + " kg?";
 }
 
 std::string describe(const FaultReport& report, const std::string& where, bool drives_off) {

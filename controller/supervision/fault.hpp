@@ -24,7 +24,7 @@ enum class Fault : std::uint8_t {
   force_excessive,       // beyond the cell's max_force_N
   force_reversed,        // the force grows with the motion that it causes: wrong sign, mounting or joint direction
   sensor_drifts,         // with nobody at the handle, the bias has drifted further than max_bias_drift_N
-  force_at_start,        // the handle was pushed while the sensor was tared: nothing moves
+  force_at_start,        // the handle was held or pushed while the sensor was tared: nothing moves
   feedback_late,         // a drive's TPDO missing, for no more than max_missed_feedback cycles
   drive_silent,          // no TPDO of a drive for more than max_missed_feedback cycles
   drive_fault,           // a drive reports the state fault, or an EMCY
@@ -59,8 +59,9 @@ enum class Fault : std::uint8_t {
   enabling_squeezed,     // a switch with three positions was squeezed through
   standstill_left,       // a joint moves, by its encoder, where the arm is to stand
   weight_unknown,        // impedance type: to hold the device takes another torque than its weight: nothing moves
+  force_jumped,          // the force has changed within a sample by more than hand and handle can make
 };
-inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::weight_unknown) + 1;
+inline constexpr std::size_t fault_count = static_cast<std::size_t>(Fault::force_jumped) + 1;
 
 // What the arm does. Each reaction does more than the one before.
 enum class Reaction : std::uint8_t {
@@ -82,6 +83,8 @@ struct FaultReport {
   double value = 0.0;  // the figure that broke the limit, in the unit that describe() prints
   double limit = 0.0;
   Reaction reaction = Reaction::stop_1;  // what the arm did; hold: a hold that lasted too long led to the stop
+  std::array<double, 3> force_W_N{};     // force_at_start: what stands on the handle beyond the tool's weight; 0: not
+                                         // known
 };
 
 // The name of the enumerator: "sensor_lost".
@@ -92,6 +95,10 @@ const char* reaction_name(Reaction reaction) noexcept;
 Reaction default_reaction(Fault fault) noexcept;
 // All reactions, with the cell's choices.
 Reactions reactions_of(const description::SupervisionDescription& supervision);
+
+// What of a force that stands on the handle at the start, in words with its direction in W and what it may be: "25 N
+// towards +x: is somebody holding it?". Along gravity it may be the tool's mass, too. Empty: it isn't known.
+std::string standing_force_text(const FaultReport& report, const std::array<double, 3>& gravity_W_m_per_s2);
 
 // Describes the cause, what the arm did, and what to do, in one line. `where`: the name of the drive, joint or bus.
 // `drives_off`: every drive has confirmed that it is switched off.

@@ -123,7 +123,8 @@ class Supervisor {
   void archive(fieldbus::StateArchive& state) noexcept {
     state(phase_, slow_end_);
     for (FaultReport* report : {&report_, &escalation_, &held_for_}) {
-      state(report->fault, report->where, report->cycle, report->value, report->limit, report->reaction);
+      state(report->fault, report->where, report->cycle, report->value, report->limit, report->reaction,
+            report->force_W_N);
     }
     for (Notice& notice : notices_) state(notice.times, notice.cycles, notice.last);
   }

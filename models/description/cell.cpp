@@ -292,6 +292,7 @@ SensorPlacement read_sensor(const YamlNode& node) {
   s.sample_rate_Hz = node.number("sample_rate_Hz", above(0.0, 1e6));
   s.bandwidth_Hz = bandwidth_or(node, "bandwidth_Hz", 0.0, 1e6);
   s.delay_s = node.number_or("delay_s", 0.0, 0.0, longest_sensor_delay_s);
+  if (node.has("zero_drift_N")) s.zero_drift_N = node.number("zero_drift_N", above(0.0, 1e6));
   return s;
 }
 

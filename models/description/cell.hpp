@@ -149,6 +149,8 @@ struct SensorPlacement {
   double sample_rate_Hz = 0.0;  // of its converter, not synchronised with anything
   double bandwidth_Hz = 0.0;    // its own low-pass; 0: none
   double delay_s = 0.0;         // by which its readings are older than that
+  // By which its zero may differ from the one that is known when it is tared; 0: zero_drift_N() of its range.
+  double zero_drift_N = 0.0;
 };
 
 inline constexpr double longest_sensor_delay_s = 0.1;

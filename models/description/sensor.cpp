@@ -70,7 +70,24 @@ SensorSimulation read_simulation(const YamlNode& node) {
   return s;
 }
 
+constexpr double drifting_share = 0.01;  // of the range
+
 }  // namespace
+
+double zero_drift_N(const SensorDescription& sensor) noexcept {
+  return drifting_share * *std::max_element(sensor.force_range_N.begin(), sensor.force_range_N.end());
+}
+
+std::array<double, 3> simulated_zero_S_N(const SensorDescription& sensor) noexcept {
+  const SensorSimulation& s = sensor.simulation;
+  std::array<double, 3> zero_S_N{};
+  for (std::size_t row = 0; row < zero_S_N.size(); ++row) {
+    for (std::size_t gauge = 0; gauge < s.bias_counts.size(); ++gauge) {
+      zero_S_N[row] += s.matrix[row][gauge] * s.bias_counts[gauge] / static_cast<double>(s.counts_per_N);
+    }
+  }
+  return zero_S_N;
+}
 
 SensorSources read_sensor_sources(const YamlNode& root) {
   SensorSources sources;

@@ -37,6 +37,14 @@ struct SensorDescription {
   std::optional<SensorProtocol> described;  // described
 };
 
+// By how much the zero of such a sensor may differ from the one that is known, in N, where its cell doesn't say
+// (`sensor.zero_drift_N`): 1 % of its largest range, which is what strain gauges drift by while they warm up.
+double zero_drift_N(const SensorDescription& sensor) noexcept;
+
+// What the simulated sensor reads without any load, in N: matrix · bias / counts per unit. A sensor that is described
+// by its frames reads none.
+std::array<double, 3> simulated_zero_S_N(const SensorDescription& sensor) noexcept;
+
 // With what a cell chooses, or as the sensor is delivered. Throws SetupError, with file, line and key.
 SensorDescription load_sensor(const std::filesystem::path& file, const SensorChoices& choices = {});
 // The same of a file that has been read already.

@@ -14,6 +14,7 @@ const std::vector<ReactionChoice>& reaction_choices() {
       {"force_excessive", {"stop_1", "hold"}},
       {"force_reversed", {"stop_1", "stop_0", "hold"}},
       {"sensor_drifts", {"stop_1", "hold", "continue"}},
+      {"force_jumped", {"stop_1", "stop_0", "hold"}},
       {"feedback_late", {"continue", "slow"}},
       {"position_implausible", {"stop_0", "stop_1"}},
       {"drive_deviates", {"stop_0", "stop_1"}},
@@ -45,6 +46,7 @@ SupervisionDescription read_supervision(const YamlNode& node) {
   s.let_go = let_go == "coast" ? LetGo::coast : let_go == "hold" ? LetGo::hold : LetGo::rest;
   s.empty_handle_N = node.number_or("empty_handle_N", s.empty_handle_N, 0.001, 10.0);
   s.max_bias_drift_N = node.number_or("max_bias_drift_N", s.max_bias_drift_N, 0.01, 100.0);
+  s.max_force_step_N = node.number_or("max_force_step_N", s.max_force_step_N, 1.0, 1e4);
   s.brake_release = text_up_to(node, "brake_release", "", 120);
   s.monitored_standstill = node.boolean_or("monitored_standstill", s.monitored_standstill);
   s.bus_loss_stop_s = node.number_or("bus_loss_stop_s", s.bus_loss_stop_s, 0.006, 1.0);

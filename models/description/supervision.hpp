@@ -9,6 +9,7 @@
 //     let_go: rest                     # what the arm does when nobody holds the handle: rest, coast or hold
 //     empty_handle_N: 0.1              # below this force for half a second nobody holds it
 //     max_bias_drift_N: 0.5            # by which the force sensor's bias may go meanwhile
+//     max_force_step_N: 60             # by which hand and handle may change the force from one sample to the next
 //     reactions: {sensor_lost: hold}   # of faults that leave a choice: reaction_choices()
 //
 //     monitored_standstill: false      # where the arm is to stand, a joint that moves is a fault (standstill_left)
@@ -49,8 +50,9 @@ struct SupervisionDescription {
   double slow_speed_m_per_s = 0.1;
   double release_speed_m_per_s = 0.05;
   LetGo let_go = LetGo::rest;
-  double empty_handle_N = 0.1;    // below this for half a second nobody is there
-  double max_bias_drift_N = 0.5;  // by which the sensor's bias may go while nobody is there
+  double empty_handle_N = 0.1;     // below this for half a second nobody is there
+  double max_bias_drift_N = 0.5;   // by which the sensor's bias may go while nobody is there
+  double max_force_step_N = 60.0;  // within a sample, by hand and handle (controller/handle/force_jump.hpp)
   bool monitored_standstill = false;
   double bus_loss_stop_s = 0.06;  // within which each drive on CAN stops by itself when the controller is gone
   std::string brake_release;      // how a person opens the brakes by hand; empty: not at all

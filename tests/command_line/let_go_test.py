@@ -206,7 +206,7 @@ class LetGo(harness.ProgramTest):
                 faults = [fault["fault"] for fault in summary["faults"]]
                 print(f"nobody, sensor:{bias} {arguments}: {1e3 * went:.1f} mm {faults}")
                 self.assertLess(went, 0.05)
-                self.assertLessEqual(set(faults), {"sensor_drifts"})
+                self.assertLessEqual(set(faults), {"sensor_drifts", "force_jumped"})
                 if not faults:
                     self.assertLess(track.speed(len(track.place) - 1), 1e-3)
 

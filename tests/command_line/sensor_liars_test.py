@@ -47,12 +47,12 @@ class Liars(harness.ProgramTest):
             self.references[hand, mass] = track
         return self.references[hand, mass]
 
-    def judged(self, hand, lie, at_s=LIE_S, mass="4", until_s=None):
+    def judged(self, hand, lie, *arguments, at_s=LIE_S, mass="4", until_s=None):
         """The faults of a session with this lie, how long after its begin they ended it, and how far the tool was off
         the session without it until it came to rest; from the start on, how far it went in all."""
         reference = self.reference(hand, mass)
         when = f"@{at_s}s" + (f"..{until_s}s" if until_s else "") if at_s else ""
-        summary, track = self.session(hand, mass, "--fault", f"sensor:{lie}{when}")
+        summary, track = self.session(hand, mass, "--fault", f"sensor:{lie}{when}", *arguments)
         began = track.at(at_s - BEFORE_FIRST_CYCLE_S - SLACK_S) if at_s else track.began
         ended = track.leaves_rendering(began)
         if ended is None:
@@ -70,11 +70,12 @@ class Liars(harness.ProgramTest):
         for lie in ("inverted", "turned"):
             for hand, mass in (("somebody", "4"), ("soft", "4"), ("stiff", "4"), ("somebody", "10"), ("soft", "10")):
                 with self.subTest(f"{lie}, {hand}, {mass} kg"):
-                    names, _, off = self.judged(hand, lie, at_s=None, mass=mass)
+                    # The tool's weight tells a wrong sign while the sensor is tared; here that is accepted.
+                    names, _, off = self.judged(hand, lie, "--accept-force", "20N", at_s=None, mass=mass)
                     self.assertEqual(names, {"force_reversed"})
                     self.assertLessEqual(off, MOST_M)
             with self.subTest(f"{lie}, nobody"):
-                names, _, off = self.judged("nobody", lie, at_s=None)
+                names, _, off = self.judged("nobody", lie, "--accept-force", "20N", at_s=None)
                 self.assertEqual(names, set())
                 self.assertLessEqual(off, 0.005)
 
@@ -128,7 +129,7 @@ class Liars(harness.ProgramTest):
                     self.assertLessEqual(off, MOST_M)
 
     def test_what_a_lie_did_is_replayed_to_the_bit(self):
-        for hand, lie, when in (("somebody", "inverted", ""), ("nobody", "drift=1N/s", f"@{LIE_S}s"),
+        for hand, lie, when in (("somebody", "inverted", f"@{LIE_S}s"), ("nobody", "drift=1N/s", f"@{LIE_S}s"),
                                 ("somebody", "channel=3", f"@{LIE_S}s")):
             self.session(hand, "4", "--fault", f"sensor:{lie}{when}")
             outcome = self.call("replay", "record")

@@ -523,6 +523,11 @@ PreparedSession prepare(const RunOptions& options) {
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
   session.settings.receive_window = session.cell.receive_window;
   session.duration_s = options.duration_s;
+  session.settings.zero_S_N = description::simulated_zero_S_N(session.sensor);
+  if (!std::isfinite(session.settings.zero_drift_N)) {
+    const double of_cell_N = session.cell.sensor.zero_drift_N;
+    session.settings.zero_drift_N = of_cell_N > 0.0 ? of_cell_N : description::zero_drift_N(session.sensor);
+  }
   set_timestep(session, options, options.period_s.value_or(session.cell.default_period_s));
   choose_orientation(session, options);
   choose_scheme(session, options);

@@ -244,6 +244,22 @@ std::vector<std::string> weight_surprises(const PreparedSession& session, const 
 }
 
 // No arm swings a tool that is longer than itself; one in millimetres is a thousand times as long as it should be.
+// What it pushes by at the start is taken for the sensor's zero, or is Fault::force_at_start.
+std::vector<std::string> hand_surprises(const PreparedSession& session) {
+  const description::HandDescription& hand = session.hand;
+  std::array<double, 3> at_m{};
+  if (!hand.waypoints.empty()) at_m = hand.waypoints.front().offset_m;
+  if (!hand.trajectory.empty()) at_m = hand.trajectory.front().value;
+  const double way_m = std::hypot(at_m[0], at_m[1], at_m[2]);
+  if (!(way_m > 0.0) || !(hand.stiffness_N_per_m > 0.0)) return {};
+  char text[160];
+  std::snprintf(text, sizeof text,
+                ": begins %.3g m beside the handle, so it pulls by %.3g N while the sensor is tared; "
+                "begin with offset_m: [0, 0, 0]",
+                way_m, std::min(hand.max_force_N, way_m * hand.stiffness_N_per_m));
+  return {hand.file.string() + text};
+}
+
 std::vector<std::string> tool_surprises(const scenes::RigidTool& tool, double reach_m) {
   const double tool_m = models::reach_of(tool.shape);
   if (tool_m <= reach_m) return {};
@@ -283,6 +299,7 @@ std::vector<std::string> surprises(const PreparedSession& session) {
   // No joint's axis is further from the tool than the arm can reach.
   const double reach_m = std::max(arm.path_curvature().maxCoeff(), 0.1);
   std::vector<std::string> lines = weight_surprises(session, arm);
+  for (const std::string& line : hand_surprises(session)) lines.push_back(line);
   if (session.scene.tool) {
     for (const std::string& line : tool_surprises(*session.scene.tool, reach_m)) lines.push_back(line);
   }

@@ -12,7 +12,8 @@ namespace proxarm::command_line {
 // masses that aren't stable, and in simulation a timestep that a bus can't carry. Throws SetupError.
 void require_runnable(const PreparedSession& session, const RunOptions& options);
 
-// What isn't wrong but would surprise, a line each: of the scene's meshes (scenes/mesh_files/mesh_report.hpp), a rigid
+// What isn't wrong but would surprise, a line each: a simulated hand that pushes before the sensor is tared, of the
+// scene's meshes (scenes/mesh_files/mesh_report.hpp), a rigid
 // tool that is longer than the arm, and where the arm's weight takes all that setpoints may ask of a drive
 // (controller/setpoints/held_weight.hpp).
 std::vector<std::string> surprises(const PreparedSession& session);

@@ -20,6 +20,7 @@
 #include "controller/command_line/sessions/interface_network.hpp"
 #include "controller/command_line/sessions/recorded_messages.hpp"
 #include "controller/command_line/sessions/session_output.hpp"
+#include "controller/command_line/sessions/zero_run.hpp"
 #include "controller/record/frame_tap.hpp"
 #include "controller/report/latency.hpp"
 #include "controller/session/bring_up.hpp"
@@ -195,6 +196,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   if (replay) replay->finish();
   if (messages) messages->finish();
 
+  keep_zero(session, options, interfaces, cycle);
   controller::Summary summary = output.summary(cycle, tally.end, signals.cause());
   summary.wall_time_s = wall_s;
   summary.overruns = tally.overruns;

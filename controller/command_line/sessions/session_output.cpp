@@ -22,6 +22,8 @@ using controller::CycleRecord;
 using controller::Summary;
 
 constexpr const char* default_plot = "proxarm-run.svg";
+// A force of so many times empty_handle_N is above its band, what the tool rings by included.
+constexpr double felt_bands = 4.0;
 
 std::string rendered_text(const PreparedSession& session) {
   const controller::SessionSettings& s = session.settings;
@@ -202,6 +204,21 @@ void SessionOutput::say_oscillation() {
   told_oscillation_ = present.lasts;
 }
 
+// On standard error, when a force that is no longer taken for a hand's is one that somebody could feel.
+void SessionOutput::say_belief(const CycleRecord& record) {
+  const bool off = record.has(controller::RecordFlag::hands_off);
+  const double force_N = controller::vec3(record.force_W_N).norm();
+  if (off && !was_off_ && !told_belief_ && force_N > felt_bands * session_.cell.supervision.empty_handle_N) {
+    std::fprintf(
+        stderr,
+        "proxarm: nobody at the handle from %.4g s on, it is taken: %.2g N are as straight as a sensor's drift; "
+        "if a hand or a load is there, --handle held\n",
+        1e-9 * static_cast<double>(record.time_ns), force_N);
+    told_belief_ = true;
+  }
+  was_off_ = off;
+}
+
 void SessionOutput::judge_pose(const CycleRecord& record) {
   if (!poses_ || record.phase != controller::Phase::rendering) return;
   if (!(record.added_damping_Ns_per_m > 0.0)) user_damping_Ns_per_m_ = record.proxy_damping_Ns_per_m;
@@ -243,6 +260,7 @@ void SessionOutput::tell(CycleRecord record) {
   say_timestep(record);
   builder_.add(record);
   say_oscillation();
+  say_belief(record);
   judge_pose(record);
   if (writer_) writer_->add(record, deriver_.derive(record));
   if (plot_) plot_->add(record);

@@ -49,6 +49,7 @@ class SessionOutput {
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);
   void say_oscillation();
+  void say_belief(const controller::CycleRecord& record);
   void tell(controller::CycleRecord record);
   void judge_pose(const controller::CycleRecord& record);
   void say_poses();
@@ -66,8 +67,9 @@ class SessionOutput {
   std::optional<controller::Swing> swing_;       // of a tool that is turned
   std::chrono::steady_clock::duration spent_{};  // on records and their figures
   std::int64_t rendered_ns_ = 0;
-  std::int64_t told_period_ns_ = 0;  // that the user knows of
-  bool told_oscillation_ = false;    // of the present spell
+  std::int64_t told_period_ns_ = 0;             // that the user knows of
+  bool told_oscillation_ = false;               // of the present spell
+  bool was_off_ = false, told_belief_ = false;  // nobody held the handle in the cycle before; and what that was told of
   controller::Phase last_phase_ = controller::Phase::idle;
 };
 

@@ -438,6 +438,7 @@ std::vector<Row> rows() {
        [] { return RigOptions{.device_faults = {"sensor:inverted"}, .scene = "scenes/free.yaml"}; }, rendering_begins},
       // Half a newton at 0.2 N/s, and what the bias is behind.
       {sensor_drifts, Reaction::stop_1, 3500, still_m, [] { return nobody_there("sensor:drift=0.2N/s@1.9s"); }},
+      {force_jumped, Reaction::stop_1, 1, way_m, [] { return failing_device("sensor:inverted"); }},
       {force_at_start, Reaction::stop_1, 400, 2e-3, hand_at_start, at_start},
       {feedback_late, Reaction::carry_on, 2, 1.0,
        [] {

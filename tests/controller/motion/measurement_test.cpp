@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "tests/controller/motion/fake_devices.hpp"
 
 namespace proxarm::controller {
@@ -10,6 +12,7 @@ namespace {
 using models::JointVector;
 using testing::FakeDrives;
 using testing::FakeSensor;
+using testing::Watched;
 
 struct MeasurementTest : ::testing::Test {
   description::Cell cell = testing::default_cell();
@@ -73,6 +76,48 @@ TEST_F(MeasurementTest, ReadsNoForceAtRestAfterTaring) {
   measurement.finish_tare();
   EXPECT_LT(measurement.now().hand_W.force.norm(), 1e-6);
   EXPECT_LT(measurement.tare_spread_N(), 1e-6);
+}
+
+// The story: only the spread of a tare was judged, so a steady 30 N became the zero, and let go sent the arm off.
+TEST_F(MeasurementTest, ATareWhoseMeanIsntTheKnownZeroIsOfAHandUnlessThatMuchIsAccepted) {
+  for (const double held_N : {0.0, 2.0, 30.0}) {
+    for (const double accepted_N : {3.3, 40.0, std::numeric_limits<double>::infinity()}) {
+      Watched watched;
+      SessionSettings settings;
+      settings.zero_S_N = {10.0, -4.0, 3.0};
+      settings.zero_drift_N = accepted_N;
+      measurement.take();
+      const models::Wrench weight = WrenchCompensation(cell).tool_weight_S(measurement.now().R_WS);
+      const models::Vec3 zero_S(settings.zero_S_N.data()),
+          reading_S = zero_S + weight.force + models::Vec3(held_N, 0, 0);
+      sensor.sample.wrench_S = {reading_S.x(), reading_S.y(), reading_S.z(), 0.0, 0.0, 0.0};
+      measurement.start_tare();
+      bool tared = false;
+      for (int k = 0; k < 300 && !tared; ++k) {
+        measurement.take();
+        tared = measurement.tare(settings, 1e-3 * k, watched.alarm);
+      }
+      EXPECT_EQ(tared, held_N <= accepted_N) << held_N << " N, " << accepted_N;
+      const FaultReport& report = watched.supervisor.report();
+      EXPECT_EQ(report.fault, tared ? Fault::none : Fault::force_at_start);
+      if (tared) continue;
+      EXPECT_NEAR(report.value, held_N, 1e-9);
+      EXPECT_NEAR(models::Vec3(report.force_W_N.data()).norm(), held_N, 1e-9);
+    }
+  }
+}
+
+TEST(StandingForce, IsToldWithItsDirectionAndAlongGravityAsAMass) {
+  const std::array<double, 3> gravity{0.0, 0.0, -9.80665};
+  const auto told = [&](const std::array<double, 3>& force_W_N) {
+    return standing_force_text({.fault = Fault::force_at_start, .force_W_N = force_W_N}, gravity);
+  };
+  EXPECT_EQ(told({25, 0.1, 0}), "25 N towards +x of W: is somebody holding it, or has the sensor's zero moved?");
+  EXPECT_EQ(told({0, 0, -24.5}), "25 N towards -z of W: is somebody holding it, or is the tool heavier by 2.5 kg?");
+  EXPECT_EQ(told({0, 0, 9.80665}), "9.8 N towards +z of W: is somebody holding it, or is the tool lighter by 1 kg?");
+  EXPECT_EQ(told({6, -8, 0}),
+            "10 N towards (0.6, -0.8, 0) of W: is somebody holding it, or has the sensor's zero moved?");
+  EXPECT_EQ(told({0, 0, 0}), "");
 }
 
 TEST_F(MeasurementTest, CountsInTheNewTimestep) {
