@@ -34,8 +34,8 @@ bool ForceJump::flipped(const LoadSample& sample) noexcept {
     if (step_N < least_N) continue;
     const double off_N = (sample.load_S.force - turned.force).norm();
     const double off_Nm = (sample.load_S.torque - turned.torque).norm();
-    if (off_N > flipped_share * step_N + noises * sample.noise_N) continue;
-    if (off_Nm > flipped_share * step_Nm + noises * noise_lever_m * sample.noise_N) continue;
+    if (!(off_N <= flipped_share * step_N + noises * sample.noise_N)) continue;
+    if (!(off_Nm <= flipped_share * step_Nm + noises * noise_lever_m * sample.noise_N)) continue;
     s.step_N = step_N;
     s.limit_N = least_N;
     return true;
@@ -60,7 +60,7 @@ void ForceJump::watch(const LoadSample& sample, double step_N) noexcept {
   const double beside_Nm = beside_handle_m * step_N + noises * noise_lever_m * sample.noise_N;
   const bool calm = s.samples >= 2.0 && s.calm_N <= kept_share * step_N;
   const bool offset = step_N >= least_N && calm && step.torque.norm() > beside_Nm;
-  if (step_N < most_N && !offset) return;
+  if (!std::isfinite(step_N) || (step_N < most_N && !offset)) return;
   if (releases(sample, kept_share * step_N + noises * sample.noise_N)) return;
   s.before_S = s.last_S.force;
   s.before_s = 0.0;
@@ -75,7 +75,7 @@ bool ForceJump::stayed(const LoadSample& sample) noexcept {
   if (s.watched_s < 0.0) return false;
   s.watched_s += sample.since_s;
   const double changed_N = (sample.load_S.force - s.stepped_S.force).norm();
-  if (changed_N > kept_share * s.step_N + noises * sample.noise_N) {
+  if (!(changed_N <= kept_share * s.step_N + noises * sample.noise_N)) {
     s.watched_s = -1.0;
     return false;
   }

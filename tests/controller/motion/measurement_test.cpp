@@ -113,7 +113,7 @@ TEST(StandingForce, IsToldWithItsDirectionAndAlongGravityAsAMass) {
     return standing_force_text({.fault = Fault::force_at_start, .force_W_N = force_W_N}, gravity);
   };
   EXPECT_EQ(told({25, 0.1, 0}), "25 N towards +x of W: is somebody holding it, or has the sensor's zero moved?");
-  EXPECT_EQ(told({0, 0, -24.5}), "25 N towards -z of W: is somebody holding it, or is the tool heavier by 2.5 kg?");
+  EXPECT_EQ(told({0, 0, -24.6}), "25 N towards -z of W: is somebody holding it, or is the tool heavier by 2.5 kg?");
   EXPECT_EQ(told({0, 0, 9.80665}), "9.8 N towards +z of W: is somebody holding it, or is the tool lighter by 1 kg?");
   EXPECT_EQ(told({6, -8, 0}),
             "10 N towards (0.6, -0.8, 0) of W: is somebody holding it, or has the sensor's zero moved?");
