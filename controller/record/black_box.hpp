@@ -79,7 +79,7 @@ class CycleBox {
 // What any thread or process may read of a box while its cycle writes: whole cycles only.
 class BoxReader {
  public:
-  static constexpr std::size_t most_state_bytes = 12288;
+  static constexpr std::size_t most_state_bytes = 16384;
 
   BoxReader(const BoxReader&) = delete;
   BoxReader& operator=(const BoxReader&) = delete;
