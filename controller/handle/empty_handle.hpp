@@ -14,7 +14,7 @@
 // absent.
 //
 // The handle counts as held again when the force leaves 1.5 times the band, or at once when a single sample leaves it
-// by 8 σ more. To that band, 1.5 times the inertial force of the tool behind the sensor is added: its mass times the
+// by 8 σ more, where the tool's inertia isn't in the samples. To that band, 1.5 times the inertial force of the tool behind the sensor is added: its mass times the
 // largest acceleration of the last tenth of a second, with which its gears ring.
 //
 // A force that acts at the handle (hand_force.hpp) is a hand's or a load's, however straight: it never leads an empty
@@ -35,6 +35,7 @@ struct EmptyHandleConfig {
   double tool_mass_kg = 0.0;  // what moves behind the sensor; rings as the arm is braked
   double lever_m = 0.0;       // a torque counts as its force at this lever; 0: torques don't count
   double way_share = 1.0;     // of the 20 and 40 mm
+  bool at_once = true;        // a single sample beyond the band ends it; false: it may be the tool's inertia
 };
 
 // What one cycle shows of the hand.

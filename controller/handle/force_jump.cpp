@@ -22,16 +22,18 @@ constexpr double late = 1.5;
 
 }  // namespace
 
-// Whether the load is the one before with its sign, or the sign of two axes, turned.
+// Whether the load is the one before with its sign, or the sign of two axes, turned. A force that swings through zero
+// is its own opposite from one sample to the next, too, but it has come on the way there.
 bool ForceJump::flipped(const LoadSample& sample) noexcept {
   State& s = state_;
+  if (s.samples < 2.0) return false;
   const std::array<Vec3, 4> signs{Vec3(-1, -1, -1), Vec3(-1, -1, 1), Vec3(-1, 1, -1), Vec3(1, -1, -1)};
   for (const Vec3& sign : signs) {
     const Wrench turned{sign.cwiseProduct(s.last_S.force), sign.cwiseProduct(s.last_S.torque)};
     const double step_N = (turned.force - s.last_S.force).norm(), step_Nm = (turned.torque - s.last_S.torque).norm();
     const bool all = sign.sum() < -2.0;
     const double least_N = std::max(all ? least_flip_N : least_turn_N, least_noises * sample.noise_N);
-    if (step_N < least_N) continue;
+    if (step_N < least_N || s.calm_N > kept_share * step_N) continue;
     const double off_N = (sample.load_S.force - turned.force).norm();
     const double off_Nm = (sample.load_S.torque - turned.torque).norm();
     if (!(off_N <= flipped_share * step_N + noises * sample.noise_N)) continue;

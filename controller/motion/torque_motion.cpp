@@ -42,8 +42,10 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
   state_.torque_Nm = state_.missing_Nm = JointVector::Zero(arm.axes());
   if (supervision.let_go == description::LetGo::coast) return;
   empty_.emplace(
-      EmptyHandleConfig{
-          .band_N = supervision.empty_handle_N, .tool_mass_kg = tool_mass_kg + left_kg, .way_share = way_share},
+      EmptyHandleConfig{.band_N = supervision.empty_handle_N,
+                        .tool_mass_kg = tool_mass_kg + left_kg,
+                        .way_share = way_share,
+                        .at_once = false},
       period_s);
 }
 

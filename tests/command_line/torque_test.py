@@ -94,11 +94,13 @@ class Torque(ProgramTest):
             _, record = self.led(NOBODY, 5, "--arm", self.other_device(links, tool_kg))
             self.assertLess(max(math.dist(x, record.steel[0]) for x in record.steel), 1e-3, (links, tool_kg))
 
-    def test_one_that_is_more_wrong_is_refused_with_the_torque(self):
-        for tool_kg in (0.1, 0.5):
-            summary, record = self.led(NOBODY, 5, "--arm", self.other_device(1.0, tool_kg), status=1)
-            self.assertEqual([fault["fault"] for fault in summary["faults"]], ["weight_unknown"])
-            self.assertIn("Nm, limit 0.36", summary["faults"][0]["text"])
+    # A tool that is heavier is known by the sensor's reading first, links by the torque that holds them.
+    def test_one_that_is_more_wrong_is_refused_with_the_force_or_the_torque(self):
+        for links, tool_kg, fault, words in ((1.0, 0.1, "weight_unknown", "Nm, limit 0.36"), (1.0, 0.5, "force_at_start", "heavier by"),
+                                             (1.5, 0.0, "weight_unknown", "Nm, limit 0.36")):
+            summary, record = self.led(NOBODY, 5, "--arm", self.other_device(links, tool_kg), status=1)
+            self.assertEqual([fault["fault"] for fault in summary["faults"]], [fault], (links, tool_kg))
+            self.assertIn(words, summary["faults"][0]["text"])
             self.assertEqual(record.time, [], "nothing was rendered")
 
     # 25 N at 750 N/m, and 10 N at 200: 33 and 50 mm of wall that want to get rid of the device.

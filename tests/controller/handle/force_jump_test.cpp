@@ -63,6 +63,20 @@ TEST_F(ForceJumpTest, AHalfTurnIsFoundWithItsFirstSampleFromFiveNewtonsOn) {
   }
 }
 
+// 25 N at 14 Hz, sampled each 4 ms at all phases: where it passes zero, one sample is the other's opposite.
+TEST_F(ForceJumpTest, ASwingThroughZeroIsNoFlip) {
+  for (int phase = 0; phase < 400; ++phase) {
+    jump.start();
+    for (int k = 0; k < 40; ++k) {
+      const double angle = 2.0 * M_PI * (14.0 * 4e-3 * k + phase / 400.0);
+      const Wrench load_S{25.0 * std::sin(angle) * Vec3(0.6, 0.8, 0.0), 2.5 * std::sin(angle) * Vec3(-0.8, 0.6, 0.0)};
+      EXPECT_FALSE(
+          jump.step({.load_S = load_S, .hand_S = load_S.force, .noise_N = noise_N, .since_s = 4 * T, .usual_s = 4 * T}))
+          << phase << ", " << k;
+    }
+  }
+}
+
 TEST_F(ForceJumpTest, AnOffsetIsFoundWithinSixMilliseconds) {
   for (const double offset_N : {1.0, 2.0, 5.0, 59.0, 100.0, -100.0}) {
     const auto offset = [&](const Wrench& w) { return Wrench{w.force + Vec3(offset_N, 0, 0), w.torque}; };
