@@ -98,15 +98,18 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
   const double T = period_s_;
   const double share = T / (T + limits_.max_tool_speed_m_per_s / limits_.max_tool_acceleration_m_per_s2);
   // A point that is already outside may not go further out.
-  const auto room = [&](double d) { return borders == Borders::walls ? d : std::max(0.0, share * d); };
+  const auto room = [&](double d, double setback) {
+    return borders == Borders::walls ? d : std::max(0.0, share * (d - setback));
+  };
   for (int i = 0; i < 3; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const double to_upper = limits_.workspace_max_m[k] - q_W[i], to_lower = q_W[i] - limits_.workspace_min_m[k];
+    const double setback = border_setback_m(limits_.workspace_max_m[k] - limits_.workspace_min_m[k]);
     if (std::isfinite(to_upper)) {
-      add_plane(out, {Vec3::Unit(i), room(to_upper), ActiveLimits::of(Limit::workspace), share});
+      add_plane(out, {Vec3::Unit(i), room(to_upper, setback), ActiveLimits::of(Limit::workspace), share});
     }
     if (std::isfinite(to_lower)) {
-      add_plane(out, {-Vec3::Unit(i), room(to_lower), ActiveLimits::of(Limit::workspace), share});
+      add_plane(out, {-Vec3::Unit(i), room(to_lower, setback), ActiveLimits::of(Limit::workspace), share});
     }
   }
   for (const description::BoxDescription& zone : limits_.keep_out) {
@@ -118,7 +121,7 @@ void StepLimiter::add_borders(const Vec3& q_W, Borders borders, StepLimits& out)
       if (below > nearest.bound_m) nearest = {Vec3::Unit(i), below, limits};
       if (above > nearest.bound_m) nearest = {-Vec3::Unit(i), above, limits};
     }
-    nearest.bound_m = room(nearest.bound_m);
+    nearest.bound_m = room(nearest.bound_m, longest_setback_m);
     nearest.share = share;
     add_plane(out, nearest);
   }

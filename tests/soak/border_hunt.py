@@ -47,9 +47,9 @@ def start_of(cell, chance):
 
 
 def made_border(chance, start):
-    """The normal towards where the tool may be, and the border's place: at most 40 mm from the start."""
+    """The normal towards where the tool may be, and the border's place: 0.6 to 40 mm from the start."""
     axis, sign = chance.randrange(3), chance.choice((-1, 1))
-    gap = chance.choice((1e-5, chance.uniform(1e-5, 0.04)))
+    gap = chance.choice((6e-4, chance.uniform(6e-4, 0.04)))
     normal = [sign * (i == axis) for i in range(3)]
     return axis, sign, normal, start[axis] - sign * gap
 

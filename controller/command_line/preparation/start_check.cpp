@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/limits/step_limits.hpp"
 #include "controller/setpoints/held_weight.hpp"
 #include "models/arm/arm.hpp"
 #include "models/arm/inverse_kinematics.hpp"
@@ -188,23 +189,30 @@ void require_in_space(const PreparedSession& session, const Vec3& start_W) {
                     .advice = "move space.origin_m, or change start_rad in the cell file"});
 }
 
-// Within the workspace, and in no zone to be kept out of.
+// Within the workspace, and in no zone to be kept out of, by as much as the tool stops before their borders.
 void require_allowed(const PreparedSession& session, const models::Vec3& start_W) {
   const description::CellLimits& limits = session.cell.limits;
-  const auto inside = [&](const std::array<double, 3>& min_m, const std::array<double, 3>& max_m) {
+  // less_m(thickness): by how much smaller the box is on each of its sides.
+  const auto inside = [&](const std::array<double, 3>& min_m, const std::array<double, 3>& max_m, auto less_m) {
     const models::Vec3 min(min_m.data()), max(max_m.data());
-    return (start_W.array() >= min.array()).all() && (start_W.array() <= max.array()).all();
+    const models::Vec3 less = (max - min).unaryExpr(less_m);
+    return (start_W.array() >= (min + less).array()).all() && (start_W.array() <= (max - less).array()).all();
   };
+  char setback[32];
+  std::snprintf(setback, sizeof setback, "%.3g mm", 1e3 * controller::longest_setback_m);
   const auto refuse = [&](const char* key, const char* expected) {
     throw SetupError({.file = session.cell.file.string(),
                       .key = key,
                       .found = "the start of the tool at " + point_text(start_W),
-                      .expected = expected,
+                      .expected = std::string(expected) + ", " + setback + " from its borders at least",
                       .advice = "change the box, or start_rad"});
   };
-  if (!inside(limits.workspace_min_m, limits.workspace_max_m)) refuse("limits.workspace_m", "a start inside of it");
+  if (!inside(limits.workspace_min_m, limits.workspace_max_m, controller::border_setback_m)) {
+    refuse("limits.workspace_m", "a start inside of it");
+  }
   for (const description::BoxDescription& zone : limits.keep_out) {
-    if (inside(zone.min_m, zone.max_m)) refuse("limits.keep_out_m", "a start outside of all of them");
+    const auto more = [](double /*thickness_m*/) { return -controller::longest_setback_m; };
+    if (inside(zone.min_m, zone.max_m, more)) refuse("limits.keep_out_m", "a start outside of all of them");
   }
 }
 
