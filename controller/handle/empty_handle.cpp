@@ -77,8 +77,7 @@ bool EmptyHandle::step(const HandSigns& signs) noexcept {
   if (s.empty) {
     const double held_N =
         leaving * band + leaving * config_.tool_mass_kg * s.acceleration_m_per_s2 + led_share * s.bias_W.norm();
-    s.empty = size <= held_N &&
-              (!config_.at_once || size_N(signs.hand_W) <= held_N + noise_deviations * signs.noise_N);
+    s.empty = size <= held_N && (!config_.at_once || size_N(signs.hand_W) <= held_N + noise_deviations * signs.noise_N);
     if (!s.empty) {
       s.calm_s = s.quiet_s = 0.0;
       s.led = false;

@@ -14,8 +14,9 @@
 // absent.
 //
 // The handle counts as held again when the force leaves 1.5 times the band, or at once when a single sample leaves it
-// by 8 σ more, where the tool's inertia isn't in the samples. To that band, 1.5 times the inertial force of the tool behind the sensor is added: its mass times the
-// largest acceleration of the last tenth of a second, with which its gears ring.
+// by 8 σ more, where the tool's inertia isn't in the samples. To that band, 1.5 times the inertial force of the tool
+// behind the sensor is added: its mass times the largest acceleration of the last tenth of a second, with which its
+// gears ring.
 //
 // A force that acts at the handle (hand_force.hpp) is a hand's or a load's, however straight: it never leads an empty
 // one.

@@ -7,10 +7,11 @@
 // load as it is read, which is the hand's wrench and the tool's weight (y, in S):
 //
 //   a flip      y(n) = R y(n−1), R being −1 or half a turn about an axis of S, to 2 % and the noise, in forces and
-//               torques alike, out of a force that was calm: a swing through zero may be its own opposite from one sample
-//               to the next. By at least 1 N where all six channels flip, the weight among them; by 10 N where a
+//               torques alike, out of a force that was calm: a swing through zero may be its own opposite from one
+//               sample to the next. By at least 1 N where all six channels flip, the weight among them; by 10 N where a
 //               hand's force alone might. Found with the first sample.
-//   a step      by more than max_force_step_N per millisecond, and within 5 ms it doesn't change by more than a fifth of
+//   a step      by more than max_force_step_N per millisecond, and within 5 ms it doesn't change by more than a fifth
+//   of
 //               itself. What a hand makes in a sample doesn't stay, and nor does a blow.
 //               A release may be as fast: a step after which there is little force, or what was there within the 50 ms
 //               before, is none.

@@ -14,7 +14,8 @@
 // - Acceleration: it is that of the commanded point, behind the filter of the setpoints (elastic_setpoint.hpp) with the
 //   state x, v: ‖ω²(q − x) − 2ωv‖ ≤ a, a ball around x + 2v/ω. A wall that is met more slowly than a·e/ω (e = 2.718…;
 //   0.34 m/s with the default cell) needs no more than a. Without a filter: ‖q − 2q₁ + q₂‖ ≤ aT².
-// - Borders at distance d, less a setback: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border decreases with the distance, slowly
+// - Borders at distance d, less a setback: n·(q − q₁) ≤ d T/(T + v/a). The speed towards a border decreases with the
+// distance, slowly
 //   enough that braking straight along the present velocity satisfies all borders at once: from u ≤ d/(T + v/a) and a
 //   deceleration of a follows (1 − aT/v)(T + v/a) ≤ v/a. The filter doesn't overshoot, so the commanded point keeps
 //   convex borders, too.
@@ -125,10 +126,10 @@ struct StepLimits {
   models::Vec3 q_k1_W = models::Vec3::Zero();  // the place that all sets are relative to
 };
 
-// The proxy stops so far before a border, in a box thinner than four times as much a quarter of it: motors lead the links
-// that they accelerate. While the tool slides along a border that puts setpoints up to 0.23 mm beyond it on six and
-// seven axes (0.4 m/s, 2 m/s²), and 0.55 on the rail; the guard of the setpoints has room for another 0.08. Nobody sees
-// where a border is to half a millimetre.
+// The proxy stops so far before a border, in a box thinner than four times as much a quarter of it: motors lead the
+// links that they accelerate. While the tool slides along a border that puts setpoints up to 0.23 mm beyond it on six
+// and seven axes (0.4 m/s, 2 m/s²), and 0.55 on the rail; the guard of the setpoints has room for another 0.08. Nobody
+// sees where a border is to half a millimetre.
 inline constexpr double longest_setback_m = 5e-4;
 inline double border_setback_m(double thickness_m) noexcept { return std::min(longest_setback_m, 0.25 * thickness_m); }
 

@@ -113,8 +113,8 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   parts_.inverse.set_posture(arm_step_.link_rad());
   parts_.elastic.start(arm_step_.link_rad());
   final_.start(target_rad);
-  if (pose() != nullptr) pose()->turn_to(orientation_of(X_WT), Vec3::Zero());
-  world().start(state_.q_k1_W);
+  if (state_.freeing) parts_.release->tool().count_from(parts_.tool->sets().home);
+  tool().start(state_.q_k1_W, orientation_of(X_WT));
   if (ahead_) {
     ahead_->point.start(state_.q_k1_W);
     ahead_->proxy_step.start(arm_step_.link_rad());
@@ -124,7 +124,6 @@ void AdmittanceMotion::start(const Measured& measured, Beginning beginning) noex
   if (passivity_) passivity_->start(measured.tool_W);
   if (parts_.links) parts_.links->start(measured.link_rad);
   hand_.start();
-  parts_.orientation.start(orientation_of(X_WT));
   if (beginning == Beginning::resuming) {
     state_.speed_limit_m_per_s = std::min(state_.speed_limit_m_per_s, supervision_.release_speed_m_per_s);
   }
@@ -134,8 +133,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   period_s_ = period_s;
   parts_.inverse.set_max_step(final_.max_steps_rad(period_s));
   parts_.elastic.set_period(period_s);
-  parts_.orientation.set_period(period_s);
-  parts_.world->set_period(period_s);
+  parts_.tool->set_period(period_s);
   parts_.release->set_period(period_s);
   if (passivity_) passivity_->set_period(period_s);
   if (parts_.links) parts_.links->set_period(period_s);
@@ -151,10 +149,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
 
 // With another mass, damping or spring the prediction yields another point, to which the arm moves slowly.
 void AdmittanceMotion::set(const Change& change) noexcept {
-  parts_.world->set(change);
-  if (change.parameter == Parameter::inertia) parts_.orientation.set_inertia(change.value, parts_.behind_sensor_T);
-  if (change.parameter == Parameter::turning_damping) parts_.orientation.set_damping(change.value);
-  if (change.parameter == Parameter::turning_spring) parts_.orientation.set_spring(change.value);
+  parts_.tool->set(change);
   if (!ahead_) return;
   switch (change.parameter) {
     case Parameter::lookahead:
@@ -174,12 +169,12 @@ void AdmittanceMotion::set(const Change& change) noexcept {
 }
 
 void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {
-  parts_.world->archive(state);
+  parts_.tool->archive(state);
   parts_.release->archive(state);
   if (passivity_) passivity_->archive(state);
   if (parts_.links) parts_.links->archive(state);
   if (ahead_) state(ahead_->point, ahead_->proxy_step, ahead_->proxy_filter);
-  state(parts_.elastic, parts_.orientation, hand_, arm_step_, final_, limits_work_, parts_.inverse.posture());
+  state(parts_.elastic, hand_, arm_step_, final_, limits_work_, parts_.inverse.posture());
   archive_fields(state, state_);
 }
 
@@ -191,7 +186,7 @@ ProxyMotion AdmittanceMotion::proxy_motion() const noexcept {
           .mass_kg = state_.mass_kg,
           .damping_Ns_per_m = state_.damping_Ns_per_m,
           .touches = state_.touches,
-          .braking_torque_W = parts_.orientation.braking_torque_W()};
+          .braking_torque_W = parts_.tool->braking_torque_W()};
 }
 
 bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
@@ -199,24 +194,15 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   limit_speed(cycle);
   if (passivity_) observe_hand(measured);
   const models::Wrench h_W = hand_.step(cycle, proxy_motion());
-  // A rigid tool turns in its world's step; a point turns beside it.
-  ProxyFault turned = ProxyFault::none;
-  if (parts_.pose != nullptr) {
-    parts_.pose->set_torque_W(h_W.torque);
-  } else {
-    turned = parts_.orientation.step(h_W.torque);
-  }
+  const ProxyFault turned = parts_.tool->turn(h_W.torque);
   make_limits(cycle);
   const Vec3 from_W = state_.q_k1_W;
-  const WorldStep step = parts_.world->step(h_W.force, step_limits_);
+  const WorldStep step = parts_.tool->step(h_W.force, step_limits_);
   if (step.fault == ProxyFault::none && turned != ProxyFault::none) {
     cycle.alarm.raise(Fault::proxy_not_finite);
     return false;
   }
   if (!take(step, cycle)) return false;
-  if (parts_.pose != nullptr) {
-    parts_.orientation.resume(parts_.pose->orientation(), parts_.pose->angular_velocity_W());
-  }
   state_.mass_kg = step.mass_kg;
   state_.damping_Ns_per_m = step.damping_Ns_per_m;
   state_.touches = step.contacts > 0;
@@ -224,10 +210,7 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   record_world(step, cycle.record);
   if (step.contacts > 0) state_.last_normal_W = step.normal_W;
   if (passivity_) record_passivity(step, cycle.record);
-  const bool turning_limited = parts_.pose != nullptr
-                                   ? parts_.pose->turning_limited()
-                                   : parts_.orientation.speed_limited() || parts_.orientation.angle_limited();
-  cycle.record.set(RecordFlag::limit_orientation, turning_limited);
+  cycle.record.set(RecordFlag::limit_orientation, parts_.tool->turning_limited());
   if (follow_proxy(cycle)) {
     judge_limits(step, from_W, cycle);
     send(measured);
@@ -254,9 +237,9 @@ bool AdmittanceMotion::take(const WorldStep& step, const MotionCycle& cycle) noe
 
 // How far the end of a handle is from where the proxy would have it, by what the arm lags in turning.
 double AdmittanceMotion::turned_away_m(const Measured& measured) const noexcept {
-  if (!parts_.orientation.config().free) return 0.0;
+  if (!parts_.tool->turns()) return 0.0;
   const Eigen::Quaterniond R_WT(models::Mat3(measured.R_WS * R_TS_.transpose()));
-  return torque_lever_m * R_WT.angularDistance(parts_.orientation.R_WT());
+  return torque_lever_m * R_WT.angularDistance(parts_.tool->R_WT());
 }
 
 // Makes the sets of this step: around the proxy, and with lookahead around the point that the arm is sent to, too.
@@ -291,12 +274,12 @@ ArmStepStart AdmittanceMotion::arm_start(const LinkFilter& filter, const JointVe
                      .twist_rad = twist_rad,
                      .tool_m_per_s = share * limits_.max_tool_speed_m_per_s,
                      .elbow_m_per_s = share * limits_.max_elbow_speed_m_per_s,
-                     .R_WT = R_WT(),
-                     .held = !parts_.orientation.config().free,
-                     .touches_turning = parts_.pose != nullptr,
-                     .turn = parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets()};
+                     .R_WT = tool().R_WT(),
+                     .held = !tool().turns(),
+                     .touches_turning = tool().turns_in_step(),
+                     .turn = tool().sets()};
   if (!start.held) return start;
-  start.turn = {R_WT(), held_lag_rad, {}, limits_.max_turning_speed_rad_per_s, period_s_};
+  start.turn = {start.R_WT, held_lag_rad, {}, limits_.max_turning_speed_rad_per_s, period_s_};
   return start;
 }
 
@@ -309,9 +292,7 @@ void AdmittanceMotion::limit_speed(const MotionCycle& cycle) noexcept {
   double& limit = state_.speed_limit_m_per_s;
   limit = std::clamp(wanted, limit - step, limit + step);
   if (state_.q_k1_W == state_.q_k2_W && final_.at_rest()) limit = std::min(limit, wanted);
-  const double share = std::min(1.0, limit / most);
-  parts_.orientation.limit_speed(share);
-  if (parts_.pose != nullptr) parts_.pose->limit_turning(share);
+  tool().limit_turning(std::min(1.0, limit / most));
   cycle.record.set(RecordFlag::slowed, !state_.freeing && limit < most);
 }
 
@@ -325,32 +306,29 @@ void AdmittanceMotion::count_work(const WorldStep& step) noexcept {
 
 // ρ² of what is felt, with the tool behind the sensor; 0 before the first step.
 double AdmittanceMotion::gyration_m2() const noexcept {
-  return state_.mass_kg > 0.0 ? parts_.orientation.config().inertia_kg_m2 / (state_.mass_kg + tool_mass_kg_) : 0.0;
+  return state_.mass_kg > 0.0 ? parts_.tool->inertia_kg_m2() / (state_.mass_kg + tool_mass_kg_) : 0.0;
 }
 
 void AdmittanceMotion::observe_hand(const Measured& measured) noexcept {
   if (!parts_.links) {
-    return parts_.world->add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
+    return parts_.tool->world().add_damping(passivity_->observe_hand(measured.hand_W.force, measured.tool_W));
   }
   const double rho2 = gyration_m2();
   const double added =
       passivity_->observe_hand(measured.hand_W, parts_.links->step(measured.link_rad, measured.hand_W), rho2);
-  parts_.world->add_damping(added);
-  if (pose() != nullptr) return pose()->add_turning_damping(rho2 * added);
-  parts_.orientation.add_damping(rho2 * added);
+  parts_.tool->world().add_damping(added);
+  parts_.tool->add_turning_damping(rho2 * added);
 }
 
 void AdmittanceMotion::observe_proxy(const WorldStep& step) noexcept {
   const Vec3 force_W = step.f_W + step.limit_force_W;
   if (!parts_.links) return passivity_->observe_proxy(step.v_W, force_W, step.mass_kg, step.damping_Ns_per_m);
-  const OrientationProxy& turns = parts_.orientation;
-  const bool rigid = parts_.pose != nullptr;
-  TurningPort port{
-      .kinetic_J = rigid ? parts_.pose->kinetic_J() : 0.5 * step.mass_kg * step.v_W.squaredNorm() + turns.kinetic_J(),
-      .damping_Ns_per_m = step.damping_Ns_per_m,
-      .turning_damping_Nms_per_rad = rigid ? parts_.pose->turning_damping_Nms_per_rad() : turns.damping_Nms_per_rad()};
-  port.velocity_W << step.v_W, turns.velocity_W();
-  port.world_W << force_W, rigid ? Vec3(step.torque_W + step.limit_torque_W) : turns.limit_torque_W();
+  const RenderedTool& turns = *parts_.tool;
+  TurningPort port{.kinetic_J = turns.kinetic_J(step),
+                   .damping_Ns_per_m = step.damping_Ns_per_m,
+                   .turning_damping_Nms_per_rad = turns.turning_damping_Nms_per_rad()};
+  port.velocity_W << step.v_W, turns.omega_W();
+  port.world_W << force_W, Vec3(step.torque_W + step.limit_torque_W);
   passivity_->observe_proxy(port);
 }
 
@@ -406,7 +384,7 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
   make_limits(cycle);
   const Vec3 v_W = (state_.q_k1_W - state_.q_k2_W) / period_s_;
   const Vec3 h_W = parts_.release->force_W(state_.q_k1_W, v_W, hand_W);
-  const WorldStep step = world().step(h_W, step_limits_);
+  const WorldStep step = tool().step(h_W, step_limits_);
   if (!take(step, cycle)) return false;
   cycle.record.p_hat_W_m = triple(step.p_hat_W);
   if (follow_proxy(cycle)) send(cycle.measured);
@@ -420,9 +398,9 @@ bool AdmittanceMotion::free(const MotionCycle& cycle) noexcept {
 // measures the inertia of the hand's own mass, which the term would feed back: the arm's elastic modes would then stay
 // calm only up to half as long a horizon (docs/design.md has the figures).
 bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
-  if (const OrientationConfig& turning = parts_.orientation.config(); turning.free) {
-    cycle.record.proxy_inertia_kg_m2 = turning.inertia_kg_m2;
-    cycle.record.proxy_turning_damping_Nms_per_rad = turning.damping_Nms_per_rad;
+  if (tool().turns()) {
+    cycle.record.proxy_inertia_kg_m2 = parts_.tool->inertia_kg_m2();
+    cycle.record.proxy_turning_damping_Nms_per_rad = parts_.tool->own_turning_damping_Nms_per_rad();
   }
   const Eigen::Quaterniond R_k1_WT = arm_step_.R_WT();
   if (ahead_) {
@@ -431,7 +409,7 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     put_proxy_where(ahead_->proxy_step);
     SentPoint& point = ahead_->point;
     point.advance_horizon();
-    point.step(state_.q_k1_W, world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), ahead_->limits);
+    point.step(state_.q_k1_W, tool().world().look_ahead(Vec3::Zero(), step_limits_, ahead_s()), ahead_->limits);
     active_.add(point.active());
     if (!go(arm_step_, point.c_k1_W(), cycle)) return false;
     point.correct(arm_step_.kinematics().X_WT.translation());
@@ -439,9 +417,9 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     if (!go(arm_step_, state_.q_k1_W, cycle)) return false;
     put_proxy_where(arm_step_);
   }
-  if (parts_.inverse.reaches_orientation() && arm_step_.R_WT().angularDistance(R_WT()) > same_turn_rad) {
+  if (parts_.inverse.reaches_orientation() && arm_step_.R_WT().angularDistance(tool().R_WT()) > same_turn_rad) {
     cycle.record.set(RecordFlag::limit_orientation, true);
-    if (parts_.orientation.config().free) turn_on_from(arm_step_, R_k1_WT);
+    if (tool().turns()) turn_on_from(arm_step_, R_k1_WT);
   }
   return true;
 }
@@ -450,13 +428,12 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
 void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, const MotionCycle& cycle) noexcept {
   if (step.settled) return;
   const double T = period_s_, kappa = step.mass_kg / (T * T) + step.damping_Ns_per_m / T;
-  const Vec3 way = state_.q_k1_W - from_W, omega_W = parts_.orientation.velocity_W();
+  const Vec3 way = state_.q_k1_W - from_W, omega_W = parts_.tool->omega_W();
   const Vec3 limits_W = step.limit_force_W + kappa * (state_.q_k1_W - step.q_W);
-  const Vec3 torque_W = parts_.pose != nullptr ? step.limit_torque_W : parts_.orientation.limit_torque_W();
   const models::Wrench& h_W = cycle.measured.hand_W;
   const double v = way.norm() / T, omega = omega_W.norm();
   limits_work_.step(
-      {.work_J = limits_W.dot(way) + T * torque_W.dot(omega_W),
+      {.work_J = limits_W.dot(way) + T * step.limit_torque_W.dot(omega_W),
        .power_W = (h_W.force.norm() + step.f_W.norm()) * v + (h_W.torque.norm() + step.torque_W.norm()) * omega,
        .kinetic_J = 0.5 * step.mass_kg * v * v});
   cycle.record.limits_work_J = limits_work_.total_J();
@@ -466,7 +443,7 @@ void AdmittanceMotion::judge_limits(const WorldStep& step, const Vec3& from_W, c
 
 // Takes a step of the arm to q_W, turned as the proxy is. False if that isn't a pose.
 bool AdmittanceMotion::go(ArmStep& step, const Vec3& q_W, const MotionCycle& cycle) noexcept {
-  if (step.go(q_W, R_WT()) == ArmStep::Outcome::invalid) {
+  if (step.go(q_W, tool().R_WT()) == ArmStep::Outcome::invalid) {
     cycle.alarm.raise(Fault::singular);
     return false;
   }
@@ -482,34 +459,31 @@ void AdmittanceMotion::put_proxy_where(const ArmStep& step) noexcept {
 
 // The proxy is at q_W instead of where it stepped to, with this velocity.
 void AdmittanceMotion::put_proxy_to(const Vec3& q_W, const Vec3& velocity_W) noexcept {
-  if (pose() != nullptr) pose()->turn_to(R_WT(), parts_.orientation.velocity_W());
-  state_.q_k1_W = world().resume(q_W, velocity_W);
+  state_.q_k1_W = tool().resume(q_W, velocity_W);
 }
 
 // How fast the tool turns on where the arm couldn't follow: as fast as the proxy did, or, where that was slow, up to a
 // quarter of the limit, since joints can't stop at once either.
 double AdmittanceMotion::most_turning_rad_per_s() const noexcept {
-  return std::max(parts_.orientation.velocity_W().norm(), 0.25 * limits_.max_turning_speed_rad_per_s);
+  return std::max(tool().omega_W().norm(), 0.25 * limits_.max_turning_speed_rad_per_s);
 }
 
 // The tool turns on from the orientation that the arm has reached.
 void AdmittanceMotion::turn_on_from(const ArmStep& step, const Eigen::Quaterniond& from) noexcept {
   const Vec3 turn = models::rotation_vector(step.R_WT() * from.conjugate());
   const Vec3 omega_W = no_faster(turn / period_s_, most_turning_rad_per_s());
-  parts_.orientation.resume(step.R_WT(), omega_W);
-  if (pose() == nullptr) return;
-  put_proxy_to(state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
+  state_.q_k1_W = tool().turn_on(step.R_WT(), omega_W, state_.q_k1_W, (state_.q_k1_W - state_.q_k2_W) / period_s_);
 }
 
 // The limits of turning that setpoints are judged by. While the tool is slowed they stay as they are.
 TurnSets AdmittanceMotion::turn_limits() const noexcept {
-  TurnSets sets = (parts_.pose != nullptr ? parts_.pose->sets() : parts_.orientation.sets()).sent();
+  TurnSets sets = tool().sets().sent();
   sets.max_speed_rad_per_s = std::max(sets.max_speed_rad_per_s, limits_.max_turning_speed_rad_per_s);
   return sets;
 }
 
 void AdmittanceMotion::send(const Measured& measured) noexcept {
-  const bool turns = parts_.orientation.config().free;
+  const bool turns = tool().turns();
   const TurnSets turn = turns ? turn_limits() : TurnSets{};
   const JointVector motor_rad = parts_.elastic.step(arm_step_.link_rad());
   const FinalSetpoints::Result result = final_.step(motor_rad, measured,
@@ -532,12 +506,9 @@ void AdmittanceMotion::go_on_from_setpoints(std::uint8_t blocked) noexcept {
   const models::ToolKinematics& at = arm_step_.kinematics();
   const Vec3 velocity_W = at.J_W.topRows<3>() * speed;
   const Vec3 omega_W = no_faster(at.J_W.bottomRows<3>() * speed, most_turning_rad_per_s());
-  parts_.orientation.resume(orientation_of(at.X_WT), omega_W);
-  if (pose() != nullptr) pose()->turn_to(orientation_of(at.X_WT), omega_W);
   const Vec3& c_W = at.X_WT.translation();
   const Vec3 q_W = ahead_ ? ahead_->point.resume(c_W, velocity_W, ahead_s()) : c_W;
-  state_.q_k1_W = world().resume(q_W, velocity_W);
-  if (pose() != nullptr) parts_.orientation.resume(pose()->orientation(), omega_W);
+  state_.q_k1_W = tool().resume(q_W, velocity_W, orientation_of(at.X_WT), omega_W);
   state_.q_k2_W = state_.q_k1_W - period_s_ * velocity_W;
   if (!ahead_) return;
   ahead_->proxy_step.resume(arm_step_.link_rad() - ahead_s() * speed, period_s_ * speed);

@@ -62,9 +62,7 @@ class AdmittanceMotion final : public Motion {
   [[nodiscard]] const models::Wrench* resting_wrench_W() const noexcept override { return hand_.resting_wrench_W(); }
   [[nodiscard]] bool wants_hold() const noexcept override { return hand_.wants_hold(); }
   [[nodiscard]] const models::Vec3& proxy_W() const noexcept override { return state_.q_k1_W; }
-  [[nodiscard]] Eigen::Quaterniond proxy_R_WT() const noexcept override {
-    return parts_.pose != nullptr ? parts_.pose->orientation() : parts_.orientation.R_WT();
-  }
+  [[nodiscard]] Eigen::Quaterniond proxy_R_WT() const noexcept override { return tool().R_WT(); }
   [[nodiscard]] const MotionWork* work() const noexcept override { return &work_; }
 
   void archive(fieldbus::StateArchive& state) noexcept override;
@@ -88,10 +86,8 @@ class AdmittanceMotion final : public Motion {
     StepLimits limits;  // around the point
   };
 
-  // Null while the tool is freed, which is without the scene.
-  [[nodiscard]] PoseWorld* pose() noexcept { return state_.freeing ? nullptr : parts_.pose; }
-  [[nodiscard]] RenderedWorld& world() noexcept { return state_.freeing ? parts_.release->world() : *parts_.world; }
-  [[nodiscard]] const Eigen::Quaterniond& R_WT() const noexcept { return parts_.orientation.R_WT(); }
+  // A tool that is freed is a point, without the scene.
+  [[nodiscard]] RenderedTool& tool() const noexcept { return state_.freeing ? parts_.release->tool() : *parts_.tool; }
   [[nodiscard]] ProxyMotion proxy_motion() const noexcept;
   void make_limits(const MotionCycle& cycle) noexcept;
   [[nodiscard]] ArmStepStart arm_start(const LinkFilter& filter, const models::JointVector& twist_rad) noexcept;

@@ -10,9 +10,8 @@
 
 #include "controller/motion/release.hpp"
 #include "controller/motion/wrench_compensation.hpp"
-#include "controller/proxies/orientation_proxy.hpp"
 #include "controller/rendering/pose_world.hpp"
-#include "controller/rendering/rendered_world.hpp"
+#include "controller/rendering/rendered_tool.hpp"
 #include "controller/rendering/torque_rendering.hpp"
 #include "controller/setpoints/elastic_setpoint.hpp"
 #include "controller/stability/link_motion.hpp"
@@ -48,10 +47,7 @@ struct DriveBus {
 struct AdmittanceParts {
   models::InverseKinematics inverse;
   ElasticSetpoint elastic;
-  std::unique_ptr<RenderedWorld> world;
-  PoseWorld* pose;  // the same world, where a rigid tool is rendered; null: a point
-  OrientationProxy orientation;
-  models::Mat3 behind_sensor_T;     // inertia of the tool behind the sensor, as in OrientationConfig
+  std::unique_ptr<RenderedTool> tool;
   std::optional<LinkMotion> links;  // of a tool that turns, for its passivity observer
   std::unique_ptr<Release> release;
 };

@@ -20,9 +20,9 @@ SessionSettings plain(SessionSettings settings) {
 
 }  // namespace
 
-Release::Release(const SessionSettings& settings, double speed_m_per_s)
+Release::Release(const SessionSettings& settings, const OrientationConfig& orientation, double speed_m_per_s)
     : scene_(scenes::compile(scenes::Scene{})),
-      world_(make_rendered_world(scene_, plain(settings), mass_kg)),
+      tool_(make_rendered_world(scene_, plain(settings), mass_kg), orientation),
       period_s_(settings.period_s),
       speed_m_per_s_(speed_m_per_s) {}
 

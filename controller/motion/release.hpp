@@ -12,7 +12,7 @@
 
 #include <memory>
 
-#include "controller/rendering/rendered_world.hpp"
+#include "controller/rendering/rendered_tool.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
@@ -33,13 +33,13 @@ class Release {
   static constexpr double relief_share =
       0.15;  // by this share of itself: 500 N by 75 N; on 10 N/mm they fall by 50 N only
 
-  Release(const SessionSettings& settings, double speed_m_per_s);
+  Release(const SessionSettings& settings, const OrientationConfig& orientation, double speed_m_per_s);
 
   void set_period(double period_s) noexcept {
     period_s_ = period_s;
-    world_->set_period(period_s);
+    tool_.set_period(period_s);
   }
-  [[nodiscard]] RenderedWorld& world() noexcept { return *world_; }
+  [[nodiscard]] PointTool& tool() noexcept { return tool_; }
   [[nodiscard]] double speed_m_per_s() const noexcept { return speed_m_per_s_; }
 
   void start_release() noexcept { distance_m_ = pressed_N_ = 0.0; }
@@ -58,7 +58,7 @@ class Release {
   [[nodiscard]] bool over(const models::Vec3& q_W, const models::Vec3& hand_W) const noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept {
-    world_->archive(state);
+    tool_.archive(state);
     state(start_W_, n_W_, distance_m_, against_N_, pressed_N_);
   }
 
@@ -66,7 +66,7 @@ class Release {
   [[nodiscard]] double left_m(const models::Vec3& q_W) const noexcept { return distance_m_ - n_W_.dot(q_W - start_W_); }
 
   scenes::CompiledScene scene_;  // empty
-  std::unique_ptr<RenderedWorld> world_;
+  PointTool tool_;
   double period_s_, speed_m_per_s_;
   models::Vec3 start_W_ = models::Vec3::Zero(), n_W_ = models::Vec3::UnitX();
   double distance_m_ = 0.0;  // how far to back off; 0: release

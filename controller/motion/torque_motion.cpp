@@ -41,12 +41,11 @@ TorqueMotion::TorqueMotion(std::unique_ptr<TorqueRendering> rendering, const mod
   }
   state_.torque_Nm = state_.missing_Nm = JointVector::Zero(arm.axes());
   if (supervision.let_go == description::LetGo::coast) return;
-  empty_.emplace(
-      EmptyHandleConfig{.band_N = supervision.empty_handle_N,
-                        .tool_mass_kg = tool_mass_kg + left_kg,
-                        .way_share = way_share,
-                        .at_once = false},
-      period_s);
+  empty_.emplace(EmptyHandleConfig{.band_N = supervision.empty_handle_N,
+                                   .tool_mass_kg = tool_mass_kg + left_kg,
+                                   .way_share = way_share,
+                                   .at_once = false},
+                 period_s);
 }
 
 // Anchors the device where it stands until its first drive is enabled and its brake opens.

@@ -99,13 +99,6 @@ void OrientationProxy::set_spring(double spring_Nm_per_rad) noexcept {
   R_ref_ = (rotation(-before / spring_Nm_per_rad * phi) * R_WT_).normalized();
 }
 
-// With the default damping, J/D is TurnSets::braking_s already, and nothing is added.
-Vec3 OrientationProxy::braking_torque_W() const noexcept {
-  const double wanted = config_.inertia_kg_m2 / TurnSets::braking_s;
-  if (!(wanted > damping_Nms_per_rad())) return Vec3::Zero();
-  return -(wanted - damping_Nms_per_rad()) * omega_W_;
-}
-
 void OrientationProxy::return_reference() noexcept {
   const Vec3 way = rotation_vector(R_start_ * R_ref_.conjugate());
   const double left = way.norm(), step = TurnSets::returning_rad_per_s * config_.period_s;

@@ -55,6 +55,11 @@ class OrientationProxy {
   // Starts at rest at R. If R isn't a unit quaternion to within 1e-6, returns false and changes nothing. The first
   // start is where the range of angles and the spring are counted from; a later one is after a hold.
   bool start(const Eigen::Quaterniond& R_WT) noexcept;
+  // The range of angles is counted from here, whatever the first start was.
+  void count_from(const Eigen::Quaterniond& R_WT) noexcept {
+    R_start_ = R_WT;
+    started_ = true;
+  }
   // The arm couldn't follow: the motion goes on from here with this angular velocity.
   bool resume(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W) noexcept;
   // Take effect with the next step, without a jump. A value out of range changes nothing.
@@ -63,9 +68,6 @@ class OrientationProxy {
   void set_spring(double spring_Nm_per_rad) noexcept;
   // Damping beside D from the next step on (passivity.hpp).
   void add_damping(double damping_Nms_per_rad) noexcept;
-  // The torque of a damping that brings the tool to rest within TurnSets::braking_s, for the next step: beyond its own
-  // D. Precondition: nobody holds the handle.
-  [[nodiscard]] models::Vec3 braking_torque_W() const noexcept;
   // A share of the speed limit, from 0 to 1, while the tool is slowed.
   void limit_speed(double share) noexcept { speed_share_ = share; }
   // One period under the torque τ(k). After a fault nothing has changed.

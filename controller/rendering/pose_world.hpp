@@ -47,9 +47,8 @@ class PoseWorld final : public RenderedWorld {
   void limit_turning(double share) noexcept { speed_share_ = share; }
   // As add_damping(), of turning.
   void add_turning_damping(double damping_Nms_per_rad) noexcept;
-  [[nodiscard]] double turning_damping_Nms_per_rad() const noexcept {
-    return proxy_.config().turning_damping_Nms_per_rad;
-  }
+  [[nodiscard]] const PoseConfig& config() const noexcept { return proxy_.config(); }  // with what was added
+  [[nodiscard]] double own_turning_damping_Nms_per_rad() const noexcept { return turning_damping_Nms_per_rad_; }
   [[nodiscard]] double kinetic_J() const noexcept { return proxy_.kinetic_J(); }
   [[nodiscard]] const Eigen::Quaterniond& orientation() const noexcept { return proxy_.q().orientation; }
   [[nodiscard]] models::Vec3 angular_velocity_W() const noexcept {

@@ -228,6 +228,13 @@ std::unique_ptr<PoseWorld> make_pose_world(const description::Cell& cell, scenes
   return std::make_unique<PoseWorld>(std::move(g), scene, pose_config(cell, settings));
 }
 
+std::unique_ptr<RenderedTool> make_tool(const description::Cell& cell, scenes::CompiledScene& scene,
+                                        const SessionSettings& settings) {
+  if (scene.source->tool) return std::make_unique<RigidTool>(make_pose_world(cell, scene, settings));
+  return std::make_unique<PointTool>(make_rendered_world(scene, settings, proxy_mass(cell, settings)),
+                                     orientation_config(cell, settings), models::tool_inertia(cell.tool).about_T_kg_m2);
+}
+
 // What the passivity observer of a tool that turns looks at.
 std::optional<LinkMotion> make_links(const description::Cell& cell, const models::Arm& arm,
                                      const SessionSettings& settings) {
@@ -253,23 +260,12 @@ decltype(CycleParts::rendering) build_rendering(const description::Cell& cell, s
     return make_torque_rendering(scene, arm, cell.drives, cell.limits, impedance_config(settings));
   }
   const models::InverseKinematicsConfig steps{.max_step_rad = max_steps_rad(cell.drives, settings.period_s)};
-  std::unique_ptr<RenderedWorld> world;
-  PoseWorld* pose = nullptr;
-  if (scene.source->tool) {
-    std::unique_ptr<PoseWorld> rigid = make_pose_world(cell, scene, settings);
-    pose = rigid.get();
-    world = std::move(rigid);
-  } else {
-    world = make_rendered_world(scene, settings, proxy_mass(cell, settings));
-  }
   return AdmittanceParts{.inverse = models::InverseKinematics(arm, steps),
                          .elastic = ElasticSetpoint(arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s),
-                         .world = std::move(world),
-                         .pose = pose,
-                         .orientation = OrientationProxy(orientation_config(cell, settings)),
-                         .behind_sensor_T = models::tool_inertia(cell.tool).about_T_kg_m2,
+                         .tool = make_tool(cell, scene, settings),
                          .links = make_links(cell, arm, settings),
-                         .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
+                         .release = std::make_unique<Release>(settings, orientation_config(cell, settings),
+                                                              cell.supervision.release_speed_m_per_s)};
 }
 
 std::optional<EnablingInput> make_enabling_input(const description::Cell& cell, const SessionSettings& settings,
