@@ -9,6 +9,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
+#include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/session/bring_up.hpp"
 #include "controller/session/identifiers.hpp"
 #include "controller/session/reachable_scene.hpp"
@@ -549,6 +550,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.order = session.settings.order;
   session.loop.arms = arms_at(session, controller::led_poses(models::Arm(session.cell), {}));
   session.settings.force_age_s = session.cell.sensor.delay_s;
+  session.settings.report_rate_Hz = slowest_report_Hz(session.cell);
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
   require_renderable_tool(session);
   choose_horizon(session);
