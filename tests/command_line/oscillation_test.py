@@ -168,7 +168,7 @@ class Oscillation(ProgramTest):
         self.assertLess(seconds, 1.0 + 2.0 + 1.0)
         track = Track(self.folder / "record")
         late = [place[0] for place in track.place[track.at(5.0):]]
-        self.assertLess(max(late) - min(late), 0.2e-3)
+        self.assertLess((max(late) - min(late)) / 2, LEAST_M)  # what creeps against the damping included; 1 mm before
 
     def test_a_swing_that_dies_away_along_a_slow_rail_is_none(self):
         """The story: the rail reports 200 times a second, and its steps were taken for an oscillation: a hand that
