@@ -122,8 +122,9 @@ void add_session_options(CLI::App& app, RunOptions& options) {
       ->type_name("KG");
   app.add_option("--damping",
                  quantity([](const std::string& w) { return description::parse_damping(w, "--damping"); },
-                          [&](double value) { options.settings.damping_Ns_per_m = value; }),
-                 "damping against the world, in Ns/m (default 0); impedance: of the virtual coupling (default 8)")
+                          [&](double value) { options.damping_Ns_per_m = value; }),
+                 "damping against the world, in Ns/m (default: the cell's, else 0); impedance: of the virtual coupling "
+                 "(default 8)")
       ->type_name("NS/M");
   app.add_option("--spring",
                  quantity([](const std::string& w) { return description::parse_stiffness(w, "--spring"); },

@@ -38,13 +38,10 @@ std::string mass_text(const std::optional<double>& mass) {
   return text.data();
 }
 
-// The least damping with which some mass is stable with the margins: what there is, or of a few.
-std::optional<double> damping_needed(const HandModel& hand, LoopModel loop) {
-  for (const double damping : {0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0}) {
-    loop.damping_Ns_per_m = std::max(damping, loop.damping_Ns_per_m);
-    if (smallest_with_margins(hand, loop)) return loop.damping_Ns_per_m;
-  }
-  return std::nullopt;
+// The least damping with which some mass is stable with the margins.
+std::optional<controller::DampedMass> damping_needed(const HandModel& hand, const LoopModel& loop) {
+  return controller::least_damping(loop, HUGE_VAL,
+                                   [&](const LoopModel& damped) { return smallest_with_margins(hand, damped); });
 }
 
 // What would be, were one thing ideal.
@@ -232,33 +229,45 @@ void print_inertia(const Tuned& of) {
   print_turning_damping(session, of.stages);
 }
 
-void print_damping(const Tuned& of) {
-  const LoopModel& loop = of.loop;
-  of.stages.begin("damping with margins");
-  const auto damping = damping_needed(of.hand, loop);
+void print_tried_damping(const Tuned& of, const controller::DampedMass& damped) {
+  PreparedSession session = of.session;
+  session.settings.damping_Ns_per_m = damped.damping_Ns_per_m;
+  of.stages.begin(trying(mass_text(damped.mass_kg)));
+  const TriedAdvice tried = tried_mass(session, rounded_up(damped.mass_kg));
   of.stages.done();
-  if (!damping) {
+  std::printf("  tried: %s\n", tried.text.c_str());
+}
+
+// Where no mass has its margins without damping.
+void print_needed_damping(const Tuned& of) {
+  of.stages.begin("damping with margins");
+  const auto needed = damping_needed(of.hand, of.loop);
+  of.stages.done();
+  if (!needed) {
     std::printf("damping: not even %.3g Ns/m gives it these margins: shorten the delay\n",
-                std::max(500.0, loop.damping_Ns_per_m));
-  } else if (*damping > loop.damping_Ns_per_m) {
-    LoopModel damped = loop;
-    damped.damping_Ns_per_m = *damping;
-    const auto least = smallest_with_margins(of.hand, damped);
-    std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", *damping,
-                mass_text(least).c_str());
-    PreparedSession with_damping = of.session;
-    with_damping.settings.damping_Ns_per_m = *damping;
-    if (!least) return;
-    of.stages.begin(trying(mass_text(least)));
-    const TriedAdvice tried = tried_mass(with_damping, rounded_up(*least));
-    of.stages.done();
-    std::printf("  tried: %s\n", tried.text.c_str());
-  } else {
-    std::printf(
-        "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
-        "R: %.2g Ns/m at 20 N and 0.1 m\n",
-        loop.period_s * 20.0 / 0.1);
+                std::max(controller::tried_dampings.back(), of.loop.damping_Ns_per_m));
+    return;
   }
+  std::printf("damping: --damping %.3g Ns/m gives it these margins, from %s on\n", needed->damping_Ns_per_m,
+              mass_text(needed->mass_kg).c_str());
+  print_tried_damping(of, *needed);
+}
+
+void print_damping(const Tuned& of) {
+  of.stages.begin("damping with margins");
+  const auto without = smallest_with_margins(of.hand, of.loop);
+  if (!without) return print_needed_damping(of);
+  const auto worthwhile = worthwhile_damping(of.hand, of.loop);
+  of.stages.done();
+  if (worthwhile) {
+    std::printf("damping: %s with --damping %.3g Ns/m, or %s without\n", mass_text(worthwhile->mass_kg).c_str(),
+                worthwhile->damping_Ns_per_m, mass_text(without).c_str());
+    return print_tried_damping(of, *worthwhile);
+  }
+  std::printf(
+      "damping: none needed for stability; on curved surfaces T f/R cancels what (26) gains outside a curvature "
+      "R: %.2g Ns/m at 20 N and 0.1 m\n",
+      of.loop.period_s * 20.0 / 0.1);
 }
 
 // Returns what limits the smallest mass most, in words.

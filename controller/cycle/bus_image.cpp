@@ -84,7 +84,7 @@ bool BusImage::is_masters_own(std::size_t bus, const fieldbus::CanFrame& frame) 
 }
 
 bool BusImage::everything_received() const noexcept {
-  return parts_.sensor->fresh() &&
+  return parts_.sensor->answered() &&
          std::all_of(parts_.drives.begin(), parts_.drives.end(), [](const DriveOnBus& a) { return a.drive.fresh(); });
 }
 

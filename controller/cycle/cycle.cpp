@@ -150,6 +150,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record.period_ns = period_ns();
   record.phase = state_.entered_phase;
   record.set(RecordFlag::sample_held, !measured.sample_is_new);
+  record.set(RecordFlag::sample_late, measured.sample_is_new && parts_.sensor->latest().late);
   record.set(RecordFlag::overrun, overruns_in_a_row_ > 0 || was_waited_for_);
   record.set(RecordFlag::timestep, timestep_.under_way());
   record.set(RecordFlag::power_cut, supervisor_.cuts_power());

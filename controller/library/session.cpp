@@ -29,7 +29,9 @@ RunOptions run_options(const SessionOptions& given) {
     options.period_s = description::parse_duration(number_text(*given.timestep_s) + "s", "--timestep");
   }
   options.duration_s = description::parse_duration(number_text(given.duration_s) + "s", "--duration");
-  options.settings.damping_Ns_per_m = description::parse_damping(number_text(given.damping_Ns_per_m), "--damping");
+  if (given.damping_Ns_per_m != 0.0) {
+    options.damping_Ns_per_m = description::parse_damping(number_text(given.damping_Ns_per_m), "--damping");
+  }
   options.settings.spring_N_per_m = description::parse_stiffness(number_text(given.spring_N_per_m), "--spring");
   if (given.order != 1 && given.order != 2) {
     throw SetupError({.key = "--order", .found = std::to_string(given.order), .expected = "1 or 2"});

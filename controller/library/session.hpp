@@ -42,7 +42,7 @@ struct SessionOptions {
   std::optional<double> mass_kg{};     // that the hand feels; unset: the cell's
   std::optional<double> timestep_s{};  // unset: the cell's
   double duration_s = 10.0;            // of rendering
-  double damping_Ns_per_m = 0.0;       // against the world
+  double damping_Ns_per_m = 0.0;       // against the world; 0: the cell's
   double spring_N_per_m = 0.0;         // to the start position
   int order = 1;                       // 1: (26); 2: its second-order sibling
   std::string lookahead = "off";       // "auto", "off" or a time, such as "8ms"

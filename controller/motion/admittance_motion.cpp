@@ -96,8 +96,9 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
     ahead_->proxy_filter.start(arm.start_rad());
   }
   if (settings.passivity != Passivity::off) {
-    passivity_.emplace(PassivityConfig{.force_age_s = settings.force_age_s}, settings.period_s,
-                       damping_by(settings.passivity));
+    passivity_.emplace(
+        PassivityConfig{.band = {.report_rate_Hz = settings.report_rate_Hz}, .force_age_s = settings.force_age_s},
+        settings.period_s, damping_by(settings.passivity));
   }
 }
 

@@ -18,6 +18,8 @@ const char* flag_name(RecordFlag flag) noexcept {
   switch (flag) {
     case RecordFlag::sample_held:
       return "sample_held";
+    case RecordFlag::sample_late:
+      return "sample_late";
     case RecordFlag::feedback_missing:
       return "feedback_missing";
     case RecordFlag::limit_speed:

@@ -32,6 +32,7 @@ const std::vector<FlagWords>& flag_words() {
       {RecordFlag::oscillation_lasts, "the arm has been oscillating for half a second", false},
       {RecordFlag::timestep, "the timestep is being changed", false},
       {RecordFlag::sample_held, "a sample of the force sensor is missing", false},
+      {RecordFlag::sample_late, "a sample of the force sensor came a cycle late", false},
       {RecordFlag::feedback_missing, "a drive's feedback is missing", false},
       {RecordFlag::overrun, "the cycle was late", false}};
   return all;

@@ -41,7 +41,9 @@ struct SessionSettings {
   double horizon_s = 0.0;         // H, the lookahead's horizon
   OrientationMode orientation = OrientationMode::held;
   Passivity passivity = Passivity::off;
-  double force_age_s = 0.0;  // the age of the sensor's readings on arrival, for the passivity observer
+  // For the passivity observer: the age of the sensor's readings on arrival, and how often the joint that reports its
+  // position most seldom does; 0: in each cycle.
+  double force_age_s = 0.0, report_rate_Hz = 0.0;
   // What the hand feels of the tool's rotation, tool behind the sensor included; 0: `default_inertia_kg_m2` more.
   double rotational_inertia_kg_m2 = 0.0;
   double rotational_damping_Nms_per_rad = 0.5;

@@ -29,6 +29,7 @@ void append_seconds(std::string& text, std::int64_t ns, std::size_t least_decima
 
 // `overrun` is left out because it is of the wall clock, `truth` because the columns say it.
 constexpr std::array written_flags{RecordFlag::sample_held,
+                                   RecordFlag::sample_late,
                                    RecordFlag::feedback_missing,
                                    RecordFlag::limit_speed,
                                    RecordFlag::limit_acceleration,

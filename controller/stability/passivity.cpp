@@ -9,44 +9,8 @@ namespace proxarm::controller {
 using models::Twist;
 using models::Vec3;
 
-namespace {
-
-// Relative to the largest ⟨x̃²⟩: the least for an oscillation that lasts, and the bound below which it is over.
-// Between the first two, the oscillation decays, and must go on for some periods.
-constexpr double steady_share = 0.8, kept_share = 0.5, died_away = 1.0 / 16.0;
-
-}  // namespace
-
-// Bilinear transform, prewarped so that the corner frequency is kept: Ω = tan(π f T), and per section, of quality Q,
-//   H(z) = (1 − z⁻¹)²/(1 + Ω/Q + Ω²) / (1 + a₁z⁻¹ + a₂z⁻²)
-void PassivityObserver::HighPass::design(double corner_Hz, double period_s) noexcept {
-  const double pi = std::numbers::pi, omega = std::tan(pi * corner_Hz * period_s);
-  const std::array angles{pi / 8.0, 3.0 * pi / 8.0};  // of Butterworth's poles
-  for (std::size_t i = 0; i < sections.size(); ++i) {
-    const double damping = 2.0 * std::cos(angles[i]) * omega;  // Ω/Q
-    const double scale = 1.0 / (1.0 + damping + omega * omega);
-    sections[i].gain = scale;
-    sections[i].a1 = 2.0 * (omega * omega - 1.0) * scale;
-    sections[i].a2 = (1.0 - damping + omega * omega) * scale;
-  }
-}
-
-void PassivityObserver::HighPass::reset() noexcept {
-  for (Section& section : sections) {
-    section.s1.setZero();
-    section.s2.setZero();
-  }
-}
-
-Vec3 PassivityObserver::Section::step(const Vec3& in) noexcept {
-  const Vec3 scaled = gain * in, out = scaled + s1;
-  s1 = s2 - 2.0 * scaled - a1 * out;
-  s2 = scaled - a2 * out;
-  return out;
-}
-
 PassivityObserver::PassivityObserver(const PassivityConfig& config, double period_s, Damping damping)
-    : config_(config), damping_(damping) {
+    : config_(config), damping_(damping), spell_(config.spell) {
   delay_.reset(Vec3::Zero());
   set_period(period_s);
 }
@@ -55,11 +19,9 @@ void PassivityObserver::set_period(double period_s) noexcept {
   period_s_ = period_s;
   average_ = 1.0 - std::exp(-period_s / config_.average_s);
   delay_.design(config_.force_age_s, period_s);
-  for (HighPass* filter : {&force_, &torque_}) filter->design(config_.low_Hz, period_s);
+  for (Band* band : {&force_, &torque_}) band->design(config_.band, period_s);
   for (View* view : {&seen_, &motors_}) {
-    for (HighPass* filter : {&view->motion, &view->place, &view->turning, &view->angle}) {
-      filter->design(config_.low_Hz, period_s);
-    }
+    for (Band* band : {&view->motion, &view->place, &view->turning, &view->angle}) band->design(config_.band, period_s);
   }
 }
 
@@ -68,7 +30,7 @@ void PassivityObserver::start(const Vec3& tool_W) noexcept {
   force_.reset();
   torque_.reset();
   for (View* view : {&seen_, &motors_}) {
-    for (HighPass* filter : {&view->motion, &view->place, &view->turning, &view->angle}) filter->reset();
+    for (Band* band : {&view->motion, &view->place, &view->turning, &view->angle}) band->reset();
     view->moved_W.setZero();
     view->power = view->band = view->all = view->square = 0.0;
     view->tank = config_.tank_J;
@@ -78,7 +40,7 @@ void PassivityObserver::start(const Vec3& tool_W) noexcept {
   h_k1_.setZero();
   torque_W_.setZero();
   force_square_ = added_ = remembered_s_ = 0.0;
-  spell_ = {};
+  spell_.start();
   release_s_ = config_.release_s;
   oscillates_ = false;
   energies_ = {};
@@ -88,10 +50,10 @@ double PassivityObserver::observe_hand(const Vec3& h_W, const Vec3& tool_W) noex
   if (!h_W.allFinite() || !tool_W.allFinite()) return added_;  // a fault follows; the observer's state stays finite
   h_k1_ = h_;
   h_ = h_W;
-  const Vec3 step = delay_.step(tool_W - tool_k1_), velocity = step / period_s_;
+  const Vec3 step = delay_.step(tool_W - tool_k1_), velocity = seen_.motion.smooth(step / period_s_);
   tool_k1_ = tool_W;
   energies_.hand += 0.5 * (h_ + h_k1_).dot(step);
-  const Vec3 force = force_.step(h_), motion = seen_.motion.step(velocity);
+  const Vec3 force = force_.step(h_), motion = seen_.motion.above(velocity);
   take(seen_, {.power = force.dot(motion),
                .band = motion.squaredNorm(),
                .all = velocity.squaredNorm(),
@@ -119,8 +81,9 @@ double PassivityObserver::observe_hand(const models::Wrench& h_W, const ToolMove
 PassivityObserver::Moment PassivityObserver::look(View& view, const Twist& move_W, const Vec3& force,
                                                   const Vec3& torque) const noexcept {
   view.moved_W += move_W;
-  const Vec3 velocity = move_W.head<3>() / period_s_, omega = move_W.tail<3>() / period_s_;
-  const Vec3 motion = view.motion.step(velocity), turning = view.turning.step(omega);
+  const Vec3 velocity = view.motion.smooth(move_W.head<3>() / period_s_);
+  const Vec3 omega = view.turning.smooth(move_W.tail<3>() / period_s_);
+  const Vec3 motion = view.motion.above(velocity), turning = view.turning.above(omega);
   const Vec3 place = view.place.step(view.moved_W.head<3>()), angle = view.angle.step(view.moved_W.tail<3>());
   const double rho2 = gyration_m2_;
   return {.power = force.dot(motion) + torque.dot(turning),
@@ -157,28 +120,12 @@ bool PassivityObserver::shakes() const noexcept {
 
 void PassivityObserver::follow_spell() noexcept {
   remembered_s_ = std::max(0.0, remembered_s_ - period_s_);
-  if (oscillates_ && remembered_s_ > 0.0) remembered_s_ = config_.remembered_s;
-  spell_.pause_s = oscillates_ && !spell_.over ? 0.0 : spell_.pause_s + period_s_;
-  if (spell_.over) {
-    if (spell_.pause_s < config_.pause_s) return;
-    spell_ = {.most = seen_.square, .over = seen_.square < kept_share * spell_.most};
-    return;
-  }
-  if (spell_.pause_s > config_.pause_s) spell_ = {};
-  if (!oscillates_ && !(spell_.lasted_s > 0.0)) return;
-  spell_.lasted_s += period_s_;
-  spell_.most = std::max(spell_.most, seen_.square);
-  if (seen_.square < died_away * spell_.most) spell_ = {.most = seen_.square, .over = true};
-  if (lasts()) remembered_s_ = config_.remembered_s;
-}
-
-bool PassivityObserver::lasts() const noexcept {
-  if (!oscillates_ || spell_.lasted_s < config_.lasting_s || seen_.square < kept_share * spell_.most) return false;
-  if (gyration_m2_ > 0.0 || seen_.square < steady_share * spell_.most) {
-    const double periods = spell_.lasted_s / (2.0 * std::numbers::pi) * std::sqrt(seen_.band / seen_.square);
-    if (!(periods >= config_.lasting_periods)) return false;
-  }
-  return 2.0 * seen_.square >= config_.felt_m * config_.felt_m || spell_.lasted_s >= config_.small_lasting_s;
+  spell_.step({.oscillates = oscillates_,
+               .square_m2 = seen_.square,
+               .speed_square_m2_per_s2 = seen_.band,
+               .turns = gyration_m2_ > 0.0},
+              period_s_);
+  if (spell_.lasts() || (oscillates_ && remembered_s_ > 0.0)) remembered_s_ = config_.remembered_s;
 }
 
 // `begins`: another oscillation begins.

@@ -21,8 +21,9 @@
 // hand that is shaken for one that shakes. So the motion is delayed by τ, too (delay.hpp). Below, x is the delayed
 // motion.
 //
-// Oscillation is judged at the hand's port, above the band in which hands move deliberately (low_Hz). A Butterworth
-// high-pass of order 4 filters force and motion alike, which keeps the phase between them. Averages are over average_s:
+// Oscillation is judged at the hand's port, above the band in which hands move deliberately (low_Hz). One filter takes
+// this band of force and motion alike, which keeps the phase between them (band.hpp). Averages are over average_s, and
+// ẋ is what the filter has below its upper limit:
 //   P̂ = ⟨h̃·ẋ̃⟩,   b̂ = P̂/⟨ẋ̃²⟩        power that the hand gives, and the damping that it finds, there
 //   E(k) = min(E(k−1) + T(P̂ + refill_W), tank_J)       the balance; E(0) = tank_J, never below −tank_J
 // The device oscillates while the balance E is negative, P̂ < −refill_W, and the band holds more than a share of ⟨ẋ²⟩.
@@ -54,15 +55,9 @@
 // the largest −b̂.
 //
 // A blow on a wall, a hand that shakes for a moment, and ringing gears look the same at first, but end by themselves.
-// An oscillation lasts if it has gone on for lasting_s, pauses up to pause_s included (a wall interrupts it in every
-// period), and hasn't decayed meanwhile. Its amplitude A is given by A² = 2⟨x̃²⟩, x̃ being the motion behind the same
-// high-pass. ⟨x̃²⟩ must be at least half of its largest value. If it falls to a sixteenth, the oscillation is over;
-// what is left counts as a new one once it no longer halves within pause_s. Below the amplitude felt_m, an oscillation
-// must go on for small_lasting_s. If an oscillation lasts, the loop isn't stable with this grip. Damping::what_lasts
-// begins then, and acts at once for remembered_s after each oscillation. A tool that turns, and a swing below four
-// fifths of its largest ⟨x̃²⟩, must also have swung lasting_periods. After a jerk a hand of 20 Nm/rad on 0.05 kg m²
-// swings at 3 to 4.5 Hz, and so do 4 kg on a layer of 2.5 kN/m: within this band. 0.5 s are two of these periods, and
-// the swing dies away in the next three.
+// Whether an oscillation lasts is judged by its amplitude A over time, A² = 2⟨x̃²⟩, x̃ being the motion in the same band
+// (spell.hpp). If it lasts, the loop isn't stable with this grip. Damping::what_lasts begins then, and acts at once for
+// remembered_s after each oscillation.
 //
 // Vectors in W. Neither allocates, locks nor throws. A session without passivity doesn't have this object.
 #pragma once
@@ -70,8 +65,10 @@
 #include <array>
 #include <cstdint>
 
+#include "controller/stability/band.hpp"
 #include "controller/stability/delay.hpp"
 #include "controller/stability/port_energies.hpp"
+#include "controller/stability/spell.hpp"
 #include "controller/stability/tool_move.hpp"
 #include "models/base/state_archive.hpp"
 #include "models/geometry/geometry.hpp"
@@ -82,7 +79,7 @@ namespace proxarm::controller {
 struct PassivityConfig {
   // Deliberate, forceful motion of hands ends at about 2 Hz, the band of the apparent mass. A stiff grip (3000 N/m) on
   // 1 to 10 kg becomes unstable at 8 to 2.6 Hz.
-  double low_Hz = 3.0;
+  BandLimits band{.low_Hz = 3.0};
   double average_s = 0.1;
   double share = 0.2;        // of the energy of all motion; a deliberate motion at 2 Hz has 0.04
   double tank_J = 1e-3;      // for a grip of 3000 N/m: an amplitude of 0.8 mm
@@ -98,10 +95,7 @@ struct PassivityConfig {
   // g: palm and fingertips are so far apart, and so are the ends of a handle. 20 N there make 2 Nm. Shaking a hand of
   // 0.003 kg m² by 0.15 rad at 7 Hz takes 0.9 Nm.
   double grip_m = 0.1;
-  // A blow oscillates for 0.1 to 0.3 s. Gears ring for up to 1.4 s after it, with a decreasing amplitude.
-  double lasting_s = 0.5, small_lasting_s = 3.0, felt_m = 0.5e-3;
-  double lasting_periods = 4.0;
-  double pause_s = 0.25;
+  SpellConfig spell{};
   double remembered_s = 60.0;
   double force_age_s = 0.0;  // τ, the age of a reading when it is used; below half a period it counts as 0
 };
@@ -139,7 +133,7 @@ class PassivityObserver {
 
   [[nodiscard]] double added_damping_Ns_per_m() const noexcept { return added_; }
   [[nodiscard]] bool oscillates() const noexcept { return oscillates_; }
-  [[nodiscard]] bool lasts() const noexcept;
+  [[nodiscard]] bool lasts() const noexcept { return spell_.lasts(); }
   // ⟨ẋ̃²⟩^½ in m/s, and b̂ in Ns/m, which is 0 if nothing moves.
   [[nodiscard]] double oscillation_m_per_s() const noexcept;
   [[nodiscard]] double felt_damping_Ns_per_m() const noexcept;
@@ -148,38 +142,21 @@ class PassivityObserver {
   [[nodiscard]] const models::Twist& moved_W() const noexcept { return seen_.moved_W; }
 
   void archive(fieldbus::StateArchive& state) noexcept {
-    for (HighPass* filter : {&force_, &torque_}) archive(state, *filter);
+    for (Band* band : {&force_, &torque_}) band->archive(state);
     for (View* view : {&seen_, &motors_}) {
-      for (HighPass* filter : {&view->motion, &view->place, &view->turning, &view->angle}) archive(state, *filter);
+      for (Band* band : {&view->motion, &view->place, &view->turning, &view->angle}) band->archive(state);
       state(view->moved_W, view->power, view->band, view->all, view->square, view->tank);
     }
-    state(delay_.s1, delay_.s2, release_s_, start_W_, force_square_, spell_.lasted_s, spell_.pause_s, spell_.most,
-          spell_.over, remembered_s_, torque_W_, gyration_m2_);
+    spell_.archive(state);
+    state(delay_.s1, delay_.s2, release_s_, start_W_, force_square_, remembered_s_, torque_W_, gyration_m2_);
     state(h_k1_, h_, tool_k1_, added_, oscillates_, energies_.hand, energies_.proxy, energies_.world, energies_.kinetic,
           energies_.damping, energies_.added);
   }
 
  private:
-  struct Section {  // second order, transposed direct form II
-    double gain = 1.0, a1 = 0.0, a2 = 0.0;
-    models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();
-    models::Vec3 step(const models::Vec3& in) noexcept;
-  };
-  struct HighPass {
-    std::array<Section, 2> sections;
-    void design(double corner_Hz, double period_s) noexcept;
-    models::Vec3 step(const models::Vec3& in) noexcept { return sections[1].step(sections[0].step(in)); }
-    void reset() noexcept;
-  };
-  struct Spell {  // an oscillation, pauses included
-    double lasted_s = 0.0;
-    double pause_s = 0.0;  // since the last oscillation
-    double most = 0.0;     // the largest ⟨x̃²⟩
-    bool over = false;     // it is decaying; `most` is then the value of pause_s ago
-  };
   struct View {  // the motion by one account
-    HighPass motion, place;
-    HighPass turning, angle;  // of a tool that turns, as the next
+    Band motion, place;
+    Band turning, angle;  // of a tool that turns, as the next
     models::Twist moved_W = models::Twist::Zero();
     double power = 0.0, band = 0.0, all = 0.0;  // ⟨h̃·ẋ̃⟩, ⟨ẋ̃²⟩, ⟨ẋ²⟩
     double square = 0.0;                        // ⟨x̃²⟩
@@ -188,9 +165,6 @@ class PassivityObserver {
   struct Moment {
     double power, band, all, square;
   };
-  static void archive(fieldbus::StateArchive& state, HighPass& filter) noexcept {
-    for (Section& section : filter.sections) state(section.s1, section.s2);
-  }
   [[nodiscard]] Moment look(View& view, const models::Twist& move_W, const models::Vec3& force,
                             const models::Vec3& torque) const noexcept;
   void take(View& view, const Moment& now) const noexcept;
@@ -206,7 +180,7 @@ class PassivityObserver {
   double average_ = 0.0;       // weight of a new value in an average
   double release_s_ = 0.0;     // present time constant of B_a's decay
   Delay<models::Vec3> delay_;  // delays the motion by the force's age
-  HighPass force_, torque_;
+  Band force_, torque_;
   View seen_, motors_;                           // by what counts; and of a tool that turns also by the motors
   models::Vec3 start_W_ = models::Vec3::Zero();  // where the tool was when rendering began
   models::Vec3 h_ = models::Vec3::Zero(), h_k1_ = models::Vec3::Zero(), tool_k1_ = models::Vec3::Zero();

@@ -325,15 +325,44 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
   return steps * T;
 }
 
+std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
+                                        const std::function<std::optional<double>(const LoopModel&)>& smallest,
+                                        double unit) {
+  LoopModel damped = loop;
+  for (const double tried : tried_dampings) {
+    damped.damping_Ns_per_m = unit * tried;
+    if (!(damped.damping_Ns_per_m > loop.damping_Ns_per_m)) continue;
+    const std::optional<double> mass = smallest(damped);
+    if (mass && *mass <= most_kg) return DampedMass{damped.damping_Ns_per_m, *mass};
+  }
+  return std::nullopt;
+}
+
 namespace {
 
-// The words of a check: of a mass in space, or of an inertia about a point.
+// The words of a check: of a mass in space, or of an inertia about a point; and the unit of the dampings that are
+// tried: a hand that is damped by 20 Ns/m at 0.1 m turns with 0.2 Nms/rad.
 struct Words {
   const char *option, *unit, *what, *damping_option;
   const char *stiffness_unit, *damping_unit;
+  double damping;
 };
-constexpr Words of_mass{"--mass", "kg", "mass", "--damping", "N/m", "Ns/m"};
-constexpr Words of_inertia{"--inertia", "kg m²", "inertia", "--turning-damping", "Nm/rad", "Nms/rad"};
+constexpr Words of_mass{"--mass", "kg", "mass", "--damping", "N/m", "Ns/m", 1.0};
+constexpr Words of_inertia{"--inertia", "kg m²", "inertia", "--turning-damping", "Nm/rad", "Nms/rad", 0.01};
+
+// More isn't advised for the sake of a light mass.
+constexpr double honey_Ns_per_m = 50.0;
+
+// "--damping 20 Ns/m, with which 12 kg are stable"; empty: no damping that is tried does it.
+std::string damping_text(const HandModel& hand, const LoopModel& loop, double most_felt, double most_damping,
+                         const Words& w) {
+  const double handle = loop.handle_mass_kg;
+  const auto smallest = [&](const LoopModel& damped) { return smallest_stable_mass(hand, damped); };
+  const auto found = least_damping(loop, most_felt - handle, smallest, w.damping);
+  if (!found || found->damping_Ns_per_m > most_damping * w.damping) return "";
+  return w.damping_option + text(" %.3g ", found->damping_Ns_per_m) + w.damping_unit +
+         text(", with which %.2g ", round_up(found->mass_kg + handle)) + w.unit + " are stable";
+}
 
 void require_stable(double felt, const HandModel& hand, const LoopModel& loop, bool force_unstable, const Words& w) {
   const double handle = loop.handle_mass_kg;
@@ -354,12 +383,17 @@ void require_stable(double felt, const HandModel& hand, const LoopModel& loop, b
   const auto smallest = smallest_stable_mass(hand, loop);
   if (!smallest) {
     // For B + D_h ≤ K_h L no mass helps.
+    const std::string some = damping_text(hand, loop, HUGE_VAL, HUGE_VAL, w);
+    const std::string wanted = damping_text(hand, loop, felt, honey_Ns_per_m, w);
+    const std::string add =
+        some.empty() ? "" : "add " + some + (wanted == some || wanted.empty() ? "" : ", or " + wanted) + "; or ";
     refuse(std::string("a loop that some ") + w.what + " makes stable; " + grip + " none does",
-           std::string("add ") + w.damping_option +
-               ", or shorten the delay by a smaller --timestep (--force-unstable overrides, in simulation)");
+           add + "shorten the delay by a smaller --timestep (--force-unstable overrides, in simulation)");
   }
+  const std::string wanted = damping_text(hand, loop, felt, honey_Ns_per_m, w);
   refuse(text("at least %.2g", round_up(*smallest + handle)) + unit + ", the smallest that is stable " + grip,
-         std::string("choose a larger ") + w.what + " (--force-unstable overrides, in simulation)");
+         std::string("choose a larger ") + w.what + (wanted.empty() ? "" : ", or add " + wanted) +
+             " (--force-unstable overrides, in simulation)");
 }
 
 }  // namespace

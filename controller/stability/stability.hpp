@@ -99,8 +99,20 @@ inline constexpr std::array<double, 3> gear_margins{0.7, 1.0, 1.4};
 inline constexpr double auto_share = 0.85, heavy_hand = 1.9;
 double stable_horizon_s(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
 
+// A damping B, and the smallest mass that is stable with it.
+struct DampedMass {
+  double damping_Ns_per_m = 0.0, mass_kg = 0.0;
+};
+// The dampings that are tried, Ns/m: by hand a heavier handle from about 5 on, honey from 50 on.
+inline constexpr std::array<double, 9> tried_dampings{1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0};
+// The least of them, times `unit` and above the loop's own, for which `smallest` finds a mass of at most `most_kg`.
+std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
+                                        const std::function<std::optional<double>(const LoopModel&)>& smallest,
+                                        double unit = 1.0);
+
 // The check of --mass. Throws description::SetupError that names the smallest stable felt mass (proxy and handle),
-// rounded up to two digits, or what else would help if no mass is stable; also for a mass at or below the handle's.
+// rounded up to two digits, and the damping with which the mass that is wanted is stable; if none is without damping,
+// the least damping with which some is. Also for a mass at or below the handle's.
 // With `force_unstable` only the latter is checked.
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable);
 

@@ -11,13 +11,27 @@ constexpr std::uint8_t op_gauges_odd = 0x1;   // SG1, SG3, SG5
 }  // namespace
 
 bool AtiNetCanOem::poll(std::int64_t now_ns, CanFrame& frame) noexcept {
-  if (half_) ++incomplete_;
-  half_ = fresh_ = false;
-  polled_ = true;
+  older_poll_ns_ = polled_ ? poll_ns_ : now_ns;
   poll_ns_ = now_ns;
+  polled_ = true;
+  fresh_ = false;
   frame = CanFrame{};
   frame.id = id(op_gauges_even);
   return true;
+}
+
+bool AtiNetCanOem::in_time(std::int64_t time_ns) const noexcept {
+  return polled_ && time_ns >= older_poll_ns_ && !answered();
+}
+
+bool AtiNetCanOem::fits_half(std::int64_t time_ns) const noexcept {
+  const bool poll_between = half_ns_ < poll_ns_ && time_ns >= poll_ns_;
+  return half_ && (!poll_between || time_ns - half_ns_ <= (poll_ns_ - older_poll_ns_) / 2);
+}
+
+void AtiNetCanOem::drop_half() noexcept {
+  if (half_) ++incomplete_;
+  half_ = false;
 }
 
 bool AtiNetCanOem::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept {
@@ -28,19 +42,20 @@ bool AtiNetCanOem::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcep
     ++wrong_lengths_;
     return true;
   }
-  // What was on the wire before the poll answers an older one, however late it was read.
-  if (!polled_ || time_ns < poll_ns_ || fresh_) {
+  if (!in_time(time_ns)) {
     ++dropped_;
     return true;
   }
   if (op == op_gauges_even) {
-    if (half_) ++dropped_;  // the older half's partner was lost
+    drop_half();  // its partner was lost
+    half_ns_ = time_ns;
     half_status_ = read_u16_be(&frame.data[0]);
     for (std::size_t i = 0; i < 3; ++i) half_gauges_[2 * i] = read_i16_be(&frame.data[2 + 2 * i]);
     half_ = true;
     return true;
   }
-  if (!half_) {
+  if (!fits_half(time_ns)) {
+    drop_half();
     ++dropped_;
     return true;
   }
@@ -58,6 +73,8 @@ void AtiNetCanOem::complete(std::int64_t time_ns) noexcept {
   channels_.add(counts);
   latest_.channel_repeats = channels_.repeats();
   latest_.time_ns = time_ns;
+  latest_.late = half_ns_ < poll_ns_;
+  if (latest_.late) ++late_;
   latest_.status = half_status_;
   latest_.healthy = half_status_ == 0;
   latest_.saturated = false;

@@ -11,9 +11,11 @@
 //
 //   wrench_S = unit · matrix · SG / counts per unit
 //
-// The sensor's own bias is never set, so its state doesn't matter. A sample is op 0 followed by op 1, both received
-// after the poll that asked for them: an op 1 without its op 0, a second op 0, halves older than the poll and wrong
-// lengths are dropped and counted.
+// The sensor's own bias is never set, so its state doesn't matter. A sample is op 0 followed by op 1. Nothing in
+// them says which poll they answer. So op 1 must follow its op 0 after the same poll, or within half a period where a
+// poll lies between them: op 1 of the next sample comes a whole one later. An op 1 without its op 0, a second op 0,
+// what was on the wire before the last two polls and wrong lengths are dropped and counted. What answers an older poll
+// and is read after the last one is a late sample: it is taken until the last poll's own answer comes.
 #pragma once
 
 #include <array>
@@ -47,20 +49,22 @@ class AtiNetCanOem final : public ForceSensor {
   bool poll(std::int64_t now_ns, CanFrame& frame) noexcept override;
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
+  [[nodiscard]] bool answered() const noexcept override { return fresh_ && !latest_.late; }
   [[nodiscard]] const ForceSample& latest() const noexcept override { return latest_; }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
   [[nodiscard]] std::string describe_losses() const override;
   void archive(StateArchive& state) noexcept override {
-    state(scaled_, poll_ns_, polled_, half_, half_status_, half_gauges_, gauges_, fresh_, latest_, incomplete_,
-          dropped_, wrong_lengths_, channels_);
+    state(scaled_, poll_ns_, older_poll_ns_, polled_, half_, half_ns_, half_status_, half_gauges_, gauges_, fresh_,
+          latest_, late_, incomplete_, dropped_, wrong_lengths_, channels_);
   }
 
   // What was read at start, and what has been wrong since.
   [[nodiscard]] const std::array<std::array<double, 6>, 6>& matrix() const noexcept { return matrix_; }
   [[nodiscard]] const std::array<std::uint32_t, 2>& counts_per_unit() const noexcept { return counts_per_unit_; }
   [[nodiscard]] const Gauges& gauges() const noexcept { return gauges_; }  // of the latest sample
+  [[nodiscard]] std::uint64_t late_samples() const noexcept { return late_; }
   [[nodiscard]] std::uint64_t incomplete_samples() const noexcept { return incomplete_; }
-  [[nodiscard]] std::uint64_t dropped_frames() const noexcept { return dropped_; }  // late, repeated, out of order
+  [[nodiscard]] std::uint64_t dropped_frames() const noexcept { return dropped_; }  // too late, repeated, out of order
   [[nodiscard]] std::uint64_t wrong_lengths() const noexcept { return wrong_lengths_; }
 
  private:
@@ -73,6 +77,9 @@ class AtiNetCanOem final : public ForceSensor {
   void check_first_sample(CanNetwork& network, std::size_t bus, const FrameHandler& other);
   [[noreturn]] void refuse(const std::string& what, const std::string& found, const std::string& expected,
                            const std::string& advice) const;
+  [[nodiscard]] bool in_time(std::int64_t time_ns) const noexcept;
+  [[nodiscard]] bool fits_half(std::int64_t time_ns) const noexcept;
+  void drop_half() noexcept;
   void complete(std::int64_t time_ns) noexcept;
 
   AtiNetCanOemSettings settings_;
@@ -83,15 +90,17 @@ class AtiNetCanOem final : public ForceSensor {
   std::string serial_;
   std::string firmware_;
 
-  std::int64_t poll_ns_ = 0;
+  std::int64_t poll_ns_ = 0, older_poll_ns_ = 0;  // the last poll and the one before
   bool polled_ = false;
   bool half_ = false;  // op 0 is in, op 1 is awaited
+  std::int64_t half_ns_ = 0;
   std::uint16_t half_status_ = 0;
   Gauges half_gauges_{};
   Gauges gauges_{};
   bool fresh_ = false;
   ChannelWatch channels_;
   ForceSample latest_{};
+  std::uint64_t late_ = 0;
   std::uint64_t incomplete_ = 0;
   std::uint64_t dropped_ = 0;
   std::uint64_t wrong_lengths_ = 0;

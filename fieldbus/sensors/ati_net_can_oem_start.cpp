@@ -273,8 +273,9 @@ std::string AtiNetCanOem::identity() const {
 
 std::string AtiNetCanOem::describe_losses() const {
   return losses_text({{wrong_lengths_, "frames of a wrong length"},
+                      {late_, "samples late, taken a cycle later where no newer one came"},
                       {incomplete_, "samples incomplete"},
-                      {dropped_, "frames late, repeated or out of order"}});
+                      {dropped_, "frames too late, repeated or out of order"}});
 }
 
 std::string AtiNetCanOem::describe_status(std::uint32_t status) const {

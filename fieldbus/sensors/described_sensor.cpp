@@ -71,11 +71,11 @@ double DescribedSensor::number_of(const Slice& slice) const noexcept {
 
 bool DescribedSensor::poll(std::int64_t now_ns, CanFrame& frame) noexcept {
   fresh_ = false;
+  older_poll_ns_ = polled_ ? poll_ns_ : now_ns;
   poll_ns_ = now_ns;
-  if (streams_) return false;
-  if (next_ > 0) tear();
-  torn_ = false;
   polled_ = true;
+  if (streams_) return false;
+  torn_ = false;
   frame = poll_frame_;
   return true;
 }
@@ -96,7 +96,16 @@ bool DescribedSensor::repeats_last(const CanFrame& frame) const noexcept {
 
 bool DescribedSensor::in_time(std::int64_t time_ns) const noexcept {
   if (streams_) return time_ns >= poll_ns_ - settings_.oldest_sample_ns;
-  return polled_ && time_ns >= poll_ns_ && !fresh_;
+  return polled_ && time_ns >= older_poll_ns_ && !answered();
+}
+
+// Of what answers polls, a sample with a poll between its frames has come within half a period: the frames of two
+// samples are a whole one apart.
+bool DescribedSensor::came_together(std::int64_t time_ns) const noexcept {
+  const std::int64_t took_ns = time_ns - begun_ns_;
+  if (took_ns < 0 || took_ns > together_ns_) return false;
+  const bool poll_between = !streams_ && begun_ns_ < poll_ns_ && time_ns >= poll_ns_;
+  return !poll_between || took_ns <= (poll_ns_ - older_poll_ns_) / 2;
 }
 
 bool DescribedSensor::on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept {
@@ -104,7 +113,7 @@ bool DescribedSensor::on_frame(const CanFrame& frame, std::int64_t time_ns) noex
   const bool known = std::any_of(slots_.begin(), slots_.end(), [&](const Slot& slot) { return slot.id == frame.id; });
   if (!known) return false;
   // Before the question whether it came twice: at rest, the next sample's first frame is the same to the bit.
-  if (next_ > 0 && (time_ns - begun_ns_ > together_ns_ || time_ns < begun_ns_)) tear();
+  if (next_ > 0 && !came_together(time_ns)) tear();
   if (frame.fd != protocol_.fd || !in_time(time_ns) || repeats_last(frame)) {
     ++counts_.dropped;
     return true;
@@ -204,6 +213,8 @@ void DescribedSensor::decode(std::int64_t time_ns) noexcept {
   watch_.add(numbers_);
   latest_.channel_repeats = watch_.repeats();
   latest_.time_ns = time_ns;
+  latest_.late = !streams_ && begun_ns_ < poll_ns_;
+  if (latest_.late) ++counts_.late;
   ++latest_.number;
   fresh_ = true;
   for (std::size_t row = 0; row < 6; ++row) {

@@ -31,6 +31,7 @@ struct DescribedSensorSettings {
 struct DescribedSensorCounts {
   std::uint64_t wrong_lengths = 0;
   std::uint64_t dropped = 0;        // repeated, out of order, too late, or before the poll
+  std::uint64_t late = 0;           // samples that answer an older poll than the last
   std::uint64_t incomplete = 0;     // samples that lack a frame, or whose order isn't certain
   std::uint64_t bad_checksums = 0;  // samples
   std::uint64_t repeated = 0;       // samples with the counter of the one before, or an older one
@@ -50,12 +51,13 @@ class DescribedSensor final : public ForceSensor {
   bool poll(std::int64_t now_ns, CanFrame& frame) noexcept override;
   bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept override;
   [[nodiscard]] bool fresh() const noexcept override { return fresh_; }
+  [[nodiscard]] bool answered() const noexcept override { return fresh_ && !latest_.late; }
   [[nodiscard]] const ForceSample& latest() const noexcept override { return latest_; }
   [[nodiscard]] std::string describe_status(std::uint32_t status) const override;
   [[nodiscard]] std::string describe_losses() const override;
   void archive(StateArchive& state) noexcept override {
-    state(sample_, next_, begun_ns_, torn_, poll_ns_, polled_, fresh_, counted_, last_count_, numbers_, watch_, values_,
-          latest_, counts_);
+    state(sample_, next_, begun_ns_, torn_, poll_ns_, older_poll_ns_, polled_, fresh_, counted_, last_count_, numbers_,
+          watch_, values_, latest_, counts_);
     if (next_ >= slots_.size()) next_ = 0;
   }
 
@@ -89,6 +91,7 @@ class DescribedSensor final : public ForceSensor {
   [[nodiscard]] double number_of(const Slice& slice) const noexcept;
   [[nodiscard]] bool fits(std::size_t slot, const CanFrame& frame) const noexcept;
   [[nodiscard]] bool repeats_last(const CanFrame& frame) const noexcept;
+  [[nodiscard]] bool came_together(std::int64_t time_ns) const noexcept;
   [[nodiscard]] bool in_time(std::int64_t time_ns) const noexcept;
   void take(std::size_t slot, const CanFrame& frame, std::int64_t time_ns) noexcept;
   void refuse_frame(const CanFrame& frame) noexcept;
@@ -122,8 +125,8 @@ class DescribedSensor final : public ForceSensor {
   std::array<std::uint8_t, description::max_sample_bytes + 8> sample_{};  // a slice may be read past the end
   std::size_t next_ = 0;                                                  // slot that is awaited; 0: the first
   std::int64_t begun_ns_ = 0;
-  bool torn_ = false;  // the order of what comes now isn't certain
-  std::int64_t poll_ns_ = 0;
+  bool torn_ = false;                             // the order of what comes now isn't certain
+  std::int64_t poll_ns_ = 0, older_poll_ns_ = 0;  // the last poll and the one before
   bool polled_ = false;
   bool fresh_ = false;
   bool counted_ = false;  // a counter has been seen

@@ -216,6 +216,7 @@ std::string DescribedSensor::identity() const {
 
 std::string DescribedSensor::describe_losses() const {
   return losses_text({{counts_.wrong_lengths - counts_before_.wrong_lengths, "frames of a wrong length"},
+                      {counts_.late - counts_before_.late, "samples late, taken a cycle later where no newer one came"},
                       {counts_.incomplete - counts_before_.incomplete, "samples incomplete"},
                       {counts_.bad_checksums - counts_before_.bad_checksums, "samples with a bad checksum"},
                       {counts_.repeated - counts_before_.repeated, "samples with an old counter"},

@@ -31,13 +31,14 @@ struct ForceSample {
   std::uint32_t status = 0;   // the maker's status word, see describe_status()
   bool healthy = false;       // the status reports no error
   bool saturated = false;     // some channel is at its rail, so the wrench is not to be believed
+  bool late = false;          // on the wire before the last poll: it answers an older one, and is a cycle older
   std::uint64_t number = 0;   // counts the samples, from 1
   std::uint32_t repeats = 0;  // samples before this one with exactly the same raw reading: a frozen sensor
 
   std::uint32_t channel_repeats = 0;  // of one channel alone, while others went on (channel_watch.hpp)
 
   void archive(StateArchive& state) noexcept {
-    state(wrench_S, time_ns, status, healthy, saturated, number, repeats, channel_repeats);
+    state(wrench_S, time_ns, status, healthy, saturated, late, number, repeats, channel_repeats);
   }
 };
 
@@ -62,10 +63,13 @@ class ForceSensor {
 
   // ---- cycle: noexcept, no allocation ----
   // The frame that asks for the next sample; false where the sensor streams by itself. What was received before no
-  // longer counts as fresh, and halves of older samples are dropped.
+  // longer counts as fresh. A sample that comes between two polls and after its cycle had stopped waiting is taken in
+  // the next cycle, unless that one's own comes in time; older ones are dropped.
   virtual bool poll(std::int64_t now_ns, CanFrame& frame) noexcept = 0;
   virtual bool on_frame(const CanFrame& frame, std::int64_t time_ns) noexcept = 0;  // true when it was the sensor's
-  [[nodiscard]] virtual bool fresh() const noexcept = 0;  // a whole sample came since the last poll
+  [[nodiscard]] virtual bool fresh() const noexcept = 0;  // a whole sample was taken since the last poll
+  // Nothing newer can come in this cycle: there is no use in waiting.
+  [[nodiscard]] virtual bool answered() const noexcept { return fresh(); }
   [[nodiscard]] virtual const ForceSample& latest() const noexcept = 0;
   // What was read at start, and all that changes in a cycle.
   virtual void archive(StateArchive& state) noexcept = 0;

@@ -495,6 +495,7 @@ Cell read_cell(const YamlNode& root) {
   cell.receive_window = root.number_or("receive_window", cell.receive_window, 0.2, 0.8);
   cell.default_period_s = root.number_or("default_period_s", cell.default_period_s, 1e-4, 0.1);
   cell.default_mass_kg = root.number_or("default_mass_kg", cell.default_mass_kg, above(0.0, 1000.0));
+  cell.default_damping_Ns_per_m = root.number_or("default_damping_Ns_per_m", cell.default_damping_Ns_per_m, 0.0, 1e4);
   cell.default_scene = absolute_path_or_empty(root, "default_scene");
   cell.default_hand = absolute_path_or_empty(root, "default_hand");
   root.finish();

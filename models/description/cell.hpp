@@ -205,7 +205,7 @@ struct Cell {
   std::optional<EnablingInputDescription> enabling_input;
   double receive_window = 0.45;  // of the timestep, in which feedback and samples are taken; then setpoints leave
   double default_period_s = 1e-3;
-  double default_mass_kg = 4.0;
+  double default_mass_kg = 4.0, default_damping_Ns_per_m = 0.0;
   std::string default_scene;  // path, absolute (in the cell's file: relative to its folder); may be empty
   std::string default_hand;   // likewise
 };

@@ -7,6 +7,7 @@ channel not at all; a drift led an empty handle through the room.
 Judged by true_tool_W of signals.csv, the simulated steel, beside a session with the same hand and a sensor that says the
 truth. Nothing here knows how a lie is found.
 """
+import csv
 import math
 import unittest
 
@@ -119,6 +120,20 @@ class Liars(harness.ProgramTest):
                 names, _, off = self.judged("somebody", f"scale={scale}", at_s=None)
                 self.assertEqual(names, set())
                 self.assertLessEqual(off, MOST_M)
+
+    def test_readings_that_are_late_by_a_part_of_a_cycle_are_used_in_the_next(self):
+        """The story: they came after their cycle had stopped waiting and before the next poll, and each was dropped: the
+        arm stopped after three cycles, while readings that were late by a whole cycle did nothing."""
+        for microseconds in (400, 700, 1500, 2500):
+            for hand in ("nobody", "somebody", "stiff"):
+                with self.subTest(f"{microseconds} us, {hand}"):
+                    names, _, off = self.judged(hand, f"delay={microseconds}")
+                    self.assertEqual(names, set())
+                    self.assertLessEqual(off, 0.001)
+                    with open(self.folder / "record/signals.csv", encoding="utf-8") as file:
+                        words = [row["flags"].split("|") for row in csv.DictReader(file) if float(row["time_s"]) > LIE_S]
+                    self.assertGreater(sum("sample_late" in w for w in words), 0.99 * len(words) - 10)
+                    self.assertLessEqual(sum("sample_held" in w for w in words), 1)
 
     def test_readings_that_come_late_swing_no_further_than_a_decimetre(self):
         for cycles in (1, 2, 3, 4, 5, 10):

@@ -32,6 +32,13 @@ def hand(mass, stiffness, damping, waypoints, most_N=None, lets_go_s=None):
 
 
 class Torque(ProgramTest):
+    def test_a_damping_of_zero_is_what_was_asked_for(self):
+        """The story: it became 8 Ns/m without a word. At 1 ms 750 N/m need 3KT/2 = 1.125 Ns/m."""
+        refused = self.call("run", CELL, "--damping", "0", "--duration", "1s", "--no-plot")
+        self.assert_refused(refused, "0 Ns/m", "damping above 1.1")
+        fine = self.call("run", CELL, "--damping", "3", "--duration", "1s", "--no-plot", "--record", "record")
+        self.assertIn("coupling_damping_Ns_per_m: 3", (self.folder / "record/effective.yaml").read_text(), fine.err)
+
     def led(self, text, seconds, *arguments, scene=FREE, status=0):
         self.written("hand.yaml", text)
         outcome = self.call("run", str(CELL), "--scene", scene, "--hand", "hand.yaml", "--duration", f"{seconds}s",

@@ -125,6 +125,10 @@ std::string cell_text(const description::Cell& cell, const std::vector<std::stri
       "\n# A quarter more than the least mass that is stable with margins and steady on the simulated arm (tune).\n"
       "default_mass_kg: " +
       number(cell.default_mass_kg) + "\n";
+  if (cell.default_damping_Ns_per_m > 0.0) {
+    text += "# With it the mass is stable; without, a larger one would be.\ndefault_damping_Ns_per_m: " +
+            number(cell.default_damping_Ns_per_m) + "\n";
+  }
   if (with_scene) text += "default_scene: scene.yaml\n";
   if (!cell.default_hand.empty()) text += "default_hand: hand.yaml\n";
   return text;

@@ -323,13 +323,37 @@ class NewCell {
     return free.steady;
   }
 
+  // The steady mass with this damping in the cell.
+  std::optional<double> advised_mass_with(double damping_Ns_per_m) {
+    cell_.default_damping_Ns_per_m = damping_Ns_per_m;
+    save();
+    return advised_mass();
+  }
+
+  // A mass that hands lead easily needs no damping. Where a larger one is needed, or none is steady, the dampings that
+  // a hand takes for a heavier handle are tried, too; the least that saves a quarter of the mass is kept.
+  std::optional<double> advised_mass_and_damping() {
+    constexpr double easy_kg = 10.0, worth = 0.75;
+    const auto without = advised_mass_with(0.0);
+    if (without && *without <= easy_kg) return without;
+    const std::string advice = advice_;
+    for (const double damping_Ns_per_m : {0.5 * most_for_comfort_Ns_per_m, most_for_comfort_Ns_per_m}) {
+      const auto with = advised_mass_with(damping_Ns_per_m);
+      if (!with || (without && *with > worth * *without)) continue;
+      advice_ = "with " + description::rounded_text(damping_Ns_per_m) + " Ns/m " + advice_ + "; without: " + advice;
+      return with;
+    }
+    cell_.default_damping_Ns_per_m = 0.0;
+    advice_ = advice;
+    return without;
+  }
+
   // Where none is stable or steady the arm's gears are too soft for the filter: a slower one is tried.
   void advise_mass() {
     std::string with_the_fastest;  // what went wrong with the filter that an arm should bear
     for (const double bandwidth_Hz : {25.0, 15.0, 10.0}) {
       cell_.limits.setpoint_bandwidth_Hz = bandwidth_Hz;
-      save();
-      const auto mass_kg = advised_mass();
+      const auto mass_kg = advised_mass_and_damping();
       if (with_the_fastest.empty()) with_the_fastest = advice_;
       if (!mass_kg) continue;
       cell_.default_mass_kg = rounded_up(margin * *mass_kg);
@@ -343,9 +367,13 @@ class NewCell {
   }
 
   void tell() const {
-    std::printf("%s: a cell of %zu axes, sensor on %s, %zu %s, T = %.4g ms, %.3g kg\n", file_.c_str(),
+    const double damping_Ns_per_m = cell_.default_damping_Ns_per_m;
+    const std::string damped =
+        damping_Ns_per_m > 0.0 ? " with " + description::rounded_text(damping_Ns_per_m) + " Ns/m" : "";
+    std::printf("%s: a cell of %zu axes, sensor on %s, %zu %s, T = %.4g ms, %.3g kg%s\n", file_.c_str(),
                 cell_.drives.size(), cell_.sensor.link.c_str(), cell_.buses.size(),
-                cell_.buses.size() == 1 ? "bus" : "buses", 1e3 * cell_.default_period_s, cell_.default_mass_kg);
+                cell_.buses.size() == 1 ? "bus" : "buses", 1e3 * cell_.default_period_s, cell_.default_mass_kg,
+                damped.c_str());
     std::printf("the tool starts at x %.4f, y %.4f, z %.4f m\ntried on the simulated arm: %s\n", start_W_.x(),
                 start_W_.y(), start_W_.z(), advice_.c_str());
     for (const std::string& remark : source_.remarks) std::printf("  - %s\n", remark.c_str());

@@ -57,16 +57,31 @@ std::vector<DriveOnLine> drives_on(const description::Cell& cell, const descript
   return drives;
 }
 
+// Drives and the sensor, of which each has its turn.
+int devices_on(const description::Cell& cell, const description::ModbusLineDescription& line) {
+  return static_cast<int>(drives_on(cell, line).size()) + (cell.sensor.bus == line.name ? 1 : 0);
+}
+
 std::string in_ms(double time_s) { return short_text(1e3 * time_s) + " ms"; }
 
 }  // namespace
+
+double slowest_report_Hz(const description::Cell& cell) {
+  double slowest_Hz = 0.0;
+  for (const description::ModbusLineDescription& line : cell.modbus_lines) {
+    for (const DriveOnLine& on_it : drives_on(cell, line)) {
+      const double rate_Hz = fieldbus::modbus_expected_rate_Hz(on_it.registers, line, devices_on(cell, line));
+      slowest_Hz = slowest_Hz > 0.0 ? std::min(slowest_Hz, rate_Hz) : rate_Hz;
+    }
+  }
+  return slowest_Hz;
+}
 
 std::string modbus_plan_text(const PreparedSession& session) {
   std::string text;
   for (const description::ModbusLineDescription& line : session.cell.modbus_lines) {
     const std::vector<DriveOnLine> drives = drives_on(session.cell, line);
-    const bool sensor_here = session.cell.sensor.bus == line.name;
-    const int devices = static_cast<int>(drives.size()) + (sensor_here ? 1 : 0);
+    const int devices = devices_on(session.cell, line);
     text += line.name + ": Modbus " + (line.serial() ? "RTU" : "TCP") + ", " + fieldbus::peer_text(line) +
             (line.serial() ? ", " + std::to_string(line.baud) + " baud" : "") + "\n";
     for (const DriveOnLine& on_it : drives) {
@@ -80,7 +95,8 @@ std::string modbus_plan_text(const PreparedSession& session) {
               " wanted; a setpoint comes " + in_ms(exchanges_late / rate_Hz) + " later than on CAN\n";
       warn_if_unstable(session, on_it.drive->joint, rate_Hz);
     }
-    if (!sensor_here || !session.sensor.described || !session.sensor.described->registers) continue;
+    if (session.cell.sensor.bus != line.name || !session.sensor.described || !session.sensor.described->registers)
+      continue;
     double rate_Hz = session.sensor.described->rate_Hz;
     if (line.serial()) {
       const double read_s = fieldbus::modbus_rtu_read_s(session.sensor.described->registers->count, line);

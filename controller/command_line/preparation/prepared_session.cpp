@@ -9,6 +9,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/file_kind.hpp"
+#include "controller/command_line/preparation/modbus_rates.hpp"
 #include "controller/session/bring_up.hpp"
 #include "controller/session/identifiers.hpp"
 #include "controller/session/reachable_scene.hpp"
@@ -175,7 +176,9 @@ void choose_scheme(PreparedSession& session, const RunOptions& options) {
            "none: the tool's orientation isn't rendered");
   }
   settings.coupling_stiffness_N_per_m = options.stiffness_N_per_m.value_or(settings.coupling_stiffness_N_per_m);
-  if (settings.damping_Ns_per_m > 0.0) settings.coupling_damping_Ns_per_m = settings.damping_Ns_per_m;
+  if (options.damping_Ns_per_m || settings.damping_Ns_per_m > 0.0) {
+    settings.coupling_damping_Ns_per_m = settings.damping_Ns_per_m;
+  }
   settings.damping_Ns_per_m = 0.0;
   settings.mass_kg = 0.0;
 }
@@ -521,6 +524,7 @@ PreparedSession prepare(const RunOptions& options) {
   add_delay(session.cell.sensor, options.extra_delay_s);
   session.settings = options.settings;
   session.settings.mass_kg = options.mass_kg.value_or(session.cell.default_mass_kg);
+  session.settings.damping_Ns_per_m = options.damping_Ns_per_m.value_or(session.cell.default_damping_Ns_per_m);
   session.settings.receive_window = session.cell.receive_window;
   session.duration_s = options.duration_s;
   session.settings.zero_S_N = description::simulated_zero_S_N(session.sensor);
@@ -549,6 +553,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.order = session.settings.order;
   session.loop.arms = arms_at(session, controller::led_poses(models::Arm(session.cell), {}));
   session.settings.force_age_s = session.cell.sensor.delay_s;
+  session.settings.report_rate_Hz = slowest_report_Hz(session.cell);
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;
   require_renderable_tool(session);
   choose_horizon(session);

@@ -48,12 +48,12 @@ struct ViewPlace {
 };
 
 struct RunOptions {
-  std::filesystem::path cell;   // empty: the default cell
-  std::filesystem::path scene;  // empty: the cell's
-  std::filesystem::path hand;   // empty: the cell's
-  std::filesystem::path tool;   // empty: the scene's, else the cell's; point: a point
-  std::filesystem::path arm;    // cell file of the simulated arm; empty: it is as the cell says
-  std::optional<double> mass_kg;
+  std::filesystem::path cell;                       // empty: the default cell
+  std::filesystem::path scene;                      // empty: the cell's
+  std::filesystem::path hand;                       // empty: the cell's
+  std::filesystem::path tool;                       // empty: the scene's, else the cell's; point: a point
+  std::filesystem::path arm;                        // cell file of the simulated arm; empty: it is as the cell says
+  std::optional<double> mass_kg, damping_Ns_per_m;  // unset: the cell's
   std::optional<double> period_s;
   double extra_delay_s = 0.0;  // of the sensor's readings
   double duration_s = 10.0;

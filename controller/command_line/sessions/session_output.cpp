@@ -75,7 +75,8 @@ SessionOutput::SessionOutput(const PreparedSession& session, const RunOptions& o
       options_(options),
       builder_(controller::summary_config(session)),
       progress_(session.duration_s),
-      deriver_(session.cell) {
+      deriver_(session.cell),
+      loop_(session.loop) {
   refuse_lost_plot();
   if (!session.impedance()) {
     poses_ = std::make_unique<PoseWatch>(controller::PassedPoses(deriver_.arm(), session.cell, hand_model(session),
@@ -187,10 +188,34 @@ void SessionOutput::say_timestep(const CycleRecord& record) {
       std::fprintf(stderr, "proxarm: timestep %.4g ms from %.4g s on, all drives have confirmed it\n",
                    1e-6 * static_cast<double>(record.period_ns), 1e-9 * static_cast<double>(record.time_ns));
       const double period_s = 1e-9 * static_cast<double>(record.period_ns);
-      if (poses_) poses_->change(with_timestep(session_, options_, period_s).loop);
+      loop_ = with_timestep(session_, options_, period_s).loop;
+      if (poses_) poses_->change(judged_loop());
     }
     told_period_ns_ = record.period_ns;
   }
+}
+
+// A sample that comes a cycle late is a cycle older when it acts.
+controller::LoopModel SessionOutput::judged_loop() const {
+  controller::LoopModel loop = loop_;
+  if (samples_late_) loop.delay_s += loop.period_s;
+  return loop;
+}
+
+// Whether most samples of the last quarter of a second were late; then the loop is judged with their age.
+void SessionOutput::follow_lateness(const CycleRecord& record) {
+  constexpr double average_s = 0.25;
+  const double period_s = 1e-9 * static_cast<double>(record.period_ns);
+  const double late = record.has(controller::RecordFlag::sample_late) ? 1.0 : 0.0;
+  late_share_ += std::min(1.0, period_s / average_s) * (late - late_share_);
+  if ((late_share_ > 0.5) == samples_late_) return;
+  samples_late_ = !samples_late_;
+  if (poses_) poses_->change(judged_loop());
+  if (!samples_late_) return;
+  std::fprintf(stderr,
+               "proxarm: from %.4g s on the force sensor's samples come a cycle late and are used %.4g ms later: the "
+               "stability of the mass is judged with that; what delays them, or a longer --timestep?\n",
+               1e-9 * static_cast<double>(record.time_ns), 1e3 * period_s);
 }
 
 // On standard error, while it happens: once for each spell that lasts.
@@ -258,6 +283,7 @@ void SessionOutput::tell(CycleRecord record) {
   }
   controller::complete(record, session_, rendered_ns_);
   say_timestep(record);
+  follow_lateness(record);
   builder_.add(record);
   say_oscillation();
   say_belief(record);

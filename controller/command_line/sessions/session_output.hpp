@@ -48,6 +48,8 @@ class SessionOutput {
   void refuse_lost_plot() const;
   bool draw_plot();
   void say_timestep(const controller::CycleRecord& record);
+  void follow_lateness(const controller::CycleRecord& record);
+  [[nodiscard]] controller::LoopModel judged_loop() const;
   void say_oscillation();
   void say_belief(const controller::CycleRecord& record);
   void tell(controller::CycleRecord record);
@@ -63,6 +65,9 @@ class SessionOutput {
   std::unique_ptr<controller::SessionWriter> writer_;
   controller::SignalDeriver deriver_;
   std::unique_ptr<PoseWatch> poses_;             // admittance type
+  controller::LoopModel loop_;                   // of the present timestep, with samples that are in time
+  double late_share_ = 0.0;                      // of the sensor's samples, lately
+  bool samples_late_ = false;                    // most of them
   double user_damping_Ns_per_m_ = 0.0;           // without what passivity adds
   std::optional<controller::Swing> swing_;       // of a tool that is turned
   std::chrono::steady_clock::duration spent_{};  // on records and their figures

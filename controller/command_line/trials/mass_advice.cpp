@@ -1,6 +1,7 @@
 #include "controller/command_line/trials/mass_advice.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace proxarm::command_line {
 
@@ -15,6 +16,16 @@ std::optional<double> smallest_with_margins(const HandModel& hand, const LoopMod
     return mass.has_value();
   });
   return all ? std::optional<double>(worst) : std::nullopt;
+}
+
+std::optional<controller::DampedMass> worthwhile_damping(const HandModel& hand, const LoopModel& loop) {
+  constexpr double worth = 0.5;  // of the mass without
+  const auto smallest = [&](const LoopModel& damped) -> std::optional<double> {
+    if (damped.damping_Ns_per_m > most_for_comfort_Ns_per_m) return std::nullopt;
+    return smallest_with_margins(hand, damped);
+  };
+  const std::optional<double> without = smallest_with_margins(hand, loop);
+  return controller::least_damping(loop, without ? worth * *without : HUGE_VAL, smallest);
 }
 
 }  // namespace proxarm::command_line

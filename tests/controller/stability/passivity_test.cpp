@@ -254,6 +254,29 @@ TEST(Passivity, LetsHandsMoveByWillAndTheSmallestBe) {
   EXPECT_TRUE(felt(4.0, 4.0, -40.0, 0.0005).oscillates);
 }
 
+// The story: a rail that reports 200 times a second moves in steps. Their speed lies in the band of oscillations, so
+// each motion of a hand that led along it seemed to, and what swung at 1.75 Hz and died away was told and damped.
+TEST(Passivity, AHandThatLeadsAJointThatReportsSeldomIsNoOscillation) {
+  const auto oscillates = [](double frequency_Hz, double amplitude_m, double report_rate_Hz) {
+    const double T = 1e-3, omega = 2.0 * std::numbers::pi * frequency_Hz, mass_kg = 4.0, damping = -20.0;
+    PassivityObserver observer({.band = {.report_rate_Hz = report_rate_Hz}}, T, Damping::never);
+    observer.start(Vec3::Zero());
+    bool any = false;
+    for (int k = 1; k < 6000; ++k) {
+      const double t = k * T, size = amplitude_m * std::min(1.0, t);
+      const double v = size * omega * std::cos(omega * t), a = -size * omega * omega * std::sin(omega * t);
+      const double reported_s = std::floor(t * 200.0 + 1e-9) / 200.0;
+      const double x = amplitude_m * std::min(1.0, reported_s) * std::sin(omega * reported_s);
+      observer.observe_hand(Vec3(0.0, mass_kg * a + damping * v, 0.0), Vec3(0.0, x, 0.0));
+      any = any || observer.oscillates();
+    }
+    return any;
+  };
+  EXPECT_TRUE(oscillates(1.75, 0.035, 0.0)) << "without knowing of the reports, so that this test can fail";
+  EXPECT_FALSE(oscillates(1.75, 0.035, 200.0));
+  EXPECT_TRUE(oscillates(6.0, 0.001, 200.0));  // what does oscillate is found all the same
+}
+
 TEST(Passivity, OutlivesWhatIsNotFinite) {
   PassivityObserver observer({}, 1e-3, Damping::at_once);
   observer.start(Vec3::Zero());

@@ -273,5 +273,31 @@ TEST(Stability, RefusesAMassWithTheSmallestThatIsStable) {
   }
 }
 
+// The story: "add --damping" didn't say how much.
+TEST(Stability, RefusesAMassWithTheDampingThatMakesItStable) {
+  const HandModel hand;
+  const auto advice = [&](double felt_mass_kg, const LoopModel& loop) {
+    try {
+      require_stable_mass(felt_mass_kg, hand, loop, false);
+    } catch (const description::SetupError& error) {
+      std::printf("%s\n", error.what());
+      return error.problem().advice;
+    }
+    return std::string("none");
+  };
+  // Where K_h L beats D_h no mass is stable without damping. Those that are named are checked against the loop itself,
+  // and two fifths of the damping are not enough.
+  for (const double delay_s : {45e-3, 60e-3, 90e-3}) {
+    LoopModel loop{.delay_s = delay_s, .drive_time_constant_s = 1.6e-3, .handle_mass_kg = 0.25};
+    const std::string text = advice(50.0, loop);
+    const std::size_t at = text.find("--damping "), mass_at = text.find("with which ", at);
+    ASSERT_NE(mass_at, std::string::npos) << text;
+    loop.damping_Ns_per_m = std::stod(text.substr(at + 10));
+    EXPECT_NO_THROW(require_stable_mass(std::stod(text.substr(mass_at + 11)), hand, loop, false));
+    loop.damping_Ns_per_m *= 0.4;  // less than the one before in the series 1, 2, 5, 10
+    EXPECT_FALSE(smallest_stable_mass(hand, loop).has_value());
+  }
+}
+
 }  // namespace
 }  // namespace proxarm::controller

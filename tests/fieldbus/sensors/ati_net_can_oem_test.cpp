@@ -134,14 +134,63 @@ TEST_F(AtiNetCanOemTest, NeverMixesHalvesOfTwoSamples) {
   EXPECT_EQ(sensor.dropped_frames(), 1U);
 }
 
-TEST_F(AtiNetCanOemTest, DropsWhatWasOnTheWireBeforeThePoll) {
+TEST_F(AtiNetCanOemTest, DropsWhatWasOnTheWireBeforeTheLastTwoPolls) {
   start();
   poll();
-  take("680#00000BAD0BAD0BAD", -50'000);
-  take("681#0BAD0BAD0BAD", -10'000);
+  poll();
+  take("680#00000BAD0BAD0BAD", -1'050'000);
+  take("681#0BAD0BAD0BAD", -1'010'000);
   EXPECT_FALSE(sensor.fresh());
   take("681#000100010001");
   EXPECT_FALSE(sensor.fresh());
+  EXPECT_EQ(sensor.dropped_frames(), 3U);
+}
+
+// The story: samples that came 1.5 ms late were all on the wire between a cycle's last look and the next poll. Each was
+// dropped as older than the poll, and the arm stopped after three cycles.
+TEST_F(AtiNetCanOemTest, TakesInTheNextCycleWhatWasTooLateForItsOwn) {
+  start();
+  poll();
+  for (int k = 1; k < 5; ++k) {
+    poll();
+    EXPECT_FALSE(sensor.fresh());
+    take("680#0000000" + std::to_string(k) + "00010001", -300'000);  // read after the poll
+    take("681#000100010001", -200'000);
+    EXPECT_TRUE(sensor.fresh());
+    EXPECT_FALSE(sensor.answered()) << "a newer one may come";
+    EXPECT_TRUE(sensor.latest().late);
+    EXPECT_EQ(sensor.gauges()[0], k);
+  }
+  EXPECT_EQ(sensor.late_samples(), 4U);
+  EXPECT_EQ(sensor.dropped_frames(), 0U);
+}
+
+TEST_F(AtiNetCanOemTest, APollsOwnAnswerOutdoesALateOne) {
+  start();
+  poll();
+  poll();
+  take("680#0000000100010001", -300'000);
+  take("681#000100010001", -200'000);
+  take("680#0000000200020002");
+  take("681#000200020002", 200'000);
+  EXPECT_TRUE(sensor.answered());
+  EXPECT_FALSE(sensor.latest().late);
+  EXPECT_EQ(sensor.gauges(), (AtiNetCanOem::Gauges{2, 2, 2, 2, 2, 2}));
+}
+
+TEST_F(AtiNetCanOemTest, HalvesOnBothSidesOfAPollAreOneSampleIfTheyAreCloseTogether) {
+  start();
+  poll();
+  poll();
+  take("680#0000000100010001", -60'000);
+  take("681#000100010001", 60'000);
+  ASSERT_TRUE(sensor.fresh());
+  EXPECT_TRUE(sensor.latest().late);
+  poll();
+  take("680#0000000200020002", -300'000);  // its partner is lost; that of the next sample follows
+  take("681#000300030003", 300'000);
+  EXPECT_FALSE(sensor.fresh());
+  EXPECT_EQ(sensor.incomplete_samples(), 1U);
 }
 
 TEST_F(AtiNetCanOemTest, TakesOneSamplePerPoll) {

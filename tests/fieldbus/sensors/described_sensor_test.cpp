@@ -502,15 +502,42 @@ TEST(DescribedSensor, APolledSensorAnswersOncePerPoll) {
   Rig rig(written(text));
   CanFrame request;
   rig.take("310#0000000000000000");
+  rig.now_ns += 900 * us;
   rig.sensor.poll(rig.now_ns, request);
   rig.take("311#0000000000000000");
-  EXPECT_FALSE(rig.sensor.fresh()) << "its first half came before the poll";
+  EXPECT_FALSE(rig.sensor.fresh()) << "its first half came a period before";
   rig.take("310#0000000000000000");
   rig.take("311#0000000000000000");
   EXPECT_TRUE(rig.sensor.fresh());
   rig.take("310#0100000000000000");
   rig.take("311#0000000000000000");
   EXPECT_EQ(rig.sensor.latest().number, 1U) << "nobody asked for it";
+}
+
+// The story: what came between the end of a cycle's waiting and the next poll was dropped, cycle after cycle.
+TEST(DescribedSensor, APolledSampleThatIsTooLateForItsCycleIsTakenInTheNext) {
+  std::string text = polled_little_endian;
+  text.resize(text.find("checksum"));
+  Rig rig(written(text));
+  CanFrame request;
+  const auto late = [&](std::int64_t first_ns, std::int64_t second_ns, const char* first) {
+    rig.now_ns += 1000 * us;
+    const std::int64_t poll_ns = rig.now_ns;
+    rig.sensor.poll(poll_ns, request);
+    for (const auto& [frame, after_ns] : {std::pair(first, first_ns), {"311#0000000000000000", second_ns}}) {
+      rig.sensor.on_frame(frame_of(frame), poll_ns + after_ns);
+    }
+  };
+  late(-300 * us, -200 * us, "310#0100000000000000");
+  EXPECT_TRUE(rig.sensor.fresh());
+  EXPECT_FALSE(rig.sensor.answered());
+  late(-50 * us, 50 * us, "310#0200000000000000");  // the poll lies between its frames
+  EXPECT_TRUE(rig.sensor.fresh());
+  EXPECT_TRUE(rig.sensor.latest().late);
+  late(100 * us, 200 * us, "310#0300000000000000");
+  EXPECT_TRUE(rig.sensor.answered());
+  EXPECT_EQ(rig.sensor.counts().late, 2U);
+  EXPECT_EQ(rig.sensor.latest().number, 3U);
 }
 
 TEST(DescribedSensor, SaysWhatIsWrongAtStart) {

@@ -1,0 +1,51 @@
+// The band in which an oscillation is looked for, as a filter of forces and motions alike, so that the phase between
+// them stays.
+//
+// Below it hands move by will: a Butterworth high-pass of order 4. Above it there is something only where a joint
+// reports its position less often than the cycle runs, at f_r: a position that stands and jumps. At a constant speed v
+// and N = 1/(f_r T) cycles a report, its speed per cycle has the mean square N v², which is v² and a ripple of
+// (N − 1) v² at f_r and beyond. A Butterworth low-pass of order 2 leaves (f_c/f_r)⁴ of that; with
+//   f_c = f_r (left/(N − 1))^¼
+// `left` = 0.02 of v², a tenth of the least share that counts as an oscillation. The corner is 53 Hz of 200 reports a
+// second at 1 ms. Where all joints report in each cycle, or f_c comes near half of the cycle's rate, nothing is left
+// out.
+#pragma once
+
+#include <array>
+
+#include "models/base/state_archive.hpp"
+#include "models/geometry/geometry.hpp"
+
+namespace proxarm::controller {
+
+struct BandLimits {
+  double low_Hz = 3.0;
+  double report_rate_Hz = 0.0;  // f_r, of the joint that reports most seldom; 0: each reports in each cycle
+};
+
+class Band {
+ public:
+  void design(const BandLimits& limits, double period_s) noexcept;
+  void reset() noexcept;
+  // What lies below the upper limit: once for each cycle. Then of this what lies above the lower one.
+  models::Vec3 smooth(const models::Vec3& in) noexcept { return smooths_ ? top_.step(in) : in; }
+  models::Vec3 above(const models::Vec3& smoothed) noexcept { return bottom_[1].step(bottom_[0].step(smoothed)); }
+  models::Vec3 step(const models::Vec3& in) noexcept { return above(smooth(in)); }
+  void archive(fieldbus::StateArchive& state) noexcept {
+    for (Section* section : {&top_, &bottom_[0], &bottom_[1]}) state(section->s1, section->s2);
+  }
+
+ private:
+  struct Section {  // second order, transposed direct form II: gain (1 ± 2z⁻¹ + z⁻²)/(1 + a₁z⁻¹ + a₂z⁻²)
+    double gain = 1.0, a1 = 0.0, a2 = 0.0;
+    double b1 = -2.0;  // −2 of a high-pass, 2 of a low-pass
+    models::Vec3 s1 = models::Vec3::Zero(), s2 = models::Vec3::Zero();
+    void design(double omega, double inverse_quality, double b1_of_kind) noexcept;
+    models::Vec3 step(const models::Vec3& in) noexcept;
+  };
+  bool smooths_ = false;
+  Section top_;
+  std::array<Section, 2> bottom_;
+};
+
+}  // namespace proxarm::controller
