@@ -9,8 +9,8 @@
 // made. It is told once the jerk is out of the memory, 1 to 1.25 s later. And no shorter, because of what decays. An
 // amplitude that falls by e in τ_a lets ⟨x̃²⟩ fall to a half in τ_a/2.9 and to nine tenths in τ_a/19; the average takes
 // some 0.25 s to rise, and ripples. So a swing that is below nine tenths of the largest must have gone on for
-// decaying_s: then, in 0.85 s, all with τ_a < 2.4 s have halved; and what is above nine tenths after lasting_s has a τ_a
-// of 4 s or more. An exponential memory that tells as soon, of 0.75 s, would take what decays with τ_a = 0.8 s for
+// decaying_s: then, in 0.85 s, all with τ_a < 2.4 s have halved; and what is above nine tenths after lasting_s has a
+// τ_a of 4 s or more. An exponential memory that tells as soon, of 0.75 s, would take what decays with τ_a = 0.8 s for
 // lasting.
 //
 // If ⟨x̃²⟩ falls to a sixteenth, the spell is over. What is left is a new one, which has to last by itself. Below the
