@@ -66,6 +66,9 @@ IdentifiedTool identified(PreparedSession session, const IdentifyOptions& option
   if (!tool.failure.empty()) return tool;
   tool.fit = identification::identify_tool(session.cell, tool.readings, tool.allowances);
   tool.failure = identification::doubts(tool.fit, tool.allowances);
+  if (tool.fit.mass_found && !tool.fit.centre_found && tool.not_shown.empty()) {
+    tool.not_shown = "centre of mass and zero of the torque: the mass is no more than its uncertainty";
+  }
   return tool;
 }
 

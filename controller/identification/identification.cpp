@@ -104,6 +104,8 @@ ToolFit identify_tool(const description::Cell& cell, const std::vector<proof::Re
     if (!fit.centre_found) continue;
     Eigen::Map<Vec3>(with_tool.tool.centre_of_mass_S_m.data()) = fit.centre_S_m;
   }
+  // What may be nothing has no centre.
+  if (fit.mass_kg <= fit.mass_half_kg) fit.centre_found = false;
   return fit;
 }
 

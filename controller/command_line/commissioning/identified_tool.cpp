@@ -196,6 +196,7 @@ Json json(const IdentifiedTool& tool) {
   if (!tool.found()) return told;
   told["mass_kg"] = with_half({fit.mass_kg}, {fit.mass_half_kg});
   told["zero_force_S_N"] = with_half(list(fit.zero_S.force), list(fit.zero_half_S.force));
+  told["left_over_N"] = fit.force.worst;
   told["mounting_error_deg"] = fit.turned_rad * 180.0 / std::numbers::pi;
   if (!fit.centre_found) return told;
   told["centre_of_mass_S_m"] = with_half(list(fit.centre_S_m), list(fit.centre_half_m));

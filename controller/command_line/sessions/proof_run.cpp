@@ -11,6 +11,7 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
+#include "controller/library/simulated_loop.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/base/text.hpp"
@@ -135,11 +136,14 @@ ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSessi
   const description::HandDescription& hand_there = options.hand.empty() ? nobody : arm.hand;
   sim::SimulatedCell far_end(arm.cell, arm.sensor, hand_there, network.events(), config);
   scenes::CompiledScene scene = scenes::compile(session.scene);
+  const controller::ModbusOpener open_line = [&](const description::ModbusLineDescription& line, double) {
+    return far_end.modbus_client(line.name);
+  };
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         buses_in_order(session.cell));
+                                                         buses_in_order(session.cell), open_line);
   far_end.attach_to(network);
   far_end.power_on();
-  controller::bring_up(parts);
+  controller::bring_up(parts, [&](fieldbus::ModbusLine& line) { controller::pump(network, line, network.now_ns()); });
   proof::ProofSession proof(std::move(parts), session.settings, session.cell, task);
   SimulatedHand hand(far_end);
   run(proof, network, session.settings.period_s, [&] { hand.heed(proof); });
