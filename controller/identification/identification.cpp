@@ -13,22 +13,57 @@ using models::JointVector;
 using models::Mat3;
 using models::Vec3;
 
-constexpr double twist_known_to = 0.2, friction_share = 0.02, linearity = 2e-3, resolution_share = 1e-3;
+constexpr double twist_known_to = 0.2, friction_share = 0.02, linearity = 1e-3, resolution_share = 1e-3;
 // The gears' twist by the tool is some milliradians, known to a hundredth after the first round and to 1e-4 after that.
 constexpr int rounds = 3;
 
-double tilt_of_gears_rad(const description::Cell& cell, const models::Arm& arm, const JointVector& link_rad) {
-  const JointVector twist_rad = arm.motor_from_link(link_rad) - link_rad;
-  double squares = linearity * linearity;
-  for (std::size_t i = 0; i < cell.drives.size(); ++i) {
-    const description::DriveDescription& drive = cell.drives[i];
-    const auto joint = static_cast<Eigen::Index>(i);
-    if (arm.slides(static_cast<int>(joint)) || drive.gear_stiffness_Nm_per_rad <= 0.0) continue;
-    const double friction_rad = friction_share * drive.max_torque_Nm / drive.gear_stiffness_Nm_per_rad;
-    squares += std::pow(twist_known_to * twist_rad[joint], 2) + friction_rad * friction_rad;
+// Where links and gears were in each pose.
+struct Stand {
+  JointVector link_rad, twist_rad;
+};
+
+std::vector<Stand> stands_of(const models::Arm& arm, const std::vector<proof::Reading>& readings) {
+  std::vector<Stand> stands;
+  for (const proof::Reading& reading : readings) {
+    const JointVector link_rad = arm.link_from_motor(reading.motor_rad);
+    stands.push_back({link_rad, reading.motor_rad - link_rad});
   }
-  return std::sqrt(squares);
+  return stands;
 }
+
+// By how much the sensor may be tilted otherwise in one pose than in another. What is the same in all poses, the twist
+// of an axis that carries the whole arm, is a mounting error of the base.
+class Tilts {
+ public:
+  Tilts(const description::Cell& cell, const models::Arm& arm, const std::vector<proof::Reading>& readings,
+        const std::vector<Stand>& stands)
+      : mean_twist_rad_(JointVector::Zero(arm.axes())), friction_rad_(JointVector::Zero(arm.axes())) {
+    for (const Stand& stand : stands) mean_twist_rad_ += stand.twist_rad / static_cast<double>(stands.size());
+    for (Eigen::Index joint = 0; joint < arm.axes(); ++joint) {
+      turns_.push_back(!arm.slides(static_cast<int>(joint)));
+      const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(joint)];
+      const bool moved = std::any_of(readings.begin(), readings.end(), [&](const proof::Reading& reading) {
+        return reading.station.motor_rad[joint] != readings.front().station.motor_rad[joint];
+      });
+      if (!moved || drive.gear_stiffness_Nm_per_rad <= 0.0) continue;
+      friction_rad_[joint] = friction_share * drive.max_torque_Nm / drive.gear_stiffness_Nm_per_rad;
+    }
+  }
+
+  [[nodiscard]] double of(const Stand& stand) const {
+    double squares = linearity * linearity;
+    for (Eigen::Index joint = 0; joint < mean_twist_rad_.size(); ++joint) {
+      if (!turns_[static_cast<std::size_t>(joint)]) continue;
+      const double twist_rad = twist_known_to * (stand.twist_rad[joint] - mean_twist_rad_[joint]);
+      squares += twist_rad * twist_rad + friction_rad_[joint] * friction_rad_[joint];
+    }
+    return std::sqrt(squares);
+  }
+
+ private:
+  JointVector mean_twist_rad_, friction_rad_;
+  std::vector<bool> turns_;
+};
 
 // The standard deviation of a mean of n samples, from their steps Σ(xᵢ₊₁ − xᵢ)²: with white noise σ² = Σ/2(n − 1), and
 // the mean is known to σ/√n. Behind the sensor's low-pass neighbours are alike, φ = e^(−2π f T): steps are smaller,
@@ -47,18 +82,20 @@ double deviation_of_mean(const Vec3& step_squares, const proof::Reading& reading
 std::vector<PoseReading> placed(const description::Cell& cell, const std::vector<proof::Reading>& readings,
                                 const Allowances& allowances) {
   const models::Arm arm(cell);
+  const std::vector<Stand> stands = stands_of(arm, readings);
+  const Tilts tilts(cell, arm, readings, stands);
   std::vector<PoseReading> poses;
-  for (const proof::Reading& reading : readings) {
-    const JointVector link_rad = arm.link_from_motor(reading.motor_rad);
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const proof::Reading& reading = readings[k];
     const double bandwidth_Hz = cell.sensor.bandwidth_Hz;
     const double step_N = resolution_share * allowances.zero_drift_N;
     const double noise_N = deviation_of_mean(reading.step_squares_S.force, reading, bandwidth_Hz);
     const double noise_Nm = deviation_of_mean(reading.step_squares_S.torque, reading, bandwidth_Hz);
-    poses.push_back({.R_SW = arm.sensor_pose(link_rad).linear().transpose(),
+    poses.push_back({.R_SW = arm.sensor_pose(stands[k].link_rad).linear().transpose(),
                      .mean_S = {reading.force_S, reading.torque_S},
                      .noise_N = std::hypot(noise_N, step_N),
                      .noise_Nm = std::hypot(noise_Nm, lever_m * step_N),
-                     .tilt_rad = tilt_of_gears_rad(cell, arm, link_rad),
+                     .tilt_rad = tilts.of(stands[k]),
                      .time_s = reading.time_s});
   }
   return poses;

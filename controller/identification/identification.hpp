@@ -4,9 +4,9 @@
 // to be found: the fit begins with the cell's tool and is repeated with the one that it found. What is allowed for:
 //   mounting   0.5 degrees, of the sensor on its flange and of the base, about each axis
 //   drift      the cell's sensor.zero_drift_N from the first pose to the last
-//   gears      a fifth of the twist (stiffness is known to that), and 2 % of the drive's torque, over the stiffness
-//              (friction within the gear), all joints together
-//   sensor     0.2 % of the load (linearity), and steps of a thousandth of zero_drift_N: by default 1e-5 of its range
+//   gears      a fifth of the change of their twist from pose to pose (stiffness is known to that), and in joints that
+//              move 2 % of the drive's torque over the stiffness (friction within the gear), all joints together
+//   sensor     0.1 % of the load (linearity), and steps of a thousandth of zero_drift_N: by default 1e-5 of its range
 #pragma once
 
 #include <string>

@@ -4,8 +4,9 @@
     PROXARM_PROGRAM=build/release/controller/proxarm tests/soak/identify_hunt.py --tools 100 --seed 1
 
 The controller knows a shipped cell; the arm is given another tool (0.1 to 8 kg, its centre up to 0.2 m from S), a sensor
-that is mounted 0.5 degrees off, noise, and gears with friction, hysteresis and another stiffness than the cell says. The
-judge reads the truth from the files that it wrote and from the sensor's (zero = matrix · bias_counts / counts). Wanted:
+that is mounted 0.5 degrees off, a base that stands up to as much off, noise, and gears with friction, hysteresis and
+another stiffness than the cell says. The judge reads the truth from the files that it wrote and from the sensor's
+(zero = matrix · bias_counts / counts). Wanted:
   mass    within 1 % + 10 g, each time
   centre  within 2 mm, each time
   95 %    the mass, and each component of centre and zero, within its stated interval in 95 of 100
@@ -64,6 +65,8 @@ def made_arm(chance, text):
     text = replaced(text, r"inertia_kg_m2: \[[^]]*\]", f"inertia_kg_m2: {flow([inertia] * 3 + [0] * 3)}")
     text = replaced(text, r"(pose_link: \{position_m: \[[^]]*\], rpy_rad: )\[0, 0, 0\]",
                     lambda found: found[1] + flow([MOUNTING_RAD * x for x in direction(chance)]))
+    text = replaced(text, r"(base_W: \{position_m: \[[^]]*\], rpy_rad: )\[0, 0, 0\]",
+                    lambda found: found[1] + flow([chance.uniform(0, MOUNTING_RAD) * x for x in direction(chance)]))
     text = replaced(text, r"\n  noise_N: [\d.]+", f"\n  noise_N: {log_uniform(chance, 0.005, 0.05):.4g}")
     text = replaced(text, r"\n  noise_Nm: [\d.]+", f"\n  noise_Nm: {log_uniform(chance, 0.0003, 0.003):.4g}")
     gear = lambda: (f"\n      gear_hysteresis_rad: {chance.uniform(0, 1e-4):.3g}"
