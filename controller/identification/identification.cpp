@@ -150,8 +150,7 @@ std::string doubts(const ToolFit& fit, const Allowances& allowances) {
   if (!fit.mass_found) return "";
   constexpr double clearly = 4.0;
   if (fit.turned_rad > clearly * allowances.mounting_rad) {
-    return "the sensor seems to be turned by " +
-           description::rounded_text(fit.turned_rad * 180.0 / std::numbers::pi) +
+    return "the sensor seems to be turned by " + description::rounded_text(fit.turned_rad * 180.0 / std::numbers::pi) +
            " degrees against its cell: was a hand at the handle, or is sensor.pose_link or base_W wrong? `proxarm "
            "prove` tells signs, ratios and mounting";
   }

@@ -78,7 +78,9 @@ void take_row(Misfit& misfit, std::size_t pose, const Vec3& left, double deviati
   misfit.explained = deviation;
 }
 
-double prior(const Vec3& x, double deviation) { return deviation > 0.0 ? x.squaredNorm() / (deviation * deviation) : 0.0; }
+double prior(const Vec3& x, double deviation) {
+  return deviation > 0.0 ? x.squaredNorm() / (deviation * deviation) : 0.0;
+}
 
 class Fit {
  public:

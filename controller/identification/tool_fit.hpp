@@ -70,7 +70,6 @@ models::Vec3 spread(const std::vector<models::Mat3>& R_SW, const models::Vec3& g
 
 // Precondition: noise or allowances are above 0, so that no reading is taken for exact; gravity isn't 0. Fewer than
 // three readings, or poses that show nothing, give a fit in which nothing is found.
-ToolFit fit_tool(const std::vector<PoseReading>& readings, const models::Vec3& gravity_W,
-                 const Allowances& allowances);
+ToolFit fit_tool(const std::vector<PoseReading>& readings, const models::Vec3& gravity_W, const Allowances& allowances);
 
 }  // namespace proxarm::identification

@@ -126,8 +126,7 @@ Eigen::MatrixXd ways(const description::Cell& cell, const models::Arm& arm, cons
     for (Eigen::Index j = 0; j < i; ++j) {
       const JointVector &from = poses[static_cast<std::size_t>(i)], &to = poses[static_cast<std::size_t>(j)];
       const bool is_free = free_path(cell, arm, from, to);
-      way(i, j) = way(j, i) =
-          is_free ? (to - from).cwiseAbs().maxCoeff() : std::numeric_limits<double>::infinity();
+      way(i, j) = way(j, i) = is_free ? (to - from).cwiseAbs().maxCoeff() : std::numeric_limits<double>::infinity();
     }
   }
   return way;
@@ -161,9 +160,8 @@ std::vector<std::size_t> round_of(const Eigen::MatrixXd& way) {
 
 bool turns_weight(const description::Cell& cell, const models::Arm& arm, const std::vector<JointVector>& poses) {
   const Vec3 first = down_in_sensor(cell, arm, poses.front());
-  return std::any_of(poses.begin(), poses.end(), [&](const JointVector& pose) {
-    return (down_in_sensor(cell, arm, pose) - first).norm() > same;
-  });
+  return std::any_of(poses.begin(), poses.end(),
+                     [&](const JointVector& pose) { return (down_in_sensor(cell, arm, pose) - first).norm() > same; });
 }
 
 }  // namespace

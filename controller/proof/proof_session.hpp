@@ -44,8 +44,8 @@ struct Task {
 
 class ProofSession {
  public:
-  ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings,
-               const description::Cell& cell, Task task = {});
+  ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings, const description::Cell& cell,
+               Task task = {});
   ProofSession(const ProofSession&) = delete;
   ProofSession& operator=(const ProofSession&) = delete;
 

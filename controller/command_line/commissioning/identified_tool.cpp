@@ -136,10 +136,8 @@ std::vector<ToolDifference> compare(const IdentifiedTool& tool, const Cell& cell
   all.push_back({"tool.mass_kg", {cell.tool.mass_kg}, {fit.mass_kg}, {fit.mass_half_kg}});
   if (fit.centre_found) {
     const auto& centre = cell.tool.centre_of_mass_S_m;
-    all.push_back({"tool.centre_of_mass_S_m",
-                   {centre.begin(), centre.end()},
-                   list(fit.centre_S_m),
-                   list(fit.centre_half_m)});
+    all.push_back(
+        {"tool.centre_of_mass_S_m", {centre.begin(), centre.end()}, list(fit.centre_S_m), list(fit.centre_half_m)});
   }
   if (!zero) return all;
   all.push_back({"force_S_N of " + zero_path(cell).filename().string(),
@@ -162,10 +160,11 @@ std::string text(const IdentifiedTool& tool) {
       told += line("zero, torque", list(fit.zero_S.torque), list(fit.zero_half_S.torque), "Nm in S");
     }
     std::array<char, 240> allowed{};
-    std::snprintf(allowed.data(), allowed.size(),
-                  "\u00b1: 95 %% interval, with a mounting error of %.2g degrees, a zero that drifts by %.3g N meanwhile, "
-                  "and gears allowed for\n",
-                  identification::mounting_deg, tool.allowances.zero_drift_N);
+    std::snprintf(
+        allowed.data(), allowed.size(),
+        "\u00b1: 95 %% interval, with a mounting error of %.2g degrees, a zero that drifts by %.3g N meanwhile, "
+        "and gears allowed for\n",
+        identification::mounting_deg, tool.allowances.zero_drift_N);
     told += allowed.data();
   }
   if (!tool.not_shown.empty()) told += "not identifiable: " + tool.not_shown + "\n";
@@ -184,15 +183,9 @@ std::string text(const std::vector<ToolDifference>& differences) {
 
 Json json(const IdentifiedTool& tool) {
   const identification::ToolFit& fit = tool.fit;
-  Json told{{"identified", tool.whole()},
-            {"failure", tool.failure},
-            {"not_identifiable", tool.not_shown},
-            {"poses", tool.readings.size()},
-            {"real_arm", tool.real_arm},
-            {"mass_kg", nullptr},
-            {"centre_of_mass_S_m", nullptr},
-            {"zero_force_S_N", nullptr},
-            {"zero_torque_S_Nm", nullptr}};
+  Json told{{"identified", tool.whole()},    {"failure", tool.failure},   {"not_identifiable", tool.not_shown},
+            {"poses", tool.readings.size()}, {"real_arm", tool.real_arm}, {"mass_kg", nullptr},
+            {"centre_of_mass_S_m", nullptr}, {"zero_force_S_N", nullptr}, {"zero_torque_S_Nm", nullptr}};
   if (!tool.found()) return told;
   told["mass_kg"] = with_half({fit.mass_kg}, {fit.mass_half_kg});
   told["zero_force_S_N"] = with_half(list(fit.zero_S.force), list(fit.zero_half_S.force));

@@ -20,7 +20,7 @@ struct Tool {
   double mass_kg = 3.2;
   Vec3 centre_S_m = Vec3(0.02, -0.05, 0.12);
   Vec3 zero_N = Vec3(4.0, -2.5, 11.0), zero_Nm = Vec3(0.2, -0.1, 0.05);
-  Vec3 drift_N = Vec3::Zero();     // from the first pose to the last
+  Vec3 drift_N = Vec3::Zero();      // from the first pose to the last
   Mat3 mounted = Mat3::Identity();  // the sensor, against what its reader takes it for
 };
 

@@ -37,8 +37,7 @@ TEST(ToolStations, OfArmsThatCantTiltTheSensorSayThatNothingIsIdentifiable) {
     const models::Arm arm(cell);
     const std::vector<Station> stations = stations_of(cell, arm);
     EXPECT_EQ(stations.size(), 1u) << name;
-    EXPECT_NE(not_shown(cell, arm, stations, allowances_of(3.0)).find("no joint of the wrist tilts"),
-              std::string::npos)
+    EXPECT_NE(not_shown(cell, arm, stations, allowances_of(3.0)).find("no joint of the wrist tilts"), std::string::npos)
         << name;
   }
 }
