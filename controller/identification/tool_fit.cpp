@@ -17,6 +17,9 @@ constexpr double spread_over_mounting = 5.0;
 // The steps of Gauss-Newton are products of mounting errors, a hundredth each: four leave 1e-8 of the first.
 constexpr int steps = 6;
 
+// No tool's centre is much further away. It matters where nothing hangs there, which would leave c without any bound.
+constexpr double far_m = 1.0;
+
 // Unknowns of the forces: m, b, d, ε, δ. Of the torques: c, b', d'.
 constexpr int of_mass = 0, of_zero = 1, of_drift = 4, of_sensor = 7, of_base = 10, force_unknowns = 13;
 constexpr int of_centre = 0, of_torque_zero = 3, of_torque_drift = 6, torque_unknowns = 9;
@@ -25,6 +28,12 @@ Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
   m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
   return m;
+}
+
+Mat3 turned(const Vec3& by) {
+  const double angle_rad = by.norm();
+  if (angle_rad == 0.0) return Mat3::Identity();
+  return Eigen::AngleAxisd(angle_rad, by / angle_rad).toRotationMatrix();
 }
 
 // Least squares with N unknowns, row by row: A = Σ JᵀJ/σ², a = Σ Jᵀr/σ².
@@ -125,6 +134,7 @@ class Fit {
         normal.add(torque_jacobian(reading), reading.mean_S.torque, torque_deviation(reading));
       }
       normal.expect_zero(of_torque_drift, Vec3::Zero(), drift_Nm);
+      normal.expect_zero(of_centre, Vec3::Zero(), far_m);
       y = normal.step();
     }
     for (std::size_t k = 0; k < readings_.size(); ++k) {
@@ -150,9 +160,7 @@ class Fit {
   }
   // The weight of a kilogram in S, mounting errors included.
   [[nodiscard]] Vec3 weight_of_1_kg(const PoseReading& reading) const {
-    const Vec3 sensor = x_.segment<3>(of_sensor), base = x_.segment<3>(of_base);
-    const Vec3 u = reading.R_SW * gravity_W_;
-    return u + sensor.cross(u) + reading.R_SW * base.cross(gravity_W_);
+    return turned(x_.segment<3>(of_sensor)) * (reading.R_SW * (turned(x_.segment<3>(of_base)) * gravity_W_));
   }
   [[nodiscard]] Vec3 zero(const PoseReading& reading) const {
     return x_.segment<3>(of_zero) + before_last(reading) * x_.segment<3>(of_drift);
@@ -197,7 +205,7 @@ class Fit {
       J.col(of_mass) = weight_of_1_kg(reading);
       J.block<3, 3>(0, of_zero).setIdentity();
       J.block<3, 3>(0, of_drift) = before_last(reading) * Mat3::Identity();
-      J.block<3, 3>(0, of_sensor) = -m * cross_matrix(reading.R_SW * gravity_W_);
+      J.block<3, 3>(0, of_sensor) = -m * cross_matrix(J.col(of_mass));  // exact at ε = δ = 0
       J.block<3, 3>(0, of_base) = -m * reading.R_SW * cross_matrix(gravity_W_);
       normal.add(J, reading.mean_S.force - force(reading), force_deviation(reading));
     }

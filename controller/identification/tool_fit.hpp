@@ -1,11 +1,11 @@
 // Mass, centre of mass and zero of the sensor from its readings in poses at rest, with their uncertainty.
 //
-// At rest in pose k, with all vectors in S and u_k = R_SW(k) g:
-//   F_k = b + d s_k + m (u_k + ε × u_k + R_SW(k) (δ × g))      b: the zero at the last pose; d: its drift
-//   τ_k = b' + d' s_k + c × (F_k − b − d s_k)                   s_k: time before the last pose, −1 … 0 (the first pose)
-// ε turns the sensor against its flange and δ the base against the vertical, both small: mounting errors. The forces
-// are fitted first (Gauss-Newton from m and b alone, since m multiplies ε and δ), then the torques, which are linear in
-// c. The weight in them is the one that was read, so c is independent of mounting errors.
+// At rest in pose k, with all vectors but g and δ in S:
+//   F_k = b + d s_k + m R(ε) R_SW(k) R(δ) g      b: the zero at the last pose; d: its drift
+//   τ_k = b' + d' s_k + c × (F_k − b − d s_k)    s_k: time before the last pose, from −1 (the first) to 0
+// The rotation vectors ε and δ turn the sensor against its flange and the base against the vertical: mounting errors.
+// The forces are fitted first (Gauss-Newton from m and b alone, since m multiplies ε and δ), then the torques, which
+// are linear in c. The weight in them is the one that was read, so c is independent of mounting errors.
 //
 // Drift and mounting errors aren't wanted but not known either: each is an unknown with an expected value of 0 and a
 // stated standard deviation (Allowances), a row of its own in the least squares. The covariance is the inverse of the

@@ -20,8 +20,8 @@ constexpr std::size_t wrist_joints = 3;
 // Seven poses beside the first are 27 readings of a force for 13 unknowns; 5,040 rounds are all tried. Five are the
 // least that are worth the name.
 constexpr std::size_t chosen = 7, least_chosen = 5;
-constexpr double grid[] = {-1.0, -0.5, 0.0, 0.5, 1.0};  // of most_turn_rad, each joint
-constexpr int places_of_path = 24;
+constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};  // of most_turn_rad, that a joint is tried to be turned by
+constexpr int places_of_path = 16;                    // they are 20 mm apart at most
 // Two poses of which one shows nothing more than the other: the weight's directions are this close.
 constexpr double same = 1e-6;
 
@@ -58,19 +58,32 @@ bool free_path(const description::Cell& cell, const models::Arm& arm, const Join
   return true;
 }
 
-// All poses of the grid that the arm can go to from where it is, and back. A drive may be off by the following error
-// without a fault, so ends of ranges are kept by that.
+// By how much a joint alone can be turned to one side. A drive may be off by the following error without a fault, so
+// ends of ranges are kept by that.
+double turn_of(const description::Cell& cell, const models::Arm& arm, const JointVector& start, Eigen::Index joint,
+               double side) {
+  const auto& range = cell.drives[static_cast<std::size_t>(joint)].range_rad;
+  const double kept_rad = cell.limits.following_error_rad;
+  const double low = std::min(start[joint], range[0] + kept_rad), high = std::max(start[joint], range[1] - kept_rad);
+  for (const double share : shares) {
+    JointVector there = start;
+    there[joint] = std::clamp(start[joint] + side * share * most_turn_rad, low, high);
+    if (free_path(cell, arm, start, there)) return there[joint] - start[joint];
+  }
+  return 0.0;
+}
+
+// All poses of the grid that the arm can go to from where it is, and back: each joint as far as it can be turned alone,
+// and half as far.
 std::vector<JointVector> candidates(const description::Cell& cell, const models::Arm& arm, const JointVector& start) {
   std::vector<JointVector> poses{start};
   for (const Eigen::Index joint : wrist_of(arm)) {
-    const auto& range = cell.drives[static_cast<std::size_t>(joint)].range_rad;
-    const double kept_rad = cell.limits.following_error_rad;
-    const double low = std::min(start[joint], range[0] + kept_rad), high = std::max(start[joint], range[1] - kept_rad);
+    const double back = turn_of(cell, arm, start, joint, -1.0), forth = turn_of(cell, arm, start, joint, 1.0);
     std::vector<JointVector> more;
     for (const JointVector& pose : poses) {
-      for (const double share : grid) {
+      for (const double turn : {back, 0.5 * back, 0.0, 0.5 * forth, forth}) {
         more.push_back(pose);
-        more.back()[joint] = std::clamp(start[joint] + share * most_turn_rad, low, high);
+        more.back()[joint] += turn;
       }
     }
     poses = std::move(more);

@@ -82,7 +82,7 @@ TEST(ToolFit, ADriftThatIsEvenIsTakenForDrift) {
   EXPECT_TRUE(found.force.explained_all());
 }
 
-// To first order the angle is fitted; 0.5 degrees squared are 8e-5 of the weight.
+// The angle is fitted, a little less than it is, since none is expected.
 TEST(ToolFit, ASensorThatIsMountedHalfADegreeOffHardlyChangesTheResult) {
   Tool tool;
   tool.mounted = turned(half_degree * Vec3(0.6, -0.64, 0.48));
