@@ -61,6 +61,13 @@ struct ZeroOptions {
   std::filesystem::path out;  // empty: beside the cell
 };
 
+struct IdentifyOptions {
+  RunOptions run;
+  std::filesystem::path arm;  // cell of the simulated arm; empty: the same
+  bool compare = false;       // with the cell and its zero
+  bool write = false;         // into the cell and its zero
+};
+
 struct AssessOptions {
   RunOptions run;
   std::filesystem::path thresholds;  // empty: the shipped ones
@@ -86,6 +93,7 @@ int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
 int prove_command(const ProveOptions& options);          // 1: not proven
 int zero_command(const ZeroOptions& options);            // 1: somebody was there
+int identify_command(const IdentifyOptions& options);    // 1: not identified, or another than the cell's
 int calibrate_command(const CalibrateOptions& options);  // 1: poses that don't fit one another
 int assess_command(const AssessOptions& options);        // 1: a threshold is exceeded
 

@@ -360,6 +360,25 @@ void add_prove_options(CLI::App& app, command_line::ProveOptions& options) {
   app.add_flag("--json", options.run.json, "print the verdict as one JSON object");
 }
 
+void add_identify_options(CLI::App& app, command_line::IdentifyOptions& options) {
+  add_session_options(app, options.run);
+  leave_out(app, {"--scene", "--mass", "--damping", "--spring", "--stiffness", "--scheme", "--duration",
+                  "--extra-delay", "--lookahead"});
+  app.remove_option(app.get_option("--hand"));
+  app.add_option("--hand", options.run.hand, "simulated arm only: file of a hand at the handle (default: nobody)")
+      ->type_name("FILE");
+  add_fault_option(app, options.run);
+  add_enabling_option(app, options.run);
+  add_hardware_option(app, options.run);
+  add_arm_option(app, options.arm);
+  app.add_flag("--compare", options.compare,
+               "what differs from the cell and its CELL.zero, and whether by more than the uncertainty. Status 1: "
+               "something does");
+  app.add_flag("--write", options.write,
+               "write tool.mass_kg and tool.centre_of_mass_S_m into the cell, with a backup, and the zero beside it");
+  app.add_flag("--json", options.run.json, "print the result as one JSON object");
+}
+
 std::vector<double> angles_of(const std::string& text) {
   std::vector<double> angles;
   std::istringstream parts(text);
@@ -571,6 +590,15 @@ class Commands {
     add_hardware_option(*zero, zero_.run);
     add_arm_option(*zero, zero_.arm);
     zero->add_option("--out", zero_.out, "file of the zero (default: beside the cell, CELL.zero)")->type_name("FILE");
+    add_identify_options(
+        *add("identify",
+             "mass, centre of mass and zero of what hangs behind the sensor, by slow motions of the wrist, with their "
+             "uncertainty. Status 1: not identified",
+             [this] {
+               identify_.run.without_proof = true;
+               return identify_command(identify_);
+             }),
+        identify_);
     add_calibrate_options(
         *add(
             "calibrate",
@@ -599,6 +627,7 @@ class Commands {
   command_line::SchemaOptions schema_;
   command_line::ProveOptions prove_;
   command_line::ZeroOptions zero_;
+  command_line::IdentifyOptions identify_;
   command_line::CalibrateOptions calibrate_;
   command_line::AssessOptions assess_;
 };

@@ -12,7 +12,6 @@
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/proof_run.hpp"
 #include "models/base/setup_error.hpp"
-#include "models/base/text.hpp"
 #include "models/files/json.hpp"
 
 namespace proxarm::command_line {
@@ -33,36 +32,6 @@ PreparedSession prepared(const RunOptions& options) {
                                  .key = "prove",
                                  .found = "a cell of the impedance type",
                                  .expected = "one whose drives take positions"});
-}
-
-void refuse_on_interfaces(const ProveOptions& options) {
-  const char* key = !options.arm.empty()            ? "--arm"
-                    : !options.run.faults.empty()   ? "--fault"
-                    : !options.run.enabling.empty() ? "--enabling"
-                                                    : nullptr;
-  if (key == nullptr) return;
-  throw description::SetupError({.key = key,
-                                 .found = "a bus that isn't simulated",
-                                 .expected = "--bus sim, where the arm is simulated",
-                                 .advice = "on an interface, give it to `proxarm sim`"});
-}
-
-// What ended the session before all was read, and brakes that don't hold; empty: nothing.
-std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome) {
-  using controller::Fault;
-  if (outcome.fault.fault != Fault::none) {
-    const bool of_joint = outcome.fault.where >= 0;
-    const std::string where =
-        of_joint ? session.cell.drives[static_cast<std::size_t>(outcome.fault.where) % session.cell.drives.size()].joint
-                 : controller::standing_force_text(outcome.fault, session.cell.gravity_W_m_per_s2);
-    return controller::describe(outcome.fault, where);
-  }
-  if (outcome.not_pushed) return "nobody pushed, or took the hand off again, within a minute";
-  if (!outcome.complete) return "the session ended before all was read";
-  if (!outcome.slipped_rad) return "the brakes were never seen closed";
-  if (*outcome.slipped_rad <= session.cell.limits.following_error_rad) return "";
-  return "the brakes don't hold: a joint moved by " + description::rounded_text(*outcome.slipped_rad) +
-         " rad in a second without power";
 }
 
 // The hand of an arm that is a process of its own hears no question.
@@ -96,7 +65,7 @@ Json json_of(const proof::Verdict& verdict, const std::string& failure) {
 int prove_command(const ProveOptions& options) {
   const bool simulated = options.run.bus.simulated();
   require_interface_for_hardware(options.run);
-  if (!simulated) refuse_on_interfaces(options);
+  if (!simulated) refuse_simulated_options(options.run, options.arm);
   const PreparedSession session = prepared(options.run);
   if (!options.bus_loss) proof::require_provable(session.cell, models::Arm(session.cell));
   require_enabling_switch(session, options.run);

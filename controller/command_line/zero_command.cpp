@@ -8,7 +8,6 @@
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/zero_run.hpp"
-#include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -24,24 +23,12 @@ PreparedSession prepared(RunOptions options) {
   return session;
 }
 
-void refuse_on_interfaces(const ZeroOptions& options) {
-  const char* key = !options.arm.empty()            ? "--arm"
-                    : !options.run.faults.empty()   ? "--fault"
-                    : !options.run.enabling.empty() ? "--enabling"
-                                                    : nullptr;
-  if (key == nullptr) return;
-  throw description::SetupError({.key = key,
-                                 .found = "a bus that isn't simulated",
-                                 .expected = "--bus sim, where the arm is simulated",
-                                 .advice = "on an interface, give it to `proxarm sim`"});
-}
-
 }  // namespace
 
 int zero_command(const ZeroOptions& options) {
   const bool simulated = options.run.bus.simulated();
   require_interface_for_hardware(options.run);
-  if (!simulated) refuse_on_interfaces(options);
+  if (!simulated) refuse_simulated_options(options.run, options.arm);
   const PreparedSession session = prepared(options.run);
   require_enabling_switch(session, options.run);
   RunOptions of_arm = options.run;

@@ -33,6 +33,11 @@ struct Reading {
   Station station;
   models::JointVector motor_rad;  // by the encoders
   models::Vec3 force_S = models::Vec3::Zero();
+  // For who asks how well the mean is known, too (controller/identification):
+  models::Vec3 torque_S = models::Vec3::Zero();
+  models::Wrench step_squares_S{};  // Σ(xᵢ₊₁ − xᵢ)² of the samples, by axis
+  int samples = 0;
+  double time_s = 0.0, lasted_s = 0.0;  // its end, since the first cycle; how long samples were taken
 };
 
 // The bound of ρ. A scale that is wrong by 15 % reaches it; one wrong joint in six makes five times as much.

@@ -15,7 +15,6 @@ using models::Vec3;
 
 // Paths keep to these shares of the speed limits, since T moves along arcs and drives overshoot.
 constexpr double share_of_speed = 0.7, share_of_joint_speed = 0.25, peak_of_minimum_jerk = 15.0 / 8.0;
-constexpr double settle_s = 0.4, read_s = 0.3;
 // A force above push_N is a push once it has lasted; below no_push_N it is over.
 constexpr double push_N = 8.0, no_push_N = 2.0, steady_s = 0.3, push_timeout_s = 60.0;
 constexpr double run_out_s = 0.1, brakes_watched_s = 1.0, disable_timeout_s = 1.0;
@@ -42,10 +41,11 @@ double longest_feedback_s(const controller::CycleParts& parts) {
 }  // namespace
 
 ProofSession::ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings,
-                           const description::Cell& cell)
+                           const description::Cell& cell, Task task)
     : parts_(std::move(parts)),
       settings_(settings),
       cell_(cell),
+      task_(std::move(task)),
       limits_(slow(cell.limits)),
       supervisor_(controller::reactions_of(parts_.supervision)),
       alarm_(supervisor_, cycle_),
@@ -151,7 +151,8 @@ void ProofSession::tare(double in_phase_s) noexcept {
 bool ProofSession::needs_plan() const noexcept { return entered_ == Phase::rendering && stations_.empty(); }
 
 void ProofSession::begin_plan() {
-  std::vector<Station> stations = plan(cell_, *parts_.arm, setpoints_.values);
+  std::vector<Station> stations =
+      task_.stations ? task_.stations(setpoints_.values) : plan(cell_, *parts_.arm, setpoints_.values);
   readings_.reserve(stations.size());
   stations_ = std::move(stations);
   begin_move(stations_.front().motor_rad);
@@ -181,8 +182,7 @@ void ProofSession::begin_move(const JointVector& to_rad) noexcept {
 void ProofSession::go_to(Step step) noexcept {
   step_ = step;
   step_s_ = pressed_s_ = 0.0;
-  force_sum_S_.setZero();
-  samples_ = 0;
+  gathered_ = {};
   const bool asks = step == Step::waiting, frees = step == Step::releasing;
   asked_ = asks ? Asked::push : frees ? Asked::let_go : Asked::nothing;
 }
@@ -204,7 +204,7 @@ void ProofSession::follow_plan() noexcept {
       if (path_s_ >= duration_s_) go_to(Step::settling);
       return;
     case Step::settling:
-      if (step_s_ < settle_s) return;
+      if (step_s_ < task_.settle_s) return;
       return go_to(stations_[station_].push_W.isZero() ? Step::reading : Step::waiting);
     case Step::waiting:
       return wait_for_push(true);
@@ -227,16 +227,33 @@ void ProofSession::wait_for_push(bool pressed) noexcept {
   }
 }
 
+void ProofSession::add_sample(const models::Wrench& reading_S) noexcept {
+  Gathered& g = gathered_;
+  if (g.samples > 0) {
+    g.step_squares_S.force += (reading_S.force - g.last_S.force).cwiseAbs2();
+    g.step_squares_S.torque += (reading_S.torque - g.last_S.torque).cwiseAbs2();
+  }
+  g.last_S = reading_S;
+  g.sum_S.force += reading_S.force;
+  g.sum_S.torque += reading_S.torque;
+  ++g.samples;
+}
+
 void ProofSession::read() noexcept {
   const controller::Measured& measured = measurement_.now();
-  if (measured.sample_is_new) {
-    force_sum_S_ += measured.reading_S.force;
-    ++samples_;
-  }
-  if (step_s_ < read_s || samples_ == 0) return;
+  if (measured.sample_is_new) add_sample(measured.reading_S);
+  const Gathered& g = gathered_;
+  if (step_s_ < task_.read_s || g.samples == 0) return;
   const Station& station = stations_[station_];
-  const Vec3 mean_S = force_sum_S_ / samples_;
-  readings_.push_back({station, measured.motor_rad, mean_S});  // begin_plan() has reserved the room
+  const Vec3 mean_S = g.sum_S.force / g.samples;
+  readings_.push_back({.station = station,  // begin_plan() has reserved the room
+                       .motor_rad = measured.motor_rad,
+                       .force_S = mean_S,
+                       .torque_S = g.sum_S.torque / g.samples,
+                       .step_squares_S = g.step_squares_S,
+                       .samples = g.samples,
+                       .time_s = settings_.period_s * static_cast<double>(cycle_),
+                       .lasted_s = step_s_});
   if (!station.push_W.isZero()) return go_to(Step::releasing);
   unpushed_S_ = mean_S;
   next_station();

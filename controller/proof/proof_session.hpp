@@ -1,6 +1,5 @@
 // The session in which an arm is proven: by small slow motions of each joint and by pushes, under the same supervision
-// as any other session.
-// any other session.
+// as any other session. With other stations than a proof's it reads whatever is read of an arm that stands: Task.
 //
 // After enabling and taring, the session follows its plan: move, settle, read; and where a push is needed: wait for it,
 // read, wait for its end. Then the drives are switched off, and the brakes are watched for a second.
@@ -13,6 +12,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -35,10 +35,17 @@ inline constexpr double proof_speed_m_per_s = 0.1;
 // What the person is asked to do, as one number that another thread may read.
 enum class Asked : std::uint8_t { nothing, press, push, let_go };
 
+// Where the arm goes, from the motors' angles at which it was found, and how long it stands there: before it is read,
+// and while it is.
+struct Task {
+  std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: the proof's, plan()
+  double settle_s = 0.4, read_s = 0.3;
+};
+
 class ProofSession {
  public:
-  ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings,
-               const description::Cell& cell);
+  ProofSession(controller::CycleParts parts, const controller::SessionSettings& settings, const description::Cell& cell,
+               Task task = {});
   ProofSession(const ProofSession&) = delete;
   ProofSession& operator=(const ProofSession&) = delete;
 
@@ -73,6 +80,11 @@ class ProofSession {
 
  private:
   enum class Step : std::uint8_t { moving, settling, waiting, reading, releasing };
+  // The samples of the reading that is under way.
+  struct Gathered {
+    models::Wrench sum_S, last_S, step_squares_S;
+    int samples = 0;
+  };
   class NoListener final : public controller::FrameListener {
    public:
     bool on_frame(std::size_t /*bus*/, const fieldbus::CanFrame& /*frame*/) noexcept override { return false; }
@@ -88,6 +100,7 @@ class ProofSession {
   void move() noexcept;
   void wait_for_push(bool pressed) noexcept;
   void read() noexcept;
+  void add_sample(const models::Wrench& reading_S) noexcept;
   void next_station() noexcept;
   void begin_move(const models::JointVector& to_rad) noexcept;
   void watch_brakes(double in_phase_s) noexcept;
@@ -96,6 +109,7 @@ class ProofSession {
   controller::CycleParts parts_;
   controller::SessionSettings settings_;
   description::Cell cell_;
+  Task task_;
   description::CellLimits limits_;
   std::uint64_t cycle_ = 0;
   controller::Supervisor supervisor_;
@@ -118,8 +132,8 @@ class ProofSession {
   double step_s_ = 0.0, pressed_s_ = 0.0;  // the time in this step; how long a push, or its end, has lasted
   models::JointVector from_rad_, way_rad_;
   double duration_s_ = 0.0, path_s_ = 0.0, rate_ = 1.0;
-  models::Vec3 force_sum_S_ = models::Vec3::Zero(), unpushed_S_ = models::Vec3::Zero();
-  int samples_ = 0;
+  models::Vec3 unpushed_S_ = models::Vec3::Zero();
+  Gathered gathered_;
   bool not_pushed_ = false;
   models::JointVector braked_rad_;
   std::optional<double> slipped_rad_;

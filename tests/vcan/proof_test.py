@@ -1,4 +1,5 @@
-"""`proxarm prove` on interfaces, where nobody pushes and where somebody does: minutes of the arm's time."""
+"""`proxarm prove` and `proxarm identify` on interfaces, where nobody pushes and where somebody does: minutes of the arm's time."""
+import json
 import subprocess
 from pathlib import Path
 
@@ -50,6 +51,17 @@ class Proof(two.VcanTestCase):
         self.assertIn("push the handle along +x of the world W", done.stderr)
         self.assertIn("nobody pushed", done.stdout)
         self.assertFalse((self.folder / "proof").exists())
+
+    def test_what_hangs_behind_the_sensor_is_identified_on_interfaces(self):
+        with two.simulated_arm(two.THREE, HELPER):
+            done = subprocess.run([two.PROGRAM, "identify", "--bus", two.THREE, "--json"], capture_output=True,
+                                  text=True, timeout=600, stdin=subprocess.DEVNULL)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        found = json.loads(done.stdout)
+        self.assertFalse(found["real_arm"])
+        self.assertAlmostEqual(found["mass_kg"]["value"], 0.25, delta=0.0125)
+        for value, truth in zip(found["centre_of_mass_S_m"]["value"], (0, 0, 0.06)):
+            self.assertAlmostEqual(value, truth, delta=0.002)
 
 
 if __name__ == "__main__":

@@ -1,34 +1,16 @@
 #include "controller/command_line/commissioning/offsets.hpp"
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <limits>
 #include <regex>
-#include <sstream>
 
+#include "controller/command_line/commissioning/cell_change.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::command_line {
 namespace {
 
-namespace fs = std::filesystem;
 using description::SetupError;
-
-std::string read_text(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  if (!in) throw SetupError({.file = file.string(), .message = "can't be read"});
-  return text.str();
-}
-
-void write_text(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  out << text;
-  out.flush();
-  if (!out) throw SetupError({.file = file.string(), .message = "can't be written"});
-}
 
 // Where `joint: NAME` ends in the text, a comment apart; npos: nowhere.
 std::size_t end_of_joint(const std::string& text, const std::string& joint, std::size_t from) {
@@ -51,15 +33,6 @@ std::size_t end_of_drive(const std::string& text, std::size_t from) {
   std::smatch match;
   if (!std::regex_search(text.begin() + static_cast<std::ptrdiff_t>(from), text.end(), match, next)) return text.size();
   return from + static_cast<std::size_t>(match.position(0));
-}
-
-fs::path backup_of(const fs::path& file) {
-  for (int number = 1; number < 1000; ++number) {
-    const fs::path backup = file.string() + ".before-calibration" + (number == 1 ? "" : "-" + std::to_string(number));
-    std::error_code ignored;
-    if (!fs::exists(backup, ignored)) return backup;
-  }
-  throw SetupError({.file = file.string(), .message = "a thousand backups are there already"});
 }
 
 }  // namespace
@@ -107,12 +80,8 @@ std::string with_offsets(const std::string& text, const description::Cell& cell,
   return changed;
 }
 
-fs::path write_offsets(const description::Cell& cell, const std::vector<std::int32_t>& offsets) {
-  const std::string before = read_text(cell.file);
-  const fs::path fresh = cell.file.string() + ".calibrating";
-  write_text(fresh, with_offsets(before, cell, offsets));
-  try {
-    const description::Cell written = description::load_cell(fresh);
+std::filesystem::path write_offsets(const description::Cell& cell, const std::vector<std::int32_t>& offsets) {
+  const auto check = [&](const description::Cell& written) {
     for (std::size_t i = 0; i < offsets.size(); ++i) {
       if (written.drives.size() == offsets.size() && written.drives[i].offset_counts == offsets[i]) continue;
       throw SetupError({.file = cell.file.string(),
@@ -120,15 +89,9 @@ fs::path write_offsets(const description::Cell& cell, const std::vector<std::int
                         .message = "can't be changed in this file; write it by hand",
                         .expected = std::to_string(offsets[i])});
     }
-  } catch (const SetupError&) {
-    std::error_code ignored;
-    fs::remove(fresh, ignored);
-    throw;
-  }
-  const fs::path backup = backup_of(cell.file);
-  write_text(backup, before);
-  fs::rename(fresh, cell.file);
-  return backup;
+  };
+  return change_cell(
+      cell.file, "calibration", [&](const std::string& text) { return with_offsets(text, cell, offsets); }, check);
 }
 
 }  // namespace proxarm::command_line

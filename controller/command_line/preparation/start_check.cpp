@@ -362,6 +362,19 @@ void require_nodes_apart(const PreparedSession& session, const std::vector<std::
   }
 }
 
+void refuse_simulated_options(const RunOptions& options, const std::filesystem::path& arm) {
+  const char* key = !arm.empty()                ? "--arm"
+                    : !options.faults.empty()   ? "--fault"
+                    : !options.enabling.empty() ? "--enabling"
+                    : !options.hand.empty()     ? "--hand"
+                                                : nullptr;
+  if (key == nullptr) return;
+  throw SetupError({.key = key,
+                    .found = "a bus that isn't simulated",
+                    .expected = "--bus sim, where the arm is simulated",
+                    .advice = "on an interface, give it to `proxarm sim`"});
+}
+
 void require_view(const RunOptions& options) {
   if (options.view || (options.view_port == 0 && options.allowed_origins.empty())) return;
   throw description::SetupError({.key = options.view_port != 0 ? "--view-port" : "--allow-origin",

@@ -27,6 +27,10 @@ void require_usable_start(const PreparedSession& session);
 // Throws SetupError where `--enabling` has no simulated enabling switch that it could press.
 void require_enabling_switch(const PreparedSession& session, const RunOptions& options);
 
+// Throws SetupError where an option of a simulated arm is given, one of them its cell, `arm`. Precondition: on
+// interfaces.
+void refuse_simulated_options(const RunOptions& options, const std::filesystem::path& arm);
+
 // Throws SetupError where there are options of a view and none is wanted.
 void require_view(const RunOptions& options);
 

@@ -11,8 +11,10 @@
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
+#include "controller/library/simulated_loop.hpp"
 #include "controller/session/bring_up.hpp"
 #include "fieldbus/simulated/simulated_can_network.hpp"
+#include "models/base/text.hpp"
 #include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
@@ -106,27 +108,49 @@ class Announcer {
 
 }  // namespace
 
-ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options) {
+std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome) {
+  using controller::Fault;
+  if (outcome.fault.fault != Fault::none) {
+    const bool of_joint = outcome.fault.where >= 0;
+    const std::string where =
+        of_joint ? session.cell.drives[static_cast<std::size_t>(outcome.fault.where) % session.cell.drives.size()].joint
+                 : controller::standing_force_text(outcome.fault, session.cell.gravity_W_m_per_s2);
+    return controller::describe(outcome.fault, where);
+  }
+  if (outcome.not_pushed) return "nobody pushed, or took the hand off again, within a minute";
+  if (!outcome.complete) return "the session ended before all was read";
+  if (!outcome.slipped_rad) return "the brakes were never seen closed";
+  if (*outcome.slipped_rad <= session.cell.limits.following_error_rad) return "";
+  return "the brakes don't hold: a joint moved by " + description::rounded_text(*outcome.slipped_rad) +
+         " rad in a second without power";
+}
+
+ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
+                             const proof::Task& task) {
   fieldbus::SimulatedCanNetwork network(sim::simulated_buses(arm.cell));
   description::HandDescription nobody;
   nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
   sim::SimulatedCellConfig config;
   config.faults = options.faults;
   config.enabling = options.enabling;
-  sim::SimulatedCell far_end(arm.cell, arm.sensor, nobody, network.events(), config);
+  const description::HandDescription& hand_there = options.hand.empty() ? nobody : arm.hand;
+  sim::SimulatedCell far_end(arm.cell, arm.sensor, hand_there, network.events(), config);
   scenes::CompiledScene scene = scenes::compile(session.scene);
+  const controller::ModbusOpener open_line = [&](const description::ModbusLineDescription& line, double) {
+    return far_end.modbus_client(line.name);
+  };
   controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         buses_in_order(session.cell));
+                                                         buses_in_order(session.cell), open_line);
   far_end.attach_to(network);
   far_end.power_on();
-  controller::bring_up(parts);
-  proof::ProofSession proof(std::move(parts), session.settings, session.cell);
+  controller::bring_up(parts, [&](fieldbus::ModbusLine& line) { controller::pump(network, line, network.now_ns()); });
+  proof::ProofSession proof(std::move(parts), session.settings, session.cell, task);
   SimulatedHand hand(far_end);
   run(proof, network, session.settings.period_s, [&] { hand.heed(proof); });
   return outcome_of(proof);
 }
 
-ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options) {
+ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options, const proof::Task& task) {
   const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
   require_nodes_apart(session, interfaces);
   fieldbus::SocketCanNetwork network = open_network(interfaces);
@@ -138,7 +162,7 @@ ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOption
                                                          controller::opener_of(fieldbus::ModbusPeers::any));
   set_filters(network, parts);
   bring_up_devices(parts);
-  proof::ProofSession proof(std::move(parts), session.settings, session.cell);
+  proof::ProofSession proof(std::move(parts), session.settings, session.cell, task);
   SignalWatch signals([&] { proof.request_stop(); });
   {
     const Announcer announcer(proof);

@@ -1,5 +1,8 @@
-// `proxarm prove`: the session of a proof, against a simulated arm in this process or on interfaces.
+// `proxarm prove` and what moves as it does: the session, against a simulated arm in this process or on interfaces.
 #pragma once
+
+#include <string>
+#include <vector>
 
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/proof/proof_session.hpp"
@@ -14,12 +17,17 @@ struct ProofOutcome {
   bool real_arm = false;
 };
 
+// What ended the session before all was read, and brakes that don't hold; empty: nothing.
+std::string failure_of(const PreparedSession& session, const ProofOutcome& outcome);
+
 // `arm`: what the simulated arm is, where that isn't what the controller takes it for. A simulated hand pushes where it
-// is asked to. In virtual time, nothing printed.
-ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options);
+// is asked to; with options.hand that one is at the handle all along. In virtual time, nothing printed.
+ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
+                             const proof::Task& task = {});
 
 // On the interfaces of options.bus, in real time; tells on standard error what is to be done. Throws SetupError as
 // `run` does, but wants no proof.
-ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options);
+ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options,
+                                 const proof::Task& task = {});
 
 }  // namespace proxarm::command_line

@@ -1,0 +1,110 @@
+#include <cstdio>
+#include <limits>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/commissioning/identified_tool.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/cell_buses.hpp"
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/command_line/sessions/proof_run.hpp"
+#include "controller/identification/tool_stations.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+constexpr int not_identified = 1;
+// The arm swings out at 10 Hz and more after each way; the mean of half a second is known to a few millinewtons.
+constexpr double settle_s = 0.7, read_s = 0.5;
+
+PreparedSession prepared_to_identify(const RunOptions& options) {
+  RunOptions run = options;
+  run.scene = shipped_file("scenes/free.yaml");
+  PreparedSession session = prepare(run);
+  if (!session.impedance()) return session;
+  throw description::SetupError({.file = session.cell.file.string(),
+                                 .key = "identify",
+                                 .found = "a cell of the impedance type",
+                                 .expected = "one whose drives take positions: torques don't hold poses to a "
+                                             "milliradian"});
+}
+
+ProofOutcome read(const PreparedSession& session, const IdentifyOptions& options, const models::Arm& arm) {
+  const proof::Task task{.stations =
+                             [&](const models::JointVector& motor_rad) {
+                               return identification::tool_stations(session.cell, arm, motor_rad);
+                             },
+                         .settle_s = settle_s,
+                         .read_s = read_s};
+  if (!options.run.bus.simulated()) return prove_on_interfaces(session, options.run, task);
+  RunOptions of_arm = options.run;
+  if (!options.arm.empty()) of_arm.cell = options.arm;
+  return prove_simulated(session, prepared_to_identify(of_arm), options.run, task);
+}
+
+void require_bus(const PreparedSession& session, const IdentifyOptions& options) {
+  require_enabling_switch(session, options.run);
+  if (options.run.bus.simulated()) return require_carried(session, options.run);
+  require_carried_on(options.run.bus.interfaces(bus_names(session.cell)), session, options.run);
+}
+
+IdentifiedTool identified(PreparedSession session, const IdentifyOptions& options) {
+  IdentifiedTool tool;
+  tool.allowances = identification::allowances_of(session.settings.zero_drift_N);
+  // What hangs there is to be found: whatever is read at first is right.
+  session.settings.zero_drift_N = std::numeric_limits<double>::infinity();
+  const models::Arm arm(session.cell);
+  const auto stations = identification::tool_stations(session.cell, arm, arm.motor_from_link(arm.start_rad()));
+  tool.not_shown = identification::not_shown(session.cell, arm, stations, tool.allowances);
+  if (stations.size() == 1) return tool;
+  const ProofOutcome outcome = read(session, options, arm);
+  tool.failure = failure_of(session, outcome);
+  tool.real_arm = outcome.real_arm;
+  tool.readings = outcome.readings;
+  if (!tool.failure.empty()) return tool;
+  tool.fit = identification::identify_tool(session.cell, tool.readings, tool.allowances);
+  tool.failure = identification::doubts(tool.fit, tool.allowances);
+  if (tool.fit.mass_found && !tool.fit.centre_found && tool.not_shown.empty()) {
+    tool.not_shown = "centre of mass and zero of the torque: the mass is no more than its uncertainty";
+  }
+  return tool;
+}
+
+void write(const IdentifiedTool& tool, const PreparedSession& session, bool told) {
+  const std::filesystem::path backup = write_tool(tool, session);
+  if (!told) return;
+  std::printf(
+      "written to %s and %s; before: %s\n"
+      "a proof of the cell as it was holds no more; tool.inertia_kg_m2 is as it was: poses at rest don't show it\n",
+      session.cell.file.c_str(), zero_path(session.cell).c_str(), backup.c_str());
+}
+
+}  // namespace
+
+int identify_command(const IdentifyOptions& options) {
+  require_interface_for_hardware(options.run);
+  if (!options.run.bus.simulated()) refuse_simulated_options(options.run, options.arm);
+  const PreparedSession session = prepared_to_identify(options.run);
+  require_bus(session, options);
+  const IdentifiedTool tool = identified(session, options);
+  std::vector<ToolDifference> differences;
+  bool same = true;
+  if (options.compare) {
+    differences = compare(tool, session.cell, kept_zero(session, tool.real_arm));
+    for (const ToolDifference& difference : differences) same = same && !difference.differs();
+  }
+  if (options.run.json) {
+    description::Json told = json(tool);
+    if (options.compare) told["compared"] = json(differences);
+    std::printf("%s\n", told.dump().c_str());
+  } else {
+    std::fputs((text(tool) + text(differences)).c_str(), stdout);
+  }
+  if (!tool.whole()) return not_identified;
+  if (options.write) write(tool, session, !options.run.json);
+  return same || options.write ? fine : not_identified;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,137 @@
+#!/usr/bin/python3
+"""`proxarm identify`: what hangs behind the sensor, found on arms that carry another tool than their cell says.
+
+The judge of masses, centres and zeros is tests/soak/identify_hunt.py, which reads the truth from the files."""
+import json
+import math
+import re
+import sys
+import unittest
+
+from harness import SOURCE, ProgramTest
+
+sys.path.insert(0, str(SOURCE / "tests/soak"))
+import identify_hunt as hunt  # noqa: E402
+
+HELD = """name: {name}
+mass_kg: 0.5
+stiffness_N_per_m: 200
+damping_Ns_per_m: 10
+max_force_N: {newtons}
+waypoints:
+  - {{time_s: 1.0, offset_m: [0, 0, 0]}}
+  - {{time_s: 4.0, offset_m: [0.05, 0.05, 0]}}
+"""
+
+
+class Identify(ProgramTest):
+    def cell(self, name, *, of="default.yaml", change=lambda text: text):
+        """A copy of a shipped cell that nobody else uses, in the test's folder."""
+        path = SOURCE / "models/cells" / of
+        return self.written(name, change(hunt.rooted(path.read_text())))
+
+    def identify(self, *arguments, status=0):
+        outcome = self.call("identify", "--json", *arguments)
+        self.assertEqual((outcome.status, outcome.err), (status, ""), outcome.out)
+        return json.loads(outcome.out)
+
+    def heavier(self, name="arm.yaml"):
+        return self.cell(name, change=lambda text: text.replace("  mass_kg: 0.25\n", "  mass_kg: 1.75\n", 1).replace(
+            "centre_of_mass_S_m: [0, 0, 0.06]", "centre_of_mass_S_m: [0.03, -0.02, 0.09]", 1))
+
+    def test_random_tools_are_found_and_the_intervals_are_true(self):
+        judge = hunt.Judge()
+        for n in range(4):
+            hunt.session(judge, f"fast/{n}", self.folder)
+        self.assertEqual(judge.missed, [])
+        # Of 4 masses and 12 components each, one in twenty may be missed: two of twelve are, in one of eight such tests.
+        for kind, true in judge.true.items():
+            self.assertGreaterEqual(sum(true), len(true) - 2, kind)
+
+    def test_the_result_is_told_compared_and_written(self):
+        cell, arm = self.cell("mine.yaml"), self.heavier()
+        before = cell.read_text()
+        told = self.call("identify", cell, "--arm", arm, "--compare", "--write")
+        self.assertEqual((told.status, told.err), (0, ""), told.out)
+        self.assertRegex(told.out, r"(?m)^  mass +1\.7\d+ kg, ± 0\.\d+$")
+        self.assertRegex(told.out, r"tool\.mass_kg: 0\.25\d*, found 1\.7\d+: DIFFERS")
+        self.assertIn("mounting error of 0.5 degrees, a zero that drifts by 3.3 N", told.out)
+        self.assertIn("mine.yaml.before-identify", told.out)
+        self.assertEqual((self.folder / "mine.yaml.before-identify").read_text(), before)
+        after = cell.read_text()
+        mass = float(re.search(r"\n  mass_kg: ([\d.]+)", after)[1])
+        centre = [float(x) for x in re.search(r"centre_of_mass_S_m: \[([^]]*)\]", after)[1].split(",")]
+        self.assertAlmostEqual(mass, 1.75, delta=0.0275)
+        self.assertLess(math.dist(centre, (0.03, -0.02, 0.09)), 0.002)
+        blank = lambda text: re.sub(r"(\n  mass_kg:|centre_of_mass_S_m:).*", r"\1", text)
+        self.assertEqual(blank(after), blank(before), "all else stays")
+        zero = (self.folder / "mine.yaml.zero").read_text()
+        self.assertIn("arm: simulated\n", zero)
+        read = [float(x) for x in re.search(r"force_S_N: \[([^]]*)\]", zero)[1].split(",")]
+        self.assertLess(math.dist(read, hunt.zero_of_sensor()[0]), 0.1)
+        # The cell is now as the arm is: a session starts, and a comparison finds no difference.
+        run = self.call("run", cell, "--arm", arm, "--duration", "0.2s", "--no-plot", "--json", "--hand",
+                        self.written("nobody.yaml", "name: nobody\nmass_kg: 0\nstiffness_N_per_m: 0\n"
+                                     "damping_Ns_per_m: 0\nwaypoints:\n  - {time_s: 0.3, offset_m: [0, 0, 0]}\n"))
+        self.assertEqual(run.summary["faults"], [])
+        compared = self.identify(cell, "--arm", arm, "--compare")["compared"]
+        self.assertEqual([d["key"] for d in compared],
+                         ["tool.mass_kg", "tool.centre_of_mass_S_m", "force_S_N of mine.yaml.zero"])
+        self.assertEqual([d["differs"] for d in compared], [False] * 3, compared)
+
+    def test_a_comparison_that_differs_is_status_1_and_changes_nothing(self):
+        cell, arm = self.cell("mine.yaml"), self.heavier()
+        before = cell.read_text()
+        result = self.identify(cell, "--arm", arm, "--compare", status=1)
+        self.assertTrue(result["identified"])
+        self.assertTrue(result["compared"][0]["differs"])
+        self.assertEqual(cell.read_text(), before)
+        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["arm.yaml", "mine.yaml"])
+
+    def test_a_hand_at_the_handle_is_noticed(self):
+        cell = self.cell("mine.yaml")
+        for newtons in (1, 5):
+            with self.subTest(newtons):
+                hand = self.written("hand.yaml", HELD.format(name="held", newtons=newtons))
+                result = self.identify(cell, "--hand", hand, "--write", status=1)
+                self.assertFalse(result["identified"])
+                self.assertIn("hand", result["failure"])
+                self.assertIsNone(result["mass_kg"])
+        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["hand.yaml", "mine.yaml"])
+
+    def test_a_drive_that_fails_ends_it(self):
+        result = self.identify(self.cell("mine.yaml"), "--fault", "axis_5:fault=0x4210@6s", status=1)
+        self.assertIn("drive_fault", result["failure"])
+
+    def test_a_zero_that_drifts_is_told_from_weight(self):
+        result = self.identify(self.cell("mine.yaml"), "--fault", "sensor:drift=0.03N/s")
+        self.assertAlmostEqual(result["mass_kg"]["value"], 0.25, delta=0.005)
+
+    def test_what_can_t_be_identified_is_said_with_the_reason(self):
+        for name in ("scara", "gantry", "linear"):
+            with self.subTest(name):
+                outcome = self.call("identify", SOURCE / f"models/cells/{name}.yaml", "--write")
+                self.assertEqual((outcome.status, outcome.err), (1, ""))
+                self.assertIn("not identifiable: mass, centre of mass and zero: no joint of the wrist tilts",
+                              outcome.out)
+
+    def test_mistakes_are_refused(self):
+        light = SOURCE / "models/cells/light.yaml"
+        for arguments, words in (((light,), ("light.yaml", "identify", "impedance", "positions")),
+                                 (("--arm", "nobody.yaml"), ("nobody.yaml",)),
+                                 (("--hand", "nobody.yaml"), ("nobody.yaml",)),
+                                 (("--arm", light, "--bus", "vcan0"), ("--arm", "proxarm sim")),
+                                 (("--hand", "hand.yaml", "--bus", "vcan0"), ("--hand", "proxarm sim")),
+                                 (("--hardware",), ("--hardware: found --bus sim",)),
+                                 (("--mass", "4"), ("--mass",))):
+            with self.subTest(arguments):
+                self.written("hand.yaml", HELD.format(name="held", newtons=1))
+                self.assert_refused(self.call("identify", *arguments), *words)
+        narrow = self.cell("narrow.yaml", change=lambda text: text.replace(
+            "limits:\n", "limits:\n  workspace_m: {min: [0.699, -0.001, 0.599], max: [0.701, 0.001, 0.601]}\n", 1))
+        self.assert_refused(self.call("identify", narrow), "identify: found a start from which the wrist can go to",
+                            "workspace_m")
+
+
+if __name__ == "__main__":
+    unittest.main()
