@@ -195,14 +195,10 @@ bool AdmittanceMotion::render(const MotionCycle& cycle) noexcept {
   limit_speed(cycle);
   if (passivity_) observe_hand(measured);
   const models::Wrench h_W = hand_.step(cycle, proxy_motion());
-  const ProxyFault turned = parts_.tool->turn(h_W.torque);
+  parts_.tool->turn(h_W.torque);
   make_limits(cycle);
   const Vec3 from_W = state_.q_k1_W;
   const WorldStep step = parts_.tool->step(h_W.force, step_limits_);
-  if (step.fault == ProxyFault::none && turned != ProxyFault::none) {
-    cycle.alarm.raise(Fault::proxy_not_finite);
-    return false;
-  }
   if (!take(step, cycle)) return false;
   state_.mass_kg = step.mass_kg;
   state_.damping_Ns_per_m = step.damping_Ns_per_m;

@@ -21,6 +21,7 @@ void PointTool::start(const Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept 
 WorldStep PointTool::step(const Vec3& h_W, const StepLimits& limits) noexcept {
   WorldStep step = world_->step(h_W, limits);
   step.limit_torque_W = orientation_.limit_torque_W();
+  if (step.fault == ProxyFault::none) step.fault = turned_;
   return step;
 }
 
@@ -52,11 +53,6 @@ void PointTool::archive(fieldbus::StateArchive& state) noexcept {
 void RigidTool::start(const Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept {
   pose_->turn_to(R_WT, Vec3::Zero());
   pose_->start(q_W);
-}
-
-ProxyFault RigidTool::turn(const Vec3& torque_W) noexcept {
-  pose_->set_torque_W(torque_W);
-  return ProxyFault::none;
 }
 
 Vec3 RigidTool::resume(const Vec3& q_W, const Vec3& v_W) noexcept {

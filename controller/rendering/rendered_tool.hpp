@@ -24,8 +24,9 @@ class RenderedTool {
 
   // At rest at this pose. Angles are counted from the orientation at the first start.
   virtual void start(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept = 0;
-  // The torque about the rendered point for this period, before step(). A point turns at once.
-  [[nodiscard]] virtual ProxyFault turn(const models::Vec3& torque_W) noexcept = 0;
+  // The torque about the rendered point for this period, before step(). A point turns at once; a fault in that is told
+  // by step().
+  virtual void turn(const models::Vec3& torque_W) noexcept = 0;
   [[nodiscard]] virtual bool turns_in_step() const noexcept = 0;
   // One period under the hand's force, as RenderedWorld has it; with the torque of the limits of turning.
   virtual WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept = 0;
@@ -81,7 +82,7 @@ class PointTool final : public RenderedTool {
 
   RenderedWorld& world() noexcept override { return *world_; }
   void start(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept override;
-  ProxyFault turn(const models::Vec3& torque_W) noexcept override { return orientation_.step(torque_W); }
+  void turn(const models::Vec3& torque_W) noexcept override { turned_ = orientation_.step(torque_W); }
   bool turns_in_step() const noexcept override { return false; }
   WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept override;
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override {
@@ -118,6 +119,7 @@ class PointTool final : public RenderedTool {
   std::unique_ptr<RenderedWorld> world_;
   OrientationProxy orientation_;
   models::Mat3 behind_sensor_T_;
+  ProxyFault turned_ = ProxyFault::none;
 };
 
 class RigidTool final : public RenderedTool {
@@ -126,7 +128,7 @@ class RigidTool final : public RenderedTool {
 
   RenderedWorld& world() noexcept override { return *pose_; }
   void start(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept override;
-  ProxyFault turn(const models::Vec3& torque_W) noexcept override;
+  void turn(const models::Vec3& torque_W) noexcept override { pose_->set_torque_W(torque_W); }
   bool turns_in_step() const noexcept override { return true; }
   WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept override {
     return pose_->step(h_W, limits);

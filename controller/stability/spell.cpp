@@ -9,7 +9,7 @@ namespace {
 
 // Relative to the largest ⟨x̃²⟩ that is remembered: the least for an oscillation that lasts, and the bound below which
 // it is over. Between the first two, the oscillation may decay, and must go on for decaying_s and some periods.
-constexpr double steady_share = 0.8, kept_share = 0.5, died_away = 1.0 / 16.0;
+constexpr double steady_share = 0.9, kept_share = 0.5, died_away = 1.0 / 16.0;
 
 }  // namespace
 

@@ -7,13 +7,14 @@
 //
 // No longer than five quarters, because after a jerk an unstable loop may settle at less than a half of what the jerk
 // made. It is told once the jerk is out of the memory, 1 to 1.25 s later. And no shorter, because of what decays. An
-// amplitude that falls by e in τ_a lets ⟨x̃²⟩ fall to a half in τ_a/2.9 and to four fifths in τ_a/9; the average takes
-// some 0.2 s to rise. So a swing that is below four fifths of the largest must have gone on for decaying_s: then, in
-// 0.8 s, all with τ_a < 2.3 s have halved; and what is above four fifths after lasting_s has a τ_a above 2.5 s. An
-// exponential memory that tells as soon, of 0.75 s, would take what decays with τ_a = 0.8 s for lasting.
+// amplitude that falls by e in τ_a lets ⟨x̃²⟩ fall to a half in τ_a/2.9 and to nine tenths in τ_a/19; the average takes
+// some 0.25 s to rise, and ripples. So a swing that is below nine tenths of the largest must have gone on for
+// decaying_s: then, in 0.85 s, all with τ_a < 2.4 s have halved; and what is above nine tenths after lasting_s has a τ_a
+// of 4 s or more. An exponential memory that tells as soon, of 0.75 s, would take what decays with τ_a = 0.8 s for
+// lasting.
 //
 // If ⟨x̃²⟩ falls to a sixteenth, the spell is over. What is left is a new one, which has to last by itself. Below the
-// amplitude felt_m, it must go on for small_lasting_s. A tool that turns, and a swing below four fifths, must also have
+// amplitude felt_m, it must go on for small_lasting_s. A tool that turns, and a swing below nine tenths, must also have
 // swung lasting_periods. After a jerk a hand of 20 Nm/rad on 0.05 kg m² swings at 3 to 4.5 Hz, and so do 4 kg on a
 // layer of 2.5 kN/m. 0.5 s are two of these periods, and the swing dies away in the next three.
 #pragma once
@@ -27,7 +28,7 @@ namespace proxarm::controller {
 struct SpellConfig {
   // A blow oscillates for 0.1 to 0.3 s. Gears ring for up to 1.4 s after it, with a decreasing amplitude.
   double lasting_s = 0.5, small_lasting_s = 3.0, felt_m = 0.5e-3;
-  double decaying_s = 1.0;
+  double decaying_s = 1.1;
   double lasting_periods = 4.0;
   double pause_s = 0.25;
 };

@@ -15,35 +15,28 @@ frictionless plane of the scene where the border is. Judged by the records alone
 Masses that aren't stable with the hand are refused by the program, and counted. Status 1, and the session's files in
 `--keep DIR`, where it isn't so.
 """
-import argparse
 import json
 import math
-import os
 import pathlib
 import random
 import re
-import shutil
-import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 
-from comes_back_hunt import Record, SOURCE, dot, log_uniform, minus
+import hunting
+from comes_back_hunt import Record
+from hunting import SOURCE, dot, log_uniform, minus
 
-CELLS = {"default": 3, "cobot": 3, "seven": 3, "rail": 3, "gantry": 3}
+CELLS = ("default", "cobot", "seven", "rail", "gantry")
 BEYOND_M, SHARE, STANDS_M_PER_S, STANDS_S, PULL_N = 2e-4, 0.1, 1e-3, 0.5, 1.0
 # Below these, the tenth part is less than what the loop's delay or the sensor's noise makes of a session.
 LEAST_N, LEAST_M = 1.0, 2e-3
 
 
-def start_of(cell, chance):
-    """Where the handle stands at the start: the first row of a session of a tenth of a second."""
-    folder = pathlib.Path(chance)
-    if not (folder / "signals.csv").exists():
-        subprocess.run([os.environ["PROXARM_PROGRAM"], "run", str(SOURCE / f"models/cells/{cell}.yaml"), "--scene",
-                        str(SOURCE / "scenes/free.yaml"), "--duration", "0.1s", "--no-plot", "--record",
-                        str(folder)], check=True, capture_output=True, stdin=subprocess.DEVNULL)
-    return Record(folder / "signals.csv").proxy[0]
+def start_of(cell, folder):
+    """Where the handle stands at the start."""
+    hunting.run(SOURCE / f"models/cells/{cell}.yaml", SOURCE / "scenes/free.yaml", ["--duration", "0.1s"], folder / cell)
+    return Record(folder / cell / "signals.csv").proxy[0]
 
 
 def made_border(chance, start):
@@ -84,14 +77,11 @@ def made_hand(chance, normal, gap, axis):
     return "\n".join(lines) + "\n", points[-1][0]
 
 
-def run(folder, cell, scene, arguments, record):
-    command = [os.environ["PROXARM_PROGRAM"], "run", str(cell), "--scene", str(scene), *arguments, "--no-plot", "--json",
-               "--record", str(folder / record)]
-    (folder / f"{record}.command").write_text(" ".join(command) + "\n")
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+def run(cell, scene, arguments, record):
+    done = hunting.run(cell, scene, arguments, record)
     if done.returncode == 2:
         return None, done.stderr.strip()[-120:]
-    return json.loads(done.stdout), Record(folder / record / "signals.csv")
+    return json.loads(done.stdout), Record(record / "signals.csv")
 
 
 def mean(values):
@@ -116,10 +106,10 @@ def figures_of(record, normal, place, axis):
     return {"beyond mm": 1e3 * beyond, "press N": press, "pull N": pull, "way m": way, "stands": stands}
 
 
-def session(seed, folder, keep, starts):
+def session(seed, folder, _keep, starts):
     chance = random.Random(seed)
     folder.mkdir()
-    name = chance.choice(sorted(CELLS))
+    name = chance.choice(CELLS)
     start = starts[name]
     axis, sign, normal, place = made_border(chance, start)
     limits = made_limits(chance, axis, sign, place, start)
@@ -135,10 +125,10 @@ def session(seed, folder, keep, starts):
         f"normal: {normal}}}\n")
     arguments = ["--hand", str(folder / "hand.yaml"), "--timestep", f"{chance.choice((1, 1, 2, 4))}ms", "--mass",
                  f"{chance.choice((4, 10, 20))}", "--duration", f"{ended_s:.4g}s"]
-    summary, border = run(folder, folder / "cell.yaml", SOURCE / "scenes/free.yaml", arguments, "border")
+    summary, border = run(folder / "cell.yaml", SOURCE / "scenes/free.yaml", arguments, folder / "border")
     if summary is None:
         return {"refused": border}
-    other, plane = run(folder, folder / "plain.yaml", folder / "plane.yaml", arguments, "plane")
+    other, plane = run(folder / "plain.yaml", folder / "plane.yaml", arguments, folder / "plane")
     if other is None:
         return {"refused": plane}
     if other["oscillation"]["lasts"] or other["faults"]:
@@ -162,42 +152,16 @@ def session(seed, folder, keep, starts):
         if summary["guarded_cycles"] > 0:
             wrong.append(f"guard: {summary['guarded_cycles']} cycles")
     figures["wrong"] = wrong
-    if wrong and keep:
-        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
     return figures
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sessions", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--keep", type=pathlib.Path)
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
-        starts = {name: start_of(name, pathlib.Path(scratch) / f"start_{name}") for name in CELLS}
-
-        def one(n):
-            folder = pathlib.Path(scratch) / str(n)
-            try:
-                return n, session(f"{options.seed}/{n}", folder, options.keep, starts)
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
-        results = list(pool.map(one, range(options.sessions)))
-    ran = [(n, r) for n, r in results if "refused" not in r]
-    refused = [(n, r) for n, r in results if "refused" in r]
-    print(f"{len(ran)} sessions, {len(refused)} refused")
-    for key in ("beyond mm", "plane mm", "press", "pull", "way"):
-        values = sorted((r[key], n) for n, r in ran if key in r)
-        if values:
-            print(f"  {key:9s} median {values[len(values) // 2][0]:.4g}, most {values[-1][0]:.4g} in session {values[-1][1]}")
-    wrong = [(n, r) for n, r in ran if r["wrong"]]
-    print(f"something was wrong in {len(wrong)} sessions")
-    for n, r in wrong[:60]:
-        print(f"  {n} ({r['cell']}, {r['limits']}): {'; '.join(r['wrong'])}")
-    for n, r in refused[:10]:
-        print(f"  refused {n}: {r['refused']}")
-    return 1 if wrong or not ran else 0
+    given = hunting.options(__doc__)
+    with tempfile.TemporaryDirectory() as scratch:
+        starts = {name: start_of(name, pathlib.Path(scratch)) for name in CELLS}
+    results = hunting.sessions(given, session, starts)
+    return hunting.tell(results, ("beyond mm", "plane mm", "press", "pull", "way"), "",
+                        lambda r: f"{r['cell']}, {r['limits']}")
 
 
 if __name__ == "__main__":

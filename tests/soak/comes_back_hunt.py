@@ -16,32 +16,18 @@ ends, if a joint is at the end of its range then, since the straight way back ma
 arm oscillated for long, since the damping that ends a swing slows the way back. Both are counted. Status 1, and the
 session's files in `--keep DIR`, where it isn't so.
 """
-import argparse
 import csv
 import json
 import math
-import os
-import pathlib
 import random
-import shutil
-import subprocess
 import sys
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
+import hunting
+from hunting import SOURCE, direction, dot, log_uniform, minus
+
 CELLS = ("default", "cobot", "seven", "rail", "scara", "gantry", "linear")
 NEAR_M = 1e-3
 LEAST_J, SHARE = 1e-3, 1e-3
-
-
-def log_uniform(chance, low, high):
-    return math.exp(chance.uniform(math.log(low), math.log(high)))
-
-
-def direction(chance):
-    way = [chance.gauss(0, 1) for _ in range(3)]
-    return [x / math.hypot(*way) for x in way]
 
 
 def made_hand(chance):
@@ -102,14 +88,6 @@ class Record:
                 self.flags.append(row[at["flags"]])
 
 
-def minus(a, b):
-    return [x - y for x, y in zip(a, b)]
-
-
-def dot(a, b):
-    return sum(x * y for x, y in zip(a, b))
-
-
 def against_the_hand(record, mass_kg, delay_s):
     """By how many joules the hand was led beyond what is allowed, at most.
 
@@ -132,7 +110,7 @@ def against_the_hand(record, mass_kg, delay_s):
     return worst
 
 
-def session(seed, folder, keep):
+def session(seed, folder, _keep=None):
     chance = random.Random(seed)
     folder.mkdir()
     cell = chance.choice(CELLS)
@@ -141,11 +119,9 @@ def session(seed, folder, keep):
     arguments = made_arguments(chance, cell, most_N)
     # A mass on the hand's spring swings on without any limit: it falls to 1e-4 of a metre in 9 of its time constants.
     settles_s = max(1.2, 9 * 2 * (float(arguments[3]) + 1.5) / damping)
-    command = [os.environ["PROXARM_PROGRAM"], "run", str(SOURCE / f"models/cells/{cell}.yaml"), "--scene",
-               str(SOURCE / "scenes/free.yaml"), "--hand", str(folder / "hand.yaml"), *arguments, "--duration",
-               f"{ended_s + settles_s:.4g}s", "--no-plot", "--json", "--record", str(folder / "record")]
-    (folder / "command").write_text(" ".join(command) + "\n")
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    done = hunting.run(SOURCE / f"models/cells/{cell}.yaml", SOURCE / "scenes/free.yaml",
+                       ["--hand", folder / "hand.yaml", *arguments, "--duration", f"{ended_s + settles_s:.4g}s"],
+                       folder / "record")
     if "isn't stable with this hand" in done.stderr:
         return {"refused": "not stable where it is led"}
     if done.returncode == 2:
@@ -173,40 +149,14 @@ def session(seed, folder, keep):
         if slowed:
             figures["oscillates"] = 1.0
     figures["wrong"] = wrong
-    if wrong and keep:
-        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
     return figures
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sessions", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--keep", type=pathlib.Path)
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
-        def run(n):
-            folder = pathlib.Path(scratch) / str(n)
-            try:
-                return n, session(f"{options.seed}/{n}", folder, options.keep)
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
-        results = list(pool.map(run, range(options.sessions)))
-    refused = [r for _, r in results if "refused" in r]
-    ran = [(n, r) for n, r in results if "refused" not in r]
-    wrong = [(n, r) for n, r in ran if r["wrong"]]
-    print(f"{len(ran)} sessions, {len(refused)} refused (a mass that isn't stable with that hand)")
-    for what in ("off mm", "against mJ", "push J", "far m"):
-        values = sorted((r[what], n) for n, r in ran if what in r)
-        if values:
-            print(f"  {what:12s} median {values[len(values) // 2][0]:.4g}, most {values[-1][0]:.4g} in session {values[-1][1]}")
-    print(f"  oscillating for long: {sum(1 for _, r in ran if r.get('oscillates'))}; at the end of a joint's range at last: "
-          f"{sum(1 for _, r in ran if r.get('cornered'))}")
-    print(f"something was wrong in {len(wrong)} sessions")
-    for n, r in wrong[:40]:
-        print(f"  {n} ({r['cell']}): {'; '.join(r['wrong'])}")
-    return 1 if wrong or not ran else 0
+    results = hunting.sessions(hunting.options(__doc__), session)
+    words = (f"; oscillating for long: {sum('oscillates' in r for _, r in results)}; at the end of a joint's range at last: "
+             f"{sum(bool(r.get('cornered')) for _, r in results)}")
+    return hunting.tell(results, ("off mm", "against mJ", "push J", "far m"), words)
 
 
 if __name__ == "__main__":

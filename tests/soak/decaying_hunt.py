@@ -25,14 +25,11 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(SOURCE / "tests/command_line"))
 import oscillation_test  # noqa: E402
 from steel import Track  # noqa: E402
+from hunting import log_uniform  # noqa: E402
 
 CELLS = ("default", "bench", "gantry", "linear", "rail", "scara", "cobot", "seven")
 CALM_M = 20e-6
 LEAST = re.compile(r"at least ([\d.e+]+) kg")
-
-
-def log_uniform(chance, low, high):
-    return math.exp(chance.uniform(math.log(low), math.log(high)))
 
 
 def jerk(chance, cell):

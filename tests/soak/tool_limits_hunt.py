@@ -27,6 +27,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(SOURCE / "tests/command_line"))
 import harness  # noqa: E402
 import tool_motion  # noqa: E402
+from hunting import direction, log_uniform  # noqa: E402
 
 DURATION_S = 10.0
 # By which the steel may be faster than its limit, m/s.
@@ -51,17 +52,8 @@ EXCESSIVE_N = 180.0
 SCENES = ("free", "free", "wall", "room", "frictionless_wall", "coulomb")
 
 
-def log_uniform(chance, low, high):
-    return math.exp(chance.uniform(math.log(low), math.log(high)))
-
-
 def triple(values):
     return "[" + ", ".join(f"{x:.6g}" for x in values) + "]"
-
-
-def direction(chance):
-    way = [chance.gauss(0, 1) for _ in range(3)]
-    return [x / math.hypot(*way) for x in way]
 
 
 def made_hand(chance):

@@ -13,21 +13,18 @@ fault, and the speed of a force that is there within 2 ms, faster than people pu
 as a step) and by how stiff it is; a quarter of them let go. Status 1, and the session's files in `--keep DIR`, where it
 isn't so.
 """
-import argparse
+import collections
 import csv
 import json
 import math
-import os
 import pathlib
 import random
-import shutil
-import subprocess
 import sys
-import tempfile
 import xml.etree.ElementTree
-from concurrent.futures import ThreadPoolExecutor
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
+import hunting
+from hunting import SOURCE, direction, log_uniform
+
 CELL = SOURCE / "models/cells/light.yaml"
 JOINTS = ("turn", "shoulder", "elbow")
 # Of models/cells/light.yaml; the test asks whether they still are.
@@ -40,15 +37,6 @@ TOOL_KG, TOOL_FROM_FLANGE_M = 0.05, 0.02 + 0.05
 
 BEYOND_RAD, STEEL_RAD, SPEED_SHARE = 5e-3, 0.05, 1.2
 AFTER_S = 1.0
-
-
-def log_uniform(chance, low, high):
-    return math.exp(chance.uniform(math.log(low), math.log(high)))
-
-
-def direction(chance):
-    way = [chance.gauss(0, 1) for _ in range(3)]
-    return [x / math.hypot(*way) for x in way]
 
 
 def made_hand(chance):
@@ -174,17 +162,14 @@ def faults_of(figures):
     return wrong
 
 
-def session(seed, folder, keep):
+def session(seed, folder, _keep=None):
     chance = random.Random(seed)
     folder.mkdir()
     hand, kind, lasts_s = made_hand(chance)
     scene = chance.choice(("free", "wall"))
     (folder / "hand.yaml").write_text(hand)
-    command = [os.environ["PROXARM_PROGRAM"], "run", str(CELL), "--scene", str(SOURCE / f"scenes/{scene}.yaml"), "--hand",
-               str(folder / "hand.yaml"), "--duration", f"{lasts_s:.4g}s", "--no-plot", "--json", "--record",
-               str(folder / "record")]
-    (folder / "command").write_text(" ".join(command) + "\n")
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    done = hunting.run(CELL, SOURCE / f"scenes/{scene}.yaml",
+                       ["--hand", folder / "hand.yaml", "--duration", f"{lasts_s:.4g}s"], folder / "record")
     if done.returncode == 2:
         return {"kind": kind, "refused": done.stderr.strip()[:120], "wrong": []}
     summary = json.loads(done.stdout)
@@ -195,43 +180,14 @@ def session(seed, folder, keep):
     figures["wrong"] = faults_of(figures)
     if summary["oscillation"] and summary["oscillation"]["lasts"]:
         figures["wrong"].append("oscillates")
-    if figures["wrong"] and keep:
-        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
     return figures
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sessions", type=int, default=100)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--keep", type=pathlib.Path)
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
-        def run(n):
-            folder = pathlib.Path(scratch) / str(n)
-            try:
-                return n, session(f"{options.seed}/{n}", folder, options.keep)
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
-        results = list(pool.map(run, range(options.first, options.first + options.sessions)))
-    ran = [(n, r) for n, r in results if "refused" not in r]
-    print(f"{len(ran)} sessions, {len(results) - len(ran)} refused")
-    for what in ("beyond mrad", "speed m/s", "of steps m/s", "overpowered s"):
-        values = sorted((r[what], n) for n, r in ran if what in r)
-        if values:
-            print(f"  {what:14s} median {values[len(values) // 2][0]:.4g}, most {values[-1][0]:.4g} in session {values[-1][1]}")
-    told = {}
-    for _, r in ran:
-        for fault in r["faults"]:
-            told[fault] = told.get(fault, 0) + 1
-    print(f"  faults: {', '.join(f'{name} {count}' for name, count in sorted(told.items())) or 'none'}")
-    wrong = [(n, r) for n, r in ran if r["wrong"]]
-    print(f"something was wrong in {len(wrong)} sessions")
-    for n, r in wrong[:40]:
-        print(f"  {n} ({r['kind']}): {'; '.join(r['wrong'])}")
-    return 1 if wrong or not ran else 0
+    results = hunting.sessions(hunting.options(__doc__), session)
+    told = collections.Counter(fault for _, r in results for fault in r.get("faults", []))
+    words = f"; faults: {', '.join(f'{name} {count}' for name, count in sorted(told.items())) or 'none'}"
+    return hunting.tell(results, ("beyond mrad", "speed m/s", "of steps m/s", "overpowered s"), words, lambda r: r["kind"])
 
 
 if __name__ == "__main__":

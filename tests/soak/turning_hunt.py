@@ -8,22 +8,18 @@ gravity taken off. Angles from the start, tilt, twist and turning speed of what 
 rounding to counts. What the simulated steel does is told. Status 1 and the session's files, in `--keep DIR`, where it
 isn't so.
 """
-import argparse
 import csv
 import json
 import math
-import os
 import pathlib
 import random
-import shutil
-import subprocess
 import sys
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
+import hunting
+from hunting import SOURCE, log_uniform
+
 sys.path.insert(0, str(SOURCE / "tests/command_line"))
 import tool_motion  # noqa: E402
 
@@ -31,10 +27,6 @@ DURATION_S = 6.0
 ANGLE_RAD = 1e-6
 # A count at each end of a step, about 4e-8 rad for each of seven axes, at 1 ms.
 COUNTS_RAD_PER_S = 3e-4
-
-
-def log_uniform(chance, low, high):
-    return math.exp(chance.uniform(math.log(low), math.log(high)))
 
 
 def made_cell(chance, name, folder):
@@ -105,7 +97,7 @@ def steel_turns(rows, at):
                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]).transpose(2, 0, 1)
 
 
-def session(seed, folder, keep):
+def session(seed, folder, _keep=None):
     chance = random.Random(seed)
     folder.mkdir()
     name = chance.choice(("default", "cobot", "seven"))
@@ -139,43 +131,16 @@ def session(seed, folder, keep):
            "lasts": summary["oscillation"]["lasts"]}
     out |= {f"{what} {key}": figure[key] - limit for key, limit in limits.items()
             for what, figure in (("sent", sent), ("steel", steel))}
-    if wrong and keep:
-        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
     return out
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cycles", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--keep", type=pathlib.Path)
-    options = parser.parse_args()
-    results, cycles, begun = [], 0, 0
-    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(options.jobs) as pool:
-        def run(n):
-            folder = pathlib.Path(scratch) / str(n)
-            try:
-                return n, session(f"{options.seed}/{n}", folder, options.keep)
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
-        while cycles < options.cycles and begun < 10 + options.cycles // 500:
-            batch = list(pool.map(run, range(begun, begun + 4 * options.jobs)))
-            begun += len(batch)
-            results += batch
-            cycles += sum(r.get("cycles", 0) for _, r in batch)
-    ran = [(n, r) for n, r in results if "refused" not in r]
-    print(f"{cycles} cycles in {len(ran)} sessions, {len(results) - len(ran)} refused; the last guard acted in "
-          f"{sum(r['guarded'] for _, r in ran)} cycles of {sum(1 for _, r in ran if r['guarded'])} sessions; "
-          f"{sum(1 for _, r in ran if r['lasts'])} oscillated for long")
-    for key in sorted({key for _, r in ran for key in r if key.startswith(("sent", "steel"))}):
-        most, n = max((r[key], n) for n, r in ran if key in r)
-        print(f"  {key}: at most {most:+.3g} beyond its limit, in session {n}")
-    wrong = [(n, r) for n, r in ran if r["wrong"]]
-    print(f"something was wrong in {len(wrong)} sessions")
-    for n, r in wrong[:40]:
-        print(f"  {n} ({r['cell']}): {'; '.join(r['wrong'])}")
-    return 1 if wrong or not ran else 0
+    results = hunting.sessions(hunting.options(__doc__, cycles=100_000), session)
+    ran = [r for _, r in results if "refused" not in r]
+    words = (f"; {sum(r['cycles'] for r in ran)} cycles, the last guard acted in {sum(r['guarded'] for r in ran)} of "
+             f"{sum(bool(r['guarded']) for r in ran)} sessions; {sum(bool(r['lasts']) for r in ran)} oscillated for long")
+    beyond = sorted({key for r in ran for key in r if key.startswith(("sent", "steel"))})
+    return hunting.tell(results, beyond, words)
 
 
 if __name__ == "__main__":

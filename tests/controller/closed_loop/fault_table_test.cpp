@@ -29,39 +29,56 @@ constexpr std::int64_t failure_ns = 1'900'000'000;
 
 // ---- what can't be made to fail from outside ------------------------------------------------------------------------
 
-// A world whose steps go wrong.
-class WrongWorld final : public RenderedWorld {
+// A tool whose steps go wrong.
+class WrongTool final : public RenderedTool {
  public:
-  WrongWorld(std::unique_ptr<RenderedWorld> inner, std::function<void(WorldStep&)> spoil)
+  WrongTool(std::unique_ptr<RenderedTool> inner, std::function<void(WorldStep&)> spoil)
       : inner_(std::move(inner)), spoil_(std::move(spoil)) {}
-  void start(const models::Vec3& q_W) noexcept override { inner_->start(q_W); }
+  RenderedWorld& world() noexcept override { return inner_->world(); }
+  void start(const models::Vec3& q_W, const Eigen::Quaterniond& R_WT) noexcept override { inner_->start(q_W, R_WT); }
+  void turn(const models::Vec3& torque_W) noexcept override { inner_->turn(torque_W); }
+  bool turns_in_step() const noexcept override { return inner_->turns_in_step(); }
   WorldStep step(const models::Vec3& h_W, const StepLimits& limits) noexcept override {
     WorldStep step = inner_->step(h_W, limits);
     if (++steps_ > 1300) spoil_(step);
     return step;
   }
-  models::Vec3 look_ahead(const models::Vec3& h_W, const StepLimits& limits, double horizon_s) noexcept override {
-    return inner_->look_ahead(h_W, limits, horizon_s);
-  }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override {
     return inner_->resume(q_W, v_W);
   }
+  models::Vec3 turn_on(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W, const models::Vec3& q_W,
+                       const models::Vec3& v_W) noexcept override {
+    return inner_->turn_on(R_WT, omega_W, q_W, v_W);
+  }
   void set(const Change& change) noexcept override { inner_->set(change); }
   void set_period(double period_s) noexcept override { inner_->set_period(period_s); }
-  void add_damping(double damping_Ns_per_m) noexcept override { inner_->add_damping(damping_Ns_per_m); }
+  void limit_turning(double share) noexcept override { inner_->limit_turning(share); }
+  void add_turning_damping(double damping) noexcept override { inner_->add_turning_damping(damping); }
+  const Eigen::Quaterniond& R_WT() const noexcept override { return inner_->R_WT(); }
+  models::Vec3 omega_W() const noexcept override { return inner_->omega_W(); }
+  bool turns() const noexcept override { return inner_->turns(); }
+  bool turning_limited() const noexcept override { return inner_->turning_limited(); }
+  TurnSets sets() const noexcept override { return inner_->sets(); }
+  double inertia_kg_m2() const noexcept override { return inner_->inertia_kg_m2(); }
+  double own_turning_damping_Nms_per_rad() const noexcept override { return inner_->own_turning_damping_Nms_per_rad(); }
+  double turning_damping_Nms_per_rad() const noexcept override { return inner_->turning_damping_Nms_per_rad(); }
+  double kinetic_J(const WorldStep& step) const noexcept override { return inner_->kinetic_J(step); }
   void archive(fieldbus::StateArchive& state) noexcept override { inner_->archive(state); }
 
  private:
-  std::unique_ptr<RenderedWorld> inner_;
+  // The tools of these tests don't turn.
+  void turn_to(const Eigen::Quaterniond& /*R_WT*/, const models::Vec3& /*omega_W*/) noexcept override {}
+
+  std::unique_ptr<RenderedTool> inner_;
   std::function<void(WorldStep&)> spoil_;
   int steps_ = 0;
 };
 
-RigOptions wrong_world(std::function<void(WorldStep&)> spoil) {
+RigOptions wrong_tool(std::function<void(WorldStep&)> spoil) {
   RigOptions options;
   options.edit_parts = [spoil = std::move(spoil)](CycleParts& parts) {
-    std::unique_ptr<RenderedWorld>& world = std::get<AdmittanceParts>(parts.rendering).world;
-    world = std::make_unique<WrongWorld>(std::move(world), spoil);
+    std::unique_ptr<RenderedTool>& tool = std::get<AdmittanceParts>(parts.rendering).tool;
+    tool = std::make_unique<WrongTool>(std::move(tool), spoil);
   };
   return options;
 }
@@ -265,7 +282,7 @@ RigOptions never_disabled() {
 
 RigOptions runaway_world() {
   auto extra_m = std::make_shared<double>(0.0);
-  RigOptions options = wrong_world([extra_m](WorldStep& step) { step.q_W.x() += * extra_m += 4e-4; });
+  RigOptions options = wrong_tool([extra_m](WorldStep& step) { step.q_W.x() += * extra_m += 4e-4; });
   options.edit_cell = [](description::Cell& cell) { cell.limits.leash_m = 0.004; };
   return options;
 }
@@ -273,7 +290,7 @@ RigOptions runaway_world() {
 // A world whose limits push the proxy on, however it moves: 1 J for each 0.3 mm in a step.
 RigOptions pushing_world() {
   auto last_W = std::make_shared<models::Vec3>(models::Vec3::Constant(std::numeric_limits<double>::quiet_NaN()));
-  return wrong_world([last_W](WorldStep& step) {
+  return wrong_tool([last_W](WorldStep& step) {
     if (last_W->allFinite()) step.limit_force_W = 1e7 * (step.q_W - *last_W);
     *last_W = step.q_W;
   });
@@ -494,7 +511,7 @@ std::vector<Row> rows() {
       {target_too_fast, Reaction::stop_1, 0, 0.03, thrown_device, device_is_thrown},
       {singular, Reaction::stop_1, 1, way_m,
        [] {
-         return wrong_world([](WorldStep& step) { step.q_W.setConstant(std::numeric_limits<double>::quiet_NaN()); });
+         return wrong_tool([](WorldStep& step) { step.q_W.setConstant(std::numeric_limits<double>::quiet_NaN()); });
        },
        world_is_wrong},
       // 0.4 m/s more than the arm does, for some 10 ms of lag until 4 mm are between them.
@@ -505,9 +522,9 @@ std::vector<Row> rows() {
       {tool_off_limits, Reaction::stop_1, 1, 0.01, creeping_out, tool_is_out},
       {elbow_too_fast, Reaction::stop_0, 15, 0.005, elbow_runs_off},
       {proxy_not_finite, Reaction::stop_1, 1, way_m,
-       [] { return wrong_world([](WorldStep& step) { step.fault = ProxyFault::result_not_finite; }); }, world_is_wrong},
+       [] { return wrong_tool([](WorldStep& step) { step.fault = ProxyFault::result_not_finite; }); }, world_is_wrong},
       {proxy_squeezed, Reaction::stop_1, 1, way_m,
-       [] { return wrong_world([](WorldStep& step) { step.fault = ProxyFault::squeezed; }); }, world_is_wrong},
+       [] { return wrong_tool([](WorldStep& step) { step.fault = ProxyFault::squeezed; }); }, world_is_wrong},
       {bus_off, Reaction::stop_1, 1, way_m,
        [] { return failing_bus({.action = FaultAction::bus_off, .bus = "axes_1_3"}); }},
       {send_failed, Reaction::stop_1, 1, way_m, [] { return RigOptions{}; }, {}, true},

@@ -29,12 +29,10 @@ struct AdmittanceMotionTest : ::testing::Test {
     AdmittanceParts parts{
         .inverse = models::InverseKinematics(arm, {.max_step_rad = max_steps_rad(cell.drives, settings.period_s)}),
         .elastic = ElasticSetpoint(arm, cell.limits.setpoint_bandwidth_Hz, settings.period_s),
-        .world = make_rendered_world(scene, settings, settings.mass_kg),
-        .pose = nullptr,
-        .orientation = OrientationProxy({}),
-        .behind_sensor_T = models::Mat3::Zero(),
+        .tool =
+            std::make_unique<PointTool>(make_rendered_world(scene, settings, settings.mass_kg), OrientationConfig{}),
         .links = std::nullopt,
-        .release = std::make_unique<Release>(settings, cell.supervision.release_speed_m_per_s)};
+        .release = std::make_unique<Release>(settings, OrientationConfig{}, cell.supervision.release_speed_m_per_s)};
     return std::make_unique<AdmittanceMotion>(std::move(parts), arm, cell.drives, cell.limits, cell.supervision,
                                               settings);
   }

@@ -1,0 +1,95 @@
+"""What the hunts share: random values, vectors, and sessions beside each other, each judged by itself.
+
+A session is a function of its seed, a folder that doesn't exist yet, and the folder where files of a wrong one are kept
+or None. Its result has `refused` and why, or `wrong`, a list of words that is empty where nothing was, beside figures.
+"""
+import argparse
+import math
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+
+
+def log_uniform(chance, low, high):
+    return math.exp(chance.uniform(math.log(low), math.log(high)))
+
+
+def direction(chance):
+    way = [chance.gauss(0, 1) for _ in range(3)]
+    return [x / math.hypot(*way) for x in way]
+
+
+def minus(a, b):
+    return [x - y for x, y in zip(a, b)]
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def run(cell, scene, arguments, record):
+    """`proxarm run` with a record and a summary in JSON. Its command is kept beside the record."""
+    command = [os.environ["PROXARM_PROGRAM"], "run", str(cell), "--scene", str(scene), *map(str, arguments), "--no-plot",
+               "--json", "--record", str(record)]
+    record.with_name(f"{record.name}.command").write_text(" ".join(command) + "\n")
+    return subprocess.run(command, cwd=record.parent, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+
+
+def kept(figures, seed, folder, keep):
+    if figures.get("wrong") and keep:
+        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
+    return figures
+
+
+def options(doc, sessions=100, cycles=None):
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
+    if cycles is None:
+        parser.add_argument("--sessions", type=int, default=sessions)
+    else:
+        parser.add_argument("--cycles", type=int, default=cycles)
+    parser.add_argument("--first", type=int, default=0, help="the first session's number")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for the files of wrong sessions")
+    return parser.parse_args()
+
+
+def sessions(given, session, *more):
+    """(number, result) of given.sessions, or of as many as have given.cycles between them (but not for ever)."""
+    results = []
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(given.jobs) as pool:
+        def one(n):
+            folder = pathlib.Path(scratch) / str(n)
+            try:
+                return n, kept(session(f"{given.seed}/{n}", folder, given.keep, *more), f"{given.seed}/{n}", folder, given.keep)
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
+        if hasattr(given, "sessions"):
+            return list(pool.map(one, range(given.first, given.first + given.sessions)))
+        while sum(r.get("cycles", 0) for _, r in results) < given.cycles and len(results) < 10 + given.cycles // 500:
+            begun = given.first + len(results)
+            results += pool.map(one, range(begun, begun + 4 * given.jobs))
+    return results
+
+
+def tell(results, figures, words="", name=lambda r: r["cell"]):
+    """Prints counts, each figure's median and most, and what was wrong. Returns the status."""
+    ran = [(n, r) for n, r in results if "refused" not in r]
+    refused = [(n, r) for n, r in results if "refused" in r]
+    print(f"{len(ran)} sessions, {len(refused)} refused{words}")
+    for key in figures:
+        values = sorted((r[key], n) for n, r in ran if key in r)
+        if values:
+            print(f"  {key:16s} median {values[len(values) // 2][0]:.4g}, most {values[-1][0]:.4g} in session {values[-1][1]}")
+    wrong = [(n, r) for n, r in ran if r["wrong"]]
+    print(f"something was wrong in {len(wrong)} sessions")
+    for n, r in wrong[:40]:
+        print(f"  {n} ({name(r)}): {'; '.join(r['wrong'])}")
+    for n, r in refused[:3]:
+        print(f"  {n} refused: {r['refused'][:150]}")
+    return 1 if wrong or not ran else 0
