@@ -23,18 +23,10 @@ import subprocess
 import sys
 import tempfile
 
-SOURCE = pathlib.Path(__file__).resolve().parents[2]
+from hunting import SOURCE, direction, log_uniform
+
 CELLS = ("default", "cobot", "seven")
 MOUNTING_RAD = math.radians(0.5)
-
-
-def log_uniform(chance, low, high):
-    return math.exp(chance.uniform(math.log(low), math.log(high)))
-
-
-def direction(chance):
-    way = [chance.gauss(0, 1) for _ in range(3)]
-    return [x / math.hypot(*way) for x in way]
 
 
 def flow(values):
