@@ -118,8 +118,10 @@ class RealPeer(ModbusAxis):
 
     def test_runs_with_all_of_them(self):
         with drive_in_the_network():
+            # No `proxarm zero` has been at this sensor, whose zero is that of a simulated one.
             status, summary, errors = self.run_both(far_end=self.near, cell=self.real,
-                                                    options=["--hardware=checked", "--without-proof"])
+                                                    options=["--hardware=checked", "--without-proof",
+                                                             "--accept-force", "100N"])
         self.assertEqual(status, 0, errors)
         self.assertEqual(summary["faults"], [])
         self.assertIn("This will enable the drives of a real arm on 10.77.0.1, port 15020", errors)

@@ -12,6 +12,10 @@ import two_processes as two
 CELLS = Path(__file__).resolve().parents[2] / "models" / "cells"
 
 
+# No `proxarm zero` has been at this sensor, whose zero is that of a simulated one.
+NEW_SENSOR = ("--accept-force", "100N")
+
+
 class Refusals(two.VcanTestCase):
     def refused(self, command, *options):
         """The line that says why."""
@@ -133,7 +137,7 @@ class Refusals(two.VcanTestCase):
         self.assertIn('found "yes", expected "checked"', shown)
         with two.simulated_arm(two.THREE, cell):
             for options in (("--hardware=checked",), ("--hardware=checked", "--without-enabling-input")):
-                status, shown = self.as_if_real(cell, *options, "--without-proof")
+                status, shown = self.as_if_real(cell, *options, "--without-proof", *NEW_SENSOR)
                 self.assertEqual(status, 0, shown)
                 self.assertIn("bit 16 of the inputs of axis_2" if len(options) == 1 else "NONE", shown)
 
@@ -154,7 +158,7 @@ class Refusals(two.VcanTestCase):
         # No hand is there that would push: the file as such a proof would have left it.
         proof.write_text(proof.read_text().replace("arm: simulated", "arm: real"))
         with two.simulated_arm(two.THREE, cell):
-            status, shown = self.as_if_real(cell, "--hardware=checked")
+            status, shown = self.as_if_real(cell, "--hardware=checked", *NEW_SENSOR)
         self.assertEqual(status, 0, shown)
         cell.write_text(cell.read_text() + "# another cell\n")
         status, errors = self.as_if_real(cell, "--hardware=checked")
