@@ -10,7 +10,6 @@ namespace {
 
 using models::Mat3;
 using models::Vec3;
-using models::Wrench;
 
 constexpr double T = 1e-3, lag_s = 0.017, noise_N = 0.02;
 const HeldTool tool{.mass_kg = 1.0, .centre_S = Vec3(0, 0, 0.06), .handle_S = Vec3(0, 0, 0.1)};

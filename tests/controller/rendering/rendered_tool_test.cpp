@@ -31,10 +31,10 @@ struct RenderedToolTest : ::testing::Test {
     return config;
   }
   std::unique_ptr<RenderedTool> point() {
-    return std::make_unique<PointTool>(make_rendered_world(free_, SessionSettings{}, 4.0), orientation());
+    return std::make_unique<PointTool>(make_rendered_world(empty, SessionSettings{}, 4.0), orientation());
   }
 
-  scenes::CompiledScene free_ = scenes::compile(scenes::Scene{});
+  scenes::CompiledScene empty = scenes::compile(scenes::Scene{});
 };
 
 TEST_F(RenderedToolTest, APointTurnsOnFromWhereItIsToldAndStaysInItsPlace) {
@@ -61,11 +61,11 @@ TEST_F(RenderedToolTest, ATorqueThatIsntANumberIsAFaultOfTheStep) {
 }
 
 TEST_F(RenderedToolTest, AnglesAreCountedFromTheFirstStartOrFromWhereItIsTold) {
-  PointTool tool(make_rendered_world(free_, SessionSettings{}, 4.0), orientation());
+  PointTool tool(make_rendered_world(empty, SessionSettings{}, 4.0), orientation());
   tool.start(start_W, turned(0.1));
   tool.start(start_W, turned(0.3));
   EXPECT_NEAR(tool.sets().home.angularDistance(turned(0.1)), 0.0, 1e-12);
-  PointTool freed(make_rendered_world(free_, SessionSettings{}, 4.0), orientation());
+  PointTool freed(make_rendered_world(empty, SessionSettings{}, 4.0), orientation());
   freed.count_from(tool.sets().home);
   freed.start(start_W, turned(0.3));
   EXPECT_NEAR(freed.sets().home.angularDistance(turned(0.1)), 0.0, 1e-12);
