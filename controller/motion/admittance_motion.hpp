@@ -87,7 +87,10 @@ class AdmittanceMotion final : public Motion {
   };
 
   // A tool that is freed is a point, without the scene.
-  [[nodiscard]] RenderedTool& tool() const noexcept { return state_.freeing ? parts_.release->tool() : *parts_.tool; }
+  [[nodiscard]] RenderedTool& tool() const noexcept {
+    if (state_.freeing) return parts_.release->tool();
+    return *parts_.tool;
+  }
   [[nodiscard]] ProxyMotion proxy_motion() const noexcept;
   void make_limits(const MotionCycle& cycle) noexcept;
   [[nodiscard]] ArmStepStart arm_start(const LinkFilter& filter, const models::JointVector& twist_rad) noexcept;
