@@ -3,12 +3,11 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/commissioning/identified_tool.hpp"
+#include "controller/command_line/commissioning/proof_run.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
-#include "controller/command_line/sessions/proof_run.hpp"
 #include "controller/identification/tool_stations.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -42,12 +41,6 @@ ProofOutcome read(const PreparedSession& session, const IdentifyOptions& options
   RunOptions of_arm = options.run;
   if (!options.arm.empty()) of_arm.cell = options.arm;
   return prove_simulated(session, prepared_to_identify(of_arm), options.run, task);
-}
-
-void require_bus(const PreparedSession& session, const IdentifyOptions& options) {
-  require_enabling_switch(session, options.run);
-  if (options.run.bus.simulated()) return require_carried(session, options.run);
-  require_carried_on(options.run.bus.interfaces(bus_names(session.cell)), session, options.run);
 }
 
 IdentifiedTool identified(PreparedSession session, const IdentifyOptions& options) {
@@ -87,7 +80,8 @@ int identify_command(const IdentifyOptions& options) {
   require_interface_for_hardware(options.run);
   if (!options.run.bus.simulated()) refuse_simulated_options(options.run, options.arm);
   const PreparedSession session = prepared_to_identify(options.run);
-  require_bus(session, options);
+  require_enabling_switch(session, options.run);
+  require_carried(session, options.run);
   const IdentifiedTool tool = identified(session, options);
   std::vector<ToolDifference> differences;
   bool same = true;

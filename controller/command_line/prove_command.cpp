@@ -4,13 +4,12 @@
 
 #include "controller/command_line/commands.hpp"
 #include "controller/command_line/commissioning/bus_loss_run.hpp"
+#include "controller/command_line/commissioning/proof_run.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/prepared_session.hpp"
 #include "controller/command_line/preparation/proof_file.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
-#include "controller/command_line/sessions/proof_run.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/json.hpp"
 
@@ -72,11 +71,7 @@ int prove_command(const ProveOptions& options) {
   ProofOutcome outcome;
   RunOptions of_arm = options.run;
   if (!options.arm.empty()) of_arm.cell = options.arm;
-  if (simulated) {
-    require_carried(session, options.run);
-  } else {
-    require_carried_on(options.run.bus.interfaces(bus_names(session.cell)), session, options.run);
-  }
+  require_carried(session, options.run);
   const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
   if (options.bus_loss) return prove_bus_loss(session, prepared(of_arm), options.run, file);
   if (simulated) {

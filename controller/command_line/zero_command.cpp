@@ -2,12 +2,11 @@
 #include <limits>
 
 #include "controller/command_line/commands.hpp"
+#include "controller/command_line/commissioning/tare_run.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
 #include "controller/command_line/preparation/start_check.hpp"
-#include "controller/command_line/sessions/zero_run.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -33,7 +32,7 @@ int zero_command(const ZeroOptions& options) {
   require_enabling_switch(session, options.run);
   RunOptions of_arm = options.run;
   if (!options.arm.empty()) of_arm.cell = options.arm;
-  if (!simulated) require_carried_on(options.run.bus.interfaces(bus_names(session.cell)), session, options.run);
+  if (!simulated) require_carried(session, options.run);
   const ZeroOutcome outcome =
       simulated ? tare_simulated(session, prepared(of_arm), options.run) : tare_on_interfaces(session, options.run);
   if (!outcome.complete) {

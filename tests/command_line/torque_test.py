@@ -80,7 +80,7 @@ class Torque(ProgramTest):
 
     def test_random_hands(self):
         for n in range(6):
-            figures = hunt.session(f"fast/{n}", self.folder / str(n), None)
+            figures = hunt.session(f"fast/{n}", self.folder / str(n))
             self.assertEqual(figures["wrong"], [], figures)
 
     # Links and tool as the arm has them, beside what the cell says.

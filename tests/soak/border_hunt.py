@@ -106,7 +106,7 @@ def figures_of(record, normal, place, axis):
     return {"beyond mm": 1e3 * beyond, "press N": press, "pull N": pull, "way m": way, "stands": stands}
 
 
-def session(seed, folder, _keep, starts):
+def session(seed, folder, starts):
     chance = random.Random(seed)
     folder.mkdir()
     name = chance.choice(CELLS)

@@ -110,7 +110,7 @@ def against_the_hand(record, mass_kg, delay_s):
     return worst
 
 
-def session(seed, folder, _keep=None):
+def session(seed, folder):
     chance = random.Random(seed)
     folder.mkdir()
     cell = chance.choice(CELLS)

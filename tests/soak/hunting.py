@@ -1,7 +1,7 @@
 """What the hunts share: random values, vectors, and sessions beside each other, each judged by itself.
 
-A session is a function of its seed, a folder that doesn't exist yet, and the folder where files of a wrong one are kept
-or None. Its result has `refused` and why, or `wrong`, a list of words that is empty where nothing was, beside figures.
+A session is a function of its seed and of a folder for its files that doesn't exist yet. Its result has `refused` and
+why, or `wrong`, a list of words that is empty where nothing was, beside figures.
 """
 import argparse
 import math
@@ -40,12 +40,6 @@ def run(cell, scene, arguments, record):
     return subprocess.run(command, cwd=record.parent, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
 
 
-def kept(figures, seed, folder, keep):
-    if figures.get("wrong") and keep:
-        shutil.copytree(folder, keep / str(seed).replace("/", "-"), dirs_exist_ok=True)
-    return figures
-
-
 def options(doc, sessions=100, cycles=None):
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     if cycles is None:
@@ -66,7 +60,10 @@ def sessions(given, session, *more):
         def one(n):
             folder = pathlib.Path(scratch) / str(n)
             try:
-                return n, kept(session(f"{given.seed}/{n}", folder, given.keep, *more), f"{given.seed}/{n}", folder, given.keep)
+                figures = session(f"{given.seed}/{n}", folder, *more)
+                if figures.get("wrong") and given.keep:
+                    shutil.copytree(folder, given.keep / f"{given.seed}-{n}", dirs_exist_ok=True)
+                return n, figures
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
         if hasattr(given, "sessions"):

@@ -148,7 +148,7 @@ def judge(record, arm):
             "lag rad": lag[near].max()}
 
 
-def session(seed, folder, _keep, arms):
+def session(seed, folder, arms):
     chance = random.Random(seed)
     folder.mkdir()
     name = chance.choice(sorted(arms))

@@ -162,7 +162,7 @@ def faults_of(figures):
     return wrong
 
 
-def session(seed, folder, _keep=None):
+def session(seed, folder):
     chance = random.Random(seed)
     folder.mkdir()
     hand, kind, lasts_s = made_hand(chance)

@@ -97,7 +97,7 @@ def steel_turns(rows, at):
                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]).transpose(2, 0, 1)
 
 
-def session(seed, folder, _keep=None):
+def session(seed, folder):
     chance = random.Random(seed)
     folder.mkdir()
     name = chance.choice(("default", "cobot", "seven"))

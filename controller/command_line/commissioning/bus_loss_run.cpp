@@ -4,19 +4,17 @@
 #include <cmath>
 #include <cstdio>
 
+#include "controller/command_line/commissioning/arm_at_hand.hpp"
 #include "controller/command_line/live/hardware_consent.hpp"
 #include "controller/command_line/live/realtime.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
 #include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/command_line/preparation/proof_file.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/command_line/sessions/interface_network.hpp"
 #include "controller/proof/bus_loss.hpp"
 #include "controller/session/bring_up.hpp"
-#include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/files/json.hpp"
-#include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -64,34 +62,23 @@ Outcome run(proof::BusLossSession& session, fieldbus::CanNetwork& network, doubl
 }
 
 Outcome in_simulation(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options) {
-  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(arm.cell));
-  description::HandDescription nobody;
-  nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
-  sim::SimulatedCellConfig config;
-  config.faults = options.faults;
-  config.enabling = options.enabling;
-  sim::SimulatedCell far_end(arm.cell, arm.sensor, nobody, network.events(), config);
+  SimulatedArm simulated(arm, options);
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         buses_in_order(session.cell));
-  far_end.attach_to(network);
-  far_end.power_on();
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
+                                                         simulated.network, buses_in_order(session.cell));
+  simulated.power_on();
   controller::bring_up(parts);
-  fieldbus::ask_for_words(network, parts.can_drives);
+  fieldbus::ask_for_words(simulated.network, parts.can_drives);
   proof::BusLossSession silence(std::move(parts), session.settings, session.cell);
-  return run(silence, network, session.settings.period_s, [] {});
+  return run(silence, simulated.network, session.settings.period_s, [] {});
 }
 
 Outcome on_interfaces(const PreparedSession& session, const RunOptions& options) {
-  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
-  require_nodes_apart(session, interfaces);
-  fieldbus::SocketCanNetwork network = open_network(interfaces);
-  require_hardware_consent(session, options, interfaces);
-  require_fd(session.cell, network);
+  ArmOnInterfaces arm(session, options);
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         indices_in(network, interfaces.size()));
-  set_filters(network, parts, [&](std::size_t bus) {
+  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings,
+                                                         arm.network, indices_in(arm.network, arm.interfaces.size()));
+  set_filters(arm.network, parts, [&](std::size_t bus) {
     std::vector<std::uint32_t> ids;
     for (const fieldbus::DriveSlot& slot : parts.can_drives) {
       if (slot.bus == bus) ids.push_back(fieldbus::SilenceWatch(*slot.drive).wanted_id());
@@ -99,16 +86,16 @@ Outcome on_interfaces(const PreparedSession& session, const RunOptions& options)
     return ids;
   });
   bring_up_devices(parts);
-  fieldbus::ask_for_words(network, parts.can_drives);
+  fieldbus::ask_for_words(arm.network, parts.can_drives);
   proof::BusLossSession silence(std::move(parts), session.settings, session.cell);
   SignalWatch signals([&] { silence.request_stop(); });
   Outcome outcome;
   {
     const RealtimeThread realtime;
-    outcome = run(silence, network, session.settings.period_s,
+    outcome = run(silence, arm.network, session.settings.period_s,
                   [] { std::fprintf(stderr, "let go of the enabling switch, then press it and keep it so\n"); });
   }
-  outcome.real_arm = is_real(session, interfaces);
+  outcome.real_arm = is_real(session, arm.interfaces);
   return outcome;
 }
 

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <iostream>
 
+#include "controller/command_line/commissioning/arm_at_hand.hpp"
 #include "controller/command_line/commissioning/offsets.hpp"
 #include "controller/command_line/live/hardware_consent.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
@@ -15,11 +16,9 @@
 #include "controller/supervision/enabling_input.hpp"
 #include "fieldbus/canopen/canopen_sync.hpp"
 #include "fieldbus/cia402/homing.hpp"
-#include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/arm/arm.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/description/homing.hpp"
-#include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -242,14 +241,9 @@ void home_all(fieldbus::CanNetwork& network, const Slots& slots, Permission& per
 }
 
 void home_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options) {
-  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(arm.cell));
-  description::HandDescription nobody;
-  nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
-  sim::SimulatedCellConfig config;
-  config.faults = options.faults;
-  sim::SimulatedCell far_end(arm.cell, arm.sensor, nobody, network.events(), config);
-  far_end.attach_to(network);
-  far_end.power_on();
+  SimulatedArm simulated(arm, options);
+  simulated.power_on();
+  fieldbus::SimulatedCanNetwork& network = simulated.network;
   network.sleep_until(network.now_ns() + boot_ns);
   const Drives drives(session.cell, buses_in_order(session.cell));
   PreparedSession alone = session;

@@ -8,7 +8,6 @@
 #include "controller/command_line/live/orders.hpp"
 #include "controller/command_line/live/session_status.hpp"
 #include "controller/command_line/preparation/bus_plan.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
 #include "controller/session/bring_up.hpp"
 #include "models/base/quantity.hpp"
 #include "models/base/setup_error.hpp"
@@ -145,11 +144,7 @@ controller::Timestep LiveParameters::take_timestep(const std::string& text) {
   PreparedSession changed = with_timestep(session_, judged, period_s);
   controller::require_timestep(changed.cell, changed.settings);
   require_stable(changed, judged);
-  if (options_.bus.simulated()) {
-    require_carried(changed, judged);
-  } else {
-    require_carried_on(options_.bus.interfaces(bus_names(changed.cell)), changed, judged);
-  }
+  require_carried(changed, judged);
   session_ = std::move(changed);
   const controller::SessionSettings& settings = session_.settings;
   return {settings.period_s, settings.max_missed_samples, settings.max_repeated_samples, settings.horizon_s};

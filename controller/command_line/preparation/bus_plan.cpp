@@ -393,6 +393,9 @@ bool is_carried(const PreparedSession& session) {
 }
 
 void require_carried(const PreparedSession& session, const RunOptions& options) {
+  if (!options.bus.simulated()) {
+    return require_carried_on(options.bus.interfaces(bus_names(session.cell)), session, options);
+  }
   require_within(plan_buses(session, buses_in_order(session.cell)), session.cell, options);
 }
 

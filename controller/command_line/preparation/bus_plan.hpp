@@ -15,8 +15,8 @@ namespace proxarm::command_line {
 // bitrate among them. `indices[i]` is where the cell's bus i is.
 std::vector<fieldbus::BusPlan> plan_buses(const PreparedSession& session, const controller::BusIndices& indices);
 
-// Throws SetupError with the arithmetic where a bus of the cell, each on a wire of its own, can't carry the timestep.
-// It names who asked for that: the options or the cell.
+// Throws SetupError with the arithmetic where a bus of the cell can't carry the timestep: in simulation each on a wire
+// of its own, else on the interfaces of options.bus. It names who asked for that: the options or the cell.
 void require_carried(const PreparedSession& session, const RunOptions& options);
 // Whether that would be refused.
 [[nodiscard]] bool is_carried(const PreparedSession& session);

@@ -1,5 +1,4 @@
-// The zero of the force sensor: what a session holds its tare against, what is kept of it afterwards, and the session
-// in which nothing but the sensor is tared.
+// The zero of the force sensor: what a session holds its tare against, and what is kept of it afterwards.
 #pragma once
 
 #include <string>
@@ -15,19 +14,12 @@ namespace proxarm::command_line {
 // one is expected to have none.
 void know_zero(PreparedSession& session, const RunOptions& options);
 
+// As this cycle has tared and followed it.
+ZeroFile zero_of(const PreparedSession& session, const controller::Cycle& cycle, bool real_arm);
+
 // After a session on a real arm that found nothing wrong: its zero, as it was followed, is kept. With --accept-force it
 // isn't, since a hand may be in it.
 void keep_zero(const PreparedSession& session, const RunOptions& options, const std::vector<std::string>& interfaces,
                const controller::Cycle& cycle);
-
-struct ZeroOutcome {
-  controller::FaultReport fault;
-  bool complete = false;
-  ZeroFile zero;
-};
-
-// Enables the drives, tares the sensor, switches them off.
-ZeroOutcome tare_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options);
-ZeroOutcome tare_on_interfaces(const PreparedSession& session, const RunOptions& options);
 
 }  // namespace proxarm::command_line

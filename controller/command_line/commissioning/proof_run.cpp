@@ -1,21 +1,16 @@
-#include "controller/command_line/sessions/proof_run.hpp"
+#include "controller/command_line/commissioning/proof_run.hpp"
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <thread>
 
+#include "controller/command_line/commissioning/arm_at_hand.hpp"
 #include "controller/command_line/live/hardware_consent.hpp"
 #include "controller/command_line/live/realtime.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
-#include "controller/command_line/preparation/cell_buses.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
-#include "controller/command_line/sessions/interface_network.hpp"
-#include "controller/library/simulated_loop.hpp"
-#include "controller/session/bring_up.hpp"
-#include "fieldbus/simulated/simulated_can_network.hpp"
 #include "models/base/text.hpp"
-#include "sim/cell/simulated_cell.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -127,50 +122,26 @@ std::string failure_of(const PreparedSession& session, const ProofOutcome& outco
 
 ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSession& arm, const RunOptions& options,
                              const proof::Task& task) {
-  fieldbus::SimulatedCanNetwork network(sim::simulated_buses(arm.cell));
-  description::HandDescription nobody;
-  nobody.mass_kg = nobody.stiffness_N_per_m = nobody.damping_Ns_per_m = 0.0;
-  sim::SimulatedCellConfig config;
-  config.faults = options.faults;
-  config.enabling = options.enabling;
-  const description::HandDescription& hand_there = options.hand.empty() ? nobody : arm.hand;
-  sim::SimulatedCell far_end(arm.cell, arm.sensor, hand_there, network.events(), config);
+  SimulatedArm simulated(arm, options, options.hand.empty() ? nobody() : arm.hand);
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  const controller::ModbusOpener open_line = [&](const description::ModbusLineDescription& line, double) {
-    return far_end.modbus_client(line.name);
-  };
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         buses_in_order(session.cell), open_line);
-  far_end.attach_to(network);
-  far_end.power_on();
-  controller::bring_up(parts, [&](fieldbus::ModbusLine& line) { controller::pump(network, line, network.now_ns()); });
-  proof::ProofSession proof(std::move(parts), session.settings, session.cell, task);
-  SimulatedHand hand(far_end);
-  run(proof, network, session.settings.period_s, [&] { hand.heed(proof); });
+  proof::ProofSession proof(simulated.brought_up(session, scene), session.settings, session.cell, task);
+  SimulatedHand hand(simulated.far_end);
+  run(proof, simulated.network, session.settings.period_s, [&] { hand.heed(proof); });
   return outcome_of(proof);
 }
 
 ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options, const proof::Task& task) {
-  const std::vector<std::string> interfaces = options.bus.interfaces(bus_names(session.cell));
-  require_nodes_apart(session, interfaces);
-  fieldbus::SocketCanNetwork network = open_network(interfaces);
-  require_hardware_consent(session, options, interfaces);
-  require_fd(session.cell, network);
+  ArmOnInterfaces arm(session, options);
   scenes::CompiledScene scene = scenes::compile(session.scene);
-  controller::CycleParts parts = controller::build_parts(session.cell, session.sensor, scene, session.settings, network,
-                                                         indices_in(network, interfaces.size()),
-                                                         controller::opener_of(fieldbus::ModbusPeers::any));
-  set_filters(network, parts);
-  bring_up_devices(parts);
-  proof::ProofSession proof(std::move(parts), session.settings, session.cell, task);
+  proof::ProofSession proof(arm.brought_up(session, scene), session.settings, session.cell, task);
   SignalWatch signals([&] { proof.request_stop(); });
   {
     const Announcer announcer(proof);
     const RealtimeThread realtime;
-    run(proof, network, session.settings.period_s, [] {});
+    run(proof, arm.network, session.settings.period_s, [] {});
   }
   ProofOutcome outcome = outcome_of(proof);
-  outcome.real_arm = is_real(session, interfaces);
+  outcome.real_arm = is_real(session, arm.interfaces);
   return outcome;
 }
 

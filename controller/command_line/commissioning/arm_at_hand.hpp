@@ -1,0 +1,43 @@
+// The arm that commissioning leads: a simulated one in this process and in virtual time, or one on interfaces.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "controller/command_line/preparation/prepared_session.hpp"
+#include "controller/motion/cycle_parts.hpp"
+#include "fieldbus/can/socket_can_network.hpp"
+#include "fieldbus/simulated/simulated_can_network.hpp"
+#include "scenes/compiler/compile.hpp"
+#include "sim/cell/simulated_cell.hpp"
+
+namespace proxarm::command_line {
+
+// A hand that isn't there.
+description::HandDescription nobody();
+
+// `arm` outlives it.
+struct SimulatedArm {
+  SimulatedArm(const PreparedSession& arm, const RunOptions& options,
+               const description::HandDescription& hand = nobody());
+
+  void power_on();
+  // The parts of a cycle that leads it, its devices brought up. `scene` outlives them.
+  controller::CycleParts brought_up(const PreparedSession& session, scenes::CompiledScene& scene);
+
+  fieldbus::SimulatedCanNetwork network;
+  sim::SimulatedCell far_end;
+};
+
+struct ArmOnInterfaces {
+  // Opened, after consent where the arm is a real one. Throws SetupError as `run` does.
+  ArmOnInterfaces(const PreparedSession& session, const RunOptions& options);
+
+  // As above.
+  controller::CycleParts brought_up(const PreparedSession& session, scenes::CompiledScene& scene);
+
+  std::vector<std::string> interfaces;
+  fieldbus::SocketCanNetwork network;
+};
+
+}  // namespace proxarm::command_line
