@@ -134,8 +134,9 @@ Session& Session::set_hand(sim::HandForce force) {
   return *this;
 }
 
-Session& Session::set_sensor(controller::MakeSensor make) {
+Session& Session::set_sensor(controller::MakeSensor make, const std::array<double, 3>& zero_S_N) {
   state_->own.sensor = std::move(make);
+  state_->session.settings.zero_S_N = zero_S_N;
   return *this;
 }
 

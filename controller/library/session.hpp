@@ -8,6 +8,7 @@
 // A real arm is run by the command line alone, which has its supervision, consent and clocks.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <exception>
 #include <filesystem>
@@ -65,8 +66,9 @@ class Session {
   // In the place of the hand's motion and grip; of its file, its mass and, for the check of stability, its grip remain.
   // In N, on the handle, in W. What it throws ends the session, and comes out of run().
   Session& set_hand(sim::HandForce force);
-  // In the place of the cell's sensor, and of the drive of one of its joints (simulated_loop.hpp).
-  Session& set_sensor(controller::MakeSensor make);
+  // In the place of the cell's sensor, and of the drive of one of its joints (simulated_loop.hpp). zero_S_N is what the
+  // sensor reads without a load: one that reads something else at the start, beside the tool's weight, is a fault.
+  Session& set_sensor(controller::MakeSensor make, const std::array<double, 3>& zero_S_N = {});
   Session& set_drive(const std::string& joint, controller::MakeDrive make);
 
   // Runs a session from power on to power off. `each` sees every cycle's record in order, whatever the phase, with the
