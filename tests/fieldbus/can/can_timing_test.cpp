@@ -235,7 +235,7 @@ TEST(CanTiming, RoundsOddBitratesToTheNearestNanosecond) {
   EXPECT_EQ(wire_time_ns(WireBits{10, 10}, {1'000'000, 8'000'000}), 11'250);
 }
 
-// Not a benchmark: a guard against losing the tables. Measured: see CHANGELOG or tests/bench; the limit is 5 times
+// Not a benchmark: a guard against losing the tables. Measured: tests/bench; the limit is 5 times
 // that.
 TEST(CanTiming, IsFastEnoughForEveryFrameOfASimulation) {
   std::mt19937 random(6);
