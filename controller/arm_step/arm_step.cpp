@@ -119,7 +119,7 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   aim(start.R_WT);
   margin_.go_to(link_rad_, from_);
   make_boxes(start);
-  if (eases()) turn_gently();
+  if (start.held && eases()) turn_gently();
   use_first_box();
 }
 
@@ -185,13 +185,13 @@ JointVector ArmStep::hardest_braking() const noexcept {
 // A hand that turns a point changes its turning no faster than joints take it up. One box for entering and for leaving
 // that limit: with a smaller one for leaving, the tool swung between the two at 16 Hz.
 bool ArmStep::eases() const noexcept {
-  return lags_ || (!start_.held && !start_.touches_turning) || near_wrist_singularity();
+  return lags_ || (start_.held ? near_wrist_singularity() : !start_.touches_turning);
 }
 
 void ArmStep::use_first_box() noexcept { use_box(eases() ? first_ease : whole_box); }
 
-// Where turning gives way to the place, the joints that only turn the tool stay gentle, whatever the place asks of the
-// others.
+// Where a held orientation gives way to the place, the joints that only turn the tool stay gentle, whatever the place
+// asks of the others. (One that a hand turns may be anywhere: there they may be asked to stop at once.)
 void ArmStep::turn_gently() noexcept {
   use_box(first_ease);
   for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
