@@ -45,6 +45,8 @@ constexpr double catching_s = 0.1, catching_rad_per_s2 = 5.0, catching_share = 0
 constexpr double caught_up_rad = 1e-6;
 // How the change of a joint's step that is tried grows, and from where on it is U's whole box.
 constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
+// The wrist is nearly singular where the sine of the middle one of its angles is less.
+constexpr double near_singular = 0.3;
 constexpr int most_rounds = 8;
 constexpr double alike = 1e-3;  // of half-spaces' normals: the sine of the angle between them
 constexpr double rounding_rad = 1e-12;
@@ -117,6 +119,7 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   aim(start.R_WT);
   margin_.go_to(link_rad_, from_);
   make_boxes(start);
+  if (start.held && eases()) turn_gently();
   use_first_box();
 }
 
@@ -181,9 +184,30 @@ JointVector ArmStep::hardest_braking() const noexcept {
 
 // A hand that turns a point changes its turning no faster than joints take it up. One box for entering and for leaving
 // that limit: with a smaller one for leaving, the tool swung between the two at 16 Hz.
-void ArmStep::use_first_box() noexcept {
-  const bool eases = lags_ || (!start_.held && !start_.touches_turning);
-  use_box(eases ? first_ease : whole_box);
+bool ArmStep::eases() const noexcept {
+  return lags_ || (start_.held ? near_wrist_singularity() : !start_.touches_turning);
+}
+
+void ArmStep::use_first_box() noexcept { use_box(eases() ? first_ease : whole_box); }
+
+// Where a held orientation gives way to the place, the joints that only turn the tool stay gentle, whatever the place
+// asks of the others. (One that a hand turns may be anywhere: there they may be asked to stop at once.)
+void ArmStep::turn_gently() noexcept {
+  use_box(first_ease);
+  for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
+    if (margin_.carries(i)) continue;
+    whole_.low[i] = box_.low[i];
+    whole_.high[i] = box_.high[i];
+  }
+}
+
+bool ArmStep::near_wrist_singularity() const noexcept {
+  const Eigen::Index n = from_.J_W.cols();
+  if (!inverse_->reaches_orientation() || n < 6) return false;
+  const auto axis = [&](Eigen::Index i) {
+    return Vec3(from_.J_W.col(arm_->drive_along_chain(static_cast<std::size_t>(n - i))).tail<3>());
+  };
+  return std::abs(axis(1).cross(axis(2)).dot(axis(3))) < near_singular;
 }
 
 // The part of the box in which no joint's step changes by more than `ease` times half of its acceleration.

@@ -5,8 +5,11 @@
 // x, R: the tool's pose by exact kinematics at c(k−1) + u, with c the links' angles before the setpoints' filter. The
 // sets of U:
 //   box      low ≤ u ≤ high: each joint's range with room to brake, its speed, and its acceleration behind the filter.
-//            The filter's input may therefore jump, as it does at a wall. A step that turns the tool otherwise than was
-//            wanted keeps to half of the acceleration before the filter, too, if the place allows it
+//            The filter's input may therefore jump, as it does at a wall. Where turning may have to give way (near a
+//            wrist's singularity, while it lags, and where a hand turns the tool) steps keep to half of the acceleration
+//            before the filter, too, if the place allows it; of an orientation that is held, those of the joints that
+//            only turn the tool always. Motors lead the links that they accelerate, and can't follow what jumps at a
+//            wrist
 //   place    −∇σ·u ≤ b: distance from the poses in which the place is lost (place_margin.hpp)
 //   points   |p(u) − p(0)| ≤ vT for elbow and wrist, also while all joints brake from there (growth_m_per_s())
 //   turn     the sets of turning (turn_sets.hpp); of an orientation that is held, how far it may lag
@@ -127,6 +130,9 @@ class ArmStep final : public FollowableStep {
   [[nodiscard]] bool allows(const models::JointVector& u) const noexcept;
   void use_box(double ease) noexcept;
   void use_first_box() noexcept;
+  [[nodiscard]] bool eases() const noexcept;
+  void turn_gently() noexcept;
+  [[nodiscard]] bool near_wrist_singularity() const noexcept;
   [[nodiscard]] double growth_m_per_s(const models::JointVector& u) const noexcept;
   [[nodiscard]] models::JointVector growth_gradient(const models::JointVector& u) const noexcept;
   [[nodiscard]] double braking_of(Eigen::Index i, const models::JointVector& rad_per_s) const noexcept;

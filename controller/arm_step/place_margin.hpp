@@ -36,6 +36,8 @@ class PlaceMargin {
   [[nodiscard]] double value() const noexcept { return value_; }
   [[nodiscard]] const models::JointVector& gradient() const noexcept { return gradient_; }
 
+  // Whether the joint of this drive carries the wrist; the others only turn the tool about it.
+  [[nodiscard]] bool carries(Eigen::Index joint) const noexcept { return carries_[static_cast<std::size_t>(joint)]; }
   // J_w, and the wrist's place. `at` is the kinematics at c_rad.
   using Columns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, models::max_axes>;
   struct Wrist {

@@ -15,7 +15,9 @@ FinalSetpoints::FinalSetpoints(const models::Arm& arm, const std::vector<descrip
       limits_(limits),
       period_s_(period_s),
       guard_(drives_, period_s),
-      tool_guard_(arm, drives_, limits, period_s) {
+      tool_guard_(arm, drives_, limits, period_s),
+      lever_(arm.path_curvature().diagonal()) {
+  lever_ /= lever_.maxCoeff();
   state_.run_out_rad_per_s = JointVector::Zero(arm.axes());
   start(arm.start_rad());
 }
@@ -40,9 +42,12 @@ FinalSetpoints::Result FinalSetpoints::step(const JointVector& motor_rad, const 
   if (result.blocked != 0) result.limits.set(Limit::following_error, result.blocked);
   result.limits.add(guard(wanted_rad, &bounds, result.guarded));
   follow(measured, result.blocked);
-  result.differs = result.blocked != 0 || guard_.lag_rad() > limits_.following_error_rad;
+  result.differs = result.blocked != 0 || lag_rad() > limits_.following_error_rad;
   return result;
 }
+
+// That of the joint which holds the tool furthest back, as if it were the one with the longest lever.
+double FinalSetpoints::lag_rad() const noexcept { return guard_.lag_rad().cwiseAbs().cwiseProduct(lever_).maxCoeff(); }
 
 JointVector FinalSetpoints::go_on_from_here(std::uint8_t blocked) noexcept {
   guard_.follow_from_here(blocked);

@@ -34,7 +34,8 @@ class FinalSetpoints {
     bool guarded = false;      // the tool's guard, which is the last one, held something back
     // What was wanted can't be caught up: the motion has to go on from what was commanded. A guard that holds back a
     // little is caught up with, as joints that lag are: going on from setpoints takes the motors' lead for the links'
-    // place, and would shake the tool.
+    // place, and would shake the tool. A little: what moves the tool no further than limits.following_error_rad of the
+    // joint that moves it furthest.
     bool differs = false;
   };
   // Bounds on the setpoints of one period.
@@ -73,6 +74,7 @@ class FinalSetpoints {
   ActiveLimits guard(const models::JointVector& wanted_rad, const Bounds* bounds, bool& held_back) noexcept;
   [[nodiscard]] std::uint8_t find_blocked(const models::JointVector& motor_rad, const Measured& measured,
                                           models::JointVector& wanted_rad) const noexcept;
+  [[nodiscard]] double lag_rad() const noexcept;
   void follow(const Measured& measured, std::uint8_t blocked) noexcept;
 
   std::vector<description::DriveDescription> drives_;
@@ -80,6 +82,7 @@ class FinalSetpoints {
   double period_s_;
   JointGuard guard_;
   ToolGuard tool_guard_;
+  models::JointVector lever_;  // of each joint: how far it moves the tool at most, as a share of the longest
   SetpointEnvelope envelope_;  // of the setpoints; a blocked joint's is frozen
   State state_;
 };

@@ -37,7 +37,7 @@ void JointGuard::follow_from_here(std::uint8_t but_not) noexcept {
   }
 }
 
-bool JointGuard::lags() const noexcept { return lag_rad() > lag_tolerance_rad; }
+bool JointGuard::lags() const noexcept { return lag_rad().cwiseAbs().maxCoeff() > lag_tolerance_rad; }
 
 ActiveLimits JointGuard::step(const JointVector& wanted_rad) noexcept {
   ActiveLimits active;

@@ -41,8 +41,8 @@ class JointGuard {
 
   [[nodiscard]] const models::JointVector& target_rad() const noexcept { return target_rad_; }
   [[nodiscard]] const models::JointVector& speed_rad_per_s() const noexcept { return speed_rad_per_s_; }
-  // The largest distance over all joints between the setpoint and what was wanted.
-  [[nodiscard]] double lag_rad() const noexcept { return (wanted_k1_rad_ - target_rad_).cwiseAbs().maxCoeff(); }
+  // By how much each setpoint is behind what was wanted.
+  [[nodiscard]] models::JointVector lag_rad() const noexcept { return wanted_k1_rad_ - target_rad_; }
   // Whether a joint's limits hold its setpoint back from what was wanted.
   [[nodiscard]] bool lags() const noexcept;
   [[nodiscard]] bool at_rest() const noexcept { return speed_rad_per_s_.cwiseAbs().maxCoeff() < 1e-9; }

@@ -7,8 +7,9 @@ feel it?
 The ways are found with kinematics of the judge's own: straight ones from the start, along which the fifth joint of six,
 or the sixth of seven, goes through zero or comes nearer to it than 0.05 rad. The hand leads along each, past the
 singularity and back, at 0.05 to 0.4 m/s. Judged by the records alone, while the joint is within 0.1 rad of zero:
-  place        the tool, by the setpoints' joints, is within 0.5 mm of the proxy's way
-  no stop      no fault; nor does the tool stand while the hand pulls with more than 5 N
+  place        the tool is within 0.5 mm of the proxy's way, beside what the hand's force bends the gears by: in
+               proportion to the force, as elsewhere on the way
+  no stop      no fault; nor does the tool stand while the hand pulls with more than 5 N for 0.2 s
   speeds       of the tool, as sent, within the limit
   force        below twice the largest of the same session elsewhere on the way
 Told, not judged: how far the orientation lags. Status 1, and the session's files in `--keep DIR`, where it isn't so.
@@ -134,16 +135,19 @@ def judge(record, arm):
     if not near.any():
         return None
     sent = numpy.linalg.norm(numpy.diff(proxy, axis=0), axis=1) / T
-    off = distances_to_way(steel, proxy)
-    off = off[near & (numpy.arange(len(off)) > 60) & (numpy.arange(len(off)) < len(off) - 60)]
+    off, inner = distances_to_way(steel, proxy), numpy.arange(len(steel))
+    inner = (inner > 60) & (inner < len(off) - 60)
+    pulls = ~near & inner & (time_s > 0.5) & (force > max(PULL_N, 0.5 * force.max()))
+    off = (off - force * (off[pulls] / force[pulls]).max(initial=0.0))[near & inner].max(initial=0.0)
     window = max(1, int(0.2 / T))
-    moved = numpy.linalg.norm(steel[window:] - steel[:-window], axis=1) / (window * T)
+    way = numpy.cumsum(numpy.linalg.norm(numpy.diff(steel, axis=0, prepend=steel[:1]), axis=1))
+    moved = (way[window:] - way[:-window]) / (window * T)
     pulled = numpy.lib.stride_tricks.sliding_window_view(force, window).min(1)
     stands = ((moved < STANDS_M_PER_S) & (pulled[:len(moved)] > PULL_N) & near[window:]).sum() * T
     elsewhere = ~near & (time_s > 0.5)
     four = lambda name: column([f"{name}_W_q{x}" for x in ("x", "y", "z", "w")])
     lag = 2 * numpy.arccos(numpy.minimum(1.0, numpy.abs((four("proxy") * four("true_tool")).sum(1))))
-    return {"off mm": 1e3 * off.max() if len(off) else 0.0, "stands s": stands,
+    return {"off mm": 1e3 * off, "stands s": stands,
             "speed": sent.max() / arm.cell.speed, "force": force[near].max() / max(2.0, force[elsewhere].max()),
             "lag rad": lag[near].max()}
 
