@@ -6,10 +6,10 @@
 // sets of U:
 //   box      low ≤ u ≤ high: each joint's range with room to brake, its speed, and its acceleration behind the filter.
 //            The filter's input may therefore jump, as it does at a wall. Where turning may have to give way (near a
-//            wrist's singularity, while it lags, and where a hand turns the tool) steps keep to half of the acceleration
-//            before the filter, too, if the place allows it; of an orientation that is held, those of the joints that
-//            only turn the tool always. Motors lead the links that they accelerate, and can't follow what jumps at a
-//            wrist
+//            wrist's singularity, while it lags, and where a hand turns the tool) steps keep to half of the
+//            acceleration before the filter, too, if the place allows it; of an orientation that is held, those of the
+//            joints that only turn the tool always. Motors lead the links that they accelerate, and can't follow what
+//            jumps at a wrist
 //   place    −∇σ·u ≤ b: distance from the poses in which the place is lost (place_margin.hpp)
 //   points   |p(u) − p(0)| ≤ vT for elbow and wrist, also while all joints brake from there (growth_m_per_s())
 //   turn     the sets of turning (turn_sets.hpp); of an orientation that is held, how far it may lag

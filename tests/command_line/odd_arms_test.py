@@ -1,7 +1,7 @@
 """Odd arms get from `proxarm new-cell` a cell that runs at once and is steady, or the reason why there is none."""
 import unittest
 
-from harness import SOURCE, ProgramTest
+from harness import ProgramTest
 from new_cell_test import FOUR, SIX, arm
 
 LONG_TOOL = ('<origin xyz="0.05 0 0"/>', '<origin xyz="0.4 0 0"/>')

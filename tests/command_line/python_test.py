@@ -310,7 +310,7 @@ class Around(ProgramTest):
 class CallTiming(unittest.TestCase):
     def test_a_step_costs_a_microsecond_more_than_a_bare_call(self):
         # What the machine does beside comes and goes: the quickest of many short rounds, each of both by turns.
-        world, bare = proxarm.World("scenes/wall.yaml"), proxarm._bare
+        world, bare = proxarm.World("scenes/wall.yaml"), proxarm._proxarm._bare
         p, q = numpy.array([0.95, 0.0, 0.6]), numpy.array([0.9, 0.0, 0.6])
 
         def took_s(function, times=2000):

@@ -6,7 +6,7 @@ import subprocess
 import time
 import unittest
 
-from harness import SOURCE, ProgramTest, program
+from harness import ProgramTest, program
 
 PATIENCE_S = 60
 LONG = ("run", "--json", "--no-plot", "--duration", "1h", "--record", "session")

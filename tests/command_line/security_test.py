@@ -5,7 +5,7 @@ import subprocess
 import time
 import unittest
 
-from harness import SOURCE, ProgramTest, program
+from harness import ProgramTest, program
 
 PATIENCE_S = 60  # far more than any of these takes; what hangs is found all the same
 BOMB = "a: &a [x, x, x, x, x, x, x, x]\n" + "".join(

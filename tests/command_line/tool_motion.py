@@ -196,7 +196,6 @@ def judge(cell_file, signals, column):
         header = {name: i for i, name in enumerate(next(rows))}
         columns = [header[f"{joint}_{column}_counts"] for joint in cell.joints]
         time, phase = header["time_s"], header["phase"]
-        start_box = None
         for row in rows:
             if row[phase] not in MOVING:
                 before = []

@@ -1,5 +1,4 @@
 """The web server of `--view` from outside: whom it refuses, and that noise does nothing to it."""
-import json
 import os
 import random
 import socket

@@ -11,7 +11,6 @@ anything, by a fault. Status 1 and the session's files, in `--keep DIR`, where i
 import argparse
 import csv
 import json
-import math
 import os
 import pathlib
 import random

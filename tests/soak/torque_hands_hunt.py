@@ -17,7 +17,6 @@ import collections
 import csv
 import json
 import math
-import pathlib
 import random
 import sys
 import xml.etree.ElementTree

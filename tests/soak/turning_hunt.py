@@ -10,8 +10,6 @@ isn't so.
 """
 import csv
 import json
-import math
-import pathlib
 import random
 import sys
 
@@ -104,12 +102,10 @@ def session(seed, folder):
     limits = made_cell(chance, name, folder)
     (folder / "hand.yaml").write_text(made_hand(chance))
     period_ms = chance.choice((1, 1, 1, 2))
-    command = [os.environ["PROXARM_PROGRAM"], "run", str(folder / "cell.yaml"), "--scene", str(SOURCE / "scenes/free.yaml"),
-               "--hand", str(folder / "hand.yaml"), "--inertia", f"{chance.uniform(0.05, 0.15):.3g}", "--mass",
-               f"{chance.uniform(5, 12):.3g}", "--timestep", f"{period_ms}ms", "--duration", f"{DURATION_S}s", "--no-plot",
-               "--json", "--record", str(folder / "record")]
-    (folder / "command").write_text(" ".join(command) + "\n")
-    done = subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
+    done = hunting.run(folder / "cell.yaml", SOURCE / "scenes/free.yaml",
+                       ["--hand", folder / "hand.yaml", "--inertia", f"{chance.uniform(0.05, 0.15):.3g}", "--mass",
+                        f"{chance.uniform(5, 12):.3g}", "--timestep", f"{period_ms}ms", "--duration", f"{DURATION_S}s"],
+                       folder / "record")
     if done.returncode not in (0, 1) or not done.stdout:
         return {"refused": done.stderr.strip()[-150:]}
     summary = json.loads(done.stdout)

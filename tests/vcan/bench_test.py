@@ -7,7 +7,6 @@ import json
 import struct
 import subprocess
 import sys
-import unittest
 from pathlib import Path
 
 import two_processes as two

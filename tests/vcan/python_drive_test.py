@@ -6,7 +6,6 @@ machine, written down once more.
 import json
 import struct
 import time
-import unittest
 
 import python_peer
 import two_processes as two

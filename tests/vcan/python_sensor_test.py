@@ -9,7 +9,6 @@ import re
 import struct
 import subprocess
 import time
-import unittest
 from pathlib import Path
 
 import python_peer

@@ -16,7 +16,7 @@ import subprocess
 
 import numpy
 
-from ._proxarm import SetupError, World, _Session, _bare, _read_table
+from ._proxarm import SetupError, World, _Session, _read_table
 
 __all__ = ["Live", "Record", "Result", "Session", "SetupError", "Signals", "Study", "World", "load", "run", "study"]
 
