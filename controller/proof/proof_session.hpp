@@ -2,7 +2,8 @@
 // as any other session. With other stations than a proof's it reads whatever is read of an arm that stands: Task.
 //
 // After enabling and taring, the session follows its plan: move, settle, exercise if there is one, read; and where a
-// push is needed: wait for it, read, wait for its end. Then the drives are switched off, and the brakes are watched for a second.
+// push is needed: wait for it, read, wait for its end. Then the drives are switched off, and the brakes are watched for
+// a second.
 //
 // The tool moves at proof_speed_m_per_s at most, and joints move on minimum-jerk paths from rest to rest. Any fault,
 // any hold, and an enabling input that is released end the session: the motion runs out within a tenth of a second, and
@@ -42,7 +43,7 @@ enum class Asked : std::uint8_t { nothing, press, push, let_go };
 struct Task {
   std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: the proof's, plan()
   double settle_s = 0.4, read_s = 0.3;
-  std::shared_ptr<Exercise> exercise;  // between settling and reading; null: the arm only stands
+  std::shared_ptr<Exercise> exercise = nullptr;  // between settling and reading; null: the arm only stands
 };
 
 class ProofSession {

@@ -173,7 +173,7 @@ class ServoDrive final : public CyclicDrive {
   std::shared_ptr<const description::EdsFile> eds_;  // may be none
   CyclicMode mode_;
   std::uint8_t tpdo_bytes_, rpdo_bytes_;
-  bool torque_feedback_;                    // in TPDO1, behind the position
+  bool torque_feedback_;                     // in TPDO1, behind the position
   std::optional<std::uint8_t> torque_byte_;  // of 6077h among the feedback that nothing depends on
   std::vector<std::string> losses_;
   std::string fixed_by_eds_;  // until the drive itself has been asked
