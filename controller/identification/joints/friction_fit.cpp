@@ -15,7 +15,7 @@ using models::JointVector;
 using Complex = std::complex<double>;
 
 // Unknowns: J; F and b of the slow motion; the same of the fast one; the torque's delay.
-constexpr int of_rotor = 0, of_slow = 1, of_fast = 3, of_delay = 5, unknowns = 6;
+constexpr int of_rotor = 0, of_slow = 1, of_fast = 3, of_delay = 5, of_lag = 6, unknowns = 7;
 constexpr double slow_highest_Hz = 20.0;
 constexpr int repeats = 4;  // the delay is small against 1/ω: it is found to a hundredth in each
 // A motor slower than this share of its fastest counts as one that turns round: its friction takes any value.
@@ -134,6 +134,7 @@ Solution solved(const std::vector<Line>& lines, double delay_s) {
     row[line.friction] = line.sign;
     row[line.friction + 1] = i * line.omega * line.motor;
     row[of_delay] = -i * line.omega * torque;
+    row[of_lag] = line.friction == of_fast ? i * line.omega * line.sign : Complex(0.0);
     rows.push_back(row);
     wanted.push_back(torque - line.gear);
     A += (row.real() * row.real().transpose() + row.imag() * row.imag().transpose()) / line.variance;

@@ -164,7 +164,7 @@ class JointsProblem {
                           .rated_torque_Nm = drive.rated_torque_Nm,
                           .torque_step_Nm = 1e-3 * drive.rated_torque_Nm,
                           .encoder_step_rad = 1.0 / std::abs(drive.counts_per_rad()),
-                          .line_share = allowed_.line};
+                          .line_share = allowed_.torque_line};
     FrictionFit fit = fit_friction(arm_, response_, gears_, inputs);
     Eigen::Vector3d squares = fit.deviation.cwiseAbs2();
     const auto also = [&](const FrictionFit& other) { squares += (other.value - fit.value).cwiseAbs2(); };
@@ -179,10 +179,17 @@ class JointsProblem {
       (stiffness ? other.stiffness_Nm_per_rad : other.damping_Nms_per_rad)[joint] *= std::exp(by);
       also(fit_friction(arm_, response_, other, inputs));
     }
+    squares[0] += std::pow(fit.value[0] * between_setpoints(drive), 2);
     inputs.rated_torque_Nm *= 1.0 + allowed_.torque_scale;
     also(fit_friction(arm_, response_, gears_, inputs));
     fit.deviation = squares.cwiseSqrt();
     return fit;
+  }
+
+  // By which the torque at the setpoints may differ from the mean, as a share of J θ̈.
+  [[nodiscard]] double between_setpoints(const description::DriveDescription& drive) const {
+    const double stiff = 2.0 * std::numbers::pi * drive.position_bandwidth_Hz * records_.front().cycle_s;
+    return stiff * stiff / 12.0;
   }
 
   // In slow motions the sensor reads the tool's weight and inertia alone; their change from motion to motion is drift.

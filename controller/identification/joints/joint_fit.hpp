@@ -14,6 +14,10 @@
 // Then (1), for each joint, in the lines of both motions: linear in J, F, b and in the delay δ of 6077h,
 // τ(t) ≈ τ_read + δ dτ_read/dt. Friction of the fast motion counts for itself, since it is that of slower speeds.
 //
+// A drive reads its torque where setpoints follow one another, once a cycle T. One that goes straight from setpoint to
+// setpoint with a position loop of bandwidth f_p gives less there than in the mean, by (2π f_p T)²/12 of J θ̈; one that
+// goes on a curve, or filters what it reads, doesn't. J is allowed to be off by that, as a standard deviation.
+//
 // Not measured, and therefore allowed for (Allowed): links whose inertias are others than the URDF's, a drive whose
 // torque has another scale, a sensor that is tilted. The interval is what all that and the noise leave open; a figure
 // that is then known to half of its value at best is called not identifiable.
@@ -30,6 +34,7 @@ namespace proxarm::identification {
 struct Allowed {
   double link_inertia = 0.025, torque_scale = 0.025, sensor_scale = 0.03;
   double line = 0.01;         // of a line's size: tilted sensor, poses that change, resolution
+  double torque_line = 0.003;  // likewise of the drive's torque
   double zero_drift_N = 1.0;  // of the sensor, while all motions last
 };
 
