@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "controller/identification/joints/spectrum.hpp"
@@ -15,6 +16,9 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double loosely = 1.5, delay_deviation_s = 2e-3;  // the former of ln k and ln d
 constexpr int sweeps = 3, places = 33, damping_places = 9, most_steps = 60;
+// A gear is shown where no other explains the lines nearly as well; those beyond three deviations, and this, are
+// others.
+constexpr double surely = 30.0, least_apart = 0.1;
 const double searched = std::log(3.0);
 
 class Problem {
@@ -23,13 +27,13 @@ class Problem {
       : response_(response), lines_(lines), start_(start), joints_(start.gears.stiffness_Nm_per_rad.size()) {}
 
   [[nodiscard]] Vector first() const {
-    Vector p = Vector::Zero(2 * joints_ + 2);
+    Vector p = Vector::Zero(3 * joints_ + 2);
     p.head(joints_) = start_.gears.stiffness_Nm_per_rad.array().log();
     p.segment(joints_, joints_) = start_.gears.damping_Nms_per_rad.array().log();
     return p;
   }
   [[nodiscard]] Gears gears(const Vector& p) const {
-    return {p.head(joints_).array().exp(), p.segment(joints_, joints_).array().exp()};
+    return {p.head(joints_).array().exp(), p.segment(joints_, joints_).array().exp(), p.tail(joints_).array().exp()};
   }
   [[nodiscard]] ComplexWrench reading(const GearLine& line, const Vector& p) const {
     const std::complex<double> i(0.0, 1.0);
@@ -51,6 +55,7 @@ class Problem {
     r.segment(at, 2 * joints_) = (first() - p).head(2 * joints_) / loosely;
     r[at + 2 * joints_] = -p[2 * joints_] / delay_deviation_s;
     r[at + 2 * joints_ + 1] = -p[2 * joints_ + 1] / start_.sensor_scale;
+    r.tail(joints_) = -p.tail(joints_) / (0.5 * start_.link_inertia);
     return r;
   }
   [[nodiscard]] Eigen::MatrixXd slopes(const Vector& p, const Vector& r) const {
@@ -76,6 +81,18 @@ class Problem {
       at = p[unknown];
     }
     p[unknown] = at;
+  }
+  // The least cost of a gear that is clearly another one, all else as in p: a rigid one, or one in reach of the search.
+  [[nodiscard]] double cost_of_others(const Vector& p, Eigen::Index joint, double half) const {
+    constexpr double rigid = 4.0;
+    Vector other = p;
+    other[joint] = p[joint] + rigid;
+    double least = differences(other).squaredNorm();
+    for (int n = 0; n < places; ++n) {
+      other[joint] = p[joint] + searched * (2.0 * n / (places - 1) - 1.0);
+      if (std::abs(other[joint] - p[joint]) > half) least = std::min(least, differences(other).squaredNorm());
+    }
+    return least;
   }
   [[nodiscard]] Eigen::Index joints() const noexcept { return joints_; }
   [[nodiscard]] double left_over_share(const Vector& p) const {
@@ -141,7 +158,7 @@ std::vector<GearLine> gear_lines(const std::vector<MotionRecord>& fast, double l
 GearFit fit_gears(const LinkResponse& response, const std::vector<GearLine>& lines, const GearStart& start) {
   const Problem problem(response, lines, start);
   Vector p = problem.first();
-  for (int sweep = 0; start.search && sweep < sweeps; ++sweep) {
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (Eigen::Index joint = 0; joint < problem.joints(); ++joint) {
       problem.search(p, joint, places);
       problem.search(p, problem.joints() + joint, damping_places);
@@ -154,8 +171,14 @@ GearFit fit_gears(const LinkResponse& response, const std::vector<GearLine>& lin
   const double inflation = std::max(1.0, r.squaredNorm() / nu);
   const Eigen::MatrixXd covariance =
       (J.transpose() * J).ldlt().solve(Eigen::MatrixXd::Identity(p.size(), p.size())) * inflation;
-  const Vector deviation = covariance.diagonal().cwiseSqrt();
+  Vector deviation = covariance.diagonal().cwiseSqrt();
   const Eigen::Index n = problem.joints();
+  for (Eigen::Index joint = 0; joint < n; ++joint) {
+    const double half = std::max(least_apart, 3.0 * deviation[joint]);
+    const double others = problem.cost_of_others(p, joint, half);
+    if (others > r.squaredNorm() + surely * inflation) continue;
+    deviation[joint] = deviation[n + joint] = std::numeric_limits<double>::infinity();
+  }
   return {.gears = problem.gears(p),
           .stiffness_deviation = deviation.head(n),
           .damping_deviation = deviation.segment(n, n),

@@ -29,7 +29,7 @@ constexpr double first_mode_Hz = 40.0, first_damping_ratio = 0.03;
 
 Gears gears_of(const description::Cell& cell, const LinkResponse& response) {
   const auto n = static_cast<Eigen::Index>(cell.drives.size());
-  Gears gears{Eigen::VectorXd(n), Eigen::VectorXd(n)};
+  Gears gears{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::VectorXd::Ones(n)};
   for (Eigen::Index i = 0; i < n; ++i) {
     const description::DriveDescription& drive = cell.drives[static_cast<std::size_t>(i)];
     const double inertia = response.mass_kg_m2()(i, i), omega = 2.0 * std::numbers::pi * first_mode_Hz;
@@ -87,9 +87,10 @@ class JointsProblem {
     const std::vector<GearLine> lines = gear_lines(fast_of(records_), allowed_.line);
     start_ = {.gears = gears_of(cell_, response_),
               .sensor_bandwidth_Hz = cell_.sensor.bandwidth_Hz,
-              .sensor_scale = allowed_.sensor_scale};
+              .sensor_scale = allowed_.sensor_scale,
+              .link_inertia = allowed_.link_inertia};
     const bool is_shown = cell_.tool.mass_kg > 0.0;
-    if (is_shown) find_gears(lines);
+    if (is_shown) found_ = fit_gears(response_, lines, start_);
     gears_ = is_shown ? found_.gears : start_.gears;
     fit.left_over_share = found_.left_over_share;
     if (fit.doubt.empty() && is_shown && fit.left_over_share > most_left_over) {
@@ -102,14 +103,6 @@ class JointsProblem {
   }
 
  private:
-  void find_gears(const std::vector<GearLine>& lines) {
-    found_ = fit_gears(response_, lines, start_);
-    GearStart near = start_;
-    near.gears = found_.gears;
-    near.search = false;
-    with_heavier_ = fit_gears(heavier_, lines, near).gears;
-  }
-
   [[nodiscard]] const MotionRecord& record(int joint, bool fast) const {
     return records_[static_cast<std::size_t>(2 * joint + (fast ? 1 : 0))];
   }
@@ -117,10 +110,8 @@ class JointsProblem {
   [[nodiscard]] JointEstimates estimates(int joint, bool gears_are_shown) const {
     JointEstimates e;
     if (gears_are_shown) {
-      e.stiffness_Nm_per_rad = gear(found_.gears.stiffness_Nm_per_rad[joint], with_heavier_.stiffness_Nm_per_rad[joint],
-                                    found_.stiffness_deviation[joint]);
-      e.damping_Nms_per_rad = gear(found_.gears.damping_Nms_per_rad[joint], with_heavier_.damping_Nms_per_rad[joint],
-                                   found_.damping_deviation[joint]);
+      e.stiffness_Nm_per_rad = gear(found_.gears.stiffness_Nm_per_rad[joint], found_.stiffness_deviation[joint]);
+      e.damping_Nms_per_rad = gear(found_.gears.damping_Nms_per_rad[joint], found_.damping_deviation[joint]);
     } else {
       e.stiffness_Nm_per_rad = e.damping_Nms_per_rad =
           not_shown("nothing hangs behind the sensor, whose weight would show how the links swing");
@@ -129,10 +120,9 @@ class JointsProblem {
     return e;
   }
 
-  // The value, and how far it is off where links are heavier than they are said to be.
-  [[nodiscard]] static Estimate gear(double value, double with_heavier, double deviation_of_log) {
-    const double deviation = std::hypot(value * deviation_of_log, with_heavier - value);
-    return judged(value, deviations_of_95 * deviation,
+  // Links that are otherwise in a way that S doesn't have change k by about as much as their inertia.
+  [[nodiscard]] Estimate gear(double value, double deviation_of_log) const {
+    return judged(value, deviations_of_95 * value * std::hypot(deviation_of_log, allowed_.link_inertia),
                   "the tool hardly swings by it up to 40 Hz: its link is too light or its gear too stiff, or the "
                   "sensor's noise hides it");
   }
@@ -168,7 +158,7 @@ class JointsProblem {
     FrictionFit fit = fit_friction(arm_, response_, gears_, inputs);
     Eigen::Vector3d squares = fit.deviation.cwiseAbs2();
     const auto also = [&](const FrictionFit& other) { squares += (other.value - fit.value).cwiseAbs2(); };
-    also(fit_friction(arm_, heavier_, found_.gears.stiffness_Nm_per_rad.size() > 0 ? with_heavier_ : gears_, inputs));
+    also(fit_friction(arm_, heavier_, gears_, inputs));
     constexpr double most_of_log = 0.5;
     for (const bool stiffness : {true, false}) {
       Gears other = gears_;
@@ -239,7 +229,7 @@ class JointsProblem {
   LinkResponse response_, heavier_;
   GearStart start_;
   GearFit found_;
-  Gears gears_, with_heavier_;
+  Gears gears_;
 };
 
 }  // namespace

@@ -33,9 +33,9 @@ namespace proxarm::identification {
 // Standard deviations of what isn't measured, as shares.
 struct Allowed {
   double link_inertia = 0.025, torque_scale = 0.025, sensor_scale = 0.03;
-  double line = 0.01;         // of a line's size: tilted sensor, poses that change, resolution
+  double line = 0.01;          // of a line's size: tilted sensor, poses that change, resolution
   double torque_line = 0.003;  // likewise of the drive's torque
-  double zero_drift_N = 1.0;  // of the sensor, while all motions last
+  double zero_drift_N = 1.0;   // of the sensor, while all motions last
 };
 
 struct Estimate {

@@ -55,7 +55,8 @@ LinkResponse::LinkResponse(const description::Cell& cell, const models::Arm& arm
 ComplexJoints LinkResponse::links(const Gears& gears, double omega, const ComplexJoints& motors) const {
   const std::complex<double> i(0.0, 1.0);
   const ComplexJoints gear = gears.stiffness_Nm_per_rad + i * omega * gears.damping_Nms_per_rad;
-  Eigen::MatrixXcd A = (gravity_ - omega * omega * mass_).cast<std::complex<double>>();
+  const Eigen::MatrixXd mass = gears.inertia_root.asDiagonal() * mass_ * gears.inertia_root.asDiagonal();
+  Eigen::MatrixXcd A = (gravity_ - omega * omega * mass).cast<std::complex<double>>();
   A.diagonal() += gear;
   return A.partialPivLu().solve(ComplexJoints(gear.cwiseProduct(motors)));
 }

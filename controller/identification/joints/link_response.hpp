@@ -1,8 +1,9 @@
 // How links and sensor swing when the motors do: small motions about a pose, line by line of a spectrum.
 //
 // With θ the motors' angles and φ the links' (rad at the joint; of linear joints m), at a frequency ω (rad/s):
-//   (K + iωD − ω²M + G) φ = (K + iωD) θ                                                       (1)
-//   K, D: diagonal, Nm/rad and Nms/rad;  M: links and tool without rotors, kg m²;  G = ∂τ_g/∂φ, Nm/rad
+//   (K + iωD − ω² S M S + G) φ = (K + iωD) θ                                                  (1)
+//   K, D: diagonal, Nm/rad and Nms/rad;  M: links and tool without rotors, kg m²;  G = ∂τ_g/∂φ, Nm/rad;
+//   S: diagonal, about 1: links that are heavier or lighter than the URDF says, by the square of it
 // The gears' torques are what the links take:
 //   τ_gear = (G − ω²M) φ                                                                      (2)
 // The tool (mass m, centre of mass C, inertia I about it) behind the sensor reads, in S,
@@ -22,6 +23,7 @@ using ComplexWrench = Eigen::Matrix<std::complex<double>, 6, 1>;  // force, torq
 
 struct Gears {
   Eigen::VectorXd stiffness_Nm_per_rad, damping_Nms_per_rad;
+  Eigen::VectorXd inertia_root;  // S of (1)
 };
 
 class LinkResponse {
