@@ -17,7 +17,7 @@ using Complex = std::complex<double>;
 // Unknowns: J; F and b of the slow motion; the same of the fast one; the torque's delay.
 constexpr int of_rotor = 0, of_slow = 1, of_fast = 3, of_delay = 5, of_lag = 6, unknowns = 7;
 constexpr double slow_highest_Hz = 20.0;
-constexpr int repeats = 4;  // the delay is small against 1/ω: it is found to a hundredth in each
+constexpr int repeats = 12;  // each finds the delay to a fraction of what is left of it
 // A motor slower than this share of its fastest counts as one that turns round: its friction takes any value.
 constexpr double turning_share = 0.01;
 

@@ -130,11 +130,13 @@ class JointsProblem {
   void find_friction(int joint, JointEstimates& e) const {
     const description::DriveDescription& drive = cell_.drives[static_cast<std::size_t>(joint)];
     const MotionRecord& fast = record(joint, true);
+    const bool is_told =
+        fast.torque_share.col(joint).allFinite() && record(joint, false).torque_share.col(joint).allFinite();
     std::string reason;
-    if (!fast.torque_share.col(joint).allFinite() || !record(joint, false).torque_share.col(joint).allFinite()) {
-      reason = "the drive doesn't tell its torque (6077h)";
-    } else if (!(drive.rated_torque_Nm > 0.0)) {
+    if (!(drive.rated_torque_Nm > 0.0)) {
       reason = "the cell doesn't say rated_torque_Nm, what 1000 in 6077h is at the joint";
+    } else if (!is_told) {
+      reason = "the drive doesn't tell its torque (6077h)";
     }
     if (!reason.empty()) {
       e.coulomb_Nm = e.viscous_Nms_per_rad = e.rotor_inertia_kg_m2 = not_shown(reason);
