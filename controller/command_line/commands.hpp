@@ -92,11 +92,11 @@ int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
 int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
-int prove_command(const ProveOptions& options);          // 1: not proven
-int zero_command(const ZeroOptions& options);            // 1: somebody was there
-int identify_command(const IdentifyOptions& options);    // 1: not identified, or another than the cell's
+int prove_command(const ProveOptions& options);               // 1: not proven
+int zero_command(const ZeroOptions& options);                 // 1: somebody was there
+int identify_command(const IdentifyOptions& options);         // 1: not identified, or another than the cell's
 int identify_joints_command(const IdentifyOptions& options);  // likewise
-int calibrate_command(const CalibrateOptions& options);  // 1: poses that don't fit one another
-int assess_command(const AssessOptions& options);        // 1: a threshold is exceeded
+int calibrate_command(const CalibrateOptions& options);       // 1: poses that don't fit one another
+int assess_command(const AssessOptions& options);             // 1: a threshold is exceeded
 
 }  // namespace proxarm::command_line

@@ -24,8 +24,8 @@ constexpr double cycle_s = 1e-3;
 // A motor that is led, a spring and a damper, a mass, and a tool at its end that a sensor carries.
 struct TrueAxis {
   double rotor = 0.0, coulomb = 0.0, viscous = 0.0, stiffness = 0.0, damping = 0.0, mass = 0.0;
-  double rounding = 0.0;           // of the torque
-  double hand_N_per_m = 0.0;       // of somebody who holds the handle
+  double rounding = 0.0;      // of the torque
+  double hand_N_per_m = 0.0;  // of somebody who holds the handle
   bool tells_torque = true;
 };
 
@@ -83,12 +83,14 @@ class Recorded {
       const double gear = axis_.stiffness * (theta - x) + axis_.damping * (speed - v);
       const double a = (gear - axis_.hand_N_per_m * x) / axis_.mass;
       if (const int row = k - first; row >= 0 && row < static_cast<int>(record.motor_rad.rows())) {
-        const double torque = axis_.rotor * acceleration + axis_.viscous * speed + std::copysign(axis_.coulomb, speed) + gear;
+        const double torque =
+            axis_.rotor * acceleration + axis_.viscous * speed + std::copysign(axis_.coulomb, speed) + gear;
         fill(record, row, theta, torque, a, -axis_.hand_N_per_m * x);
       }
       for (int p = 0; p < parts; ++p) {
         const double now = t + p * h;
-        const double drive = axis_.stiffness * led(n, now) + axis_.damping * (led(n, now + h) - led(n, now - h)) / (2.0 * h);
+        const double drive =
+            axis_.stiffness * led(n, now) + axis_.damping * (led(n, now + h) - led(n, now - h)) / (2.0 * h);
         v += h * (drive - (axis_.stiffness + axis_.hand_N_per_m) * x - axis_.damping * v) / axis_.mass;
         x += h * v;
       }
