@@ -12,6 +12,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <complex>
 
 #include "models/arm/arm.hpp"
 #include "models/description/cell.hpp"

@@ -62,9 +62,9 @@ class Recorded {
     tool_kg_ = cell.tool.mass_kg;
     centre_S_ = Vec3(cell.tool.centre_of_mass_S_m.data());
     weight_S_ = at.X_WS.linear().transpose() * (tool_kg_ * Vec3(cell.gravity_W_m_per_s2.data()));
-    for (std::size_t n = 0; n < exercise_.records().size(); ++n) records_.push_back(recorded(n));
+    for (std::size_t n = 0; n < exercise_.records().size(); ++n) records.push_back(recorded(n));
   }
-  std::vector<MotionRecord> records_;
+  std::vector<MotionRecord> records;
 
  private:
   [[nodiscard]] double led(std::size_t n, double t) const { return exercise_.offset_rad(n, t)[0]; }
@@ -121,7 +121,7 @@ class Recorded {
 };
 
 JointsFit fit_of(const Cell& cell, const TrueAxis& axis) {
-  return identify_joints(cell, Recorded(cell, axis).records_, Allowed{.zero_drift_N = 3.0});
+  return identify_joints(cell, Recorded(cell, axis).records, Allowed{.zero_drift_N = 3.0});
 }
 
 void expect_true(const Estimate& estimate, double truth, double widest_share) {
@@ -208,7 +208,7 @@ TEST(JointFit, AHandAtTheHandleIsADoubt) {
 TEST(JointFit, ATorqueThatComesLateIsNoFriction) {
   const Cell cell = cell_of_one_axis();
   const TrueAxis axis = axis_of(cell);
-  std::vector<MotionRecord> records = Recorded(cell, axis).records_;
+  std::vector<MotionRecord> records = Recorded(cell, axis).records;
   constexpr Eigen::Index late = 2;  // cycles, within whole periods
   for (MotionRecord& record : records) {
     const Eigen::MatrixXd told = record.torque_share;
