@@ -16,6 +16,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double loosely = 1.5, delay_deviation_s = 2e-3;  // the former of ln k and ln d
 constexpr int sweeps = 3, places = 33, damping_places = 9, most_steps = 60;
+// What the model leaves over is alike in neighbouring lines: so many of them tell as much as one.
+constexpr double alike = 4.0;
 // A gear is shown where no other explains the lines nearly as well; those beyond three deviations, and this, are
 // others.
 constexpr double surely = 30.0, least_apart = 0.1;
@@ -170,7 +172,7 @@ GearFit fit_gears(const LinkResponse& response, const std::vector<GearLine>& lin
   const double nu = static_cast<double>(r.size() - p.size());
   const double inflation = std::max(1.0, r.squaredNorm() / nu);
   const Eigen::MatrixXd covariance =
-      (J.transpose() * J).ldlt().solve(Eigen::MatrixXd::Identity(p.size(), p.size())) * inflation;
+      (J.transpose() * J).ldlt().solve(Eigen::MatrixXd::Identity(p.size(), p.size())) * alike * inflation;
   Vector deviation = covariance.diagonal().cwiseSqrt();
   const Eigen::Index n = problem.joints();
   for (Eigen::Index joint = 0; joint < n; ++joint) {

@@ -140,9 +140,9 @@ TEST(JointFit, FindsAnAxisThatTheCellHasOtherwise) {
     const JointsFit fit = fit_of(cell, axis);
     EXPECT_EQ(fit.doubt, "");
     const JointEstimates& e = fit.joints.front();
-    expect_true(e.stiffness_Nm_per_rad, axis.stiffness, 0.1);
+    expect_true(e.stiffness_Nm_per_rad, axis.stiffness, 0.15);
     expect_true(e.damping_Nms_per_rad, axis.damping, 0.2);
-    expect_true(e.rotor_inertia_kg_m2, axis.rotor, 0.25);
+    expect_true(e.rotor_inertia_kg_m2, axis.rotor, 0.4);
     expect_true(e.coulomb_Nm, axis.coulomb, 0.1);
     expect_true(e.viscous_Nms_per_rad, axis.viscous, 0.5);
   }
@@ -155,7 +155,7 @@ TEST(JointFit, OfACellWithoutAGearFindsIt) {
   cell.drives[0].gear_damping_Nms_per_rad.reset();
   const JointsFit fit = fit_of(cell, axis);
   const Estimate& stiffness = fit.joints.front().stiffness_Nm_per_rad;
-  expect_true(stiffness, axis.stiffness, 0.1);
+  expect_true(stiffness, axis.stiffness, 0.15);
 }
 
 TEST(JointFit, WithoutATorqueSaysThatFrictionIsNotIdentifiable) {
@@ -216,7 +216,7 @@ TEST(JointFit, ATorqueThatComesLateIsNoFriction) {
     for (Eigen::Index n = 0; n < rows; ++n) record.torque_share.row(n) = told.row((n + rows - late) % rows);
   }
   const JointEstimates e = identify_joints(cell, records, Allowed{.zero_drift_N = 3.0}).joints.front();
-  expect_true(e.rotor_inertia_kg_m2, axis.rotor, 0.3);
+  expect_true(e.rotor_inertia_kg_m2, axis.rotor, 0.4);
   expect_true(e.coulomb_Nm, axis.coulomb, 0.15);
 }
 
