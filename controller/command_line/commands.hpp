@@ -64,6 +64,7 @@ struct ZeroOptions {
 struct IdentifyOptions {
   RunOptions run;
   std::filesystem::path arm;  // cell of the simulated arm; empty: the same
+  bool joints = false;        // friction, rotors and gears of the joints, instead of what hangs behind the sensor
   bool compare = false;       // with the cell and its zero
   bool write = false;         // into the cell and its zero
 };
@@ -91,10 +92,11 @@ int check_command(const CheckFilesOptions& options);  // 2: one is wrong
 int explain_command(const FileOptions& options);
 int schema_command(const SchemaOptions& options);
 int tune_command(const RunOptions& options);
-int prove_command(const ProveOptions& options);          // 1: not proven
-int zero_command(const ZeroOptions& options);            // 1: somebody was there
-int identify_command(const IdentifyOptions& options);    // 1: not identified, or another than the cell's
-int calibrate_command(const CalibrateOptions& options);  // 1: poses that don't fit one another
-int assess_command(const AssessOptions& options);        // 1: a threshold is exceeded
+int prove_command(const ProveOptions& options);               // 1: not proven
+int zero_command(const ZeroOptions& options);                 // 1: somebody was there
+int identify_command(const IdentifyOptions& options);         // 1: not identified, or another than the cell's
+int identify_joints_command(const IdentifyOptions& options);  // likewise
+int calibrate_command(const CalibrateOptions& options);       // 1: poses that don't fit one another
+int assess_command(const AssessOptions& options);             // 1: a threshold is exceeded
 
 }  // namespace proxarm::command_line

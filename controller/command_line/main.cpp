@@ -371,11 +371,16 @@ void add_identify_options(CLI::App& app, command_line::IdentifyOptions& options)
   add_enabling_option(app, options.run);
   add_hardware_option(app, options.run);
   add_arm_option(app, options.arm);
+  app.add_flag("--joints", options.joints,
+               "friction, rotor inertia, gear stiffness and damping of each joint instead, by small motions about the "
+               "pose the arm is in");
   app.add_flag("--compare", options.compare,
                "what differs from the cell and its CELL.zero, and whether by more than the uncertainty. Status 1: "
                "something does");
-  app.add_flag("--write", options.write,
-               "write tool.mass_kg and tool.centre_of_mass_S_m into the cell, with a backup, and the zero beside it");
+  app.add_flag(
+      "--write", options.write,
+      "write tool.mass_kg and tool.centre_of_mass_S_m into the cell, with a backup, and the zero beside it; or "
+      "with --joints what was found of these");
   app.add_flag("--json", options.run.json, "print the result as one JSON object");
 }
 
@@ -591,13 +596,14 @@ class Commands {
     add_arm_option(*zero, zero_.arm);
     zero->add_option("--out", zero_.out, "file of the zero (default: beside the cell, CELL.zero)")->type_name("FILE");
     add_identify_options(
-        *add("identify",
-             "mass, centre of mass and zero of what hangs behind the sensor, by slow motions of the wrist, with their "
-             "uncertainty. Status 1: not identified",
-             [this] {
-               identify_.run.without_proof = true;
-               return identify_command(identify_);
-             }),
+        *add(
+            "identify",
+            "mass, centre of mass and zero of what hangs behind the sensor, by slow motions of the wrist, or friction, "
+            "rotors and gears of the joints (--joints), with their uncertainty. Status 1: not identified",
+            [this] {
+              identify_.run.without_proof = true;
+              return identify_.joints ? identify_joints_command(identify_) : identify_command(identify_);
+            }),
         identify_);
     add_calibrate_options(
         *add(

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numeric>
 
+#include "controller/identification/free_path.hpp"
 #include "models/base/setup_error.hpp"
 
 namespace proxarm::identification {
@@ -21,7 +22,6 @@ constexpr std::size_t wrist_joints = 3;
 // least that are worth the name.
 constexpr std::size_t chosen = 7, least_chosen = 5;
 constexpr double shares[] = {1.0, 0.5, 0.25, 0.125};  // of most_turn_rad, that a joint is tried to be turned by
-constexpr int places_of_path = 16;                    // they are 20 mm apart at most
 // Two poses of which one shows nothing more than the other: the weight's directions are this close.
 constexpr double same = 1e-6;
 
@@ -37,25 +37,6 @@ std::vector<Eigen::Index> wrist_of(const models::Arm& arm) {
 Vec3 down_in_sensor(const description::Cell& cell, const models::Arm& arm, const JointVector& motor_rad) {
   const Vec3 down_W = Vec3(cell.gravity_W_m_per_s2.data()).normalized();
   return arm.sensor_pose(arm.link_from_motor(motor_rad)).linear().transpose() * down_W;
-}
-
-bool allowed(const description::CellLimits& limits, const Vec3& place_W) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<std::size_t>(axis);
-    if (place_W[axis] < limits.workspace_min_m[i] || place_W[axis] > limits.workspace_max_m[i]) return false;
-  }
-  return std::none_of(limits.keep_out.begin(), limits.keep_out.end(), [&](const description::BoxDescription& box) {
-    const Vec3 low(box.min_m.data()), high(box.max_m.data());
-    return (place_W.array() >= low.array()).all() && (place_W.array() <= high.array()).all();
-  });
-}
-
-bool free_path(const description::Cell& cell, const models::Arm& arm, const JointVector& from, const JointVector& to) {
-  for (int n = 0; n <= places_of_path; ++n) {
-    const JointVector q = from + (static_cast<double>(n) / places_of_path) * (to - from);
-    if (!allowed(cell.limits, arm.tool_pose(arm.link_from_motor(q)).translation())) return false;
-  }
-  return true;
 }
 
 // By how much a joint alone can be turned to one side. A drive may be off by the following error without a fault, so

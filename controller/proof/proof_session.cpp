@@ -120,7 +120,7 @@ void ProofSession::act(std::int64_t t_k_ns) noexcept {
       return follow_plan();
     case Phase::stopping:
       rate_ = std::max(0.0, rate_ - settings_.period_s / run_out_s);
-      move();
+      step_ == Step::exercising ? exercise() : move();
       if (rate_ <= 0.0) supervisor_.handle(Event::at_rest);
       return;
     case Phase::disabling:
@@ -181,7 +181,7 @@ void ProofSession::begin_move(const JointVector& to_rad) noexcept {
 
 void ProofSession::go_to(Step step) noexcept {
   step_ = step;
-  step_s_ = pressed_s_ = 0.0;
+  step_s_ = pressed_s_ = exercise_s_ = 0.0;
   gathered_ = {};
   const bool asks = step == Step::waiting, frees = step == Step::releasing;
   asked_ = asks ? Asked::push : frees ? Asked::let_go : Asked::nothing;
@@ -195,6 +195,12 @@ void ProofSession::move() noexcept {
   setpoints_.values = from_rad_ + s * s * s * (10.0 + s * (-15.0 + s * 6.0)) * way_rad_;
 }
 
+// The exercise's own time passes more slowly while the arm is stopped.
+void ProofSession::exercise() noexcept {
+  exercise_s_ += rate_ * settings_.period_s;
+  setpoints_.values = stations_[station_].motor_rad + task_.exercise->offset_rad(station_, exercise_s_);
+}
+
 void ProofSession::follow_plan() noexcept {
   if (stations_.empty() || station_ >= stations_.size()) return;
   step_s_ += settings_.period_s;
@@ -205,7 +211,13 @@ void ProofSession::follow_plan() noexcept {
       return;
     case Step::settling:
       if (step_s_ < task_.settle_s) return;
+      if (task_.exercise) return go_to(Step::exercising);
       return go_to(stations_[station_].push_W.isZero() ? Step::reading : Step::waiting);
+    case Step::exercising:
+      task_.exercise->take(station_, exercise_s_, {measurement_.now(), parts_.drives});
+      exercise();
+      if (exercise_s_ >= task_.exercise->lasts_s(station_)) go_to(Step::reading);
+      return;
     case Step::waiting:
       return wait_for_push(true);
     case Step::reading:

@@ -1,8 +1,9 @@
 // The session in which an arm is proven: by small slow motions of each joint and by pushes, under the same supervision
 // as any other session. With other stations than a proof's it reads whatever is read of an arm that stands: Task.
 //
-// After enabling and taring, the session follows its plan: move, settle, read; and where a push is needed: wait for it,
-// read, wait for its end. Then the drives are switched off, and the brakes are watched for a second.
+// After enabling and taring, the session follows its plan: move, settle, exercise if there is one, read; and where a
+// push is needed: wait for it, read, wait for its end. Then the drives are switched off, and the brakes are watched for
+// a second.
 //
 // The tool moves at proof_speed_m_per_s at most, and joints move on minimum-jerk paths from rest to rest. Any fault,
 // any hold, and an enabling input that is released end the session: the motion runs out within a tenth of a second, and
@@ -13,6 +14,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -22,6 +24,7 @@
 #include "controller/cycle/timestep_change.hpp"
 #include "controller/motion/cycle_parts.hpp"
 #include "controller/motion/measurement.hpp"
+#include "controller/proof/exercise.hpp"
 #include "controller/proof/proof.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/supervision/alarm.hpp"
@@ -40,6 +43,7 @@ enum class Asked : std::uint8_t { nothing, press, push, let_go };
 struct Task {
   std::function<std::vector<Station>(const models::JointVector& motor_rad)> stations;  // empty: the proof's, plan()
   double settle_s = 0.4, read_s = 0.3;
+  std::shared_ptr<Exercise> exercise = nullptr;  // between settling and reading; null: the arm only stands
 };
 
 class ProofSession {
@@ -79,7 +83,7 @@ class ProofSession {
   [[nodiscard]] const controller::CycleParts& parts() const noexcept { return parts_; }
 
  private:
-  enum class Step : std::uint8_t { moving, settling, waiting, reading, releasing };
+  enum class Step : std::uint8_t { moving, settling, exercising, waiting, reading, releasing };
   // The samples of the reading that is under way.
   struct Gathered {
     models::Wrench sum_S, last_S, step_squares_S;
@@ -98,6 +102,7 @@ class ProofSession {
   void tare(double in_phase_s) noexcept;
   void follow_plan() noexcept;
   void move() noexcept;
+  void exercise() noexcept;
   void wait_for_push(bool pressed) noexcept;
   void read() noexcept;
   void add_sample(const models::Wrench& reading_S) noexcept;
@@ -131,7 +136,7 @@ class ProofSession {
   Step step_ = Step::moving;
   double step_s_ = 0.0, pressed_s_ = 0.0;  // the time in this step; how long a push, or its end, has lasted
   models::JointVector from_rad_, way_rad_;
-  double duration_s_ = 0.0, path_s_ = 0.0, rate_ = 1.0;
+  double duration_s_ = 0.0, path_s_ = 0.0, exercise_s_ = 0.0, rate_ = 1.0;
   models::Vec3 unpushed_S_ = models::Vec3::Zero();
   Gathered gathered_;
   bool not_pushed_ = false;

@@ -207,6 +207,7 @@ ServoDrive::ServoDrive(const description::DriveDescription& drive, const DriveSe
       tpdo_bytes_(pdo_bytes(tpdo_mapping(drive))),
       rpdo_bytes_(pdo_bytes(rpdo_mapping(drive))),
       torque_feedback_(mode_.torque),
+      torque_byte_(extra_torque_byte(drive)),
       scale_(drive),
       heartbeat_(drive.node, std::int64_t{settings.drive_heartbeat_timeout_ms} * 1'000'000) {
   if (drive.node < 1 || drive.node > 127) refuse(drive, "node", std::to_string(drive.node), "1 to 127");
@@ -245,6 +246,7 @@ void ServoDrive::lose_feedback(const MappedObject& object) {
     return object_address(feedback.object) == object.object;
   });
   tpdo_bytes_ = pdo_bytes(tpdo_mapping(description_, torque_feedback_));
+  torque_byte_ = extra_torque_byte(description_);
   const char* name = is_torque ? "no torque feedback" : "no such feedback in the record";
   losses_.push_back("no " + to_string(object.object) + " in its TPDO: " + name);
 }

@@ -77,6 +77,7 @@ bool ServoDrive::decode_tpdo(const CanFrame& frame) noexcept {
   statusword_ = read_u16_le(&frame.data[0]);
   actual_counts_ = read_i32_le(&frame.data[2]);
   if (torque_feedback_) actual_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[6]));
+  if (torque_byte_) extra_torque_ = static_cast<std::int16_t>(read_u16_le(&frame.data[*torque_byte_]));
   cycles_without_tpdo_ = 0;
   fresh_ = heard_ = true;
 
@@ -101,6 +102,11 @@ void ServoDrive::judge_state(bool was_enabled) noexcept {
   } else if (enabled && (statusword_ & statusword::remote) == 0) {
     raise(DriveFault::not_remote);
   }
+}
+
+std::optional<double> ServoDrive::torque_share() const noexcept {
+  if (!torque_feedback_ && !torque_byte_) return std::nullopt;
+  return 1e-3 * description_.direction * (torque_feedback_ ? actual_torque_ : extra_torque_);
 }
 
 bool ServoDrive::set_target_rad(double angle_rad) noexcept {

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -123,6 +124,8 @@ class ServoDrive final : public CyclicDrive {
   [[nodiscard]] std::int16_t target_torque() const noexcept { return target_torque_; }
   [[nodiscard]] std::int16_t actual_torque() const noexcept { return actual_torque_; }  // 0 without torque feedback
   [[nodiscard]] double actual_torque_Nm() const noexcept { return actual_torque_ / torque_per_Nm_; }
+  // In torque mode, and of a drive that takes positions where the cell's `feedback` has 6077h.
+  [[nodiscard]] std::optional<double> torque_share() const noexcept override;
   [[nodiscard]] std::uint16_t statusword() const noexcept { return statusword_; }
   [[nodiscard]] std::int32_t actual_counts() const noexcept override { return actual_counts_; }
   [[nodiscard]] double actual_rad() const noexcept override { return scale_.angle_rad(actual_counts_); }
@@ -170,7 +173,8 @@ class ServoDrive final : public CyclicDrive {
   std::shared_ptr<const description::EdsFile> eds_;  // may be none
   CyclicMode mode_;
   std::uint8_t tpdo_bytes_, rpdo_bytes_;
-  bool torque_feedback_;  // in TPDO1
+  bool torque_feedback_;                     // in TPDO1, behind the position
+  std::optional<std::uint8_t> torque_byte_;  // of 6077h among the feedback that nothing depends on
   std::vector<std::string> losses_;
   std::string fixed_by_eds_;  // until the drive itself has been asked
   CountScale scale_;
@@ -184,6 +188,7 @@ class ServoDrive final : public CyclicDrive {
   std::int32_t actual_counts_ = 0;
   std::int32_t target_counts_ = 0;
   std::int16_t target_torque_ = 0, actual_torque_ = 0;
+  std::int16_t extra_torque_ = 0;  // at torque_byte_
   std::uint64_t boot_ups_at_start_ = 0;
   std::uint32_t cycles_without_tpdo_ = 0;
   int held_ = 0;  // SYNCs that latched a target equal to the actual position, in the state switched on

@@ -37,6 +37,16 @@ std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& driv
   return mapping;
 }
 
+std::optional<std::uint8_t> extra_torque_byte(const description::DriveDescription& drive) noexcept {
+  if (mode_of(drive).torque) return std::nullopt;
+  unsigned bits = 16 + 32;  // statusword and position
+  for (const description::DriveFeedback& more : drive.feedback) {
+    if (more.object == drive.objects.torque && more.bits == 16) return static_cast<std::uint8_t>(bits / 8);
+    bits += more.bits;
+  }
+  return std::nullopt;
+}
+
 std::uint8_t pdo_bytes(const std::vector<MappedObject>& mapping) noexcept {
   unsigned bits = 0;
   for (const MappedObject& object : mapping) bits += object.bits;

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "fieldbus/canopen/canopen_pdo.hpp"
@@ -36,6 +37,9 @@ struct CyclicMode {
 [[nodiscard]] std::vector<MappedObject> rpdo_mapping(const description::DriveDescription& drive);
 [[nodiscard]] std::vector<MappedObject> tpdo_mapping(const description::DriveDescription& drive,
                                                      bool torque_feedback = true);
+// The first byte of the actual torque (6077h, 16 bits) in TPDO1 of a drive that takes positions; none: its cell's
+// `feedback` doesn't have it.
+[[nodiscard]] std::optional<std::uint8_t> extra_torque_byte(const description::DriveDescription& drive) noexcept;
 [[nodiscard]] std::uint8_t pdo_bytes(const std::vector<MappedObject>& mapping) noexcept;
 
 }  // namespace proxarm::fieldbus

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "fieldbus/can/can_frame.hpp"
@@ -54,6 +55,8 @@ class CyclicDrive {
   [[nodiscard]] virtual bool following() const noexcept = 0;  // takes targets
   [[nodiscard]] virtual std::int32_t actual_counts() const noexcept = 0;
   [[nodiscard]] virtual double actual_rad() const noexcept = 0;
+  // The motor's torque as a share of the rated one (6077h), by the sense of the joint; none: the drive doesn't tell it.
+  [[nodiscard]] virtual std::optional<double> torque_share() const noexcept { return std::nullopt; }
   [[nodiscard]] virtual std::int32_t target_counts() const noexcept = 0;
   [[nodiscard]] virtual double target_rad() const noexcept = 0;
   [[nodiscard]] virtual DriveFault fault() const noexcept = 0;  // the first one

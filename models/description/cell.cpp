@@ -228,8 +228,9 @@ DriveDescription read_drive(const YamlNode& node) {
   if (d.mode == "cst") {
     d.rated_torque_Nm = node.number("rated_torque_Nm", above(0.0, 1e5));
     d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 10.0 * d.rated_torque_Nm));
-  } else if (node.has("max_torque_Nm")) {
-    d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
+  } else {
+    if (d.on_can() && node.has("rated_torque_Nm")) d.rated_torque_Nm = node.number("rated_torque_Nm", above(0.0, 1e5));
+    if (node.has("max_torque_Nm")) d.max_torque_Nm = node.number("max_torque_Nm", above(0.0, 1e6));
   }
   if (d.on_can()) {
     if (node.has("eds")) d.eds = node.existing_file("eds").string();

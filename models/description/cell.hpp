@@ -112,7 +112,8 @@ struct DriveDescription {
   std::array<double, 2> range_rad{};
   double max_speed_rad_per_s = 0.0;
   double max_acceleration_rad_per_s2 = 0.0;
-  double rated_torque_Nm = 0.0;             // mode cst: 6076h times the gear ratio, what 1000 in 6071h is at the joint
+  double rated_torque_Nm = 0.0;             // 6076h times the gear ratio, what 1000 in 6071h and 6077h is at the joint;
+                                            // 0: not said
   double max_torque_Nm = 0.0;               // mode cst: what the joint may be asked for; others: what the drive has at
                                             // the joint, which its setpoints are kept to; 0: not said
   std::optional<HomingDescription> homing;  // of an incremental encoder; none: an absolute one

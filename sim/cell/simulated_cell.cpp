@@ -76,7 +76,8 @@ DriveDeviceConfig drive_config(const description::DriveDescription& drive, const
     c.position_min = to_i32(std::min(first, second) - home);  // by its own zero, once it is homed
     c.position_max = to_i32(std::max(first, second) - home);
   }
-  if (drive.rated_torque_Nm > 0.0) c.rated_torque_mNm = to_u32(1e3 * drive.rated_torque_Nm / drive.gear_ratio);
+  const double rated_Nm = drive.rated_torque_Nm > 0.0 ? drive.rated_torque_Nm : drive.simulation.max_torque_Nm;
+  c.rated_torque_mNm = to_u32(1e3 * rated_Nm / drive.gear_ratio);
   return c;
 }
 

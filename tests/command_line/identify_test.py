@@ -12,6 +12,7 @@ from harness import SOURCE, ProgramTest
 
 sys.path.insert(0, str(SOURCE / "tests/soak"))
 import identify_hunt as hunt  # noqa: E402
+import identify_joints_hunt as joints_hunt  # noqa: E402
 
 HELD = """name: {name}
 mass_kg: 0.5
@@ -131,6 +132,110 @@ class Identify(ProgramTest):
             "limits:\n", "limits:\n  workspace_m: {min: [0.699, -0.001, 0.599], max: [0.701, 0.001, 0.601]}\n", 1))
         self.assert_refused(self.call("identify", narrow), "identify: found a start from which the wrist can go to",
                             "workspace_m")
+
+
+KEYS = ("rotor_inertia_kg_m2", "gear_stiffness_Nm_per_rad", "gear_damping_Nms_per_rad", "simulation.coulomb_friction_Nm",
+        "simulation.viscous_friction_Nms_per_rad")
+
+
+class IdentifyJoints(ProgramTest):
+    def cell(self, name="mine.yaml", *, change=lambda text: text):
+        return self.written(name, change(joints_hunt.shipped("default")))
+
+    def identify(self, *arguments, status=0):
+        outcome = self.call("identify", "--joints", "--json", *arguments)
+        self.assertEqual((outcome.status, outcome.err), (status, ""), outcome.out)
+        return json.loads(outcome.out)
+
+    def test_random_arms_are_found_and_the_intervals_are_true(self):
+        rows = []
+        for n in range(2):
+            result = joints_hunt.session(f"fast/{n}", self.folder / str(n))
+            self.assertEqual(result["wrong"], [])
+            rows += result["rows"]
+        self.assertGreaterEqual(len(rows), 2 * 20)
+        missed = [row for row in rows if abs(row[2]) > 1.0]
+        # Of 50, one in twenty may be missed: more than five are, in one of thirty such tests.
+        self.assertLessEqual(len(missed), 5, missed)
+
+    def test_what_is_about_to_move_is_said_and_the_result_is_compared_and_written(self):
+        soft = lambda text: text.replace("gear_stiffness_Nm_per_rad: 115000", "gear_stiffness_Nm_per_rad: 90000", 1).replace(
+            "coulomb_friction_Nm: 25", "coulomb_friction_Nm: 40", 1)
+        cell, arm = self.cell(), self.cell("arm.yaml", change=soft)
+        before = cell.read_text()
+        told = self.call("identify", cell, "--joints", "--arm", arm, "--compare", "--write")
+        self.assertEqual((told.status, told.err), (0, ""), told.out)
+        self.assertRegex(told.out, r"\Athe arm is about to move, one joint after the other, for \d+ s:\n  axis_1 +± [\d.]+ mrad")
+        self.assertRegex(told.out, r"simulation\.coulomb_friction_Nm +(39|40|41)\S* Nm, ± \S+; the cell has 25: DIFFERS")
+        self.assertRegex(told.out, r"gear_stiffness_Nm_per_rad +(8|9)\d+ Nm/rad, ± \d+; the cell has 1.15e\+05: DIFFERS")
+        self.assertRegex(told.out, r"axis_6\n(  .*\n)*  gear_damping_Nms_per_rad +not identifiable: the tool hardly swings")
+        self.assertEqual((self.folder / "mine.yaml.before-identify").read_text(), before)
+        after = cell.read_text()
+        blank = lambda text: re.sub(rf"({'|'.join(key.split('.')[-1] for key in KEYS)}): \S+", r"\1", text)
+        self.assertEqual(blank(after), blank(before), "all else stays")
+        first = after[:after.index("joint: axis_2")]
+        self.assertAlmostEqual(float(re.search(r"coulomb_friction_Nm: (\S+)", first)[1]), 40.0, delta=2.5)
+        damping = re.findall(r"gear_damping_Nms_per_rad: (\S+)", first)
+        self.assertEqual(len(set(damping)), 1, "the controller's and the simulated one")
+        self.assertIn("gear_damping_Nms_per_rad: 1.5\n", after, "what wasn't found stays")
+        compared = self.identify(cell, "--arm", arm, "--compare")
+        self.assertEqual([key for joint in compared["joints"].values() for key, e in joint.items() if e.get("differs")], [])
+
+    def test_a_comparison_that_differs_is_status_1_and_changes_nothing(self):
+        cell = self.cell()
+        arm = self.cell("arm.yaml", change=lambda text: text.replace("coulomb_friction_Nm: 25", "coulomb_friction_Nm: 50", 1))
+        before = cell.read_text()
+        result = self.identify(cell, "--arm", arm, "--compare", status=1)
+        self.assertTrue(result["joints"]["axis_1"]["simulation.coulomb_friction_Nm"]["differs"])
+        self.assertEqual(cell.read_text(), before)
+
+    def test_a_hand_at_the_handle_is_noticed(self):
+        for newtons in (1, 5):
+            with self.subTest(newtons):
+                hand = self.written("hand.yaml", HELD.format(name="held", newtons=newtons))
+                result = self.identify(self.cell(), "--hand", hand, "--write", status=1)
+                self.assertFalse(result["identified"])
+                self.assertIn("hand", result["failure"])
+                self.assertEqual(result["joints"], {})
+        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["hand.yaml", "mine.yaml"])
+
+    def test_a_drive_that_fails_ends_it(self):
+        result = self.identify(self.cell(), "--fault", "axis_3:fault=0x4210@20s", status=1)
+        self.assertIn("drive_fault", result["failure"])
+
+    def test_a_tool_that_is_another_is_noticed(self):
+        heavier = self.cell("arm.yaml", change=lambda text: text.replace("  mass_kg: 0.25\n", "  mass_kg: 0.5\n", 1))
+        result = self.identify(self.cell(), "--arm", heavier, status=1)
+        self.assertIn("tool", result["failure"])
+
+    def test_without_torques_the_reason_is_told(self):
+        result = self.identify(self.cell(), "--fault", "axis_2:lacks=0x607700")
+        self.assertIn("6077h", result["joints"]["axis_2"]["simulation.coulomb_friction_Nm"]["not_identifiable"])
+        self.assertIsNotNone(result["joints"]["axis_2"]["gear_stiffness_Nm_per_rad"]["value"])
+        self.assertIsNotNone(result["joints"]["axis_1"]["simulation.coulomb_friction_Nm"]["value"])
+        unsaid = self.cell("unsaid.yaml", change=lambda text: re.sub(r"\n    rated_torque_Nm: \S+", "", text))
+        result = self.identify(unsaid)
+        for joint in result["joints"].values():
+            self.assertIn("rated_torque_Nm", joint["rotor_inertia_kg_m2"]["not_identifiable"])
+
+    def test_mistakes_are_refused(self):
+        for arguments, words in (((SOURCE / "models/cells/light.yaml",), ("light.yaml", "identify --joints", "impedance")),
+                                 ((SOURCE / "models/cells/rail.yaml",), ("rail.yaml", "Modbus")),
+                                 (("--hardware",), ("--hardware: found --bus sim",))):
+            with self.subTest(arguments):
+                self.assert_refused(self.call("identify", "--joints", *arguments), *words)
+        narrow = self.cell("narrow.yaml", change=lambda text: text.replace(
+            "limits:\n", "limits:\n  workspace_m: {min: [0.6, -0.005, 0.5], max: [0.8, 0.005, 0.7]}\n", 1))
+        self.assert_refused(self.call("identify", "--joints", narrow), "identify --joints", "axis_1", "workspace_m")
+
+    def test_a_key_that_the_file_does_not_have_is_named_and_nothing_is_written(self):
+        bare = self.cell("bare.yaml", change=lambda text: re.sub(r"\n +gear_damping_Nms_per_rad: 130(?=\n)", "", text))
+        before = bare.read_text()
+        outcome = self.call("identify", "--joints", bare, "--arm", self.cell(), "--write")
+        self.assertEqual(outcome.status, 2)
+        self.assertRegex(outcome.err, r"bare\.yaml.*axis_1.*gear_damping_Nms_per_rad.*write it by hand")
+        self.assertEqual(bare.read_text(), before)
+        self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["bare.yaml", "mine.yaml"])
 
 
 if __name__ == "__main__":

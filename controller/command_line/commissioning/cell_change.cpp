@@ -37,6 +37,12 @@ fs::path backup_of(const fs::path& file, const std::string& what) {
 
 }  // namespace
 
+bool in_comment(const std::string& text, std::size_t at) {
+  const std::size_t line_begin = text.rfind('\n', at);
+  const std::size_t from = line_begin == std::string::npos ? 0 : line_begin;
+  return text.substr(from, at - from).find('#') != std::string::npos;
+}
+
 fs::path change_cell(const fs::path& file, const std::string& what,
                      const std::function<std::string(const std::string& text)>& edit,
                      const std::function<void(const description::Cell& written)>& check) {

@@ -9,6 +9,9 @@
 
 namespace proxarm::command_line {
 
+// Whether a place of a YAML text is behind a # of its line.
+bool in_comment(const std::string& text, std::size_t at);
+
 // Writes `edit` of the cell's text to its file. What was there goes to a backup beside it, FILE.before-WHAT, whose path
 // is returned. The new text is loaded first: where it is no cell, or `check` throws, nothing is changed. Throws
 // SetupError.

@@ -69,12 +69,6 @@ std::pair<std::size_t, std::size_t> section(const std::string& text, const std::
   return {from, found ? from + static_cast<std::size_t>(match.position(0)) : text.size()};
 }
 
-bool in_comment(const std::string& text, std::size_t at) {
-  const std::size_t line_begin = text.rfind('\n', at);
-  const std::size_t from = line_begin == std::string::npos ? 0 : line_begin;
-  return text.substr(from, at - from).find('#') != std::string::npos;
-}
-
 // Replaces the value of a key of the section; `value` is what it looks like as a regular expression.
 void replace(std::string& text, const Cell& cell, const std::string& key, const std::string& value,
              const std::string& fresh) {

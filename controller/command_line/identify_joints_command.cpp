@@ -1,0 +1,112 @@
+#include <cstdio>
+#include <memory>
+
+#include "controller/command_line/commands.hpp"
+#include "controller/command_line/commissioning/identified_joints.hpp"
+#include "controller/command_line/commissioning/proof_run.hpp"
+#include "controller/command_line/entry/exit_status.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/data_files.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
+#include "controller/identification/joints/joint_motion.hpp"
+#include "fieldbus/cia402/cia402_mode.hpp"
+#include "models/base/setup_error.hpp"
+
+namespace proxarm::command_line {
+namespace {
+
+using description::SetupError;
+
+constexpr int no_figure = 1;
+
+[[noreturn]] void refuse(const PreparedSession& session, const std::string& found, const std::string& expected) {
+  throw SetupError(
+      {.file = session.cell.file.string(), .key = "identify --joints", .found = found, .expected = expected});
+}
+
+// Drives tell their torques where there is room for them behind the position; those that can't say so at bring-up, and
+// go without.
+void ask_for_torques(description::Cell& cell) {
+  constexpr int classic_bytes = 8;
+  for (description::DriveDescription& drive : cell.drives) {
+    if (fieldbus::extra_torque_byte(drive)) continue;
+    const bool fits = drive.fd || fieldbus::pdo_bytes(fieldbus::tpdo_mapping(drive)) + 2 <= classic_bytes;
+    if (fits && drive.rated_torque_Nm > 0.0) drive.feedback.push_back({drive.objects.torque, 16});
+  }
+}
+
+PreparedSession prepared(const RunOptions& options) {
+  RunOptions run = options;
+  run.scene = shipped_file("scenes/free.yaml");
+  PreparedSession session = prepare(run);
+  if (session.impedance()) {
+    refuse(session, "a cell of the impedance type",
+           "one whose drives take positions: torques don't lead motors along a motion to a microradian");
+  }
+  for (const description::DriveDescription& drive : session.cell.drives) {
+    if (!drive.on_can()) refuse(session, drive.joint + ": a drive on Modbus", "drives on CAN, which answer each cycle");
+  }
+  ask_for_torques(session.cell);
+  return session;
+}
+
+IdentifiedJoints identified(const PreparedSession& session, const IdentifyOptions& options, const models::Arm& arm) {
+  const auto exercise = std::make_shared<identification::JointExercise>(session.cell, arm, session.settings.period_s);
+  proof::Task task{.stations = [&](const models::JointVector& motor_rad) { return exercise->stations(motor_rad); }};
+  task.exercise = exercise;
+  ProofOutcome outcome;
+  if (options.run.bus.simulated()) {
+    RunOptions of_arm = options.run;
+    if (!options.arm.empty()) of_arm.cell = options.arm;
+    outcome = prove_simulated(session, prepared(of_arm), options.run, task);
+  } else {
+    outcome = prove_on_interfaces(session, options.run, task);
+  }
+  IdentifiedJoints joints;
+  joints.failure = failure_of(session, outcome);
+  joints.real_arm = outcome.real_arm;
+  if (!joints.failure.empty()) return joints;
+  const identification::Allowed allowed{.zero_drift_N = session.settings.zero_drift_N};
+  joints.fit = identification::identify_joints(session.cell, exercise->records(), allowed);
+  joints.failure = joints.fit.doubt;
+  return joints;
+}
+
+}  // namespace
+
+int identify_joints_command(const IdentifyOptions& options) {
+  require_interface_for_hardware(options.run);
+  if (!options.run.bus.simulated()) refuse_simulated_options(options.run, options.arm);
+  const PreparedSession session = prepared(options.run);
+  require_enabling_switch(session, options.run);
+  require_carried(session, options.run);
+  const models::Arm arm(session.cell);
+  const auto motions =
+      identification::joint_motions(session.cell, arm, arm.motor_from_link(arm.start_rad()), session.settings.period_s);
+  if (!options.run.json) {
+    std::fputs(identification::text(motions, arm, session.settings.period_s).c_str(), stdout);
+    std::fflush(stdout);
+  }
+  const IdentifiedJoints joints = identified(session, options, arm);
+  const std::vector<JointFigure> all =
+      joints.failure.empty() ? figures(joints, session.cell) : std::vector<JointFigure>{};
+  if (options.run.json) {
+    std::printf("%s\n", json(joints, all, options.compare).dump().c_str());
+  } else {
+    std::fputs(text(joints, all, options.compare).c_str(), stdout);
+  }
+  if (!joints.found()) return no_figure;
+  if (options.write) {
+    const std::filesystem::path backup = write_joints(all, session);
+    if (!options.run.json) {
+      std::printf("written to %s; before: %s\na proof of the cell as it was holds no more\n", session.cell.file.c_str(),
+                  backup.c_str());
+    }
+    return fine;
+  }
+  bool differs = false;
+  for (const JointFigure& figure : all) differs = differs || figure.differs();
+  return options.compare && differs ? no_figure : fine;
+}
+
+}  // namespace proxarm::command_line

@@ -1,0 +1,29 @@
+// Friction and rotor inertia of one joint from its motor's torque, line by line: equation (1) of joint_fit.hpp.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "controller/identification/joints/joint_motion.hpp"
+#include "controller/identification/joints/link_response.hpp"
+
+namespace proxarm::identification {
+
+struct FrictionInputs {
+  const MotionRecord& slow;
+  const MotionRecord& fast;
+  double rated_torque_Nm = 0.0;
+  double torque_step_Nm = 0.0;  // of 6077h
+  double encoder_step_rad = 0.0;
+  double line_share = 0.01;
+};
+
+// J, F, b and their standard deviations.
+struct FrictionFit {
+  Eigen::Vector3d value = Eigen::Vector3d::Zero(), deviation = Eigen::Vector3d::Zero();
+};
+
+// Precondition: the torque was read. `gears` matter for the torque that the links take in the fast motion.
+FrictionFit fit_friction(const models::Arm& arm, const LinkResponse& response, const Gears& gears,
+                         const FrictionInputs& inputs);
+
+}  // namespace proxarm::identification
