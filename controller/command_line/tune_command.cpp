@@ -152,6 +152,12 @@ void print_mass(const Tuned& of, const std::optional<double>& smallest) {
   std::printf(
       "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
       mass_text(smallest).c_str(), of.loop.handle_mass_kg, at_start.c_str());
+  if (const auto layer = controller::decisive_layer(of.hand, of.loop)) {
+    LoopModel free = of.loop;
+    free.layers = nullptr;
+    std::printf("  that is what %s asks for; %s in free motion\n", layer->what.c_str(),
+                mass_text(smallest_felt(of.hand, free)).c_str());
+  }
   of.stages.begin(in_poses("mass with margins", of.loop.arms->size()));
   const auto safe = smallest_with_margins(of.hand, of.loop);
   if (safe) of.stages.begin(trying(mass_text(safe)));

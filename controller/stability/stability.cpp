@@ -427,22 +427,20 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
   return steps * T;
 }
 
+// Just below the smallest mass, the touch that asks for it isn't stable; where no mass is, at the heaviest on gears. A
+// layer's unstable masses can lie above ones that are stable there.
 std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop) {
+  constexpr double more = 1.01;  // than what a search leaves
   if (!loop.layers) return std::nullopt;
+  const std::optional<double> smallest = smallest_stable_mass(hand, loop);
   const std::optional<double> without = smallest_stable_mass(hand, with_layers(loop, {}));
-  if (!without) return std::nullopt;
-  double asked = *without;
-  std::optional<LayerLimit> decisive;
+  if (!without || (smallest && *smallest <= more * *without)) return std::nullopt;
+  const double unstable_kg = smallest ? *smallest / more : heaviest_on_gears_kg;
   for (const LayerTouch& layer : *loop.layers) {
-    const LoopModel there = with_layers(loop, {layer});
-    if (spectral_radius(hand, there, asked) < 1.0) continue;
-    const std::optional<double> mass = smallest_stable_mass(hand, there);
-    if (mass && *mass <= asked) continue;
-    decisive = LayerLimit{layer.what, mass};
-    if (!mass) break;
-    asked = *mass;
+    if (!(spectral_radius(hand, with_layers(loop, {layer}), unstable_kg) < 1.0))
+      return LayerLimit{layer.what, smallest};
   }
-  return decisive;
+  return std::nullopt;
 }
 
 std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,

@@ -126,9 +126,9 @@ std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
 // What a layer asks for beyond free motion.
 struct LayerLimit {
   std::string what;               // of the touch
-  std::optional<double> mass_kg;  // the proxy's, the smallest that is stable there; none is
+  std::optional<double> mass_kg;  // the proxy's, the smallest that is stable there; absent: none is
 };
-// The touch that asks for most mass; none: free motion asks for at least as much.
+// The touch that asks for most mass. Absent: free motion asks for as much.
 std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop);
 
 // The check of --mass. Throws description::SetupError that names the smallest stable felt mass (proxy and handle),
