@@ -192,12 +192,22 @@ std::vector<Touch> touches_of(const ElasticArm& arm, const LoopModel& loop) {
   return touches;
 }
 
-// The loops in all poses, free and on all layers.
+LoopModel feeding_forward(LoopModel loop) {
+  loop.feed_forward = true;
+  return loop;
+}
+
+// The loops in all poses, free and on all layers, with drives that lag and with drives that feed forward: the cell
+// doesn't say which it has.
 class ElasticLoops {
  public:
   ElasticLoops(const HandModel& hand, const LoopModel& loop)
       : damping_(loop.damping_Ns_per_m), spring_(loop.spring_N_per_m) {
-    for (const ElasticArm& arm : *loop.arms) loops_.push_back({ElasticLoop(arm, hand, loop), touches_of(arm, loop)});
+    std::vector<LoopModel> ways{loop};
+    if (loop.drive_time_constant_s > 0.0 && !loop.feed_forward) ways.push_back(feeding_forward(loop));
+    for (const ElasticArm& arm : *loop.arms) {
+      for (const LoopModel& way : ways) loops_.push_back({ElasticLoop(arm, hand, way), touches_of(arm, loop)});
+    }
   }
   [[nodiscard]] double spectral_radius(double proxy_mass_kg) const {
     double largest = 0.0;
