@@ -129,7 +129,8 @@ struct Tuned {
 Tuned tuned(const PreparedSession& session, Stages& stages) {
   LoopModel loop = led_loop(session);
   loop.horizon_s = 0.0;
-  return {session, hand_model(session, loop), loop, stages};
+  const HandModel hand = hand_model(session, loop);
+  return {session, hand, loop, stages};
 }
 
 void print_delays(const Tuned& of) {
@@ -321,11 +322,12 @@ int tune_command(const RunOptions& options) {
   require_inertia_in_range(session);
   Stages stages;
   stages.begin("poses of the hand");
-  const Tuned of = tuned(session, stages);
+  Tuned of = tuned(session, stages);
   stages.done();
   print_delays(of);
   stages.begin(in_poses("smallest mass", of.loop.arms->size()));
   const auto smallest = smallest_felt(of.hand, of.loop);
+  of.loop = controller::with_worst_layers(of.hand, of.loop, smallest.value_or(session.settings.mass_kg));
   print_mass(of, smallest);
   print_inertia(of);
   print_damping(of);

@@ -217,11 +217,21 @@ class ElasticLoops {
     }
     return largest;
   }
-  [[nodiscard]] bool stable(double proxy_mass_kg) const {
-    return std::all_of(loops_.begin(), loops_.end(), [&](const Posed& posed) {
-      return std::all_of(posed.touches.begin(), posed.touches.end(),
-                         [&](const Touch& touch) { return spectral_radius(posed.loop, touch, proxy_mass_kg) < 1.0; });
-    });
+  // Above which every mass up to max_mass_kg is stable. Most touches are stable with what others ask for; these aren't
+  // searched.
+  [[nodiscard]] std::optional<double> smallest_stable(double max_mass_kg) const {
+    constexpr double least_kg = 1e-3, close_enough = 1.002;
+    double smallest = 0.0;
+    for (const Posed& posed : loops_) {
+      for (const Touch& touch : posed.touches) {
+        const auto holds = [&](double mass_kg) { return spectral_radius(posed.loop, touch, mass_kg) < 1.0; };
+        if (smallest > 0.0 && holds_from(smallest, max_mass_kg, holds)) continue;
+        const auto here = smallest_from_above(holds, max_mass_kg, least_kg, close_enough);
+        if (!here) return std::nullopt;
+        smallest = std::max(smallest, *here);
+      }
+    }
+    return smallest;
   }
 
  private:
@@ -235,6 +245,15 @@ class ElasticLoops {
     const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(d, d);
     return loop.spectral_radius({proxy_mass_kg / elastic_margin * one, damping_ * one, spring_ * one + touch.spring},
                                 touch.forbidden);
+  }
+
+  // At some masses from the smallest to the largest: a layer's unstable masses can lie above ones that are stable.
+  template <class Holds>
+  static bool holds_from(double smallest_kg, double largest_kg, const Holds& holds) {
+    for (const double share : {0.0, 0.1, 0.25, 1.0}) {
+      if (!holds(smallest_kg * std::pow(largest_kg / smallest_kg, share))) return false;
+    }
+    return true;
   }
 
   double damping_, spring_;
@@ -258,13 +277,7 @@ std::vector<double> springs_of(const LoopModel& loop) {
 // couldn't tell the eigenvalues of the slowest modes from 1; a proxy has two that are close to it.
 constexpr double heaviest_on_gears_kg = 50.0;
 
-// The same if only eigenvalues decide.
-std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mass_kg) {
-  constexpr double least_kg = 1e-3, close_enough = 1.002;
-  return smallest_from_above([&](double mass_kg) { return loop.stable(mass_kg); }, max_mass_kg, least_kg, close_enough);
-}
-
-// The same of a rigid arm: from the top down to the first interval of masses that aren't stable.
+// Of a rigid arm: from the top down to the first interval of masses that aren't stable.
 std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
   if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
   double smallest = max_mass_kg;
@@ -334,7 +347,7 @@ std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopMode
     rigid.arms = nullptr;
     const auto without_gears = smallest_stable_mass(hand, rigid, max_mass_kg);
     if (!without_gears || *without_gears > heaviest_on_gears_kg) return without_gears;
-    return smallest_on_gears(ElasticLoops(hand, model), std::min(max_mass_kg, heaviest_on_gears_kg));
+    return ElasticLoops(hand, model).smallest_stable(std::min(max_mass_kg, heaviest_on_gears_kg));
   }
   double smallest = 0.0;
   LoopModel pressed = model;
@@ -371,18 +384,6 @@ struct Held {
   HandModel hand;
   LoopModel loop;
 };
-
-// Of a scene's layers the two on which this mass is the least stable, for the sake of time: each is asked some dozens
-// of times.
-LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
-  constexpr std::size_t most = 2;
-  if (!loop.layers || loop.layers->size() <= most) return loop;
-  std::vector<std::pair<double, const LayerTouch*>> by_radius;
-  for (const LayerTouch& layer : *loop.layers)
-    by_radius.emplace_back(spectral_radius(hand, with_layers(loop, {layer}), proxy_mass_kg), &layer);
-  std::stable_sort(by_radius.begin(), by_radius.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
-  return with_layers(loop, {*by_radius[0].second, *by_radius[1].second});
-}
 
 // What a horizon has to be stable with: each pose, hand, delay and gear alone.
 std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
@@ -435,6 +436,16 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
     }
   }
   return steps * T;
+}
+
+LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  constexpr std::size_t most = 2;
+  if (!loop.layers || loop.layers->size() <= most) return loop;
+  std::vector<std::pair<double, const LayerTouch*>> by_radius;
+  for (const LayerTouch& layer : *loop.layers)
+    by_radius.emplace_back(spectral_radius(hand, with_layers(loop, {layer}), proxy_mass_kg), &layer);
+  std::stable_sort(by_radius.begin(), by_radius.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  return with_layers(loop, {*by_radius[0].second, *by_radius[1].second});
 }
 
 // Just below the smallest mass, the touch that asks for it isn't stable; where no mass is, at the heaviest on gears. A

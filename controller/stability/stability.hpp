@@ -131,6 +131,10 @@ struct LayerLimit {
 // The touch that asks for most mass. Absent: free motion asks for as much.
 std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop);
 
+// The loop with the two layers on which this mass is the least stable: where it is asked dozens of times, for the sake
+// of time.
+LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
+
 // The check of --mass. Throws description::SetupError that names the smallest stable felt mass (proxy and handle),
 // rounded up to two digits, and the damping with which the mass that is wanted is stable; if none is without damping,
 // the least damping with which some is. It names the layer if one asks for more than free motion does. Also for a mass
