@@ -192,6 +192,9 @@ std::vector<Touch> touches_of(const ElasticArm& arm, const LoopModel& loop) {
   return touches;
 }
 
+// A horizon is chosen, and judged, with drives that lag: they are what it compensates for.
+enum class Drives { lag, both };
+
 LoopModel feeding_forward(LoopModel loop) {
   loop.feed_forward = true;
   return loop;
@@ -201,10 +204,11 @@ LoopModel feeding_forward(LoopModel loop) {
 // doesn't say which it has.
 class ElasticLoops {
  public:
-  ElasticLoops(const HandModel& hand, const LoopModel& loop)
+  ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)
       : damping_(loop.damping_Ns_per_m), spring_(loop.spring_N_per_m) {
     std::vector<LoopModel> ways{loop};
-    if (loop.drive_time_constant_s > 0.0 && !loop.feed_forward) ways.push_back(feeding_forward(loop));
+    const bool lags = drives == Drives::lag || loop.horizon_s > 0.0;
+    if (!lags && loop.drive_time_constant_s > 0.0 && !loop.feed_forward) ways.push_back(feeding_forward(loop));
     for (const ElasticArm& arm : *loop.arms) {
       for (const LoopModel& way : ways) loops_.push_back({ElasticLoop(arm, hand, way), touches_of(arm, loop)});
     }
@@ -319,13 +323,15 @@ double round_up(double mass) {
   return std::ceil(mass / unit * (1.0 + 1e-9)) * unit;
 }
 
-double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+namespace {
+double largest_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg, Drives drives) {
   if (loop.order == 2 && loop.with_events) {
     const auto [free, at_events] = both_methods(loop);
-    return std::max(spectral_radius(hand, free, proxy_mass_kg), spectral_radius(hand, at_events, proxy_mass_kg));
+    return std::max(largest_radius(hand, free, proxy_mass_kg, drives),
+                    largest_radius(hand, at_events, proxy_mass_kg, drives));
   }
   if (loop.arms && proxy_mass_kg <= heaviest_on_gears_kg)
-    return ElasticLoops(hand, loop).spectral_radius(proxy_mass_kg);
+    return ElasticLoops(hand, loop, drives).spectral_radius(proxy_mass_kg);
   double largest = 0.0;
   LoopModel pressed = loop;
   for (const double spring : springs_of(loop)) {
@@ -333,6 +339,11 @@ double spectral_radius(const HandModel& hand, const LoopModel& loop, double prox
     largest = std::max(largest, spectral_radius(make_loop(hand, pressed), proxy_mass_kg));
   }
   return largest;
+}
+}  // namespace
+
+double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  return largest_radius(hand, loop, proxy_mass_kg, Drives::both);
 }
 
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& model, double max_mass_kg) {
@@ -421,7 +432,7 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
   const double T = model.period_s;
   const auto radius = [&](Held& held, int steps) {
     held.loop.horizon_s = steps * T;
-    return spectral_radius(held.hand, held.loop, proxy_mass_kg);
+    return largest_radius(held.hand, held.loop, proxy_mass_kg, Drives::lag);
   };
   std::vector<Held> all = held_in_all_ways(hand, model, proxy_mass_kg);
   std::vector<double> without;
