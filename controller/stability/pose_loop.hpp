@@ -20,9 +20,9 @@
 //
 // Each is judged with drives that lag and with drives that feed forward (elastic_loop.hpp), since the cell doesn't say
 // which it has. A hand that turns stiffly makes modes of the wrist swing at 60 to 80 Hz, where feed-forward gives half
-// as much gain again as a lag. For masses (stability.hpp) both are taken likewise: with the default hand at 1 ms the two
-// are within 5 % on the default cell and the collaborative arm, 17 on the linear axis. Over random hands and places of
-// touch, 56 in all, feed-forward asked for up to an eighth more also where modes are slow and the tool touches.
+// as much gain again as a lag. For masses (stability.hpp) both are taken likewise: with the default hand at 1 ms the
+// two are within 5 % on the default cell and the collaborative arm, 17 on the linear axis. Over random hands and places
+// of touch, 56 in all, feed-forward asked for up to an eighth more also where modes are slow and the tool touches.
 //
 // Not modelled: what elastic_loop.hpp leaves out, and contacts that come and go.
 //
