@@ -129,7 +129,8 @@ struct Tuned {
 Tuned tuned(const PreparedSession& session, Stages& stages) {
   LoopModel loop = led_loop(session);
   loop.horizon_s = 0.0;
-  return {session, hand_model(session, loop), loop, stages};
+  const HandModel hand = hand_model(session, loop);
+  return {session, hand, loop, stages};
 }
 
 void print_delays(const Tuned& of) {
@@ -152,6 +153,12 @@ void print_mass(const Tuned& of, const std::optional<double>& smallest) {
   std::printf(
       "smallest stable mass: %s felt, handle's %.3g kg included; %s in the start pose alone, by which `run` refuses\n",
       mass_text(smallest).c_str(), of.loop.handle_mass_kg, at_start.c_str());
+  if (const auto layer = controller::decisive_layer(of.hand, of.loop)) {
+    LoopModel free = of.loop;
+    free.layers = nullptr;
+    std::printf("  that is what %s asks for; %s in free motion\n", layer->what.c_str(),
+                mass_text(smallest_felt(of.hand, free)).c_str());
+  }
   of.stages.begin(in_poses("mass with margins", of.loop.arms->size()));
   const auto safe = smallest_with_margins(of.hand, of.loop);
   if (safe) of.stages.begin(trying(mass_text(safe)));
@@ -315,11 +322,12 @@ int tune_command(const RunOptions& options) {
   require_inertia_in_range(session);
   Stages stages;
   stages.begin("poses of the hand");
-  const Tuned of = tuned(session, stages);
+  Tuned of = tuned(session, stages);
   stages.done();
   print_delays(of);
   stages.begin(in_poses("smallest mass", of.loop.arms->size()));
   const auto smallest = smallest_felt(of.hand, of.loop);
+  of.loop = controller::with_worst_layers(of.hand, of.loop, smallest.value_or(session.settings.mass_kg));
   print_mass(of, smallest);
   print_inertia(of);
   print_damping(of);

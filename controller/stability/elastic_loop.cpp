@@ -93,7 +93,8 @@ ElasticArm elastic_arm(const models::Arm& arm, const models::JointVector& pose_r
                  .jacobian = U.transpose() * kinematics.J_W.topRows<3>(),
                  .joints_per_m = models::joints_per_m(kinematics.J_W) * U,
                  .stiffness = arm.gear_stiffness_Nm_per_rad(),
-                 .damping = VectorXd::Zero(arm.axes())};
+                 .damping = VectorXd::Zero(arm.axes()),
+                 .axes = U};
   if (cell.limits.setpoint_bandwidth_Hz > 0.0) out.filter_s = 1.0 / (2.0 * pi * cell.limits.setpoint_bandwidth_Hz);
   const double first = 2.0 * pi * arm.first_elastic_frequency_Hz(pose_rad);
   for (Index i = 0; i < out.stiffness.size(); ++i) {
@@ -118,6 +119,7 @@ ElasticArm elastic_turning_arm(const models::Arm& arm, const models::JointVector
   const MatrixXd moved = kinematics.J_W.topRows<3>();
   out.mass += hand_mass_kg * transposed_product(moved, moved);
   out.jacobian = kinematics.J_W.bottomRows<3>();
+  out.axes.resize(0, 0);
   out.joints_per_m = models::joints_per_rad(kinematics.J_W);
   return out;
 }
@@ -128,6 +130,7 @@ ElasticArm elastic_pose_arm(const models::Arm& arm, const models::JointVector& p
   models::ToolKinematics kinematics;
   arm.kinematics(pose_rad, kinematics);
   out.jacobian = kinematics.J_W;
+  out.axes.resize(0, 0);
   out.joints_per_m.resize(arm.axes(), 6);
   out.joints_per_m << models::joints_per_m(kinematics.J_W), models::joints_per_rad(kinematics.J_W);
   return out;

@@ -55,6 +55,7 @@ struct ElasticArm {
   Eigen::MatrixXd joints_per_m;        // G: a column for each of these dimensions
   Eigen::VectorXd stiffness, damping;  // k > 0 and d ≥ 0 of each gear
   double filter_s = 0.0;               // 1/ω of the setpoints' filter; 0: none
+  Eigen::MatrixXd axes{};  // of the tool's space in W, a column for each dimension; empty: not a space of places
   // J_r of each rotor, at the joint, and ω_v of its drive; empty: the drives don't yield.
   Eigen::VectorXd rotor_kg_m2{}, drive_rad_per_s{};
 };

@@ -39,17 +39,13 @@ MatrixXd held(const Vec3& r, const models::Mat3& directions, Eigen::Index count)
   return N;
 }
 
-std::vector<MatrixXd> all_forbidden(const std::vector<TouchedPlace>& touched) {
-  std::vector<MatrixXd> all{MatrixXd(6, 0)};
-  for (const TouchedPlace& at : touched) {
-    models::Mat3 directions;
-    directions.col(0) = at.n_W;
-    directions.col(1) = at.n_W.unitOrthogonal();
-    directions.col(2) = at.n_W.cross(directions.col(1));
-    all.push_back(held(at.r_W_m, directions, 1));
-    all.push_back(held(at.r_W_m, directions, 3));
-  }
-  return all;
+// Orthonormal, n first.
+models::Mat3 beside(const Vec3& n) {
+  models::Mat3 directions;
+  directions.col(0) = n;
+  directions.col(1) = n.unitOrthogonal();
+  directions.col(2) = n.cross(directions.col(1));
+  return directions;
 }
 
 // How a drive follows isn't known: as a lag or by feed-forward. Without a lag there is but the one.
@@ -64,6 +60,22 @@ std::vector<ElasticLoop> with_both_drives(const ElasticArm& arm, const PoseLoopM
 }
 
 }  // namespace
+
+std::vector<PoseLoop::Touch> PoseLoop::touches_of(const PoseLoopModel& model) {
+  std::vector<Touch> touches{{MatrixXd(6, 0)}};
+  for (const TouchedPlace& at : model.touched) {
+    touches.push_back({held(at.r_W_m, beside(at.n_W), 1)});
+    touches.push_back({held(at.r_W_m, beside(at.n_W), 3)});
+  }
+  if (!model.loop.layers) return touches;
+  for (const LayerTouch& layer : *model.loop.layers) {
+    Touch touch{MatrixXd(6, 0)};
+    touch.spring.topLeftCorner<3, 3>() = layer.spring_W;
+    if (layer.sticks_along_W) touch.forbidden = held(Vec3::Zero(), beside(*layer.sticks_along_W), 3).rightCols(2);
+    touches.push_back(touch);
+  }
+  return touches;
+}
 
 Mat6 behind_sensor_W(const description::Cell& cell, const models::Mat3& R_WT) {
   const models::ToolInertia tool = models::tool_inertia(cell.tool);
@@ -92,26 +104,27 @@ PoseLoop::PoseLoop(const ElasticArm& arm, const PoseLoopModel& model)
       behind_(model.behind_sensor_W),
       own_{Mat6::Zero(), of_both(model.loop.damping_Ns_per_m, model.turning_damping_Nms_per_rad),
            of_both(model.loop.spring_N_per_m, model.turning_spring_Nm_per_rad)},
-      forbidden_(all_forbidden(model.touched)),
+      touches_(touches_of(model)),
       period_s_(model.loop.period_s) {}
 
-ProxyMatrices PoseLoop::proxy(double mass_kg, double inertia_kg_m2, double margin) const {
+ProxyMatrices PoseLoop::proxy(const Touch& touch, double mass_kg, double inertia_kg_m2, double margin) const {
   ProxyMatrices proxy = own_;
+  proxy.spring += touch.spring;
   proxy.mass = (of_both(mass_kg, inertia_kg_m2) - behind_) / margin;
   return proxy;
 }
 
-bool PoseLoop::stable(const ElasticLoop& loop, const MatrixXd& N, double mass_kg, double inertia_kg_m2) const {
-  const ProxyMatrices lighter = proxy(mass_kg, inertia_kg_m2, elastic_margin);
+bool PoseLoop::stable(const ElasticLoop& loop, const Touch& touch, double mass_kg, double inertia_kg_m2) const {
+  const ProxyMatrices lighter = proxy(touch, mass_kg, inertia_kg_m2, elastic_margin);
   // Else what hangs behind the sensor is felt as more than was asked for.
   if (Eigen::LLT<MatrixXd>(lighter.mass).info() != Eigen::Success) return false;
-  return loop.spectral_radius(lighter, N) < 1.0;
+  return loop.spectral_radius(lighter, touch.forbidden) < 1.0;
 }
 
 bool PoseLoop::stable(double mass_kg, double inertia_kg_m2) const {
   return std::all_of(loops_.begin(), loops_.end(), [&](const ElasticLoop& loop) {
-    return std::all_of(forbidden_.begin(), forbidden_.end(),
-                       [&](const MatrixXd& N) { return stable(loop, N, mass_kg, inertia_kg_m2); });
+    return std::all_of(touches_.begin(), touches_.end(),
+                       [&](const Touch& touch) { return stable(loop, touch, mass_kg, inertia_kg_m2); });
   });
 }
 
@@ -120,8 +133,8 @@ std::optional<double> PoseLoop::smallest_inertia(double mass_kg) const {
   constexpr double least_kg_m2 = 1e-6, close_enough = 1.005;
   double smallest = 0.0;
   for (const ElasticLoop& loop : loops_) {
-    for (const MatrixXd& N : forbidden_) {
-      const auto holds = [&](double inertia_kg_m2) { return stable(loop, N, mass_kg, inertia_kg_m2); };
+    for (const Touch& touch : touches_) {
+      const auto holds = [&](double inertia_kg_m2) { return stable(loop, touch, mass_kg, inertia_kg_m2); };
       if (smallest > 0.0 && holds(smallest) && holds(largest_kg_m2)) continue;
       const auto here = smallest_from_above(holds, largest_kg_m2, least_kg_m2, close_enough);
       if (!here) return std::nullopt;
@@ -139,11 +152,11 @@ bool swings(const std::complex<double>& s) { return s.real() * std::numbers::pi 
 
 std::optional<Swing> PoseLoop::slowest_swing(double mass_kg, double inertia_kg_m2) const {
   constexpr double pi = std::numbers::pi, slowest_Hz = 3.0;
-  const ProxyMatrices as_it_is = proxy(mass_kg, inertia_kg_m2, 1.0);
   std::optional<Swing> slowest;
   for (const ElasticLoop& loop : loops_) {
-    for (const MatrixXd& N : forbidden_) {
-      for (const std::complex<double>& z : loop.eigenvalues(as_it_is, N)) {
+    for (const Touch& touch : touches_) {
+      const ProxyMatrices as_it_is = proxy(touch, mass_kg, inertia_kg_m2, 1.0);
+      for (const std::complex<double>& z : loop.eigenvalues(as_it_is, touch.forbidden)) {
         if (!(std::abs(z) < 1.0)) return std::nullopt;
         if (z == 0.0) continue;  // gone after a period
         const std::complex<double> s = std::log(z) / period_s_;

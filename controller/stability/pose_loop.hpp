@@ -15,11 +15,14 @@
 // three at random places within 0.03 m, default cell, 2 to 6 kg), the smallest stable inertia was within 12 % of that
 // of the one or the other.
 //
+// A point tool that presses on elastic layers (loop.layers) has their springs in K_v, and sticks or slides there
+// likewise; a tool with a shape touches nothing that has one.
+//
 // Each is judged with drives that lag and with drives that feed forward (elastic_loop.hpp), since the cell doesn't say
 // which it has. A hand that turns stiffly makes modes of the wrist swing at 60 to 80 Hz, where feed-forward gives half
-// as much gain again as a lag. For masses (stability.hpp) only a lag is taken: the two are within 5 % there on the
-// default cell, 9 on the collaborative arm. Over random hands and places of touch, 56 in all, feed-forward asked for up
-// to an eighth more also where modes are slow and the tool touches, so it isn't judged in free motion alone.
+// as much gain again as a lag. For masses (stability.hpp) both are taken likewise: with the default hand at 1 ms the
+// two are within 5 % on the default cell and the collaborative arm, 17 on the linear axis. Over random hands and places
+// of touch, 56 in all, feed-forward asked for up to an eighth more also where modes are slow and the tool touches.
 //
 // Not modelled: what elastic_loop.hpp leaves out, and contacts that come and go.
 //
@@ -68,14 +71,19 @@ class PoseLoop {
   static constexpr double largest_kg_m2 = 10.0;
 
  private:
-  [[nodiscard]] bool stable(const ElasticLoop& loop, const Eigen::MatrixXd& N, double mass_kg,
-                            double inertia_kg_m2) const;
-  [[nodiscard]] ProxyMatrices proxy(double mass_kg, double inertia_kg_m2, double margin) const;
+  // What the proxy touches: the directions N that are held, and the spring of layers.
+  struct Touch {
+    Eigen::MatrixXd forbidden;
+    models::Mat6 spring = models::Mat6::Zero();
+  };
+  static std::vector<Touch> touches_of(const PoseLoopModel& model);
+  [[nodiscard]] bool stable(const ElasticLoop& loop, const Touch& touch, double mass_kg, double inertia_kg_m2) const;
+  [[nodiscard]] ProxyMatrices proxy(const Touch& touch, double mass_kg, double inertia_kg_m2, double margin) const;
 
   std::vector<ElasticLoop> loops_;  // with drives that lag, and with drives that feed forward
   models::Mat6 behind_;
-  ProxyMatrices own_;                       // its damping and spring
-  std::vector<Eigen::MatrixXd> forbidden_;  // N, beginning with none
+  ProxyMatrices own_;           // its damping and spring
+  std::vector<Touch> touches_;  // beginning with none
   double period_s_;
 };
 

@@ -157,36 +157,142 @@ std::vector<double> critical_masses(const Loop& loop, double max_mass_kg) {
   return masses;
 }
 
-// The loops in all poses.
+// Beside the proxy's own: the spring of a touch in a tool's space, and the directions N that friction holds.
+struct Touch {
+  Eigen::MatrixXd spring, forbidden;
+};
+
+// A basis of what is across n, which has two or three dimensions.
+Eigen::MatrixXd across(const Eigen::VectorXd& n) {
+  Eigen::MatrixXd basis(n.size(), n.size() - 1);
+  if (n.size() == 2) {
+    basis << -n.y(), n.x();
+    return basis;
+  }
+  const models::Vec3 n_3 = n, one = n_3.unitOrthogonal();
+  basis << one, n_3.cross(one);
+  return basis;
+}
+
+// Free motion first, then the layers, as far as an arm's tool can press on them.
+std::vector<Touch> touches_of(const ElasticArm& arm, const LoopModel& loop) {
+  constexpr double least_share = 0.05;  // of a normal in the tool's space; below, friction holds more than the layer
+  const Eigen::Index d = arm.jacobian.rows();
+  std::vector<Touch> touches{{Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd(d, 0)}};
+  if (!loop.layers || arm.axes.cols() != d) return touches;
+  for (const LayerTouch& layer : *loop.layers) {
+    Touch touch{arm.axes.transpose() * layer.spring_W * arm.axes, Eigen::MatrixXd(d, 0)};
+    if (layer.sticks_along_W) {
+      const Eigen::VectorXd n = arm.axes.transpose() * *layer.sticks_along_W;
+      if (d < 2 || n.norm() < least_share) continue;
+      touch.forbidden = across(n.normalized());
+    }
+    touches.push_back(std::move(touch));
+  }
+  return touches;
+}
+
+// A horizon is chosen, and judged, with drives that lag: they are what it compensates for.
+enum class Drives { lag, both };
+
+LoopModel feeding_forward(LoopModel loop) {
+  loop.feed_forward = true;
+  return loop;
+}
+
+// The loops in all poses, free and on all layers, with drives that lag and with drives that feed forward: the cell
+// doesn't say which it has.
 class ElasticLoops {
  public:
-  ElasticLoops(const HandModel& hand, const LoopModel& loop) {
-    for (const ElasticArm& arm : *loop.arms) loops_.emplace_back(arm, hand, loop);
+  ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)
+      : damping_(loop.damping_Ns_per_m), spring_(loop.spring_N_per_m) {
+    std::vector<LoopModel> ways{loop};
+    const bool lags = drives == Drives::lag || loop.horizon_s > 0.0;
+    if (!lags && loop.drive_time_constant_s > 0.0 && !loop.feed_forward) ways.push_back(feeding_forward(loop));
+    for (const ElasticArm& arm : *loop.arms) {
+      for (const LoopModel& way : ways) loops_.push_back({ElasticLoop(arm, hand, way), touches_of(arm, loop)});
+    }
   }
   [[nodiscard]] double spectral_radius(double proxy_mass_kg) const {
     double largest = 0.0;
-    for (const ElasticLoop& loop : loops_)
-      largest = std::max(largest, loop.spectral_radius(proxy_mass_kg / elastic_margin));
+    for (const Posed& posed : loops_) {
+      for (const Touch& touch : posed.touches)
+        largest = std::max(largest, spectral_radius(posed.loop, touch, proxy_mass_kg));
+    }
     return largest;
   }
-  [[nodiscard]] bool stable(double proxy_mass_kg) const {
-    return std::all_of(loops_.begin(), loops_.end(), [&](const ElasticLoop& loop) {
-      return loop.spectral_radius(proxy_mass_kg / elastic_margin) < 1.0;
-    });
+  // Above which every mass up to max_mass_kg is stable. Most touches are stable with what others ask for; these aren't
+  // searched.
+  [[nodiscard]] std::optional<double> smallest_stable(double max_mass_kg) const {
+    constexpr double least_kg = 1e-3, close_enough = 1.002;
+    double smallest = 0.0;
+    for (const Posed& posed : loops_) {
+      for (const Touch& touch : posed.touches) {
+        const auto holds = [&](double mass_kg) { return spectral_radius(posed.loop, touch, mass_kg) < 1.0; };
+        if (smallest > 0.0 && holds_from(smallest, max_mass_kg, holds)) continue;
+        const auto here = smallest_from_above(holds, max_mass_kg, least_kg, close_enough);
+        if (!here) return std::nullopt;
+        smallest = std::max(smallest, *here);
+      }
+    }
+    return smallest;
   }
 
  private:
-  std::vector<ElasticLoop> loops_;
+  struct Posed {
+    ElasticLoop loop;
+    std::vector<Touch> touches;
+  };
+
+  [[nodiscard]] double spectral_radius(const ElasticLoop& loop, const Touch& touch, double proxy_mass_kg) const {
+    const Eigen::Index d = touch.spring.rows();
+    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(d, d);
+    return loop.spectral_radius({proxy_mass_kg / elastic_margin * one, damping_ * one, spring_ * one + touch.spring},
+                                touch.forbidden);
+  }
+
+  // At some masses from the smallest to the largest: a layer's unstable masses can lie above ones that are stable.
+  template <class Holds>
+  static bool holds_from(double smallest_kg, double largest_kg, const Holds& holds) {
+    for (const double share : {0.0, 0.1, 0.25, 1.0}) {
+      if (!holds(smallest_kg * std::pow(largest_kg / smallest_kg, share))) return false;
+    }
+    return true;
+  }
+
+  double damping_, spring_;
+  std::vector<Posed> loops_;
 };
+
+// K_v of the rigid loop, free and along each layer's stiffest direction, each once.
+std::vector<double> springs_of(const LoopModel& loop) {
+  std::vector<double> springs{loop.spring_N_per_m};
+  if (!loop.layers) return springs;
+  for (const LayerTouch& layer : *loop.layers) {
+    springs.push_back(loop.spring_N_per_m + models::symmetric_eigenvalues(layer.spring_W).maxCoeff());
+  }
+  std::sort(springs.begin(), springs.end());
+  const auto same = [](double a, double b) { return b - a <= 1e-9 * b; };
+  springs.erase(std::unique(springs.begin(), springs.end(), same), springs.end());
+  return springs;
+}
 
 // Above this mass the gears don't matter, since the hand's mass is too small beside the proxy's. Besides, rounding
 // couldn't tell the eigenvalues of the slowest modes from 1; a proxy has two that are close to it.
 constexpr double heaviest_on_gears_kg = 50.0;
 
-// The same if only eigenvalues decide.
-std::optional<double> smallest_on_gears(const ElasticLoops& loop, double max_mass_kg) {
-  constexpr double least_kg = 1e-3, close_enough = 1.002;
-  return smallest_from_above([&](double mass_kg) { return loop.stable(mass_kg); }, max_mass_kg, least_kg, close_enough);
+// Of a rigid arm: from the top down to the first interval of masses that aren't stable.
+std::optional<double> smallest_on_rigid(const Loop& loop, double max_mass_kg) {
+  if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
+  double smallest = max_mass_kg;
+  std::vector<double> edges = critical_masses(loop, max_mass_kg);
+  edges.push_back(least_mass_kg);
+  double above = max_mass_kg;
+  for (const double edge : edges) {
+    if (above > edge && !(spectral_radius(loop, std::sqrt(above * edge)) < 1.0)) break;
+    smallest = above = edge;
+  }
+  return smallest;
 }
 
 // Of an order 2 whose events count: its free motion, and (26).
@@ -195,6 +301,13 @@ std::pair<LoopModel, LoopModel> both_methods(const LoopModel& loop) {
   free.with_events = false;
   at_events.order = 1;
   return {free, at_events};
+}
+
+// The loop with these touches alone.
+LoopModel with_layers(const LoopModel& loop, std::vector<LayerTouch> layers) {
+  LoopModel with = loop;
+  with.layers = layers.empty() ? nullptr : std::make_shared<const std::vector<LayerTouch>>(std::move(layers));
+  return with;
 }
 
 std::string text(const char* pattern, double value) {
@@ -210,14 +323,27 @@ double round_up(double mass) {
   return std::ceil(mass / unit * (1.0 + 1e-9)) * unit;
 }
 
-double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+namespace {
+double largest_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg, Drives drives) {
   if (loop.order == 2 && loop.with_events) {
     const auto [free, at_events] = both_methods(loop);
-    return std::max(spectral_radius(hand, free, proxy_mass_kg), spectral_radius(hand, at_events, proxy_mass_kg));
+    return std::max(largest_radius(hand, free, proxy_mass_kg, drives),
+                    largest_radius(hand, at_events, proxy_mass_kg, drives));
   }
   if (loop.arms && proxy_mass_kg <= heaviest_on_gears_kg)
-    return ElasticLoops(hand, loop).spectral_radius(proxy_mass_kg);
-  return spectral_radius(make_loop(hand, loop), proxy_mass_kg);
+    return ElasticLoops(hand, loop, drives).spectral_radius(proxy_mass_kg);
+  double largest = 0.0;
+  LoopModel pressed = loop;
+  for (const double spring : springs_of(loop)) {
+    pressed.spring_N_per_m = spring;
+    largest = std::max(largest, spectral_radius(make_loop(hand, pressed), proxy_mass_kg));
+  }
+  return largest;
+}
+}  // namespace
+
+double spectral_radius(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  return largest_radius(hand, loop, proxy_mass_kg, Drives::both);
 }
 
 std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopModel& model, double max_mass_kg) {
@@ -232,18 +358,15 @@ std::optional<double> smallest_stable_mass(const HandModel& hand, const LoopMode
     rigid.arms = nullptr;
     const auto without_gears = smallest_stable_mass(hand, rigid, max_mass_kg);
     if (!without_gears || *without_gears > heaviest_on_gears_kg) return without_gears;
-    return smallest_on_gears(ElasticLoops(hand, model), std::min(max_mass_kg, heaviest_on_gears_kg));
+    return ElasticLoops(hand, model).smallest_stable(std::min(max_mass_kg, heaviest_on_gears_kg));
   }
-  const Loop loop = make_loop(hand, model);
-  if (!(spectral_radius(loop, max_mass_kg) < 1.0)) return std::nullopt;
-  // Goes from the top down and ends at the first interval of masses that aren't stable.
-  double smallest = max_mass_kg;
-  std::vector<double> edges = critical_masses(loop, max_mass_kg);
-  edges.push_back(least_mass_kg);
-  double above = max_mass_kg;
-  for (const double edge : edges) {
-    if (above > edge && !(spectral_radius(loop, std::sqrt(above * edge)) < 1.0)) break;
-    smallest = above = edge;
+  double smallest = 0.0;
+  LoopModel pressed = model;
+  for (const double spring : springs_of(model)) {
+    pressed.spring_N_per_m = spring;
+    const std::optional<double> there = smallest_on_rigid(make_loop(hand, pressed), max_mass_kg);
+    if (!there) return std::nullopt;
+    smallest = std::max(smallest, *there);
   }
   return smallest;
 }
@@ -274,7 +397,7 @@ struct Held {
 };
 
 // What a horizon has to be stable with: each pose, hand, delay and gear alone.
-std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model) {
+std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model, double proxy_mass_kg) {
   std::vector<LoopModel> poses;
   if (!model.arms) poses = {model};
   for (std::size_t i = 0; model.arms && i < model.arms->size(); ++i) {
@@ -283,6 +406,7 @@ std::vector<Held> held_in_all_ways(const HandModel& hand, const LoopModel& model
   }
   std::vector<Held> all;
   for (LoopModel loop : poses) {
+    loop = with_worst_layers(hand, loop, proxy_mass_kg);
     const double unsure_s = loop.delay_s - 2.0 * loop.filter_s;
     for (const double ratio : gear_margins) {
       loop.gear_stiffness_ratio = ratio;
@@ -308,9 +432,9 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
   const double T = model.period_s;
   const auto radius = [&](Held& held, int steps) {
     held.loop.horizon_s = steps * T;
-    return spectral_radius(held.hand, held.loop, proxy_mass_kg);
+    return largest_radius(held.hand, held.loop, proxy_mass_kg, Drives::lag);
   };
-  std::vector<Held> all = held_in_all_ways(hand, model);
+  std::vector<Held> all = held_in_all_ways(hand, model, proxy_mass_kg);
   std::vector<double> without;
   for (Held& held : all) without.push_back(radius(held, 0));
   const double worst = *std::max_element(without.begin(), without.end());
@@ -323,6 +447,32 @@ double stable_horizon_s(const HandModel& hand, const LoopModel& model, double pr
     }
   }
   return steps * T;
+}
+
+LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg) {
+  constexpr std::size_t most = 2;
+  if (!loop.layers || loop.layers->size() <= most) return loop;
+  std::vector<std::pair<double, const LayerTouch*>> by_radius;
+  for (const LayerTouch& layer : *loop.layers)
+    by_radius.emplace_back(spectral_radius(hand, with_layers(loop, {layer}), proxy_mass_kg), &layer);
+  std::stable_sort(by_radius.begin(), by_radius.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  return with_layers(loop, {*by_radius[0].second, *by_radius[1].second});
+}
+
+// Just below the smallest mass, the touch that asks for it isn't stable; where no mass is, at the heaviest on gears. A
+// layer's unstable masses can lie above ones that are stable there.
+std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop) {
+  constexpr double more = 1.01;  // than what a search leaves
+  if (!loop.layers) return std::nullopt;
+  const std::optional<double> smallest = smallest_stable_mass(hand, loop);
+  const std::optional<double> without = smallest_stable_mass(hand, with_layers(loop, {}));
+  if (!without || (smallest && *smallest <= more * *without)) return std::nullopt;
+  const double unstable_kg = smallest ? *smallest / more : heaviest_on_gears_kg;
+  for (const LayerTouch& layer : *loop.layers) {
+    if (!(spectral_radius(hand, with_layers(loop, {layer}), unstable_kg) < 1.0))
+      return LayerLimit{layer.what, smallest};
+  }
+  return std::nullopt;
 }
 
 std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
@@ -376,7 +526,9 @@ void require_stable(double felt, const HandModel& hand, const LoopModel& loop, b
            "the handle sits after the sensor, so no control can make it lighter");
   }
   if (force_unstable || spectral_radius(hand, loop, felt - handle) < 1.0) return;
-  const std::string grip = text("with a hand of %.4g ", hand.stiffness_N_per_m) + w.stiffness_unit +
+  const std::optional<LayerLimit> layer = decisive_layer(hand, loop);
+  const std::string grip = (layer ? "on " + layer->what + " " : "") +
+                           text("with a hand of %.4g ", hand.stiffness_N_per_m) + w.stiffness_unit +
                            text(", %.4g ", hand.damping_Ns_per_m) + w.damping_unit + text(", %.3g", hand.mass_kg) +
                            unit + text(" and a delay of %.3g ms", 1e3 * (loop.period_s + loop.delay_s)) +
                            text(" (drives: %.3g ms)", 1e3 * loop.drive_time_constant_s);

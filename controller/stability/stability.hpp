@@ -20,6 +20,10 @@
 // With an elastic model of the cell's arm (`arms`), the eigenvalues are those of elastic_loop.hpp instead, the largest
 // of all its poses. What follows applies to C.
 //
+// An elastic layer (models/surfaces/layer.hpp) that the proxy presses on is a spring along its normal, K_v + k n nᵀ,
+// and what is stable in free motion needn't be stable there. So with `layers` a mass counts as stable only if it is in
+// free motion and in each of these touches; of C the spring is K_v plus the touch's stiffest direction.
+//
 // C is linear in M: C = M X + Y. So the masses at which a root lies on the unit circle are found by D-decomposition
 // (Neimark): a sweep over θ, w = exp(−jθ), finds where M(θ) = −Y/X is real and positive. Between two neighbouring
 // masses stability doesn't change. This makes "the smallest mass above which all are stable" exact, even if the stable
@@ -33,6 +37,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "controller/stability/elastic_loop.hpp"
 
@@ -43,6 +48,13 @@ struct HandModel {
   double stiffness_N_per_m = 500.0;  // K_h ≥ 0
   double damping_Ns_per_m = 20.0;    // D_h ≥ 0
   double mass_kg = 1.0;              // m_h ≥ 0, without the handle
+};
+
+// Elastic layers that the proxy presses on at once: one, or several where they meet.
+struct LayerTouch {
+  std::string what;                              // for messages: "layer 'foam' of 2 kN/m"
+  models::Mat3 spring_W = models::Mat3::Zero();  // Σ k n nᵀ of the layers, N/m
+  std::optional<models::Vec3> sticks_along_W{};  // friction holds it but for this normal; none: it slides freely
 };
 
 struct LoopModel {
@@ -64,7 +76,8 @@ struct LoopModel {
   // modelled there as the two first-order lags that it is. Lookahead compensates for their phase; a pure delay would
   // seem worse.
   double filter_s = 0.0;
-  std::shared_ptr<const std::vector<ElasticArm>> arms{};  // in all poses that count; null: rigid
+  std::shared_ptr<const std::vector<ElasticArm>> arms{};    // in all poses that count; null: rigid
+  std::shared_ptr<const std::vector<LayerTouch>> layers{};  // beside free motion; null: none
 };
 
 // Compared with the simulated arm, the smallest stable masses of elastic loops are off by −8 to 15 %, so a twentieth
@@ -110,10 +123,22 @@ std::optional<DampedMass> least_damping(const LoopModel& loop, double most_kg,
                                         const std::function<std::optional<double>(const LoopModel&)>& smallest,
                                         double unit = 1.0);
 
+// What a layer asks for beyond free motion.
+struct LayerLimit {
+  std::string what;               // of the touch
+  std::optional<double> mass_kg;  // the proxy's, the smallest that is stable there; absent: none is
+};
+// The touch that asks for most mass. Absent: free motion asks for as much.
+std::optional<LayerLimit> decisive_layer(const HandModel& hand, const LoopModel& loop);
+
+// The loop with the two layers on which this mass is the least stable: where it is asked dozens of times, for the sake
+// of time.
+LoopModel with_worst_layers(const HandModel& hand, const LoopModel& loop, double proxy_mass_kg);
+
 // The check of --mass. Throws description::SetupError that names the smallest stable felt mass (proxy and handle),
 // rounded up to two digits, and the damping with which the mass that is wanted is stable; if none is without damping,
-// the least damping with which some is. Also for a mass at or below the handle's.
-// With `force_unstable` only the latter is checked.
+// the least damping with which some is. It names the layer if one asks for more than free motion does. Also for a mass
+// at or below the handle's. With `force_unstable` only the latter is checked.
 void require_stable_mass(double felt_mass_kg, const HandModel& hand, const LoopModel& loop, bool force_unstable);
 
 // The check of --inertia, which is the same question about the tool's rotation: `hand` and `loop` hold the hand's

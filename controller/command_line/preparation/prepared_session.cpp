@@ -20,6 +20,7 @@
 #include "models/base/setup_error.hpp"
 #include "models/files/key_line.hpp"
 #include "models/rigid_shapes/furthest.hpp"
+#include "scenes/compiler/layer_touches.hpp"
 #include "scenes/format/scene_file.hpp"
 #include "scenes/format/tool_file.hpp"
 #include "scenes/rigid/compile_rigid.hpp"
@@ -313,6 +314,39 @@ std::shared_ptr<const std::vector<controller::ElasticArm>> arms_at(const Prepare
   return arms;
 }
 
+// "20 kN/m"; a scene's numbers are round.
+std::string stiffness_text(double N_per_m) {
+  std::array<char, 40> text{};
+  const bool kilo = N_per_m >= 1000.0;
+  std::snprintf(text.data(), text.size(), kilo ? "%.3g kN/m" : "%.3g N/m", kilo ? 1e-3 * N_per_m : N_per_m);
+  return text.data();
+}
+
+// "layer 'foam' of 20 kN/m and layer 'mat' of 4 kN/m at once"
+std::string words_of(const scenes::LayersTogether& layers) {
+  std::string words;
+  for (const scenes::PressedLayer& layer : layers) {
+    words +=
+        (words.empty() ? "layer '" : " and layer '") + layer.object + "' of " + stiffness_text(layer.stiffness_N_per_m);
+  }
+  return words + (layers.size() > 1 ? " at once" : "");
+}
+
+// Each slides, and a single one with friction sticks, too.
+std::shared_ptr<const std::vector<controller::LayerTouch>> layers_of(const scenes::Scene& scene) {
+  auto all = std::make_shared<std::vector<controller::LayerTouch>>();
+  for (const scenes::LayersTogether& layers : scenes::layer_touches(scene)) {
+    controller::LayerTouch touch{.what = words_of(layers)};
+    for (const scenes::PressedLayer& layer : layers)
+      touch.spring_W += layer.stiffness_N_per_m * layer.normal_W * layer.normal_W.transpose();
+    all->push_back(touch);
+    if (layers.size() > 1 || !(layers[0].friction > 0.0)) continue;
+    touch.sticks_along_W = layers[0].normal_W;
+    all->push_back(touch);
+  }
+  return all->empty() ? nullptr : all;
+}
+
 }  // namespace
 
 controller::HandModel turning_hand_model(const PreparedSession& session) {
@@ -330,6 +364,7 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
   controller::LoopModel loop = session.loop;
   loop.horizon_s = 0.0;  // only the tool's place is predicted
   loop.order = 1;
+  loop.layers = nullptr;  // the place is held
   loop.handle_mass_kg = models::tool_inertia(session.cell.tool).largest_kg_m2;
   loop.damping_Ns_per_m = session.settings.rotational_damping_Nms_per_rad;
   loop.spring_N_per_m = session.settings.rotational_spring_Nm_per_rad;
@@ -552,6 +587,7 @@ PreparedSession prepare(const RunOptions& options) {
   session.loop.spring_N_per_m = session.settings.spring_N_per_m;
   session.loop.order = session.settings.order;
   session.loop.arms = arms_at(session, controller::led_poses(models::Arm(session.cell), {}));
+  session.loop.layers = layers_of(session.scene);
   session.settings.force_age_s = session.cell.sensor.delay_s;
   session.settings.report_rate_Hz = slowest_report_Hz(session.cell);
   session.settings.looks_ahead = session.lookahead.kind != LookaheadChoice::Kind::off;

@@ -219,6 +219,85 @@ TEST(ElasticLoop, AHorizonLeavesAsManyHandsCalmAsThereWereWithout) {
   }
 }
 
+// The story: a setting that is calm in free motion swung without end by 0.2 mm on a layer of 61 kN/m, and eight of 56
+// accepted ones did. The judge hadn't asked for layers.
+LayerTouch layer_along(const Vec3& n, double stiffness_N_per_m) {
+  return {.what = "layer", .spring_W = stiffness_N_per_m * n * n.transpose()};
+}
+
+LoopModel on_layers(LoopModel loop, const std::vector<LayerTouch>& layers) {
+  loop.layers = std::make_shared<const std::vector<LayerTouch>>(layers);
+  return loop;
+}
+
+TEST(LayerTouch, ThatPressesFromAllSidesIsTheProxysOwnSpring) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  LoopModel elastic = loop_of(cell, 1e-3), rigid = elastic;
+  rigid.arms = nullptr;
+  const HandModel hand{500.0, 20.0, 1.0};
+  for (const LoopModel& loop : {elastic, rigid}) {
+    for (const double k : {500.0, 8000.0, 60000.0}) {
+      const LayerTouch all{.what = "all", .spring_W = k * models::Mat3::Identity()};
+      LoopModel held = loop;
+      held.spring_N_per_m = k;
+      for (const double mass_kg : {1.0, 3.0, 12.0}) {
+        const double expected = std::max(spectral_radius(hand, loop, mass_kg), spectral_radius(hand, held, mass_kg));
+        EXPECT_NEAR(spectral_radius(hand, on_layers(loop, {all}), mass_kg), expected, 1e-12) << k << " " << mass_kg;
+      }
+    }
+  }
+}
+
+TEST(LayerTouch, NeverMakesAMassPassThatWouldntWithout) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  const LoopModel loop = loop_of(cell, 2e-3);
+  const HandModel hand{1000.0, 15.0, 1.5};
+  const double free_kg = *smallest_stable_mass(hand, loop);
+  for (const double k : {100.0, 2000.0, 20000.0, 1e6, 1e12}) {
+    const LoopModel there = on_layers(loop, {layer_along(Vec3::UnitX(), k)});
+    const auto least_kg = smallest_stable_mass(hand, there);
+    if (least_kg) {
+      EXPECT_GE(*least_kg, 0.995 * free_kg) << k;
+      EXPECT_LT(spectral_radius(hand, there, 1.01 * *least_kg), 1.0) << k;
+    }
+    EXPECT_GE(spectral_radius(hand, there, 0.9 * free_kg), 1.0) << k;
+  }
+}
+
+TEST(LayerTouch, AcrossWhereAnArmCanGoChangesNothing) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/linear.yaml"));
+  const LoopModel loop = loop_of(cell, 1e-3);
+  const HandModel hand{500.0, 20.0, 1.0};
+  LayerTouch across = layer_along(Vec3::UnitZ(), 50000.0);
+  const double free_kg = *smallest_stable_mass(hand, loop);
+  EXPECT_EQ(*smallest_stable_mass(hand, on_layers(loop, {across})), free_kg);
+  across.sticks_along_W = Vec3::UnitZ();
+  EXPECT_EQ(*smallest_stable_mass(hand, on_layers(loop, {across})), free_kg);
+}
+
+TEST(LayerTouch, TheOneThatAsksForMostIsNamedInARefusal) {
+  const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
+  LoopModel loop = loop_of(cell, 1e-3);
+  const HandModel hand{399.2, 12.3, 1.91};
+  const Vec3 n = Vec3(-0.3277, -0.6618, 0.6743).normalized();
+  LayerTouch soft = layer_along(n, 100.0), hard = layer_along(n, 61254.0);
+  soft.what = "layer 'cushion' of 100 N/m";
+  hard.what = "layer 'foam' of 61.3 kN/m";
+  const double free_kg = *smallest_stable_mass(hand, loop);
+  EXPECT_FALSE(decisive_layer(hand, loop));
+  loop = on_layers(loop, {soft, hard});
+  const auto limit = decisive_layer(hand, loop);
+  ASSERT_TRUE(limit);
+  EXPECT_EQ(limit->what, hard.what);
+  EXPECT_GT(*limit->mass_kg, free_kg);
+  try {
+    require_stable_mass(*limit->mass_kg / 1.01 + loop.handle_mass_kg, hand, loop, false);
+    ADD_FAILURE() << "accepted";
+  } catch (const description::SetupError& error) {
+    EXPECT_NE(std::string(error.what()).find("on layer 'foam' of 61.3 kN/m"), std::string::npos) << error.what();
+  }
+}
+
 TEST(ElasticLoop, DrivesWithoutALagAreStableToo) {
   const description::Cell cell = description::load_cell(source_file("models/cells/default.yaml"));
   LoopModel loop = loop_of(cell, 1e-3);
