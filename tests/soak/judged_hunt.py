@@ -19,7 +19,7 @@ from types import SimpleNamespace
 
 import hunting
 from decaying_hunt import CALM_M, jerk
-from hunting import SOURCE, direction, log_uniform
+from hunting import SOURCE, log_uniform
 
 sys.path.insert(0, str(SOURCE / "tests/command_line"))
 from steel import Track  # noqa: E402
