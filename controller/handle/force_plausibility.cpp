@@ -21,7 +21,7 @@ constexpr double least_force_N = 2.0;
 // For the straight line:
 constexpr double near_m = 1e-3, far_m = 1e-2;
 // The line is tested every 30 samples. If it were tested at each one, chance would reject a good line now and then.
-constexpr double looks = 30.0, deviations = 3.0;
+constexpr double looks = 30.0, bend_noises = 3.0;
 // For the jump. The share of a fifth allows for the tool behind the sensor, which oscillates as the arm starts.
 constexpr double jump_s = 0.03, jump_share = 0.2, jump_noises = 20.0;
 constexpr double ramp_noises = 30.0, constant_noises = 10.0, constant_share = 0.15, speed_gain = 1.5;
@@ -108,7 +108,7 @@ bool StraightForce::step(const ForceAndMotion& now, bool empty, double noise_N) 
   const bool went = gone_W.norm() >= far_m;
   if (s.fit.n < looks || (!went && std::fmod(s.fit.n, looks) != 0.0)) return false;
   const FittedLine line = fitted(s.fit, now.period_s);
-  if (bends(line, noise_N, deviations)) {
+  if (bends(line, noise_N, bend_noises)) {
     s.fit.n = 0.0;
     s.judged = gone_W.norm() <= near_m;
     return false;

@@ -207,7 +207,7 @@ class ElasticLoops {
   ElasticLoops(const HandModel& hand, const LoopModel& loop, Drives drives = Drives::both)
       : damping_(loop.damping_Ns_per_m), spring_(loop.spring_N_per_m) {
     std::vector<LoopModel> ways{loop};
-    const bool lags = drives == Drives::lag || loop.horizon_s > 0.0;
+    const bool lags = drives == Drives::lag || !loop.either_drive || loop.horizon_s > 0.0;
     if (!lags && loop.drive_time_constant_s > 0.0 && !loop.feed_forward) ways.push_back(feeding_forward(loop));
     for (const ElasticArm& arm : *loop.arms) {
       for (const LoopModel& way : ways) loops_.push_back({ElasticLoop(arm, hand, way), touches_of(arm, loop)});

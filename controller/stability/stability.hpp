@@ -62,6 +62,7 @@ struct LoopModel {
   double delay_s = 0.0;                // L ≥ 0
   double drive_time_constant_s = 0.0;  // τ ≥ 0 of the drives' position loop
   bool feed_forward = false;           // with arms: the drives follow by feed-forward instead (elastic_loop.hpp)
+  bool either_drive = true;            // with arms: a mass has to be stable with drives of both kinds
   double handle_mass_kg = 0.0;         // mass after the sensor
   double damping_Ns_per_m = 0.0;       // B ≥ 0 of the proxy
   double spring_N_per_m = 0.0;         // K_v ≥ 0 of the proxy

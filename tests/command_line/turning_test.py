@@ -130,7 +130,7 @@ class Turning(ProgramTest):
         # The line that causes it is named, also where another one says what it takes.
         refuse("--inertia 0.1 --set inertia=0.2@1s --set inertia=0.0001@2s", "proxarm: --set inertia=0.0001@2s: found")
         turned = f"--hand {SOURCE}/sim/hands/wobble.yaml"
-        refuse(f"{turned} --mass 4 --inertia 0.0087 --set timestep=4ms@1s", "proxarm: --set timestep=4ms@1s: inertia: found")
+        refuse(f"{turned} --mass 5 --inertia 0.0087 --set timestep=4ms@1s", "proxarm: --set timestep=4ms@1s: inertia: found")
         refuse(f"{turned} --mass 2 --inertia 0.05 --set mass=1.8@1s", "proxarm: --set mass=1.8@1s: inertia: found 0.05 kg m²")
         refuse("--set nothing=3@1s", 'proxarm: --set nothing=3@1s: found "nothing=3"')
         still = self.written("still.yaml", "name: still\nwaypoints: [{time_s: 1, turn_rad: [0, 0, 1]}]\n")

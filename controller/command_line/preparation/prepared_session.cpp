@@ -365,6 +365,8 @@ controller::LoopModel turning_loop(const PreparedSession& session) {
   loop.horizon_s = 0.0;  // only the tool's place is predicted
   loop.order = 1;
   loop.layers = nullptr;  // the place is held
+  // With a place that is held, feed-forward would ask for a quarter more than it takes: PoseLoop judges it.
+  loop.either_drive = false;
   loop.handle_mass_kg = models::tool_inertia(session.cell.tool).largest_kg_m2;
   loop.damping_Ns_per_m = session.settings.rotational_damping_Nms_per_rad;
   loop.spring_N_per_m = session.settings.rotational_spring_Nm_per_rad;
