@@ -119,8 +119,9 @@ void ArmStep::begin(const ArmStepStart& start) noexcept {
   aim(start.R_WT);
   margin_.go_to(link_rad_, from_);
   make_boxes(start);
-  if (start.held && eases()) turn_gently();
+  eases_ = eases();
   use_first_box();
+  if (start.held && eases_) turn_gently();
 }
 
 // A held orientation that lags is caught up as a brake reaches a wall, and no faster at once than joints take it up.
@@ -188,12 +189,11 @@ bool ArmStep::eases() const noexcept {
   return lags_ || (start_.held ? near_wrist_singularity() : !start_.touches_turning);
 }
 
-void ArmStep::use_first_box() noexcept { use_box(eases() ? first_ease : whole_box); }
+void ArmStep::use_first_box() noexcept { use_box(eases_ ? first_ease : whole_box); }
 
 // Where a held orientation gives way to the place, the joints that only turn the tool stay gentle, whatever the place
 // asks of the others. (One that a hand turns may be anywhere: there they may be asked to stop at once.)
 void ArmStep::turn_gently() noexcept {
-  use_box(first_ease);
   for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
     if (margin_.carries(i)) continue;
     whole_.low[i] = box_.low[i];

@@ -175,6 +175,7 @@ class ArmStep final : public FollowableStep {
   ArmStepStart start_;
   models::JointVector brakes_;   // all joints brake together, by half of their acceleration
   Box whole_, box_;              // U's, and the part of it that is used
+  bool eases_ = false;           // the first part that is tried is a small one: eases()
   double ease_ = 0.0;            // of that part: by how many times half of its acceleration a joint's step may change
   models::ToolKinematics from_;  // at c(k−1)
   models::InverseKinematicsResult solution_;  // of the pose last asked for; after the step, of where it led
