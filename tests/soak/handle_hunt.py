@@ -14,13 +14,13 @@ Judged by the records alone:
 Masses that aren't stable with a hand are refused by the program, and counted. Oscillations are told: they aren't judged
 here. Status 1, and the session's files in `--keep DIR`, where it isn't so.
 """
-import csv
 import json
 import math
 import random
 import sys
 
 import hunting
+from comes_back_hunt import Record
 from hunting import SOURCE, direction, log_uniform
 
 CELLS = ("default", "cobot", "seven", "scara", "gantry", "rail", "linear")
@@ -109,16 +109,9 @@ def hung(chance, folder):
         from_s + 2 * on_s + held_s + 1.5
 
 
-class Record:
-    def __init__(self, file):
-        with open(file, newline="") as text:
-            rows = csv.reader(text)
-            at = {name: i for i, name in enumerate(next(rows))}
-            rows = [row for row in rows if row[at["phase"]] == "rendering"]
-        three = lambda name: [[float(row[at[f"{name}_W_{x}_m"]]) for x in "xyz"] for row in rows]
-        self.time = [float(row[at["time_s"]]) for row in rows]
-        self.proxy, self.steel = three("proxy"), three("true_tool")
-        self.limited_s = next((float(row[at["time_s"]]) for row in rows if "limit" in row[at["flags"]]), math.inf)
+def limited_s(record):
+    """When a limit acts first."""
+    return next((t for t, flags in zip(record.time, record.flags) if "limit" in flags), math.inf)
 
 
 def gone_on(record, released_s):
@@ -130,13 +123,14 @@ def gone_on(record, released_s):
 def acceleration(record, F, from_s, lasts_s):
     """Of the fit ½ a (t − t0)² to the way along F, while it acts: √way is a straight line."""
     size = math.hypot(*F)
+    until_s = min(from_s + lasts_s, limited_s(record))
     start = next(p for t, p in zip(record.time, record.proxy) if t >= from_s - 0.01)
     points = [(t, sum((a - b) * f for a, b, f in zip(p, start, F)) / size)
               for t, p in zip(record.time, record.proxy)
-              if from_s + max(0.1 * lasts_s, 0.03) < t < min(from_s + lasts_s, record.limited_s)]
+              if from_s + max(0.1 * lasts_s, 0.03) < t < until_s]
     rows = [(t, math.sqrt(2 * x), x) for t, x in points if x > 0.0]
     if len(rows) < 5:
-        return None if record.limited_s < from_s + lasts_s else 0.0
+        return None if until_s < from_s + lasts_s else 0.0
     # Weighted by the way itself: what is read of it is as exact everywhere.
     w = [x for _, _, x in rows]
     mean_t = sum(a * t for a, (t, _, _) in zip(w, rows)) / sum(w)
