@@ -5,9 +5,7 @@
 #include "controller/command_line/commissioning/identified_tool.hpp"
 #include "controller/command_line/commissioning/proof_run.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/identification/tool_stations.hpp"
 #include "models/base/setup_error.hpp"
 
@@ -37,10 +35,7 @@ ProofOutcome read(const PreparedSession& session, const IdentifyOptions& options
                              },
                          .settle_s = settle_s,
                          .read_s = read_s};
-  if (!options.run.bus.simulated()) return prove_on_interfaces(session, options.run, task);
-  RunOptions of_arm = options.run;
-  if (!options.arm.empty()) of_arm.cell = options.arm;
-  return prove_simulated(session, prepared_to_identify(of_arm), options.run, task);
+  return prove_arm(session, options.run, options.arm, prepared_to_identify, task);
 }
 
 IdentifiedTool identified(PreparedSession session, const IdentifyOptions& options) {
@@ -77,11 +72,7 @@ void write(const IdentifiedTool& tool, const PreparedSession& session, bool told
 }  // namespace
 
 int identify_command(const IdentifyOptions& options) {
-  require_interface_for_hardware(options.run);
-  if (!options.run.bus.simulated()) refuse_simulated_options(options.run, options.arm);
-  const PreparedSession session = prepared_to_identify(options.run);
-  require_enabling_switch(session, options.run);
-  require_carried(session, options.run);
+  const PreparedSession session = session_to_prove(options.run, options.arm, prepared_to_identify);
   const IdentifiedTool tool = identified(session, options);
   std::vector<ToolDifference> differences;
   bool same = true;

@@ -5,9 +5,7 @@
 #include "controller/command_line/commissioning/identified_joints.hpp"
 #include "controller/command_line/commissioning/proof_run.hpp"
 #include "controller/command_line/entry/exit_status.hpp"
-#include "controller/command_line/preparation/bus_plan.hpp"
 #include "controller/command_line/preparation/data_files.hpp"
-#include "controller/command_line/preparation/start_check.hpp"
 #include "controller/identification/joints/joint_motion.hpp"
 #include "fieldbus/cia402/cia402_mode.hpp"
 #include "models/base/setup_error.hpp"
@@ -54,14 +52,7 @@ IdentifiedJoints identified(const PreparedSession& session, const IdentifyOption
   const auto exercise = std::make_shared<identification::JointExercise>(session.cell, arm, session.settings.period_s);
   proof::Task task{.stations = [&](const models::JointVector& motor_rad) { return exercise->stations(motor_rad); }};
   task.exercise = exercise;
-  ProofOutcome outcome;
-  if (options.run.bus.simulated()) {
-    RunOptions of_arm = options.run;
-    if (!options.arm.empty()) of_arm.cell = options.arm;
-    outcome = prove_simulated(session, prepared(of_arm), options.run, task);
-  } else {
-    outcome = prove_on_interfaces(session, options.run, task);
-  }
+  const ProofOutcome outcome = prove_arm(session, options.run, options.arm, prepared, task);
   IdentifiedJoints joints;
   joints.failure = failure_of(session, outcome);
   joints.real_arm = outcome.real_arm;
@@ -75,11 +66,7 @@ IdentifiedJoints identified(const PreparedSession& session, const IdentifyOption
 }  // namespace
 
 int identify_joints_command(const IdentifyOptions& options) {
-  require_interface_for_hardware(options.run);
-  if (!options.run.bus.simulated()) refuse_simulated_options(options.run, options.arm);
-  const PreparedSession session = prepared(options.run);
-  require_enabling_switch(session, options.run);
-  require_carried(session, options.run);
+  const PreparedSession session = session_to_prove(options.run, options.arm, prepared);
   const models::Arm arm(session.cell);
   const auto motions =
       identification::joint_motions(session.cell, arm, arm.motor_from_link(arm.start_rad()), session.settings.period_s);

@@ -68,17 +68,14 @@ int prove_command(const ProveOptions& options) {
   const PreparedSession session = prepared(options.run);
   if (!options.bus_loss) proof::require_provable(session.cell, models::Arm(session.cell));
   require_enabling_switch(session, options.run);
-  ProofOutcome outcome;
-  RunOptions of_arm = options.run;
-  if (!options.arm.empty()) of_arm.cell = options.arm;
   require_carried(session, options.run);
   const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
-  if (options.bus_loss) return prove_bus_loss(session, prepared(of_arm), options.run, file);
-  if (simulated) {
-    outcome = prove_simulated(session, prepared(of_arm), options.run);
-  } else {
-    outcome = prove_on_interfaces(session, options.run);
+  if (options.bus_loss) {
+    RunOptions of_arm = options.run;
+    if (!options.arm.empty()) of_arm.cell = options.arm;
+    return prove_bus_loss(session, prepared(of_arm), options.run, file);
   }
+  const ProofOutcome outcome = prove_arm(session, options.run, options.arm, prepared);
   const std::string failure = failure_of(session, outcome);
   proof::Verdict verdict;
   if (failure.empty()) verdict = proof::judge(session.cell, models::Arm(session.cell), outcome.readings);

@@ -10,6 +10,8 @@
 #include "controller/command_line/live/hardware_consent.hpp"
 #include "controller/command_line/live/realtime.hpp"
 #include "controller/command_line/live/signal_watch.hpp"
+#include "controller/command_line/preparation/bus_plan.hpp"
+#include "controller/command_line/preparation/start_check.hpp"
 #include "models/base/text.hpp"
 
 namespace proxarm::command_line {
@@ -143,6 +145,23 @@ ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOption
   ProofOutcome outcome = outcome_of(proof);
   outcome.real_arm = is_real(session, arm.interfaces);
   return outcome;
+}
+
+PreparedSession session_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare) {
+  require_interface_for_hardware(options);
+  if (!options.bus.simulated()) refuse_simulated_options(options, arm);
+  PreparedSession session = prepare(options);
+  require_enabling_switch(session, options);
+  require_carried(session, options);
+  return session;
+}
+
+ProofOutcome prove_arm(const PreparedSession& session, const RunOptions& options, const std::filesystem::path& arm,
+                       PrepareSession prepare, const proof::Task& task) {
+  if (!options.bus.simulated()) return prove_on_interfaces(session, options, task);
+  RunOptions of_arm = options;
+  if (!arm.empty()) of_arm.cell = arm;
+  return prove_simulated(session, prepare(of_arm), options, task);
 }
 
 }  // namespace proxarm::command_line

@@ -1,6 +1,7 @@
 // `proxarm prove` and what moves as it does: the session, against a simulated arm in this process or on interfaces.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,17 @@ ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSessi
 // `run` does, but wants no proof.
 ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options,
                                  const proof::Task& task = {});
+
+// What makes a session of a command's options. Throws SetupError.
+using PrepareSession = PreparedSession (*)(const RunOptions& options);
+
+// The session of a command that is about to move the arm, once what forbids that has been asked for: a real arm without
+// --hardware, what only a simulation has on interfaces, a missing enabling switch, a bus that can't carry it. `arm`:
+// the cell of the simulated arm; empty: the command's own. Throws SetupError.
+PreparedSession session_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
+
+// prove_simulated() where the bus is simulated, else prove_on_interfaces().
+ProofOutcome prove_arm(const PreparedSession& session, const RunOptions& options, const std::filesystem::path& arm,
+                       PrepareSession prepare, const proof::Task& task = {});
 
 }  // namespace proxarm::command_line
