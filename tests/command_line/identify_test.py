@@ -228,12 +228,46 @@ class IdentifyJoints(ProgramTest):
             "limits:\n", "limits:\n  workspace_m: {min: [0.6, -0.005, 0.5], max: [0.8, 0.005, 0.7]}\n", 1))
         self.assert_refused(self.call("identify", "--joints", narrow), "identify --joints", "axis_1", "workspace_m")
 
-    def test_a_key_that_the_file_does_not_have_is_named_and_nothing_is_written(self):
-        bare = self.cell("bare.yaml", change=lambda text: re.sub(r"\n +gear_damping_Nms_per_rad: 130(?=\n)", "", text))
+    def test_keys_that_the_file_does_not_have_are_put_in_and_all_else_stays(self):
+        """A cell without any damping, friction and stiffness of one drive, and without the `simulation` of another."""
+        lost = r"gear_damping_Nms_per_rad|coulomb_friction_Nm|viscous_friction_Nms_per_rad|gear_stiffness_Nm_per_rad"
+
+        def without(text):
+            one, two, three = (text.index(f"- joint: axis_{n}") for n in (1, 2, 3))
+            first = re.sub(rf"\n +(?:{lost}): \S+", "", text[one:two])
+            second = re.sub(r"\n    simulation:\n(?:      .*\n)+", "\n", text[two:three]) + "# the third one follows\n"
+            return text[:one] + first + second + text[three:]
+
+        bare = self.cell("bare.yaml", change=without)
+        before = bare.read_text()
+        self.assertNotRegex(before[:before.index("axis_2")], lost)
+        outcome = self.call("identify", "--joints", bare, "--arm", self.cell(), "--write")
+        self.assertEqual((outcome.status, outcome.err), (0, ""), outcome.out)
+        self.assertEqual((self.folder / "bare.yaml.before-identify").read_text(), before)
+        after = bare.read_text()
+        left = after.splitlines()
+        kept = [line for line in before.splitlines() if not re.search("|".join(key.split(".")[-1] for key in KEYS), line)]
+        rest = iter(left)
+        self.assertTrue(all(any(line == there for there in rest) for line in kept), "every other line is there, in order")
+        first = after[after.index("joint: axis_1"):after.index("joint: axis_2")]
+        self.assertEqual(len(re.findall(r"\n    gear_stiffness_Nm_per_rad: ", first)), 1)
+        self.assertEqual(len(re.findall(r"\n    gear_damping_Nms_per_rad: ", first)), 1)
+        self.assertAlmostEqual(float(re.search(r"\n      coulomb_friction_Nm: (\S+)", first)[1]), 25.0, delta=2.5)
+        self.assertRegex(after[after.index("joint: axis_2"):after.index("joint: axis_3")],
+                         r"\n    simulation: \{.*coulomb_friction_Nm: [\d.]+.*\}\n# the third one follows\n")
+        # The program reads it again, and finds no difference.
+        compared = self.identify(bare, "--arm", self.cell(), "--compare")
+        self.assertEqual([(joint, key) for joint, of in compared["joints"].items() for key, e in of.items()
+                          if e.get("differs")], [])
+
+    def test_a_key_that_can_not_be_put_in_is_named_and_nothing_is_written(self):
+        """A drive that another line of the file is: it has no entry of its own."""
+        bare = self.cell("bare.yaml", change=lambda text: re.sub(r"\n +gear_damping_Nms_per_rad: 130(?=\n)", "", text).replace(
+            "- joint: axis_1\n", "- \"joint\": axis_1\n", 1))
         before = bare.read_text()
         outcome = self.call("identify", "--joints", bare, "--arm", self.cell(), "--write")
         self.assertEqual(outcome.status, 2)
-        self.assertRegex(outcome.err, r"bare\.yaml.*axis_1.*gear_damping_Nms_per_rad.*write it by hand")
+        self.assertRegex(outcome.err, r"bare\.yaml.*axis_1.*write it by hand")
         self.assertEqual(bare.read_text(), before)
         self.assertEqual(sorted(file.name for file in self.folder.iterdir()), ["bare.yaml", "mine.yaml"])
 

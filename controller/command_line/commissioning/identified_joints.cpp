@@ -11,6 +11,7 @@
 #include "models/arm/arm.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
+#include "models/files/yaml_insertion.hpp"
 
 namespace proxarm::command_line {
 namespace {
@@ -104,8 +105,20 @@ std::string bare(const std::string& key) {
 [[noreturn]] void refuse(const Cell& cell, const JointFigure& figure, const std::string& fresh) {
   throw SetupError({.file = cell.file.string(),
                     .key = "drives (" + figure.joint + ")." + figure.key,
-                    .message = "isn't in this file, or can't be changed there; write it by hand",
+                    .message = "can't be changed in this file; write it by hand",
                     .expected = fresh});
+}
+
+// Puts a figure whose key the file doesn't have into the entry of its drive. Returns false where that can't be done.
+bool insert(std::string& text, const JointFigure& figure, const std::string& fresh) {
+  const std::vector<description::YamlStep> drive{{"drives"}, {"joint", figure.joint}};
+  const std::size_t dot = figure.key.find('.');
+  if (dot == std::string::npos) return description::insert_key(text, drive, figure.key, fresh);
+  const std::string map = figure.key.substr(0, dot), key = figure.key.substr(dot + 1);
+  std::vector<description::YamlStep> inner = drive;
+  inner.push_back({map});
+  return description::insert_key(text, inner, key, fresh) ||
+         description::insert_key(text, drive, map, "{" + key + ": " + fresh + "}");
 }
 
 std::string with_joints(const std::string& text, const std::vector<JointFigure>& figures, const Cell& cell) {
@@ -113,7 +126,10 @@ std::string with_joints(const std::string& text, const std::vector<JointFigure>&
   for (const JointFigure& figure : figures) {
     if (!figure.estimate.found) continue;
     const std::string fresh = formatted("%.6g", figure.estimate.value);
-    if (replace_all(changed, figure.joint, bare(figure.key), fresh) == 0) refuse(cell, figure, fresh);
+    const int replaced = replace_all(changed, figure.joint, bare(figure.key), fresh);
+    // A damping that stands only where the simulated drive has it isn't the controller's.
+    const bool inserted = (replaced == 0 || figure.key == damping_key) && insert(changed, figure, fresh);
+    if (replaced == 0 && !inserted) refuse(cell, figure, fresh);
     // The stiffness that was found is the real one, which a simulation needn't multiply any more.
     if (figure.key == stiffness_key) replace_all(changed, figure.joint, "gear_stiffness_ratio", "1");
   }

@@ -1,0 +1,72 @@
+#include "models/files/yaml_insertion.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <optional>
+
+namespace proxarm::description {
+namespace {
+
+// Of the first character of a line, counted from 0; the text's size behind the last one.
+std::size_t line_begin(const std::string& text, int line) {
+  std::size_t at = 0;
+  for (int i = 0; i < line && at < text.size(); ++i) at = std::min(text.find('\n', at), text.size() - 1) + 1;
+  return at;
+}
+
+YAML::Node member_of(const YAML::Node& list, const YamlStep& step) {
+  for (const YAML::Node& member : list) {
+    if (member.IsMap() && member[step.key] && member[step.key].IsScalar() && member[step.key].Scalar() == step.is)
+      return member;
+  }
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+
+std::optional<YAML::Node> map_at(const std::string& text, const std::vector<YamlStep>& path) {
+  YAML::Node node = YAML::Load(text);
+  for (const YamlStep& step : path) {
+    YAML::Node next(YAML::NodeType::Undefined);
+    if (step.is.empty() && node.IsMap() && node[step.key]) next = node[step.key];
+    if (!step.is.empty() && node.IsSequence()) next = member_of(node, step);
+    if (!next.IsDefined()) return std::nullopt;
+    node.reset(next);
+  }
+  return node.IsMap() ? std::optional(node) : std::nullopt;
+}
+
+// The last key whose plain value is on its line, and nothing in braces or brackets begins there before it.
+std::optional<YAML::Mark> last_line(const YAML::Node& map) {
+  std::optional<YAML::Mark> last;
+  for (const auto& entry : map) {
+    if (!entry.second.IsScalar() || entry.second.Mark().line != entry.first.Mark().line) continue;
+    if (!last || entry.first.Mark().line > last->line) last = entry.first.Mark();
+  }
+  return last;
+}
+
+}  // namespace
+
+bool insert_key(std::string& text, const std::vector<YamlStep>& path, const std::string& key,
+                const std::string& value) {
+  const std::optional<YAML::Node> map = map_at(text, path);
+  if (!map || (*map)[key]) return false;
+  const std::string entry = key + ": " + value;
+  if (map->Style() == YAML::EmitterStyle::Flow) {
+    const std::size_t at = line_begin(text, map->Mark().line) + static_cast<std::size_t>(map->Mark().column);
+    if (at >= text.size() || text[at] != '{') return false;
+    text.insert(at + 1, entry + (map->size() > 0 ? ", " : ""));
+    return true;
+  }
+  const std::optional<YAML::Mark> last = last_line(*map);
+  if (!last) return false;
+  const std::size_t begin = line_begin(text, last->line), next = line_begin(text, last->line + 1);
+  const bool whole = next > begin && text[next - 1] == '\n';
+  // Files of another system end their lines with two characters.
+  const std::string end = whole && next - begin > 1 && text[next - 2] == '\r' ? "\r\n" : "\n";
+  text.insert(
+      next, (whole ? "" : end) + std::string(static_cast<std::size_t>(last->column), ' ') + entry + (whole ? end : ""));
+  return true;
+}
+
+}  // namespace proxarm::description
