@@ -297,7 +297,8 @@ void add_run_options(CLI::App& app, RunOptions& options) {
       ->needs(record);
   app.add_option("--set", options.changes,
                  "change a parameter when so much time has been rendered (holds and stops don't count), such as "
-                 "mass=3@4s (mass, damping, spring, inertia, turning_damping, turning_spring, lookahead, timestep, "
+                 "mass=3@4s (mass, damping, spring, inertia, turning_damping, turning_spring, tool_mass, "
+                 "tool_centre_m, lookahead, timestep, "
                  "OBJECT.friction, OBJECT.position_m); may be repeated")
       ->type_name("NAME=VALUE@TIME")
       ->expected(1)
@@ -484,10 +485,10 @@ class Commands {
   // Changes and orders to a running session, each a line on its socket.
   void add_orders() {
     constexpr const char* control_text = "the session's socket, where `proxarm run --control PATH` isn't \"default\"";
-    CLI::App* set =
-        add("set",
-            "change mass, inertia, damping, spring, timestep, or an object's friction or place, in a running session",
-            [this] { return set_command(set_); });
+    CLI::App* set = add(
+        "set",
+        "change mass, inertia, damping, spring, tool, timestep, or an object's friction or place, in a running session",
+        [this] { return set_command(set_); });
     set->add_option("changes", set_.changes,
                     "one or more of:\n"
                     "mass=6kg: mass that the hand feels, in kg, handle included\n"
@@ -495,6 +496,8 @@ class Commands {
                     "spring=100N/m: to the start position\n"
                     "inertia=0.05: moment of inertia that the hand feels of a tool that turns, in kg m²\n"
                     "turning_damping=0.5, turning_spring=20: of a tool that turns, in Nms/rad and Nm/rad\n"
+                    "tool_mass=0.75kg, tool_centre_m=X,Y,Z: of the tool behind the sensor, which the cell has wrong; "
+                    "the centre of mass in metres from the sensor\n"
                     "timestep=2ms: the arm stops for it, and goes on\n"
                     "OBJECT.friction=0.6: of an object, by its name in the scene\n"
                     "OBJECT.position_m=X,Y,Z: of an object with motion: {driven: true}, in metres from where the scene "

@@ -75,7 +75,8 @@ Cycle::Cycle(CycleParts parts, const SessionSettings& settings, const descriptio
               tool_monitor(parts_, settings, limits), drive_monitor(parts_, limits),
               standstill_monitor(parts_, limits)),
       motion_(make_motion(parts_, settings, limits)),
-      timestep_(parts_.can_drives) {}
+      timestep_(parts_.can_drives),
+      tool_(parts_.tool) {}
 
 void Cycle::run_cycle(std::int64_t t_k_ns) noexcept {
   const ComputeTime timed(parts_.network);
@@ -100,6 +101,7 @@ void Cycle::begin_cycle(std::int64_t t_k_ns) noexcept {
 }
 
 void Cycle::measure() noexcept {
+  fade_tool();
   measurement_.take();
   faults_.judge_encoders(measurement_.now(), state_.entered_phase);
 }
@@ -168,6 +170,7 @@ void Cycle::write_record(std::int64_t t_k_ns) noexcept {
   record.force_W_N = triple(measured.hand_W.force);
   record.torque_W_Nm = triple(measured.hand_W.torque);
   record.proxy_W_m = triple(motion_->proxy_W());
+  record.tool_mass_kg = tool_.wanted().mass_kg;
   const Eigen::Quaterniond R_WT = motion_->proxy_R_WT();
   record.proxy_q_W = {R_WT.x(), R_WT.y(), R_WT.z(), R_WT.w()};
   record.tool_W_m = triple(measured.tool_W);
@@ -185,7 +188,8 @@ void Cycle::end_cycle(const ComputeTime& timed) noexcept {
                 .pressed = !parts_.enabling || parts_.enabling->pressed(),
                 .cause_lasts = !may_move(),
                 .timesteps_answered = timestep_.settled(),
-                .asked_timesteps = requests_.timesteps.taken_from_thread()});
+                .asked_timesteps = requests_.timesteps.taken_from_thread(),
+                .tool = measurement_.tool_evidence(tool_.wanted(), settings_)});
   recorder_.record().compute_ns = timed.ns();  // all but that the record is copied into its rings
   recorder_.finish();
   ++state_.cycle;
@@ -216,6 +220,8 @@ void Cycle::archive(fieldbus::StateArchive& state) noexcept {
   Timestep now = timestep_of(settings_);
   archive_fields(state, now);
   if (state.reading() && plausible(now)) apply(now);
+  tool_.archive(state);
+  if (state.reading()) carry_tool();
   bus_.archive(state);
   if (parts_.enabling) parts_.enabling->archive(state);
   archive_fields(state, state_);

@@ -27,6 +27,7 @@
 #include "controller/motion/cycle_parts.hpp"
 #include "controller/motion/measurement.hpp"
 #include "controller/motion/motion.hpp"
+#include "controller/motion/tool_change.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/supervision/alarm.hpp"
 #include "controller/supervision/command.hpp"
@@ -164,6 +165,9 @@ class Cycle {
   void take_timestep() noexcept;
   void change_timestep(std::int64_t t_k_ns) noexcept;
   void take_change() noexcept;
+  [[nodiscard]] const char* take_tool(const Change& change) noexcept;
+  void fade_tool() noexcept;
+  void carry_tool() noexcept;
   void supervise_hold(std::int64_t t_k_ns) noexcept;
   [[nodiscard]] bool may_move() const noexcept;
   [[nodiscard]] bool stands_in_hold() const noexcept;
@@ -183,6 +187,7 @@ class Cycle {
   FaultMonitor faults_;
   std::unique_ptr<Motion> motion_;
   TimestepChange timestep_;
+  ToolChange tool_;
   PastFaults past_faults_;
   std::uint32_t overruns_in_a_row_ = 0;
   bool was_waited_for_ = false;

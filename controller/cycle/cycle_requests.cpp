@@ -128,8 +128,43 @@ void Cycle::take_change() noexcept {
   if (change.period_s != 0.0 && change.period_s != settings_.period_s) {
     return requests_.changes.note_refusal("the timestep that it was checked for wasn't taken");
   }
-  motion_->set(change);
+  // A mass that was set for figures of the tool that were refused is felt as it was meant.
+  const double tool_kg = tool_.wanted().mass_kg;
+  if (change.parameter == Parameter::mass && change.tool_mass_kg > 0.0 && change.tool_mass_kg != tool_kg) {
+    change.value += change.tool_mass_kg - tool_kg;
+  }
+  if (change.parameter == Parameter::tool) {
+    if (const char* const refusal = take_tool(change)) return requests_.changes.note_refusal(refusal);
+  } else {
+    motion_->set(change);
+  }
   look_ahead(change.parameter == Parameter::lookahead ? change.value : change.horizon_s);
+}
+
+// Returns why the tool's new figures can't be true, or nullptr.
+const char* Cycle::take_tool(const Change& change) noexcept {
+  const HeldTool now = tool_.wanted();
+  const HeldTool wanted{change.tool_mass_kg, models::Vec3(change.position_m.data()), now.handle_S};
+  const ToolEvidence seen = measurement_.tool_evidence(now, settings_);
+  const ToolDoubt doubt = seen.doubt(now, wanted);
+  if (doubt.why != ToolDoubt::Why::none) return ToolDoubt::text(doubt.why);
+  tool_.take(wanted, seen.change(now, wanted));
+  motion_->hang(change.value, tool_.about_T(wanted));
+  return nullptr;
+}
+
+void Cycle::fade_tool() noexcept {
+  const bool stands_by = state_.entered_phase == Phase::rendering || state_.entered_phase == Phase::holding;
+  if (!stands_by || !tool_.step(settings_.period_s)) return;
+  measurement_.set_tool(tool_.present());
+  carry_tool();
+}
+
+// To the models of arm and hand, as far as it has been faded in.
+void Cycle::carry_tool() noexcept {
+  const HeldTool& present = tool_.present();
+  parts_.arm->set_tool(present.mass_kg, present.centre_S);
+  motion_->carry(present, tool_.about_T(present));
 }
 
 void Cycle::take_timestep() noexcept {

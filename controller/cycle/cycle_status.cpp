@@ -8,7 +8,15 @@ void CycleStatus::show(const ShownCycle& cycle) noexcept {
   changes_timestep_.store(cycle.changes_timestep, std::memory_order_relaxed);
   pressed_.store(cycle.pressed, std::memory_order_relaxed);
   cause_lasts_.store(cycle.cause_lasts, std::memory_order_relaxed);
+  const ToolEvidence::Numbers numbers = cycle.tool.numbers();
+  for (std::size_t i = 0; i < numbers.size(); ++i) tool_[i].store(numbers[i], std::memory_order_relaxed);
   if (cycle.timesteps_answered) answered_timesteps_.store(cycle.asked_timesteps, std::memory_order_release);
+}
+
+ToolEvidence CycleStatus::tool_evidence() const noexcept {
+  ToolEvidence::Numbers numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = tool_[i].load(std::memory_order_relaxed);
+  return ToolEvidence::of(numbers);
 }
 
 const char* CycleStatus::refusal(Order order) const noexcept {

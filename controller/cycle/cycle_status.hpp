@@ -5,9 +5,11 @@
 // first then sees the other figures of that cycle or of a later one.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 
+#include "controller/motion/tool_change.hpp"
 #include "controller/supervision/command.hpp"
 #include "controller/supervision/supervisor.hpp"
 
@@ -22,6 +24,7 @@ struct ShownCycle {
   bool cause_lasts = false;           // what the arm is held for still lasts
   bool timesteps_answered = true;     // no change of the timestep that was asked for is under way
   std::uint32_t asked_timesteps = 0;  // number taken from the asking thread
+  ToolEvidence tool;                  // by which other figures of the tool are judged
 };
 
 class CycleStatus {
@@ -46,6 +49,8 @@ class CycleStatus {
   [[nodiscard]] Phase phase() const noexcept { return phase_.load(std::memory_order_relaxed); }
   [[nodiscard]] double period_s() const noexcept { return period_s_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool changes_timestep() const noexcept { return changes_timestep_.load(std::memory_order_relaxed); }
+  // Its figures may be of two cycles in a row, which differ as little as two cycles do.
+  [[nodiscard]] ToolEvidence tool_evidence() const noexcept;
   // How many of the timesteps that a thread asked for have been answered, whether they were taken or refused.
   [[nodiscard]] std::uint32_t answered_timesteps() const noexcept {
     return answered_timesteps_.load(std::memory_order_acquire);
@@ -57,6 +62,7 @@ class CycleStatus {
   std::atomic<double> period_s_;
   std::atomic<bool> changes_timestep_{false}, pressed_{true}, cause_lasts_{false}, stop_requested_{false};
   std::atomic<std::uint32_t> answered_timesteps_{0};
+  std::array<std::atomic<double>, ToolEvidence::Numbers().size()> tool_{};
 };
 
 }  // namespace proxarm::controller

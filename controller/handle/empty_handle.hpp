@@ -64,6 +64,7 @@ class EmptyHandle {
     way_.start();
   }
   void set_period(double period_s) noexcept;
+  void set_tool_mass(double mass_kg) noexcept { config_.tool_mass_kg = mass_kg; }
   // To be called in each cycle of rendering. Returns true if nobody holds the handle.
   bool step(const HandSigns& signs) noexcept;
 

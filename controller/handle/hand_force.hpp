@@ -50,7 +50,12 @@ class HandForce {
       : tool_(tool), lag_s_(lag_s), period_s_(period_s) {}
 
   void start() noexcept { state_ = {}; }
-  void set_period(double period_s) noexcept { period_s_ = period_s; }
+  // The lag depends on the period, too.
+  void set_period(double period_s, double lag_s) noexcept {
+    period_s_ = period_s;
+    lag_s_ = lag_s;
+  }
+  void set_tool(const HeldTool& tool) noexcept { tool_ = tool; }
   // Once in each cycle. reading_W: about T's origin, without bias and tool weight; v_W: the proxy's, in its last step.
   void step(const models::Wrench& reading_W, const models::Mat3& R_WS, const models::Vec3& v_W,
             double noise_N) noexcept;

@@ -41,16 +41,21 @@ Vec3 no_faster(const Vec3& omega_W, double most) noexcept {
   return speed > most ? Vec3(most / speed * omega_W) : omega_W;
 }
 
-// From the proxy to the steel: the setpoints' filter, the slowest drive, and two periods, less what is looked ahead.
-double steel_lag_s(const std::vector<description::DriveDescription>& drives, const description::CellLimits& limits,
-                   const SessionSettings& settings) noexcept {
+// From the proxy to the steel, but for two periods and what is looked ahead: the setpoints' filter and the slowest
+// drive.
+double drives_lag_s(const std::vector<description::DriveDescription>& drives,
+                    const description::CellLimits& limits) noexcept {
   double drive_s = 0.0;
   for (const description::DriveDescription& drive : drives) {
     drive_s = std::max(drive_s, 1.0 / (2.0 * std::numbers::pi * drive.position_bandwidth_Hz));
   }
   const double filter_s =
       limits.setpoint_bandwidth_Hz > 0.0 ? 1.0 / (std::numbers::pi * limits.setpoint_bandwidth_Hz) : 0.0;
-  return std::max(0.0, filter_s + drive_s + 2.0 * settings.period_s - settings.horizon_s);
+  return filter_s + drive_s;
+}
+
+double steel_lag_s(double drives_lag_s, double period_s, double horizon_s) noexcept {
+  return std::max(0.0, drives_lag_s + 2.0 * period_s - horizon_s);
 }
 
 Damping damping_by(Passivity passivity) noexcept {
@@ -71,10 +76,12 @@ AdmittanceMotion::AdmittanceMotion(AdmittanceParts parts, const models::Arm& arm
       supervision_(supervision),
       period_s_(settings.period_s),
       tool_mass_kg_(tool.mass_kg),
+      drives_lag_s_(drives_lag_s(drives, limits)),
+      horizon_s_(settings.horizon_s),
       hand_(supervision,
             {.tool = tool,
              .lever_m = settings.orientation == OrientationMode::free ? torque_lever_m : 0.0,
-             .lag_s = steel_lag_s(drives, limits, settings),
+             .lag_s = steel_lag_s(drives_lag_s_, settings.period_s, settings.horizon_s),
              .always_held = settings.always_held},
             settings.period_s),
       limiter_(limits, settings.period_s),
@@ -138,7 +145,7 @@ void AdmittanceMotion::set_period(double period_s) noexcept {
   parts_.release->set_period(period_s);
   if (passivity_) passivity_->set_period(period_s);
   if (parts_.links) parts_.links->set_period(period_s);
-  hand_.set_period(period_s);
+  hand_.set_period(period_s, steel_lag_s(drives_lag_s_, period_s, horizon_s_));
   limiter_.set_period(period_s);
   arm_step_.set_period(period_s);
   final_.set_period(period_s);
@@ -154,6 +161,8 @@ void AdmittanceMotion::set(const Change& change) noexcept {
   if (!ahead_) return;
   switch (change.parameter) {
     case Parameter::lookahead:
+      horizon_s_ = change.value;
+      hand_.set_period(period_s_, steel_lag_s(drives_lag_s_, period_s_, horizon_s_));
       return ahead_->point.want(change.value);
     case Parameter::mass:
     case Parameter::damping:
@@ -164,9 +173,21 @@ void AdmittanceMotion::set(const Change& change) noexcept {
     case Parameter::inertia:
     case Parameter::turning_damping:
     case Parameter::turning_spring:
+    case Parameter::tool:
     case Parameter::none:
       return;
   }
+}
+
+void AdmittanceMotion::hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept {
+  parts_.tool->hang(proxy_mass_kg, behind);
+  if (ahead_) ahead_->point.take_up_change();
+}
+
+void AdmittanceMotion::carry(const HeldTool& tool, const models::ToolInertia& behind) noexcept {
+  tool_mass_kg_ = tool.mass_kg;
+  hand_.set_tool(tool);
+  if (parts_.links) parts_.links->hang(behind);
 }
 
 void AdmittanceMotion::archive(fieldbus::StateArchive& state) noexcept {

@@ -51,6 +51,8 @@ class AdmittanceMotion final : public Motion {
   bool prepare_freeing(const Command& command, const Measured& measured) noexcept override;
   bool start_yielding(const Measured& measured) noexcept override;
   void set(const Change& change) noexcept override;
+  void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept override;
+  void carry(const HeldTool& tool, const models::ToolInertia& behind) noexcept override;
   void set_period(double period_s) noexcept override;
 
   [[nodiscard]] Setpoints setpoints() const noexcept override {
@@ -121,6 +123,7 @@ class AdmittanceMotion final : public Motion {
   description::CellLimits limits_;
   description::SupervisionDescription supervision_;
   double period_s_, tool_mass_kg_;
+  double drives_lag_s_, horizon_s_;             // of the hand's judge: from the proxy to the steel
   models::Mat3 R_TS_;                           // of the sensor in the tool
   std::optional<PassivityObserver> passivity_;  // nullopt: not wanted
   HandJudge hand_;

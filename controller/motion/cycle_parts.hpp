@@ -65,6 +65,7 @@ struct CycleParts {
   std::unique_ptr<models::Arm> arm;  // on the heap, since others keep references to it
   std::variant<AdmittanceParts, std::unique_ptr<TorqueRendering>> rendering;  // its alternative is the session's type
   WrenchCompensation compensation;
+  description::ToolDescription tool;  // behind the sensor
   std::optional<EnablingInput> enabling;
   description::SupervisionDescription supervision;
 };

@@ -29,10 +29,15 @@ HandJudge::HandJudge(const description::SupervisionDescription& supervision, con
       period_s);
 }
 
-void HandJudge::set_period(double period_s) noexcept {
+void HandJudge::set_period(double period_s, double lag_s) noexcept {
   period_s_ = period_s;
-  hand_.set_period(period_s);
+  hand_.set_period(period_s, lag_s);
   if (empty_) empty_->set_period(period_s);
+}
+
+void HandJudge::set_tool(const HeldTool& tool) noexcept {
+  hand_.set_tool(tool);
+  if (empty_) empty_->set_tool_mass(tool.mass_kg);
 }
 
 void HandJudge::start() noexcept {

@@ -43,7 +43,9 @@ class HandJudge {
  public:
   HandJudge(const description::SupervisionDescription& supervision, const HandJudgeConfig& config, double period_s);
 
-  void set_period(double period_s) noexcept;
+  // `lag_s` as in HandJudgeConfig.
+  void set_period(double period_s, double lag_s) noexcept;
+  void set_tool(const HeldTool& tool) noexcept;
   void start() noexcept;
   // The wrench that acts in this cycle; raises faults and notes flags in it.
   [[nodiscard]] models::Wrench step(const MotionCycle& cycle, const ProxyMotion& proxy) noexcept;

@@ -14,6 +14,8 @@ constexpr double bias_s = 0.35, bias_N_per_s = 0.35;
 constexpr double bias_lever_m = 0.1;
 // The tare's mean is known to this many of its standard deviations.
 constexpr double tare_deviations = 4.0;
+// Without noise the tool's pose is left, which is known to half a milliradian: half a kilogram's weight goes by 2 mN.
+constexpr double least_open_N = 2e-3;
 
 }  // namespace
 
@@ -114,11 +116,35 @@ bool Measurement::tare(const SessionSettings& settings, double tared_for_s, Alar
   if (tared_for_s < settings.tare_s || compensation_.tare_samples() == 0.0) return false;
   finish_tare();
   const Vec3 standing_S = compensation_.bias_S().force - Vec3(settings.zero_S_N.data());
-  const SensorBias& bias = state_.measured.bias;
-  const double limit_N = settings.zero_drift_N + tare_deviations * bias.noise_N / std::sqrt(bias.samples);
+  const double limit_N = standing_limit_N(settings);
   if (standing_S.norm() <= limit_N) return true;
   alarm.raise_standing(state_.measured.R_WS * standing_S, limit_N);
   return false;
+}
+
+// By which the zero that was tared may differ from the one that is known.
+double Measurement::standing_limit_N(const SessionSettings& settings) const noexcept {
+  return settings.zero_drift_N + tare_error_N();
+}
+
+double Measurement::tare_error_N() const noexcept {
+  const SensorBias& bias = state_.measured.bias;
+  return tare_deviations * bias.noise_N / std::sqrt(std::max(1.0, bias.samples));
+}
+
+ToolEvidence Measurement::tool_evidence(const HeldTool& wanted, const SessionSettings& settings) const noexcept {
+  const Measured& now = state_.measured;
+  ToolEvidence seen{.hand_S = {now.R_WS.transpose() * now.hand_W.force, now.R_WS.transpose() * now.hand_W.torque},
+                    .turned_S = compensation_.turned_gravity_S(now.R_WS),
+                    .learnt_S = compensation_.learnt_gravity_S(),
+                    .zero_off_S = compensation_.tared_S() - Vec3(settings.zero_S_N.data()),
+                    .zero_limit_N = standing_limit_N(settings),
+                    .open_N = std::max(least_open_N, tare_error_N())};
+  const models::Wrench left = seen.change(compensation_.tool(), wanted);
+  seen.hand_S.force += left.force;
+  seen.hand_S.torque += left.torque;
+  seen.zero_off_S -= (wanted.mass_kg - compensation_.tool().mass_kg) * seen.learnt_S;
+  return seen;
 }
 
 void Measurement::start_tare() noexcept {
@@ -133,6 +159,7 @@ void Measurement::follow_bias(const models::Wrench& rest_W) noexcept {
   rest_S.force *= share;
   rest_S.torque *= share;
   compensation_.follow_bias(rest_S, most_N, most_N * bias_lever_m);
+  compensation_.learn_at(now.R_WS, share);
   now.bias.drift_N = compensation_.drift_N();
 }
 

@@ -13,6 +13,7 @@
 #include <span>
 
 #include "controller/motion/cycle_parts.hpp"
+#include "controller/motion/tool_change.hpp"
 #include "controller/motion/wrench_compensation.hpp"
 #include "controller/rendering/session_settings.hpp"
 #include "controller/supervision/alarm.hpp"
@@ -82,6 +83,11 @@ class Measurement {
   // gradually.
   void follow_bias(const models::Wrench& rest_W) noexcept;
 
+  // The tool behind the sensor, from the next reading on.
+  void set_tool(const HeldTool& tool) noexcept { compensation_.set_tool(tool.mass_kg, tool.centre_S); }
+  // What is there to judge other figures of the tool by, when those that are `wanted` now have been faded in.
+  [[nodiscard]] ToolEvidence tool_evidence(const HeldTool& wanted, const SessionSettings& settings) const noexcept;
+
   // The period of the cycles to come. What is counted in cycles is converted to the new ones.
   void set_period(double period_s) noexcept;
   void archive(fieldbus::StateArchive& state) noexcept {
@@ -97,6 +103,8 @@ class Measurement {
     double tare_cycles = 0.0;
   };
 
+  [[nodiscard]] double standing_limit_N(const SessionSettings& settings) const noexcept;
+  [[nodiscard]] double tare_error_N() const noexcept;  // at most, by its noise
   void read_encoders() noexcept;
   void place_elbow() noexcept;
   void read_sensor() noexcept;

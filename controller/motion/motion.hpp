@@ -81,6 +81,10 @@ class Motion {
   // presses.
   virtual bool start_yielding(const Measured& /*measured*/) noexcept { return false; }
   virtual void set(const Change& change) noexcept = 0;
+  // Another tool behind the sensor (tool_change.hpp): what is felt of it, with the proxy's mass, at once; and what the
+  // models of arm and hand take for it, as that is faded in.
+  virtual void hang(double /*proxy_mass_kg*/, const models::ToolInertia& /*behind*/) noexcept {}
+  virtual void carry(const HeldTool& /*tool*/, const models::ToolInertia& /*behind*/) noexcept {}
   // The period of the cycles to come. Precondition: the arm stands. What was commanded and rendered stays as it is.
   virtual void set_period(double period_s) noexcept = 0;
 

@@ -39,6 +39,7 @@ void WrenchCompensation::add_tare_sample(const Wrench& reading_S, const Mat3& R_
     const Vec3 mean = tare_sum_S_.force / static_cast<double>(tare_count_);
     tare_spread_N_ = std::max(tare_spread_N_, (force - mean).norm());
   }
+  tare_gravity_S_ = R_WS.transpose() * gravity_W_;
   tare_sum_S_.force += force;
   tare_sum_S_.torque += reading_S.torque - weight_S.torque;
   ++tare_count_;
@@ -48,6 +49,23 @@ void WrenchCompensation::finish_tare() noexcept {
   bias_S_.force = tare_sum_S_.force / static_cast<double>(tare_count_);
   bias_S_.torque = tare_sum_S_.torque / static_cast<double>(tare_count_);
   drift_S_ = {};
+  learnt_gravity_S_ = tare_gravity_S_;
+}
+
+void WrenchCompensation::set_tool(double mass_kg, const Vec3& centre_S) noexcept {
+  const Vec3 moment = mass_kg * centre_S - mass_kg_ * centre_of_mass_S_;
+  bias_S_.force -= (mass_kg - mass_kg_) * learnt_gravity_S_;
+  bias_S_.torque -= moment.cross(learnt_gravity_S_);
+  mass_kg_ = mass_kg;
+  centre_of_mass_S_ = centre_S;
+}
+
+Vec3 WrenchCompensation::turned_gravity_S(const Mat3& R_WS) const noexcept {
+  return learnt_gravity_S_ - R_WS.transpose() * gravity_W_;
+}
+
+void WrenchCompensation::learn_at(const Mat3& R_WS, double share) noexcept {
+  learnt_gravity_S_ -= share * turned_gravity_S(R_WS);
 }
 
 // The variance, (Σ(x − x₁)² − n (x̄ − x₁)²)/(n − 1). Sums are taken about the first sample x₁, so that a large bias

@@ -42,12 +42,21 @@ class WrenchCompensation {
   [[nodiscard]] double tare_samples() const noexcept { return static_cast<double>(tare_count_); }
   // The tool behind the sensor.
   [[nodiscard]] HeldTool tool() const noexcept { return {mass_kg_, centre_of_mass_S_, handle_S_}; }
+  // Other figures of the tool that hung there all along: the bias becomes what would have been learnt with them.
+  void set_tool(double mass_kg, const models::Vec3& centre_S) noexcept;
+  // Gravity in S where the bias was learnt, in m/s²; and that less the one at R_WS.
+  [[nodiscard]] const models::Vec3& learnt_gravity_S() const noexcept { return learnt_gravity_S_; }
+  [[nodiscard]] models::Vec3 turned_gravity_S(const models::Mat3& R_WS) const noexcept;
+  // A share of the bias is learnt anew with the sensor held at R_WS.
+  void learn_at(const models::Mat3& R_WS, double share) noexcept;
   // Adds rest_S to the bias, at most most_N and most_Nm in each axis of S. Precondition: nobody holds the handle, so
   // what is left of the reading is bias.
   void follow_bias(const models::Wrench& rest_S, double most_N, double most_Nm) noexcept;
   // How far the force's bias has drifted since the tare, in N.
   [[nodiscard]] double drift_N() const noexcept { return drift_S_.force.norm(); }
   [[nodiscard]] const models::Wrench& bias_S() const noexcept { return bias_S_; }
+  // Of the force, by the tare alone.
+  [[nodiscard]] models::Vec3 tared_S() const noexcept { return bias_S_.force - drift_S_.force; }
   // The reading without its bias: the hand's wrench and the tool's weight.
   [[nodiscard]] models::Wrench load_S(const models::Wrench& reading_S) const noexcept {
     return {reading_S.force - bias_S_.force, reading_S.torque - bias_S_.torque};
@@ -61,7 +70,8 @@ class WrenchCompensation {
 
   void archive(fieldbus::StateArchive& state) noexcept {
     state(bias_S_.force, bias_S_.torque, tare_sum_S_.force, tare_sum_S_.torque, tare_squares_S_, tare_first_S_,
-          tare_last_S_, tare_steps_S_, drift_S_.force, drift_S_.torque, tare_count_, tare_spread_N_);
+          tare_last_S_, tare_steps_S_, drift_S_.force, drift_S_.torque, tare_count_, tare_spread_N_, mass_kg_,
+          centre_of_mass_S_, tare_gravity_S_, learnt_gravity_S_);
   }
 
  private:
@@ -77,6 +87,7 @@ class WrenchCompensation {
   models::Vec3 tare_first_S_ = models::Vec3::Zero();
   models::Vec3 tare_last_S_ = models::Vec3::Zero();
   models::Vec3 tare_steps_S_ = models::Vec3::Zero();  // Σ(xᵢ₊₁ − xᵢ)²
+  models::Vec3 tare_gravity_S_ = models::Vec3::Zero(), learnt_gravity_S_ = models::Vec3::Zero();  // m/s²
   models::Wrench drift_S_;  // how far the bias has drifted since the tare; bias_S_ includes it
   std::int64_t tare_count_ = 0;
   double tare_spread_N_ = 0.0;

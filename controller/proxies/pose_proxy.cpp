@@ -170,7 +170,8 @@ bool PoseProxy::set(const PoseConfig& changed) noexcept {
 void PoseProxy::archive(fieldbus::StateArchive& state) noexcept {
   state(q_k1_.position, q_k1_.orientation, reference_.position, reference_.orientation, move_, wrench_W_, time_s_,
         config_.mass_kg, config_.inertia_kg_m2, config_.damping_Ns_per_m, config_.spring_N_per_m,
-        config_.turning_damping_Nms_per_rad, config_.turning_spring_Nm_per_rad);
+        config_.turning_damping_Nms_per_rad, config_.turning_spring_Nm_per_rad, config_.behind_mass_kg,
+        config_.behind_centre_T_m, config_.behind_inertia_T_kg_m2);
   if (state.reading()) tell_time();
   make_K();
 }

@@ -129,6 +129,7 @@ struct CycleRecord {
   std::array<std::int32_t, max_axes> actual_counts{};  // 6064, sampled at this cycle's SYNC
 
   double proxy_mass_kg = 0.0, proxy_damping_Ns_per_m = 0.0;  // M and B of this step; impedance type: 0
+  double tool_mass_kg = 0.0;  // of the tool behind the sensor, which is felt beside the proxy's; 0: not told
 
   std::array<double, 4> proxy_q_W{0.0, 0.0, 0.0, 1.0};  // the proxy's orientation: x y z w
   Triple contact_torque_W_Nm{};                         // of the contacts on the proxy, about the rendered point

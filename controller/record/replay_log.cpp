@@ -13,7 +13,7 @@ using description::SetupError;
 // An upper bound of what a file may claim, far above what a cycle gets: a period of 100 ms on eight buses at 1 Mbit/s.
 constexpr std::uint32_t most_frames_per_cycle = 16384;
 constexpr std::size_t most_entry_bytes = most_frames_per_cycle * 96 + 4096;
-constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', '1', '0'};
+constexpr std::array<char, 16> magic{'p', 'r', 'o', 'x', 'a', 'r', 'm', ' ', 'r', 'e', 'p', 'l', 'a', 'y', '1', '1'};
 
 [[noreturn]] void cannot_write(const fs::path& file, const std::string& found) {
   throw SetupError({.file = file.string(), .found = found, .expected = "a file that can be written"});
@@ -50,8 +50,9 @@ bool archive(fieldbus::StateArchive& state, BoxCycle& cycle, std::vector<BoxFram
   std::uint32_t count = static_cast<std::uint32_t>(frames.size());
   state(cycle.record.cycle, cycle.t_k_ns, cycle.overruns_in_a_row, cycle.stop_requested, cycle.change.parameter,
         cycle.change.value, cycle.change.object, cycle.change.position_m, cycle.change.period_s, cycle.change.horizon_s,
-        cycle.command.order, cycle.command.value, cycle.timestep.period_s, cycle.timestep.max_missed_samples,
-        cycle.timestep.max_repeated_samples, cycle.timestep.horizon_s, cycle.input_bytes, count);
+        cycle.change.tool_mass_kg, cycle.command.order, cycle.command.value, cycle.timestep.period_s,
+        cycle.timestep.max_missed_samples, cycle.timestep.max_repeated_samples, cycle.timestep.horizon_s,
+        cycle.input_bytes, count);
   if (cycle.input_bytes > cycle.inputs.size() || count > most_frames_per_cycle) return false;
   state.raw(std::span(cycle.inputs).first(cycle.input_bytes));
   for (std::uint32_t bus = 0; bus < buses; ++bus) state(cycle.buses[bus].state, cycle.buses[bus].receive_overflows);

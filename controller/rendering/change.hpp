@@ -18,18 +18,21 @@ enum class Parameter : std::uint8_t {
   lookahead,
   inertia,
   turning_damping,
-  turning_spring
+  turning_spring,
+  tool  // behind the sensor
 };
 
 struct Change {
   Parameter parameter = Parameter::none;
   // For the proxy: kg (felt mass less the tool's), Ns/m, N/m; for its rotation kg m² (felt), Nms/rad, Nm/rad; for an
-  // object: μ; for the horizon: s.
+  // object: μ; for the horizon: s; for the tool behind the sensor: the proxy's mass with it.
   double value = 0.0;
   std::int32_t object = -1;            // index of the object in the scene
-  std::array<double, 3> position_m{};  // displacement of a driven object from where the scene describes it
-  double period_s = 0.0;    // T that it was checked for; at another one the change is left out. 0: good for any
-  double horizon_s = -1.0;  // the lookahead's horizon from then on; negative: unchanged
+  std::array<double, 3> position_m{};  // displacement of a driven object from where the scene describes it; of the
+                                       // tool behind the sensor its centre of mass in S
+  double period_s = 0.0;      // T that it was checked for; at another one the change is left out. 0: good for any
+  double horizon_s = -1.0;    // the lookahead's horizon from then on; negative: unchanged
+  double tool_mass_kg = 0.0;  // of the tool behind the sensor; of a mass: that was taken off of the felt one; 0: none
 };
 
 using ScheduledChange = Scheduled<Change>;  // by the time spent rendering

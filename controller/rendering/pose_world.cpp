@@ -220,9 +220,19 @@ void PoseWorld::set(const Change& change) noexcept {
     case Parameter::position:
       return changes_.set(change);
     case Parameter::lookahead:
+    case Parameter::tool:
     case Parameter::none:
       return;
   }
+  proxy_.set(changed);
+}
+
+void PoseWorld::hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept {
+  PoseConfig changed = proxy_.config();
+  changed.mass_kg = proxy_mass_kg;
+  changed.behind_mass_kg = behind.mass_kg;
+  changed.behind_centre_T_m = behind.centre_T_m;
+  changed.behind_inertia_T_kg_m2 = behind.about_T_kg_m2;
   proxy_.set(changed);
 }
 

@@ -24,6 +24,7 @@
 #include "controller/proxies/turn_sets.hpp"
 #include "controller/rendering/rendered_world.hpp"
 #include "controller/rendering/scene_changes.hpp"
+#include "models/arm/tool_inertia.hpp"
 #include "models/geometry/pose_algorithm.hpp"
 #include "models/surfaces/free_space.hpp"
 
@@ -66,6 +67,8 @@ class PoseWorld final : public RenderedWorld {
   }
   models::Vec3 resume(const models::Vec3& q_W, const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override;
+  // As RenderedTool has it. What would make the proxy's mass indefinite changes nothing.
+  void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept;
   void set_period(double period_s) noexcept override {
     changes_.set_period(period_s);
     proxy_.set_period(period_s);

@@ -38,6 +38,14 @@ void PointTool::set(const Change& change) noexcept {
   if (change.parameter == Parameter::turning_spring) orientation_.set_spring(change.value);
 }
 
+// Where no inertia was asked for, none of the tool's is taken off.
+void PointTool::hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept {
+  world_->set({.parameter = Parameter::mass, .value = proxy_mass_kg});
+  behind_sensor_T_ = behind.about_T_kg_m2;
+  const OrientationConfig& turning = orientation_.config();
+  if (!turning.behind_sensor_T.isZero(0.0)) orientation_.set_inertia(turning.inertia_kg_m2, behind_sensor_T_);
+}
+
 void PointTool::set_period(double period_s) noexcept {
   world_->set_period(period_s);
   orientation_.set_period(period_s);
@@ -45,7 +53,7 @@ void PointTool::set_period(double period_s) noexcept {
 
 void PointTool::archive(fieldbus::StateArchive& state) noexcept {
   world_->archive(state);
-  state(orientation_);
+  state(orientation_, behind_sensor_T_);
 }
 
 // ---- a tool with a shape

@@ -10,6 +10,7 @@
 #include "controller/proxies/orientation_proxy.hpp"
 #include "controller/rendering/pose_world.hpp"
 #include "controller/rendering/rendered_world.hpp"
+#include "models/arm/tool_inertia.hpp"
 
 namespace proxarm::controller {
 
@@ -45,6 +46,8 @@ class RenderedTool {
                                const models::Vec3& v_W) noexcept = 0;
 
   virtual void set(const Change& change) noexcept = 0;
+  // What hangs behind the sensor is another than was taken: the proxy's mass with it. The inertia that is felt stays.
+  virtual void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept = 0;
   virtual void set_period(double period_s) noexcept = 0;
   virtual void limit_turning(double share) noexcept = 0;  // of the speed limit, from 0 to 1
   virtual void add_turning_damping(double damping_Nms_per_rad) noexcept = 0;
@@ -91,6 +94,7 @@ class PointTool final : public RenderedTool {
   models::Vec3 turn_on(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W, const models::Vec3& q_W,
                        const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override;
+  void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept override;
   void set_period(double period_s) noexcept override;
   void limit_turning(double share) noexcept override { orientation_.limit_speed(share); }
   void add_turning_damping(double damping_Nms_per_rad) noexcept override {
@@ -137,6 +141,9 @@ class RigidTool final : public RenderedTool {
   models::Vec3 turn_on(const Eigen::Quaterniond& R_WT, const models::Vec3& omega_W, const models::Vec3& q_W,
                        const models::Vec3& v_W) noexcept override;
   void set(const Change& change) noexcept override { pose_->set(change); }
+  void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept override {
+    pose_->hang(proxy_mass_kg, behind);
+  }
   void set_period(double period_s) noexcept override { pose_->set_period(period_s); }
   void limit_turning(double share) noexcept override { pose_->limit_turning(share); }
   void add_turning_damping(double damping_Nms_per_rad) noexcept override {

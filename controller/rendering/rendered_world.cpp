@@ -153,6 +153,7 @@ class WorldOfDimension final : public RenderedWorld {
       case Parameter::inertia:
       case Parameter::turning_damping:
       case Parameter::turning_spring:
+      case Parameter::tool:
       case Parameter::none:
         break;
     }

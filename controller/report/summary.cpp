@@ -229,6 +229,7 @@ void SummaryBuilder::State::count_limit(const std::string& parameter, RecordFlag
 
 // A mass, damping or spring set while rendering counts from then on; the wanted mass is the last one.
 void SummaryBuilder::State::follow_changes(const CycleRecord& record) {
+  if (record.tool_mass_kg > 0.0 && config.handle_mass_kg > 0.0) config.handle_mass_kg = record.tool_mass_kg;
   if (record.proxy_mass_kg != mass_kg) {
     if (mass_kg > 0.0) {
       config.wanted_mass_kg = record.proxy_mass_kg + config.handle_mass_kg;

@@ -302,6 +302,10 @@ double felt_inertia_kg_m2(const description::Cell& cell, const SessionSettings& 
   return asked > 0.0 ? asked : default_inertia_kg_m2 + models::tool_inertia(cell.tool).largest_kg_m2;
 }
 
+void require_felt(const description::Cell& cell, const SessionSettings& settings) {
+  pose_config(cell, settings).proxy.validate();
+}
+
 std::unique_ptr<fieldbus::ForceSensor> make_sensor(const description::Cell& cell,
                                                    const description::SensorDescription& sensor) {
   return build_sensor(cell, sensor).owned;
@@ -357,6 +361,7 @@ CycleParts build_parts(const description::Cell& cell, const description::SensorD
                     .arm = std::move(arm),
                     .rendering = std::move(rendering),
                     .compensation = WrenchCompensation(cell),
+                    .tool = cell.tool,
                     .enabling = make_enabling_input(cell, settings, bus_indices),
                     .supervision = cell.supervision};
 }

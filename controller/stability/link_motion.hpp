@@ -38,6 +38,8 @@ class LinkMotion {
 
   // Precondition: called before start().
   void set_period(double period_s) noexcept;
+  // What hangs behind the sensor; the arm's model has it, too.
+  void hang(const models::ToolInertia& behind) noexcept { config_.behind_sensor = behind; }
   // At rest, where the encoders say.
   void start(const models::JointVector& resting_rad) noexcept;
   // One period. Values that aren't finite change nothing.

@@ -250,8 +250,15 @@ void Arm::read_tool(const Cell& cell, const Pose& X_nL) {
   const auto& i = cell.tool.inertia_kg_m2;
   Mat3 inertia_S;
   inertia_S << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
-  add_to_link(links_[static_cast<std::size_t>(axes_ - 1)], cell.tool.mass_kg, X_nS_ * Vec3(c[0], c[1], c[2]),
-              X_nS_.linear() * inertia_S * X_nS_.linear().transpose());
+  bare_ = links_[static_cast<std::size_t>(axes_ - 1)];
+  tool_inertia_ = X_nS_.linear() * inertia_S * X_nS_.linear().transpose();
+  set_tool(cell.tool.mass_kg, Vec3(c[0], c[1], c[2]));
+}
+
+void Arm::set_tool(double mass_kg, const Vec3& centre_S) noexcept {
+  Link& last = links_[static_cast<std::size_t>(axes_ - 1)];
+  last = bare_;
+  add_to_link(last, mass_kg, X_nS_ * centre_S, tool_inertia_);
 }
 
 void Arm::add_to_link(Link& link, double mass_kg, const Vec3& centre, const Mat3& inertia) const noexcept {

@@ -82,6 +82,9 @@ class Arm {
   // prismatic, and 0 if the inner one is.
   [[nodiscard]] JointMatrix path_curvature() const;
 
+  // Another mass of the tool, and another centre of it, from S. Its inertia about that stays. Neither allocates, locks
+  // nor throws.
+  void set_tool(double mass_kg, const Vec3& centre_S) noexcept;
   // Torques that hold the arm at rest against gravity, tool included: τ_g = ∂U/∂q.
   [[nodiscard]] JointVector gravity_torque(const JointVector& q) const noexcept;
   // The same while `wrench_W` (force, and torque about T, axes of W) acts on the tool from outside: τ_g − Jᵀ w.
@@ -145,6 +148,8 @@ class Arm {
   int axes_ = 0;
   std::vector<std::string> joint_names_;
   std::array<Link, max_axes> links_;  // along the chain
+  Link bare_;                         // the last one without the tool,
+  Mat3 tool_inertia_ = Mat3::Zero();  // whose inertia is about its centre of mass, along the link's axes
   Pose X_nS_ = Pose::Identity();      // of S and T in the last link
   Pose X_nT_ = Pose::Identity();
   Vec3 gravity_W_ = Vec3::Zero();

@@ -5,7 +5,7 @@
 
 namespace proxarm::models {
 
-ToolInertia tool_inertia(const description::ToolDescription& tool) {
+ToolInertia tool_about_T(const description::ToolDescription& tool) noexcept {
   const Mat3 R_ST = to_pose(tool.handle_S).linear();
   const auto& I = tool.inertia_kg_m2;
   Mat3 about_centre_S;
@@ -13,9 +13,13 @@ ToolInertia tool_inertia(const description::ToolDescription& tool) {
   const Vec3 r_S = Vec3(tool.centre_of_mass_S_m.data()) - Vec3(tool.handle_S.position_m.data());
   // Steiner: I_T = I_C + m (r·r E − r rᵀ)
   const Mat3 about_T_S = about_centre_S + tool.mass_kg * (r_S.squaredNorm() * Mat3::Identity() - r_S * r_S.transpose());
-  ToolInertia out{.mass_kg = tool.mass_kg,
-                  .centre_T_m = R_ST.transpose() * r_S,
-                  .about_T_kg_m2 = R_ST.transpose() * about_T_S * R_ST};
+  return {.mass_kg = tool.mass_kg,
+          .centre_T_m = R_ST.transpose() * r_S,
+          .about_T_kg_m2 = R_ST.transpose() * about_T_S * R_ST};
+}
+
+ToolInertia tool_inertia(const description::ToolDescription& tool) {
+  ToolInertia out = tool_about_T(tool);
   SmallMatrix all = out.about_T_kg_m2;
   out.largest_kg_m2 = symmetric_eigenvalues(all)[2];
   return out;

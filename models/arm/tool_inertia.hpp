@@ -15,5 +15,7 @@ struct ToolInertia {
 };
 
 ToolInertia tool_inertia(const description::ToolDescription& tool);
+// The same without `largest_kg_m2`, for the cycle: neither allocates, locks nor throws.
+ToolInertia tool_about_T(const description::ToolDescription& tool) noexcept;
 
 }  // namespace proxarm::models

@@ -10,10 +10,14 @@ import signal
 import socket
 import stat
 import subprocess
+import sys
 import time
 import unittest
 
 from harness import AXES, SOURCE, ProgramTest, program
+
+sys.path.insert(0, str(SOURCE / "tests/soak"))
+from identify_hunt import rooted  # noqa: E402
 
 # Sanitizers take ten times as long for everything.
 SLOWER = 10 if os.environ.get("PROXARM_SLOW_BUILD") else 1
@@ -156,6 +160,162 @@ class Objects(Script):
         figures = self.summary(*SWEEP, "--duration", "10s", "--set", "mass=6@3s")
         self.assertEqual(figures["wanted_mass_kg"], 6)
         self.assertAlmostEqual(figures["apparent_mass_kg"], 6, delta=0.06)  # 1 %, as without changes
+
+
+TURNED = """name: turned
+mass_kg: 1.0
+stiffness_N_per_m: 500
+damping_Ns_per_m: 20
+inertia_kg_m2: 0.003
+turning_stiffness_Nm_per_rad: 20
+turning_damping_Nms_per_rad: 0.5
+waypoints:
+  - {time_s: 0.5, offset_m: [0, 0, 0]}
+  - {time_s: 1.5, offset_m: [0, 0, 0], turn_rad: [0, 0.35, 0]}
+  - {time_s: 6.0, offset_m: [0, 0, 0], turn_rad: [0, 0.35, 0]}
+  - {time_s: 7.0, offset_m: [0.03, 0, 0], turn_rad: [0.3, 0, 0]}
+  - {time_s: 9.0, offset_m: [0.03, 0, 0], turn_rad: [0.3, 0, 0]}
+  - {time_s: 10.0, offset_m: [0, 0.03, 0], turn_rad: [0, -0.35, 0.2]}
+  - {time_s: 12.0, offset_m: [0, 0.03, 0], turn_rad: [0, -0.35, 0.2]}
+"""
+NOBODY = """name: nobody
+mass_kg: 0
+stiffness_N_per_m: 0
+damping_Ns_per_m: 0
+waypoints:
+  - {time_s: 0.3, offset_m: [0, 0, 0]}
+"""
+HEAVIER = (("  mass_kg: 0.25\n", "  mass_kg: 0.75\n"), ("centre_of_mass_S_m: [0, 0, 0.06]", "centre_of_mass_S_m: [0.01, 0, 0.09]"))
+
+
+class Tool(Script):
+    """What hangs behind the sensor, told to a session whose cell has it wrong by 0.5 kg."""
+
+    def setUp(self):
+        super().setUp()
+        text = rooted((SOURCE / "models/cells/default.yaml").read_text())
+        self.cell = self.written("mine.yaml", text)
+        for old, new in HEAVIER:
+            self.assertIn(old, text)
+            text = text.replace(old, new, 1)
+        self.arm = self.written("arm.yaml", text)
+        self.turned = self.written("turned.yaml", TURNED)
+        # The tare with the wrong weight is let pass.
+        self.session = ("--arm", self.arm, "--scene", "scenes/free.yaml", "--hand", self.turned, "--duration", "12s",
+                        "--mass", "6", "--inertia", "0.1", "--handle", "held", "--accept-force", "10N")
+
+    def residual(self, rows, first, last):
+        """What is read beside the hand's true force and torque, while the tool stands: N and Nm."""
+        part = [row for row in rows if first <= float(row["time_s"]) - float(rows[0]["time_s"]) < last]
+        self.assertGreater(len(part), 100)
+        mean = lambda what: [sum(float(row[f"{what[0]}_W_{c}_{what[2]}"]) - float(row[f"{what[1]}_W_{c}_{what[2]}"])
+                                 for row in part) / len(part) for c in "xyz"]
+        return math.hypot(*mean(("force", "hand_force", "N"))), math.hypot(*mean(("torque", "hand_torque", "Nm")))
+
+    def at_the_poses(self, rows):
+        return [self.residual(rows, *span) for span in ((5.0, 6.0), (8.0, 9.0), (11.0, 12.0))]
+
+    def test_a_session_that_is_told_reads_as_one_whose_cell_is_right(self):
+        wrong = self.at_the_poses(self.signals(self.cell, *self.session))
+        right = self.at_the_poses(self.signals(self.arm, *self.session))
+        told = self.at_the_poses(self.signals(self.cell, *self.session, "--set", "tool_mass=0.75kg@0.2s",
+                                              "--set", "tool_centre_m=0.01,0,0.09@0.2s"))
+        print("residual N, Nm: wrong", wrong, "told", told, "right", right)
+        for a, b, c in zip(wrong, told, right):
+            self.assertGreater(a[0], 1.0)
+            # Sensor noise of 0.02 N in the mean of 1000 readings, and gears that bend by the arm's own weight alike.
+            self.assertLess(abs(b[0] - c[0]), 0.01)
+            self.assertLess(abs(b[1] - c[1]), 0.002)
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+    def test_nothing_jumps_when_it_is_told_with_the_tool_turned(self):
+        """1.7 N are taken off a turned tool that a hand holds; the setpoints' second difference doesn't show when."""
+        told = self.signals(self.cell, *self.session, "--set", "tool_mass=0.75kg@3s")
+        self.assertEqual(self.call("replay", "session").status, 0)
+        plain = self.signals(self.cell, *self.session)
+
+        def jerk(rows, first, last):
+            most = 0
+            for axis in AXES:
+                counts = [int(row[f"{axis}_target_counts"]) for row in rows[first:last]]
+                most = max(most, *(abs(c - 2 * b + a) for a, b, c in zip(counts, counts[1:], counts[2:])))
+            return most
+
+        # From the order on until all is faded in, against the same cycles without it, and the turning before.
+        changed, without, before = jerk(told, 2990, 5500), jerk(plain, 2990, 5500), jerk(plain, 500, 2900)
+        print("second differences, counts:", changed, without, before)
+        self.assertLessEqual(changed, max(without, before))
+        self.assertGreater(self.residual(plain, 5.0, 6.0)[0] - self.residual(told, 5.0, 6.0)[0], 1.5)
+
+    def test_the_felt_mass_stays(self):
+        figures = self.summary(self.arm, "--arm", self.arm, *SWEEP, "--duration", "8s", "--mass", "6", "--set",
+                               "tool_mass=0.5@0.5s")
+        self.assertEqual(figures["wanted_mass_kg"], 6)
+        record = self.summary("--record", "session", self.cell, *SWEEP, "--duration", "2s", "--mass", "6",
+                              "--set", "tool_mass=0.3@0.5s", "--set", "mass=7@1s")
+        self.assertEqual(record["wanted_mass_kg"], 7)
+        self.assertEqual(self.call("replay", "session").status, 0)
+
+    def test_wrong_figures_lead_nobodys_handle_off(self):
+        """Nobody at the handle, the tool as it was tared: figures wrong by what is taken move nothing."""
+        nobody = self.written("nobody.yaml", NOBODY)
+        for change in ("tool_mass=0.5@2s", "tool_mass=0.01@2s", "tool_centre_m=0.05,0.05,0.1@2s"):
+            for orientation in ("held", "free"):
+                with self.subTest(change, orientation=orientation):
+                    rows = self.signals(self.cell, "--hand", nobody, "--scene", "scenes/free.yaml", "--duration", "8s",
+                                        "--orientation", orientation, "--set", change)
+                    tool = [[float(row[f"true_tool_W_{c}_m"]) for c in "xyz"] for row in rows]
+                    self.assertLess(max(math.dist(tool[0], place) for place in tool), 0.002)
+
+    def test_wrong_figures_lead_no_handle_off_that_was_let_go_of_with_the_tool_turned(self):
+        """Refused, or learnt where it rests, or no more than the tare leaves open: 2 mm in any case."""
+        let_go = self.written("let_go.yaml", TURNED[:TURNED.index("  - {time_s: 7.0")] +
+                              "grips:\n  - {time_s: 3.5, stiffness_N_per_m: 0, damping_Ns_per_m: 0}\n")
+        session = (self.cell, "--scene", "scenes/free.yaml", "--hand", let_go, "--duration", "12s", "--mass", "6",
+                   "--inertia", "0.1")
+
+        def places(*change):
+            outcome = self.call("run", "--json", "--record", "session", *session, *change)
+            self.assertEqual(outcome.status, 0, outcome.err)
+            with open(self.folder / "session" / "signals.csv", newline="") as file:
+                rows = [row for row in csv.DictReader(file) if row["phase"] == "rendering"]
+            return ([[float(row[f"true_tool_W_{c}_m"]) for c in "xyz"] for row in rows],
+                    bool(outcome.summary["idle_orders"]))
+
+        plain = places()[0]
+        taken = []
+        for mass in ("0.5", "0.27", "0.251", "0.01"):
+            for at in ("3.4s", "3.6s", "4.2s", "8s"):
+                with self.subTest(mass, at=at):
+                    changed, refused = places("--set", f"tool_mass={mass}@{at}")
+                    self.assertLess(max(math.dist(a, b) for a, b in zip(changed, plain)), 0.002)
+                    if not refused:
+                        taken.append((mass, at))
+        print("taken:", taken)
+        self.assertIn(("0.251", "3.6s"), taken)
+        self.assertNotIn(("0.27", "3.6s"), taken)
+        self.assertNotIn(("0.5", "3.6s"), taken)
+
+    def test_a_mass_that_the_remembered_zero_denies_is_refused_with_a_word(self):
+        figures = self.call("run", "--json", self.cell, *SWEEP, "--duration", "2s", "--mass", "10", "--set",
+                            "tool_mass=3@1s")
+        self.assertEqual(figures.status, 0, figures.err + figures.out)
+        (idle,) = figures.summary["idle_orders"]
+        self.assertIn("tool_mass=3", json.dumps(idle))
+        self.assertIn("zero", json.dumps(idle))
+        self.assertEqual(figures.summary["wanted_mass_kg"], 10)
+
+    def test_what_can_not_be_is_refused(self):
+        for change, said in (("tool_mass=-1@1s", "tool_mass"), ("tool_mass=nan@1s", "tool_mass"),
+                             ("tool_mass=4@1s", "less than the felt mass of 4 kg"), ("tool_mass=1N@1s", "tool_mass"),
+                             ("tool_mass=3.5@1s", "tool_mass=3.5"), ("tool_centre_m=0,0@1s", "tool_centre_m"),
+                             ("tool_centre_m=0,0,0,0@1s", "three numbers"), ("tool_centre_m=0,0,2@1s", "at most 1"),
+                             ("tool_centre_m=a,0,0@1s", "tool_centre_m"), ("tool=1@1s", "tool_mass, tool_centre_m")):
+            with self.subTest(change):
+                self.assert_refused(self.call("run", self.cell, "--set", change), said)
+        self.assert_refused(self.call("run", SOURCE / "models/cells/light.yaml", "--set", "tool_mass=0.3@1s"),
+                            "impedance")
 
 
 class Timestep(Script):
@@ -358,6 +518,21 @@ except ConnectionError:
         self.assertEqual([(t["from_s"], t["to_s"], t["refused"]) for t in figures["timesteps"]],
                          [(0.001, 0.002, ""), (0.002, 0.001, "")])
         self.assertEqual(figures["wanted_mass_kg"], 7)
+        outcome = self.call("replay", "session")
+        self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
+
+    def test_a_tool_is_told_and_a_wrong_one_refused_in_words(self):
+        self.start("--mass", "10")
+        time.sleep(UNTIL_RENDERING_S)
+        outcome = self.ask("tool_mass=3kg")
+        self.assertEqual((outcome.status, outcome.out), (2, ""))
+        self.assertRegex(outcome.err, r"refused: tool_mass.*27 N off the one that is remembered.*proxarm zero")
+        outcome = self.ask("tool_mass=0.3kg", "tool_centre_m=0,0,0.05")
+        self.assertEqual((outcome.status, outcome.out), (0, "ok: tool_mass=0.3kg\nok: tool_centre_m=0,0,0.05\n"))
+        self.assertEqual(self.ask("tool_mass=10kg").status, 2)
+        time.sleep(0.5)
+        self.assertIn(", 10 kg,", self.call("status", "--control", self.path).out)
+        self.stop()
         outcome = self.call("replay", "session")
         self.assertEqual(outcome.status, 0, outcome.out + outcome.err)
 

@@ -31,6 +31,10 @@ struct Live {
 // A time, or a word that choose_horizon() makes one of.
 bool is_lookahead(const std::string& text) { return text.compare(0, 10, "lookahead=") == 0; }
 
+bool is_tool(const std::string& text) {
+  return text.compare(0, 10, "tool_mass=") == 0 || text.compare(0, 14, "tool_centre_m=") == 0;
+}
+
 constexpr Live live[] = {{"mass", Parameter::mass, description::parse_mass},
                          {"damping", Parameter::damping, description::parse_damping},
                          {"spring", Parameter::spring, description::parse_stiffness},
@@ -53,7 +57,7 @@ const Live& find(const std::string& text) {
   throw SetupError({.key = "--set",
                     .found = description::in_quotes(text),
                     .expected = "NAME=VALUE with NAME " + description::one_of(known) +
-                                ", lookahead, timestep, OBJECT.friction, OBJECT.position_m"});
+                                ", tool_mass, tool_centre_m, lookahead, timestep, OBJECT.friction, OBJECT.position_m"});
 }
 
 [[noreturn]] void refuse(const std::string& key, const std::string& found, const std::string& expected,
@@ -68,8 +72,23 @@ double number_of(const std::string& text, const std::string& key, const std::str
   return *value;
 }
 
+// "X,Y,Z"
+std::array<double, 3> three_numbers(const std::string& text, const std::string& key, const std::string& expected,
+                                    double most) {
+  std::array<double, 3> numbers{};
+  std::istringstream parts(text + ",");
+  for (double& x : numbers) {
+    std::string part;
+    std::getline(parts, part, ',');
+    x = number_of(part, key, expected, -most, most);
+  }
+  if (parts.peek() != std::istringstream::traits_type::eof())
+    refuse(key, description::in_quotes(text), "three numbers");
+  return numbers;
+}
+
 constexpr double most_friction = 10.0;
-constexpr double farthest_m = 10.0;
+constexpr double farthest_m = 10.0, farthest_centre_m = 1.0;
 
 // "NAME.friction=MU", "NAME.position_m=X,Y,Z". Nothing where there is no such key.
 std::optional<Change> change_of_object(const std::string& text, const scenes::Scene& scene) {
@@ -101,16 +120,13 @@ std::optional<Change> change_of_object(const std::string& text, const scenes::Sc
     refuse(key, "an object that stands still", "an object that is driven",
            "give it motion: {driven: true} in the scene file");
   }
-  std::istringstream parts(value + ",");
-  for (double& x : change.position_m) {
-    std::string part;
-    std::getline(parts, part, ',');
-    x = number_of(part, key, "three numbers X,Y,Z, metres from where it is described, at most 10", -farthest_m,
-                  farthest_m);
-  }
-  if (parts.peek() != std::istringstream::traits_type::eof())
-    refuse(key, description::in_quotes(value), "three numbers");
+  change.position_m =
+      three_numbers(value, key, "three numbers X,Y,Z, metres from where it is described, at most 10", farthest_m);
   return change;
+}
+
+controller::HeldTool held(const description::ToolDescription& tool) {
+  return {tool.mass_kg, models::Vec3(tool.centre_of_mass_S_m.data()), models::Vec3(tool.handle_S.position_m.data())};
 }
 
 fs::path control_path(const RunOptions& options) {
@@ -155,6 +171,7 @@ bool LiveParameters::is_timestep(const std::string& text) { return text.compare(
 controller::Change LiveParameters::take(const std::string& text) {
   if (const std::optional<Change> change = change_of_object(text, session_.scene)) return *change;
   if (is_lookahead(text)) return take_lookahead(text);
+  if (is_tool(text)) return take_tool(text);
   const Live& parameter = find(text);
   const double value = parameter.parse(text.substr(text.find('=') + 1), parameter.name);
   if (turns(parameter.parameter) && session_.settings.orientation == controller::OrientationMode::held) {
@@ -184,6 +201,7 @@ controller::Change LiveParameters::take(const std::string& text) {
     case Parameter::friction:
     case Parameter::position:
     case Parameter::lookahead:
+    case Parameter::tool:
     case Parameter::none:
       break;
   }
@@ -196,7 +214,59 @@ controller::Change LiveParameters::take(const std::string& text) {
   return {.parameter = parameter.parameter,
           .value = value - handle_kg,
           .period_s = session_.settings.period_s,
-          .horizon_s = session_.settings.horizon_s};
+          .horizon_s = session_.settings.horizon_s,
+          .tool_mass_kg = handle_kg};
+}
+
+controller::Change LiveParameters::take_tool(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  const std::string key = text.substr(0, equals), value = text.substr(equals + 1);
+  const description::ToolDescription& tool = session_.cell.tool;
+  const double mass_kg = key == "tool_mass" ? description::parse_mass(value, key) : tool.mass_kg;
+  const std::array<double, 3> centre_S_m =
+      key == "tool_mass" ? tool.centre_of_mass_S_m
+                         : three_numbers(value, key, "three numbers X,Y,Z, metres in S, at most 1", farthest_centre_m);
+  const double felt_kg = session_.settings.mass_kg;
+  if (!(mass_kg < felt_kg)) {
+    refuse(key, description::number_text(mass_kg) + " kg",
+           "less than the felt mass of " + description::number_text(felt_kg) + " kg",
+           "the tool behind the sensor is felt in full; set mass= to more first");
+  }
+  PreparedSession changed = with_tool(session_, mass_kg, centre_S_m);
+  RunOptions judged = options_;
+  judged.mass_kg = felt_kg;
+  require_stable(changed, judged);
+  if (changed.scene.tool) controller::require_felt(changed.cell, changed.settings);
+  session_ = std::move(changed);
+  return {.parameter = Parameter::tool,
+          .value = felt_kg - mass_kg,
+          .position_m = centre_S_m,
+          .period_s = session_.settings.period_s,
+          .horizon_s = session_.settings.horizon_s,
+          .tool_mass_kg = mass_kg};
+}
+
+void LiveParameters::require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const {
+  using Why = controller::ToolDoubt::Why;
+  const controller::HeldTool from = held(before.session_.cell.tool), to = held(session_.cell.tool);
+  const controller::ToolDoubt doubt = seen.doubt(from, to);
+  if (doubt.why == Why::none) return;
+  const std::string key = from.mass_kg != to.mass_kg ? "tool_mass" : "tool_centre_m";
+  const auto text = [](double value) { return description::rounded_text(value); };
+  const std::string unit = doubt.why == Why::torque ? " Nm" : " N";
+  if (doubt.why == Why::zero) {
+    refuse(key, "a zero of the sensor that would be " + text(doubt.would_be) + " N off the one that is remembered",
+           "at most " + text(doubt.limit) + " N, by which it drifts",
+           "these figures are for the tool that hung there when the sensor was tared: after a change of the tool, "
+           "start a new session, or take the zero anew: proxarm zero");
+  }
+  refuse(
+      key,
+      "a sensor that would read " + text(doubt.would_be) + unit + " beside this tool, and reads " +
+          text((doubt.why == Why::torque ? seen.hand_S.torque : seen.hand_S.force).norm()) + unit + " now",
+      "at most " + text(doubt.limit) + unit + ": with nobody at the handle the arm would be led off",
+      "if they are right, let the sensor show it: hold the arm (proxarm hold) and take the hand off, turn the tool to "
+      "how it was when the sensor was tared, or take the sensor's zero before (proxarm zero)");
 }
 
 controller::Change LiveParameters::take_lookahead(const std::string& text) {
@@ -296,6 +366,8 @@ std::vector<std::string> split_at_tabs(const std::string& line) {
   return parts;
 }
 
+bool is_of_tool(const Change& change) { return change.parameter == Parameter::tool; }
+
 // All of a line's changes or, where one of them is refused, none.
 void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std::vector<std::string>& texts) {
   LiveParameters changed = parameters;
@@ -305,7 +377,13 @@ void change_all(controller::Cycle& cycle, LiveParameters& parameters, const std:
       refuse("timestep", "one that is set together with others", "one that is set by itself",
              "set the others when the drives have confirmed it: what they may be depends on it");
     }
-    changes.push_back(taken_from(text, text, [&](const std::string& one) { return changed.take(one); }));
+    const Change change = taken_from(text, text, [&](const std::string& one) { return changed.take(one); });
+    // A tool has its mass and its centre at once: they are judged together, and the second has both.
+    if (change.parameter == Parameter::tool) std::erase_if(changes, is_of_tool);
+    changes.push_back(change);
+  }
+  if (std::any_of(changes.begin(), changes.end(), is_of_tool)) {
+    changed.require_tool(parameters, cycle.status().tool_evidence());
   }
   if (cycle.changes().room() < changes.size()) {
     throw SetupError({.found = "a session that takes no changes now", .expected = "one that renders"});

@@ -24,6 +24,8 @@ class LiveParameters {
 
   // Throws SetupError.
   controller::Change take(const std::string& text);
+  // What the session's sensor shows against the tool that `before` didn't have yet. Throws SetupError.
+  void require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const;
   // "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);
   // Judged by what the start judges it by, as far as it depends on T. Throws SetupError.
@@ -36,6 +38,7 @@ class LiveParameters {
 
  private:
   controller::Change take_lookahead(const std::string& text);
+  controller::Change take_tool(const std::string& text);
   [[nodiscard]] RunOptions named(double period_s) const;
 
   PreparedSession session_;

@@ -39,7 +39,7 @@ std::optional<Status> present(const controller::BoxReader& box, const PreparedSe
   const CycleRecord& record = status.record = now->record;
   status.rendered_s = 1e-9 * static_cast<double>(now->rendered_ns);
   status.delay_s = total_delay_s(session);
-  status.felt_mass_kg = record.proxy_mass_kg + session.cell.tool.mass_kg;
+  status.felt_mass_kg = record.proxy_mass_kg + record.tool_mass_kg;
   status.damping_Ns_per_m = record.proxy_damping_Ns_per_m + record.added_damping_Ns_per_m;
   const std::uint64_t back = std::min(speed_cycles, status.cycles - 1);
   if (back > 0 && box.read(status.cycles - 1 - back, *before)) {

@@ -605,6 +605,17 @@ PreparedSession with_timestep(PreparedSession session, const RunOptions& options
   return session;
 }
 
+PreparedSession with_tool(PreparedSession session, double mass_kg, const std::array<double, 3>& centre_S_m) {
+  const bool turns = session.settings.orientation == controller::OrientationMode::free;
+  if (session.scene.tool && turns) session.settings.rotational_inertia_kg_m2 = felt_inertia_kg_m2(session);
+  session.cell.tool.mass_kg = mass_kg;
+  session.cell.tool.centre_of_mass_S_m = centre_S_m;
+  session.loop.handle_mass_kg = mass_kg;
+  session.loop.arms = arms_at(session, controller::led_poses(models::Arm(session.cell), {}));
+  choose_horizon(session);
+  return session;
+}
+
 namespace {
 // Of what a hand is to move. Beyond, stability isn't computed: numbers of any size would overflow there.
 constexpr double heaviest_kg = 10'000.0;

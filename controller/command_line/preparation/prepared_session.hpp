@@ -65,6 +65,10 @@ PreparedSession prepare(const RunOptions& options);
 // The same session with another timestep. Throws SetupError where no drive could hold that one.
 PreparedSession with_timestep(PreparedSession session, const RunOptions& options, double period_s);
 
+// The same session with another mass (kg) and centre of mass (m, in S) of the tool behind the sensor. The inertia of a
+// tool with a shape that turns stays as it is felt.
+PreparedSession with_tool(PreparedSession session, double mass_kg, const std::array<double, 3>& centre_S_m);
+
 // Where the timestep comes from, as a problem begins that is to be told of it: `--timestep`, or the cell's file and
 // line. Without a line, the file says nothing of it and has the default.
 description::SetupProblem timestep_problem(const description::Cell& cell, const RunOptions& options);

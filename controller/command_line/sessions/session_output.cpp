@@ -249,7 +249,7 @@ void SessionOutput::judge_pose(const CycleRecord& record) {
   if (!(record.added_damping_Ns_per_m > 0.0)) user_damping_Ns_per_m_ = record.proxy_damping_Ns_per_m;
   const auto joints_rad = [&] { return deriver_.link_rad(record); };
   const bool turns = record.proxy_inertia_kg_m2 > 0.0;
-  const controller::PassedPoses::Felt felt{.mass_kg = record.proxy_mass_kg + session_.cell.tool.mass_kg,
+  const controller::PassedPoses::Felt felt{.mass_kg = record.proxy_mass_kg + record.tool_mass_kg,
                                            .damping_Ns_per_m = user_damping_Ns_per_m_,
                                            .inertia_kg_m2 = record.proxy_inertia_kg_m2,
                                            .turning_damping_Nms_per_rad = record.proxy_turning_damping_Nms_per_rad};

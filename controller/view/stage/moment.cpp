@@ -90,6 +90,7 @@ void MomentBuilder::add(const CycleRecord& record, double rendered_s) noexcept {
     next_.compute_peak_us = next_.hand_peak_N = next_.contact_peak_N = 0.0;
   }
   next_.record = record;
+  if (record.tool_mass_kg > 0.0 && next_.handle_mass_kg > 0.0) next_.handle_mass_kg = record.tool_mass_kg;
   next_.rendered_s = rendered_s;
   next_.flags_since |= record.flags;
   next_.compute_peak_us = std::max(next_.compute_peak_us, 1e-3 * static_cast<double>(record.compute_ns));

@@ -46,6 +46,7 @@ bool PresentSettings::follow(const controller::Change& change, double period_s_n
     case Parameter::inertia:
     case Parameter::turning_damping:
     case Parameter::turning_spring:
+    case Parameter::tool:
     case Parameter::none:
       break;
   }

@@ -61,5 +61,20 @@ TEST(HandForce, WithoutALeverNothingCanBeTold) {
   EXPECT_FALSE(hand.at_handle());
 }
 
+// The story: after a change of the timestep the lag stayed that of the old one, and a tool that swings read as a hand.
+TEST(HandForce, TakesTheLagOfANewTimestep) {
+  constexpr double other_T = 4e-3, other_lag_s = 0.023;
+  HandForce changed(tool, lag_s, T), anew(tool, other_lag_s, other_T), stale(tool, lag_s, other_T);
+  changed.set_period(other_T, other_lag_s);
+  double differs_N = 0.0;
+  for (int k = 0; k < 500; ++k) {
+    const Vec3 v(0.2 * std::sin(2.0 * M_PI * 1.5 * k * other_T), 0.0, 0.0);
+    for (HandForce* hand : {&changed, &anew, &stale}) hand->step({}, Mat3::Identity(), v, noise_N);
+    EXPECT_EQ(changed.wrench_W().force, anew.wrench_W().force);
+    differs_N = std::max(differs_N, (stale.wrench_W().force - anew.wrench_W().force).norm());
+  }
+  EXPECT_GT(differs_N, 0.05);
+}
+
 }  // namespace
 }  // namespace proxarm::controller
