@@ -229,13 +229,14 @@ class IdentifyJoints(ProgramTest):
         self.assert_refused(self.call("identify", "--joints", narrow), "identify --joints", "axis_1", "workspace_m")
 
     def test_keys_that_the_file_does_not_have_are_put_in_and_all_else_stays(self):
-        """A cell without any damping, friction and stiffness of one drive, and without the `simulation` of another."""
-        lost = r"gear_damping_Nms_per_rad|coulomb_friction_Nm|viscous_friction_Nms_per_rad|gear_stiffness_Nm_per_rad"
+        """A cell without damping and friction of one drive, and with little in `simulation` of another."""
+        lost = "gear_damping_Nms_per_rad|coulomb_friction_Nm|viscous_friction_Nms_per_rad"
 
         def without(text):
             one, two, three = (text.index(f"- joint: axis_{n}") for n in (1, 2, 3))
             first = re.sub(rf"\n +(?:{lost}): \S+", "", text[one:two])
-            second = re.sub(r"\n    simulation:\n(?:      .*\n)+", "\n", text[two:three]) + "# the third one follows\n"
+            second = re.sub(r"\n    simulation:\n(?:      .*\n)+", "\n    simulation: {max_torque_Nm: 2500, position_gain_per_s: 350, "
+                            "velocity_bandwidth_Hz: 200}  # little\n", text[two:three])
             return text[:one] + first + second + text[three:]
 
         bare = self.cell("bare.yaml", change=without)
@@ -246,15 +247,14 @@ class IdentifyJoints(ProgramTest):
         self.assertEqual((self.folder / "bare.yaml.before-identify").read_text(), before)
         after = bare.read_text()
         left = after.splitlines()
-        kept = [line for line in before.splitlines() if not re.search("|".join(key.split(".")[-1] for key in KEYS), line)]
+        kept = [line for line in before.splitlines() if not re.search("|".join(["little", *(key.split(".")[-1] for key in KEYS)]), line)]
         rest = iter(left)
         self.assertTrue(all(any(line == there for there in rest) for line in kept), "every other line is there, in order")
         first = after[after.index("joint: axis_1"):after.index("joint: axis_2")]
-        self.assertEqual(len(re.findall(r"\n    gear_stiffness_Nm_per_rad: ", first)), 1)
         self.assertEqual(len(re.findall(r"\n    gear_damping_Nms_per_rad: ", first)), 1)
         self.assertAlmostEqual(float(re.search(r"\n      coulomb_friction_Nm: (\S+)", first)[1]), 25.0, delta=2.5)
         self.assertRegex(after[after.index("joint: axis_2"):after.index("joint: axis_3")],
-                         r"\n    simulation: \{.*coulomb_friction_Nm: [\d.]+.*\}\n# the third one follows\n")
+                         r"\n    simulation: \{.*coulomb_friction_Nm: [\d.]+, max_torque_Nm: 2500, .*\}  # little\n")
         # The program reads it again, and finds no difference.
         compared = self.identify(bare, "--arm", self.cell(), "--compare")
         self.assertEqual([(joint, key) for joint, of in compared["joints"].items() for key, e in of.items()

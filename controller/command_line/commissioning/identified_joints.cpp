@@ -111,14 +111,10 @@ std::string bare(const std::string& key) {
 
 // Puts a figure whose key the file doesn't have into the entry of its drive. Returns false where that can't be done.
 bool insert(std::string& text, const JointFigure& figure, const std::string& fresh) {
-  const std::vector<description::YamlStep> drive{{"drives"}, {"joint", figure.joint}};
+  std::vector<description::YamlStep> map{{"drives"}, {"joint", figure.joint}};
   const std::size_t dot = figure.key.find('.');
-  if (dot == std::string::npos) return description::insert_key(text, drive, figure.key, fresh);
-  const std::string map = figure.key.substr(0, dot), key = figure.key.substr(dot + 1);
-  std::vector<description::YamlStep> inner = drive;
-  inner.push_back({map});
-  return description::insert_key(text, inner, key, fresh) ||
-         description::insert_key(text, drive, map, "{" + key + ": " + fresh + "}");
+  if (dot != std::string::npos) map.push_back({figure.key.substr(0, dot)});
+  return description::insert_key(text, map, bare(figure.key), fresh);
 }
 
 std::string with_joints(const std::string& text, const std::vector<JointFigure>& figures, const Cell& cell) {
