@@ -32,17 +32,15 @@ PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
   }
   models::ToolKinematics at;
   arm.kinematics(arm.start_rad(), at);
-  least_ = std::min(least_m_per_rad, share_of_start * smallest(wrist(arm.start_rad(), at).J_W).value);
+  least_ = std::min(least_m_per_rad, share_of_start * smallest(wrist(at).J_W).value);
   near_below_ = near_times * least_;
   from_rad_ = arm.start_rad();
 }
 
-PlaceMargin::Wrist PlaceMargin::wrist(const JointVector& c_rad, const models::ToolKinematics& at) const noexcept {
+PlaceMargin::Wrist PlaceMargin::wrist(const models::ToolKinematics& at) const noexcept {
   Wrist out{at.J_W.topRows<3>(), Vec3::Zero()};
-  if (wrist_ == static_cast<std::size_t>(c_rad.size())) return out;
-  models::ArmPoints points;
-  arm_->points(c_rad, points);
-  out.from_T_W = points.joint_W[wrist_] - points.tool_W;
+  if (wrist_ == static_cast<std::size_t>(at.J_W.cols())) return out;
+  out.from_T_W = at.joint_W[wrist_] - at.X_WT.translation();
   for (Eigen::Index i = 0; i < out.J_W.cols(); ++i) {
     out.J_W.col(i) += Vec3(at.J_W.col(i).tail<3>()).cross(out.from_T_W);
     if (!carries_[static_cast<std::size_t>(i)]) out.J_W.col(i).setZero();
@@ -69,9 +67,9 @@ void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& 
   measure(c_rad, at);
 }
 
-// dσ = leftᵀ dJ right.
+// dσ = leftᵀ dJ right. The first joint moves all of the arm as one, and those from the wrist on don't move it: σ stays.
 void PlaceMargin::measure(const JointVector& c_rad, const models::ToolKinematics& at) noexcept {
-  const Columns J = wrist(c_rad, at).J_W;
+  const Columns J = wrist(at).J_W;
   const Smallest now = smallest(J);
   from_rad_ = c_rad;
   value_ = now.value;
@@ -79,11 +77,12 @@ void PlaceMargin::measure(const JointVector& c_rad, const models::ToolKinematics
   clear_ = near_ ? -1.0 : value_ - near_below_;
   if (!near_) return;
   models::ToolKinematics beside;
-  for (Eigen::Index i = 0; i < c_rad.size(); ++i) {
+  for (std::size_t k = 1; k < wrist_; ++k) {
+    const int i = arm_->drive_along_chain(k);
     JointVector c = c_rad;
     c[i] += nudge_rad;
     arm_->kinematics(c, beside);
-    const Columns change = wrist(c, beside).J_W - J;
+    const Columns change = wrist(beside).J_W - J;
     gradient_[i] = now.left.dot(change * now.right) / nudge_rad;
   }
 }

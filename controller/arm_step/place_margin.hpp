@@ -38,13 +38,13 @@ class PlaceMargin {
 
   // Whether the joint of this drive carries the wrist; the others only turn the tool about it.
   [[nodiscard]] bool carries(Eigen::Index joint) const noexcept { return carries_[static_cast<std::size_t>(joint)]; }
-  // J_w, and the wrist's place. `at` is the kinematics at c_rad.
+  // J_w, and the wrist's place.
   using Columns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, models::max_axes>;
   struct Wrist {
     Columns J_W;
     models::Vec3 from_T_W;  // from T to the wrist
   };
-  [[nodiscard]] Wrist wrist(const models::JointVector& c_rad, const models::ToolKinematics& at) const noexcept;
+  [[nodiscard]] Wrist wrist(const models::ToolKinematics& at) const noexcept;
 
  private:
   struct Smallest {

@@ -319,11 +319,10 @@ void Arm::place_tool(const JointVector& q, const Frames& frames, ToolKinematics&
   for (int i = 0; i < axes_; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const Vec3 z = frames.R_W[k].col(2);
-    if (links_[k].slides) {
-      out.J_W.col(links_[k].drive) << z, Vec3::Zero();
-    } else {
-      out.J_W.col(links_[k].drive) << z.cross(p_T - frames.p_W[k]), z;
-    }
+    auto column = out.J_W.col(links_[k].drive);
+    column.head<3>() = links_[k].slides ? z : z.cross(p_T - frames.p_W[k]);
+    column.tail<3>() = links_[k].slides ? Vec3(Vec3::Zero()) : z;
+    out.joint_W[k] = frames.p_W[k];
   }
 }
 

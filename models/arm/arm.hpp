@@ -34,13 +34,14 @@ struct ToolKinematics {
   JointVector q_rad;  // the angles that all this was computed at; empty: none yet
   Pose X_WT = Pose::Identity();
   Pose X_WS = Pose::Identity();
-  Jacobian J_W;  // geometric, of T
+  Jacobian J_W;                          // geometric, of T
+  std::array<Vec3, max_axes> joint_W{};  // origins of the joints as the URDF has them, outwards from the base
 };
 
 // The positions of T and of the joints, and the twist of the gears under gravity.
 struct ArmPoints {
   Vec3 tool_W = Vec3::Zero();
-  std::array<Vec3, max_axes> joint_W{};  // origins of the joints as the URDF has them, outwards from the base
+  std::array<Vec3, max_axes> joint_W{};  // as in ToolKinematics
   JointVector twist_rad;                 // by which each motor is ahead of its link: τ_g/k, in the order of the drives
 };
 

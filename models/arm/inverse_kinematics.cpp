@@ -120,7 +120,8 @@ InverseKinematics::Vec6 InverseKinematics::error(const Pose& X_WT, InverseKinema
   result.position_residual_m = e_p.norm();
   result.rotation_residual_rad = e_R.norm();
   Vec6 e;
-  e << e_p, config_.length_m * e_R;
+  e.head<3>() = e_p;
+  e.tail<3>() = config_.length_m * e_R;
   return e;
 }
 

@@ -53,9 +53,14 @@ void NearestInPolyhedron::add(const SmallVector& a, double b) noexcept {
   const SmallVector n = forward(a);
   const double length = n.norm();
   if (!(length > 0.0) || !std::isfinite(length)) return;
-  normal_[count_] = n / length;
+  push(n / length, length, (b - a.dot(u0_)) / length);
+}
+
+void NearestInPolyhedron::push(const SmallVector& normal, double length, double bound) noexcept {
+  if (count_ == most) return;
+  normal_[count_] = normal;
   length_[count_] = length;
-  bound_[count_] = (b - a.dot(u0_)) / length;
+  bound_[count_] = bound;
   lambda_[count_++] = 0.0;
 }
 
@@ -65,6 +70,24 @@ void NearestInPolyhedron::equal(const SmallVector& e, double f) noexcept {
 }
 
 void NearestInPolyhedron::at_most(const SmallVector& a, double b) noexcept { add(a, b); }
+
+// The normals are the columns of L⁻¹ and their negatives.
+void NearestInPolyhedron::within(const SmallVector& low, const SmallVector& high) noexcept {
+  const Eigen::Index size = u0_.size();
+  for (Eigen::Index i = 0; i < size; ++i) {
+    SmallVector n = SmallVector::Zero(size);
+    n[i] = 1.0 / L_(i, i);
+    for (Eigen::Index k = i + 1; k < size; ++k) {
+      for (Eigen::Index j = i; j < k; ++j) n[k] -= L_(k, j) * n[j];
+      n[k] /= L_(k, k);
+    }
+    const double length = n.norm();
+    if (!std::isfinite(length)) continue;
+    n /= length;
+    push(n, length, (high[i] - u0_[i]) / length);
+    push(-n, length, (u0_[i] - low[i]) / length);
+  }
+}
 
 void NearestInPolyhedron::orthogonalise() noexcept {
   for (std::size_t k = 0; k < active_count_; ++k) {

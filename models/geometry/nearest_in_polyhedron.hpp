@@ -27,6 +27,8 @@ class NearestInPolyhedron {
   void equal(const SmallVector& e, double f) noexcept;
   // Adds a·u ≤ b. A row of zeros is left out. Rows beyond `most` are dropped.
   void at_most(const SmallVector& a, double b) noexcept;
+  // Adds low ≤ u ≤ high: two rows for each unknown, of its upper and of its lower bound, at a quarter of their cost.
+  void within(const SmallVector& low, const SmallVector& high) noexcept;
 
   // Solves it. False if no point satisfies all rows to `tolerance` (in units of a row's bound, per unit of |L⁻¹a|); u()
   // is then the last iterate.
@@ -43,6 +45,7 @@ class NearestInPolyhedron {
   using Basis = std::array<SmallVector, most_rows>;
 
   void add(const SmallVector& a, double b) noexcept;
+  void push(const SmallVector& normal, double length, double bound) noexcept;
   [[nodiscard]] SmallVector forward(SmallVector b) const noexcept;   // L⁻¹b
   [[nodiscard]] SmallVector backward(SmallVector b) const noexcept;  // L⁻ᵀb
   // Takes row p in; false if that contradicts the active rows.

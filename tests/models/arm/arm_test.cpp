@@ -232,6 +232,7 @@ TEST(Arm, PointsAreThoseOfKinematicsAndGravity) {
     ASSERT_LT((at.tool_W - at_q.X_WT.translation()).norm(), 1e-14);
     for (int i = 0; i < 6; ++i) {
       const Vec3 z = at_q.J_W.col(i).tail<3>();
+      ASSERT_EQ(at_q.joint_W[static_cast<std::size_t>(i)], at.joint_W[static_cast<std::size_t>(i)]);
       ASSERT_LT((z.cross(at.tool_W - at.joint_W[static_cast<std::size_t>(i)]) - at_q.J_W.col(i).head<3>()).norm(),
                 1e-13);
     }

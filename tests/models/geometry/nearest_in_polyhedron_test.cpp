@@ -128,6 +128,33 @@ TEST(NearestInPolyhedron, FindsTheCheapestPointThatKeepsAllRows) {
   EXPECT_GT(not_feasible, scaled(100));
 }
 
+TEST(NearestInPolyhedron, KeepsABoxAsItKeepsItsRowsToTheBit) {
+  Random random(53);
+  int feasible = 0;
+  for (std::int64_t k = 0; k < scaled(3000); ++k) {
+    Program p = random_program(random);
+    const auto n = p.g.size();
+    const Eigen::VectorXd low = -0.5 * random_vector(random, n).cwiseAbs(), high = random_vector(random, n).cwiseAbs();
+    NearestInPolyhedron boxed = prepared(p);
+    boxed.within(SmallVector(low), SmallVector(high));
+    for (Eigen::Index i = 0; i < n; ++i) {
+      p.rows.emplace_back(Eigen::VectorXd::Unit(n, i));
+      p.bounds.push_back(high[i]);
+      p.rows.emplace_back(-Eigen::VectorXd::Unit(n, i));
+      p.bounds.push_back(-low[i]);
+    }
+    NearestInPolyhedron by_rows = prepared(p);
+    ASSERT_EQ(boxed.rows(), by_rows.rows());
+    ASSERT_EQ(boxed.solve(), by_rows.solve()) << k;
+    ASSERT_EQ(boxed.u(), by_rows.u()) << k;
+    for (std::size_t i = 0; i < boxed.rows(); ++i) ASSERT_EQ(boxed.multiplier(i), by_rows.multiplier(i)) << k;
+    if (!boxed.solve()) continue;
+    ++feasible;
+    ASSERT_TRUE((boxed.u().array() <= high.array() + 1e-12).all() && (boxed.u().array() >= low.array() - 1e-12).all());
+  }
+  EXPECT_GT(feasible, scaled(500));
+}
+
 TEST(NearestInPolyhedron, KeepsRowsThatRepeatOrContradictEachOther) {
   Program p{Eigen::MatrixXd::Identity(3, 3), Eigen::Vector3d(1.0, 2.0, 3.0), {}, {}, {}, {}};
   for (int i = 0; i < 5; ++i) {
