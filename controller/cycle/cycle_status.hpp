@@ -24,7 +24,7 @@ struct ShownCycle {
   bool cause_lasts = false;           // what the arm is held for still lasts
   bool timesteps_answered = true;     // no change of the timestep that was asked for is under way
   std::uint32_t asked_timesteps = 0;  // number taken from the asking thread
-  ToolEvidence tool;                  // by which other figures of the tool are judged
+  ToolEvidence tool{};                // by which other figures of the tool are judged
 };
 
 class CycleStatus {

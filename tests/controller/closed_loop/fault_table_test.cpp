@@ -51,6 +51,9 @@ class WrongTool final : public RenderedTool {
     return inner_->turn_on(R_WT, omega_W, q_W, v_W);
   }
   void set(const Change& change) noexcept override { inner_->set(change); }
+  void hang(double proxy_mass_kg, const models::ToolInertia& behind) noexcept override {
+    inner_->hang(proxy_mass_kg, behind);
+  }
   void set_period(double period_s) noexcept override { inner_->set_period(period_s); }
   void limit_turning(double share) noexcept override { inner_->limit_turning(share); }
   void add_turning_damping(double damping) noexcept override { inner_->add_turning_damping(damping); }

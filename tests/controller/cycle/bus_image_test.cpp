@@ -64,6 +64,7 @@ struct BusImageTest : ::testing::Test {
                    .arm = nullptr,
                    .rendering = std::unique_ptr<TorqueRendering>(),
                    .compensation = WrenchCompensation(cell),
+                   .tool = cell.tool,
                    .enabling = std::nullopt,
                    .supervision = cell.supervision};
   std::optional<BusImage> image;
