@@ -48,6 +48,7 @@ constexpr double first_ease = 1.0, next_ease = 4.0, whole_box = 256.0;
 // The wrist is nearly singular where the sine of the middle one of its angles is less.
 constexpr double near_singular = 0.3;
 constexpr int most_rounds = 8;
+constexpr int bisections = 8;   // of the way from braking to a step: to 0.4 % of it
 constexpr double alike = 1e-3;  // of half-spaces' normals: the sine of the angle between them
 constexpr double rounding_rad = 1e-12;
 constexpr std::size_t first_point = 2;  // the first joint whose place is limited; the two before it hardly move
@@ -238,17 +239,18 @@ double ArmStep::place_bound() const noexcept {
   return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), least(-margin_.gradient()));
 }
 
+// Of the inverse kinematics' solution.
 bool ArmStep::allows(const JointVector& u) const noexcept {
   if (!box_.contains(u)) return false;
   if (margin_.near() && -margin_.gradient().dot(u) > place_bound() + rounding_rad) return false;
-  return !points_too_fast(u);
+  return !points_too_fast(u, &solution_.kinematics);
 }
 
 // On the way to rest, all joints braking together, a point of speed V gets no faster than (V + B)²/4B, with
 // B = t |u̇|ᵀC|u̇| and t the time that this takes; V if B ≤ V (tool_guard.hpp has the derivation). This is B.
 double ArmStep::growth_m_per_s(const JointVector& u) const noexcept {
   const JointVector rate = u.cwiseAbs() / period_s_;
-  return braking_of(slowest_to_brake(rate), rate) * rate.dot(curvature_ * rate);
+  return braking_of(slowest_to_brake(rate), rate) * rate.dot(curvature_.lazyProduct(rate));
 }
 
 // The gradient of growth_m_per_s() by u, m/s per rad.
@@ -274,19 +276,22 @@ Eigen::Index ArmStep::slowest_to_brake(const JointVector& rad_per_s) const noexc
   return slowest;
 }
 
-// A point moves by at most Σ R_i |u_i|, R_i being the distance of T from axis i at most: most steps are below that.
-bool ArmStep::points_too_fast(const JointVector& u) const noexcept {
+// A point moves by at most Σ R_i |u_i|, R_i being the distance of T from axis i at most: many steps are below that.
+// `known`: the kinematics after the step, if they are.
+bool ArmStep::points_too_fast(const JointVector& u, const models::ToolKinematics* known) const noexcept {
   const double B = growth_m_per_s(u), T = period_s_;
   const double tool_m_per_s = elbow_share * start_.tool_m_per_s, elbow_m_per_s = elbow_share * start_.elbow_m_per_s;
   const double tool_m = T * fastest_start(B, tool_m_per_s), elbow_m = T * fastest_start(B, elbow_m_per_s);
   if (curvature_.diagonal().dot(u.cwiseAbs()) <= std::min(tool_m, elbow_m)) return false;
-  models::ArmPoints before, after;
-  arm_->points(link_rad_, before);
-  arm_->points(link_rad_ + u, after);
+  models::ToolKinematics after;
+  if (known == nullptr) arm_->kinematics(link_rad_ + u, after);
+  const models::ToolKinematics& to = known != nullptr ? *known : after;
   // Where braking makes T no faster, its own set bounds it (step_limits.hpp).
-  if (B > tool_m_per_s && (after.tool_W - before.tool_W).norm() > tool_m + set_tolerance) return true;
+  if (B > tool_m_per_s && (to.X_WT.translation() - from_.X_WT.translation()).norm() > tool_m + set_tolerance) {
+    return true;
+  }
   for (auto k = first_point; k < static_cast<std::size_t>(u.size()); ++k) {
-    if ((after.joint_W[k] - before.joint_W[k]).norm() > elbow_m + set_tolerance) return true;
+    if ((to.joint_W[k] - from_.joint_W[k]).norm() > elbow_m + set_tolerance) return true;
   }
   return false;
 }
@@ -345,7 +350,7 @@ void ArmStep::linearise(const JointVector& u, Model& model) const noexcept {
 
 void ArmStep::start_model() noexcept {
   linearise(brakes_, model_);
-  wrist_ = margin_.wrist(link_rad_ + brakes_, model_.at);
+  wrist_ = margin_.wrist(model_.at);
   wrist_wanted_W_ = aim_ * (model_.at.X_WT.linear().transpose() * wrist_.from_T_W);
   linearised_ = true;
 }
@@ -367,24 +372,19 @@ void ArmStep::objective(const Model& model, JointMatrix& H, JointVector& g) cons
   g = w * (J_R.transpose() * wanted) + cost.cwiseProduct(brakes_);
 }
 
-void ArmStep::add_set(const JointVector& a, double b, Limit limit, int joint) noexcept {
+void ArmStep::add_set(const JointVector& a, double b, Limit limit) noexcept {
   const std::size_t row = program_.rows();
   program_.at_most(a, b);
   if (program_.rows() == row) return;
   kind_[row] = limit;
-  joint_[row] = static_cast<std::int8_t>(joint);
 }
 
 void ArmStep::add_sets() noexcept {
   first_set_ = program_.rows();
-  for (Eigen::Index i = 0; i < brakes_.size(); ++i) {
-    JointVector a = JointVector::Zero(brakes_.size());
-    a[i] = 1.0;
-    add_set(a, box_.high[i], Limit::joint_range, static_cast<int>(2 * i));
-    add_set(-a, -box_.low[i], Limit::joint_range, static_cast<int>(2 * i + 1));
-  }
-  if (margin_.near()) add_set(-margin_.gradient(), place_bound(), Limit::singularity, -1);
-  for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit, -1);
+  program_.within(box_.low, box_.high);
+  box_rows_ = program_.rows() - first_set_;
+  if (margin_.near()) add_set(-margin_.gradient(), place_bound(), Limit::singularity);
+  for (std::size_t k = 0; k < row_count_; ++k) add_set(rows_[k].a, rows_[k].b, rows_[k].limit);
 }
 
 // The least of a·u in the box.
@@ -403,9 +403,22 @@ bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVe
     rows_[k] = row;
     return true;
   }
-  if (row_count_ == rows_.size()) return false;
-  rows_[row_count_++] = row;
+  rows_[row_count_ < rows_.size() ? row_count_++ : slackest_row(step)] = row;
   return true;
+}
+
+// Of the half-spaces: the one that this step keeps by the most.
+std::size_t ArmStep::slackest_row(const JointVector& step) const noexcept {
+  std::size_t slackest = 0;
+  double most = 0.0;
+  for (std::size_t k = 0; k < row_count_; ++k) {
+    const double slack = (rows_[k].b - rows_[k].a.dot(step)) / rows_[k].a.norm();
+    if (slack > most) {
+      most = slack;
+      slackest = k;
+    }
+  }
+  return slackest;
 }
 
 // The step with J u = `wanted` that turns the tool as far as U allows. False if U doesn't contain one.
@@ -435,31 +448,48 @@ bool ArmStep::solve_near(const Model& model, const Rows& J, const Vec3& wanted) 
   return program_.solve();
 }
 
+// The rotation vector by which u turns the tool beyond the sets of turning.
+Vec3 ArmStep::turned_beyond(const Model& model, const JointVector& u) const noexcept {
+  if (!inverse_->reaches_orientation()) return Vec3::Zero();
+  const auto J_R = model.at.J_W.bottomRows<3>();
+  const Eigen::Quaterniond from = Eigen::Quaterniond(from_.X_WT.linear()).normalized();
+  const Eigen::Quaterniond to =
+      (models::rotation_by(J_R * (u - model.u)) * Eigen::Quaterniond(model.at.X_WT.linear())).normalized();
+  Eigen::Quaterniond within = to;
+  start_.turn.keep(from, within);
+  return models::rotation_vector(to * within.conjugate());
+}
+
 // Takes in the half-spaces of curved sets that u has left. Whether there was one.
 bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexcept {
   bool leaves = false;
-  if (inverse_->reaches_orientation()) {
+  const Vec3 beyond = turned_beyond(model, u);
+  if (const double angle = beyond.norm(); angle > set_tolerance) {
     const auto J_R = model.at.J_W.bottomRows<3>();
-    const Eigen::Quaterniond from = Eigen::Quaterniond(from_.X_WT.linear()).normalized();
-    const Eigen::Quaterniond to =
-        (models::rotation_by(J_R * (u - model.u)) * Eigen::Quaterniond(model.at.X_WT.linear())).normalized();
-    Eigen::Quaterniond within = to;
-    start_.turn.keep(from, within);
-    const Vec3 beyond = models::rotation_vector(to * within.conjugate());
-    if (const double angle = beyond.norm(); angle > set_tolerance) {
-      const Vec3 n = beyond / angle;
-      leaves = add_row(J_R.transpose() * n, n.dot(J_R * u) - angle, Limit{}, u);
-    }
+    const Vec3 n = beyond / angle;
+    leaves = add_row(J_R.transpose() * n, n.dot(J_R * u) - angle, Limit{}, u);
   }
-  return (points_too_fast(u) && limit_points(model, u)) || leaves;
+  return (points_too_fast(u, nullptr) && limit_points(model, u)) || leaves;
+}
+
+// Half-spaces come near to a curved set in ever smaller steps. What is left is taken back towards braking, which leaves
+// no set that can be kept.
+JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const noexcept {
+  double kept = 0.0, left = 1.0;
+  for (int i = 0; i < bisections; ++i) {
+    const double share = 0.5 * (kept + left);
+    const JointVector tried = brakes_ + share * (u - brakes_);
+    const bool leaves = turned_beyond(model, tried).norm() > set_tolerance || points_too_fast(tried, nullptr);
+    (leaves ? left : kept) = share;
+  }
+  return brakes_ + kept * (u - brakes_);
 }
 
 // B changes with u, too, so the half-space is that of the linearised (V + B)²/4B, with
 //   ∂/∂V = (V + B)/2B,   ∂/∂B = (B² − V²)/4B²,   ∂B/∂u̇ = 2t C|u̇| sgn u̇ + |u̇|ᵀC|u̇| ∂t/∂u̇
 bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
-  models::ArmPoints was, at;
-  arm_->points(link_rad_, was);
-  arm_->points(link_rad_ + u, at);
+  models::ToolKinematics at;
+  arm_->kinematics(link_rad_ + u, at);
   const auto axes = static_cast<std::size_t>(u.size());
   const double B = growth_m_per_s(u), T = period_s_;
   const JointVector B_u = growth_gradient(u);
@@ -472,15 +502,15 @@ bool ArmStep::limit_points(const Model& model, const JointVector& u) noexcept {
     JointVector a(u.size());
     for (Eigen::Index i = 0; i < a.size(); ++i) {
       const Vec3 turning = model.at.J_W.col(i).tail<3>();
-      a[i] = way.dot(model.at.J_W.col(i).head<3>() + turning.cross(to_W - at.tool_W)) / length;
+      a[i] = way.dot(model.at.J_W.col(i).head<3>() + turning.cross(to_W - at.X_WT.translation())) / length;
     }
     for (std::size_t j = joints; j < axes; ++j) a[arm_->drive_along_chain(j)] = 0.0;
     if (B > V) a = (V + B) / (2.0 * B) * a + T * (B * B - V * V) / (4.0 * B * B) * B_u;
     leaves = add_row(a, a.dot(u) - T * beyond, Limit::speed, u) || leaves;
   };
-  limit(was.tool_W, at.tool_W, axes, elbow_share * start_.tool_m_per_s);
+  limit(from_.X_WT.translation(), at.X_WT.translation(), axes, elbow_share * start_.tool_m_per_s);
   for (std::size_t k = first_point; k < axes; ++k) {
-    limit(was.joint_W[k], at.joint_W[k], k, elbow_share * start_.elbow_m_per_s);
+    limit(from_.joint_W[k], at.joint_W[k], k, elbow_share * start_.elbow_m_per_s);
   }
   return leaves;
 }
@@ -498,10 +528,11 @@ ActiveLimits ArmStep::pressing() const noexcept {
   ActiveLimits out;
   for (std::size_t row = first_set_; row < program_.rows(); ++row) {
     if (!(program_.multiplier(row) > 0.0)) continue;
-    if (joint_[row] >= 0) {
-      note_joint(static_cast<std::size_t>(joint_[row] / 2), joint_[row] % 2 == 0 ? 1.0 : -1.0, out);
-    } else {
+    const std::size_t k = row - first_set_;
+    if (k >= box_rows_) {
       out.set(kind_[row]);
+    } else {
+      note_joint(k / 2, k % 2 == 0 ? 1.0 : -1.0, out);
     }
   }
   return out;
@@ -524,7 +555,8 @@ ArmStep::Outcome ArmStep::go(const Vec3& q_W, const Eigen::Quaterniond& R_WT) no
 ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
   if (!linearised_) start_model();
   use_box(first_ease);
-  bool reached = false;
+  bool reached = false, leaves = true;
+  JointVector u = brakes_;
   for (int round = 0; round < most_rounds; ++round) {
     const Rows J_p = model_.at.J_W.topRows<3>();
     const Vec3 wanted = x_W - model_.at.X_WT.translation() + J_p * model_.u;
@@ -534,19 +566,20 @@ ArmStep::Outcome ArmStep::go_limited(const Vec3& x_W) noexcept {
       reached = solve_at(model_, J_p, wanted);
     }
     const bool solved = reached || solve_near(model_, J_p, wanted);
-    const JointVector u = solved ? JointVector(program_.u().cwiseMax(box_.low).cwiseMin(box_.high)) : hardest_braking();
-    const ActiveLimits limits = pressing();
-    if (leave_curved_sets(model_, u)) continue;
-    active_ = limits;
+    u = solved ? JointVector(program_.u().cwiseMax(box_.low).cwiseMin(box_.high)) : hardest_braking();
+    active_ = pressing();
+    leaves = leave_curved_sets(model_, u);
+    if (leaves) continue;
     const double change = (u - model_.u).cwiseAbs().maxCoeff();
     linearise(u, model_);
     const Vec3 left = inverse_->space().projection() * (x_W - model_.at.X_WT.translation());
     if (reached ? left.norm() <= place_tolerance_m : change <= rounding_rad) break;
   }
+  if (leaves) linearise(taken_back(model_, u), model_);
   lags_ = true;
   solution_.kinematics = model_.at;
   accept(link_rad_ + model_.u);
-  return reached ? Outcome::lags : Outcome::held;
+  return reached && !leaves ? Outcome::lags : Outcome::held;
 }
 
 void ArmStep::accept(const JointVector& link_rad) noexcept {

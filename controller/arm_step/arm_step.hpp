@@ -137,20 +137,23 @@ class ArmStep final : public FollowableStep {
   [[nodiscard]] models::JointVector growth_gradient(const models::JointVector& u) const noexcept;
   [[nodiscard]] double braking_of(Eigen::Index i, const models::JointVector& rad_per_s) const noexcept;
   [[nodiscard]] Eigen::Index slowest_to_brake(const models::JointVector& rad_per_s) const noexcept;
-  [[nodiscard]] bool points_too_fast(const models::JointVector& u) const noexcept;
+  [[nodiscard]] bool points_too_fast(const models::JointVector& u, const models::ToolKinematics* known) const noexcept;
   bool limit_points(const Model& model, const models::JointVector& u) noexcept;
   void linearise(const models::JointVector& u, Model& model) const noexcept;
   void start_model() noexcept;
   [[nodiscard]] models::Vec3 turn_from(const Model& model, const Eigen::Quaterniond& R) const noexcept;
   void objective(const Model& model, models::JointMatrix& H, models::JointVector& g) const noexcept;
   void add_sets() noexcept;
-  void add_set(const models::JointVector& a, double b, Limit limit, int joint) noexcept;
+  void add_set(const models::JointVector& a, double b, Limit limit) noexcept;
   bool add_row(const models::JointVector& a, double b, Limit limit, const models::JointVector& step) noexcept;
+  [[nodiscard]] std::size_t slackest_row(const models::JointVector& step) const noexcept;
   using Rows = PlaceMargin::Columns;
   bool can_carry_wrist(const models::Vec3& wanted) noexcept;
   bool solve_at(const Model& model, const Rows& J, const models::Vec3& wanted) noexcept;
   bool solve_near(const Model& model, const Rows& J, const models::Vec3& wanted) noexcept;
+  [[nodiscard]] models::Vec3 turned_beyond(const Model& model, const models::JointVector& u) const noexcept;
   bool leave_curved_sets(const Model& model, const models::JointVector& u) noexcept;
+  [[nodiscard]] models::JointVector taken_back(const Model& model, const models::JointVector& u) const noexcept;
   [[nodiscard]] ActiveLimits pressing() const noexcept;
   void note_joint(std::size_t i, double sign, ActiveLimits& out) const noexcept;
   void aim(const Eigen::Quaterniond& R_WT) noexcept;
@@ -188,9 +191,8 @@ class ArmStep final : public FollowableStep {
   std::array<Row, 16> rows_;
   std::size_t row_count_ = 0;
   models::NearestInPolyhedron program_;
-  std::size_t first_set_ = 0;  // the first row of the program that is a set of U
-  std::array<Limit, models::NearestInPolyhedron::most> kind_{};
-  std::array<std::int8_t, models::NearestInPolyhedron::most> joint_{};  // −1: none
+  std::size_t first_set_ = 0, box_rows_ = 0;  // the first row of the program that is a set of U; those of the box
+  std::array<Limit, models::NearestInPolyhedron::most> kind_{};  // of the rows after the box
   ActiveLimits active_;
   std::uint64_t programs_ = 0;
 };

@@ -420,7 +420,7 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
     cycle.record.proxy_inertia_kg_m2 = parts_.tool->inertia_kg_m2();
     cycle.record.proxy_turning_damping_Nms_per_rad = parts_.tool->own_turning_damping_Nms_per_rad();
   }
-  const Eigen::Quaterniond R_k1_WT = arm_step_.R_WT();
+  const models::Mat3 R_k1_WT = arm_step_.kinematics().X_WT.linear();
   if (ahead_) {
     if (!go(ahead_->proxy_step, state_.q_k1_W, cycle)) return false;
     ahead_->proxy_filter.step(ahead_->proxy_step.link_rad());
@@ -437,7 +437,7 @@ bool AdmittanceMotion::follow_proxy(const MotionCycle& cycle) noexcept {
   }
   if (parts_.inverse.reaches_orientation() && arm_step_.R_WT().angularDistance(tool().R_WT()) > same_turn_rad) {
     cycle.record.set(RecordFlag::limit_orientation, true);
-    if (tool().turns()) turn_on_from(arm_step_, R_k1_WT);
+    if (tool().turns()) turn_on_from(arm_step_, Eigen::Quaterniond(R_k1_WT).normalized());
   }
   return true;
 }

@@ -17,10 +17,11 @@ double TurnSets::reachable_rad(double angle_rad, double most_rad, double period_
 
 TurnSets TurnSets::sent() const noexcept {
   TurnSets out = *this;
-  out.max_turn_rad += lead_rad;
-  if (axis_range.max_tilt_rad < AxisRange::everything) out.axis_range.max_tilt_rad += lead_rad;
-  if (axis_range.max_twist_rad < AxisRange::everything) out.axis_range.max_twist_rad += lead_rad;
-  out.max_speed_rad_per_s += lead_rad_per_s;
+  AxisRange& range = out.axis_range;
+  out.max_turn_rad += lead_rad.most;
+  if (range.max_tilt_rad < AxisRange::everything) range.max_tilt_rad += lead_rad.most;
+  if (range.max_twist_rad < AxisRange::everything) range.max_twist_rad += lead_rad.most;
+  out.max_speed_rad_per_s += lead_rad_per_s.most;
   return out;
 }
 

@@ -170,13 +170,12 @@ double proxy_mass(const description::Cell& cell, const SessionSettings& settings
 // Counted from the orientation at the first start, and what is sent leads up to the limits.
 TurnSets turn_sets(const description::Cell& cell) {
   const description::CellLimits& limits = cell.limits;
-  const auto before = [](double limit_rad) { return TurnSets::before(limit_rad, TurnSets::lead_rad); };
   TurnSets sets;
-  sets.max_turn_rad = before(limits.max_turn_rad);
-  if (limits.max_tilt_rad) sets.axis_range.max_tilt_rad = before(*limits.max_tilt_rad);
-  if (limits.max_twist_rad) sets.axis_range.max_twist_rad = before(*limits.max_twist_rad);
+  sets.max_turn_rad = TurnSets::lead_rad.before(limits.max_turn_rad);
+  if (limits.max_tilt_rad) sets.axis_range.max_tilt_rad = TurnSets::lead_rad.before(*limits.max_tilt_rad);
+  if (limits.max_twist_rad) sets.axis_range.max_twist_rad = TurnSets::lead_rad.before(*limits.max_twist_rad);
   sets.axis_range.axis_T = models::Vec3(limits.tilt_axis[0], limits.tilt_axis[1], limits.tilt_axis[2]);
-  sets.max_speed_rad_per_s = TurnSets::before(limits.max_turning_speed_rad_per_s, TurnSets::lead_rad_per_s);
+  sets.max_speed_rad_per_s = TurnSets::lead_rad_per_s.before(limits.max_turning_speed_rad_per_s);
   sets.brakes_s = ArmStep::braking_s(cell.drives);
   return sets;
 }

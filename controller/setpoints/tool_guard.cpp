@@ -25,8 +25,9 @@ constexpr int quick_rounds = 1, exact_rounds = 3;
 constexpr double exact_share = 0.99, quick_share = 0.985, quick_way_m = 1e-4;
 // Rounding of positions.
 constexpr double touching_m = 1e-10;
-// Of orientations: setpoints are rounded to counts of some 1e-7 rad.
-constexpr double turned_rad = 1e-6;
+// Of orientations: setpoints are rounded to counts of some 1e-7 rad. A period's turn has no more than the digits of the
+// kinematics.
+constexpr double turned_rad = 1e-6, turn_rounding_rad = 1e-9;
 // While the proxy's limits stop the tool at a border, its gears twist, and setpoints reach some micrometres beyond the
 // border. The guard tolerates this much, so that it doesn't act where the proxy's limits do. It is a fifth of the 0.1
 // mm that are promised. With more, the border would feel soft; with less, it would be felt twice.
@@ -139,7 +140,7 @@ double ToolGuard::stop_s(const JointVector& u) const noexcept {
 
 double ToolGuard::bend(const JointVector& d) const noexcept {
   const JointVector size = d.cwiseAbs();
-  return size.dot(curvature_ * size);
+  return size.dot(curvature_.lazyProduct(size));
 }
 
 // How many steps as this one the braking distance is: the sum of 1 − kT/t over the periods k = 1 … t/T.
@@ -197,8 +198,8 @@ void ToolGuard::judge_turning(const JointVector& theta, const ArmPoints& at, con
   const Eigen::Quaterniond to = orientation(theta - at.twist_rad);
   const double before = turn.beyond_rad(limit.from), beyond = turn.beyond_rad(to);
   const double rest = beyond + more_steps * (beyond - before), most = std::max(0.0, before) + turned_rad;
-  if (limit.from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turned_rad || beyond > most ||
-      rest > most + TurnSets::lead_rad) {
+  if (limit.from.angularDistance(to) > turn.max_speed_rad_per_s * period_s_ + turn_rounding_rad || beyond > most ||
+      rest > most + TurnSets::lead_rad.most) {
     out.set(Limit::guard_turning);
   }
 }

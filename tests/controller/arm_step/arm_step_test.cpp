@@ -9,6 +9,7 @@
 
 #include "controller/limits/limit_sets.hpp"
 #include "controller/setpoints/link_filter.hpp"
+#include "models/geometry/tool_pose.hpp"
 #include "tests/models/arm/few_axes.hpp"
 #include "tests/models/surfaces/random_states.hpp"
 
@@ -207,6 +208,47 @@ TEST(ArmStep, AStepThatNoSetTouchesIsTheInverseKinematics) {
     ASSERT_EQ(step.link_rad(), link) << cycle;
   }
   EXPECT_EQ(step.programs(), 0u);
+}
+
+// The story: the sixteen half-spaces of a step filled up where many sets bent, further ones were dropped without a
+// word, and a tool held to 0.09 rad/s turned at 0.4. 1e-4 rad/s: what steps that are linearised leave.
+TEST(ArmStep, SevenAxesThatAreQuickTurnTheToolNoFasterThanItsLimit) {
+  const description::Cell cell = tests::shipped_cell("seven");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  constexpr double most_rad_per_s = 0.09;
+  Random random(67);
+  int limited = 0;
+  double fastest = 0.0;
+  for (auto n = scaled(300); n > 0; --n) {
+    ArmStep step(arm, inverse, cell.drives, T);
+    LinkFilter filter(cell.limits.setpoint_bandwidth_Hz, T);
+    filter.start(arm.start_rad());
+    const Eigen::Quaterniond home = step.R_WT();
+    Vec3 q_W = step.kinematics().X_WT.translation(), v_W = Vec3::Zero();
+    for (int k = 0; k < 120; ++k) {
+      v_W += T * random.uniform(0.0, 20.0) * random.direction<3>();
+      if (v_W.norm() > 0.45) v_W *= 0.45 / v_W.norm();
+      const Eigen::Quaterniond from = step.R_WT();
+      const Eigen::Quaterniond wanted = from * models::rotation_by(random.uniform(0.0, 8e-5) * random.direction<3>());
+      step.begin({.coasting_rad = filter.coasting_rad(),
+                  .input_s2 = filter.input_s2(),
+                  .twist_rad = JointVector::Zero(arm.axes()),
+                  .tool_m_per_s = 0.5,
+                  .elbow_m_per_s = 0.5,
+                  .R_WT = wanted,
+                  .held = false,
+                  .turn = {home, 0.5, {}, most_rad_per_s, T}});
+      const auto outcome = step.go(q_W + T * v_W, wanted);
+      ASSERT_NE(outcome, ArmStep::Outcome::invalid);
+      q_W = step.kinematics().X_WT.translation();
+      filter.step(step.link_rad());
+      limited += outcome != ArmStep::Outcome::reached;
+      fastest = std::max(fastest, from.angularDistance(step.R_WT()) / T);
+    }
+  }
+  EXPECT_GT(limited, scaled(1000));
+  EXPECT_LT(fastest, most_rad_per_s + 1e-4);
 }
 
 TEST(ArmStep, RefusesAPlaceThatIsNone) {
