@@ -29,7 +29,7 @@ class Reach(ProgramTest):
         (self.folder / "hand.yaml").write_text(text)
         summary = self.summary(*([str(cell)] if cell else []), *FREE, "--hand", "hand.yaml", "--duration", f"{seconds}s",
                                "--record", "record", *arguments)
-        return summary, comes_back_hunt.Record(self.folder / "record/signals.csv")
+        return summary, comes_back_hunt.hunting.Record(self.folder / "record/signals.csv")
 
     def assert_comes_back(self, text, seconds, *arguments):
         summary, record = self.led(text, seconds, *arguments)

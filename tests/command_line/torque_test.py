@@ -44,7 +44,7 @@ class Torque(ProgramTest):
         outcome = self.call("run", str(CELL), "--scene", scene, "--hand", "hand.yaml", "--duration", f"{seconds}s",
                             "--no-plot", "--json", "--record", "record", *arguments)
         self.assertEqual(outcome.status, status, outcome.err + outcome.out)
-        return outcome.summary, hunt.Record(self.folder / "record/signals.csv")
+        return outcome.summary, hunt.hunting.Record(self.folder / "record/signals.csv")
 
     def assert_within(self, record):
         figures = hunt.judged(record)
@@ -60,7 +60,7 @@ class Torque(ProgramTest):
         self.assertNotIn("max_tool_speed_m_per_s", text)  # so it is the default, 0.5
         _, record = self.led(hand(0.5, 500, 10, [(0.5, (0, 0, 0)), (1.5, (0.1, 0.1, 0.05))]), 2)
         device = hunt.Device()
-        self.assertLess(max(math.dist(device.place(a), s) for a, s in zip(record.joints, record.steel)), 1e-3)
+        self.assertLess(max(math.dist(device.place(a), s) for a, s in zip(hunt.joints_of(record), record.steel)), 1e-3)
 
     def test_one_newton_doesn_t_lead_the_stretched_arm_past_its_range(self):
         summary, record = self.led(hand(0.2, 200, 5, [(0.5, (0, 0, 0)), (8.5, (0.5, 0, 0)), (10, (0.5, 0, 0))], 1), 9)

@@ -24,7 +24,6 @@ import sys
 import tempfile
 
 import hunting
-from comes_back_hunt import Record
 from hunting import SOURCE, dot, log_uniform, minus
 
 CELLS = ("default", "cobot", "seven", "rail", "gantry")
@@ -36,7 +35,7 @@ LEAST_N, LEAST_M = 1.0, 2e-3
 def start_of(cell, folder):
     """Where the handle stands at the start."""
     hunting.run(SOURCE / f"models/cells/{cell}.yaml", SOURCE / "scenes/free.yaml", ["--duration", "0.1s"], folder / cell)
-    return Record(folder / cell / "signals.csv").proxy[0]
+    return hunting.Record(folder / cell / "signals.csv").proxy[0]
 
 
 def made_border(chance, start):
@@ -81,7 +80,7 @@ def run(cell, scene, arguments, record):
     done = hunting.run(cell, scene, arguments, record)
     if done.returncode == 2:
         return None, done.stderr.strip()[-120:]
-    return json.loads(done.stdout), Record(record / "signals.csv")
+    return json.loads(done.stdout), hunting.Record(record / "signals.csv")
 
 
 def mean(values):

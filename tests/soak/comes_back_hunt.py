@@ -16,7 +16,6 @@ ends, if a joint is at the end of its range then, since the straight way back ma
 arm oscillated for long, since the damping that ends a swing slows the way back. Both are counted. Status 1, and the
 session's files in `--keep DIR`, where it isn't so.
 """
-import csv
 import json
 import math
 import random
@@ -51,41 +50,29 @@ def made_hand(chance):
 
 
 def made_arguments(chance, cell, most_N):
-    arguments = ["--timestep", f"{chance.choice((1, 1, 2, 4))}ms", "--mass", f"{log_uniform(chance, 4, max(4.1, min(20, most_N / 2))):.4g}"]  # led by 2 m/s² at least
-    if cell in ("default", "cobot", "seven"):
+    text = cell.read_text()
+    shipped = SOURCE in cell.parents
+    least_kg = 4.0 if shipped else number_in(text, "default_mass_kg", 4.0)
+    most_kg = max(1.025 * least_kg, min(20.0, most_N / 2))  # led by 2 m/s² at least
+    arguments = ["--timestep", f"{chance.choice((1, 1, 2, 4))}ms", "--mass", f"{log_uniform(chance, least_kg, most_kg):.4g}"]
+    if not shipped or cell.stem in ("default", "cobot", "seven"):
         arguments += ["--orientation", chance.choice(("held", "held", "free"))]
     if chance.random() < 0.4:
         arguments += ["--lookahead", "auto"]
     return arguments
 
 
+def number_in(text, key, otherwise):
+    """Of a cell's text: the number after this key."""
+    for line in text.splitlines():
+        if line.strip().startswith(f"{key}:"):
+            return float(line.split(":")[1].split("#")[0])
+    return otherwise
+
+
 def delay_s(cell, period_s):
     """Of the loop: the setpoints' filter, 2/omega, and four cycles of bus, sensor and drives."""
-    for line in (SOURCE / f"models/cells/{cell}.yaml").read_text().splitlines():
-        if line.strip().startswith("setpoint_bandwidth_Hz:"):
-            return 1.0 / (math.pi * float(line.split(":")[1].split("#")[0])) + 4 * period_s
-    return 1.0 / (math.pi * 25.0) + 4 * period_s
-
-
-def column_of(header):
-    return {name: i for i, name in enumerate(header)}
-
-
-class Record:
-    def __init__(self, file):
-        with open(file, newline="") as text:
-            rows = csv.reader(text)
-            at = column_of(next(rows))
-            self.time, self.proxy, self.steel, self.hand, self.flags = [], [], [], [], []
-            for row in rows:
-                if row[at["phase"]] != "rendering":
-                    continue
-                three = lambda name, unit: tuple(float(row[at[f"{name}_W_{x}_{unit}"]]) for x in "xyz")
-                self.time.append(float(row[at["time_s"]]))
-                self.proxy.append(three("proxy", "m"))
-                self.steel.append(three("true_tool", "m"))
-                self.hand.append(three("hand_force", "N"))
-                self.flags.append(row[at["flags"]])
+    return 1.0 / (math.pi * number_in(cell.read_text(), "setpoint_bandwidth_Hz", 25.0)) + 4 * period_s
 
 
 def against_the_hand(record, mass_kg, delay_s):
@@ -110,16 +97,16 @@ def against_the_hand(record, mass_kg, delay_s):
     return worst
 
 
-def session(seed, folder):
+def session(seed, folder, cells):
     chance = random.Random(seed)
     folder.mkdir()
-    cell = chance.choice(CELLS)
+    cell = chance.choice(cells)
     hand, ended_s, most_N, damping = made_hand(chance)
     (folder / "hand.yaml").write_text(hand)
     arguments = made_arguments(chance, cell, most_N)
     # A mass on the hand's spring swings on without any limit: it falls to 1e-4 of a metre in 9 of its time constants.
     settles_s = max(1.2, 9 * 2 * (float(arguments[3]) + 1.5) / damping)
-    done = hunting.run(SOURCE / f"models/cells/{cell}.yaml", SOURCE / "scenes/free.yaml",
+    done = hunting.run(cell, SOURCE / "scenes/free.yaml",
                        ["--hand", folder / "hand.yaml", *arguments, "--duration", f"{ended_s + settles_s:.4g}s"],
                        folder / "record")
     if "isn't stable with this hand" in done.stderr:
@@ -127,9 +114,9 @@ def session(seed, folder):
     if done.returncode == 2:
         return {"refused": done.stderr.strip().splitlines()[-1][:120] if done.stderr.strip() else "no reason"}
     summary = json.loads(done.stdout)
-    record = Record(folder / "record/signals.csv")
+    record = hunting.Record(folder / "record/signals.csv")
     wrong = [fault["fault"] for fault in summary["faults"]]
-    figures = {"cell": cell}
+    figures = {"cell": cell.stem if SOURCE in cell.parents else cell.parent.name}
     if not wrong:
         stiffness = float(hand.split("stiffness_N_per_m: ")[1].split()[0])
         start = record.steel[0]
@@ -138,7 +125,7 @@ def session(seed, folder):
         figures["against mJ"] = 1e3 * against_the_hand(record, float(arguments[3]), delay_s(cell, float(arguments[1][:-2]) / 1e3))
         figures["far m"] = max(math.hypot(*minus(x, start)) for x in record.steel)
         figures["push J"] = summary["limits_push_J"]
-        figures["cornered"] = any("limit_joint" in flags.split("|") for flags in record.flags[-100:])
+        figures["cornered"] = any("limit_joint" in flags for flags in record.flags[-100:])
         slowed = summary["oscillation"]["lasts"]
         if figures["off mm"] > 1e3 * NEAR_M and not figures["cornered"] and not slowed:
             wrong.append(f"{figures['off mm']:.3g} mm off")
@@ -153,7 +140,8 @@ def session(seed, folder):
 
 
 def main():
-    results = hunting.sessions(hunting.options(__doc__), session)
+    given = hunting.options(__doc__, cells=CELLS)
+    results = hunting.sessions(given, session, given.cell)
     words = (f"; oscillating for long: {sum('oscillates' in r for _, r in results)}; at the end of a joint's range at last: "
              f"{sum(bool(r.get('cornered')) for _, r in results)}")
     return hunting.tell(results, ("off mm", "against mJ", "push J", "far m"), words)

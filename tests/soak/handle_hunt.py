@@ -20,7 +20,6 @@ import random
 import sys
 
 import hunting
-from comes_back_hunt import Record
 from hunting import SOURCE, direction, log_uniform
 
 CELLS = ("default", "cobot", "seven", "scara", "gantry", "rail", "linear")
@@ -111,7 +110,7 @@ def hung(chance, folder):
 
 def limited_s(record):
     """When a limit acts first."""
-    return next((t for t, flags in zip(record.time, record.flags) if "limit" in flags), math.inf)
+    return next((t for t, flags in zip(record.time, record.flags) if any("limit" in flag for flag in flags)), math.inf)
 
 
 def gone_on(record, released_s):
@@ -162,7 +161,7 @@ def session(seed, folder):
                        [*arguments, "--hand", folder / "hand.yaml", "--duration", f"{ended_s:.4g}s"], folder / "record")
     if done.returncode == 2 or not done.stdout:
         return {"refused": f"{cell}, {kind}: {done.stderr.strip()[:120]}"}
-    summary, record = json.loads(done.stdout), Record(folder / "record/signals.csv")
+    summary, record = json.loads(done.stdout), hunting.Record(folder / "record/signals.csv")
     out = {"cell": f"{cell}, {kind}", "wrong": [fault["fault"] for fault in summary["faults"]]}
     oscillation = summary["oscillation"]
     out["oscillates"] = bool(oscillation and oscillation["lasts"])

@@ -4,6 +4,8 @@ A session is a function of its seed and of a folder for its files that doesn't e
 why, or `wrong`, a list of words that is empty where nothing was, beside figures.
 """
 import argparse
+import csv
+import functools
 import math
 import os
 import pathlib
@@ -40,7 +42,31 @@ def run(cell, scene, arguments, record):
     return subprocess.run(command, cwd=record.parent, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=600)
 
 
-def options(doc, sessions=100, cycles=None):
+class Record:
+    """The cycles of a record's signals.csv in which the scene was rendered."""
+
+    def __init__(self, file):
+        with open(file, newline="") as text:
+            rows = csv.reader(text)
+            self.at = {name: i for i, name in enumerate(next(rows))}
+            self.rows = [row for row in rows if row[self.at["phase"]] == "rendering"]
+
+    def column(self, name):
+        return [float(row[self.at[name]]) for row in self.rows]
+
+    def vectors(self, name, unit="m", parts="xyz"):
+        """Of each cycle, a tuple; quaternions by parts ("qx", "qy", "qz", "qw") and unit ""."""
+        end = f"_{unit}" if unit else ""
+        return list(zip(*(self.column(f"{name}_W_{part}{end}") for part in parts)))
+
+    time = functools.cached_property(lambda self: self.column("time_s"))
+    proxy = functools.cached_property(lambda self: self.vectors("proxy"))
+    steel = functools.cached_property(lambda self: self.vectors("true_tool"))
+    hand = functools.cached_property(lambda self: self.vectors("hand_force", "N"))
+    flags = functools.cached_property(lambda self: [row[self.at["flags"]].split("|") for row in self.rows])
+
+
+def options(doc, sessions=100, cycles=None, cells=()):
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     if cycles is None:
         parser.add_argument("--sessions", type=int, default=sessions)
@@ -50,7 +76,13 @@ def options(doc, sessions=100, cycles=None):
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the files of wrong sessions")
-    return parser.parse_args()
+    if cells:
+        parser.add_argument("--cell", action="append", metavar="FILE", help=f"instead of {', '.join(cells)}")
+    given = parser.parse_args()
+    if cells:
+        given.cell = [pathlib.Path(file).resolve() for file in given.cell or ()] or [
+            SOURCE / f"models/cells/{name}.yaml" for name in cells]
+    return given
 
 
 def sessions(given, session, *more):

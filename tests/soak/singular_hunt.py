@@ -14,7 +14,6 @@ singularity and back, at 0.05 to 0.4 m/s. Judged by the records alone, while the
   force        below twice the largest of the same session elsewhere on the way
 Told, not judged: how far the orientation lags. Status 1, and the session's files in `--keep DIR`, where it isn't so.
 """
-import csv
 import json
 import math
 import random
@@ -121,15 +120,10 @@ def distances_to_way(points, way):
 
 
 def judge(record, arm):
-    with open(record / "signals.csv", newline="") as text:
-        rows = csv.reader(text)
-        at = {key: i for i, key in enumerate(next(rows))}
-        rows = [row for row in rows if row[at["phase"]] == "rendering"]
-    column = lambda names: numpy.array([[float(row[at[name]]) for name in names] for row in rows])
-    time_s = column(["time_s"])[:, 0]
-    three = lambda name, unit: column([f"{name}_W_{x}_{unit}" for x in "xyz"])
-    proxy, steel, force = three("proxy", "m"), three("true_tool", "m"), numpy.linalg.norm(three("hand_force", "N"), axis=1)
-    wrist = column([f"{arm.cell.joints[arm.wrist]}_target_rad"])[:, 0]
+    record = hunting.Record(record / "signals.csv")
+    time_s = numpy.array(record.time)
+    proxy, steel, force = numpy.array(record.proxy), numpy.array(record.steel), numpy.linalg.norm(record.hand, axis=1)
+    wrist = numpy.array(record.column(f"{arm.cell.joints[arm.wrist]}_target_rad"))
     T = time_s[1] - time_s[0]
     near = (numpy.abs(wrist) < NEAR_RAD) & (time_s > 0.5 + SETTLED_S)
     if not near.any():
@@ -145,7 +139,7 @@ def judge(record, arm):
     pulled = numpy.lib.stride_tricks.sliding_window_view(force, window).min(1)
     stands = ((moved < STANDS_M_PER_S) & (pulled[:len(moved)] > PULL_N) & near[window:]).sum() * T
     elsewhere = ~near & (time_s > 0.5)
-    four = lambda name: column([f"{name}_W_q{x}" for x in ("x", "y", "z", "w")])
+    four = lambda name: numpy.array(record.vectors(name, "", ("qx", "qy", "qz", "qw")))
     lag = 2 * numpy.arccos(numpy.minimum(1.0, numpy.abs((four("proxy") * four("true_tool")).sum(1))))
     return {"off mm": 1e3 * off, "stands s": stands,
             "speed": sent.max() / arm.cell.speed, "force": force[near].max() / max(2.0, force[elsewhere].max()),

@@ -14,7 +14,6 @@ as a step) and by how stiff it is; a quarter of them let go. Status 1, and the s
 isn't so.
 """
 import collections
-import csv
 import json
 import math
 import random
@@ -106,21 +105,8 @@ class Device:
         return 0.0, shoulder, elbow
 
 
-class Record:
-    def __init__(self, file):
-        with open(file, newline="") as text:
-            rows = csv.reader(text)
-            at = {name: i for i, name in enumerate(next(rows))}
-            self.time, self.joints, self.steel, self.hand, self.flags = [], [], [], [], []
-            for row in rows:
-                if row[at["phase"]] != "rendering":
-                    continue
-                three = lambda name, unit: tuple(float(row[at[f"{name}_W_{x}_{unit}"]]) for x in "xyz")
-                self.time.append(float(row[at["time_s"]]))
-                self.joints.append(tuple(float(row[at[f"{joint}_actual_rad"]]) for joint in JOINTS))
-                self.steel.append(three("true_tool", "m"))
-                self.hand.append(three("hand_force", "N"))
-                self.flags.append(row[at["flags"]].split("|"))
+def joints_of(record):
+    return list(zip(*(record.column(f"{joint}_actual_rad") for joint in JOINTS)))
 
 
 def overpowered(device, angles, force):
@@ -132,10 +118,11 @@ def overpowered(device, angles, force):
 def judged(record):
     """The worst of each figure where no joint is overpowered, and the device has recovered from that."""
     device = Device()
+    joints = joints_of(record)
     until_s = 0.0
     figures = {"beyond mrad": -math.inf, "speed m/s": 0.0, "overpowered s": 0.0}
     for k in range(5, len(record.time)):
-        angles, time_s = record.joints[k], record.time[k]
+        angles, time_s = joints[k], record.time[k]
         beyond = max(max(low - q, q - high) for q, (low, high) in zip(angles, RANGE_RAD))
         speed = math.dist(record.steel[k], record.steel[k - 5]) / (time_s - record.time[k - 5])
         if overpowered(device, angles, record.hand[k]):
@@ -172,7 +159,7 @@ def session(seed, folder):
     if done.returncode == 2:
         return {"kind": kind, "refused": done.stderr.strip()[:120], "wrong": []}
     summary = json.loads(done.stdout)
-    figures = {"kind": f"{kind}, {scene}", **judged(Record(folder / "record/signals.csv"))}
+    figures = {"kind": f"{kind}, {scene}", **judged(hunting.Record(folder / "record/signals.csv"))}
     if kind == "step":
         figures["of steps m/s"] = figures.pop("speed m/s")
     figures["faults"] = [fault["fault"] for fault in summary["faults"]]

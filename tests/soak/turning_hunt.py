@@ -5,10 +5,9 @@
 
 Judged by the records alone, with kinematics of the judge's own (tests/command_line/tool_motion.py), the gears' twist by
 gravity taken off. Angles from the start, tilt, twist and turning speed of what is sent must keep the limits, but for the
-rounding to counts. What the simulated steel does is told. Status 1 and the session's files, in `--keep DIR`, where it
-isn't so.
+rounding to counts. What the simulated steel does is told. A hand that pulls too hard ends its session, which is wrong
+unless it does so without these limits, too. Status 1 and the session's files, in `--keep DIR`, where it isn't so.
 """
-import csv
 import json
 import random
 import sys
@@ -39,6 +38,7 @@ def made_cell(chance, name, folder):
         limits |= {"max_tilt_rad": log_uniform(chance, 0.03, 0.4), "max_twist_rad": log_uniform(chance, 0.03, 0.4)}
     lines = "".join(f"  {key}: {value:.6g}\n" for key, value in limits.items())
     (folder / "cell.yaml").write_text(text.replace("\nlimits:\n", f"\nlimits:\n{lines}", 1))
+    (folder / "loose.yaml").write_text(text.replace("\nlimits:\n", "\nlimits:\n  max_turn_rad: 3\n", 1))
     return limits
 
 
@@ -87,9 +87,8 @@ def figures(turns, time_s):
             "max_turning_speed_rad_per_s": (steps / numpy.diff(time_s)).max()}
 
 
-def steel_turns(rows, at):
-    q = numpy.array([[float(row[at[f"true_tool_W_q{part}"]]) for part in "xyzw"] for row in rows])
-    x, y, z, w = q.T
+def steel_turns(record):
+    x, y, z, w = numpy.array(record.vectors("true_tool", "", ("qx", "qy", "qz", "qw"))).T
     return numpy.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]).transpose(2, 0, 1)
@@ -102,28 +101,29 @@ def session(seed, folder):
     limits = made_cell(chance, name, folder)
     (folder / "hand.yaml").write_text(made_hand(chance))
     period_ms = chance.choice((1, 1, 1, 2))
-    done = hunting.run(folder / "cell.yaml", SOURCE / "scenes/free.yaml",
-                       ["--hand", folder / "hand.yaml", "--inertia", f"{chance.uniform(0.05, 0.15):.3g}", "--mass",
-                        f"{chance.uniform(5, 12):.3g}", "--timestep", f"{period_ms}ms", "--duration", f"{DURATION_S}s"],
-                       folder / "record")
+    arguments = ["--hand", folder / "hand.yaml", "--inertia", f"{chance.uniform(0.05, 0.15):.3g}", "--mass",
+                 f"{chance.uniform(5, 12):.3g}", "--timestep", f"{period_ms}ms", "--duration", f"{DURATION_S}s"]
+    done = hunting.run(folder / "cell.yaml", SOURCE / "scenes/free.yaml", arguments, folder / "record")
     if done.returncode not in (0, 1) or not done.stdout:
         return {"refused": done.stderr.strip()[-150:]}
     summary = json.loads(done.stdout)
     cell = tool_motion.Cell(folder / "cell.yaml")
-    with open(folder / "record/signals.csv", newline="") as text:
-        rows = csv.reader(text)
-        at = {key: i for i, key in enumerate(next(rows))}
-        rows = [row for row in rows if row[at["phase"]] == "rendering"]
-    time_s = numpy.array([float(row[at["time_s"]]) for row in rows])
-    motors = [numpy.array([cell.angle(i, float(row[at[f"{joint}_target_counts"]])) for row in rows])
+    record = hunting.Record(folder / "record/signals.csv")
+    time_s = numpy.array(record.time)
+    motors = [numpy.array([cell.angle(i, counts) for counts in record.column(f"{joint}_target_counts")])
               for i, joint in enumerate(cell.joints)]
-    sent, steel = figures(turned_tool(cell, motors), time_s), figures(steel_turns(rows, at), time_s)
-    wrong = [fault["fault"] for fault in summary["faults"]]
+    sent, steel = figures(turned_tool(cell, motors), time_s), figures(steel_turns(record), time_s)
+    faults, hands = {fault["fault"] for fault in summary["faults"]}, set()
+    if faults:
+        loose = hunting.run(folder / "loose.yaml", SOURCE / "scenes/free.yaml", arguments, folder / "loose")
+        hands = {fault["fault"] for fault in json.loads(loose.stdout)["faults"]} & {"force_excessive"}
+    wrong = sorted(faults - hands)
     for key, limit in limits.items():
         more = COUNTS_RAD_PER_S / period_ms if "speed" in key else ANGLE_RAD
         if sent[key] > limit + more:
             wrong.append(f"sent {key} {sent[key]:.6g} of {limit:.6g}")
-    out = {"cell": name, "cycles": len(rows), "wrong": wrong, "guarded": summary["guarded_cycles"],
+    out = {"cell": name, "cycles": len(time_s), "wrong": wrong, "pulled": bool(faults & hands),
+           "guarded": summary["guarded_cycles"],
            "lasts": summary["oscillation"]["lasts"]}
     out |= {f"{what} {key}": figure[key] - limit for key, limit in limits.items()
             for what, figure in (("sent", sent), ("steel", steel))}
@@ -134,7 +134,8 @@ def main():
     results = hunting.sessions(hunting.options(__doc__, cycles=100_000), session)
     ran = [r for _, r in results if "refused" not in r]
     words = (f"; {sum(r['cycles'] for r in ran)} cycles, the last guard acted in {sum(r['guarded'] for r in ran)} of "
-             f"{sum(bool(r['guarded']) for r in ran)} sessions; {sum(bool(r['lasts']) for r in ran)} oscillated for long")
+             f"{sum(bool(r['guarded']) for r in ran)} sessions; {sum(bool(r['lasts']) for r in ran)} oscillated for long; "
+             f"{sum(r['pulled'] for r in ran)} ended by a hand that pulls too hard without these limits, too")
     beyond = sorted({key for r in ran for key in r if key.startswith(("sent", "steel"))})
     return hunting.tell(results, beyond, words)
 
