@@ -2,9 +2,13 @@
 import cmath
 import csv
 import math
+import sys
 import unittest
 
 from harness import SOURCE, ProgramTest
+
+sys.path.insert(0, str(SOURCE / "tests/soak"))
+import turning_hunt  # noqa: E402
 
 PERIOD_S = 1e-3
 # About each axis, x y z: whole periods in four seconds, below 2 Hz.
@@ -408,6 +412,13 @@ class Turning(ProgramTest):
                 self.assertLess(max(beyond(row, of) for row in rows), more_rad, (limits, of))
             # At rest by what a wall yields: 1 µrad.
             self.assertLess(max(beyond(row) for row in rows[-1000:]), 2e-6, limits)
+
+    def test_seven_axes_led_quickly_turn_the_tool_no_faster_than_a_small_limit(self):
+        # The story: a step's sixteen half-spaces filled up, others were dropped, and the tool turned 0.3 rad/s faster.
+        figures = turning_hunt.session("601/223", self.folder / "hunted")
+        self.assertEqual(figures["wrong"], [])
+        self.assertEqual(figures["guarded"], 0)
+        self.assertLess(figures["sent max_turning_speed_rad_per_s"], 0.0)
 
     def test_what_limits_of_tilt_cannot_be(self):
         for limits, told in (("  max_tilt_rad: 4\n", "max_tilt_rad"), ("  max_twist_rad: -1\n", "max_twist_rad"),

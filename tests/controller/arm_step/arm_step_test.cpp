@@ -210,8 +210,7 @@ TEST(ArmStep, AStepThatNoSetTouchesIsTheInverseKinematics) {
   EXPECT_EQ(step.programs(), 0u);
 }
 
-// The story: the sixteen half-spaces of a step filled up where many sets bent, further ones were dropped without a
-// word, and a tool held to 0.09 rad/s turned at 0.4. 1e-4 rad/s: what steps that are linearised leave.
+// 1e-4 rad/s: what steps that are linearised leave.
 TEST(ArmStep, SevenAxesThatAreQuickTurnTheToolNoFasterThanItsLimit) {
   const description::Cell cell = tests::shipped_cell("seven");
   const models::Arm arm(cell);
