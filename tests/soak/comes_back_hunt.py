@@ -29,9 +29,9 @@ NEAR_M = 1e-3
 LEAST_J, SHARE = 1e-3, 1e-3
 
 
-def made_hand(chance):
-    """The text of a hand, and when its way has ended."""
-    stiffness, most_N = log_uniform(chance, 100, 3000), log_uniform(chance, 5, 150)
+def made_hand(chance, least_N):
+    """The text of a hand, when its way has ended, its largest force, and its damping."""
+    stiffness, most_N = log_uniform(chance, 100, 3000), log_uniform(chance, least_N, 150)
     way = direction(chance)
     reach = min(1.5, 0.3 + log_uniform(chance, 0.05, 1.2))
     # Slower than the tool's limit of 0.5 m/s.
@@ -49,13 +49,16 @@ def made_hand(chance):
     return "\n".join(lines) + "\n", points[-1][0], most_N, float(lines[3].split()[1])
 
 
+def least_mass_kg(cell):
+    """Of shipped cells 4 kg, of others the one that they advise."""
+    return 4.0 if SOURCE in cell.parents else number_in(cell.read_text(), "default_mass_kg", 4.0)
+
+
 def made_arguments(chance, cell, most_N):
-    text = cell.read_text()
-    shipped = SOURCE in cell.parents
-    least_kg = 4.0 if shipped else number_in(text, "default_mass_kg", 4.0)
+    least_kg = least_mass_kg(cell)
     most_kg = max(1.025 * least_kg, min(20.0, most_N / 2))  # led by 2 m/s² at least
     arguments = ["--timestep", f"{chance.choice((1, 1, 2, 4))}ms", "--mass", f"{log_uniform(chance, least_kg, most_kg):.4g}"]
-    if not shipped or cell.stem in ("default", "cobot", "seven"):
+    if SOURCE not in cell.parents or cell.stem in ("default", "cobot", "seven"):
         arguments += ["--orientation", chance.choice(("held", "held", "free"))]
     if chance.random() < 0.4:
         arguments += ["--lookahead", "auto"]
@@ -101,7 +104,8 @@ def session(seed, folder, cells):
     chance = random.Random(seed)
     folder.mkdir()
     cell = chance.choice(cells)
-    hand, ended_s, most_N, damping = made_hand(chance)
+    least_N = 5.0 if SOURCE in cell.parents else max(5.0, min(100.0, 2.0 * least_mass_kg(cell)))
+    hand, ended_s, most_N, damping = made_hand(chance, least_N)
     (folder / "hand.yaml").write_text(hand)
     arguments = made_arguments(chance, cell, most_N)
     # A mass on the hand's spring swings on without any limit: it falls to 1e-4 of a metre in 9 of its time constants.
