@@ -239,7 +239,7 @@ double ArmStep::place_bound() const noexcept {
   return std::max(std::max(0.0, share * (margin_.value() - margin_.least())), least(-margin_.gradient()));
 }
 
-// Of the inverse kinematics' solution.
+// `u` is the step to the inverse kinematics' solution.
 bool ArmStep::allows(const JointVector& u) const noexcept {
   if (!box_.contains(u)) return false;
   if (margin_.near() && -margin_.gradient().dot(u) > place_bound() + rounding_rad) return false;
@@ -407,7 +407,7 @@ bool ArmStep::add_row(const JointVector& a, double b, Limit limit, const JointVe
   return true;
 }
 
-// Of the half-spaces: the one that this step keeps by the most.
+// The half-space that this step is furthest within.
 std::size_t ArmStep::slackest_row(const JointVector& step) const noexcept {
   std::size_t slackest = 0;
   double most = 0.0;

@@ -71,9 +71,7 @@ int prove_command(const ProveOptions& options) {
   require_carried(session, options.run);
   const std::filesystem::path file = options.out.empty() ? proof_path(session.cell) : options.out;
   if (options.bus_loss) {
-    RunOptions of_arm = options.run;
-    if (!options.arm.empty()) of_arm.cell = options.arm;
-    return prove_bus_loss(session, prepared(of_arm), options.run, file);
+    return prove_bus_loss(session, arm_to_prove(options.run, options.arm, prepared), options.run, file);
   }
   const ProofOutcome outcome = prove_arm(session, options.run, options.arm, prepared);
   const std::string failure = failure_of(session, outcome);

@@ -85,7 +85,7 @@ class Measurement {
 
   // The tool behind the sensor, from the next reading on.
   void set_tool(const HeldTool& tool) noexcept { compensation_.set_tool(tool.mass_kg, tool.centre_S); }
-  // What is there to judge other figures of the tool by, when those that are `wanted` now have been faded in.
+  // By which other figures of the tool are judged, as if those that are `wanted` now had been faded in.
   [[nodiscard]] ToolEvidence tool_evidence(const HeldTool& wanted, const SessionSettings& settings) const noexcept;
 
   // The period of the cycles to come. What is counted in cycles is converted to the new ones.

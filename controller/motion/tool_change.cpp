@@ -24,6 +24,10 @@ double most_read(const Vec3& read, const Vec3& change, double open) noexcept {
 
 }  // namespace
 
+HeldTool held_tool(const description::ToolDescription& tool) noexcept {
+  return {tool.mass_kg, Vec3(tool.centre_of_mass_S_m.data()), Vec3(tool.handle_S.position_m.data())};
+}
+
 const char* ToolDoubt::text(Why why) noexcept {
   switch (why) {
     case Why::none:
@@ -85,8 +89,7 @@ ToolEvidence ToolEvidence::of(const Numbers& numbers) noexcept {
 }
 
 ToolChange::ToolChange(const description::ToolDescription& tool) : tool_(tool) {
-  state_.wanted = {tool.mass_kg, Vec3(tool.centre_of_mass_S_m.data()), Vec3(tool.handle_S.position_m.data())};
-  state_.from = state_.present = state_.wanted;
+  state_.from = state_.present = state_.wanted = held_tool(tool);
 }
 
 void ToolChange::take(const HeldTool& wanted, const Wrench& change) noexcept {

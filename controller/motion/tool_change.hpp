@@ -31,7 +31,10 @@
 
 namespace proxarm::controller {
 
-// What the sensor shows against figures of the tool.
+// The tool of a cell.
+[[nodiscard]] HeldTool held_tool(const description::ToolDescription& tool) noexcept;
+
+// Why the sensor denies figures of the tool.
 struct ToolDoubt {
   enum class Why : std::uint8_t { none, zero, force, torque };
   Why why = Why::none;
@@ -42,7 +45,7 @@ struct ToolDoubt {
   [[nodiscard]] static const char* text(Why why) noexcept;
 };
 
-// What there is to judge figures by; vectors are in S.
+// The sensor's readings by which figures are judged; vectors are in S.
 struct ToolEvidence {
   using Numbers = std::array<double, 17>;
 
@@ -72,7 +75,7 @@ class ToolChange {
   bool step(double period_s) noexcept;
   [[nodiscard]] const HeldTool& wanted() const noexcept { return state_.wanted; }
   [[nodiscard]] const HeldTool& present() const noexcept { return state_.present; }
-  // Of a tool with these figures; its inertia about its centre of mass is the cell's.
+  // The inertia about T with these figures, the one about the centre of mass staying the cell's.
   [[nodiscard]] models::ToolInertia about_T(const HeldTool& figures) noexcept;
 
   void archive(fieldbus::StateArchive& state) noexcept { archive_fields(state, state_); }

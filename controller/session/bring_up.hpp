@@ -36,10 +36,10 @@ void require_scheme(const description::Cell& cell, const SessionSettings& settin
 // build_parts() finds the same in its parts.
 void require_timestep(const description::Cell& cell, const SessionSettings& settings);
 
-// What the hand feels of the tool's rotation, what is behind the sensor included: as asked, or the default above it.
-// Of a tool with a shape: throws SetupError where what hangs behind the sensor has more inertia than is to be felt.
+// Throws SetupError where more inertia hangs behind the sensor of a tool with a shape than is to be felt.
 void require_felt(const description::Cell& cell, const SessionSettings& settings);
 
+// What the hand feels of the tool's rotation, what is behind the sensor included: as asked, or the default above it.
 double felt_inertia_kg_m2(const description::Cell& cell, const SessionSettings& settings);
 
 // `scene` must outlive the parts.

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "models/arm/arm_urdf.hpp"
+#include "models/arm/tool_inertia.hpp"
 #include "models/base/setup_error.hpp"
 #include "models/base/text.hpp"
 #include "models/files/yaml_file.hpp"
@@ -247,11 +248,8 @@ void Arm::read_tool(const Cell& cell, const Pose& X_nL) {
   X_nS_ = X_nL * to_pose(cell.sensor.pose_link);
   X_nT_ = X_nS_ * to_pose(cell.tool.handle_S);
   const auto& c = cell.tool.centre_of_mass_S_m;
-  const auto& i = cell.tool.inertia_kg_m2;
-  Mat3 inertia_S;
-  inertia_S << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
   bare_ = links_[static_cast<std::size_t>(axes_ - 1)];
-  tool_inertia_ = X_nS_.linear() * inertia_S * X_nS_.linear().transpose();
+  tool_inertia_ = X_nS_.linear() * inertia_about_centre_S(cell.tool) * X_nS_.linear().transpose();
   set_tool(cell.tool.mass_kg, Vec3(c[0], c[1], c[2]));
 }
 

@@ -5,11 +5,16 @@
 
 namespace proxarm::models {
 
+Mat3 inertia_about_centre_S(const description::ToolDescription& tool) noexcept {
+  const auto& I = tool.inertia_kg_m2;
+  Mat3 inertia;
+  inertia << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
+  return inertia;
+}
+
 ToolInertia tool_about_T(const description::ToolDescription& tool) noexcept {
   const Mat3 R_ST = to_pose(tool.handle_S).linear();
-  const auto& I = tool.inertia_kg_m2;
-  Mat3 about_centre_S;
-  about_centre_S << I[0], I[3], I[4], I[3], I[1], I[5], I[4], I[5], I[2];
+  const Mat3 about_centre_S = inertia_about_centre_S(tool);
   const Vec3 r_S = Vec3(tool.centre_of_mass_S_m.data()) - Vec3(tool.handle_S.position_m.data());
   // Steiner: I_T = I_C + m (r·r E − r rᵀ)
   const Mat3 about_T_S = about_centre_S + tool.mass_kg * (r_S.squaredNorm() * Mat3::Identity() - r_S * r_S.transpose());

@@ -14,6 +14,9 @@ struct ToolInertia {
   double largest_kg_m2 = 0.0;         // about any axis through T
 };
 
+// About the tool's centre of mass, along S's axes: the cell's six numbers as a matrix.
+Mat3 inertia_about_centre_S(const description::ToolDescription& tool) noexcept;
+
 ToolInertia tool_inertia(const description::ToolDescription& tool);
 // The same without `largest_kg_m2`, for the cycle: neither allocates, locks nor throws.
 ToolInertia tool_about_T(const description::ToolDescription& tool) noexcept;

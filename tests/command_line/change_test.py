@@ -15,6 +15,7 @@ import time
 import unittest
 
 from harness import AXES, SOURCE, ProgramTest, program
+from steel import NOBODY
 
 sys.path.insert(0, str(SOURCE / "tests/soak"))
 from identify_hunt import rooted  # noqa: E402
@@ -177,13 +178,6 @@ waypoints:
   - {time_s: 9.0, offset_m: [0.03, 0, 0], turn_rad: [0.3, 0, 0]}
   - {time_s: 10.0, offset_m: [0, 0.03, 0], turn_rad: [0, -0.35, 0.2]}
   - {time_s: 12.0, offset_m: [0, 0.03, 0], turn_rad: [0, -0.35, 0.2]}
-"""
-NOBODY = """name: nobody
-mass_kg: 0
-stiffness_N_per_m: 0
-damping_Ns_per_m: 0
-waypoints:
-  - {time_s: 0.3, offset_m: [0, 0, 0]}
 """
 HEAVIER = (("  mass_kg: 0.25\n", "  mass_kg: 0.75\n"), ("centre_of_mass_S_m: [0, 0, 0.06]", "centre_of_mass_S_m: [0.01, 0, 0.09]"))
 

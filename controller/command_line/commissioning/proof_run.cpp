@@ -156,12 +156,16 @@ PreparedSession session_to_prove(const RunOptions& options, const std::filesyste
   return session;
 }
 
+PreparedSession arm_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare) {
+  RunOptions of_arm = options;
+  if (!arm.empty()) of_arm.cell = arm;
+  return prepare(of_arm);
+}
+
 ProofOutcome prove_arm(const PreparedSession& session, const RunOptions& options, const std::filesystem::path& arm,
                        PrepareSession prepare, const proof::Task& task) {
   if (!options.bus.simulated()) return prove_on_interfaces(session, options, task);
-  RunOptions of_arm = options;
-  if (!arm.empty()) of_arm.cell = arm;
-  return prove_simulated(session, prepare(of_arm), options, task);
+  return prove_simulated(session, arm_to_prove(options, arm, prepare), options, task);
 }
 
 }  // namespace proxarm::command_line

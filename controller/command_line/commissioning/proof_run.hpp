@@ -31,13 +31,16 @@ ProofOutcome prove_simulated(const PreparedSession& session, const PreparedSessi
 ProofOutcome prove_on_interfaces(const PreparedSession& session, const RunOptions& options,
                                  const proof::Task& task = {});
 
-// What makes a session of a command's options. Throws SetupError.
+// Makes a session of a command's options. Throws SetupError.
 using PrepareSession = PreparedSession (*)(const RunOptions& options);
 
 // The session of a command that is about to move the arm, once what forbids that has been asked for: a real arm without
 // --hardware, what only a simulation has on interfaces, a missing enabling switch, a bus that can't carry it. `arm`:
 // the cell of the simulated arm; empty: the command's own. Throws SetupError.
 PreparedSession session_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
+
+// The simulated arm's session: of the cell `arm`, or of the command's own where that is empty. Throws SetupError.
+PreparedSession arm_to_prove(const RunOptions& options, const std::filesystem::path& arm, PrepareSession prepare);
 
 // prove_simulated() where the bus is simulated, else prove_on_interfaces().
 ProofOutcome prove_arm(const PreparedSession& session, const RunOptions& options, const std::filesystem::path& arm,

@@ -125,10 +125,6 @@ std::optional<Change> change_of_object(const std::string& text, const scenes::Sc
   return change;
 }
 
-controller::HeldTool held(const description::ToolDescription& tool) {
-  return {tool.mass_kg, models::Vec3(tool.centre_of_mass_S_m.data()), models::Vec3(tool.handle_S.position_m.data())};
-}
-
 fs::path control_path(const RunOptions& options) {
   return options.control == "default" ? default_control_path() : options.control;
 }
@@ -248,7 +244,8 @@ controller::Change LiveParameters::take_tool(const std::string& text) {
 
 void LiveParameters::require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const {
   using Why = controller::ToolDoubt::Why;
-  const controller::HeldTool from = held(before.session_.cell.tool), to = held(session_.cell.tool);
+  const controller::HeldTool from = controller::held_tool(before.session_.cell.tool);
+  const controller::HeldTool to = controller::held_tool(session_.cell.tool);
   const controller::ToolDoubt doubt = seen.doubt(from, to);
   if (doubt.why == Why::none) return;
   const std::string key = from.mass_kg != to.mass_kg ? "tool_mass" : "tool_centre_m";

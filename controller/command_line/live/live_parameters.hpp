@@ -24,7 +24,7 @@ class LiveParameters {
 
   // Throws SetupError.
   controller::Change take(const std::string& text);
-  // What the session's sensor shows against the tool that `before` didn't have yet. Throws SetupError.
+  // Throws SetupError where the session's sensor denies the tool that has changed since `before`.
   void require_tool(const LiveParameters& before, const controller::ToolEvidence& seen) const;
   // "timestep=2ms".
   [[nodiscard]] static bool is_timestep(const std::string& text);

@@ -2,6 +2,8 @@
 
 #include <Eigen/LU>
 
+#include "models/arm/tool_inertia.hpp"
+
 namespace proxarm::identification {
 namespace {
 
@@ -19,13 +21,6 @@ Eigen::MatrixXd gravity_stiffness(const models::Arm& arm, const JointVector& lin
     G.col(joint) = (arm.gravity_torque(high) - arm.gravity_torque(low)) / (2.0 * step_rad);
   }
   return G;
-}
-
-Mat3 inertia_of(const description::ToolDescription& tool) {
-  const auto& i = tool.inertia_kg_m2;
-  Mat3 I;
-  I << i[0], i[3], i[4], i[3], i[1], i[5], i[4], i[5], i[2];
-  return I;
 }
 
 }  // namespace
@@ -47,7 +42,8 @@ LinkResponse::LinkResponse(const description::Cell& cell, const models::Arm& arm
     const Vec3 turn_W = at.J_W.col(joint).tail<3>();
     const Vec3 centre_W = at.J_W.col(joint).head<3>() + turn_W.cross(from_T_W);
     const Vec3 force_a = -m * (R_SW * centre_W), force_q = -m * (R_SW * turn_W.cross(g_W));
-    per_acceleration_.col(joint) << force_a, c_S.cross(force_a) - inertia_of(cell.tool) * (R_SW * turn_W);
+    per_acceleration_.col(joint) << force_a,
+        c_S.cross(force_a) - models::inertia_about_centre_S(cell.tool) * (R_SW * turn_W);
     per_angle_.col(joint) << force_q, c_S.cross(force_q);
   }
 }
