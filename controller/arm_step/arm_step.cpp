@@ -317,7 +317,7 @@ bool ArmStep::cut(const Vec3& q_W, const Vec3& q_k1_W, LimitPlane<3>& out) noexc
   // J_w u = `wanted` carries the wrist to where the tool at q_W has it.
   const Vec3 here_W = model_.at.X_WT.translation() + wrist_.from_T_W;
   const auto wanted_for = [&](const Vec3& from_T_W) { return q_W + from_T_W - here_W + wrist_.J_W * model_.u; };
-  Vec3 wanted = wanted_for(wrist_wanted_W_);
+  Vec3 wanted = wanted_for(wrist_wanted_W_) - wrist_.by_turning_W * turn_from(model_, aim_);
   if (can_carry_wrist(wanted)) return false;
   if (!start_.held) {
     wanted = wanted_for(wrist_.from_T_W);

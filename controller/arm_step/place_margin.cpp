@@ -8,6 +8,7 @@
 namespace proxarm::controller {
 
 using models::JointVector;
+using models::Mat3;
 using models::Vec3;
 
 namespace {
@@ -18,6 +19,11 @@ constexpr double least_m_per_rad = 0.05, share_of_start = 0.5;
 constexpr double near_times = 3.0;
 // Of the finite differences of J_w, which is exact to 1e-16 m: the error is 1e-6 of ∂J_w/∂c by each of the two causes.
 constexpr double nudge_rad = 1e-6;
+// Axes that pass the wrist's origin within this meet there: a URDF's digits of a right angle are off by 1e-9 rad.
+constexpr double meeting_m = 1e-6;
+// Of the inverse that turns the tool back, rad/rad: where the sine of the wrist's middle angle is less, the tool turns
+// later instead. With 0.03, σ changed so fast there that its border led the tool against the hand.
+constexpr double damped_at = 0.3;
 
 }  // namespace
 
@@ -32,20 +38,49 @@ PlaceMargin::PlaceMargin(const models::Arm& arm, const models::ToolSpace& space)
   }
   models::ToolKinematics at;
   arm.kinematics(arm.start_rad(), at);
+  apart_ = axes >= 6 && !axes_meet(at);
   least_ = std::min(least_m_per_rad, share_of_start * smallest(wrist(at).J_W).value);
   near_below_ = near_times * least_;
   from_rad_ = arm.start_rad();
 }
 
+bool PlaceMargin::axes_meet(const models::ToolKinematics& at) const noexcept {
+  const Vec3 from_T_W = at.joint_W[wrist_] - at.X_WT.translation();
+  for (Eigen::Index i = 0; i < at.J_W.cols(); ++i) {
+    if (carries(i)) continue;
+    const Vec3 moves_W = at.J_W.col(i).head<3>() + Vec3(at.J_W.col(i).tail<3>()).cross(from_T_W);
+    if (moves_W.norm() > meeting_m) return false;
+  }
+  return true;
+}
+
 PlaceMargin::Wrist PlaceMargin::wrist(const models::ToolKinematics& at) const noexcept {
-  Wrist out{at.J_W.topRows<3>(), Vec3::Zero()};
+  Wrist out{.J_W = at.J_W.topRows<3>(), .from_T_W = Vec3::Zero()};
   if (wrist_ == static_cast<std::size_t>(at.J_W.cols())) return out;
   out.from_T_W = at.joint_W[wrist_] - at.X_WT.translation();
   for (Eigen::Index i = 0; i < out.J_W.cols(); ++i) {
     out.J_W.col(i) += Vec3(at.J_W.col(i).tail<3>()).cross(out.from_T_W);
-    if (!carries_[static_cast<std::size_t>(i)]) out.J_W.col(i).setZero();
+  }
+  if (apart_) hold_orientation(at, out);
+  for (Eigen::Index i = 0; i < out.J_W.cols(); ++i) {
+    if (!carries(i)) out.J_W.col(i).setZero();
   }
   return out;
+}
+
+void PlaceMargin::hold_orientation(const models::ToolKinematics& at, Wrist& wrist) const noexcept {
+  Mat3 J_3, J_R3;
+  Eigen::Index k = 0;
+  for (Eigen::Index i = 0; i < at.J_W.cols(); ++i) {
+    if (carries(i)) continue;
+    J_3.col(k) = wrist.J_W.col(i);
+    J_R3.col(k++) = at.J_W.col(i).tail<3>();
+  }
+  const Mat3 squared = J_R3 * J_R3.transpose() + damped_at * damped_at * Mat3::Identity();
+  wrist.by_turning_W = J_3 * J_R3.transpose() * squared.inverse();
+  for (Eigen::Index i = 0; i < at.J_W.cols(); ++i) {
+    if (carries(i)) wrist.J_W.col(i) -= wrist.by_turning_W * at.J_W.col(i).tail<3>();
+  }
 }
 
 PlaceMargin::Smallest PlaceMargin::smallest(const Columns& J) const noexcept {
@@ -61,15 +96,28 @@ PlaceMargin::Smallest PlaceMargin::smallest(const Columns& J) const noexcept {
   return out;
 }
 
-void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& at) noexcept {
-  const double moved = weights_.dot((c_rad - from_rad_).cwiseAbs());
-  if (moved <= clear_) return;
-  measure(c_rad, at);
+// Of three squares λ₁ ≤ λ₂ ≤ λ₃ of singular values, λ₁ ≥ λ₁λ₂λ₃ / ((λ₁ + λ₂ + λ₃)/2)².
+bool PlaceMargin::surely_clear(const Columns& J) const noexcept {
+  const Mat3 squared = J * J.transpose();
+  const double half_sum = 0.5 * squared.trace();
+  return squared.determinant() >= near_below_ * near_below_ * half_sum * half_sum;
 }
 
-// dσ = leftᵀ dJ right. The first joint moves all of the arm as one, and those from the wrist on don't move it: σ stays.
-void PlaceMargin::measure(const JointVector& c_rad, const models::ToolKinematics& at) noexcept {
-  const Columns J = wrist(at).J_W;
+void PlaceMargin::go_to(const JointVector& c_rad, const models::ToolKinematics& at) noexcept {
+  if (apart_) {
+    const Columns J = wrist(at).J_W;
+    near_ = !surely_clear(J);
+    if (near_) measure(c_rad, J);
+    return;
+  }
+  const double moved = weights_.dot((c_rad - from_rad_).cwiseAbs());
+  if (moved <= clear_) return;
+  measure(c_rad, wrist(at).J_W);
+}
+
+// dσ = leftᵀ dJ right. The first joint moves all of the arm as one, and those from the wrist on don't move it where
+// their axes meet: σ stays.
+void PlaceMargin::measure(const JointVector& c_rad, const Columns& J) noexcept {
   const Smallest now = smallest(J);
   from_rad_ = c_rad;
   value_ = now.value;
@@ -77,7 +125,8 @@ void PlaceMargin::measure(const JointVector& c_rad, const models::ToolKinematics
   clear_ = near_ ? -1.0 : value_ - near_below_;
   if (!near_) return;
   models::ToolKinematics beside;
-  for (std::size_t k = 1; k < wrist_; ++k) {
+  const std::size_t last = apart_ ? static_cast<std::size_t>(c_rad.size()) : wrist_;
+  for (std::size_t k = 1; k < last; ++k) {
     const int i = arm_->drive_along_chain(k);
     JointVector c = c_rad;
     c[i] += nudge_rad;

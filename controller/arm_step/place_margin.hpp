@@ -7,10 +7,17 @@
 // joint but one, and the last three joints turn the tool about it. An arm with fewer than six axes has no such wrist:
 // there J_w is that of T in the directions in which T can go (tool_space.hpp).
 //
+// Where the last three axes don't meet in one point, as in many light arms, turning the tool back moves it, too. With
+// the orientation held, the last three joints turn by −J_R⁺ of what the others turn the tool by, so
+//   J_w = J_c − P J_Rc,   P = J_3 J_R3⁺
+// J: of the point of the tool that is at the wrist's origin; c: the joints that carry it, 3: the last three, R: their
+// rotations, and J_R3⁺ the inverse, damped to σ = 0.3 rad/rad.
+//
 // A wrist's own singularity doesn't show in σ: there, turning lags and the place is kept (arm_step.hpp).
 //
 // σ changes by at most |ΔJ_w| ≤ Σ_k w_k |Δc_k|, w_k² = Σ_j C_kj² (C: Arm::path_curvature()), so far from the border it
-// isn't computed in every step. Neither allocates, locks nor throws after construction.
+// isn't computed in every step (with P, which may change fast, a lower bound of it is: from a determinant). Neither
+// allocates, locks nor throws after construction.
 #pragma once
 
 #include <array>
@@ -43,6 +50,8 @@ class PlaceMargin {
   struct Wrist {
     Columns J_W;
     models::Vec3 from_T_W;  // from T to the wrist
+    models::Mat3 by_turning_W =
+        models::Mat3::Zero();  // P: how the wrist moves when the last three joints turn the tool
   };
   [[nodiscard]] Wrist wrist(const models::ToolKinematics& at) const noexcept;
 
@@ -54,13 +63,17 @@ class PlaceMargin {
   };
 
   [[nodiscard]] Smallest smallest(const Columns& J) const noexcept;
-  void measure(const models::JointVector& c_rad, const models::ToolKinematics& at) noexcept;
+  void measure(const models::JointVector& c_rad, const Columns& J) noexcept;
+  [[nodiscard]] bool axes_meet(const models::ToolKinematics& at) const noexcept;
+  void hold_orientation(const models::ToolKinematics& at, Wrist& wrist) const noexcept;
+  [[nodiscard]] bool surely_clear(const Columns& J) const noexcept;
 
   const models::Arm* arm_;
   models::ToolSpace space_;
   models::JointVector weights_;  // w
   std::array<bool, models::max_axes> carries_{};
   std::size_t wrist_ = 0;  // index of the joint whose origin is the wrist; axes(): T itself
+  bool apart_ = false;     // the last three axes don't meet there
   double least_ = 0.0, near_below_ = 0.0;
   models::JointVector from_rad_, gradient_;
   double value_ = 0.0, clear_ = -1.0;

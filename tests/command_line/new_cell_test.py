@@ -108,6 +108,30 @@ class NewCell(ProgramTest):
         self.assertEqual(text.count("estimated by proxarm"), 5)
         self.assertIn("counts_per_motor_revolution: 1048576\n", (self.folder / "mine/cell.yaml").read_text())
 
+    def test_takes_efforts_that_move_the_arm_and_names_those_that_dont(self):
+        # Of a vertical axis gravity says nothing, so 0.12 Nm hold it; but they don't move what is on it. A wrist's 9 Nm
+        # are far more than its own link takes, and true all the same.
+        text = arm(SIX, inertial={i: BODY.format("0.15") for i in range(1, 7)})
+        for joint, effort in ((1, 0.12), (2, 700), (6, 9)):
+            head, mark, tail = text.partition(f'<joint name="joint_{joint}"')
+            text = head + mark + tail.replace('effort="0"', f'effort="{effort}"', 1)
+        told = self.make(text)
+        self.assertRegex(told, r"joint joint_1: its effort of 0.12 Nm can't .*: \d+ is taken")
+        for joint in (2, 6):
+            self.assertNotIn(f"joint_{joint}: its effort", told)
+        cell = (self.folder / "mine/cell.yaml").read_text()
+        drives = cell.split("  - joint: ")[1:]
+        number = lambda drive, key: float(re.search(rf"\n    {key}: (\S+)", drives[drive]).group(1))
+        self.assertGreater(number(0, "max_torque_Nm"), 50)
+        self.assertEqual(number(1, "max_torque_Nm"), 700)
+        self.assertEqual(number(5, "max_torque_Nm"), 9)
+        # To full speed in a 15th of a second where the torque is estimated for it, later where it is given.
+        self.assertAlmostEqual(number(0, "max_acceleration_rad_per_s2"), 15 * number(0, "max_speed_rad_per_s"), delta=0.5)
+        self.assertLess(number(1, "max_acceleration_rad_per_s2"), 14 * number(1, "max_speed_rad_per_s"))
+        force_N = float(re.search(r"max_force_N: (\S+)", cell).group(1))
+        self.assertGreaterEqual(force_N, 60)
+        self.assertLessEqual(force_N, 200)
+
     def test_finds_meshes_of_packages(self):
         package = self.folder / "ros/made_description"
         package.mkdir(parents=True)

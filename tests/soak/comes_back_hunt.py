@@ -29,9 +29,9 @@ NEAR_M = 1e-3
 LEAST_J, SHARE = 1e-3, 1e-3
 
 
-def made_hand(chance, least_N):
+def made_hand(chance, least_N, strongest_N):
     """The text of a hand, when its way has ended, its largest force, and its damping."""
-    stiffness, most_N = log_uniform(chance, 100, 3000), log_uniform(chance, least_N, 150)
+    stiffness, most_N = log_uniform(chance, 100, 3000), log_uniform(chance, min(least_N, strongest_N), strongest_N)
     way = direction(chance)
     reach = min(1.5, 0.3 + log_uniform(chance, 0.05, 1.2))
     # Slower than the tool's limit of 0.5 m/s.
@@ -100,12 +100,12 @@ def against_the_hand(record, mass_kg, delay_s):
     return worst
 
 
-def session(seed, folder, cells):
+def session(seed, folder, cells, strongest_N):
     chance = random.Random(seed)
     folder.mkdir()
     cell = chance.choice(cells)
     least_N = 5.0 if SOURCE in cell.parents else max(5.0, min(100.0, 2.0 * least_mass_kg(cell)))
-    hand, ended_s, most_N, damping = made_hand(chance, least_N)
+    hand, ended_s, most_N, damping = made_hand(chance, least_N, strongest_N)
     (folder / "hand.yaml").write_text(hand)
     arguments = made_arguments(chance, cell, most_N)
     # A mass on the hand's spring swings on without any limit: it falls to 1e-4 of a metre in 9 of its time constants.
@@ -145,7 +145,7 @@ def session(seed, folder, cells):
 
 def main():
     given = hunting.options(__doc__, cells=CELLS)
-    results = hunting.sessions(given, session, given.cell)
+    results = hunting.sessions(given, session, given.cell, given.strongest_N)
     words = (f"; oscillating for long: {sum('oscillates' in r for _, r in results)}; at the end of a joint's range at last: "
              f"{sum(bool(r.get('cornered')) for _, r in results)}")
     return hunting.tell(results, ("off mm", "against mJ", "push J", "far m"), words)

@@ -78,6 +78,7 @@ def options(doc, sessions=100, cycles=None, cells=()):
     parser.add_argument("--keep", type=pathlib.Path, help="folder for the files of wrong sessions")
     if cells:
         parser.add_argument("--cell", action="append", metavar="FILE", help=f"instead of {', '.join(cells)}")
+        parser.add_argument("--strongest-N", type=float, default=150.0, help="of the hands; less for a weak arm's cell")
     given = parser.parse_args()
     if cells:
         given.cell = [pathlib.Path(file).resolve() for file in given.cell or ()] or [

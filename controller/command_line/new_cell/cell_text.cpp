@@ -116,15 +116,15 @@ std::string cell_text(const description::Cell& cell, const std::vector<std::stri
           "  link: " + scalar(cell.sensor.link) +
           "\n  # z of the sensor points out of the arm, along its last joint's axis.\n  pose_link: " +
           pose(cell.sensor.pose_link) + "\n  noise_N: 0.02\n  noise_Nm: 0.001\n";
-  text +=
-      "\nlimits:\n  max_tool_speed_m_per_s: 0.5\n  max_tool_acceleration_m_per_s2: 20\n  max_force_N: 200\n"
-      "  leash_m: 0.02\n  setpoint_bandwidth_Hz: " +
-      number(cell.limits.setpoint_bandwidth_Hz) + "\n\nreceive_window: " + number(cell.receive_window) +
-      "  # of the timestep, until which the sensor's and the drives' frames are taken\ndefault_period_s: " +
-      number(cell.default_period_s) +
-      "\n# A quarter more than the least mass that is stable with margins and steady on the simulated arm (tune).\n"
-      "default_mass_kg: " +
-      number(cell.default_mass_kg) + "\n";
+  text += "\nlimits:\n  max_tool_speed_m_per_s: 0.5\n  max_tool_acceleration_m_per_s2: 20\n  max_force_N: " +
+          number(cell.limits.max_force_N) +
+          "  # what its joints bear in their worst pose, 60 to 200\n  leash_m: 0.02\n  setpoint_bandwidth_Hz: " +
+          number(cell.limits.setpoint_bandwidth_Hz) + "\n\nreceive_window: " + number(cell.receive_window) +
+          "  # of the timestep, until which the sensor's and the drives' frames are taken\ndefault_period_s: " +
+          number(cell.default_period_s) +
+          "\n# A quarter more than the least mass that is stable with margins and steady on the simulated arm (tune).\n"
+          "default_mass_kg: " +
+          number(cell.default_mass_kg) + "\n";
   if (cell.default_damping_Ns_per_m > 0.0) {
     text += "# With it the mass is stable; without, a larger one would be.\ndefault_damping_Ns_per_m: " +
             number(cell.default_damping_Ns_per_m) + "\n";

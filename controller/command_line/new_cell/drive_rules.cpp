@@ -19,6 +19,13 @@ constexpr int poses = 200;
 constexpr double rotor_share = 0.5, least_rotor_share = 0.03;
 constexpr double gear_Hz = 25.0, stiffest_gear_Hz = 150.0, least_stiffness_share = 0.1, damping_ratio = 0.05;
 constexpr double hand_N = 100.0;
+// Of a drive's torque, what friction and the speeds of the other joints leave, and how far links' masses may be off.
+constexpr double torque_share = 0.9, weight_margin = 1.2;
+// Of limits.max_force_N: what sensor and handle bear, and what the hands need that a cell is tried with.
+constexpr double most_force_N = 200.0, least_force_N = 60.0;
+// Accelerations as shares of the speed: the usual one (a 15th of a second to full speed), and the least that a drive is
+// believed to be made for.
+constexpr double usual_per_s = 15.0, least_per_s = 3.0;
 constexpr double fastest_rad_per_s = 4.0, fastest_m_per_s = 1.0, usual_rad_per_s = 2.0, usual_m_per_s = 0.5;
 
 struct Load {
@@ -54,6 +61,11 @@ double rounded(double x) {
   return std::round(x / unit) * unit;
 }
 
+double rounded_down(double x) {
+  const double unit = std::pow(10.0, std::floor(std::log10(x)) - 1.0);
+  return std::floor(x / unit) * unit;
+}
+
 // What a cell may say of a drive ends somewhere, and arms of kilometres or of a thousand tons are mistakes.
 void require_possible(const models::Arm& arm, const description::DriveDescription& drive, const fs::path& urdf) {
   constexpr double most_Nm = 1e6;  // of max_torque_Nm in cell files
@@ -68,10 +80,34 @@ void require_possible(const models::Arm& arm, const description::DriveDescriptio
                                            "arm weighs where the URDF doesn't"});
 }
 
+// The drive's torque, and the acceleration that it has for it in the worst pose, with the arm's weight on it.
+void choose_torque(const ChainJoint& joint, const Load& load, double rotor, description::DriveDescription& drive,
+                   std::vector<std::string>& remarks) {
+  const double inertia = load.most_inertia + rotor, speed = drive.max_speed_rad_per_s;
+  const double usual = usual_per_s * speed, weight_Nm = weight_margin * load.most_gravity;
+  const double needed = (weight_Nm + inertia * usual) / torque_share + hand_N * load.most_lever;
+  const auto left_for = [&](double torque_Nm) { return (torque_share * torque_Nm - weight_Nm) / inertia; };
+  const bool plausible = left_for(joint.max_effort) >= least_per_s * speed;
+  drive.max_torque_Nm = plausible ? joint.max_effort : rounded(needed);
+  drive.max_acceleration_rad_per_s2 = rounded_down(std::min(usual, left_for(drive.max_torque_Nm)));
+  if (plausible || !(joint.max_effort > 0.0)) return;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "joint %.60s: its effort of %.3g %s can't bear the arm and bring it to its speed in a third of a second: "
+      "%g is taken",
+      joint.name.c_str(), joint.max_effort, joint.slides ? "N" : "Nm", drive.max_torque_Nm);
+  remarks.emplace_back(text);
+}
+
 }  // namespace
 
-void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints, const fs::path& urdf) {
+std::vector<std::string> size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints,
+                                     const fs::path& urdf) {
+  std::vector<std::string> remarks;
   const models::Arm arm(cell);
+  double bears_N = most_force_N;
+  std::string weakest;
   const std::vector<Load> loads = loads_of(arm);
   double heaviest = 0.0;  // of the joints that turn
   for (std::size_t i = 0; i < joints.size(); ++i) {
@@ -89,12 +125,12 @@ void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints,
     const double usual = joint.slides ? usual_m_per_s : usual_rad_per_s;
     drive.max_speed_rad_per_s =
         std::min(joint.max_speed > 0.0 ? joint.max_speed : usual, joint.slides ? fastest_m_per_s : fastest_rad_per_s);
-    drive.max_acceleration_rad_per_s2 = 15.0 * drive.max_speed_rad_per_s;
-    const double needed = 1.5 * load.most_gravity +
-                          0.7 * (load.most_inertia + rotor) * drive.max_acceleration_rad_per_s2 +
-                          hand_N * load.most_lever;
-    const bool said = joint.max_effort > 1.3 * load.most_gravity && joint.max_effort < 20.0 * needed;
-    drive.max_torque_Nm = rounded(said ? joint.max_effort : needed);
+    choose_torque(joint, load, rotor, drive, remarks);
+    const double left_Nm = torque_share * drive.max_torque_Nm - weight_margin * load.most_gravity;
+    if (left_Nm < bears_N * load.most_lever) {
+      bears_N = left_Nm / load.most_lever;
+      weakest = joint.name;
+    }
     require_possible(arm, drive, urdf);
     drive.rotor_inertia_kg_m2 = rounded(rotor);
     drive.gear_stiffness_Nm_per_rad = rounded(stiffness);
@@ -104,6 +140,16 @@ void size_drives(description::Cell& cell, const std::vector<ChainJoint>& joints,
     drive.simulation.coulomb_friction_Nm = rounded(0.01 * drive.max_torque_Nm);
     drive.simulation.viscous_friction_Nms_per_rad = rounded(0.008 * drive.max_torque_Nm);
   }
+  cell.limits.max_force_N = std::max(least_force_N, rounded_down(bears_N));
+  if (bears_N < least_force_N) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "in its worst pose joint %.60s bears %.2g N at the tool: a stronger hand overpowers its drive there "
+                  "(drive_deviates)",
+                  weakest.c_str(), bears_N);
+    remarks.emplace_back(text);
+  }
+  return remarks;
 }
 
 }  // namespace proxarm::command_line

@@ -90,7 +90,9 @@ class NewCell {
   void make_cell() {
     aim_sensor();
     save();
-    size_drives(cell_, source_.joints, options_.arm);
+    for (std::string& remark : size_drives(cell_, source_.joints, options_.arm)) {
+      source_.remarks.push_back(std::move(remark));
+    }
     choose();
   }
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/SVD>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -289,6 +291,92 @@ TEST(PlaceMargin, SeesAnElbowThatStretchesAndAWristAboveTheBase) {
   JointVector wrist = arm.start_rad();
   wrist[4] = 0.0;
   EXPECT_FALSE(margin_at(wrist).near());
+}
+
+// The last three axes of the cobot don't meet in a point, so that its wrist's joints move the tool while they hold its
+// orientation. J_w is then what the whole arm does: the tool's way is measured by its kinematics alone, with the
+// wrist's joints where a damped inverse has them turn it back.
+TEST(PlaceMargin, KnowsHowAToolMovesThatIsHeldByAWristWhoseAxesDontMeet) {
+  const description::Cell cell = tests::shipped_cell("cobot");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  const PlaceMargin margin(arm, inverse.space());
+  Random random(71);
+  models::ToolKinematics from, to;
+  for (std::int64_t k = 0; k < scaled(400, 100); ++k) {
+    JointVector q(6), u = JointVector::Zero(6);
+    for (Eigen::Index i = 0; i < 6; ++i) q[i] = random.uniform(arm.lower_rad()[i], arm.upper_rad()[i]);
+    for (Eigen::Index i = 0; i < 3; ++i) u[i] = random.uniform(-1.0, 1.0);
+    arm.kinematics(q, from);
+    const models::Mat3 turns = from.J_W.block<3, 3>(3, 3);
+    const models::Mat3 damped = turns * turns.transpose() + 0.3 * 0.3 * models::Mat3::Identity();
+    u.tail<3>() = -turns.transpose() * damped.ldlt().solve(from.J_W.block<3, 3>(3, 0) * u.head<3>());
+    constexpr double nudge = 1e-6;
+    arm.kinematics(q + nudge * u, to);
+    const PlaceMargin::Wrist wrist = margin.wrist(from);
+    const auto point_W = [&](const models::ToolKinematics& at) {
+      return Vec3(at.X_WT.translation() + at.X_WT.linear() * from.X_WT.linear().transpose() * wrist.from_T_W);
+    };
+    // Second differences of an arm of 1 m, with joints at up to 4 rad/s: 1e-5 m.
+    EXPECT_LT((wrist.J_W * u - (point_W(to) - point_W(from)) / nudge).norm(), 2e-5) << k;
+  }
+}
+
+// Its margin is near where the wrist comes above the base, and the gradient, in which the wrist's joints have a share,
+// is that of finite differences.
+TEST(PlaceMargin, SeesTheSingularitiesOfAWristWhoseAxesDontMeet) {
+  const description::Cell cell = tests::shipped_cell("cobot");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  models::ToolKinematics at;
+  const auto margin_at = [&](const JointVector& c) {
+    PlaceMargin margin(arm, inverse.space());
+    arm.kinematics(c, at);
+    margin.go_to(c, at);
+    return margin;
+  };
+  Random random(72);
+  int near = 0, by_the_wrist = 0;
+  for (std::int64_t k = 0; k < scaled(2000, 500) && near < 40; ++k) {
+    JointVector q(6);
+    for (Eigen::Index i = 0; i < 6; ++i) q[i] = random.uniform(arm.lower_rad()[i], arm.upper_rad()[i]);
+    const PlaceMargin margin = margin_at(q);
+    // Where two singular values meet, there is no gradient: they are well below those of the rest.
+    if (!margin.near() || margin.value() > 0.05 || std::abs(std::sin(q[4])) < 0.3) continue;
+    ++near;
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      JointVector more = q, less = q;
+      more[i] += 1e-5;
+      less[i] -= 1e-5;
+      const double slope = (margin_at(more).value() - margin_at(less).value()) / 2e-5;
+      EXPECT_NEAR(margin.gradient()[i], slope, 1e-3) << k << " " << i;
+      if (i > 2 && std::abs(slope) > 0.02) ++by_the_wrist;
+    }
+  }
+  EXPECT_GT(near, 5);
+  EXPECT_GT(by_the_wrist, 0);
+}
+
+// Where nothing is near, a determinant says so; it never says so where σ is below the border of what is near.
+TEST(PlaceMargin, IsNeverCalledClearWhereItIsNear) {
+  const description::Cell cell = tests::shipped_cell("cobot");
+  const models::Arm arm(cell);
+  const models::InverseKinematics inverse(arm);
+  PlaceMargin margin(arm, inverse.space());
+  Random random(73);
+  models::ToolKinematics at;
+  int clear = 0, poses = 0;
+  for (std::int64_t k = 0; k < scaled(4000, 1000); ++k) {
+    JointVector q(6);
+    for (Eigen::Index i = 0; i < 6; ++i) q[i] = random.uniform(arm.lower_rad()[i], arm.upper_rad()[i]);
+    arm.kinematics(q, at);
+    margin.go_to(q, at);
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(Eigen::MatrixXd(margin.wrist(at).J_W));
+    EXPECT_EQ(margin.near(), svd.singularValues()[2] < 3.0 * margin.least()) << k;
+    clear += margin.near() ? 0 : 1;
+    ++poses;
+  }
+  EXPECT_GT(clear, poses / 4);
 }
 
 }  // namespace
