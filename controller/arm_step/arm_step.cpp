@@ -473,14 +473,18 @@ bool ArmStep::leave_curved_sets(const Model& model, const JointVector& u) noexce
 }
 
 // Half-spaces come near to a curved set in ever smaller steps. What is left is taken back towards braking, which leaves
-// no set that can be kept.
+// no set that can be kept. One that braking leaves, too, holds a step back only if that leaves it further.
 JointVector ArmStep::taken_back(const Model& model, const JointVector& u) const noexcept {
+  const double turned = std::max(set_tolerance, turned_beyond(model, brakes_).norm());
+  const bool keeps_points = !points_too_fast(brakes_, nullptr);
+  const auto leaves = [&](const JointVector& tried) {
+    return turned_beyond(model, tried).norm() > turned || (keeps_points && points_too_fast(tried, nullptr));
+  };
+  if (!leaves(u)) return u;
   double kept = 0.0, left = 1.0;
   for (int i = 0; i < bisections; ++i) {
     const double share = 0.5 * (kept + left);
-    const JointVector tried = brakes_ + share * (u - brakes_);
-    const bool leaves = turned_beyond(model, tried).norm() > set_tolerance || points_too_fast(tried, nullptr);
-    (leaves ? left : kept) = share;
+    (leaves(brakes_ + share * (u - brakes_)) ? left : kept) = share;
   }
   return brakes_ + kept * (u - brakes_);
 }
