@@ -164,7 +164,6 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
   controller::CycleParts parts =
       controller::build_parts(session.cell, session.sensor, scene, session.settings, tap, indices,
                               controller::opener_of(fieldbus::ModbusPeers::any));  // consent was given above
-  set_filters(network, parts);
   SessionOutput output(session, options, false);
   std::unique_ptr<controller::ReplayRecorder> replay;
   std::unique_ptr<RecordedMessages> messages;
@@ -173,7 +172,7 @@ int run_on_interfaces(const PreparedSession& session, const RunOptions& options,
     messages = std::make_unique<RecordedMessages>(options.record_dir, session);
   }
   keeper.set_head(replay_head(session, names_in(tap), indices));
-  bring_up_devices(parts);
+  bring_up_devices(network, parts);
   report_modbus_rates(session, parts);
 
   Cycle cycle(std::move(parts), session.settings, session.cell.limits, record_capacity);
