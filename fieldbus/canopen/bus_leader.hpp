@@ -1,9 +1,10 @@
 // Listen, then speak: whether somebody leads a bus already. Every command that sends on a bus asks this first.
 //
-// A leader shows by what only a leader sends: SYNC (080), NMT commands (000), the heartbeat of the controller's own node,
-// setpoints (RPDO 1 to 4: 200, 300, 400, 500 + node) and SDO requests (600 + node) for the nodes that are to be led. The
-// last ones are all that shows of a controller that is still at its set-up. What drives and sensors say by themselves is
-// no sign. Two that begin in the same moment both hear nothing: the first cycles tell (Fault::second_master).
+// A leader shows by what only a leader sends: SYNC (080), NMT commands (000), the heartbeat of the controller's own
+// node, setpoints (RPDO 1 to 4: 200, 300, 400, 500 + node) and SDO requests (600 + node) for the nodes that are to be
+// led. The last ones are all that shows of a controller that is still at its set-up. What drives and sensors say by
+// themselves is no sign. Two that begin in the same moment both hear nothing: the first cycles tell
+// (Fault::second_master).
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,7 @@
 #include "controller/command_line/sessions/interface_network.hpp"
 
 #include <algorithm>
+#include <cstdio>
 
 #include "fieldbus/canopen/bus_leader.hpp"
 #include "models/base/setup_error.hpp"
@@ -66,7 +67,9 @@ void bring_up_devices(fieldbus::SocketCanNetwork& network, controller::CyclePart
     pass_only(network, bus, ids);
   }
   try {
-    controller::bring_up(parts);
+    controller::bring_up(
+        parts, [](fieldbus::ModbusLine& line) { line.start(); },
+        [](const std::string& line) { std::fprintf(stderr, "proxarm: %s\n", line.c_str()); });
   } catch (const description::SetupError& error) {
     if (error.found().find("no answer") == std::string::npos) throw;
     description::SetupProblem problem = error.problem();
