@@ -57,6 +57,23 @@ fieldbus::SocketCanNetwork open_network(const std::vector<std::string>& interfac
   }
 }
 
+void require_word_order(const controller::CycleParts& parts) {
+  for (const auto& line : parts.modbus_lines) {
+    for (const fieldbus::ModbusDrive* drive : line->drives()) {
+      if (drive->word_order_shown() || drive->description().word_order_tried) continue;
+      throw description::SetupError(
+          {.bus = drive->description().bus,
+           .node = drive->description().node,
+           .message = "drive of " + drive->description().joint + ": word_order",
+           .found = "a first position, " + std::to_string(drive->actual_counts()) +
+                    " counts, that reads as well in the other order of its words",
+           .expected = "one that shows the order: sent the wrong way round, small setpoints are billions of counts",
+           .advice = "move the axis off this place by the drive's own tool; or, once its order was tried, "
+                     "`word_order_tried: true` at the drive in the cell"});
+    }
+  }
+}
+
 void bring_up_devices(fieldbus::SocketCanNetwork& network, controller::CycleParts& parts,
                       const std::function<std::vector<std::uint32_t>(std::size_t bus)>& more) {
   listen_before_speaking(network, parts.can_drives);
@@ -70,6 +87,7 @@ void bring_up_devices(fieldbus::SocketCanNetwork& network, controller::CyclePart
     controller::bring_up(
         parts, [](fieldbus::ModbusLine& line) { line.start(); },
         [](const std::string& line) { std::fprintf(stderr, "proxarm: %s\n", line.c_str()); });
+    require_word_order(parts);
   } catch (const description::SetupError& error) {
     if (error.found().find("no answer") == std::string::npos) throw;
     description::SetupProblem problem = error.problem();

@@ -27,6 +27,10 @@ fieldbus::SocketCanNetwork open_network(const std::vector<std::string>& interfac
 // somebody leads one (bus_leader.hpp). The buses' filters are those for listening afterwards.
 void listen_before_speaking(fieldbus::SocketCanNetwork& network, std::span<const fieldbus::DriveSlot> drives);
 
+// Throws SetupError where nothing shows that a Modbus drive's words come in the file's order (ModbusDrive), and the
+// cell doesn't say that somebody has tried it.
+void require_word_order(const controller::CycleParts& parts);
+
 // Listens, lets through only what the parts want, and brings them up. With another advice: whoever has no answer on a
 // virtual interface has most likely no simulated arm there. `more`: identifiers that are wanted besides, by bus.
 void bring_up_devices(

@@ -49,7 +49,8 @@ std::vector<std::string> names_in(fieldbus::CanNetwork& network) {
 
 // Bitrates by bus of the network: the slowest of the cell's buses that share an interface.
 std::vector<fieldbus::BitRates> bit_rates(const description::Cell& cell, const controller::BusIndices& indices) {
-  std::vector<fieldbus::BitRates> rates(*std::max_element(indices.begin(), indices.end()) + 1, {0, 0});
+  const std::size_t buses = indices.empty() ? 0 : *std::max_element(indices.begin(), indices.end()) + 1;
+  std::vector<fieldbus::BitRates> rates(buses, {0, 0});
   for (std::size_t i = 0; i < indices.size(); ++i) {
     fieldbus::BitRates& shared = rates[indices[i]];
     if (shared.nominal == 0 || cell.buses[i].bitrate < shared.nominal) {
